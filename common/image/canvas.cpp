@@ -1,12 +1,11 @@
 #include "common/image/canvas.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "common/image/glyphs.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::image {
 
@@ -65,7 +64,7 @@ View shrink(const View& picture, int width, int height) {
   CHECK(width >= 1 && height >= 1 && width <= picture.width && height <= picture.height);
   View out{width, height, std::vector<uint32_t>(size_t(width) * height), {}};
   const double step_x = double(picture.width) / width, step_y = double(picture.height) / height;
-  tbb::parallel_for(0, height, [&](int y) {
+  in_parallel(0, height, [&](int y) {
     const double top = y * step_y, bottom = (y + 1) * step_y;
     for (int x = 0; x < width; ++x) {
       const double left = x * step_x, right = (x + 1) * step_x;

@@ -22,13 +22,13 @@
 #include "common/core/utf8.h"
 #include "common/net/connections/broken.h"
 #include "common/net/connections/connections.h"
-#include "common/net/connections/handed_over.h"
 #include "common/net/connections/lookout.h"
 #include "common/net/connections/queued_bytes.h"
 #include "common/net/connections/tunnel.h"
 #include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
+#include "common/parallel/handed_over.h"
 
 namespace telesplat::net {
 namespace {

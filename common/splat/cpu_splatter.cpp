@@ -2,9 +2,7 @@
 
 #include <hwy/aligned_allocator.h>
 #include <hwy/cache_control.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +13,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/parallel/in_parallel.h"
 #include "common/splat/item_figures.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/tile_work.h"
@@ -170,7 +169,7 @@ void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera
   const auto room_to_pixel = camera.room_to_pixel();
   const glm::vec3 eye(camera.pose.position_room);
   arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
+    in_parallel(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
       for (size_t i = r.begin(); i < r.end(); ++i) {
         // Clusters lie scattered in memory.
         if (i + kBoxesAhead < r.end()) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
@@ -291,10 +290,10 @@ SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geome
   }
   const int count = grid.count();
   arena.execute([&] {
-    tbb::parallel_for(
+    in_parallel(
         tbb::blocked_range<int>(0, count * static_cast<int>(cameras.size()), 1),
         [&](const tbb::blocked_range<int>& tiles) {
-          Workspace& workspace = workspaces[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
+          Workspace& workspace = workspaces[static_cast<size_t>(thread_in_loop())];
           for (int i = tiles.begin(); i < tiles.end(); ++i) {
             const auto view = static_cast<size_t>(i / count);
             draw_tile(i % count, list, sights[view], targets[view], workspace);

@@ -1,8 +1,6 @@
 #include "common/splat/reference_depth.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
@@ -11,6 +9,7 @@
 #include <limits>
 
 #include "common/core/check.h"
+#include "common/parallel/in_parallel.h"
 #include "common/splat/facing.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/reference/tangent_planes.h"
@@ -152,7 +151,7 @@ void render_reference_depth(const points::PointModel& model, const geometry::Cam
                   bits.data() + static_cast<size_t>(y) * rect.width, static_cast<size_t>(rect.width) * 4);
   };
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  arena.execute([&] { tbb::parallel_for(0, points.grid.count(), draw); });
+  arena.execute([&] { in_parallel(0, points.grid.count(), draw); });
 }
 
 void add_to_reference_depth(const points::PreparedPatch& patch, const points::ModelConfig& model,

@@ -1,14 +1,12 @@
 #include "common/stereo/compose.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <functional>
 #include <limits>
 #include <utility>
 
 #include "common/core/check.h"
+#include "common/parallel/in_parallel.h"
 #include "common/stereo/anaglyph.h"
 
 namespace telesplat::stereo {
@@ -17,7 +15,7 @@ namespace {
 constexpr int kRowsAtOnce = 32;
 
 void for_rows(int rows, const std::function<void(int)>& draw) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, rows, kRowsAtOnce), [&](const tbb::blocked_range<int>& r) {
+  in_parallel(tbb::blocked_range<int>(0, rows, kRowsAtOnce), [&](const tbb::blocked_range<int>& r) {
     for (int y = r.begin(); y < r.end(); ++y) draw(y);
   });
 }

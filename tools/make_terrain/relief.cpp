@@ -1,10 +1,9 @@
 #include "tools/make_terrain/relief.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "common/parallel/in_parallel.h"
 #include "tools/make_terrain/noise.h"
 
 namespace telesplat::terrain {
@@ -82,7 +81,7 @@ double HeightMap::sample(double x_m, double y_m) const {
 HeightMap make_relief(uint64_t seed, const std::function<void(double)>& progress) {
   HeightMap map{kSide, std::vector<float>(static_cast<size_t>(kSide) * kSide)};
   std::vector<uint8_t> lake(map.height_m.size());
-  tbb::parallel_for(0, kSide, [&](int y) {
+  in_parallel(0, kSide, [&](int y) {
     for (int x = 0; x < kSide; ++x) {
       const double x_m = x * map.cell_m(), y_m = y * map.cell_m();
       map.at(x, y) = static_cast<float>(initial_height(x_m, y_m, seed));

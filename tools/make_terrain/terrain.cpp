@@ -1,11 +1,10 @@
 #include "tools/make_terrain/terrain.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "common/parallel/in_parallel.h"
 #include "tools/make_terrain/noise.h"
 #include "tools/make_terrain/relief.h"
 
@@ -105,7 +104,7 @@ class Land {
 void add_triangles(const Grid& grid, std::vector<uint32_t>& indices) {
   const uint64_t triangles = grid.rows * 2 * grid.columns + grid.rest, stride = grid.columns + 1;
   indices.resize(3 * triangles);
-  tbb::parallel_for(uint64_t{0}, triangles, [&](uint64_t t) {
+  in_parallel(uint64_t{0}, triangles, [&](uint64_t t) {
     const uint64_t cell = t / 2, a = cell / grid.columns * stride + cell % grid.columns;
     const uint64_t corner[2][3] = {{a, a + 1, a + stride}, {a + 1, a + stride + 1, a + stride}};
     for (int k = 0; k < 3; ++k) indices[3 * t + k] = static_cast<uint32_t>(corner[t % 2][k]);
@@ -134,7 +133,7 @@ Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void
     const uint64_t batch = std::max<uint64_t>(rows / 50, 16);
     for (uint64_t first = 0; first < rows; first += batch) {
       progress(from + (to - from) * static_cast<double>(first) / static_cast<double>(rows));
-      tbb::parallel_for(first, std::min(first + batch, rows), [&](uint64_t row) {
+      in_parallel(first, std::min(first + batch, rows), [&](uint64_t row) {
         for (uint64_t v = row * stride; v < std::min((row + 1) * stride, vertices); ++v)
           body(v, static_cast<double>(v % stride) * step, static_cast<double>(row) * step);
       });

@@ -1,13 +1,13 @@
 #include "tools/make_volume/tree.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <random>
+
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::made_volume {
 namespace {
@@ -179,7 +179,7 @@ Scan make_tree(int side, uint64_t seed, const std::function<void(double)>& progr
   constexpr int kSlices = 8;  // at a time
   const int parts = (side + kSlices - 1) / kSlices;
   std::atomic<int> done = 0;
-  tbb::parallel_for(0, parts, [&](int part) {
+  in_parallel(0, parts, [&](int part) {
     Slices slices(scan, part * kSlices, std::min(side, (part + 1) * kSlices));
     const float lo = float(part * kSlices) / float(side), hi = float((part + 1) * kSlices) / float(side),
                 margin = 2.0f / float(side);

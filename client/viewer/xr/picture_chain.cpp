@@ -1,10 +1,10 @@
 #include "client/viewer/xr/picture_chain.h"
 
 #include <epoxy/gl.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <utility>
+
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -71,7 +71,7 @@ Status PictureChain::put_with(Upload upload) {
 template <class T, class Row>
 void PictureChain::turn(std::vector<T>& turned, Row row) {
   turned.resize(size_t(width_) * size_t(height_));
-  tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
+  in_parallel(tbb::blocked_range<int>(0, height_, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y)
       row(size_t(y), turned.data() + size_t(height_ - 1 - y) * size_t(width_));
   });

@@ -1,14 +1,12 @@
 #include "common/image/measures/flip.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "common/image/srgb.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::image {
 namespace {
@@ -148,7 +146,7 @@ FeatureFilters feature_filters(double pixels_per_degree) {
 }
 
 void for_rows(int height, const auto& body) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, height, 8), [&](const tbb::blocked_range<int>& range) {
+  in_parallel(tbb::blocked_range<int>(0, height, 8), [&](const tbb::blocked_range<int>& range) {
     for (int y = range.begin(); y < range.end(); ++y) body(y);
   });
 }

@@ -1,14 +1,12 @@
 #include "common/image/measures/quality.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
+
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::image {
 namespace {
@@ -125,7 +123,7 @@ Quality compare_counted(const View& reference, const uint16_t* hits, const View&
   for (const View* v : {&reference, &reconstruction}) CHECK(v->colour.size() == pixels && v->depth_m.size() == pixels);
 
   std::vector<float> x(pixels), y(pixels);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, pixels, 65536), [&](const tbb::blocked_range<size_t>& range) {
+  in_parallel(tbb::blocked_range<size_t>(0, pixels, 65536), [&](const tbb::blocked_range<size_t>& range) {
     for (size_t i = range.begin(); i < range.end(); ++i)
       x[i] = luma(reference.colour[i]), y[i] = luma(reconstruction.colour[i]);
   });
@@ -157,8 +155,8 @@ Quality compare_counted(const View& reference, const uint16_t* hits, const View&
     return sums;
   };
   // Deterministic: the same views give the same figures for any number of threads.
-  const Sums sums = tbb::parallel_deterministic_reduce(tbb::blocked_range<int>(0, height, 32), Sums{}, rows,
-                                                       [](const Sums& a, const Sums& b) { return a + b; });
+  const Sums sums = sum_in_parallel(tbb::blocked_range<int>(0, height, 32), Sums{}, rows,
+                                    [](const Sums& a, const Sums& b) { return a + b; });
 
   Quality q;
   q.object_pixels = sums.object;

@@ -1,12 +1,12 @@
 #include "common/image/measures/reference.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::image {
 namespace {
@@ -37,7 +37,7 @@ void gather(const View& fine, int fine_x, int fine_y, int side, size_t at, Refer
 }
 
 void gather_piece(const View& fine, const geometry::Rect& piece, int side, Reference& out) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, piece.height, 16), [&](const tbb::blocked_range<int>& rows) {
+  in_parallel(tbb::blocked_range<int>(0, piece.height, 16), [&](const tbb::blocked_range<int>& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y)
       for (int x = 0; x < piece.width; ++x)
         gather(fine, x * side, y * side, side, size_t(piece.y + y) * out.view.width + (piece.x + x), out);

@@ -1,8 +1,5 @@
 #include "common/image/measures/temporal.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -11,6 +8,7 @@
 #include <vector>
 
 #include "common/image/measures/quality.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::image {
 namespace {
@@ -92,7 +90,7 @@ Unsteadiness unsteadiness(const VerifiedFrame& before, const VerifiedFrame& afte
   const int columns = (before.displayed.width + kBlock - 1) / kBlock;
   const int rows = (before.displayed.height + kBlock - 1) / kBlock;
   std::vector<Block> blocks(size_t(columns) * rows);
-  tbb::parallel_for(tbb::blocked_range<int>(0, rows, 4), [&](const tbb::blocked_range<int>& range) {
+  in_parallel(tbb::blocked_range<int>(0, rows, 4), [&](const tbb::blocked_range<int>& range) {
     for (int row = range.begin(); row < range.end(); ++row)
       for (int column = 0; column < columns; ++column)
         blocks[size_t(row) * columns + column] = block_at(before, after, column * kBlock, row * kBlock);

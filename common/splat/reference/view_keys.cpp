@@ -1,9 +1,7 @@
 #include "common/splat/reference/view_keys.h"
 
 #include <hwy/aligned_allocator.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
@@ -11,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "common/parallel/in_parallel.h"
 #include "common/splat/facing.h"
 #include "common/splat/item_figures.h"
 #include "common/splat/item_runs.h"
@@ -130,7 +129,7 @@ void ViewKeys::Impl::bin(const geometry::Camera& camera) {
   const auto room_to_pixel = camera.room_to_pixel();
   const glm::vec3 eye(camera.pose.position_room);
   arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
+    in_parallel(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
       for (size_t i = r.begin(); i < r.end(); ++i) {
         runs.transform(i, items, room_to_pixel, eye);
         binning.place(i, runs.transforms[i]);
@@ -179,10 +178,10 @@ uint64_t ViewKeys::points() const { return impl_->points; }
 void ViewKeys::draw(std::span<const int> tiles, const std::function<void(const Tile&)>& visit) {
   Impl& m = *impl_;
   m.arena.execute([&] {
-    tbb::parallel_for(
+    in_parallel(
         tbb::blocked_range<size_t>(0, tiles.size(), 1),
         [&](const tbb::blocked_range<size_t>& range) {
-          Workspace& workspace = m.workspaces[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
+          Workspace& workspace = m.workspaces[static_cast<size_t>(thread_in_loop())];
           for (size_t i = range.begin(); i < range.end(); ++i) m.draw_tile(tiles[i], workspace, visit);
         },
         tbb::simple_partitioner());

@@ -1,14 +1,12 @@
 #include "common/stereo/autostereo/interleaver.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 
 #include "common/core/check.h"
+#include "common/parallel/in_parallel.h"
 #include "common/stereo/autostereo/rows.h"
 
 namespace telesplat::stereo {
@@ -37,7 +35,7 @@ void Interleaver::find_lines(const Eyes& eyes) {
   for (size_t eye = 0; eye < 2; ++eye) {
     auto& lines = lines_[eye];
     lines.resize(size_t(columns) * size_t(rows));
-    tbb::parallel_for(0, rows, [&](int row) {
+    in_parallel(0, rows, [&](int row) {
       for (int column = 0; column < columns; ++column)
         lines[size_t(row) * size_t(columns) + size_t(column)] =
             line_at(panel_.lines, through(panel_.lines, eyes[eye], place_of(panel_, column * kCell, row * kCell, 0)));
@@ -119,7 +117,7 @@ void Interleaver::compose(const Eyes& eyes, const image::View& left, const image
   out.width = panel_.width, out.height = panel_.height;
   out.colour.resize(width * size_t(panel_.height));
   out.depth_m.clear();
-  tbb::parallel_for(tbb::blocked_range<int>(0, panel_.height, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
+  in_parallel(tbb::blocked_range<int>(0, panel_.height, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
     thread_local std::vector<uint32_t> buffer;
     const size_t room = width + kSpare;
     buffer.resize(4 * room);

@@ -1,11 +1,10 @@
 #include "common/stereo/autostereo/sight.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "common/core/check.h"
+#include "common/parallel/in_parallel.h"
 #include "common/stereo/autostereo/interleaver.h"
 
 namespace telesplat::stereo {
@@ -36,7 +35,7 @@ image::View seen_by(const Panel& panel, const glm::dvec3& eye, const image::View
   const auto shifts = shifts_of(panel.subpixels);
   const int reach = std::max(1, int(std::ceil(panel.lines.pitch_m / panel.pixel_m)));
   const auto width = size_t(panel.width);
-  tbb::parallel_for(0, panel.height, [&](int y) {
+  in_parallel(0, panel.height, [&](int y) {
     // Of each channel, sums from the row's beginning.
     std::vector<double> light(width + 1), visible(width + 1);
     const uint32_t* row = picture.colour.data() + size_t(y) * width;

@@ -1,8 +1,6 @@
 #include "common/volume/warp/warper.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/parallel/in_parallel.h"
 #include "common/volume/warp/plan.h"
 
 namespace telesplat::volume {
@@ -80,13 +79,12 @@ WarpStats Warper::render(const VolumeFrame* frame, const geometry::Camera& camer
     workspace.samples += warp_tile(tile);
   };
   impl_->arena.execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, plan.tiles_x() * plan.tiles_y(), 4), [&](const tbb::blocked_range<int>& r) {
-          const double begin = monotonic_s();
-          auto& workspace = impl_->workspaces[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
-          for (int i = r.begin(); i < r.end(); ++i) draw(i, workspace);
-          workspace.seconds += monotonic_s() - begin;
-        });
+    in_parallel(tbb::blocked_range<int>(0, plan.tiles_x() * plan.tiles_y(), 4), [&](const tbb::blocked_range<int>& r) {
+      const double begin = monotonic_s();
+      auto& workspace = impl_->workspaces[static_cast<size_t>(thread_in_loop())];
+      for (int i = r.begin(); i < r.end(); ++i) draw(i, workspace);
+      workspace.seconds += monotonic_s() - begin;
+    });
   });
   for (const auto& w : impl_->workspaces) {
     stats.warp_cpu_ms += w.seconds * 1e3;

@@ -1,13 +1,10 @@
 #include "services/data/mesh/chunker.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <bit>
 
 #include "common/geometry/mesh_chunk.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::data {
 namespace {
@@ -45,7 +42,7 @@ void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> 
   std::nth_element(items.begin(), items.begin() + middle, items.end(), [axis](const Item& a, const Item& b) {
     return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis] : a.triangle < b.triangle;
   });
-  tbb::parallel_invoke(
+  both_in_parallel(
       [&] { split(items.first(middle), first, left_parts, starts.first(left_parts)); },
       [&] { split(items.subspan(middle), first + middle, parts - left_parts, starts.subspan(left_parts)); });
 }
@@ -114,7 +111,7 @@ ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most) {
   const size_t triangles = mesh.indices.size() / 3;
   CHECK(triangles >= 1 && most >= 1);
   std::vector<Item> items(triangles);
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, triangles, 1 << 16), [&](const auto& range) {
+  in_parallel(tbb::blocked_range<size_t>(0, triangles, 1 << 16), [&](const auto& range) {
     for (size_t t = range.begin(); t < range.end(); ++t) items[t] = item_of(mesh, static_cast<uint32_t>(t));
   });
   ChunkPlan plan;

@@ -1,14 +1,13 @@
 #include "services/data/mesh/placement.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 
 #include "common/image/normal.h"
+#include "common/parallel/in_parallel.h"
 #include "services/data/base/placement_options.h"
 
 namespace telesplat::data {
@@ -18,7 +17,7 @@ constexpr size_t kGrain = 1 << 16;
 
 template <class Body>
 void parallel(size_t count, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kGrain), [&](const auto& range) {
+  in_parallel(tbb::blocked_range<size_t>(0, count, kGrain), [&](const auto& range) {
     for (size_t i = range.begin(); i < range.end(); ++i) body(i);
   });
 }

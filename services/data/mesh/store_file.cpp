@@ -1,13 +1,14 @@
 #include "services/data/mesh/store_file.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::data {
 namespace {
@@ -106,7 +107,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   constexpr size_t kBatch = 16;
   for (size_t first = 0; first < plan.chunks() && failure == 0; first += kBatch) {
     progress(kWritingTheStore, static_cast<double>(first) / static_cast<double>(plan.chunks()));
-    tbb::parallel_for(first, std::min(first + kBatch, plan.chunks()), [&](size_t i) {
+    in_parallel(first, std::min(first + kBatch, plan.chunks()), [&](size_t i) {
       const auto triangles = std::span(plan.order).subspan(plan.begin[i], plan.begin[i + 1] - plan.begin[i]);
       const std::vector<std::byte> bytes = make_chunk(mesh, triangles);
       StoreEntry& entry = entries[i];
@@ -171,7 +172,7 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
     out.offsets.push_back(e.offset);
   }
   std::atomic<size_t> damaged = entries.size();
-  tbb::parallel_for(size_t{0}, entries.size(), [&](size_t i) {
+  in_parallel(size_t{0}, entries.size(), [&](size_t i) {
     if (XXH3_64bits(bytes.data() + entries[i].offset, entries[i].bytes) != entries[i].checksum) damaged = i;
   });
   if (damaged != entries.size())

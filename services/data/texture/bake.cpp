@@ -1,7 +1,6 @@
 #include "services/data/texture/bake.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <bit>
@@ -11,6 +10,7 @@
 #include <unordered_map>
 
 #include "common/image/srgb.h"
+#include "common/parallel/in_parallel.h"
 #include "services/data/texture/edge_map.h"
 
 namespace telesplat::data {
@@ -160,7 +160,7 @@ class Baker {
   bool pass() {
     const size_t triangles = mesh_.indices.size() / 3;
     std::vector<uint8_t> wish(triangles, 0);
-    tbb::parallel_for(size_t{0}, triangles, [&](size_t t) {
+    in_parallel(size_t{0}, triangles, [&](size_t t) {
       if (!settled_[t]) wish[t] = wishes(t);
     });
     std::vector<std::pair<double, uint32_t>> wanted;
@@ -270,7 +270,7 @@ class Baker {
         for (const uint32_t v : {corner(t, k), corner(t, (k + 1) % 3)}) length[v] += texels, edges[v] += 1;
       }
     }
-    tbb::parallel_for(size_t{0}, mesh_.positions.size(), [&](size_t v) {
+    in_parallel(size_t{0}, mesh_.positions.size(), [&](size_t v) {
       if (use_.texture[v] == kNoTexture || edges[v] == 0) return;
       const Texture& texture = *use_.textures[use_.texture[v]];
       const float texels = length[v] / edges[v] / kShortestEdge;

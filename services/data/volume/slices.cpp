@@ -1,13 +1,12 @@
 #include "services/data/volume/slices.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <glm/matrix.hpp>
 #include <numeric>
 
 #include "common/core/check.h"
 #include "common/image/normal.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::data {
 namespace {
@@ -54,7 +53,7 @@ template <class Level>
 void VolumeSlices::count(const std::vector<Level>& levels) {
   const size_t slice = size_t(size_[0]) * size_t(size_[1]);
   counts_.resize(size_t(end_ - begin_) * size_t(level_count_));
-  tbb::parallel_for(begin_, end_, [&](int k) {
+  in_parallel(begin_, end_, [&](int k) {
     uint32_t* const mine = &counts_[size_t(k - begin_) * size_t(level_count_)];
     const Level* const first = &levels[size_t(k - stored_begin_) * slice];
     for (size_t n = 0; n < slice; ++n) ++mine[first[n]];
@@ -141,7 +140,7 @@ volume::Voxels VolumeSlices::voxels(int k_begin, int k_end, const volume::LevelS
 
   std::vector<uint8_t> table;
   for (int l = 0; l < level_count_; ++l) table.push_back(wanted.has(l));
-  tbb::parallel_for(k_begin, k_end, [&](int k) {
+  in_parallel(k_begin, k_end, [&](int k) {
     const size_t index = size_t(k - k_begin), row = index * rows_a_slice;
     if (first[index] == first[index + 1])
       std::fill_n(out.rows.begin() + ptrdiff_t(row) + 1, rows_a_slice, uint32_t(first[index]));

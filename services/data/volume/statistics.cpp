@@ -1,13 +1,13 @@
 #include "services/data/volume/statistics.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
 #include <tbb/combinable.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::data {
 namespace {
@@ -97,7 +97,7 @@ LevelArray to_levels(const Volume& v, const volume::Levels& levels, int k_begin,
   LevelArray out;
   const bool narrow = levels.count <= 256;
   narrow ? out.narrow.resize(size_t(k_end - k_begin) * slice) : out.wide.resize(size_t(k_end - k_begin) * slice);
-  tbb::parallel_for(k_begin, k_end, [&](int k) {
+  in_parallel(k_begin, k_end, [&](int k) {
     const size_t begin = size_t(k) * slice, end = begin + slice;
     if (narrow)
       each_level(v, levels, table, begin, end, [&](uint16_t l, size_t n) { out.narrow[n - first] = uint8_t(l); });
@@ -111,7 +111,7 @@ std::vector<uint64_t> count_levels(const Volume& v, const volume::Levels& levels
   const auto table = level_table(v, levels);
   const size_t slice = voxels_a_slice(v);
   tbb::combinable<std::vector<uint64_t>> counts([&] { return std::vector<uint64_t>(size_t(levels.count)); });
-  tbb::parallel_for(0, v.size[2], [&](int k) {
+  in_parallel(0, v.size[2], [&](int k) {
     auto& mine = counts.local();
     each_level(v, levels, table, size_t(k) * slice, size_t(k + 1) * slice, [&](uint16_t l, size_t) { ++mine[l]; });
   });

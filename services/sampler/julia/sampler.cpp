@@ -1,8 +1,5 @@
 #include "services/sampler/julia/sampler.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -10,6 +7,7 @@
 #include <vector>
 
 #include "common/image/normal.h"
+#include "common/parallel/in_parallel.h"
 #include "services/sampler/julia/palette.h"
 
 namespace telesplat::sampler {
@@ -94,7 +92,7 @@ void trace_rect(tbb::task_arena& arena, JuliaTrace trace, const JuliaScene& scen
       consume(rays, *points);
     }
   };
-  arena.execute([&] { tbb::parallel_for(tbb::blocked_range<size_t>(0, batches.begin.size() - 1), trace_range); });
+  arena.execute([&] { in_parallel(tbb::blocked_range<size_t>(0, batches.begin.size() - 1), trace_range); });
 }
 
 }  // namespace

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <embree3/rtcore.h>
-#include <tbb/blocked_range.h>
 #include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <limits>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "common/geometry/camera.h"
+#include "common/parallel/in_parallel.h"
 #include "services/sampler/mesh/hit_packet.h"
 #include "services/sampler/mesh/masked_pixels.h"
 #include "services/sampler/mesh/ray_scene.h"
@@ -111,23 +110,23 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
 
   // Tasks of up to 32 x 16 pixels: neighbours share the hierarchy's nodes in the cache.
   scene.arena().execute([&] {
-    tbb::parallel_for(tbb::blocked_range2d<int>(row0, row1, 8, column0, column1, 8),
-                      [&](const tbb::blocked_range2d<int>& part) {
-                        auto task = begin();
-                        RTCRayHit8 packet;
-                        rays.begin(packet);
-                        alignas(32) static constexpr int kAll[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
-                        RTCIntersectContext context;
-                        rtcInitIntersectContext(&context);
-                        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-                        for (int row = part.rows().begin(); row < part.rows().end(); ++row)
-                          for (int column = part.cols().begin(); column < part.cols().end(); ++column) {
-                            rays.aim(column * kPacketWidth, row * kPacketHeight, packet);
-                            rtcIntersect8(kAll, scene.scene(), &context, &packet);
-                            if (any_hit(packet)) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
-                          }
-                        end(task);
-                      });
+    in_parallel(tbb::blocked_range2d<int>(row0, row1, 8, column0, column1, 8),
+                [&](const tbb::blocked_range2d<int>& part) {
+                  auto task = begin();
+                  RTCRayHit8 packet;
+                  rays.begin(packet);
+                  alignas(32) static constexpr int kAll[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
+                  RTCIntersectContext context;
+                  rtcInitIntersectContext(&context);
+                  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+                  for (int row = part.rows().begin(); row < part.rows().end(); ++row)
+                    for (int column = part.cols().begin(); column < part.cols().end(); ++column) {
+                      rays.aim(column * kPacketWidth, row * kPacketHeight, packet);
+                      rtcIntersect8(kAll, scene.scene(), &context, &packet);
+                      if (any_hit(packet)) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
+                    }
+                  end(task);
+                });
   });
 }
 
@@ -168,7 +167,7 @@ void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometr
     end(task);
   };
   const size_t packets = (pixels.size() + kPacket - 1) / kPacket;
-  scene.arena().execute([&] { tbb::parallel_for(tbb::blocked_range<size_t>(0, packets, kTask / kPacket), trace); });
+  scene.arena().execute([&] { in_parallel(tbb::blocked_range<size_t>(0, packets, kTask / kPacket), trace); });
 }
 
 }  // namespace telesplat::sampler

@@ -1,11 +1,11 @@
 #include "services/sampler/mesh/ray_scene.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <optional>
 
 #include "common/core/log.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::sampler {
 
@@ -59,8 +59,8 @@ void RayScene::install(ChunkId id, Slot slot) {
 Status RayScene::add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) {
   std::vector<std::optional<Result<Slot>>> built(chunks.size());
   arena_.execute([&] {
-    tbb::parallel_for(size_t{0}, chunks.size(),
-                      [&](size_t i) { built[i].emplace(build(chunks[i].first, std::move(chunks[i].second))); });
+    in_parallel(size_t{0}, chunks.size(),
+                [&](size_t i) { built[i].emplace(build(chunks[i].first, std::move(chunks[i].second))); });
   });
   Refusals refusals(chunks.size());
   for (size_t i = 0; i < chunks.size(); ++i) {

@@ -1,7 +1,6 @@
 #include "services/sampler/volume/raycaster.h"
 
 #include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/parallel/in_parallel.h"
 #include "common/volume/lighting.h"
 #include "common/volume/warp/warper.h"
 
@@ -241,7 +241,7 @@ image::View VolumeRaycaster::draw(const geometry::Camera& camera, uint32_t backg
     out.depth_m[at] = float(solid / per_depth);
   };
   impl.arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range2d<int>(0, camera.height, 8, 0, camera.width, 64), [&](const auto& range) {
+    in_parallel(tbb::blocked_range2d<int>(0, camera.height, 8, 0, camera.width, 64), [&](const auto& range) {
       for (int y = range.rows().begin(); y < range.rows().end(); ++y)
         for (int x = range.cols().begin(); x < range.cols().end(); ++x) pixel(x, y);
     });

@@ -1,12 +1,12 @@
 #include "services/sampler/volume/work.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
+#include "common/parallel/in_parallel.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/session.h"
 
@@ -28,7 +28,7 @@ Result<volume::Session> read(const wire::Welcome& welcome, const std::string& cl
 // Each image by itself, then one after the other.
 std::vector<uint8_t> encode(const std::vector<volume::SliceImage>& images) {
   std::vector<std::vector<uint8_t>> parts(images.size());
-  tbb::parallel_for(size_t{0}, images.size(), [&](size_t i) { parts[i] = volume::encode_slice(images[i]); });
+  in_parallel(size_t{0}, images.size(), [&](size_t i) { parts[i] = volume::encode_slice(images[i]); });
   size_t size = 0;
   for (const auto& p : parts) size += p.size();
   std::vector<uint8_t> out;

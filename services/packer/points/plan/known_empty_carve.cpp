@@ -1,11 +1,11 @@
 // KnownEmpty::carve: down the octree, to cells only where what was seen and what was not meet.
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <cstring>
 #include <limits>
 
 #include "common/core/check.h"
+#include "common/parallel/in_parallel.h"
 #include "services/packer/points/plan/known_empty.h"
 #include "services/packer/points/plan/node_view.h"
 
@@ -40,7 +40,7 @@ class DepthRanges {
     const auto squares = [](int pixels, int side) { return (pixels + side - 1) / side; };
     Level level{squares(width_, kFirstSide), squares(height_, kFirstSide), {}};
     level.ranges.resize(static_cast<size_t>(level.width) * level.height);
-    tbb::parallel_for(0, level.height, [&](int y) { reduce_pixels(level, y); });
+    in_parallel(0, level.height, [&](int y) { reduce_pixels(level, y); });
     while (level.width > 1 || level.height > 1) {
       Level next{squares(level.width, 2), squares(level.height, 2), {}};
       next.ranges.resize(static_cast<size_t>(next.width) * next.height);
@@ -192,7 +192,7 @@ void KnownEmpty::carve(const geometry::Camera& camera, std::span<const float> cl
   arena.execute([&] {
     const DepthRanges clear(camera, clear_m);
     const EmptyCarver carver(*this, projection, clear);
-    tbb::parallel_for(uint32_t{0}, 1u << (3 * kTaskLevel), [&](uint32_t node) {
+    in_parallel(uint32_t{0}, 1u << (3 * kTaskLevel), [&](uint32_t node) {
       if (!(any_[kTaskLevel][node >> 3] >> (node & 7) & 1)) return;
       glm::vec3 corner = projection.root();
       for (int level = 1; level <= kTaskLevel; ++level)

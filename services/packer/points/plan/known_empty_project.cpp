@@ -1,12 +1,12 @@
 // KnownEmpty::project: tile by tile, down the octree, only where pixels are left that a node could still set.
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <array>
 #include <limits>
 #include <vector>
 
 #include "common/core/check.h"
+#include "common/parallel/in_parallel.h"
 #include "services/packer/points/plan/known_empty.h"
 #include "services/packer/points/plan/node_view.h"
 
@@ -237,7 +237,7 @@ void KnownEmpty::project(const geometry::Camera& camera, std::span<const float> 
   const int columns = (camera.width + kTile - 1) / kTile, rows = (camera.height + kTile - 1) / kTile;
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    tbb::parallel_for(0, columns * rows, [&](int tile) {
+    in_parallel(0, columns * rows, [&](int tile) {
       const int x = tile % columns * kTile, y = tile / columns * kTile;
       const geometry::Rect rect{x, y, std::min(kTile, camera.width - x), std::min(kTile, camera.height - y)};
       TileDepths depths(camera, shown_m, rect);

@@ -1,13 +1,13 @@
 #include "services/packer/points/plan/ray_tiles.h"
 
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
 #include "common/codec/mask_stream.h"
+#include "common/parallel/in_parallel.h"
 
 namespace telesplat::packer {
 namespace {
@@ -146,7 +146,7 @@ size_t add_tiles(const std::vector<RayTile>& tiles, int threads, wire::Plan& pla
   std::vector<std::vector<uint32_t>> masks(tiles.size());
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   arena.execute([&] {
-    tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
+    in_parallel(size_t{0}, tiles.size(), [&](size_t i) {
       const RayTile& t = tiles[i];
       if (t.rays < static_cast<uint64_t>(t.rect.width) * static_cast<uint64_t>(t.rect.height))
         masks[i] = codec::encode_mask(t.mask);

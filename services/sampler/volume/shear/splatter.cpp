@@ -1,7 +1,6 @@
 #include "services/sampler/volume/shear/splatter.h"
 
 #include <hwy/aligned_allocator.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/parallel/in_parallel.h"
 #include "common/volume/lighting.h"
 #include "services/sampler/volume/shear/hidden.h"
 #include "services/sampler/volume/shear/plan.h"
@@ -103,7 +103,7 @@ class Canvas {
     const int columns = column_end - column_begin, count = columns * (row_end - row_begin);
     std::vector<SplatOutcome> outcomes(size_t(std::max(count, 0)));
     arena.execute([&] {
-      tbb::parallel_for(0, count, [&](int n) {
+      in_parallel(0, count, [&](int n) {
         const SplatTile tile = tile_at(column_begin + n % columns, row_begin + n / columns, layer, image);
         splat_tile(scene, tile, outcomes[size_t(n)]);
       });

@@ -1,5 +1,5 @@
-// Tells ThreadSanitizer what it cannot see: that ZeroMQ, which is built without it, hands memory from thread to thread,
-// and orders what they do with it. Nothing without ThreadSanitizer.
+// Tells ThreadSanitizer what it cannot see: that ZeroMQ and TBB, which are built without it, hand memory from thread to
+// thread, and order what they do with it. Nothing without ThreadSanitizer.
 #pragma once
 
 #ifdef __has_feature
@@ -9,7 +9,7 @@
 #endif
 #endif
 
-namespace telesplat::net {
+namespace telesplat {
 
 /// What this thread did until now comes before what others do after was_handed_over(memory).
 inline void hand_over([[maybe_unused]] void* memory) {
@@ -23,4 +23,4 @@ inline void was_handed_over([[maybe_unused]] void* memory) {
 #endif
 }
 
-}  // namespace telesplat::net
+}  // namespace telesplat

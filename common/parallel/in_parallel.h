@@ -1,0 +1,100 @@
+// Loops whose turns run on several threads, those of TBB. All go through here, so that ThreadSanitizer can watch them:
+// it does not see how TBB's threads wait for each other, since Debian's library is built without it. Where it watches,
+// each loop has threads of its own.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
+#include <tbb/task_arena.h>
+
+#include <functional>
+#include <type_traits>
+#include <vector>
+
+#include "common/parallel/handed_over.h"
+
+namespace telesplat {
+
+#ifdef TELESPLAT_THREAD_SANITIZER
+namespace detail {
+/// turn(n) for each n below `count`, on as many threads as the arena has that the caller is in, four at most; on the
+/// caller's alone within such a loop. What a turn throws ends the loop and is thrown.
+void run_turns(size_t count, const std::function<void(size_t)>& turn);
+int thread_in_run();
+
+/// Parts of a range in their order, at most 2^halvings.
+template <class Range>
+std::vector<Range> parts_of(Range range, int halvings = 6) {
+  if (range.empty()) return {};
+  if (!range.is_divisible() || halvings == 0) return {range};
+  Range upper(range, tbb::split());
+  auto parts = parts_of(range, halvings - 1);
+  const auto more = parts_of(upper, halvings - 1);
+  parts.insert(parts.end(), more.begin(), more.end());
+  return parts;
+}
+}  // namespace detail
+#endif
+
+/// turn(part) for parts of a range (tbb::blocked_range), whose sizes a partitioner of TBB's chooses.
+template <class Range, class Turn, class... Partitioner>
+requires std::is_class_v<Range>
+void in_parallel(const Range& range, const Turn& turn, const Partitioner&... partitioner) {
+#ifdef TELESPLAT_THREAD_SANITIZER
+  const auto parts = detail::parts_of(range);
+  detail::run_turns(parts.size(), [&](size_t n) { turn(parts[n]); });
+  (void)sizeof...(partitioner);
+#else
+  tbb::parallel_for(range, turn, partitioner...);
+#endif
+}
+
+/// turn(i) for each i from `first` to `last`, the last one left out.
+template <class Index, class Turn>
+requires std::is_integral_v<Index>
+void in_parallel(Index first, Index last, const Turn& turn) {
+  in_parallel(tbb::blocked_range<Index>(first, last), [&](const tbb::blocked_range<Index>& part) {
+    for (Index i = part.begin(); i < part.end(); ++i) turn(i);
+  });
+}
+
+template <class A, class B>
+void both_in_parallel(const A& a, const B& b) {
+#ifdef TELESPLAT_THREAD_SANITIZER
+  detail::run_turns(2, [&](size_t n) { n == 0 ? a() : b(); });
+#else
+  tbb::parallel_invoke(a, b);
+#endif
+}
+
+/// Sums of turn(part, sum so far), from `none` on, joined in the same way for any number of threads.
+template <class Range, class Sum, class Turn, class Join>
+Sum sum_in_parallel(const Range& range, const Sum& none, const Turn& turn, const Join& join) {
+#ifdef TELESPLAT_THREAD_SANITIZER
+  const auto parts = detail::parts_of(range);
+  std::vector<Sum> sums(parts.size(), none);
+  detail::run_turns(parts.size(), [&](size_t n) { sums[n] = turn(parts[n], none); });
+  // As halves of halves, which is how ranges are divided.
+  const auto joined = [&](const auto& self, size_t begin, size_t end) -> Sum {
+    if (end - begin == 1) return sums[begin];
+    const size_t middle = begin + (end - begin) / 2;
+    return join(self(self, begin, middle), self(self, middle, end));
+  };
+  return sums.empty() ? none : joined(joined, 0, sums.size());
+#else
+  return tbb::parallel_deterministic_reduce(range, none, turn, join);
+#endif
+}
+
+/// Within a loop: which of the threads this is that run it at the same time, below the concurrency of the arena.
+inline int thread_in_loop() {
+#ifdef TELESPLAT_THREAD_SANITIZER
+  return detail::thread_in_run();
+#else
+  return tbb::this_task_arena::current_thread_index();
+#endif
+}
+
+}  // namespace telesplat
