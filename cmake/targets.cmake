@@ -107,7 +107,7 @@ function(telesplat_test label name)
     set(ARG_TIMEOUT 60)
   endif()
   if(TELESPLAT_SANITIZE)
-    math(EXPR ARG_TIMEOUT "8 * ${ARG_TIMEOUT}")  # sanitized programs are slow
+    math(EXPR ARG_TIMEOUT "4 * ${ARG_TIMEOUT}")  # sanitized programs are slow
   endif()
   if(ARG_SERIAL)
     set(serial RUN_SERIAL TRUE)

@@ -44,8 +44,6 @@ class Blocks(unittest.TestCase):
 
     def test_runs_are_short_and_small_unless_they_say_otherwise(self):
         self.assertEqual(run_blocks.shortened("telesplat run a"), "telesplat run a --duration 3 --size 320x240")
-        self.assertEqual(run_blocks.shortened("telesplat run a --verify 5", one_ray=True),
-                         "telesplat run a --verify 5 --verify-samples 1 --duration 3 --size 320x240")
         self.assertEqual(run_blocks.shortened("telesplat run a --duration=60 --size 9x9"),
                          "telesplat run a --duration 3 --size 9x9")
 

@@ -42,14 +42,11 @@ SERVICES = {
 }
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
-END_S = 120  # for what ran in the background and was told to end
 SECONDS, SIZE = 3, "320x240"  # of a run that does not say
 
 
-def shortened(text, seconds=SECONDS, one_ray=False):
-    """A `telesplat run` or `view`, made short and small; one_ray: views are verified with a ray a pixel, not 16."""
-    if one_ray and re.search(r"--verify[ =]", text):
-        text += " --verify-samples 1"
+def shortened(text, seconds=SECONDS):
+    """A `telesplat run` or `view`, made short and small."""
     if re.search(r"--duration[ =]", text):
         text = re.sub(r"--duration[ =]\S+", f"--duration {seconds}", text)
     else:
@@ -89,8 +86,7 @@ class Screen:
 class Page:
     """Runs the blocks of one page in `folder`."""
 
-    def __init__(self, root, programs, folder, display, slowness=1):
-        self._slowness = slowness
+    def __init__(self, root, programs, folder, display):
         self._folder, self._programs, self._display = folder, programs, display
         self._files = Files(programs, folder)
         self._background = []  # (text, process, output) of services, or of a session that ctl talks to
@@ -176,7 +172,7 @@ class Page:
             self._start_service(where, text, program)
         elif program == "telesplat" and verb in ("run", "view"):
             self._beside = text
-            self._foreground(where, shortened(text, one_ray=self._slowness > 1))
+            self._foreground(where, shortened(text))
         elif program == "telesplat" and verb == "sweep":
             self._foreground(where, shortened_sweep(text))
         elif program == "telesplat" and verb == "ctl":
@@ -187,7 +183,7 @@ class Page:
     def _control(self, where, text):
         if not self._background and self._beside:
             self._files.make_those_in(self._beside)
-            self._start(shortened(self._beside, 0, self._slowness > 1))
+            self._start(shortened(self._beside, 0))
             self._wait_for_session(where)
         self._foreground(where, text)
         if re.search(r"\bctl stop\b", text):
@@ -213,10 +209,9 @@ class Page:
         try:
             done = subprocess.run(
                 ["bash", "-c", text], cwd=self._folder, env=self._environment, stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE_S * self._slowness)
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE_S)
         except subprocess.TimeoutExpired as late:
-            return self._fail(f"{where}: not done after {PATIENCE_S * self._slowness:g} s: {text}",
-                              (late.stdout or b"").decode())
+            return self._fail(f"{where}: not done after {PATIENCE_S} s: {text}", (late.stdout or b"").decode())
         if done.returncode:
             return self._fail(f"{where}: exit code {done.returncode} after {time.monotonic() - begin:.1f} s: {text}",
                               done.stdout.decode(errors="replace"))
@@ -229,7 +224,7 @@ class Page:
 
     def _wait_for_session(self, where):
         ask = [os.path.join(self._programs, "telesplat"), "ctl", "status", "--json"]
-        for _ in range(int(120 * self._slowness)):
+        for _ in range(120):
             asked = subprocess.run(ask, env=self._environment, cwd=self._folder, stdout=subprocess.PIPE,
                                    stderr=subprocess.DEVNULL)
             status = json.loads(asked.stdout) if asked.returncode == 0 else {}
@@ -237,7 +232,7 @@ class Page:
             if viewers and all(p.get("values", {}).get("frames", 0) > 0 for p in viewers):
                 return
             time.sleep(0.5)
-        self._fail(f"{where}: no viewer of the session shows anything after {60 * self._slowness:g} s", "")
+        self._fail(f"{where}: no viewer of the session shows anything after a minute", "")
 
     def _stop_session(self):
         ask = [os.path.join(self._programs, "telesplat"), "ctl", "stop"]
@@ -252,9 +247,9 @@ class Page:
                     process.send_signal(signal_number)
         for text, process, output in self._background:
             try:
-                code = process.wait(timeout=END_S * self._slowness)
+                code = process.wait(timeout=120)
             except subprocess.TimeoutExpired:
-                code = f"none within {END_S * self._slowness:g} s"
+                code = "none within 120 s"
                 process.terminate()
                 try:
                     process.wait(timeout=10)
@@ -270,7 +265,7 @@ class Page:
 def run_page(options, path, display):
     """(commands that ran, those that failed)"""
     folder = tempfile.mkdtemp(prefix="telesplat-blocks-")
-    page = Page(os.path.abspath(options.root), os.path.abspath(options.bin), folder, display, options.slowness)
+    page = Page(os.path.abspath(options.root), os.path.abspath(options.bin), folder, display)
     print(path)
     try:
         with open(path, encoding="utf-8") as file:
@@ -289,8 +284,6 @@ def main():
     parser.add_argument("pages", nargs="+", help="Markdown files")
     parser.add_argument("--root", default=os.path.join(os.path.dirname(__file__), "../.."), help="of the source tree")
     parser.add_argument("--bin", required=True, help="folder of the programs")
-    parser.add_argument("--slowness", type=float, default=1, metavar="TIMES",
-                        help="have so many times the patience: sanitized programs are slow (default: 1)")
     parser.add_argument("--keep", action="store_true", help="keep what the commands leave")
     options = parser.parse_args()
     screen = Screen()

@@ -85,7 +85,7 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   const std::string out = run.out() + "/compare";
   {
     Program compare("telesplat", {"compare", run.out(), "--poses", "2", "--repeat", "2"}, run.folder() / "compare");
-    ASSERT_EQ(compare.wait(kSlow ? 360 : 120), 0) << compare.err();
+    ASSERT_EQ(compare.wait(120), 0) << compare.err();
     EXPECT_NE(compare.out().find("ellipse"), std::string::npos) << compare.out();
   }
   // A row for each pose, kernel and renderer; gl is there if the machine has it.

@@ -9,7 +9,6 @@
 
 #include "common/colour/colour_map.h"
 #include "common/image/legend.h"
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -67,10 +66,9 @@ TEST(LegendRun, PicturesOfAColouredMeshHaveItUnlessToldOtherwise) {
   const image::Legend expected{"height", 0, 40, *colour::find_colour_map("plasma"), {}};
   double quality[2] = {};
   for (const std::string legend : {"on", "off"}) {
-    PipelineRun run(
-        {"--colour-by", "height:0:40", "--colour-map", "plasma", "--duration", "1.5", "--verify",
-         ordinary_or_slow("20", "60"), "--size", "640x400", "--legend", legend, "--cache", folder / "cache"},
-        folder / "hill.ply");
+    PipelineRun run({"--colour-by", "height:0:40", "--colour-map", "plasma", "--duration", "1.5", "--verify", "20",
+                     "--size", "640x400", "--legend", legend, "--cache", folder / "cache"},
+                    folder / "hill.ply");
     ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
     const double share = matches(last_picture(run), expected);
     if (legend == "on")

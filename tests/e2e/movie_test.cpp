@@ -8,7 +8,6 @@
 #include <fstream>
 
 #include "common/image/file.h"
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/movie/movie_target.h"
 
@@ -108,7 +107,7 @@ TEST(Movie, OfATransparentRunHasPicturesWithItsAlpha) {
 }
 
 TEST(Movie, OfAWallIsThePictureOfAllItsTiles) {
-  PipelineRun run({"--wall", "2x1", "--size", "96x80", "--duration", ordinary_or_slow("2", "15")});
+  PipelineRun run({"--wall", "2x1", "--size", "96x80", "--duration", "2"});
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
   const Outcome made = movie(run, run.folder() / "wall/", {"--fps", "10"});
   ASSERT_EQ(made.code, 0) << made.err;
@@ -193,7 +192,7 @@ TEST(Movie, EndsWhereTheRecordWasCutShortAndSaysSo) {
   TemporaryFolder data;
   write_volume(data / "balls.mha", 64);
   for (const std::string& scene : {std::string(), data / "balls.mha"}) {
-    PipelineRun run({"--duration", ordinary_or_slow("3", "20"), "--size", "320x240"}, scene);
+    PipelineRun run({"--duration", "3", "--size", "320x240"}, scene);
     ASSERT_EQ(run.program().wait(), 0) << run.program().err();
     const std::string record = run.out() + (scene.empty() ? "/points.events" : "/slices.events");
     fs::resize_file(record, fs::file_size(record) / 2);

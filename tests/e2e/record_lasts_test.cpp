@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -41,12 +40,12 @@ TEST(FullDisk, ARunGoesOnSaysItOnceAndEndsWithOne) {
   std::unique_ptr<Program> run;
   {
     const SmallDisk disk(100'000);
-    run = std::make_unique<Program>(
-        "telesplat",
-        std::vector<std::string>{"run", folder / "terrain.ply", "--no-cache", "--size", "240x160", "--out",
-                                 folder / "out", "--sampler-threads", "1", "--duration", ordinary_or_slow("6", "40"),
-                                 "--record-every", "1", "--record-depth"},
-        folder / "run");
+    run =
+        std::make_unique<Program>("telesplat",
+                                  std::vector<std::string>{"run", folder / "terrain.ply", "--no-cache", "--size",
+                                                           "240x160", "--out", folder / "out", "--sampler-threads", "1",
+                                                           "--duration", "6", "--record-every", "1", "--record-depth"},
+                                  folder / "run");
   }
   EXPECT_EQ(run->wait(90), 1) << run->err();
   EXPECT_NE(run->err().find("not all of the record could be written"), std::string::npos) << run->err();

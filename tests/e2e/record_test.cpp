@@ -22,7 +22,7 @@ void expect_distribution(const nlohmann::json& d, const std::string& name) {
 
 TEST(Record, EveryFileIsThereAndTrue) {
   // Until what the head sees at rest is sampled.
-  const std::string duration = ordinary_or_slow("2", "42"), hold = ordinary_or_slow("1", "40");
+  const std::string duration = ordinary_or_slow("2", "12"), hold = ordinary_or_slow("1", "10");
   PipelineRun run({"--duration", duration, "--hold", hold, "--verify", "15", "--record-every", "60"});
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
@@ -198,8 +198,8 @@ TEST(Record, ARealMesh) {
                     mesh = data + "/meshes/alderson-bone-718k.ply";
   if (!fs::exists(mesh)) GTEST_SKIP() << mesh << " is not there; TELESPLAT_DATA names the folder of real data sets";
   // Long enough for a busy machine to sample what the head sees where it comes to rest.
-  PipelineRun run({"--duration", ordinary_or_slow("6", "65"), "--hold", ordinary_or_slow("5", "60"), "--verify",
-                   ordinary_or_slow("60", "400")},
+  PipelineRun run({"--duration", ordinary_or_slow("6", "26"), "--hold", ordinary_or_slow("5", "20"), "--verify",
+                   ordinary_or_slow("60", "120")},
                   mesh);
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   const auto s = run.summary();

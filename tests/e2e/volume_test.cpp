@@ -9,7 +9,6 @@
 #include <set>
 
 #include "common/image/file.h"
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/common/csv_table.h"
 
@@ -148,9 +147,9 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
 }
 
 TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
-  PipelineRun run(with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify",
-                        ordinary_or_slow("10", "40")}),
-                  volume());
+  PipelineRun run(
+      with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify", "10"}),
+      volume());
   ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
   std::string err;
   EXPECT_EQ(ctl(run, {"tf", "0:#000000:0,100:#ff0000:0,160:#ff0000:0.6"}), 0);
@@ -240,8 +239,7 @@ TEST_F(VolumeRun, ASceneFileAndRawData) {
 TEST_F(VolumeRun, TheSurfaceOfARawVolumeIsShownVerifiedAndCompared) {
   const std::string mha = read_text(volume());
   std::ofstream(folder_ / "balls.raw", std::ios::binary) << mha.substr(mha.size() - 40 * 40 * 40);
-  PipelineRun run({"--raw", "40x40x40:u8", "--iso", "100", "--duration", ordinary_or_slow("2", "42"), "--hold",
-                   ordinary_or_slow("1", "40"), "--verify", "20"},
+  PipelineRun run({"--raw", "40x40x40:u8", "--iso", "100", "--duration", "2", "--hold", "1", "--verify", "20"},
                   folder_ / "balls.raw");
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());

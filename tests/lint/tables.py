@@ -23,7 +23,7 @@ SHARED_TESTS = "tests/support"
 
 FLOORS = {
     "common": [
-        ["common/core"],
+        ["common/core", "common/parallel"],
         ["common/geometry", "common/colour", "common/links"],
         ["common/notes"],
         ["common/image", "common/gl", "common/wall", "common/tracking"],

@@ -8,7 +8,6 @@
 
 #include "common/image/file.h"
 #include "common/stereo/mode.h"
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -47,9 +46,8 @@ void write_panel(const std::string& path) {
 }
 
 TEST(Stereo, EyesAreVerifiedEachAndMadeAgain) {
-  PipelineRun run({"--stereo", "side-by-side", "--size", "480x200", "--duration", ordinary_or_slow("1.5", "12"),
-                   "--verify", ordinary_or_slow("10", "50"), "--record-every", "1", "--verify-samples", "1", "--fov",
-                   "60"});
+  PipelineRun run({"--stereo", "side-by-side", "--size", "480x200", "--duration", "1.5", "--verify", "10",
+                   "--record-every", "1", "--verify-samples", "1", "--fov", "60"});
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
   EXPECT_EQ(run.summary()["stereo"], "side-by-side");
   const auto eyes = run.summary()["quality"]["eyes"];

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "common/image/file.h"
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/common/csv_table.h"
 
@@ -81,15 +80,13 @@ void expect_in_step(const std::vector<Row>& rows, bool same_state = true) {
       apart += r.sequence != of_frame[0].sequence || r.epoch != of_frame[0].epoch;
     }
   }
-  EXPECT_GT(whole, by_frame.size() * (kSlow ? 5 : 8) / 10)
-      << "of " << by_frame.size() << " frames most are presented by all";
+  EXPECT_GT(whole, by_frame.size() * 8 / 10) << "of " << by_frame.size() << " frames most are presented by all";
   if (same_state) {
-    EXPECT_LT(apart, rows.size() / (kSlow ? 20 : 50)) << "of " << rows.size() << " rows";
+    EXPECT_LT(apart, rows.size() / 50) << "of " << rows.size() << " rows";
   }
 }
 
-const std::vector<std::string> kCommon{
-    "--duration", ordinary_or_slow("4", "24"), "--hold", ordinary_or_slow("2", "12"), "--target-fps", "20"};
+const std::vector<std::string> kCommon{"--duration", "4", "--hold", "2", "--target-fps", "20"};
 
 std::vector<std::string> with(std::vector<std::string> more) {
   more.insert(more.end(), kCommon.begin(), kCommon.end());

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/image/file.h"
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -19,8 +18,7 @@ namespace fs = std::filesystem;
 // `telesplat view --xr` of a terrain with the test runtime, told this.
 class XrRun {
  public:
-  explicit XrRun(const std::string& told,
-                 const std::vector<std::string>& arguments = {"--duration", ordinary_or_slow("3", "20")}) {
+  explicit XrRun(const std::string& told, const std::vector<std::string>& arguments = {"--duration", "3"}) {
     setenv("XR_RUNTIME_JSON", (std::string(TELESPLAT_BIN) + "/telesplat_xr_test.json").c_str(), 1);
     setenv("TELESPLAT_XR_TEST", ("rate=30;size=320x320;out=" + (folder_ / "xr") + ";" + told).c_str(), 1);
     std::vector<std::string> all{"--xr", "--xr-origin", "0,0,0"};
@@ -54,7 +52,7 @@ double covered(const image::View& picture) {
 }
 
 TEST(Xr, BothEyesSeeTheDataAndEveryCallIsRight) {
-  XrRun xr("every=15;exr=on;pressed=" + ordinary_or_slow("2-2.5", "2-15"));
+  XrRun xr("every=15;exr=on;pressed=2-2.5");
   ASSERT_EQ(xr.run().program().wait(), 0) << xr.said();
   const auto calls = xr.calls();
   ASSERT_TRUE(calls.is_object());
@@ -104,7 +102,7 @@ TEST(Xr, BothEyesSeeTheDataAndEveryCallIsRight) {
 }
 
 TEST(Xr, ALostSessionIsOpenedAnew) {
-  XrRun xr("lost=1", {"--duration", ordinary_or_slow("4", "25")});
+  XrRun xr("lost=1", {"--duration", "4"});
   ASSERT_EQ(xr.run().program().wait(), 0) << xr.said();
   const auto calls = xr.calls();
   EXPECT_EQ(calls["mistakes"], nlohmann::json::array());

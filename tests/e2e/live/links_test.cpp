@@ -298,7 +298,7 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
   // Nobody waits for what is of no use any more.
   auto latency = run.column("updates.csv", "latency_ms");
   std::sort(latency.begin(), latency.end());
-  EXPECT_LT(latency[latency.size() / 2], patient(2) * 1e3);
+  EXPECT_LT(latency[latency.size() / 2], 2000);
 }
 
 // Errors within bounds, and none of them where the head has come to rest.

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <thread>
 
-#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
 
@@ -193,8 +192,7 @@ TEST_F(PanelTest, ACheckMarkChangesHowFramesAreDrawn) {
     const auto v = run.column("frames.csv", "finish");
     return v.empty() ? -1.0 : v.back();
   };
-  EXPECT_TRUE(wait_until([&] { return finish() == 6; }, kSlow ? 60 : 30))
-      << finish() << ": 1 fill, 2 smooth, 4 antialias";
+  EXPECT_TRUE(wait_until([&] { return finish() == 6; })) << finish() << ": 1 fill, 2 smooth, 4 antialias";
   click(window, fill);
   EXPECT_TRUE(wait_until([&] { return finish() == 7; })) << finish();
   display_->tap("q");
