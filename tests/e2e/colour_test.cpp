@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "common/scene/colouring.h"
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/common/csv_table.h"
 
@@ -155,7 +156,7 @@ TEST_F(ColouredRun, ColoursChangeWhileItRuns) {
   // Each frame is compared with rays that see its own epoch's colours.
   const auto s = run.summary();
   EXPECT_GE(s["quality"]["views"], 2);
-  EXPECT_GT(s["quality"]["psnr_db"]["median"], 26);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], kSlow ? 22 : 26);  // slow programs have sampled less of an epoch by then
   EXPECT_TRUE(run.all_gone());
 }
 
