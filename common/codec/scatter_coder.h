@@ -1,7 +1,8 @@
 // The residuals of scattered pixels <-> bits. How large a residual is expected to be depends on how large those of its
 // neighbours were, and of depth on how far these are.
-//   scatter = u8 pole, by which normals are turned; stored block of colours, range-coded (range_coder.h); stored block
-//   of bits. These are of each pixel depth and the normal's bytes by Golomb's codes.
+//   scatter = stored block of colours, range-coded (range_coder.h); stored block of bits. These are of each pixel depth
+//   and the normal's bytes by Golomb's codes.
+//   Normals are turned by the tile's pole, which stands before (tile.h).
 //   A pixel's colour is as predicted, or has green's residual, and then is the last one of that green, or has the
 //   residuals of blue and red less that of green.
 // Within bounds (lattice.h) residuals are steps from where the prediction lies, and a colour is as predicted if it is

@@ -106,7 +106,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     for (first = row; first < end && image.depth[first] == 0;) ++first;
     if (first < end) break;
   }
-  Pixel base{image.depth[first], image.colour[first], image.normal[first]};
+  Pixel base{image.depth[first], image.colour[first] & 0xFFFFFF, image.normal[first]};
   if (bounds.depth != nullptr) base.depth = bounds.depth->index(base.depth);
   put_base(out, base);
   if (!full) put_mask(out, s.mask);

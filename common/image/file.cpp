@@ -3,10 +3,16 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
+#include <iterator>
 #include <limits>
+#include <string_view>
+#include <utility>
 
+#include "common/core/check.h"
 #include "common/geometry/camera.h"
 #include "common/image/srgb.h"
 
@@ -50,20 +56,34 @@ Result<std::string> encode_jpeg(const View& view, int quality) {
 
 namespace {
 
+// Of OpenImageIO's many readers those that are asked: what is hostile would choose among all of them.
+constexpr const char* kEndings[] = {"png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif",
+                                    "tga", "exr", "hdr",  "ppm",  "pgm", "pbm",  "pnm"};
+
 // OpenImageIO chooses a reader by the ending of a name, but pictures in other files have none, and some a wrong one.
 std::string name_for_reader(std::span<const std::byte> bytes, const std::string& name) {
+  using namespace std::literals;
+  constexpr std::pair<std::string_view, const char*> kBeginnings[] = {
+      {"\x89PNG"sv, "picture.png"}, {"\xff\xd8\xff"sv, "picture.jpg"}, {"II*\0"sv, "picture.tif"},
+      {"MM\0*"sv, "picture.tif"},   {"BM"sv, "picture.bmp"},           {"GIF8"sv, "picture.gif"},
+      {"v/1\x01"sv, "picture.exr"}, {"#?RADIANCE"sv, "picture.hdr"}};
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (text.starts_with("\x89PNG")) return "picture.png";
-  if (text.starts_with("\xff\xd8\xff")) return "picture.jpg";
   if (text.starts_with("RIFF") && text.substr(0, 12).ends_with("WEBP")) return "picture.webp";
+  for (const auto& [beginning, as] : kBeginnings)
+    if (text.starts_with(beginning)) return as;
   return name;
 }
 
-// OpenImageIO would ask each of its readers, HEIF's and that of movies too, about a file that is not what its name
-// says. What is hostile would choose among all of them, and one takes minutes and all memory (libheif 1.15, under
-// ThreadSanitizer).
-void ask_the_reader_of_its_name_alone() {
-  [[maybe_unused]] static const bool told = OIIO::attribute("try_all_readers", 0);
+// told: the name to be read; name: for the error text.
+Status check_reader(const std::string& told, const std::string& name) {
+  // Else OpenImageIO asks all its readers, HEIF's and that of movies too, about a file that is not what its name says.
+  // One takes minutes and all memory for a few letters (libheif 1.15, under ThreadSanitizer).
+  static const bool asks_one = OIIO::attribute("try_all_readers", 0);
+  CHECK(asks_one);
+  std::string ending = told.substr(std::min(told.rfind('.'), told.size() - 1) + 1);
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (std::find(std::begin(kEndings), std::end(kEndings), ending) != std::end(kEndings)) return ok_status();
+  return Error{fmt::format("cannot read picture {}: it is none of {}", name, fmt::join(kEndings, ", "))};
 }
 
 // path: for error texts.
@@ -108,20 +128,21 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
 }  // namespace
 
 Result<View> read_view(const std::string& path) {
-  ask_the_reader_of_its_name_alone();
+  if (const auto known = check_reader(path, path); !known) return known.error();
   const auto input = OIIO::ImageInput::open(path);
   if (!input) return Error{fmt::format("cannot read picture {}: {}", path, first_line(OIIO::geterror()))};
   return read_pixels(*input, path, ~uint64_t{0});
 }
 
 Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels) {
-  ask_the_reader_of_its_name_alone();
+  const std::string told = name_for_reader(bytes, name);
+  if (const auto known = check_reader(told, name); !known) return known.error();
   OIIO::ImageSpec wishes;
   wishes.attribute("oiio:UnassociatedAlpha", 1);
   OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes.data()), bytes.size());  // which only reads
   OIIO::Filesystem::IOProxy* const proxy = &memory;
   wishes.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);  // wishes take the place of what open() is given
-  const auto input = OIIO::ImageInput::open(name_for_reader(bytes, name), &wishes, &memory);
+  const auto input = OIIO::ImageInput::open(told, &wishes, &memory);
   if (!input) return Error{fmt::format("cannot read picture {}: {}", name, first_line(OIIO::geterror()))};
   return read_pixels(*input, name, most_pixels);
 }

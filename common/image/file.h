@@ -32,10 +32,11 @@ Status write_exr(const std::string& path, const View& view, Alpha alpha = Alpha:
 Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals);
 /// The bytes of a JPEG file of its colours. quality: 1 to 100.
 Result<std::string> encode_jpeg(const View& view, int quality);
-/// Reads any picture OpenImageIO knows; channel Z becomes depth_m. At most 16384 pixels a side.
+/// Reads a PNG, JPEG, WebP, TIFF, BMP, GIF, TGA, EXR, HDR or PNM file, as the ending of its name says; channel Z
+/// becomes depth_m. At most 16384 pixels a side.
 Result<View> read_view(const std::string& path);
 /// Reads a picture of at most `most_pixels` from memory: its colours without its alpha, which changes nothing of them.
-/// name: for error texts; its ending says what to try first.
+/// name: for error texts; its ending says what it is, unless its first bytes do.
 Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels);
 
 }  // namespace telesplat::image

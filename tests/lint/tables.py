@@ -152,7 +152,8 @@ OUTSIDE_HEADERS = [
         ],
     ),
     (r"spdlog/.*", ["common/core"]),
-    (r"(oneapi/)?tbb/(parallel_|task_group|flow).*", ["common/parallel"]),  # which ThreadSanitizer can watch
+    # Which ThreadSanitizer can watch.
+    (r"((oneapi/)?tbb(\.h|/(tbb\.h|parallel_.*|task_group\.h|flow.*))|execution)", ["common/parallel"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
     (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/wan_relay"]),
     (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),

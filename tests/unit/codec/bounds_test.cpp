@@ -233,6 +233,18 @@ void expect_bytes(const DepthImage& image, const std::vector<uint8_t>& bytes, co
   EXPECT_TRUE(*exact == image);
 }
 
+TEST(ErrorBounds, NormalsWithABoundAreTurned) {
+  DepthImage image(9, 8);
+  for (size_t i = 0; i < image.pixels(); i += 9) image.depth[i] = 500000, image.normal[i] = 0x7F7F;
+  auto bytes = encode(image, {.normal = 1});
+  const size_t mask = 5 + 1 + 2 + 1 + 8;  // header, bounds, the tile's kind, its base
+  const size_t pole = mask + 1 + bytes[mask] / 2;
+  ASSERT_EQ(bytes[pole], 4) << "the map's middle";
+  ASSERT_EQ(refusal(bytes), "");
+  bytes[pole] = 6;
+  EXPECT_NE(refusal(bytes), "");
+}
+
 TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
   DepthImage image(9, 8);
   for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {

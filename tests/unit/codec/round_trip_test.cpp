@@ -2,12 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
 
 #include "common/codec/depth_codec.h"
+#include "common/codec/mask_stream.h"
+#include "common/image/normal.h"
+#include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
 
 namespace telesplat::codec {
@@ -186,17 +190,34 @@ TEST(CodecFormat, GoldenBytes) {
   EXPECT_TRUE(*back == image);
 }
 
-// Of an older version they would all be refused at their second byte.
-TEST(CodecFormat, SeedsOfTheFuzzerAreOfThisVersion) {
-  size_t seeds = 0;
-  for (const auto& entry : std::filesystem::directory_iterator("tests/fuzz/corpus/codec")) {
+std::vector<std::vector<uint8_t>> seeds_of(const std::string& fuzzer) {
+  std::vector<std::vector<uint8_t>> out;
+  for (const auto& entry : std::filesystem::directory_iterator("tests/fuzz/corpus/" + fuzzer)) {
     std::ifstream file(entry.path(), std::ios::binary);
-    const std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
-    const auto image = decode(bytes);
-    EXPECT_TRUE(image.ok()) << entry.path() << ": " << image.error().text;
-    ++seeds;
+    out.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   }
-  EXPECT_GE(seeds, 29u);
+  return out;
+}
+
+// Of an older version they would all be refused at their second byte.
+TEST(CodecFormat, SeedsOfTheFuzzersAreOfThisVersion) {
+  const auto images = seeds_of("codec"), refinements = seeds_of("refinement"), masks = seeds_of("mask");
+  EXPECT_GE(images.size(), 29u);
+  EXPECT_GE(refinements.size(), 8u);
+  EXPECT_GE(masks.size(), 9u);
+  for (const auto& bytes : images) EXPECT_TRUE(decode(bytes).ok());
+  const auto known = test::refined_images();
+  for (const auto& bytes : refinements) {  // the first byte says of which image
+    const auto& of = known[bytes[0] % known.size()];
+    const auto exact = decode_refinement(std::span(bytes).subspan(1), of.bounded);
+    ASSERT_TRUE(exact.ok()) << exact.error().text;
+    EXPECT_EQ(*exact, of.exact);
+  }
+  for (const auto& bytes : masks) {  // two bytes say of which size
+    std::vector<uint32_t> words((bytes.size() - 2) / 4);
+    if (!words.empty()) std::memcpy(words.data(), bytes.data() + 2, 4 * words.size());
+    EXPECT_TRUE(decode_mask(words, bytes[0] + 1, bytes[1] + 1).ok());
+  }
 }
 
 // Sparse tiles are predicted in floating point, which must be the same everywhere: these bytes, too.
@@ -215,6 +236,29 @@ TEST(CodecFormat, GoldenBytesOfASparseTile) {
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;
   EXPECT_TRUE(*back == image);
+}
+
+// With normals that are canonical, so that a pole turns them: most of a session's images.
+TEST(CodecFormat, GoldenBytesOfASparseTileThatIsTurned) {
+  DepthImage image(9, 8);
+  for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {
+    const size_t i = static_cast<size_t>(y * 9 + x);
+    image.depth[i] = static_cast<uint32_t>(500000 + 1234 * x - 777 * y + x * x * y);
+    image.colour[i] = 0x405060 + static_cast<uint32_t>(x % 3) * 0x030201;
+    image.normal[i] = image::canonical_normal16(static_cast<uint16_t>((244 + x) | (100 - y) << 8));
+  }
+  const std::vector<uint8_t> golden{215, 6,   0,   9,   8,  6,   32,  161, 7,   96,  80,  64,  244, 100,
+                                    16,  163, 15,  186, 98, 90,  36,  93,  192, 0,   29,  120, 107, 7,
+                                    78,  236, 236, 242, 81, 248, 255, 215, 120, 124, 255, 193, 103, 17,
+                                    170, 14,  244, 154, 65, 20,  184, 48,  4,   12,  0};
+  EXPECT_EQ(encode(image), golden);
+  const auto back = decode(golden);
+  ASSERT_TRUE(back.ok()) << back.error().text;
+  EXPECT_TRUE(*back == image);
+  auto other = golden;
+  ASSERT_EQ(other[23], 0) << "the pole, after the mask";
+  other[23] = 7;
+  EXPECT_FALSE(decode(other).ok()) << "there is no pole 7";
 }
 
 }  // namespace

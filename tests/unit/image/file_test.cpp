@@ -101,13 +101,37 @@ TEST_F(ImageFile, UnreadableFilesAreNamed) {
   }
 }
 
-// Not by each that there is, which a hostile file could choose from.
+// Not each that there is, which a hostile file could choose from.
 TEST_F(ImageFile, TheReaderOfTheNameAloneIsAsked) {
   ASSERT_TRUE(write_exr(path("a.exr"), all_values()).ok());
-  std::filesystem::rename(path("a.exr"), path("no.png"));
-  const auto read = read_view(path("no.png"));
-  ASSERT_FALSE(read.ok());
-  EXPECT_NE(read.error().text.find("no.png"), std::string::npos) << read.error().text;
+  std::ifstream in(path("a.exr"), std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  for (const char* name : {"no.png", "no.heic", "no.mp4", "no", "exr", "a.exr.txt"}) {
+    std::ofstream(path(name), std::ios::binary) << bytes;
+    const auto read = read_view(path(name));
+    ASSERT_FALSE(read.ok()) << name;
+    EXPECT_NE(read.error().text.find(path(name)), std::string::npos) << read.error().text;
+  }
+  std::filesystem::copy(path("a.exr"), path("a.EXR"));
+  EXPECT_TRUE(read_view(path("a.EXR")).ok());
+}
+
+// In memory the first bytes say what it is; where they do not, the name does.
+TEST_F(ImageFile, PicturesWithWrongNamesAreKnownByTheirBytes) {
+  View v = all_values();
+  ASSERT_TRUE(write_exr(path("a.exr"), v).ok());
+  ASSERT_TRUE(write_png(path("a.png"), v).ok());
+  const auto read = [&](const char* file, const char* name) {
+    std::ifstream in(path(file), std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+    return read_picture(std::as_bytes(std::span(bytes)), name, 1u << 26);
+  };
+  for (const char* name : {"wood.tga", "wood", "wood.heic"})
+    for (const char* file : {"a.exr", "a.png"}) EXPECT_TRUE(read(file, name).ok()) << file << " as " << name;
+  std::ofstream(path("letters")) << "these are no picture at all";
+  const auto none = read("letters", "wood.heic");
+  ASSERT_FALSE(none.ok());
+  EXPECT_NE(none.error().text.find("wood.heic: it is none of png, jpg"), std::string::npos) << none.error().text;
 }
 
 TEST_F(ImageFile, TruncatedFilesAreRefusedAtEveryLength) {
