@@ -52,7 +52,8 @@ void DenseCoder::begin(const TileRect& rect, const Mask* mask) {
 
 void DenseCoder::load(const image::DepthImage& image, const TileRect& rect) {
   const size_t pixels = shape_.width * shape_.height;
-  if (colour_rows_.size() < pixels + 64) colour_rows_.resize(pixels + 64), normals_.codes.resize(pixels + 64);
+  if (colour_rows_.size() < pixels + 64) colour_rows_.resize(pixels + 64);
+  if (normals_.codes.size() < pixels + 64) normals_.codes.resize(pixels + 64);
   for_each_segment(rect, shape_, [&](size_t from, size_t row, size_t column, size_t count) {
     std::copy_n(image.depth.data() + from, count, depth_.depth.row(static_cast<ptrdiff_t>(row)) + column);
     std::copy_n(image.colour.data() + from, count, colour_rows_.data() + row * shape_.width + column);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <thread>
 
 #include "common/codec/dense/normals.h"
 #include "common/codec/depth_codec.h"
@@ -109,6 +110,17 @@ TEST(Dense, NarrowTilesComeBack) {
     expect_round_trip(test::random_pixels(width, 200, 0.6, static_cast<uint32_t>(width)));
     expect_round_trip(test::random_pixels(200, width, 0.6, static_cast<uint32_t>(width)));
   }
+}
+
+// Narrow tiles are one row, of which decoders keep all; a thread's buffers serve both directions.
+TEST(Dense, WhoDecodedANarrowTileEncodesAnyOther) {
+  const auto narrow = encode(test::render({.width = 9, .height = 200}));
+  const DepthImage image = test::render({.width = 40, .height = 33});
+  const auto expected = encode(image);
+  std::thread([&] {
+    EXPECT_TRUE(decode(narrow).ok());
+    EXPECT_EQ(encode(image), expected);
+  }).join();
 }
 
 TEST(Dense, TurnedNormalsAreAPermutationOfCanonicalCodes) {
