@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <latch>
 #include <mutex>
 #include <thread>
 
@@ -30,9 +31,11 @@ void run_turns(size_t count, const std::function<void(size_t)>& turn) {
   }
   std::atomic<size_t> next{0};
   std::exception_ptr thrown;
-  std::mutex mutex;  // of what was thrown
+  std::mutex mutex;           // of what was thrown
+  std::latch begun(threads);  // else short loops would be over before another thread takes a turn
   const auto work = [&](int thread) {
     t_thread = thread, t_in_loop = true;
+    begun.arrive_and_wait();
     try {
       for (size_t n; (n = next.fetch_add(1, std::memory_order_relaxed)) < count;) turn(n);
     } catch (...) {
