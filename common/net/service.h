@@ -79,6 +79,9 @@ void lower_thread_priority(int levels);
 /// Keeps up to 128 MB of freed memory for the next images of tiles, which are as large: to get them anew from the
 /// system, page by page, costs as much as to fill them.
 void keep_freed_memory();
+/// Gives freed memory back to the system, but for 1 MB: what was needed once must not stay for ever. Takes some
+/// milliseconds.
+void return_freed_memory();
 
 /// Resident memory of this process now / at most so far, MB.
 double resident_mb();

@@ -20,6 +20,7 @@ namespace telesplat::packer {
 namespace {
 
 constexpr double kSpanFlush_s = 1;
+constexpr double kKeepFreed_s = 10;  // memory that was not needed for that long goes back to the system
 constexpr int kSampledAtOnce = 8;  // then control and viewers get their turn
 constexpr int kStateAtOnce = 64;
 constexpr int kStateQueue = 1 << 16;  // messages that wait for a viewer: more than StateAnswers has under way
@@ -87,7 +88,10 @@ class PackerService {
       if (packing_) packing_->tick(now);
       flush_spans(now);
       const std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
-      if (!net::wait_readable(sockets, 0) && !use_spare_time(now)) net::wait_readable(sockets, longest_wait_ms());
+      if (!net::wait_readable(sockets, 0) && !use_spare_time(now)) {
+        return_freed_memory(now);
+        net::wait_readable(sockets, longest_wait_ms());
+      }
       receive_control();
       receive(state_, kStateAtOnce, &Packing::take_state);
       receive(tiles_, kSampledAtOnce, &Packing::take_sampled);
@@ -224,6 +228,13 @@ class PackerService {
     return v;
   }
 
+  // Where nothing is to be done. More viewers than usual, or a view that was larger, need more memory for a while.
+  void return_freed_memory(double now_s) {
+    if (now_s - last_return_s_ < kKeepFreed_s) return;
+    last_return_s_ = now_s;
+    net::return_freed_memory();
+  }
+
   void flush_spans(double now_s) {
     if (now_s - last_flush_s_ < kSpanFlush_s) return;
     last_flush_s_ = now_s;
@@ -242,7 +253,7 @@ class PackerService {
   SpareTime spare_;
   bool settled_ = false;  // what the last piece of spare time was for
   int seen_version_ = 0;
-  double last_flush_s_ = 0;
+  double last_flush_s_ = 0, last_return_s_ = 0;
 };
 
 }  // namespace

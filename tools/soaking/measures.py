@@ -4,6 +4,7 @@ import os
 import statistics
 
 GROWTH = 0.05  # of memory after the warm-up
+SAMPLE_S = 3  # from one look at all processes to the next
 SLACK_MB = 4  # below it growth is that of single buffers
 MOST_GAP_MS = 500  # between two displayed frames
 OUTAGE_S = (3, 8)  # before and after a master's death: rows that it had not written are missing in the record
@@ -68,13 +69,25 @@ def windows(samples, name, column, length_s):
     return ([v for t, v in of if warm_s <= t < warm_s + third], [v for t, v in of if t >= length_s - third])
 
 
-def peaks(samples, name, length_s):
-    """The most memory after the warm-up: until the last third of what is left, and in it."""
+def guests_at(samples):
+    """A function: how many guests were there at a time, as far as the samples around it say."""
+    times = sorted((s[0], s[1]) for s in samples if s[3])
+    return lambda t: len({name for at, name in times if abs(at - t) < SAMPLE_S / 2})
+
+
+def memory(samples, name, length_s):
+    """(MB of a process in the first half of the time after the warm-up, in the second, with how many guests). Each
+    guest takes memory of its own while it is there, so that times with equally many of them are compared: with that
+    number of which both halves have most."""
     warm_s = length_s / 3
-    last_s = length_s - (length_s - warm_s) / 3
-    of = [(s[0], s[4]) for s in samples if s[1] == name and not s[3]]
-    return (max((mb for t, mb in of if warm_s <= t < last_s), default=0),
-            max((mb for t, mb in of if t >= last_s), default=0))
+    half_s = (warm_s + length_s) / 2
+    guests = guests_at(samples)
+    halves = {}
+    for s in samples:
+        if s[1] == name and not s[3] and s[0] >= warm_s:
+            halves.setdefault(guests(s[0]), ([], []))[s[0] >= half_s].append(s[4])
+    number = max(halves, key=lambda n: (min(map(len, halves[n])), -n), default=0)
+    return *halves.get(number, ([], [])), number
 
 
 def steadiness(soak):
@@ -86,26 +99,22 @@ def steadiness(soak):
         # Who was killed began anew, with little: of such the most counts, and not what is there most of the time. A
         # master goes on with what the one before it recorded.
         lives = len({s[2] for s in soak.samples if s[1] == name and not s[3]})
-        for what, column in (("memory", 4), ("descriptors", 5), ("threads", 6)):
+        begins_anew = lives > 1 and name != "master"
+        first, last, guests = memory(soak.samples, name, length_s)
+        if len(first) >= 5 and len(last) >= 5:
+            a, b = (max(first), max(last)) if begins_anew else (statistics.median(first), statistics.median(last))
+            what = f"most memory of {name}, in {lives} lives" if begins_anew else f"memory of {name}"
+            out.append((f"{what}, guests: {guests}", f"{a:.1f} -> {b:.1f} MB ({100 * (b / a - 1):+.1f} %)",
+                        f"at most +{100 * GROWTH:.0f} % or {SLACK_MB} MB", b - a <= max(GROWTH * a, SLACK_MB)))
+        for what, column in (("descriptors", 5), ("threads", 6)):
             first, last = windows(soak.samples, name, column, length_s)
             if len(first) < 5 or len(last) < 5:
                 continue
             a, b = statistics.median(first), statistics.median(last)
-            if what == "memory" and lives > 1 and name != "master":
-                a, b = peaks(soak.samples, name, length_s)
-                ok = b - a <= max(GROWTH * a, SLACK_MB)
-                out.append((f"most memory of {name}, in {lives} lives",
-                            f"{a:.1f} -> {b:.1f} MB ({100 * (b / a - 1):+.1f} %)",
-                            f"at most +{100 * GROWTH:.0f} % or {SLACK_MB} MB", ok))
-            elif what == "memory":
-                ok = b - a <= max(GROWTH * a, SLACK_MB)
-                out.append((f"memory of {name}", f"{a:.1f} -> {b:.1f} MB ({100 * (b / a - 1):+.1f} %)",
-                            f"at most +{100 * GROWTH:.0f} % or {SLACK_MB} MB", ok))
-            else:
-                # Guests come and go, and each has some connections.
-                slack = 0 if what == "threads" else 12
-                out.append((f"{what} of {name}", f"{a:.0f} -> {b:.0f}", "as many" if slack == 0 else
-                            f"at most {slack} more, of guests' connections", b - a <= slack))
+            # Guests come and go, and each has some connections.
+            slack = 0 if what == "threads" else 12
+            out.append((f"{what} of {name}", f"{a:.0f} -> {b:.0f}", "as many" if slack == 0 else
+                        f"at most {slack} more, of guests' connections", b - a <= slack))
     return out
 
 
