@@ -30,6 +30,7 @@
 #include <fmt/format.h>
 
 #include "common/codec/lattice.h"
+#include "common/codec/room_axes.h"
 #include "common/codec/tile.h"
 
 namespace telesplat::codec {
@@ -41,7 +42,7 @@ using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
 // after them. bounds = varint depth, u8 normal, u8 colour
-constexpr uint8_t kMagic = 0xD7, kVersion = 6, kBounded = 1, kKnownFlags = kBounded;
+constexpr uint8_t kMagic = 0xD7, kVersion = 7, kBounded = 1, kKnownFlags = kBounded;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
@@ -93,6 +94,13 @@ Result<Header> read_header(Reader& in) {
   return header;
 }
 
+// Axes that count columns and rows from (x, y).
+RoomAxes moved(const RoomAxes& axes, int x, int y) {
+  RoomAxes out = axes;
+  for (auto& axis : out) axis[2] += axis[0] * x + axis[1] * y;
+  return out;
+}
+
 // f(column, row) -> bool for every tile in order, until one is false.
 template <class F>
 bool for_each_tile(const TileGrid& grid, F f) {
@@ -104,7 +112,10 @@ bool for_each_tile(const TileGrid& grid, F f) {
 
 }  // namespace
 
-std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, DepthImage* decoded) {
+namespace {
+
+std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, DepthImage* decoded,
+                            const RoomAxes* axes) {
   CHECK(image.width > 0 && image.height > 0 && image.pixels() <= kMaxPixels);
   CHECK(image.pixels() == static_cast<size_t>(image.width) * static_cast<size_t>(image.height));
   CHECK(image.colour.size() == image.pixels() && image.normal.size() == image.pixels());
@@ -125,10 +136,25 @@ std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, D
   const detail::TileBounds tile_bounds(bounds);
   const TileGrid grid(image.width, image.height);
   for_each_tile(grid, [&](int column, int row) {
-    return detail::put_tile(out, image, grid.rect(column, row), tile_bounds), true;
+    const detail::TileRect rect = grid.rect(column, row);
+    RoomAxes of_tile;
+    if (axes != nullptr)
+      of_tile = moved(*axes, column * grid.tile_width + rect.width / 2, row * grid.tile_height + rect.height / 2);
+    return detail::put_tile(out, image, rect, tile_bounds, axes != nullptr ? &of_tile : nullptr), true;
   });
   if (decoded != nullptr) CHECK(decode_into(*decoded, out).ok());
   return out;
+}
+
+}  // namespace
+
+std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& bounds, DepthImage* decoded) {
+  return encode(image, bounds, decoded, nullptr);
+}
+
+std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& bounds, DepthImage* decoded,
+                            const RoomAxes& axes) {
+  return encode(image, bounds, decoded, &axes);
 }
 
 Result<DepthImage> decode(std::span<const uint8_t> bytes, int expected_width, int expected_height) {
@@ -176,8 +202,7 @@ Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   if (!size) return size.error();
   StreamInfo info{.width = size->width, .height = size->height, .bounds = size->bounds};
   const TileGrid grid(info.width, info.height);
-  if (!for_each_tile(
-          grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
+  if (!for_each_tile(grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
     return damaged("damaged or cut off");
   if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
   return info;

@@ -9,6 +9,7 @@ namespace telesplat::codec::detail {
 namespace {
 
 enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
+constexpr int kRamp = 8;  // beside a sparse tile's pole: a ramp's axis follows
 
 TileScratch& scratch() {
   static thread_local TileScratch s;
@@ -63,6 +64,25 @@ int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& ma
   return exact && !canonical ? kRaw : choice.best();
 }
 
+// What a ramp says of a sparse tile's colours takes 17 bytes; of some pixels it is found as well as of all.
+std::optional<RampAxis> find_ramp(TileScratch& s, const image::DepthImage& image, const TileRect& rect,
+                                  const RoomAxes* axes) {
+  constexpr size_t kMostSamples = 1024;
+  const size_t step = s.mask.count() / kMostSamples + 1;
+  size_t left = 0;
+  s.samples.clear();
+  for (int y = 0; y < rect.height; ++y)
+    for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
+      if (left-- > 0) return;
+      left = step - 1;
+      const size_t i = rect.index(static_cast<int>(x), y);
+      s.samples.push_back({static_cast<float>(static_cast<int>(x) - rect.width / 2),
+                           static_cast<float>(y - rect.height / 2), static_cast<float>(image.depth[i]),
+                           image.colour[i] & 0xFFFFFF});
+    });
+  return fit_ramp(axes, s.samples, rect.width, rect.height);
+}
+
 }  // namespace
 
 TileGrid::TileGrid(int width, int height) : width(width), height(height) {
@@ -85,7 +105,7 @@ TileRect TileGrid::rect(int column, int row) const {
 }
 
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
-                const TileBounds& bounds) {
+                const TileBounds& bounds, const RoomAxes* axes) {
   TileScratch& s = scratch();
   s.mask.reset(rect.width, rect.height);
   for (int y = 0; y < rect.height; ++y)
@@ -114,13 +134,15 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   if (sparse) {
     if (bounds.depth != nullptr) base.depth = bounds.depth->code(base.depth);
     const int pole = pole_of(image, rect, s.mask, bounds.normal == 0);
-    out.push_back(static_cast<uint8_t>(pole));
-    s.scatter_encoder.start(covered, bounds);
+    const auto ramp = find_ramp(s, image, rect, axes);
+    out.push_back(static_cast<uint8_t>(pole | (ramp ? kRamp : 0)));
+    if (ramp) put_ramp(out, *ramp), s.ramp.start(*ramp, rect.width, rect.height);
+    s.scatter_encoder.start(covered, bounds, ramp ? &s.ramp : nullptr);
     encode_sparse(s, image, rect, base, pole);
     s.scatter_encoder.finish(out);
     return covered;
   }
-  s.dense.put(out, image, rect, full ? nullptr : &s.mask, base, bounds);
+  s.dense.put(out, image, rect, full ? nullptr : &s.mask, base, bounds, axes);
   return covered;
 }
 
@@ -148,12 +170,21 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   }
   if (sparse) {
     if (!may_be_sparse(covered, pixels)) return std::nullopt;
-    const auto pole = in.u8();
-    if (!pole || *pole > (bounds.normal != 0 ? kPoles - 1 : kRaw) || !s.scatter_decoder.start(in, bounds))
+    const auto turns = in.u8();
+    if (!turns) return std::nullopt;
+    const int pole = *turns & ~kRamp;
+    const bool has_ramp = (*turns & kRamp) != 0;
+    if (has_ramp) {
+      const auto ramp = get_ramp(in, rect.width, rect.height);
+      if (!ramp) return std::nullopt;
+      s.ramp.start(*ramp, rect.width, rect.height);
+    }
+    if (pole > (bounds.normal != 0 ? kPoles - 1 : kRaw) ||
+        !s.scatter_decoder.start(in, bounds, has_ramp ? &s.ramp : nullptr))
       return std::nullopt;
     const Pixel first{bounds.depth != nullptr ? bounds.depth->code(base->depth) : base->depth, base->colour,
                       base->normal};
-    if (!decode_sparse(s, image, rect, first, *pole) || !s.scatter_decoder.finished()) return std::nullopt;
+    if (!decode_sparse(s, image, rect, first, pole) || !s.scatter_decoder.finished()) return std::nullopt;
     return covered;
   }
   if (covered == 0 || !s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base, bounds)) return std::nullopt;
@@ -182,7 +213,8 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     return true;
   };
   if ((*kind & kPredictorBits) == kSparse) {
-    if (!in.u8()) return false;
+    const auto turns = in.u8();
+    if (!turns || ((*turns & kRamp) != 0 && !get_ramp(in, rect.width, rect.height))) return false;
     return skip(info.sparse_bytes, 2);
   }
   return DenseCoder::skip(in, info);

@@ -12,6 +12,7 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/entropy.h"
+#include "common/codec/room_axes.h"
 #include "common/codec/walk.h"
 #include "common/image/depth_image.h"
 
@@ -28,9 +29,10 @@ struct TileGrid {
   int width, height, tile_width, tile_height, columns, rows;
 };
 
-/// Appends the pixels of `rect`; returns the number of covered ones.
+/// Appends the pixels of `rect`; returns the number of covered ones. axes: of the room, from the tile's centre, or
+/// null.
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
-                const TileBounds& bounds);
+                const TileBounds& bounds, const RoomAxes* axes = nullptr);
 /// Writes all pixels of `rect`; returns the number of covered ones, or nothing where the stream is damaged.
 std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect, const TileBounds& bounds);
 /// Adds the covered pixels and the bytes of a tile of the size of `rect` to `info`; false where the stream is damaged.

@@ -5,8 +5,9 @@
 
 #include "common/codec/dense/dense.h"
 #include "common/codec/mask.h"
-#include "common/codec/scatter.h"
-#include "common/codec/scatter_coder.h"
+#include "common/codec/sparse/ramp.h"
+#include "common/codec/sparse/scatter.h"
+#include "common/codec/sparse/scatter_coder.h"
 #include "common/image/depth_image.h"
 
 namespace telesplat::codec::detail {
@@ -16,6 +17,8 @@ struct TileScratch {
   Mask mask;
   ScatterWalk scatter_walk;
   ScatterPredictor predictor;
+  Ramp ramp;
+  std::vector<HeightSample> samples;
   ScatterEncoder scatter_encoder;
   ScatterDecoder scatter_decoder;
   DenseCoder dense;

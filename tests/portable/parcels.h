@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "common/codec/scatter.h"
+#include "common/codec/sparse/scatter.h"
 
 namespace telesplat::portable {
 

@@ -65,11 +65,8 @@ bool follows_green(const TileShape& shape, const std::vector<uint32_t>& colours)
   return together < apart;
 }
 
-constexpr int kAxisBits = 28;
-
 void put_height(const HeightModel& height, BitSink& bits) {
-  for (const int32_t e : {height.a, height.b, height.c})
-    bits.put(static_cast<uint32_t>(e + (1 << (kAxisBits - 1))), kAxisBits);
+  for (const int32_t e : {height.a, height.b, height.c, height.base}) bits.put(static_cast<uint32_t>(e), 32);
   bits.put(static_cast<uint32_t>(height.low + 32768), 16);
   bits.put(static_cast<uint32_t>(height.scale), 16);
   GolombContext context;
@@ -82,8 +79,7 @@ void put_height(const HeightModel& height, BitSink& bits) {
 }
 
 bool get_height(HeightModel& height, BitReader& bits) {
-  for (int32_t* e : {&height.a, &height.b, &height.c})
-    *e = static_cast<int32_t>(bits.source.take(kAxisBits)) - (1 << (kAxisBits - 1));
+  for (int32_t* e : {&height.a, &height.b, &height.c, &height.base}) *e = static_cast<int32_t>(bits.source.take(32));
   height.low = static_cast<int32_t>(bits.source.take(16)) - 32768;
   height.scale = static_cast<int32_t>(bits.source.take(16));
   GolombContext context;
@@ -132,13 +128,11 @@ bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32
 }
 
 // By height where that explains the colours, else by brightness.
-void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry) {
+void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth, const KnownAxes& known) {
   const float x0 = static_cast<float>(shape.width / 2), y0 = static_cast<float>(shape.height / 2);
   const auto code_at = [&](float x, float y) {
     return static_cast<float>(depth.depth.row(static_cast<ptrdiff_t>(y))[static_cast<size_t>(x)]);
   };
-  double rays[3][3];
-  const bool has_rays = geometry != nullptr && rays_of(*geometry, rays);
   for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
   height_samples_.clear();
   for (size_t i = 0; i < samples_.places.size(); i += 2) {
@@ -147,7 +141,7 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
     const auto place = static_cast<uint32_t>(index.values.row(p.y)[p.x]);
     height_samples_.push_back({x - x0, y - y0, code_at(x, y), palette_[place], place});
   }
-  has_height_ = fit_axis(has_rays ? rays : nullptr, height_samples_, first_, height_);
+  has_height_ = fit_axis(known, height_samples_, first_, height_);
   if (has_height_) return sort_by_height(shape, depth);
   std::sort(palette_.begin(), palette_.end(), [](uint32_t a, uint32_t b) {
     const auto brightness = [](uint32_t c) { return (c >> 16 & 255) + 2 * (c >> 8 & 255) + (c & 255); };
@@ -299,14 +293,14 @@ void ColourPlanes::try_channels(const TileShape& shape, const std::vector<uint32
 }
 
 void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
-                          const DepthPlane& depth, const GeometryModel* geometry, int reach) {
+                          const DepthPlane& depth, const KnownAxes& known, int reach) {
   lattice_ = ColourLattice(reach);
   if (all_same(shape, colours, base)) {
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
     samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 12));
-    sort_palette(shape, depth, geometry);
+    sort_palette(shape, depth, known);
     encode_palette(shape, depth, reach);
     if (reach > 0 && !has_height_) try_channels(shape, colours);
   } else {

@@ -17,9 +17,9 @@ struct ColourPlanes {
   static constexpr size_t kMostColours = 1024;
 
   /// colours: row by row in all the tile's width, of covered pixels; `base`: of the first.
-  /// geometry: of the normals; null: none. reach: how far a channel may be off.
+  /// known: of where pixels look. reach: how far a channel may be off.
   void encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base, const DepthPlane& depth,
-              const GeometryModel* geometry, int reach);
+              const KnownAxes& known, int reach);
   size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
   SymbolPlane& symbols(size_t i) { return mode == kPalette ? index.symbols : channel[i].symbols; }
   void put_header(BitSink& bits) const;
@@ -38,7 +38,7 @@ struct ColourPlanes {
     SymbolPlane symbols;
   };
   bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
-  void sort_palette(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry);
+  void sort_palette(const TileShape& shape, const DepthPlane& depth, const KnownAxes& known);
   std::vector<int16_t> join_palette(int reach);
   void encode_palette(const TileShape& shape, const DepthPlane& depth, int reach);
   void sort_by_height(const TileShape& shape, const DepthPlane& depth);

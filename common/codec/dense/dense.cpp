@@ -62,7 +62,7 @@ void DenseCoder::load(const image::DepthImage& image, const TileRect& rect) {
 }
 
 void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
-                     const Pixel& base, const TileBounds& bounds) {
+                     const Pixel& base, const TileBounds& bounds, const RoomAxes* axes) {
   begin(rect, mask);
   depth_.reset(shape_, base.depth);
   normals_.reset(shape_, bounds.normal);
@@ -82,7 +82,12 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
 
-  colours_.encode(shape_, colour_rows_, base.colour, depth_, normals_.geometry(), bounds.colour);
+  // Rows that were joined are no rows of the picture.
+  KnownAxes known{.axes = rect.width >= kNarrow ? axes : nullptr, .exact = true};
+  RoomAxes about;
+  if (known.axes == nullptr && normals_.geometry() != nullptr && axes_of(*normals_.geometry(), about))
+    known = {.axes = &about, .exact = false};
+  colours_.encode(shape_, colour_rows_, base.colour, depth_, known, bounds.colour);
   writer_.start(colours_.most_header_bits() + 3 * PlaneEncoder::kMostBits);
   colours_.put_header(writer_.sink);
   for (size_t i = 0; i < colours_.planes(); ++i) encoders_[3 + i].prepare(colours_.symbols(i), shape_, writer_.sink);
@@ -113,7 +118,8 @@ void DenseCoder::put_words(std::vector<uint8_t>& out) {
   put_varint(out, static_cast<uint32_t>(ends[1] - ends[2]) / 2);
   put_varint(out, static_cast<uint32_t>(ends[2] - words_.data()) / 2);
   // Where there are words states follow them: kernels read beyond a word's end.
-  const bool any = at != words_.data() || std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
+  const bool any =
+      at != words_.data() || std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
   const size_t lanes = any ? std::min(kLanes, shape_.width) : 0;
   out.push_back(static_cast<uint8_t>(lanes));
   const size_t end = out.size();

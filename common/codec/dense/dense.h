@@ -20,9 +20,9 @@ namespace telesplat::codec::detail {
 class DenseCoder {
  public:
   /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them; its depth is an
-  /// index of the bounds' lattice, if there is one.
+  /// index of the bounds' lattice, if there is one. axes: of the room, from the tile's centre, or null.
   void put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
-           const Pixel& base, const TileBounds& bounds);
+           const Pixel& base, const TileBounds& bounds, const RoomAxes* axes);
   /// Writes the covered pixels of `rect`; false where the stream is damaged.
   [[nodiscard]] bool get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask,
                          const Pixel& base, const TileBounds& bounds);

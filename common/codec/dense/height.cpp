@@ -9,6 +9,7 @@ namespace telesplat::codec::detail {
 namespace {
 
 constexpr int kBins = HeightModel::kKnots - 1;
+constexpr int kRounds = 2, kSteps = 4;  // towards an axis that nobody knows: more take longer than they save
 
 struct Axis {
   double a, b, c;
@@ -152,25 +153,21 @@ void improve(Axis& axis, const Curve& curve, const std::vector<HeightSample>& sa
   axis.a += d[0], axis.b += d[1], axis.c += d[2];
 }
 
-// The axis in the integers of heights(). Knots are such that its results are heights themselves, 0 to 16383.
+// The axis in the integers of heights(), counted from the middle of the tile's heights, so that few steps of these are
+// lost. Knots are such that its results are heights themselves, 0 to 16383.
 bool quantise(const Axis& axis, const std::vector<HeightSample>& samples, HeightModel& model) {
-  double most = 0, far = 1, low = 1e300, high = -1e300;
-  for (const HeightSample& s : samples) {
-    const double height = axis.of(s);
-    low = std::min(low, height), high = std::max(high, height);
-    most = std::max(most, std::abs(height));
-    far = std::max(far, std::abs(double{s.x}) + std::abs(double{s.y}));
-  }
-  const double unit = 0.99 / std::max(most, 1e-12);  // quotients lie within 1
-  const double limit = static_cast<double>(1 << 26);
-  const double terms[3] = {axis.a * unit, axis.b * unit, axis.c * unit};
-  if (!(std::abs(terms[0]) * far < limit && std::abs(terms[1]) * far < limit && std::abs(terms[2]) < limit))
-    return false;
-  model.a = static_cast<int32_t>(std::lround(terms[0]));
-  model.b = static_cast<int32_t>(std::lround(terms[1]));
-  model.c = static_cast<int32_t>(std::lround(terms[2]));
+  double low = 1e300, high = -1e300;
+  for (const HeightSample& s : samples) low = std::min(low, axis.of(s)), high = std::max(high, axis.of(s));
+  // Quotients lie within 0.45, and within 1 for a base that is a whole number, and what is beyond the samples.
+  const double unit = 0.9 / std::max(high - low, 1e-300), base = std::round((low + high) / 2 * unit);
+  for (const double v : {axis.a * unit, axis.b * unit, axis.c * unit, base})
+    if (!(std::abs(v) < 2147483000.0)) return false;
+  model.a = static_cast<int32_t>(std::lround(axis.a * unit));
+  model.b = static_cast<int32_t>(std::lround(axis.b * unit));
+  model.c = static_cast<int32_t>(std::lround(axis.c * unit));
+  model.base = static_cast<int32_t>(base);
   const double range = (high - low) * unit * 16384;
-  model.low = static_cast<int32_t>(std::floor(low * unit * 16384));
+  model.low = static_cast<int32_t>(std::floor((low * unit - base) * 16384));
   model.scale =
       static_cast<int32_t>(std::clamp(std::floor(16383 * 4096.0 / std::max(range + 1, 1025.0)), 1.0, 65535.0));
   for (int i = 0; i < HeightModel::kKnots; ++i) model.knots[i] = static_cast<int16_t>(std::min(i * 256, 16383));
@@ -179,7 +176,7 @@ bool quantise(const Axis& axis, const std::vector<HeightSample>& samples, Height
 
 }  // namespace
 
-bool rays_of(const GeometryModel& g, double rays[3][3]) {
+bool axes_of(const GeometryModel& g, RoomAxes& rays) {
   double m[3][3];
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) m[i][j] = j == 2 ? g.matrix[i][j] / std::pow(2.0, g.height_shift) : g.matrix[i][j];
@@ -197,26 +194,31 @@ bool rays_of(const GeometryModel& g, double rays[3][3]) {
   return true;
 }
 
-bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
-              HeightModel& model) {
+bool find_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
+               double axis[3]) {
   if (samples.size() < 128 || first.size() < 8) return false;
   Axis best{};
   double least = 1e300;
   const auto consider = [&](const Axis& axis) {
     const double rough = roughness(axis, samples);
-    if (rough < least) least = rough, best = axis;
+    if (!(rough < least)) return false;
+    least = rough, best = axis;
+    return true;
   };
-  for (int i = 0; i < 3 && rays != nullptr; ++i) consider({rays[i][0], rays[i][1], rays[i][2]});
-  if (Axis even[3]; even_axes(samples, even)) std::for_each_n(even, 3, consider);
+  if (known.axes != nullptr)
+    for (const auto& [a, b, c] : *known.axes) consider({a, b, c});
+  bool exact = known.exact && least < 1e300;
+  if (Axis even[3]; even_axes(samples, even))
+    for (const Axis& axis : even) exact &= !consider(axis);
   if (!(least < 1e300)) return false;
   std::vector<uint32_t> rank;
   const auto order = [&] {
     rank_colours(best, samples, first, rank);
     for (HeightSample& s : samples) s.index = rank[s.place];
   };
-  for (int round = 0; round < 1; ++round) {
+  for (int round = 0; round < kRounds && !exact; ++round) {
     order();
-    for (int step = 0; step < 3; ++step) improve(best, fit_curve(best, samples), samples);
+    for (int step = 0; step < kSteps; ++step) improve(best, fit_curve(best, samples), samples);
   }
   order();
   const Curve curve = fit_curve(best, samples);
@@ -225,7 +227,14 @@ bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const
     error += std::abs(curve.at(best.of(s)) - s.index);
     spread += std::abs(static_cast<double>(first.size()) / 2 - s.index);
   }
-  return error * 4 < spread && quantise(best, samples, model);
+  axis[0] = best.a, axis[1] = best.b, axis[2] = best.c;
+  return error * 4 < spread;
+}
+
+bool fit_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
+              HeightModel& model) {
+  double axis[3];
+  return find_axis(known, samples, first, axis) && quantise({axis[0], axis[1], axis[2]}, samples, model);
 }
 
 void fit_knots(const std::vector<ColourHeight>& sorted, HeightModel& model) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/codec/dense/kernels.h"
+#include "common/codec/room_axes.h"
 
 namespace telesplat::codec::detail {
 
@@ -17,11 +18,21 @@ struct HeightSample {
   uint32_t index = 0;  ///< of the colour among those that are sorted by height
 };
 
-/// Finds the axis of room space along which colours change least, for heights(): with the knots that it sets these are
-/// heights from 0 to 16383. `rays`: what turns (x, y, 1) into three coordinates times the depth code, or null.
+/// What may be known of where a tile's pixels look: what turns (x, y, 1) into three coordinates of room space, times
+/// the depth code.
+struct KnownAxes {
+  const RoomAxes* axes = nullptr;  ///< null: nothing
+  bool exact = false;              ///< else about so
+};
+
+/// Finds the axis of room space along which colours change least: heights along it are (a x + b y + c) / code.
 /// `first`: a pixel of each colour of the palette, in its order. Sets the samples' indices; false where no axis
 /// explains the colours.
-bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
+bool find_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
+               double axis[3]);
+
+/// The same for heights(): with the knots that it sets these are heights from 0 to 16383.
+bool fit_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
               HeightModel& model);
 
 /// The heights of a colour's pixels.
@@ -33,7 +44,7 @@ struct ColourHeight {
 /// Gives the model the knots at which indices of colours, which are sorted by their mean heights, lie.
 void fit_knots(const std::vector<ColourHeight>& sorted, HeightModel& model);
 
-/// The inverse of a geometry, as fit_height() wants it; false where it has none.
-bool rays_of(const GeometryModel& geometry, double rays[3][3]);
+/// The inverse of a geometry, which are axes, about; false where it has none.
+bool axes_of(const GeometryModel& geometry, RoomAxes& axes);
 
 }  // namespace telesplat::codec::detail

@@ -239,6 +239,7 @@ static void MedianValues(const int16_t* RESTRICT above, const int16_t* RESTRICT 
 static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
                     int16_t* RESTRICT out) {
   const uint32_t row = static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c);
+  const uint32_t base = static_cast<uint32_t>(model.base);
   const int32_t low = model.low, scale = model.scale;
   int32_t at[kPart];
   for (size_t begin = 0; begin < n; begin += kPart) {
@@ -247,7 +248,8 @@ static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, con
     const uint32_t first = row + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0 + static_cast<int>(begin));
     for (size_t x = 0; x < count; ++x) {
       const int32_t code = static_cast<int32_t>(from[x] & 0xFFFFFF);
-      const int32_t sum = static_cast<int32_t>(first + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x));
+      const int32_t sum = static_cast<int32_t>(first + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x) -
+                                               base * static_cast<uint32_t>(code));
       int32_t size = sum < 0 ? ~sum : sum;
       size = size < code ? size : code;
       const int32_t up = 23 - static_cast<int32_t>((std::bit_cast<uint32_t>(static_cast<float>(code | 1)) >> 23) - 127);

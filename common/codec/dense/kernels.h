@@ -37,11 +37,11 @@ struct GuidedRows {
   int32_t most = 254;             ///< the largest value that is predicted
 };
 
-/// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
-/// kKnots points makes of it. See docs/codec.md.
+/// Where a plane of room space cuts a pixel's ray: ((a x + b y + c - base code) / code - low) * scale, code being the
+/// depth code, and what a table of kKnots points makes of it. The sum is one modulo 2^32. See docs/codec.md.
 struct HeightModel {
   static constexpr int kKnots = 65;
-  int32_t a = 0, b = 0, c = 0;
+  int32_t a = 0, b = 0, c = 0, base = 0;
   int32_t low = 0, scale = 0;
   int16_t knots[kKnots] = {};
 };

@@ -397,7 +397,7 @@ static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, 
   for (int i = 0; i + 1 < HeightModel::kKnots; ++i)
     knots[i] = static_cast<int32_t>(static_cast<uint16_t>(model.knots[i]) |
                                     static_cast<uint32_t>(static_cast<uint16_t>(model.knots[i + 1])) << 16);
-  const auto one = hn::Set(kD, 1u);
+  const auto one = hn::Set(kD, 1u), base = hn::Set(kD, static_cast<uint32_t>(model.base));
   const auto ends = hn::Set(d, 16383), turn = hn::Set(d, 32768);
   const auto step = hn::Set(kD, static_cast<uint32_t>(model.a) * static_cast<uint32_t>(kN));
   auto sums =
@@ -406,8 +406,9 @@ static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, 
                               static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0)));
   for (size_t x = 0; x < n; x += kN, sums = hn::Add(sums, step)) {
     const auto code = hn::And(hn::LoadU(kD, depth + x), hn::Set(kD, 0xFFFFFFu));
-    const auto negative = hn::ShiftRight<31>(hn::BitCast(d, sums));
-    const auto size = hn::BitCast(kD, hn::Min(hn::Xor(hn::BitCast(d, sums), negative), hn::BitCast(d, code)));
+    const auto sum = hn::BitCast(d, hn::Sub(sums, hn::Mul(code, base)));
+    const auto negative = hn::ShiftRight<31>(sum);
+    const auto size = hn::BitCast(kD, hn::Min(hn::Xor(sum, negative), hn::BitCast(d, code)));
     const auto exponent = hn::ShiftRight<23>(hn::BitCast(kD, hn::ConvertTo(f, hn::BitCast(d, hn::Or(code, one)))));
     const auto up = hn::Sub(hn::Set(kD, 150u), exponent);
     const auto divisor = hn::BitCast(d, hn::Or(hn::ShiftRight<9>(hn::Shl(code, up)), hn::Set(kD, 0x4000u)));

@@ -9,6 +9,8 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/mask_stream.h"
+#include "common/codec/room_axes.h"
+#include "common/geometry/ray_axes.h"
 #include "common/refinement/bounded_patches.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/frame_book.h"
@@ -32,6 +34,13 @@ Status check_tile(const SampledTile& t) {
     return Error{fmt::format("{}: its mask has {}x{} pixels, its rectangle {}x{}", name_of(t, "tile"), t.missed.width(),
                              t.missed.height(), t.rect.width, t.rect.height)};
   return ok_status();
+}
+
+// decoded: unless it is null, it becomes what viewers decode.
+std::shared_ptr<const std::vector<uint8_t>> encoded(const SampledTile& tile, const codec::ErrorBounds& bounds,
+                                                    image::DepthImage* decoded) {
+  return std::make_shared<const std::vector<uint8_t>>(
+      codec::encode(tile.image, bounds, decoded, geometry::ray_axes(tile.camera, tile.rect)));
 }
 
 // The smallest rectangle of the tile that holds all of its samples; of none a pixel.
@@ -163,11 +172,11 @@ struct PackerCore::Impl {
       if (code != 0) farthest = std::min(farthest, code);
     if (event.kept > 0) event.farthest_m = image::decode_depth(farthest, tile.camera.near_m);
     if (event.bounds.exact()) {
-      event.blob = stream ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+      event.blob = stream ? std::move(stream) : encoded(tile, {}, nullptr);
       return {};
     }
     image::DepthImage decoded;
-    event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image, event.bounds, &decoded));
+    event.blob = encoded(tile, event.bounds, &decoded);
     // What stands in for a frame that is coming is soon forgotten.
     event.refinable = tile.step == 1;
     ++statistics.patches_bounded;

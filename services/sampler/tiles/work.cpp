@@ -2,7 +2,9 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/mask_stream.h"
+#include "common/codec/room_axes.h"
 #include "common/core/log.h"
+#include "common/geometry/ray_axes.h"
 #include "common/net/dispatch.h"
 
 namespace telesplat::sampler {
@@ -45,7 +47,7 @@ Delivery TileWork::sample_next() {
   const HeldLease held = std::move(leases_.front());
   leases_.pop_front();
   const Sampled sampled = source_->sample(held);
-  const auto stream = codec::encode(sampled.image);
+  const auto stream = codec::encode(sampled.image, {}, nullptr, geometry::ray_axes(held.lease.camera, held.lease.rect));
   Delivery out{wire::DepthTile::kName,
                {},
                sampled.begin_s,

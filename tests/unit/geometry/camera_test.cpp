@@ -5,6 +5,7 @@
 #include <random>
 
 #include "common/geometry/camera.h"
+#include "common/geometry/ray_axes.h"
 
 namespace telesplat::geometry {
 namespace {
@@ -82,6 +83,19 @@ TEST(Camera, ValidationRefusesWhatCannotBeACamera) {
   EXPECT_TRUE(refused([](Camera& c) { c.near_m = std::numeric_limits<double>::infinity(); }));
   EXPECT_TRUE(refused([](Camera& c) { c.width = kMaxImageSide + 1; }));
   EXPECT_TRUE(refused([](Camera& c) { c.height = 0; }));
+}
+
+TEST(RayAxes, SayWhereAPixelsPointLies) {
+  const Camera camera = make_camera({{0.1, 0.2, 0.9}, {0.6, 0, 0.8, 0}}, 70, 103, 61);
+  const Rect part{40, 7, 50, 50};
+  const auto axes = ray_axes(camera, part);
+  for (const auto& [x, y] : {std::pair{0, 0}, {49, 3}, {17, 49}}) {
+    const glm::dvec3 place = camera.unproject(part.x + x + 0.5, part.y + y + 0.5, 0.7) - camera.pose.position_room;
+    for (int i = 0; i < 3; ++i) {
+      const auto& [a, b, c] = axes[static_cast<size_t>(i)];
+      EXPECT_NEAR(0.7 * (a * x + b * y + c), place[i], 1e-12);
+    }
+  }
 }
 
 TEST(Subsample, LooksWhereTheFullCameraDoes) {

@@ -176,9 +176,9 @@ TEST(CodecBenchMeasure, AddsUpToTheStreams) {
   ASSERT_TRUE(measure.add(frame));
   const CodecReport report = measure.finish("made");
   size_t bits = 0, covered = 0;
-  for (const auto& tile : tiles_of(frame.image)) {
-    bits += 8 * codec::encode(tile).size();
-    covered += tile.pixels();
+  for (const DepthFrame& tile : tiles_of(frame)) {
+    bits += 8 * codec::encode(tile.image).size();
+    covered += tile.image.pixels();
   }
   EXPECT_EQ(report.bits.all(), bits);
   EXPECT_EQ(report.covered, covered);

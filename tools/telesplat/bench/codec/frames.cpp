@@ -99,7 +99,7 @@ Result<DepthFrame> read_frame(const std::string& path, double fov_deg) {
   if (!image) return Error{fmt::format("{}: {}", path, image.error().text)};
   const auto camera = recorded_camera(path);
   if (!camera) return camera.error();
-  DepthFrame out{std::move(*image), 0};
+  DepthFrame out{std::move(*image), 0, *camera};
   out.focal_px = *camera ? (*camera)->focal_x() : out.image.width / 2.0 / std::tan(fov_deg * std::numbers::pi / 360);
   return out;
 }
@@ -124,18 +124,22 @@ Result<std::vector<DepthFrame>> sample_frames(const data::DataOptions& data, con
     const auto camera = geometry::make_camera(pose, options.fov_deg, size->first, size->second);
     auto image = (*direct)->sample(camera, EpochId{1});
     if (!image) return image.error();
-    out.push_back({std::move(*image), camera.focal_x()});
+    out.push_back({std::move(*image), camera.focal_x(), camera});
   }
   return out;
 }
 
-std::vector<image::DepthImage> tiles_of(const image::DepthImage& image) {
-  std::vector<image::DepthImage> out;
+std::vector<DepthFrame> tiles_of(const DepthFrame& frame) {
+  const image::DepthImage& image = frame.image;
+  std::vector<DepthFrame> out;
   for (int y = 0; y < image.height; y += kTile)
     for (int x = 0; x < image.width; x += kTile) {
-      auto tile = cut(image, {x, y, std::min(kTile, image.width - x), std::min(kTile, image.height - y)});
+      const geometry::Rect rect{x, y, std::min(kTile, image.width - x), std::min(kTile, image.height - y)};
+      auto tile = cut(image, rect);
       const auto empty = std::count(tile.depth.begin(), tile.depth.end(), 0u);
-      if (ptrdiff_t(tile.pixels()) - empty >= kLeastCovered) out.push_back(std::move(tile));
+      if (ptrdiff_t(tile.pixels()) - empty < kLeastCovered) continue;
+      out.push_back({std::move(tile), frame.focal_px});
+      if (frame.camera) out.back().camera = geometry::crop(*frame.camera, rect);
     }
   return out;
 }

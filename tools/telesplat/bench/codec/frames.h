@@ -2,10 +2,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/geometry/camera.h"
 #include "common/image/depth_image.h"
 #include "services/data/data_options.h"
 
@@ -14,6 +16,7 @@ namespace telesplat::launcher {
 struct DepthFrame {
   image::DepthImage image;
   double focal_px = 0;  ///< of its camera
+  std::optional<geometry::Camera> camera{};  ///< nothing: it is not known where it looked
 };
 
 /// Images that are measured as one. Those of files are named alike but for a number: colorado-01.depth,
@@ -54,6 +57,6 @@ Result<std::vector<DepthFrame>> sample_frames(const data::DataOptions& data, con
 
 /// The tiles of an image as a session cuts it, 256 x 256 pixels or what is left at the right and at the bottom, with 64
 /// covered pixels or more.
-std::vector<image::DepthImage> tiles_of(const image::DepthImage& image);
+std::vector<DepthFrame> tiles_of(const DepthFrame& frame);
 
 }  // namespace telesplat::launcher

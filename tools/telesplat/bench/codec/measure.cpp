@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "common/codec/depth_codec.h"
+#include "common/codec/room_axes.h"
+#include "common/geometry/ray_axes.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -37,9 +39,18 @@ double severity(const CodecErrors& e) {
   return double(e.uncovered) * 1e6 + e.depth_px.largest + e.normal_codes.largest + e.colour_codes.largest;
 }
 
-image::DepthImage through_codec(const image::DepthImage& image, const codec::ErrorBounds& bounds) {
+// As samplers and packers do it, who know where a tile looks.
+std::vector<uint8_t> encoded(const DepthFrame& tile, const codec::ErrorBounds& bounds = {},
+                             image::DepthImage* decoded = nullptr) {
+  const auto& [image, focal_px, camera] = tile;
+  if (!camera) return codec::encode(image, bounds, decoded);
+  return codec::encode(image, bounds, decoded, geometry::ray_axes(*camera, {0, 0, image.width, image.height}));
+}
+
+image::DepthImage through_codec(const DepthFrame& frame, const codec::ErrorBounds& bounds) {
   image::DepthImage out;
-  return codec::decode_into(out, codec::encode(image, bounds)) ? out : image::DepthImage(image.width, image.height);
+  return codec::decode_into(out, encoded(frame, bounds)) ? out
+                                                         : image::DepthImage(frame.image.width, frame.image.height);
 }
 
 }  // namespace
@@ -53,18 +64,19 @@ Status CodecMeasure::add(const DepthFrame& frame) {
   ++report_.frames;
   report_.pixels += frame.image.pixels();
   CodecErrors errors;
-  for (const auto& tile : tiles_of(frame.image))
-    if (const Status s = add_tile(tile, frame.focal_px, errors); !s) return s;
+  for (const DepthFrame& tile : tiles_of(frame))
+    if (const Status s = add_tile(tile, errors); !s) return s;
   if (options_.error_maps && severity(errors) > worst_error_) {
     worst_error_ = severity(errors);
-    worst_ = error_maps(frame.image, through_codec(frame.image, options_.wish.bounds(frame.focal_px)), frame.focal_px);
+    worst_ = error_maps(frame.image, through_codec(frame, options_.wish.bounds(frame.focal_px)), frame.focal_px);
   }
   report_.errors.merge(errors);
   return ok_status();
 }
 
-Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, CodecErrors& errors) {
-  const auto stream = codec::encode(tile);
+Status CodecMeasure::add_tile(const DepthFrame& frame, CodecErrors& errors) {
+  const image::DepthImage& tile = frame.image;
+  const auto stream = encoded(frame);
   if (const Status s = add_stream(stream, report_.bits); !s) return s;
   image::DepthImage decoded;
   if (const Status s = codec::decode_into(decoded, stream); !s)
@@ -72,10 +84,10 @@ Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, Co
   if (decoded.width != tile.width || decoded.height != tile.height)
     return Error{fmt::format("a tile of {} x {} pixels came back as {} x {}", tile.width, tile.height, decoded.width,
                              decoded.height)};
-  const codec::ErrorBounds bounds = options_.wish.bounds(focal_px);
+  const codec::ErrorBounds bounds = options_.wish.bounds(frame.focal_px);
   if (bounds.exact())
-    add_errors(tile, decoded, focal_px, errors);
-  else if (const Status s = add_bounded(tile, bounds, errors, focal_px); !s)
+    add_errors(tile, decoded, frame.focal_px, errors);
+  else if (const Status s = add_bounded(frame, bounds, errors); !s)
     return s;
   for (BaselineReport& b : report_.baselines) {
     if (!b.missing.empty()) continue;
@@ -89,18 +101,18 @@ Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, Co
   const size_t covered = covered_pixels(tile);
   ++report_.tiles;
   report_.covered += covered;
-  if (tile.width == kTile && tile.height == kTile) keep_to_time(tile, covered, bounds);
+  if (tile.width == kTile && tile.height == kTile) keep_to_time(frame, covered, bounds);
   return ok_status();
 }
 
-Status CodecMeasure::add_bounded(const image::DepthImage& tile, const codec::ErrorBounds& bounds, CodecErrors& errors,
-                                 double focal_px) {
+Status CodecMeasure::add_bounded(const DepthFrame& frame, const codec::ErrorBounds& bounds, CodecErrors& errors) {
+  const image::DepthImage& tile = frame.image;
   image::DepthImage bounded;
-  const auto stream = codec::encode(tile, bounds);
+  const auto stream = encoded(frame, bounds);
   if (const Status s = add_stream(stream, report_.bounded); !s) return s;
   if (const Status s = codec::decode_into(bounded, stream); !s)
     return Error{fmt::format("what was encoded within bounds is not decoded: {}", s.error().text)};
-  add_errors(tile, bounded, focal_px, errors);
+  add_errors(tile, bounded, frame.focal_px, errors);
   const auto refinement = codec::encode_refinement(tile, bounded);
   report_.refinement += 8 * refinement.size();
   const auto exact = codec::decode_refinement(refinement, bounded);
@@ -110,9 +122,9 @@ Status CodecMeasure::add_bounded(const image::DepthImage& tile, const codec::Err
 }
 
 // The fullest ones, of those that are as full those that came first.
-void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered, const codec::ErrorBounds& bounds) {
-  report_.full_tiles += covered == tile.pixels();
-  if (2 * covered < tile.pixels() || options_.seconds <= 0) return;
+void CodecMeasure::keep_to_time(const DepthFrame& tile, size_t covered, const codec::ErrorBounds& bounds) {
+  report_.full_tiles += covered == tile.image.pixels();
+  if (2 * covered < tile.image.pixels() || options_.seconds <= 0) return;
   const auto fuller = [](size_t c, const Timed& t) { return c > t.covered; };
   timed_.insert(std::upper_bound(timed_.begin(), timed_.end(), covered, fuller), {covered, tile, bounds});
   if (timed_.size() > kMostTimed) timed_.pop_back();
@@ -121,12 +133,12 @@ void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered, c
 void CodecMeasure::measure_speeds_of_kept() {
   if (timed_.empty()) return;
   if (report_.full_tiles >= kFewFull)
-    std::erase_if(timed_, [](const Timed& t) { return t.covered != t.tile.pixels(); });
+    std::erase_if(timed_, [](const Timed& t) { return t.covered != t.frame.image.pixels(); });
   size_t covered = 0, pixels = 0, kept = 0;  // kept: so that nothing is left out
   std::vector<std::vector<uint8_t>> streams;
   for (const Timed& t : timed_) {
-    streams.push_back(codec::encode(t.tile));
-    covered += t.covered, pixels += t.tile.pixels();
+    streams.push_back(encoded(t.frame));
+    covered += t.covered, pixels += t.frame.image.pixels();
   }
   report_.timed_tiles = timed_.size();
   report_.timed_covered = double(covered) / double(pixels);
@@ -134,7 +146,7 @@ void CodecMeasure::measure_speeds_of_kept() {
   report_.speeds = measure_speeds(
       covered, options_.seconds,
       [&] {
-        for (const Timed& t : timed_) kept += codec::encode(t.tile).size();
+        for (const Timed& t : timed_) kept += encoded(t.frame).size();
       },
       [&] {
         for (const auto& stream : streams) kept += size_t(codec::decode_into(decoded, stream).ok());
@@ -148,14 +160,14 @@ void CodecMeasure::measure_bounded_speeds(size_t covered) {
   std::vector<image::DepthImage> bounded(timed_.size());
   size_t kept = 0;
   for (size_t i = 0; i < timed_.size(); ++i) {
-    streams.push_back(codec::encode(timed_[i].tile, timed_[i].bounds, &bounded[i]));
-    refinements.push_back(codec::encode_refinement(timed_[i].tile, bounded[i]));
+    streams.push_back(encoded(timed_[i].frame, timed_[i].bounds, &bounded[i]));
+    refinements.push_back(codec::encode_refinement(timed_[i].frame.image, bounded[i]));
   }
   image::DepthImage decoded;
   report_.bounded_speeds = measure_speeds(
       covered, options_.seconds,
       [&] {
-        for (const Timed& t : timed_) kept += codec::encode(t.tile, t.bounds).size();
+        for (const Timed& t : timed_) kept += encoded(t.frame, t.bounds).size();
       },
       [&] {
         for (const auto& stream : streams) kept += size_t(codec::decode_into(decoded, stream).ok());
@@ -163,7 +175,8 @@ void CodecMeasure::measure_bounded_speeds(size_t covered) {
   report_.refinement_speeds = measure_speeds(
       covered, options_.seconds,
       [&] {
-        for (size_t i = 0; i < timed_.size(); ++i) kept += codec::encode_refinement(timed_[i].tile, bounded[i]).size();
+        for (size_t i = 0; i < timed_.size(); ++i)
+          kept += codec::encode_refinement(timed_[i].frame.image, bounded[i]).size();
       },
       [&] {
         for (size_t i = 0; i < timed_.size(); ++i)

@@ -74,18 +74,17 @@ class CodecMeasure {
   const std::optional<image::View>& worst_maps() const { return worst_; }
 
  private:
-  Status add_tile(const image::DepthImage& tile, double focal_px, CodecErrors& errors);
+  Status add_tile(const DepthFrame& tile, CodecErrors& errors);
 
   MeasureOptions options_;
   CodecReport report_;
   struct Timed {
     size_t covered = 0;
-    image::DepthImage tile;
+    DepthFrame frame;
     codec::ErrorBounds bounds;
   };
-  Status add_bounded(const image::DepthImage& tile, const codec::ErrorBounds& bounds, CodecErrors& errors,
-                     double focal_px);
-  void keep_to_time(const image::DepthImage& tile, size_t covered, const codec::ErrorBounds& bounds);
+  Status add_bounded(const DepthFrame& tile, const codec::ErrorBounds& bounds, CodecErrors& errors);
+  void keep_to_time(const DepthFrame& tile, size_t covered, const codec::ErrorBounds& bounds);
   void measure_speeds_of_kept();
   void measure_bounded_speeds(size_t covered);
 

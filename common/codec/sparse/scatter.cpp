@@ -1,6 +1,6 @@
 // Encoder and decoder must predict alike on every machine: this file is compiled without contraction of products and
 // sums, and its operations are those whose rounding IEEE 754 prescribes.
-#include "common/codec/scatter.h"
+#include "common/codec/sparse/scatter.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "common/codec/scatter_coder.h"
+#include "common/codec/sparse/scatter_coder.h"
 
 #include <algorithm>
 #include <bit>
@@ -89,28 +89,44 @@ size_t farness(uint32_t colour, uint32_t predicted, int green) {
 
 size_t sign_of(int residual) { return residual < 0 ? 0 : residual == 0 ? 1 : 2; }
 
-// `colour` becomes what is decoded. False where there is no such step.
+// What a pixel's colour is predicted to be, and by which models it is coded.
+struct ColourGuess {
+  uint32_t colour;
+  AdaptiveBit* plain;
+  SignedModel* green;
+};
+ColourGuess guess_colour(ScatterContexts& contexts, const Guess& guess, const Ramp* ramp, int height) {
+  if (ramp != nullptr)
+    if (const Ramp::Said said = ramp->at(height); said.gap != Ramp::kNothing)
+      return {said.colour, &contexts.plain_ramp[said.gap], &contexts.ramp[said.gap]};
+  return {guess.pixel.colour, &contexts.plain[guess.plain_colour],
+          &contexts.colour[0][byte_size(guess.expected.colour)]};
+}
+
+// `pixel` has its depth; its colour becomes what is decoded. False where there is no such step.
 template <class Coder>
-bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, uint32_t& colour, Magnitudes& out,
-                 const Coder& coder) {
-  const uint32_t predicted = guess.pixel.colour;
+bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, Ramp* ramp, int x, int y, Pixel& pixel,
+                 Magnitudes& out, const Coder& coder) {
+  const int height = ramp != nullptr ? ramp->height(x, y, pixel.depth) : 0;
+  const auto [predicted, plain, model_of_green] = guess_colour(contexts, guess, ramp, height);
+  const uint32_t colour = pixel.colour;
   uint32_t result = predicted;
   bool good = true;
-  if (coder(!is_near(colour, predicted, reach), contexts.plain[guess.plain_colour]) != 0) {
+  if (coder(!is_near(colour, predicted, reach), *plain) != 0) {
     const ColourLattice lattice(reach);
     const auto index = [&](uint32_t word, int c) {
       return lattice.index(static_cast<int>(byte_at(word, kChannels[c])));
     };
     result = 0;
     int residual[3];
-    const auto code_channel = [&](int c, unsigned context, size_t sign) {
-      const int expected = index(predicted, c) + (c == 0 ? 0 : residual[0]), most = lattice.index(255);
-      residual[c] = contexts.colour[c][context].code(coder, index(colour, c) - expected, sign);
+    const auto code_channel = [&, base = predicted](int c, SignedModel& model, size_t sign) {
+      const int expected = index(base, c) + (c == 0 ? 0 : residual[0]), most = lattice.index(255);
+      residual[c] = model.code(coder, index(colour, c) - expected, sign);
       const int step = expected + residual[c];
       good &= step >= 0 && step <= most;
       result |= static_cast<uint32_t>(lattice.value(std::clamp(step, 0, most))) << 8 * kChannels[c];
     };
-    code_channel(0, byte_size(guess.expected.colour), 1);
+    code_channel(0, *model_of_green, 1);
     const auto green = static_cast<int>(byte_at(result, kChannels[0]));
     const int32_t last = contexts.last_of_green[static_cast<size_t>(green)];
     const auto known = static_cast<uint32_t>(last);
@@ -121,13 +137,15 @@ bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, uint3
       result = known;
       for (int c = 1; c < 3; ++c) residual[c] = index(known, c) - index(predicted, c) - residual[0];
     } else {
-      for (int c = 1; c < 3; ++c) code_channel(c, byte_size(size_of(residual[c - 1])), sign_of(residual[c - 1]));
+      for (int c = 1; c < 3; ++c)
+        code_channel(c, contexts.colour[c][byte_size(size_of(residual[c - 1]))], sign_of(residual[c - 1]));
     }
     out.colour = 1;
     for (const int r : residual) out.colour = std::max(out.colour, static_cast<uint8_t>(byte_size(size_of(r))));
   }
   contexts.last_of_green[byte_at(result, kChannels[0])] = static_cast<int32_t>(result);
-  colour = result;
+  if (ramp != nullptr) ramp->add(height, result);
+  pixel.colour = result;
   return good;
 }
 
@@ -140,20 +158,23 @@ void ScatterContexts::start() {
     for (uint32_t size = 0; size <= kByteBits; ++size)
       for (GolombContext& context : component[size]) context.start(1u << size);
   std::fill(std::begin(plain), std::end(plain), AdaptiveBit());
+  std::fill(std::begin(plain_ramp), std::end(plain_ramp), AdaptiveBit());
+  std::fill(std::begin(ramp), std::end(ramp), SignedModel());
   std::fill(std::begin(again), std::end(again), AdaptiveBit());
   for (auto& channel : colour) std::fill(std::begin(channel), std::end(channel), SignedModel());
   last_of_green.fill(-1);
 }
 
-void ScatterEncoder::start(size_t count, const TileBounds& bounds) {
+void ScatterEncoder::start(size_t count, const TileBounds& bounds, Ramp* ramp) {
   contexts_.start();
   bounds_ = &bounds;
+  ramp_ = ramp;
   colours_.clear();
   colour_coder_ = RangeEncoder(colours_);
   bits_.start(count * kMostPixelBits);
 }
 
-Magnitudes ScatterEncoder::put(Pixel& pixel, const Guess& guess) {
+Magnitudes ScatterEncoder::put(int x, int y, Pixel& pixel, const Guess& guess) {
   Magnitudes out;
   BitSink bits = bits_.sink;
   const auto code = [&](int residual, GolombContext& context) { return context.put(residual, bits), residual; };
@@ -169,7 +190,7 @@ Magnitudes ScatterEncoder::put(Pixel& pixel, const Guess& guess) {
   else
     code_normal(contexts_, guess, pixel.normal, out, code);
   bits_.sink = bits;
-  code_colour(contexts_, bounds_->colour, guess, pixel.colour, out, BitCoder{colour_coder_});
+  code_colour(contexts_, bounds_->colour, guess, ramp_, x, y, pixel, out, BitCoder{colour_coder_});
   return out;
 }
 
@@ -179,9 +200,10 @@ void ScatterEncoder::finish(std::vector<uint8_t>& out) {
   put_stored_block(out, bits_.bytes());
 }
 
-bool ScatterDecoder::start(Reader& in, const TileBounds& bounds) {
+bool ScatterDecoder::start(Reader& in, const TileBounds& bounds, Ramp* ramp) {
   contexts_.start();
   bounds_ = &bounds;
+  ramp_ = ramp;
   const auto colours = get_stored_block(in), bits = get_stored_block(in);
   if (!colours || !bits) return false;
   colour_coder_ = RangeDecoder(*colours);
@@ -189,7 +211,7 @@ bool ScatterDecoder::start(Reader& in, const TileBounds& bounds) {
   return true;
 }
 
-std::optional<Pixel> ScatterDecoder::get(const Guess& guess, Magnitudes& out) {
+std::optional<Pixel> ScatterDecoder::get(int x, int y, const Guess& guess, Magnitudes& out) {
   Pixel pixel;
   out = {};
   BitSource bits = bits_.source;
@@ -209,7 +231,7 @@ std::optional<Pixel> ScatterDecoder::get(const Guess& guess, Magnitudes& out) {
     good = code_normal(contexts_, NormalLattice(bounds_->normal), guess, pixel.normal, out, code);
   else
     code_normal(contexts_, guess, pixel.normal, out, code);
-  good &= code_colour(contexts_, bounds_->colour, guess, pixel.colour, out, BitDecoder{colour_coder_});
+  good &= code_colour(contexts_, bounds_->colour, guess, ramp_, x, y, pixel, out, BitDecoder{colour_coder_});
   bits_.source = bits;
   if (bits_.overrun() || !good) return std::nullopt;
   return pixel;

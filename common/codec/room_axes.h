@@ -1,0 +1,20 @@
+// Where an image's pixels look, for those who encode: colours of many data follow a height in the room.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "common/codec/depth_codec.h"
+
+namespace telesplat::codec {
+
+/// axis . (x, y, 1), divided by a pixel's depth code, is that coordinate of what it shows, from the eye, in a unit of
+/// its own; x and y are the pixel's column and row in the image.
+using RoomAxes = std::array<std::array<double, 3>, 3>;
+
+/// As encode() in depth_codec.h, and what is decoded is as near to `image`. With `axes` colours that follow one of the
+/// room's axes take fewer bytes.
+std::vector<uint8_t> encode(const image::DepthImage& image, const ErrorBounds& bounds, image::DepthImage* decoded,
+                            const RoomAxes& axes);
+
+}  // namespace telesplat::codec

@@ -1,0 +1,81 @@
+// Colours of scattered pixels where a ramp gave them: pixels at like heights in the room have like colours, however far
+// apart they lie. What is known of one says that of the next one at about its height.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/codec/dense/height.h"
+#include "common/codec/entropy.h"
+#include "common/codec/room_axes.h"
+
+namespace telesplat::codec::detail {
+
+/// A pixel's height is floor((a x + b y + c) 2^shift / depth code) - low, kept within 0 and kMost; x and y are counted
+/// from the tile's centre. In the picture, a coordinate of room space is such a quotient.
+struct RampAxis {
+  static constexpr int kMost = 16383, kMostShift = 23;
+  static constexpr int64_t kMostSum = int64_t{1} << 39;  ///< of |a| width + |b| height + |c|
+  int32_t a = 0, b = 0, c = 0, low = 0;
+  int shift = 0;
+
+  int height(int x, int y, uint32_t depth) const {
+    const int64_t sum = (int64_t{a} * x + int64_t{b} * y + c) * (int64_t{1} << shift), code = depth;
+    const int64_t above = (sum >= 0 ? sum / code : -((code - 1 - sum) / code)) - low;
+    return static_cast<int>(above < 0 ? 0 : above > kMost ? kMost : above);
+  }
+};
+
+/// The axis by which colours of samples change least; nothing where none explains them. axes: of the room, from the
+/// tile's centre, or null. samples: their places and indices are set. width, height: of the tile.
+std::optional<RampAxis> fit_ramp(const RoomAxes* axes, std::vector<HeightSample>& samples, int width, int height);
+void put_ramp(std::vector<uint8_t>& out, const RampAxis& axis);
+/// Nothing where the stream is damaged. width, height: of the tile.
+std::optional<RampAxis> get_ramp(Reader& in, int width, int height);
+
+/// What is known of a tile's colours by height.
+class Ramp {
+ public:
+  /// width, height: of the tile.
+  void start(const RampAxis& axis, int width, int height) {
+    axis_ = axis;
+    x0_ = width / 2, y0_ = height / 2;
+    taken_.fill(0);
+  }
+  /// x, y: from the tile's upper left. Precondition: depth > 0.
+  int height(int x, int y, uint32_t depth) const { return axis_.height(x - x0_, y - y0_, depth); }
+
+  static constexpr uint32_t kNothing = 11;
+  struct Said {
+    uint32_t colour = 0;
+    /// How far in heights those lie apart that say so, in bits; kNothing: there is none.
+    uint32_t gap = kNothing;
+  };
+  /// What is between those below and above.
+  Said at(int height) const;
+  void add(int height, uint32_t colour) {
+    const auto cell = static_cast<size_t>(height >> kCellBits);
+    known_[cell] = {height, colour};
+    taken_[cell / 64] |= uint64_t{1} << cell % 64;
+  }
+
+ private:
+  static constexpr int kCellBits = 3, kCells = (RampAxis::kMost + 1) >> kCellBits;
+  struct Known {
+    int height;
+    uint32_t colour;
+  };
+  int last_until(int cell) const;
+  int first_after(int cell) const;
+
+  RampAxis axis_;
+  int x0_ = 0, y0_ = 0;
+  std::array<Known, kCells> known_;  // the last one of each cell
+  std::array<uint64_t, kCells / 64> taken_{};
+};
+
+}  // namespace telesplat::codec::detail
