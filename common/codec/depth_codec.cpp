@@ -29,6 +29,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "common/codec/lattice.h"
 #include "common/codec/room_axes.h"
 #include "common/codec/tile.h"
@@ -154,7 +156,11 @@ std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& bounds, 
 
 std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& bounds, DepthImage* decoded,
                             const RoomAxes& axes) {
-  return encode(image, bounds, decoded, &axes);
+  constexpr double kMost = 1e30;  // beyond, and what is no number, says nothing
+  bool known = true;
+  for (const auto& axis : axes)
+    for (const double v : axis) known &= std::abs(v) < kMost;
+  return encode(image, bounds, decoded, known ? &axes : nullptr);
 }
 
 Result<DepthImage> decode(std::span<const uint8_t> bytes, int expected_width, int expected_height) {

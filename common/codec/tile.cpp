@@ -214,7 +214,10 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
   };
   if ((*kind & kPredictorBits) == kSparse) {
     const auto turns = in.u8();
-    if (!turns || ((*turns & kRamp) != 0 && !get_ramp(in, rect.width, rect.height))) return false;
+    if (!turns) return false;
+    const size_t before = in.left();
+    if ((*turns & kRamp) != 0 && !get_ramp(in, rect.width, rect.height)) return false;
+    info.sparse_bytes += before - in.left();
     return skip(info.sparse_bytes, 2);
   }
   return DenseCoder::skip(in, info);

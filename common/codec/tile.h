@@ -1,6 +1,6 @@
 // One tile's pixels <-> bytes. docs/codec.md describes them.
 //   tile = u8 kind, and unless it is empty: base, [mask], and a dense tile (dense/dense.h) or a sparse one
-//          (scatter_coder.h)
+//          (sparse/scatter_coder.h)
 //   kind = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered
 //   base = depth (3 bytes; within bounds its index), colour (3), normal (2) of the first covered pixel
 #pragma once

@@ -94,6 +94,15 @@ TEST(Ramp, ColoursThatHaveNothingToDoWithHeightCostNoMore) {
   EXPECT_EQ(encode(any, {}, nullptr, axes_of_view()), encode(any));
 }
 
+TEST(Ramp, AxesThatAreNoneSayNothing) {
+  const image::DepthImage tinted = scattered(tint);
+  for (const double bad : {double(NAN), HUGE_VAL, 1e300}) {
+    RoomAxes axes = axes_of_view();
+    axes[1][2] = bad;
+    EXPECT_EQ(encode(tinted, {}, nullptr, axes), encode(tinted));
+  }
+}
+
 TEST(Ramp, SaysWhatIsKnownAboutAHeight) {
   Ramp ramp;
   ramp.start({}, 10, 10);
