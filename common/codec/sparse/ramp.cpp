@@ -1,4 +1,4 @@
-// The same machine code everywhere: what is fitted decides which bytes a tile becomes (see CMakeLists.txt).
+// What is fitted decides which bytes a tile becomes: compiled without contraction, as what predicts (CMakeLists.txt).
 #include "common/codec/sparse/ramp.h"
 
 #include <algorithm>

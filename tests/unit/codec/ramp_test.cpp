@@ -63,7 +63,7 @@ uint32_t tint(double height, size_t) {
          channel(0.3 + 0.3 * std::cos(5 * t));
 }
 
-TEST(Ramp, ColoursByHeightTakeHalfOfWhatTheyTookWhereItIsKnownWhereARayGoes) {
+TEST(Ramp, ColoursByHeightTakeFewBits) {
   const image::DepthImage tinted = scattered(tint), grey = scattered([](double, size_t) { return 0x808080u; });
   const auto without = encode(tinted), with = encode(tinted, {}, nullptr, axes_of_view()), none = encode(grey);
   EXPECT_EQ(decode(without).value(), tinted);
