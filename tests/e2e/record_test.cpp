@@ -21,8 +21,8 @@ void expect_distribution(const nlohmann::json& d, const std::string& name) {
 }
 
 TEST(Record, EveryFileIsThereAndTrue) {
-  // Until what the head sees at rest is sampled.
-  const std::string duration = ordinary_or_slow("2", "12"), hold = ordinary_or_slow("2", "10");
+  // The head moves for as long as the duration is longer than the hold. It rests until what it then sees is sampled.
+  const std::string duration = ordinary_or_slow("4", "12"), hold = ordinary_or_slow("2", "10");
   PipelineRun run({"--duration", duration, "--hold", hold, "--verify", "15", "--record-every", "60"});
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
