@@ -6,6 +6,7 @@
 #include <GLFW/glfw3.h>
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,6 +18,7 @@
 #include "client/viewer/display/frame_presenter.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/gl/egl_context.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -39,6 +41,21 @@ struct Library {
 
 std::atomic<bool> connection_lost{false};
 
+// The driver sends pictures over Xlib's connection with XCB, and does not tell Xlib what it finds out: Xlib's next
+// request would be written to no memory. And Mesa, which draws without a GPU, cuts a picture into parts of no size once
+// XCB knows, for minutes or for ever. So XCB and its socket are asked before requests. Null: another window system.
+struct Xcb {
+  void* connection = nullptr;
+  int socket = -1;
+  int (*has_error)(void* connection) = nullptr;
+
+  bool broken() const {
+    if (!connection) return false;
+    pollfd end{socket, POLLRDHUP, 0};
+    return has_error(connection) || (poll(&end, 1, 0) == 1 && end.revents);
+  }
+} xcb;
+
 // What Xlib does when its connection breaks, or a request is refused, is to write a line and end the process. Instead
 // the window is lost and the viewer ends in order, or the window goes on. GLFW loads Xlib by itself; so its functions
 // are looked up where they are loaded, and a window of another system needs none. Displays are only passed on, so they
@@ -51,6 +68,17 @@ void survive_broken_connection() {
   void* const glfw = dlsym(RTLD_DEFAULT, "glfwGetX11Display");
   if (!xlib || !glfw) return;
   void* const display = reinterpret_cast<void* (*)()>(glfw)();
+  xcb = {};
+  void* const bridge = dlopen("libX11-xcb.so.1", RTLD_LAZY | RTLD_NOLOAD);
+  using OfConnection = int (*)(void* connection);
+  const auto connection_of = bridge ? reinterpret_cast<void* (*)(void*)>(dlsym(bridge, "XGetXCBConnection")) : nullptr;
+  const auto socket_of = reinterpret_cast<OfConnection>(dlsym(xlib, "xcb_get_file_descriptor"));
+  const auto has_error = reinterpret_cast<OfConnection>(dlsym(xlib, "xcb_connection_has_error"));
+  if (display && connection_of && socket_of && has_error) {
+    void* const connection = connection_of(display);
+    xcb = {connection, socket_of(connection), has_error};
+  }
+  if (bridge) dlclose(bridge);
   const auto set_handler = reinterpret_cast<Handler (*)(Handler)>(dlsym(xlib, "XSetIOErrorHandler"));
   const auto set_exit = reinterpret_cast<void (*)(void*, ExitHandler, void*)>(dlsym(xlib, "XSetIOErrorExitHandler"));
   // Another program that drops a file here and ends at once is no reason to end, either.
@@ -122,7 +150,7 @@ struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::unique_ptr<FramePresenter> presenter;
   Interaction* interaction = nullptr;  // while poll() runs
-  bool pointer_caught = false;
+  bool pointer_caught = false, draws_without_gpu = false;
   std::unique_ptr<Gui> gui;
   struct Place {
     int x = 0, y = 0, width = 0, height = 0;
@@ -132,6 +160,13 @@ struct Window::Impl {
 
   ~Impl() {
     if (window) glfwDestroyWindow(window);
+  }
+
+  void say_renderer(int width, int height) {
+    const std::string_view renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+    draws_without_gpu = gl::is_software(renderer);
+    log::info("window: {}x{} pixels, {}, {}", width, height, renderer,
+              presenter->has_pixel_ring() ? "mapped pixel buffers" : "no mapped pixel buffers");
   }
 
   static Impl& of(GLFWwindow* w) { return *static_cast<Impl*>(glfwGetWindowUserPointer(w)); }
@@ -258,9 +293,7 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
       out->impl_->gui = std::move(*gui);
     else
       log::warn("{}", gui.error().text);
-    log::info("window: {}x{} pixels, {}, {}", out->width(), out->height(),
-              reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
-              out->impl_->presenter->has_pixel_ring() ? "mapped pixel buffers" : "no mapped pixel buffers");
+    out->impl_->say_renderer(out->width(), out->height());
   }
   if (glfwGetCurrentContext() == out->impl_->window) glfwMakeContextCurrent(nullptr);
   return out;
@@ -318,7 +351,11 @@ void Window::poll(Interaction& interaction) {
   read_size();
 }
 
-bool Window::lost() const { return connection_lost; }
+bool Window::lost() const {
+  if (xcb.broken()) connection_lost = true;
+  return connection_lost;
+}
+
 bool Window::closing() const { return lost() || glfwWindowShouldClose(impl_->window); }
 
 void Window::set_title(const std::string& title) {
@@ -383,6 +420,8 @@ void Window::present(const image::View& view, const Overlays& overlays, const st
   const int hidden = impl_->gui ? impl_->gui->prepare(place, monotonic_s(), gui) : 0;
   impl_->presenter->draw(view, width, height, overlays, hidden);
   if (impl_->gui) impl_->gui->show(place);
+  if (impl_->draws_without_gpu) glFinish();  // which the swap would do; the display may go away until it is done
+  if (lost()) return;
   glfwSwapBuffers(impl_->window);
 }
 
