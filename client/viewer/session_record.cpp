@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 
 #include "common/core/log.h"
@@ -65,6 +66,9 @@ Status SessionRecord::open_in(const std::string& directory) {
   std::error_code error;
   fs::create_directories(directory + "/images", error);
   if (error) return Error{fmt::format("{}/images: cannot be made: {}", directory, error.message())};
+  lock_ = Descriptor::open_file(directory + "/images", O_RDONLY | O_DIRECTORY);
+  if (!lock_.lock(LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK)  // some file systems know no locks
+    return Error{fmt::format("{}: another viewer records there; give another --out", directory)};
   auto spool = FrameSpool::open(directory + "/spool");
   if (!spool) return spool.error();
   if (options_.received_mb > 0) {

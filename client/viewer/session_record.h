@@ -9,6 +9,7 @@
 #include "client/viewer/record/event_record.h"
 #include "client/viewer/record/frame_spool.h"
 #include "client/viewer/record/slice_record.h"
+#include "common/core/descriptor.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::viewer {
@@ -22,7 +23,7 @@ class SessionRecord {
     uint64_t received_mb = 0;  ///< kept of what was received, MiB at most; 0: nothing
   };
 
-  /// Opens the folder that was told. Error: it cannot be written to.
+  /// Opens the folder that was told. Error: it cannot be written to, or another viewer records there.
   static Result<std::unique_ptr<SessionRecord>> open(const Options& options);
 
   /// Worker's thread: the session as its master tells it, before anything of it is received. The first time it takes
@@ -48,6 +49,7 @@ class SessionRecord {
 
   const Options options_;
   bool known_ = false;  // the session
+  Descriptor lock_;     // on images/, for as long as it records
   std::string directory_, records_in_;
   std::unique_ptr<FrameSpool> spool_;
   std::atomic<FrameSpool*> spool_ready_{nullptr};

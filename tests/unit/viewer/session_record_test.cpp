@@ -49,6 +49,20 @@ TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
   EXPECT_EQ((*first)->records_in(), ".");
 }
 
+// Else the second would write over the files of the first.
+TEST_F(JoinedRecord, TwoViewersThatAreToldOneFolderDoNotShareIt) {
+  for (const char* folder : {"/own", "/run"}) {
+    const SessionRecord::Options told{.out = folder_ + folder, .join = true, .name = "guest", .received_mb = 0};
+    auto first = SessionRecord::open(told);
+    ASSERT_TRUE(first) << first.error().text;
+    const auto second = SessionRecord::open(told);
+    ASSERT_FALSE(second);
+    EXPECT_NE(second.error().text.find("another viewer records there"), std::string::npos) << second.error().text;
+    first->reset();
+    EXPECT_TRUE(SessionRecord::open(told)) << "once the first is gone";
+  }
+}
+
 TEST_F(JoinedRecord, NothingIsWrittenThroughLinks) {
   std::ofstream(folder_ + "/precious") << "mine";
   for (const char* name : {"images", "spool", "points.events", "slices.events"}) {
