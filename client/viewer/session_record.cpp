@@ -100,7 +100,7 @@ void SessionRecord::follow(const wire::Welcome& session) {
     const fs::path own = fs::absolute(options_.out, error).lexically_normal();
     const fs::path named = own.has_filename() ? own : own.parent_path();
     if (metrics::folder_id(named) == id)
-      records_in_ = ".";
+      records_in_ = std::string(".");
     else if (metrics::folder_id(named.parent_path()) == id)
       records_in_ = named.filename().string();
     return;
@@ -115,7 +115,7 @@ void SessionRecord::follow(const wire::Welcome& session) {
 Status SessionRecord::join(const std::string& folder, const std::string& id) {
   if (const Status s = refuse_links(folder); !s) return s;
   if (made(folder + "/images")) {
-    records_in_ = ".";
+    records_in_ = std::string(".");
     return open_in(folder);
   }
   const std::string name = folder_name(options_.name);
