@@ -303,7 +303,9 @@ Window::Window(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { read_size(
 
 Window::~Window() {
   if (lost()) {
-    impl_.release();  // libraries would ask the server that is gone
+    // Libraries would ask the server that is gone. Leaks are looked for, so it is known where this is.
+    [[maybe_unused]] static Impl* volatile kept;
+    kept = impl_.release();
     return;
   }
   const Current current(*this);
