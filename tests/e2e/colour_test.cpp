@@ -113,7 +113,9 @@ TEST_F(ColouredRun, WhatIsDisplayedIsWhatRaysSee) {
 }
 
 TEST_F(ColouredRun, ColoursChangeWhileItRuns) {
-  PipelineRun run(with({"--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify", "10"}), mesh());
+  PipelineRun run(with({"--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify",
+                        ordinary_or_slow("10", "60")}),
+                  mesh());
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   std::string out, err;
   // Another array is fetched, and then its epoch begins.

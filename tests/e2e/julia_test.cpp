@@ -7,6 +7,7 @@
 #include <fstream>
 #include <set>
 
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -94,11 +95,11 @@ TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
     EXPECT_NE(std::find(epochs.begin(), epochs.end(), shown[i]), epochs.end()) << shown[i];
   }
   EXPECT_GT(displayed.size(), 3u);
-  // Compared with the set of its own epoch each frame is right (31 dB); compared with the first epoch's all are at 21
-  // dB.
+  // Compared with the set of its own epoch each frame is right (31 dB; 26 where programs are slow); compared with the
+  // first epoch's all are at 21 dB.
   const auto s = run.summary();
   EXPECT_GE(s["quality"]["views"], 2);
-  EXPECT_GT(s["quality"]["psnr_db"]["median"], 27);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], kSlow ? 24 : 27);
 }
 
 TEST(Julia, ParametersAreSetAndAnimatedWhileItRuns) {

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "common/image/file.h"
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/common/csv_table.h"
 
@@ -106,8 +107,11 @@ TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
 }
 
 TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
-  const std::vector<std::string> common{"--tf", kGlass,   "--fov", "60",           "--duration",
-                                        "2.5",  "--hold", "1.5",   "--target-fps", "20"};
+  const std::vector<std::string> common{"--tf",         kGlass,
+                                        "--fov",        "60",
+                                        "--duration",   ordinary_or_slow("2.5", "11"),
+                                        "--hold",       ordinary_or_slow("1.5", "10"),
+                                        "--target-fps", "20"};
   auto arguments = common;
   arguments.insert(arguments.end(), {"--size", "320x400", "--data-servers", "2", "--samplers", "3", "--wall", "2x1"});
   PipelineRun wall(with(arguments), volume());
