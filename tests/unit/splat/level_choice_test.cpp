@@ -47,8 +47,8 @@ geometry::Camera from(double distance) {
 double largest_jump(const points::PointModel& model, const SelectionOptions& options, double* least = nullptr) {
   double jump = 0, last = -1;
   const auto all = static_cast<double>(model.points());
+  splat::DrawList list;
   for (double distance = 1.0; distance < 6.0; distance *= 1.002) {
-    splat::DrawList list;
     splat::select_view(model, from(distance), options, list);
     uint64_t sum = 0;
     for (const auto& item : list.items) sum += item.level.count;
