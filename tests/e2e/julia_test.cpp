@@ -59,8 +59,8 @@ TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
 }
 
 TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
-  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration", "4", "--verify", "10",
-                        "--trajectory", "still"}),
+  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration",
+                        ordinary_or_slow("4", "10"), "--verify", "10", "--trajectory", "still"}),
                   "julia");
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
