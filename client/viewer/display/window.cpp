@@ -62,13 +62,13 @@ struct Xcb {
 // need no type.
 void survive_broken_connection() {
   connection_lost = false;
+  xcb = {};
   using Handler = int (*)(void* display);
   using ExitHandler = void (*)(void* display, void* data);
   void* const xlib = dlopen("libX11.so.6", RTLD_LAZY | RTLD_NOLOAD);
   void* const glfw = dlsym(RTLD_DEFAULT, "glfwGetX11Display");
   if (!xlib || !glfw) return;
   void* const display = reinterpret_cast<void* (*)()>(glfw)();
-  xcb = {};
   void* const bridge = dlopen("libX11-xcb.so.1", RTLD_LAZY | RTLD_NOLOAD);
   using OfConnection = int (*)(void* connection);
   const auto connection_of = bridge ? reinterpret_cast<void* (*)(void*)>(dlsym(bridge, "XGetXCBConnection")) : nullptr;
