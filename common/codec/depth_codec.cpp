@@ -1,7 +1,7 @@
 // The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), and dense tiles
 // (dense/): depth first (depth), normals by what depth says of them (normals, guided), colours by a palette and by
 // height (colours, height); residuals -> tokens by context -> words (symbols, tables, rans). Where few pixels are
-// covered: prediction from coarse to fine (scatter), residuals -> adaptive Golomb codes (scatter_coder, golomb).
+// covered: prediction from coarse to fine (scatter), residuals -> bits by how far they spread (scatter_coder, spread).
 //
 // Bits a covered pixel of 256 x 256 tiles of frames of 1280 x 800, outlines, masks and sparse tiles included; LZW is
 // that of TIFF, with its predictor:
@@ -44,7 +44,7 @@ using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
 // after them. bounds = varint depth, u8 normal, u8 colour
-constexpr uint8_t kMagic = 0xD7, kVersion = 7, kBounded = 1, kKnownFlags = kBounded;
+constexpr uint8_t kMagic = 0xD7, kVersion = 8, kBounded = 1, kKnownFlags = kBounded;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 

@@ -58,6 +58,12 @@ class RangeEncoder {
       while (range_ < 1u << 24) range_ <<= 8, shift();
     }
   }
+  /// One of several places, which fill 2^16: it begins at `begin` and has `size`.
+  void put_share(uint32_t begin, uint32_t size) {
+    const uint32_t unit = range_ >> 16;
+    low_ += uint64_t{unit} * begin, range_ = unit * size;
+    while (range_ < 1u << 24) range_ <<= 8, shift();
+  }
   /// The fewest bytes that mean the same: zeros follow them.
   void finish() {
     for (int zeros = 32; zeros >= 0; --zeros) {
@@ -121,6 +127,13 @@ class RangeDecoder {
     }
     return value;
   }
+  /// Below 2^16: in the place that put_share() was given, which take_share() must be told.
+  uint32_t share() const { return std::min(code_ / (range_ >> 16), 65535u); }
+  void take_share(uint32_t begin, uint32_t size) {
+    const uint32_t unit = range_ >> 16;
+    code_ -= unit * begin, range_ = unit * size;
+    for (; range_ < 1u << 24; range_ <<= 8) code_ = code_ << 8 | next();
+  }
   /// All bytes were read.
   bool finished() const { return at_ == bytes_.size(); }
 
@@ -137,11 +150,28 @@ struct BitCoder {
   RangeEncoder& coder;
   uint32_t operator()(uint32_t bit, AdaptiveBit& model) const { return coder.put(bit, model), bit; }
   uint32_t raw(uint32_t value, unsigned count) const { return coder.put_raw(value, count), value; }
+  template <class Shares>
+  int place(int place, const Shares& shares) const {
+    const uint32_t begin = shares.begin(place);
+    return coder.put_share(begin, shares.begin(place + 1) - begin), place;
+  }
 };
 struct BitDecoder {
   RangeDecoder& coder;
   uint32_t operator()(uint32_t, AdaptiveBit& model) const { return coder.get(model); }
   uint32_t raw(uint32_t, unsigned count) const { return coder.get_raw(count); }
+  /// Shares: begin(place) of [0, 2^16) for 0 <= place <= places(), rising.
+  template <class Shares>
+  int place(int, const Shares& shares) const {
+    const uint32_t share = coder.share();
+    int low = 0, high = shares.places();
+    while (high - low > 1) {
+      const int middle = (low + high) / 2;
+      (shares.begin(middle) <= share ? low : high) = middle;
+    }
+    const uint32_t begin = shares.begin(low);
+    return coder.take_share(begin, shares.begin(low + 1) - begin), low;
+  }
 };
 
 /// A signed number: how large it is by unary bits, its sign, the two bits below its highest one, and the rest as it is.

@@ -137,7 +137,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     const auto ramp = find_ramp(s, image, rect, axes);
     out.push_back(static_cast<uint8_t>(pole | (ramp ? kRamp : 0)));
     if (ramp) put_ramp(out, *ramp), s.ramp.start(*ramp, rect.width, rect.height);
-    s.scatter_encoder.start(covered, bounds, ramp ? &s.ramp : nullptr);
+    s.scatter_encoder.start(bounds, ramp ? &s.ramp : nullptr);
     encode_sparse(s, image, rect, base, pole);
     s.scatter_encoder.finish(out);
     return covered;
@@ -218,7 +218,7 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     const size_t before = in.left();
     if ((*turns & kRamp) != 0 && !get_ramp(in, rect.width, rect.height)) return false;
     info.sparse_bytes += before - in.left();
-    return skip(info.sparse_bytes, 2);
+    return skip(info.sparse_bytes, 1);
   }
   return DenseCoder::skip(in, info);
 }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "common/core/clock.h"
 #include "common/net/service.h"
@@ -78,28 +79,32 @@ TEST(HostilePeers, WhatNobodyReadsIsBoundedInBytes) {
 // A publisher, to one who reads and one who does not: with keys, and without.
 void expect_reader_served(Bound& bound, Socket& reads, const std::function<bool()>& deaf_is_gone) {
   const double until = monotonic_s() + kDeadline_s;
-  int published = 0, got = 0, missed = 0;
+  int published = 0, first = 0, got = 0, missed = 0;
+  const auto publish = [&](size_t size) {
+    std::string body(size, 'x');
+    std::memcpy(body.data(), &published, sizeof published);
+    EXPECT_TRUE(bound.socket.send_frames({}, "x", body));
+    ++published;
+  };
   const auto receive = [&] {
     while (const auto m = reads.receive()) {
-      missed += m->body.size() < 4 ? 1 : 0;
+      int number = -1;
+      if (m->body.size() >= sizeof number) std::memcpy(&number, m->body.data(), sizeof number);
+      if (got == 0) first = number;  // those before it came to nobody
+      missed += number != first + got;
       ++got;
     }
   };
   while (got == 0 && monotonic_s() < until) {  // subscribed?
-    bound.socket.send_frames({}, "x", std::string(100, 'x'));
-    ++published;
+    publish(100);
     wait_readable({&reads}, 20);
     receive();
   }
-  const int first = published - got;
   const double before_mb = resident_mb();
   double most_mb = 0;
   while ((published < 3000 || got < published - first) && monotonic_s() < until) {
     // Half of what may wait for anybody: with more, who reads slowly would be late as well.
-    if (published < 3000 && published - first - got < 16) {
-      EXPECT_TRUE(bound.socket.send_frames({}, "x", std::string(kBody, 'x')));
-      ++published;
-    }
+    if (published < 3000 && published - first - got < 16) publish(kBody);
     if (published % 100 == 0) most_mb = std::max(most_mb, resident_mb() - before_mb);
     wait_readable({&reads}, published < 3000 ? 0 : 5);
     receive();

@@ -48,7 +48,7 @@ uint64_t scatter(const Parcel& p) {
   Digest digest;
   walk(mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
     int parts[kParts];
-    parts_of(predictor.predict(x, y, neighbours).pixel, parts);
+    parts_of(predictor.predict(x, y, neighbours), parts);
     for (int& part : parts) digest.add(static_cast<uint32_t>(part += context.get(bits.source)));
     predictor.add(x, y, pixel_of(parts), {});
     return true;

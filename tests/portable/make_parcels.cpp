@@ -74,7 +74,7 @@ void add_scatter(File& file, const image::DepthImage& image, const Mask& mask) {
     const Pixel pixel = at(image, x, y);
     int parts[kParts], guessed[kParts];
     parts_of(pixel, parts);
-    parts_of(predictor.predict(x, y, neighbours).pixel, guessed);
+    parts_of(predictor.predict(x, y, neighbours), guessed);
     for (int i = 0; i < kParts; ++i) {
       context.put(parts[i] - guessed[i], bits.sink);
       digest.add(static_cast<uint32_t>(parts[i]));

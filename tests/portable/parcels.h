@@ -56,6 +56,12 @@ inline void parts_of(const codec::detail::Pixel& p, int* out) {
   out[5] = static_cast<int>(p.colour >> 16 & 255);
 }
 
+inline void parts_of(const codec::detail::Guess& guess, int* out) {
+  const auto whole = [](int sixteenths) { return (sixteenths + 8) >> 4; };
+  out[0] = whole(guess.depth), out[1] = whole(guess.normal[0]) & 255, out[2] = whole(guess.normal[1]) & 255;
+  for (int c = 0; c < 3; ++c) out[3 + c] = static_cast<int>(guess.colour >> 8 * c & 255);
+}
+
 inline codec::detail::Pixel pixel_of(const int* parts) {
   const auto byte = [&](int i) { return static_cast<uint32_t>(parts[i]) & 255; };
   return {static_cast<uint32_t>(parts[0]), byte(3) | byte(4) << 8 | byte(5) << 16,

@@ -75,18 +75,23 @@ def guests_at(samples):
     return lambda t: len({name for at, name in times if abs(at - t) < SAMPLE_S / 2})
 
 
+def serves_guests(name):
+    """A sampler and a data server hold what one lease or one chunk needs, however many viewers there are."""
+    return not name.startswith(("sampler", "data"))
+
+
 def memory(samples, name, length_s):
     """(MB of a process in the first half of the time after the warm-up, in the second, with how many guests). Each
-    guest takes memory of its own while it is there, so that times with equally many of them are compared: with that
-    number of which both halves have most."""
+    guest takes memory, while it is there, of those who serve it: so times with equally many of them are compared, with
+    that number of which both halves have most. Of others all times are, and the number is None."""
     warm_s = length_s / 3
     half_s = (warm_s + length_s) / 2
-    guests = guests_at(samples)
+    guests = guests_at(samples) if serves_guests(name) else lambda t: None
     halves = {}
     for s in samples:
         if s[1] == name and not s[3] and s[0] >= warm_s:
             halves.setdefault(guests(s[0]), ([], []))[s[0] >= half_s].append(s[4])
-    number = max(halves, key=lambda n: (min(map(len, halves[n])), -n), default=0)
+    number = max(halves, key=lambda n: (min(map(len, halves[n])), -(n or 0)), default=0)
     return *halves.get(number, ([], [])), number
 
 
@@ -104,7 +109,8 @@ def steadiness(soak):
         if len(first) >= 5 and len(last) >= 5:
             a, b = (max(first), max(last)) if begins_anew else (statistics.median(first), statistics.median(last))
             what = f"most memory of {name}, in {lives} lives" if begins_anew else f"memory of {name}"
-            out.append((f"{what}, guests: {guests}", f"{a:.1f} -> {b:.1f} MB ({100 * (b / a - 1):+.1f} %)",
+            what += "" if guests is None else f", guests: {guests}"
+            out.append((what, f"{a:.1f} -> {b:.1f} MB ({100 * (b / a - 1):+.1f} %)",
                         f"at most +{100 * GROWTH:.0f} % or {SLACK_MB} MB", b - a <= max(GROWTH * a, SLACK_MB)))
         for what, column in (("descriptors", 5), ("threads", 6)):
             first, last = windows(soak.samples, name, column, length_s)

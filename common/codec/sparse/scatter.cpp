@@ -143,7 +143,11 @@ void ScatterPredictor::add(int x, int y, const Pixel& pixel, const Magnitudes& k
 }
 
 Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbours) {
-  if (neighbours.empty()) return {.pixel = base_};
+  if (neighbours.empty()) {
+    const auto sixteenths = [&](int shift) { return 16 * static_cast<int>(base_.normal >> shift & 255); };
+    return {
+        .depth = 16 * static_cast<int>(base_.depth), .normal = {sixteenths(0), sixteenths(8)}, .colour = base_.colour};
+  }
   Near near;
   near.count = neighbours.size();
   const Known* nearest = nullptr;
@@ -162,7 +166,7 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
   const Moments moments(near);
   const Four at = load(&nearest->depth), colour_at = load(nearest->colour);
   const Four most{1e30f, 127.5f, 127.5f, 1e30f}, turn{0, 256, 256, 0};  // a normal's bytes wrap: the shorter way
-  Four sum = {}, colour = {}, sizes = {};
+  Four sum = {}, colour = {}, sizes = {}, mean = {}, squares = {};
   for (size_t i = 0; i < near.count; ++i) {
     const Known& k = known_[neighbours[i]];
     const float w = near.weight[i];
@@ -170,27 +174,32 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
     Four d = load(&k.depth) - at;
     d = d > most ? d - turn : d < -most ? d + turn : d;
     sum += share * d;
+    mean += four(w) * d, squares += four(w) * d * d;
     colour += share * (load(k.colour) - colour_at);
     sizes += four(w) * load(k.sizes);
   }
 
   Guess out;
-  constexpr float kFar = image::kMaxDepthCode;
-  const FourInt by = rounded(sum, Four{-kFar, -128, -128, 0}, Four{kFar, 127, 127, 0});
-  out.pixel.depth = static_cast<uint32_t>(
-      std::clamp(static_cast<int>(nearest->depth) + by[0], 1, static_cast<int>(image::kMaxDepthCode)));
-  for (int c = 0; c < 2; ++c) {
-    const int byte = static_cast<int>(nearest->normal[c]) + by[1 + c];
-    out.pixel.normal = static_cast<uint16_t>(out.pixel.normal | (byte & 255) << 8 * c);
-  }
+  constexpr float kFar = 16 * image::kMaxDepthCode;
+  const FourInt by = rounded(sum * four(16), Four{-kFar, -16 * 128, -16 * 128, 0}, Four{kFar, 16 * 127, 16 * 127, 0});
+  out.depth =
+      std::clamp(16 * static_cast<int>(nearest->depth) + by[0], 16, 16 * static_cast<int>(image::kMaxDepthCode));
+  for (int c = 0; c < 2; ++c) out.normal[c] = 16 * static_cast<int>(nearest->normal[c]) + by[1 + c];
   const FourInt bytes = rounded(colour_at + colour, four(0), four(255));
-  out.pixel.colour = static_cast<uint32_t>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
-  const FourInt expected = rounded(sizes * four(1 / moments.by_1[0]), four(0), four(24));
+  out.colour = static_cast<uint32_t>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
+  const FourInt expected = rounded(sizes * four(1 / moments.by_1[0]), four(0), four(255));
   const auto size = [&](int i) { return static_cast<uint8_t>(expected[i]); };
   out.expected = {size(0), {size(1), size(2)}, size(3)};
   const float plain = sum[3] + nearest->plain;
   out.plain_colour = plain > 0.9f ? 3 : plain > 0.5f ? 2 : plain > 0 ? 1 : 0;
-  out.distance = std::min(static_cast<uint32_t>(std::bit_width(least)), Guess::kMostDistance);
+  out.distance = std::min(least, Guess::kMostDistance);
+  out.few = near.count < 3;
+  constexpr float kMostSpread = 1 << 27;
+  const Four inverse = four(1 / moments.by_1[0]), middle = mean * inverse,
+             variance = squares * inverse - middle * middle;
+  for (int i = 0; i < 3; ++i)
+    out.spread[i] = static_cast<int>(std::min(16 * std::sqrt(std::max(variance[i], 0.0f)), kMostSpread));
+  out.slope = static_cast<int>(std::min(16 * std::abs(sum[0] - middle[0]), kMostSpread));
   return out;
 }
 

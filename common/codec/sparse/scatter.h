@@ -74,17 +74,22 @@ class ScatterWalk {
   size_t found_count_ = 0;
 };
 
-/// Bits that residuals took: of depth, of the normal's two bytes, the most of the colour's.
+/// How wrong predictions were: of depth and of the normal's bytes by error_log(), of the colour the bits of its largest
+/// residual.
 struct Magnitudes {
   uint8_t depth = 0, normal[2] = {0, 0}, colour = 0;
 };
 
 struct Guess {
-  Pixel pixel;
-  Magnitudes expected;                ///< of the residuals, as those of the neighbours were
-  uint32_t plain_colour = 0;          ///< 0..3: how many neighbours had colours as predicted, from none to all
-  uint32_t distance = kMostDistance;  ///< to the nearest one: bits of its square, 1..kMostDistance
-  static constexpr uint32_t kMostDistance = 7;
+  int depth = 0, normal[2] = {0, 0};  ///< in 16ths of a code
+  uint32_t colour = 0;
+  Magnitudes expected;        ///< as those of the neighbours were
+  uint32_t plain_colour = 0;  ///< 0..3: how many neighbours had colours as predicted, from none to all
+  uint32_t distance = 1;      ///< the square of that to the nearest neighbour, at most kMostDistance
+  bool few = true;            ///< there are fewer than three neighbours
+  int spread[3] = {0, 0, 0};  ///< of the neighbours' depths and normals' bytes, the standard deviation; 16ths
+  int slope = 0;              ///< how far the plane lies from the neighbours' mean depth; 16ths
+  static constexpr uint32_t kMostDistance = 1u << 20;
 };
 
 /// What is known of the pixels that were coded, in the order of the walk.

@@ -7,65 +7,110 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr size_t kMostPixelBits = 3 * GolombContext::kMostBits;
-
 unsigned size_of(int residual) {
   return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(residual))));
 }
-int signed_byte(uint32_t difference) { return static_cast<int8_t>(static_cast<uint8_t>(difference)); }
 uint32_t byte_at(uint32_t word, int i) { return word >> 8 * i & 255; }
-
-// What is coded of a normal's second component depends on the size of its first.
-unsigned beside(unsigned size) { return std::min(size, 4u); }
 unsigned byte_size(unsigned size) { return std::min<unsigned>(size, ScatterContexts::kByteBits); }
 
 // Green first, the others less what green had, as places of bytes.
 constexpr int kChannels[3] = {1, 0, 2};
 
-// Both walk a pixel's residuals alike: code(residual, context) puts the residual, or returns the one that it gets.
-template <class Code>
-void code_normal(ScatterContexts& contexts, const Guess& guess, uint16_t& normal, Magnitudes& out, Code code) {
-  unsigned other = 0;
-  uint32_t result = 0;
-  for (int c = 0; c < 2; ++c) {
-    const uint32_t expected = byte_at(guess.pixel.normal, c);
-    auto& context = contexts.normal[c][byte_size(guess.expected.normal[c])][beside(other)];
-    const int residual = code(signed_byte(byte_at(normal, c) - expected), context);
-    result |= ((expected + static_cast<uint32_t>(residual)) & 255) << 8 * c;
-    other = byte_size(size_of(residual));
-    out.normal[c] = static_cast<uint8_t>(other);
-  }
-  normal = static_cast<uint16_t>(result);
+// What tells how far from its prediction a number is expected to lie: as log8() and error_log() say it.
+struct Signs {
+  int error[3], spread[3], slope;  // of the neighbours
+  int distance, few;
+  int before[2] = {0, 0};  // errors of this pixel's depth, and of the normal's first byte
+};
+
+Signs signs_of(const Guess& guess, const TileBounds& bounds) {
+  const Magnitudes& e = guess.expected;
+  Signs out{{e.depth, e.normal[0], e.normal[1]}, {0, 0, 0}, 0, log8(guess.distance), guess.few};
+  if (guess.few) return out;
+  const auto code = static_cast<uint32_t>(guess.depth >> 4);
+  const int of_depth = bounds.depth ? static_cast<int>(2 * bounds.depth->reach(code) + 1) : 1;
+  const auto log = [](int sixteenths) { return error_log(sixteenths); };
+  out.spread[0] = log(guess.spread[0] / of_depth), out.slope = log(guess.slope / of_depth);
+  for (int c = 1; c < 3; ++c) out.spread[c] = log(guess.spread[c] / (2 * bounds.normal + 1));
+  return out;
 }
 
-// The same within bounds, by steps of lattices. False where there is no such step.
-template <class Code>
-bool code_depth(ScatterContexts& contexts, const DepthLattice& lattice, const Guess& guess, uint32_t& depth,
-                Magnitudes& out, Code code) {
-  const int expected = static_cast<int>(lattice.index(guess.pixel.depth));
-  const int residual =
-      code(static_cast<int>(lattice.index(depth)) - expected, contexts.depth[guess.expected.depth][guess.distance]);
-  out.depth = static_cast<uint8_t>(std::min<unsigned>(size_of(residual), ScatterContexts::kDepthBits));
-  const int index = expected + residual;
-  if (index < 1 || index > static_cast<int>(lattice.last())) return false;
-  depth = lattice.code(static_cast<uint32_t>(index));
+// By least bits for walks over two terrains, a head and a bone, half of their images; 256ths. Of depth and of the
+// normal's bytes.
+struct Weights {
+  int constant, error, next_error, other_error, coarse_error, distance, few, before[2], spread[3], slope;
+};
+constexpr Weights kExact[3] = {{-2941 * 8, 115, 13, 9, 254, -16, 3849 * 8, {0, 0}, {111, 87, 76}, 53},
+                               {-19 * 8, 62, 49, -9, 84, 31, 294 * 8, {41, 0}, {-60, 157, -2}, 17},
+                               {-56 * 8, 51, -10, 33, 93, 26, 87 * 8, {28, 83}, {-52, -34, 153}, 13}};
+constexpr Weights kBounded[3] = {{-1758 * 8, 130, 17, 11, 54, -9, 2937 * 8, {0, 0}, {93, 102, 91}, 55},
+                                 {-603 * 8, 48, 54, -11, 144, 22, 555 * 8, {49, 0}, {-49, 171, -7}, 23},
+                                 {-609 * 8, 37, -12, 36, 137, 18, 392 * 8, {32, 92}, {-46, -39, 170}, 20}};
+
+int scale_of(int kind, bool bounded, const Signs& s) {
+  const Weights& w = (bounded ? kBounded : kExact)[kind];
+  const int error = s.error[kind];
+  return w.constant + w.error * error + w.next_error * s.error[(kind + 1) % 3] +
+         w.other_error * s.error[(kind + 2) % 3] + w.coarse_error * std::min(error, 40) + w.distance * s.distance +
+         w.few * s.few + w.before[0] * s.before[0] + w.before[1] * s.before[1] + w.spread[0] * s.spread[0] +
+         w.spread[1] * s.spread[1] + w.spread[2] * s.spread[2] + w.slope * s.slope;
+}
+
+// A number that is predicted, in 16ths.
+struct Predicted {
+  explicit Predicted(int sixteenths) : nearest((sixteenths + 8) >> 4), rounding(sixteenths + 8 - 16 * nearest) {}
+  int nearest, rounding;
+  int error(int64_t residual) const { return error_log(16 * residual + 8 - rounding); }
+};
+
+// Where among a lattice's intervals a depth in 16ths of a code lies, in 16ths.
+int on_lattice(const DepthLattice& lattice, int depth) {
+  const int code = std::min((depth + 8) >> 4, static_cast<int>(image::kMaxDepthCode));
+  const uint32_t index = lattice.index(static_cast<uint32_t>(code));
+  const auto sixteenths = [&](uint32_t i) { return 16 * static_cast<int>(lattice.code(i)); };
+  const int above = depth - sixteenths(index);
+  const int step = above >= 0 ? sixteenths(index + 1) - sixteenths(index) : sixteenths(index) - sixteenths(index - 1);
+  return 16 * static_cast<int>(index) + (step == 0 ? 0 : static_cast<int>(16 * int64_t{above} / step));
+}
+
+// `depth` and `normal` become what is decoded. False where there is no such number.
+template <class Coder>
+bool code_depth(ScatterContexts& contexts, const DepthLattice* lattice, const Guess& guess, Signs& signs,
+                uint32_t& depth, Magnitudes& out, const Coder& coder) {
+  const Predicted predicted(lattice ? on_lattice(*lattice, guess.depth) : guess.depth);
+  const int64_t wanted = int64_t{lattice ? lattice->index(depth) : depth} - predicted.nearest;
+  const int64_t residual =
+      contexts.depth.code(coder, wanted, predicted.rounding, scale_of(0, lattice != nullptr, signs));
+  signs.before[0] = predicted.error(residual);
+  out.depth = static_cast<uint8_t>(signs.before[0]);
+  const int64_t index = predicted.nearest + residual;
+  if (index < 1 || index > (lattice ? lattice->last() : image::kMaxDepthCode)) return false;
+  depth = lattice ? lattice->code(static_cast<uint32_t>(index)) : static_cast<uint32_t>(index);
   return true;
 }
 
-template <class Code>
-bool code_normal(ScatterContexts& contexts, const NormalLattice& lattice, const Guess& guess, uint16_t& normal,
-                 Magnitudes& out, Code code) {
-  unsigned other = 0;
-  int result = 0;
+template <class Coder>
+bool code_normal(ScatterContexts& contexts, const TileBounds& bounds, const Guess& guess, Signs& signs,
+                 uint16_t& normal, Magnitudes& out, const Coder& coder) {
+  const NormalLattice lattice(bounds.normal);
+  const bool exact = bounds.normal == 0;
+  uint32_t result = 0;
   for (int c = 0; c < 2; ++c) {
-    const int expected = lattice.index(std::min(static_cast<int>(byte_at(guess.pixel.normal, c)), 254));
-    auto& context = contexts.normal[c][byte_size(guess.expected.normal[c])][beside(other)];
-    const int residual = code(lattice.index(static_cast<int>(byte_at(normal, c))) - expected, context);
-    const int index = expected + residual;
-    if (index < 0 || index > lattice.most()) return false;
-    result |= lattice.value(index) << 8 * c;
-    other = byte_size(size_of(residual));
-    out.normal[c] = static_cast<uint8_t>(other);
+    const auto value = static_cast<int>(byte_at(normal, c));
+    const Predicted predicted(exact ? guess.normal[c]
+                                    : lattice.index64(std::clamp(4 * guess.normal[c], 0, 64 * 254)) >> 2);
+    // Bytes wrap, indices do not.
+    const int64_t wanted = exact ? static_cast<int8_t>(static_cast<uint8_t>(value - predicted.nearest))
+                                 : lattice.index(value) - predicted.nearest;
+    const int64_t residual =
+        contexts.normal[c].code(coder, wanted, predicted.rounding, scale_of(1 + c, bounds.depth != nullptr, signs));
+    signs.before[1] = predicted.error(residual);
+    out.normal[c] = static_cast<uint8_t>(signs.before[1]);
+    const int64_t index = predicted.nearest + residual;
+    if (!exact && (index < 0 || index > lattice.most())) return false;
+    result |=
+        (exact ? static_cast<uint32_t>(index) & 255 : static_cast<uint32_t>(lattice.value(static_cast<int>(index))))
+        << 8 * c;
   }
   normal = static_cast<uint16_t>(result);
   return true;
@@ -99,8 +144,7 @@ ColourGuess guess_colour(ScatterContexts& contexts, const Guess& guess, const Ra
   if (ramp != nullptr)
     if (const Ramp::Said said = ramp->at(height); said.gap != Ramp::kNothing)
       return {said.colour, &contexts.plain_ramp[said.gap], &contexts.ramp[said.gap]};
-  return {guess.pixel.colour, &contexts.plain[guess.plain_colour],
-          &contexts.colour[0][byte_size(guess.expected.colour)]};
+  return {guess.colour, &contexts.plain[guess.plain_colour], &contexts.colour[0][byte_size(guess.expected.colour)]};
 }
 
 // `pixel` has its depth; its colour becomes what is decoded. False where there is no such step.
@@ -149,14 +193,20 @@ bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, Ramp*
   return good;
 }
 
+// All of a pixel; false where there is no such one.
+template <class Coder>
+bool code_pixel(ScatterContexts& contexts, const TileBounds& bounds, Ramp* ramp, int x, int y, const Guess& guess,
+                Pixel& pixel, Magnitudes& out, const Coder& coder) {
+  Signs signs = signs_of(guess, bounds);
+  return code_depth(contexts, bounds.depth, guess, signs, pixel.depth, out, coder) &&
+         code_normal(contexts, bounds, guess, signs, pixel.normal, out, coder) &&
+         code_colour(contexts, bounds.colour, guess, ramp, x, y, pixel, out, coder);
+}
+
 }  // namespace
 
 void ScatterContexts::start() {
-  for (uint32_t size = 0; size <= kDepthBits; ++size)
-    for (GolombContext& context : depth[size]) context.start(1u << size);
-  for (auto& component : normal)
-    for (uint32_t size = 0; size <= kByteBits; ++size)
-      for (GolombContext& context : component[size]) context.start(1u << size);
+  for (SpreadModel* model : {&depth, &normal[0], &normal[1]}) model->start();
   std::fill(std::begin(plain), std::end(plain), AdaptiveBit());
   std::fill(std::begin(plain_ramp), std::end(plain_ramp), AdaptiveBit());
   std::fill(std::begin(ramp), std::end(ramp), SignedModel());
@@ -165,75 +215,39 @@ void ScatterContexts::start() {
   last_of_green.fill(-1);
 }
 
-void ScatterEncoder::start(size_t count, const TileBounds& bounds, Ramp* ramp) {
+void ScatterEncoder::start(const TileBounds& bounds, Ramp* ramp) {
   contexts_.start();
   bounds_ = &bounds;
   ramp_ = ramp;
-  colours_.clear();
-  colour_coder_ = RangeEncoder(colours_);
-  bits_.start(count * kMostPixelBits);
+  bytes_.clear();
+  coder_ = RangeEncoder(bytes_);
 }
 
 Magnitudes ScatterEncoder::put(int x, int y, Pixel& pixel, const Guess& guess) {
   Magnitudes out;
-  BitSink bits = bits_.sink;
-  const auto code = [&](int residual, GolombContext& context) { return context.put(residual, bits), residual; };
-  if (bounds_->depth != nullptr) {
-    code_depth(contexts_, *bounds_->depth, guess, pixel.depth, out, code);
-  } else {
-    const int depth = static_cast<int>(pixel.depth) - static_cast<int>(guess.pixel.depth);
-    code(depth, contexts_.depth[guess.expected.depth][guess.distance]);
-    out.depth = static_cast<uint8_t>(size_of(depth));
-  }
-  if (bounds_->normal != 0)
-    code_normal(contexts_, NormalLattice(bounds_->normal), guess, pixel.normal, out, code);
-  else
-    code_normal(contexts_, guess, pixel.normal, out, code);
-  bits_.sink = bits;
-  code_colour(contexts_, bounds_->colour, guess, ramp_, x, y, pixel, out, BitCoder{colour_coder_});
+  (void)code_pixel(contexts_, *bounds_, ramp_, x, y, guess, pixel, out, BitCoder{coder_});
   return out;
 }
 
 void ScatterEncoder::finish(std::vector<uint8_t>& out) {
-  colour_coder_.finish();
-  put_stored_block(out, colours_);
-  put_stored_block(out, bits_.bytes());
+  coder_.finish();
+  put_stored_block(out, bytes_);
 }
 
 bool ScatterDecoder::start(Reader& in, const TileBounds& bounds, Ramp* ramp) {
   contexts_.start();
   bounds_ = &bounds;
   ramp_ = ramp;
-  const auto colours = get_stored_block(in), bits = get_stored_block(in);
-  if (!colours || !bits) return false;
-  colour_coder_ = RangeDecoder(*colours);
-  bits_.start(*bits, 2 * kMostPixelBits);
+  const auto bytes = get_stored_block(in);
+  if (!bytes) return false;
+  coder_ = RangeDecoder(*bytes);
   return true;
 }
 
 std::optional<Pixel> ScatterDecoder::get(int x, int y, const Guess& guess, Magnitudes& out) {
   Pixel pixel;
   out = {};
-  BitSource bits = bits_.source;
-  const auto code = [&](int, GolombContext& context) { return context.get(bits); };
-  bool good = true;
-  if (bounds_->depth != nullptr) {
-    good = code_depth(contexts_, *bounds_->depth, guess, pixel.depth, out, code);
-  } else {
-    const int residual = code(0, contexts_.depth[guess.expected.depth][guess.distance]);
-    const int depth = static_cast<int>(guess.pixel.depth) + residual;
-    out.depth = static_cast<uint8_t>(std::min<unsigned>(size_of(residual), ScatterContexts::kDepthBits));
-    pixel.depth = static_cast<uint32_t>(depth);
-    good = depth >= 1 && depth <= static_cast<int>(image::kMaxDepthCode);
-  }
-  if (!good) return std::nullopt;
-  if (bounds_->normal != 0)
-    good = code_normal(contexts_, NormalLattice(bounds_->normal), guess, pixel.normal, out, code);
-  else
-    code_normal(contexts_, guess, pixel.normal, out, code);
-  good &= code_colour(contexts_, bounds_->colour, guess, ramp_, x, y, pixel, out, BitDecoder{colour_coder_});
-  bits_.source = bits;
-  if (bits_.overrun() || !good) return std::nullopt;
+  if (!code_pixel(contexts_, *bounds_, ramp_, x, y, guess, pixel, out, BitDecoder{coder_})) return std::nullopt;
   return pixel;
 }
 

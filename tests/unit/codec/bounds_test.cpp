@@ -119,8 +119,8 @@ std::string refusal(const std::vector<uint8_t>& bytes) {
 
 TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
   // 1 x 1 pixels, nothing in it. varint depth, u8 normal, u8 colour.
-  EXPECT_EQ(refusal({0xD7, 7, 1, 1, 1, 0, 1, 0, 0}), "");
-  EXPECT_EQ(refusal({0xD7, 7, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
+  EXPECT_EQ(refusal({0xD7, 8, 1, 1, 1, 0, 1, 0, 0}), "");
+  EXPECT_EQ(refusal({0xD7, 8, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
   for (const auto& bounds : {std::vector<uint8_t>{0, 0, 0},
                              {1, 0, 0},
                              {0xFF, 0x7F, 1, 1},
@@ -129,12 +129,12 @@ TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
                              {0, 4, 0},
                              {0, 0, 16},
                              {0, 255, 255}}) {
-    std::vector<uint8_t> bytes{0xD7, 7, 1, 1, 1};
+    std::vector<uint8_t> bytes{0xD7, 8, 1, 1, 1};
     bytes.insert(bytes.end(), bounds.begin(), bounds.end());
     bytes.push_back(0);
     EXPECT_NE(refusal(bytes).find("bounds of error that nobody writes"), std::string::npos) << int(bounds[0]);
   }
-  EXPECT_NE(refusal({0xD7, 7, 1, 1, 1, 0, 1}), "");
+  EXPECT_NE(refusal({0xD7, 8, 1, 1, 1, 0, 1}), "");
 }
 
 TEST(ErrorBounds, IndicesOfDepthBeyondTheLast) {
@@ -158,14 +158,14 @@ std::string refusal_of(const std::vector<uint8_t>& bytes, const DepthImage& boun
 TEST(Refinement, Headers) {
   const DepthImage nothing(30, 20);
   const auto bytes = encode_refinement(nothing, nothing);
-  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 7, 30, 20}));
+  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 8, 30, 20}));
   EXPECT_EQ(refusal_of(bytes, nothing), "");
   EXPECT_NE(refusal_of({}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 7, 30}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD7, 7, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 7"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 7, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 7, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 8, 30}, nothing).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD7, 8, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 8"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 8, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 8, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
 }
 
 TEST(Refinement, OfWhatIsExactTakesAByteATile) {
@@ -253,10 +253,10 @@ TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((150 + 2 * x) % 256 | (100 - y) << 8);
   }
-  expect_bytes(image, {215, 7,   1,   9,   8,   179, 230, 12,  1,  1,  6,   87,  206, 0,  96,  80,
-                       64,  150, 100, 16,  163, 15,  186, 98,  90, 36, 93,  192, 4,   25, 120, 235,
-                       37,  109, 136, 144, 45,  248, 95,  221, 23, 19, 226, 214, 65,  1,  4,   0},
-               {216, 7,   9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
+  expect_bytes(image, {215, 8,   1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
+                       64,  150, 100, 16, 163, 15,  186, 98,  90,  36,  93,  192, 4,   69, 129, 254,
+                       239, 53,  221, 2,  180, 57,  248, 197, 119, 198, 145, 198, 101, 32, 4},
+               {216, 8,   9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
                 110, 210, 128, 18, 0, 0,   111, 128, 18, 0, 25, 151, 242, 34,  0,   25, 143, 10, 10, 164, 39, 128});
 }
 
@@ -269,7 +269,7 @@ TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
     image.normal[i] = static_cast<uint16_t>(0x8040 + x * y);
   }
   expect_bytes(
-      image, {215, 7,   1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   29,
+      image, {215, 8,   1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   29,
               76,  1,   209, 39,  254, 76,  0,   120, 23,  0,   0,   0,   0,   0,   0,   124, 194, 245, 201, 217, 170,
               7,   165, 148, 82,  85,  85,  85,  85,  25,  244, 0,   0,   144, 127, 240, 69,  7,   84,  21,  254, 94,
               160, 95,  70,  84,  85,  5,   0,   64,  142, 170, 85,  85,  5,   30,  3,   248, 248, 227, 31,  135, 136,
@@ -278,7 +278,7 @@ TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
               29,  239, 4,   188, 191, 122, 16,  107, 61,  13,  8,   157, 27,  238, 4,   106, 141, 238, 4,   136, 191,
               97,  78,  229, 220, 174, 1,   157, 27,  238, 4,   158, 14,  116, 23,  165, 207, 118, 16,  118, 76,  174,
               1,   124, 173, 99,  23,  116, 173, 239, 4,   78,  223, 214, 94},
-      {216, 7,   17,  3,   1,   239, 207, 12,  16,  0,   132, 1,   82,  0,   194, 159, 18,  224, 223, 249, 189, 207,
+      {216, 8,   17,  3,   1,   239, 207, 12,  16,  0,   132, 1,   82,  0,   194, 159, 18,  224, 223, 249, 189, 207,
        189, 245, 22,  124, 192, 237, 6,   124, 222, 141, 27,  0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,
        0,   0,   0,   0,   128, 127, 199, 251, 247, 0,   0,   0,   0,   0,   0,   0,   0,   0,   252, 59,  174, 113,
        141, 107, 44,  7,   248, 103, 226, 55,  152, 44,  0,   132, 195, 225, 0,   0,   128, 195, 33,  0,   226, 0,

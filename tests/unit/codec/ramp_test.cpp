@@ -155,8 +155,8 @@ TEST(Ramp, TheBytesAreTheSameEverywhere) {
   };
   const image::DepthImage tinted =
       scattered([](double height, size_t i) { return tint(std::round(height * 4096) / 4096, i); });
-  EXPECT_EQ(digest(encode(tinted, {}, nullptr, axes_of_view())), 14850694782071117777u);
-  EXPECT_EQ(digest(encode(tinted)), 6922180152382345998u);
+  EXPECT_EQ(digest(encode(tinted, {}, nullptr, axes_of_view())), 14771306466673591676u);
+  EXPECT_EQ(digest(encode(tinted)), 2402333840615986549u);
 }
 
 }  // namespace
