@@ -39,7 +39,7 @@ struct Patch {
   /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else empty.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
-  Moments moments;                        ///< of the tile that completed it; none where it is sent again later
+  Moments moments;                        ///< of the last tile, if it completes an update; none when sent again
   bool refinable = false;                 ///< what its image leaves out may follow: Refine
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);

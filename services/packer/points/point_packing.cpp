@@ -89,6 +89,9 @@ uint64_t size_on_wire(const Event& e) {
   return kRest + (e.blob ? e.blob->size() : 0) + 4 * (e.missed.size() + e.clusters.size() + e.frames.size());
 }
 
+// Whose moments tell how an update came about (metrics/stages.h): who is sent other patches has no use for them.
+bool completes_update(const Event& e) { return e.frame_complete && !e.extra && e.step <= 1; }
+
 // The event as messages: calls send(message).
 void with_message(InstanceId packer, const Event& e, const wire::Moments& moments, auto&& send) {
   switch (e.kind) {
@@ -245,7 +248,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
     done.moments.packed_s = outlets_.master_now();
     if (event.is_told()) {
       done.moments.published_s = done.moments.packed_s;
-      publish(event, done.moments);
+      publish(event, completes_update(event) ? done.moments : wire::Moments{});
     }
     if (event.kept > 0) points_came_s_ = now_s;
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;

@@ -254,6 +254,24 @@ TEST_F(PointPackingTest, ATileKeepsItsLabelFromLeaseToPatch) {
   EXPECT_EQ(status("tiles_duplicate"), 1);
 }
 
+// Stages of an update are those of the part that completes it: nobody reads the moments of others.
+TEST_F(PointPackingTest, MomentsAreOfThePatchThatCompletesAnUpdate) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) {
+    wire::DepthTile m = tile(1, half);
+    m.lease.block = uint64_t(half), m.lease.blocks_in_frame = 2, m.lease.block_rect = m.lease.rect;
+    sample(m, 3);
+  }
+  ASSERT_EQ(sent.size(), 2u);
+  const auto first = decoded<wire::Patch>(sent[0]), second = decoded<wire::Patch>(sent[1]);
+  EXPECT_FALSE(first.frame_complete);
+  EXPECT_EQ(first.moments, wire::Moments{});
+  EXPECT_TRUE(second.frame_complete);
+  EXPECT_EQ(second.moments.leased_s, 2);
+  EXPECT_EQ(second.moments.published_s, 99);
+  EXPECT_EQ(told[0].moments.published_s, 99) << "the master is told of all";
+}
+
 TEST_F(PointPackingTest, TilesAheadOfTheirEpochWaitForIt) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   const EpochId next = test::kEpoch.next();
