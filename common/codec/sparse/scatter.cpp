@@ -198,8 +198,8 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
   const Four inverse = four(1 / moments.by_1[0]), middle = mean * inverse,
              variance = squares * inverse - middle * middle;
   for (int i = 0; i < 3; ++i)
-    out.spread[i] = static_cast<int>(std::min(16 * std::sqrt(std::max(variance[i], 0.0f)), kMostSpread));
-  out.slope = static_cast<int>(std::min(16 * std::abs(sum[0] - middle[0]), kMostSpread));
+    out.spread[i] = static_cast<int>(std::min(kMostSpread, 16 * std::sqrt(std::max(0.0f, variance[i]))));
+  out.slope = static_cast<int>(std::min(kMostSpread, 16 * std::abs(sum[0] - middle[0])));
   return out;
 }
 
