@@ -307,7 +307,7 @@ TEST(Links, BehindASlowOnePointsHaveErrorsUntilTheHeadRests) {
   for (const bool said : {false, true}) {
     if (!said && test::kSlow) continue;  // they do not fill any link
     std::vector<std::string> flags{"--duration", "14", "--hold", "12", "--size", "640x400", "--link"};
-    flags.push_back(said ? "20ms" : "rtt=20ms,rate=500kbit");
+    flags.push_back(said ? "20ms" : "rtt=20ms,rate=300kbit");
     if (said) flags.insert(flags.end(), {"--depth-error", "1/16", "--normal-error", "2", "--colour-error", "off"});
     PipelineRun run(flags);
     ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
