@@ -13,8 +13,9 @@
 // more; contexts that never share tables, 0.1 to 0.2 more; least squares without a second look at what they miss, 0.3
 // bits more of normals.
 //
-// Sparse tiles, of 4 frames of 1280 x 800 along a recorded walk: bits a covered pixel with its mask, in brackets how
-// many times those of full tiles, and the bits with the nearest pixel as prediction and Huffman codes.
+// Sparse tiles as they were in version 3 of the stream (docs/codec-bench.md has later ones), of 4 frames of 1280 x 800
+// along a recorded walk: bits a covered pixel with its mask, in brackets how many times those of full tiles, and the
+// bits with the nearest pixel as prediction and Huffman codes.
 //                       terrain 5.8M       terrain 2.9M       head 4.1M          bone 0.7M triangles
 //   full tiles          17.8               24.1               12.6               17.9
 //   1 in 32, even       29.2 (1.6; 39.4)   36.5 (1.5; 45.8)   23.2 (1.8; 31.3)   34.1 (1.9; 37.3)

@@ -17,21 +17,20 @@ unsigned byte_size(unsigned size) { return std::min<unsigned>(size, ScatterConte
 constexpr int kChannels[3] = {1, 0, 2};
 
 // What tells how far from its prediction a number is expected to lie: as log8() and error_log() say it.
-struct Signs {
+struct SpreadContext {
   int error[3], spread[3], slope;  // of the neighbours
   int distance, few;
   int before[2] = {0, 0};  // errors of this pixel's depth, and of the normal's first byte
 };
 
-Signs signs_of(const Guess& guess, const TileBounds& bounds) {
+SpreadContext context_of(const Guess& guess, const TileBounds& bounds) {
   const Magnitudes& e = guess.expected;
-  Signs out{{e.depth, e.normal[0], e.normal[1]}, {0, 0, 0}, 0, log8(guess.distance), guess.few};
+  SpreadContext out{{e.depth, e.normal[0], e.normal[1]}, {0, 0, 0}, 0, log8(guess.distance), guess.few};
   if (guess.few) return out;
   const auto code = static_cast<uint32_t>(guess.depth >> 4);
   const int of_depth = bounds.depth ? static_cast<int>(2 * bounds.depth->reach(code) + 1) : 1;
-  const auto log = [](int sixteenths) { return error_log(sixteenths); };
-  out.spread[0] = log(guess.spread[0] / of_depth), out.slope = log(guess.slope / of_depth);
-  for (int c = 1; c < 3; ++c) out.spread[c] = log(guess.spread[c] / (2 * bounds.normal + 1));
+  out.spread[0] = error_log(guess.spread[0] / of_depth), out.slope = error_log(guess.slope / of_depth);
+  for (int c = 1; c < 3; ++c) out.spread[c] = error_log(guess.spread[c] / (2 * bounds.normal + 1));
   return out;
 }
 
@@ -47,7 +46,7 @@ constexpr Weights kBounded[3] = {{-1758 * 8, 130, 17, 11, 54, -9, 2937 * 8, {0, 
                                  {-603 * 8, 48, 54, -11, 144, 22, 555 * 8, {49, 0}, {-49, 171, -7}, 23},
                                  {-609 * 8, 37, -12, 36, 137, 18, 392 * 8, {32, 92}, {-46, -39, 170}, 20}};
 
-int scale_of(int kind, bool bounded, const Signs& s) {
+int scale_of(int kind, bool bounded, const SpreadContext& s) {
   const Weights& w = (bounded ? kBounded : kExact)[kind];
   const int error = s.error[kind];
   return w.constant + w.error * error + w.next_error * s.error[(kind + 1) % 3] +
@@ -75,14 +74,14 @@ int on_lattice(const DepthLattice& lattice, int depth) {
 
 // `depth` and `normal` become what is decoded. False where there is no such number.
 template <class Coder>
-bool code_depth(ScatterContexts& contexts, const DepthLattice* lattice, const Guess& guess, Signs& signs,
+bool code_depth(ScatterContexts& contexts, const DepthLattice* lattice, const Guess& guess, SpreadContext& context,
                 uint32_t& depth, Magnitudes& out, const Coder& coder) {
   const Predicted predicted(lattice ? on_lattice(*lattice, guess.depth) : guess.depth);
   const int64_t wanted = int64_t{lattice ? lattice->index(depth) : depth} - predicted.nearest;
   const int64_t residual =
-      contexts.depth.code(coder, wanted, predicted.rounding, scale_of(0, lattice != nullptr, signs));
-  signs.before[0] = predicted.error(residual);
-  out.depth = static_cast<uint8_t>(signs.before[0]);
+      contexts.depth.code(coder, wanted, predicted.rounding, scale_of(0, lattice != nullptr, context));
+  context.before[0] = predicted.error(residual);
+  out.depth = static_cast<uint8_t>(context.before[0]);
   const int64_t index = predicted.nearest + residual;
   if (index < 1 || index > (lattice ? lattice->last() : image::kMaxDepthCode)) return false;
   depth = lattice ? lattice->code(static_cast<uint32_t>(index)) : static_cast<uint32_t>(index);
@@ -90,7 +89,7 @@ bool code_depth(ScatterContexts& contexts, const DepthLattice* lattice, const Gu
 }
 
 template <class Coder>
-bool code_normal(ScatterContexts& contexts, const TileBounds& bounds, const Guess& guess, Signs& signs,
+bool code_normal(ScatterContexts& contexts, const TileBounds& bounds, const Guess& guess, SpreadContext& context,
                  uint16_t& normal, Magnitudes& out, const Coder& coder) {
   const NormalLattice lattice(bounds.normal);
   const bool exact = bounds.normal == 0;
@@ -103,9 +102,9 @@ bool code_normal(ScatterContexts& contexts, const TileBounds& bounds, const Gues
     const int64_t wanted = exact ? static_cast<int8_t>(static_cast<uint8_t>(value - predicted.nearest))
                                  : lattice.index(value) - predicted.nearest;
     const int64_t residual =
-        contexts.normal[c].code(coder, wanted, predicted.rounding, scale_of(1 + c, bounds.depth != nullptr, signs));
-    signs.before[1] = predicted.error(residual);
-    out.normal[c] = static_cast<uint8_t>(signs.before[1]);
+        contexts.normal[c].code(coder, wanted, predicted.rounding, scale_of(1 + c, bounds.depth != nullptr, context));
+    context.before[1] = predicted.error(residual);
+    out.normal[c] = static_cast<uint8_t>(context.before[1]);
     const int64_t index = predicted.nearest + residual;
     if (!exact && (index < 0 || index > lattice.most())) return false;
     result |=
@@ -197,9 +196,9 @@ bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, Ramp*
 template <class Coder>
 bool code_pixel(ScatterContexts& contexts, const TileBounds& bounds, Ramp* ramp, int x, int y, const Guess& guess,
                 Pixel& pixel, Magnitudes& out, const Coder& coder) {
-  Signs signs = signs_of(guess, bounds);
-  return code_depth(contexts, bounds.depth, guess, signs, pixel.depth, out, coder) &&
-         code_normal(contexts, bounds, guess, signs, pixel.normal, out, coder) &&
+  SpreadContext context = context_of(guess, bounds);
+  return code_depth(contexts, bounds.depth, guess, context, pixel.depth, out, coder) &&
+         code_normal(contexts, bounds, guess, context, pixel.normal, out, coder) &&
          code_colour(contexts, bounds.colour, guess, ramp, x, y, pixel, out, coder);
 }
 
