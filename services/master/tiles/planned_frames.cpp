@@ -13,9 +13,10 @@ constexpr uint64_t kFirstTileRays = 8192, kFirstExtraRays = 65536;
 // Of fewer rays the lease costs more than the rays.
 constexpr double kLeastTileRays = 1024, kMostRays = 1 << 24;
 // Tiles of plans have longer sides, for the same reason: with 256 pixels a view of 1280x800 had 24 tiles of 260 rays,
-// and two thirds of the time samplers waited for leases. Where few samplers share them they are longer still: packer
-// and viewers pay for each tile, too, in every cluster that it adds points to.
-constexpr int kPlannedSide = 2, kPlannedSideOfFew = 4;
+// and two thirds of the time samplers waited for leases. Where few samplers share them a view of few rays is one tile:
+// packer and viewers pay for each tile, too, in every cluster that it adds points to, and links in what stands around
+// its image. With 1024 pixels that view had a second tile with a fifth of its rays.
+constexpr int kPlannedSide = 2, kPlannedSideOfFew = 8;
 constexpr double kTargetsOfFew = 3;  // of lease_target_s
 constexpr size_t kFewSamplers = 2;
 constexpr uint64_t kUnknownTileRays = 16384;  // of rays beyond views, while nothing is known of any link

@@ -101,7 +101,7 @@ TEST_F(Steered, AViewWaitsForItsPlanAndBecomesItsTiles) {
   EXPECT_EQ(question.viewer.value, 5u);
   EXPECT_EQ(question.request.value, 7u);
   EXPECT_EQ(question.camera, request(5, 7, 0.25).camera);
-  EXPECT_EQ(question.tile_size, 256u) << "few rays lie in a tile";
+  EXPECT_EQ(question.tile_size, 512u) << "few rays lie in a tile";
   EXPECT_GT(question.tile_rays, 0u);
   EXPECT_GT(question.most_rays, 0u) << "others are left to later views";
   EXPECT_FALSE(question.extra || question.still);

@@ -232,6 +232,23 @@ TEST(RayTiles, HoldEveryRayOnce) {
   }
 }
 
+// A view of few rays is one tile, whatever its size; more are shared out evenly, so that there are few tiles.
+TEST(RayTiles, AreFewAndHaveAboutAsManyRaysEach) {
+  const image::PixelMask few = random_mask(1312, 816, 0.003, 5);
+  EXPECT_EQ(cut_tiles(few, {0, 0, 1312, 816}, {2048, few.count()}).size(), 1u);
+  EXPECT_EQ(cut_tiles(few, {0, 0, 1312, 816}, {1024, few.count()}).size(), 2u);
+
+  // Half of the rays lie in a corner.
+  image::PixelMask many = random_mask(1312, 816, 0.01, 6);
+  merge(random_mask(200, 150, 0.35, 7), 1100, 20, many);
+  constexpr uint64_t kMost = 2000;
+  const std::vector<RayTile> tiles = cut_tiles(many, {0, 0, 1312, 816}, {2048, kMost});
+  const uint64_t least = (many.count() + kMost - 1) / kMost;
+  EXPECT_GE(tiles.size(), least);
+  EXPECT_LE(tiles.size(), least + least / 2) << many.count();
+  for (const RayTile& t : tiles) EXPECT_GT(t.rays, kMost / 4);
+}
+
 TEST(RayTiles, ArePlansThatTheWireTakes) {
   const image::PixelMask mask = random_mask(300, 200, 0.2, 7);
   wire::Plan plan;

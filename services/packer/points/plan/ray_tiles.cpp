@@ -47,19 +47,63 @@ Content content_of(const image::PixelMask& mask, const geometry::Rect& r) {
   return out;
 }
 
-void cut(const image::PixelMask& mask, const geometry::Rect& r, const TileLimits& limits, int size,
-         std::vector<RayTile>& tiles) {
-  const Content content = content_of(mask, r);
-  if (content.rays == 0) return;
-  const bool small = std::max(content.box.width, content.box.height) <= kLeastTile;
-  if (limits.rays == 0 || content.rays <= limits.rays || small || size <= kLeastTile) {
-    tiles.push_back({content.box, cropped(mask, content.box), content.rays});
+// Where to cut a box that is wider than high: so that about `share` of its rays lie on the left. At a word of the
+// mask, where there is one.
+int cut_across(const image::PixelMask& mask, const geometry::Rect& box, double share, uint64_t rays) {
+  const int first = box.x / 64 + 1, last = (box.x + box.width - 1) / 64;
+  if (first > last) return box.x + box.width / 2;
+  std::vector<uint64_t> before(static_cast<size_t>(last - first + 1));  // rays of the word before each place
+  for (int y = box.y; y < box.y + box.height; ++y) {
+    const uint64_t* const row = mask.row(y);
+    before[0] += static_cast<uint64_t>(std::popcount(row[first - 1] >> (box.x & 63)));
+    for (size_t i = 1; i < before.size(); ++i)
+      before[i] += static_cast<uint64_t>(std::popcount(row[static_cast<size_t>(first) + i - 1]));
+  }
+  const double wanted = share * static_cast<double>(rays);
+  int best = first;
+  double sum = 0, least = HUGE_VAL;
+  for (size_t i = 0; i < before.size(); ++i) {
+    sum += static_cast<double>(before[i]);
+    if (std::abs(sum - wanted) < least) least = std::abs(sum - wanted), best = first + static_cast<int>(i);
+  }
+  return best * 64;
+}
+
+// The same of one that is higher than wide: about `share` of its rays above.
+int cut_down(const image::PixelMask& mask, const geometry::Rect& box, double share, uint64_t rays) {
+  const double wanted = share * static_cast<double>(rays);
+  int best = box.y + 1;
+  double sum = 0, least = HUGE_VAL;
+  for (int y = box.y; y + 1 < box.y + box.height; ++y) {
+    sum += static_cast<double>(content_of(mask, {box.x, y, box.width, 1}).rays);
+    if (std::abs(sum - wanted) < least) least = std::abs(sum - wanted), best = y + 1;
+  }
+  return best;
+}
+
+void cut(const image::PixelMask& mask, const geometry::Rect& r, const TileLimits& limits, std::vector<RayTile>& tiles) {
+  const auto [rays, box] = content_of(mask, r);
+  if (rays == 0) return;
+  const int longest = std::max(box.width, box.height);
+  const auto parts = [](uint64_t all, uint64_t of) { return (all + of - 1) / of; };
+  const uint64_t by_size =
+      parts(static_cast<uint64_t>(longest), static_cast<uint64_t>(std::max(limits.size, kLeastTile)));
+  const uint64_t by_rays = limits.rays == 0 || longest <= kLeastTile ? 1 : parts(rays, limits.rays);
+  const uint64_t most = std::max(by_size, by_rays);
+  if (most == 1) {
+    tiles.push_back({box, cropped(mask, box), rays});
     return;
   }
-  const int half = std::max(size / 2, kLeastTile);
-  for (int y = r.y; y < r.y + r.height; y += half)
-    for (int x = r.x; x < r.x + r.width; x += half)
-      cut(mask, {x, y, std::min(half, r.x + r.width - x), std::min(half, r.y + r.height - y)}, limits, half, tiles);
+  const double share = static_cast<double>(most / 2) / static_cast<double>(most);
+  if (box.width >= box.height) {
+    const int x = cut_across(mask, box, share, rays);
+    cut(mask, {box.x, box.y, x - box.x, box.height}, limits, tiles);
+    cut(mask, {x, box.y, box.x + box.width - x, box.height}, limits, tiles);
+  } else {
+    const int y = cut_down(mask, box, share, rays);
+    cut(mask, {box.x, box.y, box.width, y - box.y}, limits, tiles);
+    cut(mask, {box.x, y, box.width, box.y + box.height - y}, limits, tiles);
+  }
 }
 
 }  // namespace
@@ -89,13 +133,7 @@ void merge(const image::PixelMask& part, int x, int y, image::PixelMask& mask) {
 
 std::vector<RayTile> cut_tiles(const image::PixelMask& mask, const geometry::Rect& area, const TileLimits& limits) {
   std::vector<RayTile> tiles;
-  const int size = std::max(limits.size, kLeastTile);
-  for (int y = area.y - area.y % size; y < area.y + area.height; y += size)
-    for (int x = area.x - area.x % size; x < area.x + area.width; x += size) {
-      const int x0 = std::max(x, area.x), y0 = std::max(y, area.y);
-      const int x1 = std::min(x + size, area.x + area.width), y1 = std::min(y + size, area.y + area.height);
-      cut(mask, {x0, y0, x1 - x0, y1 - y0}, limits, size, tiles);
-    }
+  cut(mask, area, limits, tiles);
   return tiles;
 }
 

@@ -28,8 +28,9 @@ image::PixelMask cropped(const image::PixelMask& mask, const geometry::Rect& rec
 /// Sets in `mask` what `part`, which lies at (x, y), has set.
 void merge(const image::PixelMask& part, int x, int y, image::PixelMask& mask);
 
-/// Cuts the part of a mask in `area`, which lies in it, into tiles: squares aligned to limits.size, cut into four
-/// while they have too many rays, and each then to the box of its rays. None has no rays.
+/// Cuts the part of a mask in `area`, which lies in it, into tiles: the box of its rays, halved across its longer side
+/// while it is too long or has too many rays, so that about as many rays lie on either side; and each half likewise.
+/// None has no rays.
 std::vector<RayTile> cut_tiles(const image::PixelMask& mask, const geometry::Rect& area, const TileLimits& limits);
 
 /// Takes from `cast` those of its rays in `some`, a part of it, that are farthest from the middle, by pieces of 64 x
