@@ -10,6 +10,8 @@
 #include <msgpack/unpack.hpp>
 
 #include "common/core/utf8.h"
+#include "common/wire/short_camera.h"
+#include "common/wire/varint.h"
 
 namespace telesplat::wire {
 namespace {
@@ -232,6 +234,12 @@ void Decoder::get(const msgpack::object& o, geometry::Pose& p) {
 }
 
 void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
+  if (brief_ && o.type == msgpack::type::BIN) {
+    const auto read = read_short_form({reinterpret_cast<const std::byte*>(o.via.bin.ptr), o.via.bin.size});
+    if (!read) return fail(read.error().text);
+    c = *read;
+    return;
+  }
   double v[14];
   if (!numbers(o, v)) return;
   if (!is_integer(v[12], 1, geometry::kMaxImageSide) || !is_integer(v[13], 1, geometry::kMaxImageSide))
@@ -241,25 +249,45 @@ void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
   if (const auto valid = geometry::validate(c); !valid) fail(": " + valid.error().text);
 }
 
-void Decoder::get(const msgpack::object& o, Moments& m) {
-  if (o.type != msgpack::type::ARRAY || o.via.array.size != std::size(kMoments))
-    return fail(fmt::format("is not a list of {} moments", std::size(kMoments)));
+// What they say, in microseconds or not known, one after the other: next() returns it, or has failed.
+void Decoder::get_moments(Moments& m, const std::function<std::optional<double>()>& next) {
   double before = 0;  // sums stay far below what f64 holds exactly: each is checked
-  for (size_t i = 0; i < std::size(kMoments); ++i) {
-    const msgpack::object& moment = entry(o, i);
-    m.*kMoments[i] = 0;
-    if (moment.type == msgpack::type::NIL) continue;
-    if (moment.type != msgpack::type::POSITIVE_INTEGER && moment.type != msgpack::type::NEGATIVE_INTEGER)
-      return fail("has a moment that is no integer");
-    const double number =
-        moment.type == msgpack::type::POSITIVE_INTEGER ? double(moment.via.u64) : double(moment.via.i64);
-    const bool duration = kMoments[i] == &Moments::fetch_s;
-    const double us = duration ? number : before + number;
-    if (!(std::abs(number) <= kMostMoment_us && std::abs(us) <= kMostMoment_us))
+  for (double Moments::*const moment : kMoments) {
+    m.*moment = 0;
+    const std::optional<double> number = next();
+    if (error_) return;
+    if (!number) continue;
+    const bool duration = moment == &Moments::fetch_s;
+    const double us = duration ? *number : before + *number;
+    if (!(std::abs(*number) <= kMostMoment_us && std::abs(us) <= kMostMoment_us))
       return fail(fmt::format("has a moment of {} microseconds, limit {}", us, kMostMoment_us));
     if (!duration) before = us;
-    m.*kMoments[i] = us / 1e6;
+    m.*moment = us / 1e6;
   }
+}
+
+void Decoder::get(const msgpack::object& o, Moments& m) {
+  if (brief_ && o.type == msgpack::type::BIN) {
+    VarintSource in({reinterpret_cast<const std::byte*>(o.via.bin.ptr), o.via.bin.size});
+    get_moments(m, [&]() -> std::optional<double> {
+      const uint64_t number = in.number(kMostVarint);
+      if (number == 0) return std::nullopt;
+      return static_cast<double>(unfold(number - 1));
+    });
+    if (in.failed() || in.left() != 0)
+      fail(fmt::format("of {} bytes is not {} moments", o.via.bin.size, std::size(kMoments)));
+    return;
+  }
+  if (o.type != msgpack::type::ARRAY || o.via.array.size != std::size(kMoments))
+    return fail(fmt::format("is not a list of {} moments", std::size(kMoments)));
+  uint32_t at = 0;
+  get_moments(m, [&]() -> std::optional<double> {
+    const msgpack::object& moment = entry(o, at++);
+    if (moment.type == msgpack::type::POSITIVE_INTEGER) return double(moment.via.u64);
+    if (moment.type == msgpack::type::NEGATIVE_INTEGER) return double(moment.via.i64);
+    if (moment.type != msgpack::type::NIL) fail("has a moment that is no integer");
+    return std::nullopt;
+  });
 }
 
 void Decoder::get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks) {

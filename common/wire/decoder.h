@@ -61,6 +61,7 @@ class Decoder {
   void get(const msgpack::object& o, geometry::Pose& p);
   void get(const msgpack::object& o, geometry::Camera& c);
   void get(const msgpack::object& o, Moments& m);
+  void get_moments(Moments& m, const std::function<std::optional<double>()>& next);
   void get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks);
   void get(const msgpack::object& o, volume::ShearFrame& s);
   template <class Tag>

@@ -7,6 +7,8 @@
 #include <msgpack/pack.hpp>
 
 #include "common/core/utf8.h"
+#include "common/wire/short_camera.h"
+#include "common/wire/varint.h"
 
 static_assert(std::endian::native == std::endian::little, "bulk fields are little-endian and copied as they are");
 
@@ -103,27 +105,32 @@ void Encoder::put(const geometry::Pose& pose) {
 }
 
 void Encoder::put(const geometry::Camera& c) {
+  if (const auto bytes = brief_ ? short_form(c) : std::nullopt) return put(std::as_bytes(std::span(*bytes)));
   const auto& p = c.pose.position_room;
   const auto& q = c.pose.orientation;
   numbers({p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m, double(c.width),
            double(c.height)});
 }
 
-// Whole microseconds since the moment before that is known: most differences take three bytes, what is not known one.
+// Whole microseconds since the moment before that is known: most differences take three bytes, what is not known one;
+// in a brief message two bytes and one.
 void Encoder::put(const Moments& m) {
-  begin_array(std::size(kMoments));
+  std::string brief;
+  if (!brief_) begin_array(std::size(kMoments));
   int64_t before = 0;
   for (const double Moments::*moment : kMoments) {
     const double us = std::round(1e6 * (m.*moment));
     if (us == 0 || !(std::abs(us) <= kMostMoment_us)) {
-      Packer(out_).pack_nil();
+      brief_ ? put_varint(brief, 0) : static_cast<void>(Packer(out_).pack_nil());
       continue;
     }
     const auto now = static_cast<int64_t>(us);
     const bool duration = moment == &Moments::fetch_s;
-    Packer(out_).pack_int64(duration ? now : now - before);
+    const int64_t sent = duration ? now : now - before;
+    brief_ ? put_varint(brief, fold(sent) + 1) : static_cast<void>(Packer(out_).pack_int64(sent));
     if (!duration) before = now;
   }
+  if (brief_) put(std::as_bytes(std::span(brief)));
 }
 
 void Encoder::put(const std::vector<geometry::ChunkInfo>& chunks) {

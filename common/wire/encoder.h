@@ -19,6 +19,7 @@ class Encoder {
   template <Struct M>
   void versioned_map(const M& m) {
     const Blank<M> blank(m);
+    brief_ = kIsBrief<M>;
     uint32_t count = 1;
     auto counter = [&](const char*, const auto& value, size_t = 0) { count += !blank(value); };
     M::fields(counter, m);
@@ -109,6 +110,7 @@ class Encoder {
   }
 
   std::string& out_;
+  bool brief_ = false;
 };
 
 }  // namespace telesplat::wire

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "common/splat/select/frame_budget.h"
+#include "common/wire/short_camera.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -22,16 +23,6 @@ constexpr double kSteeredAim = 0.5, kFastEnough = 0.6;  // of the target, of tha
 
 // Side of a sampled image: a multiple of 8 in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
-
-// Every update says its camera: single precision, far finer than a pixel, is half as long (wire: numbers are as short
-// as they are exact).
-geometry::Camera in_single_precision(geometry::Camera c) {
-  auto& p = c.pose.position_room;
-  auto& q = c.pose.orientation;
-  for (double* v : {&p.x, &p.y, &p.z, &q.w, &q.x, &q.y, &q.z, &c.left, &c.right, &c.bottom, &c.top, &c.near_m})
-    *v = static_cast<float>(*v);
-  return c;
-}
 
 }  // namespace
 
@@ -78,7 +69,7 @@ bool ViewRequester::rests_at(const geometry::Pose& there, const geometry::Pose& 
 }
 
 geometry::Camera ViewRequester::wanted(double now_s, bool& still, const geometry::Camera* asked) {
-  return in_single_precision(exactly_wanted(now_s, still, asked));
+  return wire::shortened(exactly_wanted(now_s, still, asked));  // every update says its camera
 }
 
 geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const geometry::Camera* asked) {

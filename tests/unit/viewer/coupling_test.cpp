@@ -6,6 +6,7 @@
 
 #include "client/viewer/coupling/view_requester.h"
 #include "common/splat/select/frame_budget.h"
+#include "common/wire/short_camera.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -148,7 +149,7 @@ TEST_F(Requester, AHeadThatTremblesAsksForTheSameViewAgain) {
   const auto apart_px = [&](const geometry::Camera& asked) {
     return splat::screen_movement(asked.pose, display.pose, ViewRequester::kNearest_m, display.focal_x());
   };
-  EXPECT_LT(apart_px(next), 1e-3) << "what is displayed, but for single precision";
+  EXPECT_LT(apart_px(next), 5e-3) << "what is displayed, but for what is short";
   // It drifts, in steps that are small each: the dead band is about what was asked for, not about the step before.
   display.pose = turned(1.9 * quarter_rad, {0, 0, 0});
   for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
@@ -159,18 +160,14 @@ TEST_F(Requester, AHeadThatTremblesAsksForTheSameViewAgain) {
   // Metres count as well.
   display.pose.position_room.x += ViewRequester::kNearest_m * 1.1 * quarter_rad;
   for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
-  EXPECT_LT(apart_px(requester.next(now_s)->camera), 1e-3);
+  EXPECT_LT(apart_px(requester.next(now_s)->camera), 5e-3);
 }
 
 // Every update says its camera.
-TEST_F(Requester, AsksForCamerasInSinglePrecision) {
+TEST_F(Requester, AsksForCamerasThatAreShort) {
   display.pose = turned(0.123456789, {1.0 / 3, 1.0 / 7, -1.0 / 9});
   requester.on_pose(0, display);
-  const geometry::Camera c = requester.next(0)->camera;
-  const auto& p = c.pose.position_room;
-  const auto& q = c.pose.orientation;
-  for (const double v : {p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m})
-    EXPECT_EQ(v, double(float(v)));
+  EXPECT_TRUE(wire::short_form(requester.next(0)->camera));
 }
 
 TEST_F(Requester, KeepsItsRateWhoeverLooksLate) {

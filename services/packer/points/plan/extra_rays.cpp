@@ -6,6 +6,7 @@
 #include <mutex>
 #include <utility>
 
+#include "common/wire/short_camera.h"
 #include "services/packer/points/plan/planner_impl.h"
 
 namespace telesplat::packer {
@@ -196,6 +197,7 @@ bool Planner::Impl::plan_cell(Question& q, ViewerView& view, unsigned turn) {
   const bool ahead = !view.still && moved > 1e-4 && turn % 2 == 0;
   camera.pose.position_room +=
       step_aside_m(view) * (ahead ? view.movement_m / moved : camera.pose.orientation * direction(turn));
+  camera = wire::shortened(camera);
   // A head does not go where nobody has looked: into what is solid, whose inside is another surface, and near.
   if (!geometry::validate(camera) || known_empty.unseen_at(camera.pose.position_room)) return false;
   q.look_at(camera);
