@@ -44,8 +44,8 @@ using detail::TileGrid;
 using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
-// after them. bounds = varint depth, u8 normal, u8 colour
-constexpr uint8_t kMagic = 0xD7, kVersion = 8, kBounded = 1, kKnownFlags = kBounded;
+// after them. bounds = varint depth, u8 normal, u8 colour. flags: bounds follow; there is one tile, a sparse one.
+constexpr uint8_t kMagic = 0xD7, kVersion = 9, kBounded = 1, kOneTile = 2, kKnownFlags = kBounded | kOneTile;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
@@ -56,6 +56,7 @@ bool is_valid(const ErrorBounds& b) {
 
 struct Header {
   int width, height;
+  bool one_tile;
   ErrorBounds bounds;
 };
 
@@ -83,13 +84,13 @@ Result<Header> read_header(Reader& in) {
   if (*width == 0 || *height == 0 || *width > kMaxPixels || *height > kMaxPixels ||
       uint64_t{*width} * *height > kMaxPixels)
     return damaged(fmt::format("{} x {} pixels, limit {} in all and at least 1 x 1", *width, *height, kMaxPixels));
-  Header header{static_cast<int>(*width), static_cast<int>(*height), {}};
+  Header header{static_cast<int>(*width), static_cast<int>(*height), (*flags & kOneTile) != 0, {}};
   if (*flags & kBounded) {
     const auto bounds = read_bounds(in);
     if (!bounds) return damaged("bounds of error that nobody writes");
     header.bounds = *bounds;
   }
-  const TileGrid grid(header.width, header.height);
+  const TileGrid grid(header.width, header.height, header.one_tile);
   const size_t tiles = static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows);
   if (in.left() < tiles)
     return damaged(
@@ -126,9 +127,11 @@ std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, D
   ErrorBounds bounds = given;
   if (bounds.depth < ErrorBounds::kLeastDepth) bounds.depth = 0;
   const bool bounded = !bounds.exact();
+  const detail::TileBounds tile_bounds(bounds);
+  const bool one_tile = detail::is_one_tile(image, tile_bounds);
   std::vector<uint8_t> out;
   out.reserve(64 + image.pixels() / 8);
-  out.assign({kMagic, kVersion, bounded ? kBounded : uint8_t{0}});
+  out.assign({kMagic, kVersion, static_cast<uint8_t>((bounded ? kBounded : 0) | (one_tile ? kOneTile : 0))});
   detail::put_varint(out, static_cast<uint32_t>(image.width));
   detail::put_varint(out, static_cast<uint32_t>(image.height));
   if (bounded) {
@@ -136,8 +139,7 @@ std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, D
     out.push_back(static_cast<uint8_t>(bounds.normal));
     out.push_back(static_cast<uint8_t>(bounds.colour));
   }
-  const detail::TileBounds tile_bounds(bounds);
-  const TileGrid grid(image.width, image.height);
+  const TileGrid grid(image.width, image.height, one_tile);
   for_each_tile(grid, [&](int column, int row) {
     const detail::TileRect rect = grid.rect(column, row);
     RoomAxes of_tile;
@@ -190,7 +192,7 @@ Status decode_into(DepthImage& image, std::span<const uint8_t> bytes, int expect
   image.depth.resize(pixels);  // not cleared: every tile writes all its pixels
   image.colour.resize(pixels);
   image.normal.resize(pixels);
-  const TileGrid grid(image.width, image.height);
+  const TileGrid grid(image.width, image.height, size->one_tile);
   const detail::TileBounds bounds(size->bounds);
   std::string problem;
   const bool good = for_each_tile(grid, [&](int column, int row) {
@@ -208,7 +210,7 @@ Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   const auto size = read_header(in);
   if (!size) return size.error();
   StreamInfo info{.width = size->width, .height = size->height, .bounds = size->bounds};
-  const TileGrid grid(info.width, info.height);
+  const TileGrid grid(info.width, info.height, size->one_tile);
   if (!for_each_tile(grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
     return damaged("damaged or cut off");
   if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));

@@ -41,6 +41,10 @@ void clear(image::DepthImage& image, const TileRect& rect) {
 // No other tile is coded as a sparse one: so nobody makes a decoder take that time for all pixels.
 bool may_be_sparse(size_t covered, size_t pixels) { return covered * 4 < pixels; }
 
+// Of the image that is one tile: how large it may be, since its walk keeps two bytes a pixel and thread, and how many
+// pixels a walk tells apart.
+constexpr size_t kMostOfOne = size_t{1} << 22, kMostScattered = 65535;
+
 constexpr size_t kFewWithinBounds = 4000;  // bench codec on whole views: 2700 to 8000 are alike
 
 // Filled rows predict better where runs are long. Elsewhere sparse tiles take fewer bits up to any density (a tenth
@@ -50,6 +54,15 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
   const bool few = covered * 8 < pixels && (!bounded || covered < kFewWithinBounds);
   return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
+
+// What is covered of a tile.
+void look_at(Mask& mask, const image::DepthImage& image, const TileRect& rect) {
+  mask.reset(rect.width, rect.height);
+  for (int y = 0; y < rect.height; ++y)
+    covered_bits(image.depth.data() + rect.index(0, y), static_cast<size_t>(rect.width), mask.row(y));
+}
+
+size_t pixels_of(const TileRect& rect) { return static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height); }
 
 // By which the sparse tile's normals are turned. exact: codes that are not canonical must come back.
 int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& mask, bool exact) {
@@ -85,7 +98,9 @@ std::optional<RampAxis> find_ramp(TileScratch& s, const image::DepthImage& image
 
 }  // namespace
 
-TileGrid::TileGrid(int width, int height) : width(width), height(height) {
+TileGrid::TileGrid(int width, int height, bool one)
+    : width(width), height(height), tile_width(width), tile_height(height), columns(1), rows(1) {
+  if (one) return;
   // About 256 x 256, longer where the image is narrow; of equal size up to rounding, so that none is a sliver.
   constexpr int kSide = 256, kPixels = static_cast<int>(kMaxTilePixels);
   const int most_rows = width < kSide ? kPixels / width : kSide,
@@ -104,20 +119,35 @@ TileRect TileGrid::rect(int column, int row) const {
           std::min(tile_width, width - x), std::min(tile_height, height - y)};
 }
 
+bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds) {
+  const TileGrid grid(image.width, image.height);
+  if (image.pixels() > kMostOfOne || grid.columns * grid.rows == 1) return false;
+  Mask& mask = scratch().mask;
+  size_t total = 0, tiles = 0;
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column) {
+      const TileRect rect = grid.rect(column, row);
+      look_at(mask, image, rect);
+      const size_t covered = mask.count();
+      if (covered == 0) continue;
+      if (!is_sparse(covered, mask.runs(), pixels_of(rect), bounds.depth != nullptr)) return false;
+      ++tiles, total += covered;
+    }
+  return tiles > 1 && total <= kMostScattered;
+}
+
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
                 const TileBounds& bounds, const RoomAxes* axes) {
   TileScratch& s = scratch();
-  s.mask.reset(rect.width, rect.height);
-  for (int y = 0; y < rect.height; ++y)
-    covered_bits(image.depth.data() + rect.first + rect.stride * static_cast<size_t>(y),
-                 static_cast<size_t>(rect.width), s.mask.row(y));
-  const size_t pixels = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height), covered = s.mask.count();
+  look_at(s.mask, image, rect);
+  const size_t pixels = pixels_of(rect), covered = s.mask.count();
   if (covered == 0) {
     out.push_back(kEmpty);
     return 0;
   }
   const bool full = covered == pixels,
-             sparse = !full && is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr);
+             sparse = !full &&
+                      (pixels > kMaxTilePixels || is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr));
   out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
 
   size_t first = rect.first;  // of the covered pixels
@@ -160,16 +190,18 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   TileScratch& s = scratch();
   const auto base = get_base(in);
   if (!base) return std::nullopt;
-  const size_t pixels = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
+  const size_t pixels = pixels_of(rect);
+  if (!sparse && pixels > kMaxTilePixels) return std::nullopt;
   size_t covered = pixels;
   if (!full) {
     s.mask.reset(rect.width, rect.height);
     if (!get_mask(in, s.mask)) return std::nullopt;
     covered = s.mask.count();
+    if (covered == 0) return std::nullopt;  // that is an empty tile
     clear(image, rect);
   }
   if (sparse) {
-    if (!may_be_sparse(covered, pixels)) return std::nullopt;
+    if (!may_be_sparse(covered, pixels) || covered > kMostScattered) return std::nullopt;
     const auto turns = in.u8();
     if (!turns) return std::nullopt;
     const int pole = *turns & ~kRamp;
@@ -187,7 +219,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
     if (!decode_sparse(s, image, rect, first, pole) || !s.scatter_decoder.finished()) return std::nullopt;
     return covered;
   }
-  if (covered == 0 || !s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base, bounds)) return std::nullopt;
+  if (!s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base, bounds)) return std::nullopt;
   return covered;
 }
 

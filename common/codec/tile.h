@@ -24,10 +24,14 @@ inline constexpr size_t kMaxTilePixels = size_t{1} << 16;
 /// How an image of width x height pixels is divided: tiles of tile_width x tile_height, those at the right and below
 /// cut off.
 struct TileGrid {
-  TileGrid(int width, int height);
+  /// one: all of the image is a single tile, which must be sparse.
+  TileGrid(int width, int height, bool one = false);
   TileRect rect(int column, int row) const;
   int width, height, tile_width, tile_height, columns, rows;
 };
+
+/// Whether an image is coded as one tile: what it covers lies in several sparse tiles, which one says in fewer bytes.
+bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds);
 
 /// Appends the pixels of `rect`; returns the number of covered ones. axes: of the room, from the tile's centre, or
 /// null.

@@ -119,8 +119,8 @@ std::string refusal(const std::vector<uint8_t>& bytes) {
 
 TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
   // 1 x 1 pixels, nothing in it. varint depth, u8 normal, u8 colour.
-  EXPECT_EQ(refusal({0xD7, 8, 1, 1, 1, 0, 1, 0, 0}), "");
-  EXPECT_EQ(refusal({0xD7, 8, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
+  EXPECT_EQ(refusal({0xD7, 9, 1, 1, 1, 0, 1, 0, 0}), "");
+  EXPECT_EQ(refusal({0xD7, 9, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
   for (const auto& bounds : {std::vector<uint8_t>{0, 0, 0},
                              {1, 0, 0},
                              {0xFF, 0x7F, 1, 1},
@@ -129,12 +129,12 @@ TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
                              {0, 4, 0},
                              {0, 0, 16},
                              {0, 255, 255}}) {
-    std::vector<uint8_t> bytes{0xD7, 8, 1, 1, 1};
+    std::vector<uint8_t> bytes{0xD7, 9, 1, 1, 1};
     bytes.insert(bytes.end(), bounds.begin(), bounds.end());
     bytes.push_back(0);
     EXPECT_NE(refusal(bytes).find("bounds of error that nobody writes"), std::string::npos) << int(bounds[0]);
   }
-  EXPECT_NE(refusal({0xD7, 8, 1, 1, 1, 0, 1}), "");
+  EXPECT_NE(refusal({0xD7, 9, 1, 1, 1, 0, 1}), "");
 }
 
 TEST(ErrorBounds, IndicesOfDepthBeyondTheLast) {
@@ -162,7 +162,7 @@ TEST(Refinement, Headers) {
   EXPECT_EQ(refusal_of(bytes, nothing), "");
   EXPECT_NE(refusal_of({}, nothing).find("shorter than its header"), std::string::npos);
   EXPECT_NE(refusal_of({0xD8, 8, 30}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD7, 8, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD7, 9, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
   EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 8"), std::string::npos);
   EXPECT_NE(refusal_of({0xD8, 8, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
   EXPECT_NE(refusal_of({0xD8, 8, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
@@ -253,7 +253,7 @@ TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((150 + 2 * x) % 256 | (100 - y) << 8);
   }
-  expect_bytes(image, {215, 8,   1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
+  expect_bytes(image, {215, 9,   1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
                        64,  150, 100, 16, 163, 15,  186, 98,  90,  36,  93,  192, 4,   69, 129, 254,
                        239, 53,  221, 2,  180, 57,  248, 197, 119, 198, 145, 198, 101, 32, 4},
                {216, 8,   9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
@@ -269,7 +269,7 @@ TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
     image.normal[i] = static_cast<uint16_t>(0x8040 + x * y);
   }
   expect_bytes(
-      image, {215, 8,   1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   29,
+      image, {215, 9,   1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   29,
               76,  1,   209, 39,  254, 76,  0,   120, 23,  0,   0,   0,   0,   0,   0,   124, 194, 245, 201, 217, 170,
               7,   165, 148, 82,  85,  85,  85,  85,  25,  244, 0,   0,   144, 127, 240, 69,  7,   84,  21,  254, 94,
               160, 95,  70,  84,  85,  5,   0,   64,  142, 170, 85,  85,  5,   30,  3,   248, 248, 227, 31,  135, 136,

@@ -176,7 +176,7 @@ TEST(CodecFormat, GoldenBytes) {
       image.normal[i] = static_cast<uint16_t>(0x8040 + i);
     }
   const std::vector<uint8_t> golden{
-      215, 8,   0,   4,   3,   5,   232, 3,   0,   48,  32,  16,  64,  128, 4,   185, 179, 1,   46,  0,   0,   224, 39,
+      215, 9,   0,   4,   3,   5,   232, 3,   0,   48,  32,  16,  64,  128, 4,   185, 179, 1,   46,  0,   0,   224, 39,
       252, 97,  203, 0,   0,   0,   0,   0,   0,   0,   248, 72,  240, 130, 115, 235, 53,  0,   0,   0,   0,   0,   0,
       0,   159, 244, 200, 213, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 21,  37,  244, 0,   0,
       240, 236, 15,  91,  62,  232, 30,  0,   0,   128, 233, 90,  13,  152, 190, 184, 40,  203, 178, 44,  203, 178, 44,
@@ -229,7 +229,7 @@ TEST(CodecFormat, GoldenBytesOfASparseTile) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((250 + 2 * x) % 256 | (100 - y) << 8);
   }
-  const std::vector<uint8_t> golden{215, 8,  0,  9,   8,   6,   32, 161, 7,   96,  80,  64,  250, 100, 16,  163, 15,
+  const std::vector<uint8_t> golden{215, 9,  0,  9,   8,   6,   32, 161, 7,   96,  80,  64,  250, 100, 16,  163, 15,
                                     186, 98, 90, 36,  93,  192, 6,  101, 127, 253, 46,  169, 5,   139, 210, 61,  156,
                                     27,  98, 14, 130, 242, 53,  82, 27,  42,  11,  147, 224, 44,  201, 195, 192};
   EXPECT_EQ(encode(image), golden);
@@ -247,7 +247,7 @@ TEST(CodecFormat, GoldenBytesOfASparseTileThatIsTurned) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x % 3) * 0x030201;
     image.normal[i] = image::canonical_normal16(static_cast<uint16_t>((244 + x) | (100 - y) << 8));
   }
-  const std::vector<uint8_t> golden{215, 8,   0,   9,  8,  6,   32,  161, 7,   96,  80, 64,  244, 100, 16,  163, 15,
+  const std::vector<uint8_t> golden{215, 9,   0,   9,  8,  6,   32,  161, 7,   96,  80, 64,  244, 100, 16,  163, 15,
                                     186, 98,  90,  36, 93, 192, 0,   105, 127, 253, 46, 169, 5,   128, 182, 6,   64,
                                     194, 133, 137, 32, 32, 214, 124, 46,  183, 218, 47, 244, 155, 228, 21,  46,  64};
   EXPECT_EQ(encode(image), golden);

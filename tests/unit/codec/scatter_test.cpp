@@ -1,6 +1,7 @@
 // Sparse tiles: what they cost where it can be said, and that no dense tile is coded as one.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -16,7 +17,7 @@ namespace {
 // A tile whose pixels `mask` covers, coded as a sparse one.
 std::vector<uint8_t> as_sparse(const image::DepthImage& image, const image::PixelMask& mask) {
   const detail::TileRect rect{0, static_cast<size_t>(image.width), image.width, image.height};
-  std::vector<uint8_t> out{0xD7, 8, 0, static_cast<uint8_t>(image.width), static_cast<uint8_t>(image.height), 2 | 4};
+  std::vector<uint8_t> out{0xD7, 9, 0, static_cast<uint8_t>(image.width), static_cast<uint8_t>(image.height), 2 | 4};
   out.resize(out.size() + 8);  // the first prediction: none
   out[6] = 1;
   detail::put_mask(out, mask);
@@ -86,6 +87,69 @@ TEST(Scatter, NormalsThatAreNotCanonicalComeBack) {
     }
   ASSERT_GT(others, 10u);
   EXPECT_EQ(decode(encode(image)).value(), image);
+}
+
+// What a viewer lacks lies all over its view. With its own base, mask, tables and end each tile takes 20 bytes or more.
+TEST(OneTile, IsWhatScatteredPixelsOfALargeImageAre) {
+  image::DepthImage image = test::render({.width = 700, .height = 500, .seed = 4});
+  test::keep_random(image, 0.002, 5);
+  const auto whole = encode(image);
+  EXPECT_EQ(whole[2], 2) << "the flag";
+  EXPECT_EQ(decode(whole).value(), image);
+  const auto info = inspect(whole);
+  ASSERT_TRUE(info.ok());
+  EXPECT_EQ(info->covered_pixels, size_t(std::ranges::count_if(image.depth, [](uint32_t d) { return d != 0; })));
+  size_t apart = 0;
+  for (int y = 0; y < 500; y += 250)
+    for (int x = 0; x < 700; x += 234) apart += encode(test::crop(image, x, y, std::min(234, 700 - x), 250)).size();
+  EXPECT_LT(whole.size() + 100, apart);
+
+  image::DepthImage known;
+  const ErrorBounds bounds{209715, 1, 1};
+  const auto bounded = encode(image, bounds, &known);
+  EXPECT_EQ(bounded[2], 3) << "the flags";
+  EXPECT_LT(bounded.size(), whole.size());
+  EXPECT_EQ(decode_refinement(encode_refinement(image, known), known).value(), image);
+}
+
+TEST(OneTile, IsNoImageOfWhichAPartIsDense) {
+  image::DepthImage image = test::render({.width = 600, .height = 300, .seed = 4});
+  image::DepthImage scattered = image;
+  test::keep_random(scattered, 0.002, 5);
+  for (int y = 0; y < 300; ++y)
+    for (int x = 0; x < 600; ++x) {
+      const auto i = static_cast<size_t>(600 * y + x);
+      if (x < 150 && y < 100) continue;
+      image.depth[i] = scattered.depth[i], image.colour[i] = scattered.colour[i], image.normal[i] = scattered.normal[i];
+    }
+  const auto bytes = encode(image);
+  EXPECT_EQ(bytes[2], 0);
+  EXPECT_EQ(decode(bytes).value(), image);
+}
+
+// A walk tells 65535 pixels apart.
+TEST(OneTile, HasNoMorePixelsThanAWalkTellsApart) {
+  for (const double density : {0.0150, 0.0165}) {
+    image::DepthImage image = test::random_pixels(2048, 2048, density, 9);
+    const auto count = std::ranges::count_if(image.depth, [](uint32_t d) { return d != 0; });
+    const auto bytes = encode(image);
+    EXPECT_EQ(bytes[2], count <= 65535 ? 2 : 0) << count;
+    EXPECT_EQ(decode(bytes).value(), image);
+  }
+}
+
+TEST(OneTile, IsSparseOrRefused) {
+  image::DepthImage image = test::render({.width = 300, .height = 256, .seed = 4});
+  auto dense = encode(image);
+  ASSERT_EQ(dense[2], 0);
+  dense[2] = 2;
+  EXPECT_FALSE(decode(dense).ok());
+  test::keep_random(image, 0.002, 5);
+  auto sparse = encode(image);
+  ASSERT_EQ(sparse[2], 2);
+  for (size_t n = 0; n < sparse.size(); ++n) EXPECT_FALSE(decode(std::span(sparse).first(n)).ok()) << n;
+  sparse[2] = 0;
+  EXPECT_FALSE(decode(sparse).ok()) << "of two tiles";
 }
 
 // A ramp's colours follow from their green, once it was seen.
