@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "common/image/file.h"
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/movie/movie_target.h"
 
@@ -107,8 +108,8 @@ TEST(Movie, OfATransparentRunHasPicturesWithItsAlpha) {
 }
 
 TEST(Movie, OfAWallIsThePictureOfAllItsTiles) {
-  PipelineRun run({"--wall", "2x1", "--size", "96x80", "--duration", "2"});
-  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  PipelineRun run({"--wall", "2x1", "--size", "96x80", "--duration", ordinary_or_slow("2", "10")});
+  ASSERT_EQ(run.program().wait(patient(60)), 0) << run.program().err();
   const Outcome made = movie(run, run.folder() / "wall/", {"--fps", "10"});
   ASSERT_EQ(made.code, 0) << made.err;
   const auto picture = image::read_view(run.folder() / "wall/000005.png");

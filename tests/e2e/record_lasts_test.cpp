@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -40,14 +41,14 @@ TEST(FullDisk, ARunGoesOnSaysItOnceAndEndsWithOne) {
   std::unique_ptr<Program> run;
   {
     const SmallDisk disk(100'000);
-    run =
-        std::make_unique<Program>("telesplat",
-                                  std::vector<std::string>{"run", folder / "terrain.ply", "--no-cache", "--size",
-                                                           "240x160", "--out", folder / "out", "--sampler-threads", "1",
-                                                           "--duration", "6", "--record-every", "1", "--record-depth"},
-                                  folder / "run");
+    run = std::make_unique<Program>(
+        "telesplat",
+        std::vector<std::string>{"run", folder / "terrain.ply", "--no-cache", "--size", "240x160", "--out",
+                                 folder / "out", "--sampler-threads", "1", "--duration", ordinary_or_slow("6", "40"),
+                                 "--record-every", "1", "--record-depth"},
+        folder / "run");
   }
-  EXPECT_EQ(run->wait(90), 1) << run->err();
+  EXPECT_EQ(run->wait(patient(90)), 1) << run->err();
   EXPECT_NE(run->err().find("not all of the record could be written"), std::string::npos) << run->err();
   const auto summary = nlohmann::json::parse(read_text(folder / "out/summary.json"), nullptr, false);
   ASSERT_TRUE(summary.is_object()) << "the disk had no room for it: " << run->err();
