@@ -140,8 +140,11 @@ TEST(Faults, ASamplerKilledWithMaskedLeasesLosesNoRays) {
   for (size_t i = 0; i < frames.size(); ++i) planned[frames[i]] = rays[i];
   for (size_t i = 0; i < of.size(); ++i) cast[of[i]] += tile_rays[i];
   size_t masked = 0;
-  for (const double frame : run.column("updates.csv", "frame")) {
-    EXPECT_EQ(cast[frame], planned[frame]) << "frame " << frame;
+  const auto updated = run.column("updates.csv", "frame"), left_out = run.column("updates.csv", "left_out");
+  for (size_t i = 0; i < updated.size(); ++i) {
+    const double frame = updated[i];
+    EXPECT_EQ(cast[frame], planned[frame])
+        << "frame " << frame << " of update " << i << " of " << updated.size() << ", left out " << left_out[i];
     masked += planned[frame] > 0;
   }
   EXPECT_GT(masked, 3u);
