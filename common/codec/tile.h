@@ -30,7 +30,8 @@ struct TileGrid {
   int width, height, tile_width, tile_height, columns, rows;
 };
 
-/// Whether an image is coded as one tile: what it covers lies in several sparse tiles, which one says in fewer bytes.
+/// Whether an image is coded as one tile: what it covers lies in several sparse tiles, for which
+/// one takes fewer bytes nearly always.
 bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds);
 
 /// Appends the pixels of `rect`; returns the number of covered ones. axes: of the room, from the tile's centre, or
