@@ -133,7 +133,8 @@ TEST(Faults, ASamplerKilledWithMaskedLeasesLosesNoRays) {
   }));
   ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_GE(run.summary()["tiles_released"], 1);
-  // Every planned ray of a view whose update is complete came back.
+  // Every planned ray of a view whose update is complete came back. One that a newer view overtook while its tile was
+  // out with the dead sampler ends with that tile left out.
   std::map<double, double> planned, cast;
   const auto frames = run.column("plans.csv", "frame"), rays = run.column("plans.csv", "rays_cast");
   const auto of = run.column("tiles.csv", "frame"), tile_rays = run.column("tiles.csv", "rays");
@@ -143,8 +144,11 @@ TEST(Faults, ASamplerKilledWithMaskedLeasesLosesNoRays) {
   const auto updated = run.column("updates.csv", "frame"), left_out = run.column("updates.csv", "left_out");
   for (size_t i = 0; i < updated.size(); ++i) {
     const double frame = updated[i];
-    EXPECT_EQ(cast[frame], planned[frame])
-        << "frame " << frame << " of update " << i << " of " << updated.size() << ", left out " << left_out[i];
+    if (left_out[i] > 0) {
+      EXPECT_LT(cast[frame], planned[frame]) << "frame " << frame << ", left out " << left_out[i];
+      continue;
+    }
+    EXPECT_EQ(cast[frame], planned[frame]) << "frame " << frame << " of update " << i << " of " << updated.size();
     masked += planned[frame] > 0;
   }
   EXPECT_GT(masked, 3u);

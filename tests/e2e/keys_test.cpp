@@ -150,6 +150,53 @@ TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
 }
 
+// A session whose viewer is behind a link, and viewers outside that come through a SOCKS tunnel as `ssh -D` makes it.
+TEST(KeysOfSessions, TunnelsCarryThoseWithKeysAndNobodyElse) {
+  const KeyFolder keys, others;
+  const TemporaryFolder folder;
+  ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok());
+  Program bundle("telesplat", {"keys", keys.path(), folder / "laptop", "--bundle", "anna"}, folder / "bundle");
+  ASSERT_EQ(bundle.wait(20), 0) << bundle.err();
+  PipelineRun run({"--duration", "0", "--keys", keys.path(), "--link", "rtt=20ms"});
+  run.use_keys(keys.path(), keys.of(Role::kOperator));
+  const std::string master = run.master();
+  ASSERT_TRUE(run.wait_status([](const auto& s) {
+    return value(s, "viewer-1", "updates") > 3 && value(s, "viewer-1", "rtt_ms") >= 20;
+  })) << run.program().err();
+
+  Program tunnel("telesplat-wan-relay", {"--socks", "127.0.0.1:*"}, folder / "tunnel");
+  ASSERT_TRUE(wait_until([&] { return tunnel.out().find('\n') != std::string::npos; })) << tunnel.err();
+  const std::string line = tunnel.out().substr(0, tunnel.out().find('\n')), words = "listening on ";
+  ASSERT_NE(line.find(words), std::string::npos) << line;
+  const std::string via = line.substr(line.find(words) + words.size());
+  const auto viewer = [&](const std::string& name, const std::string& key_folder) {
+    return std::vector<std::string>{"--master", master,     "--via", via,      "--keys",  key_folder, "--name",
+                                    name,       "--frames", "120",   "--size", "320x200", "--out",    folder / name};
+  };
+  Program stranger("telesplat-viewer", viewer("stranger", others.path()), folder / "stranger-viewer");
+  Program anna("telesplat-viewer", viewer("anna", folder / "laptop"), folder / "anna-viewer");
+  EXPECT_EQ(anna.wait(60), 0) << anna.err();
+  EXPECT_EQ(stranger.wait(60), 2) << stranger.err();
+
+  // A packer that is started again has other ports, and knows who may come in.
+  const auto before = run.status();
+  const pid_t victim = process(before, "packer").value("pid", pid_t{0});
+  ASSERT_GT(victim, 0);
+  ::kill(victim, SIGKILL);
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    const auto packer = process(s, "packer");
+    return packer.is_object() && packer.value("pid", victim) != victim &&
+           value(s, "viewer-1", "updates") > value(before, "viewer-1", "updates") + 3;
+  })) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  const std::string updates = read_text(run.out() + "/updates.csv");
+  EXPECT_NE(updates.find("\nanna,"), std::string::npos) << "views were made for her";
+  EXPECT_EQ(updates.find("\nstranger,"), std::string::npos);
+  EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
+  EXPECT_GE(run.summary()["errors"]["keys_refused"], 1);
+  EXPECT_TRUE(run.all_gone());
+}
+
 TEST(KeysOfSessions, BadFoldersAreRefusedInALine) {
   const KeyFolder keys;
   const TemporaryFolder folder;
