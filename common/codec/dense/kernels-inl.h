@@ -90,13 +90,17 @@ static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT
   }
 }
 
-// What contexts take for tokens of planes.
-static void PlaneSizes(const uint8_t* RESTRICT tokens, size_t n, uint8_t* RESTRICT sizes) {
+static void PlaneKinds(const uint8_t* RESTRICT tokens, size_t n, uint8_t* RESTRICT kinds) {
   for (size_t x = 0; x < n; ++x) {
     const uint16_t t = tokens[x];
-    const uint16_t hit = static_cast<uint16_t>((t * 52 >> 8) * 4), missed = static_cast<uint16_t>(27 + (t >> 3));
-    sizes[x] = static_cast<uint8_t>(t < kHits ? hit : missed);
+    const uint16_t hit = static_cast<uint16_t>(t * 52 >> 8), missed = Least(15, static_cast<uint16_t>((t + 88) >> 4));
+    kinds[x] = static_cast<uint8_t>(t < kHits ? hit : missed);
   }
+}
+
+static void PlaneContexts(const uint8_t* RESTRICT above, size_t n, int merges, uint8_t* RESTRICT contexts) {
+  for (size_t x = 0; x < n; ++x)
+    contexts[x] = static_cast<uint8_t>(kPlaneContexts[static_cast<size_t>(above[x] * 16 + above[x + 1])] >> merges);
 }
 
 static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* RESTRICT contexts) {

@@ -2,8 +2,10 @@
 // All sets give the same results to the bit: integers only. The plain set is standard C++20 and needs nothing else.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "common/codec/dense/rans.h"
 
@@ -22,6 +24,21 @@ struct ContextRows {
 };
 
 inline constexpr unsigned kHits = 40;  ///< eight planes, five distances: -2 to 2
+
+/// The context of a token of planes by the kinds of those above and above right, as kind above * 16 + kind above right.
+/// Kinds that are followed by similar tokens share a context: 256 clusters of tokens of two isosurfaces were merged to
+/// 16, always those two whose merging cost the fewest bits.
+inline constexpr auto kPlaneContexts = [] {
+  constexpr std::string_view kDigits =
+      "0092535355ceeefe0151441444cccccc0595535356defffea59bbbbbbbbeeefe"
+      "649466466677777485956b6b66defffea59bb66666beeeeea4996b6b66deffff"
+      "a497666666defffea497666666defffeb497bd7ddddefffeec9eee7eeeeeffff"
+      "ecfffffffffffffffcfffffffffffffffcffffffffffffffecffefffeeffffff";
+  std::array<uint8_t, 256> out{};
+  for (size_t i = 0; i < out.size(); ++i)
+    out[i] = static_cast<uint8_t>(kDigits[i] - (kDigits[i] > '9' ? 'a' - 10 : '0'));
+  return out;
+}();
 
 inline constexpr int kFeatures = 16;     ///< of what least squares sum up
 inline constexpr int kGuidedTerms = 14;  ///< of guided prediction: 4 neighbours, 9 of the guide, 1 of another residual
@@ -66,8 +83,10 @@ struct Kernels {
   /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]).
   void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
                       uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
-  /// What contexts take for such tokens: 4 (token / 5), or 32 + (token - kHits) / 8.
-  void (*plane_sizes)(const uint8_t* tokens, size_t n, uint8_t* sizes);
+  /// The kinds of such tokens: token / 5, or by how large what is missed is 8 + (token - kHits) / 16, at most 15.
+  void (*plane_kinds)(const uint8_t* tokens, size_t n, uint8_t* kinds);
+  /// Contexts of n such tokens from the kinds above, of which there are n + 1: those of kPlaneContexts >> merges.
+  void (*plane_contexts)(const uint8_t* above, size_t n, int merges, uint8_t* contexts);
   /// Contexts of n tokens.
   void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
   /// 0 if all of n normals are canonical (image/normal.h).

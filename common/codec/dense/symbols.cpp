@@ -10,8 +10,18 @@ constexpr unsigned kBiasBits = 13, kShiftBits = 4;
 
 ContextRows rows_around(const SymbolPlane& plane, size_t y) {
   const auto row = static_cast<ptrdiff_t>(y);
-  const Plane<uint8_t>& sizes = plane.first != 0 ? plane.sizes : plane.tokens;
-  return {sizes.row(row - 1), sizes.row(row - 2), plane.other != nullptr ? plane.other->row(row) : nullptr};
+  return {plane.tokens.row(row - 1), plane.tokens.row(row - 2), plane.other != nullptr ? plane.other->row(row) : nullptr};
+}
+
+bool has_kinds(const SymbolPlane& plane) { return plane.first != 0; }
+
+void make_contexts(SymbolPlane& plane, const TileShape& shape, size_t y) {
+  const auto row = static_cast<ptrdiff_t>(y);
+  uint8_t* const out = plane.contexts.row(row);
+  if (has_kinds(plane))
+    kernels().plane_contexts(plane.kinds.row(row - 1), shape.width, plane.scale.merges, out);
+  else
+    kernels().contexts(rows_around(plane, y), shape.width, plane.scale, out);
 }
 
 }  // namespace
@@ -40,9 +50,9 @@ void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_nu
   else
     narrow.reset(shape.width, shape.height);
   tokens.fill_row(-1, 0), tokens.fill_row(-2, 0);
-  if (first == 0) return;
-  sizes.reset(shape.width, shape.height);
-  sizes.fill_row(-1, 0), sizes.fill_row(-2, 0);
+  if (!has_kinds(*this)) return;
+  kinds.reset(shape.width, shape.height);
+  kinds.fill_row(-1, 0);
 }
 
 SymbolRow SymbolPlane::row(const TileShape& shape, size_t y) const {
@@ -60,8 +70,7 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   const uint8_t* const above = plane.tokens.row(static_cast<ptrdiff_t>(y) - 1);
   shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
   row[-1] = row[0], row[shape.width] = row[shape.width - 1];
-  if (plane.first == 0) return;
-  kernels().plane_sizes(row - 1, shape.width + 2, plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1);
+  if (has_kinds(plane)) kernels().plane_kinds(row, shape.width + 1, plane.kinds.row(static_cast<ptrdiff_t>(y)));
 }
 
 double rough_bits(const SymbolPlane& plane, const TileShape& shape) {
@@ -118,9 +127,8 @@ void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
 }
 
 void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
-  if (!plane.has_contexts) choose_scale(plane, shape);
-  for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y)
-    kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
+  if (!plane.has_contexts && !has_kinds(plane)) choose_scale(plane, shape);
+  for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y) make_contexts(plane, shape, y);
   count(plane, shape);
   if (!plane.has_contexts) plane.scale.merges = merge_contexts(counts_, plane.alphabet);
   if (const int merges = plane.scale.merges; merges != 0)
@@ -129,8 +137,10 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
       for (size_t x = 0, width = shape.width; x < width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> merges);
     }
   choose_levels(counts_, plane.alphabet, levels_);
-  bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
-  bits.put(static_cast<uint64_t>(plane.scale.shift), kShiftBits);
+  if (!has_kinds(plane)) {
+    bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
+    bits.put(static_cast<uint64_t>(plane.scale.shift), kShiftBits);
+  }
   bits.put(static_cast<uint64_t>(plane.scale.merges), 3);
   put_levels(bits, levels_);
   make_encode_tables(levels_, tables_);
@@ -162,8 +172,10 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
 }
 
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
-  plane.scale.bias = static_cast<int>(bits.source.take(kBiasBits));
-  plane.scale.shift = static_cast<int>(bits.source.take(kShiftBits));
+  if (!has_kinds(plane)) {
+    plane.scale.bias = static_cast<int>(bits.source.take(kBiasBits));
+    plane.scale.shift = static_cast<int>(bits.source.take(kShiftBits));
+  }
   plane.scale.merges = static_cast<int>(bits.source.take(3));
   levels_.alphabet = plane.alphabet;
   if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > 4 || !get_levels(bits, levels_)) return false;
@@ -176,7 +188,7 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   uint8_t *const contexts = plane.contexts.row(r), *const tokens = plane.tokens.row(r);
   uint32_t* const wide = plane.is_wide ? plane.wide.row(r) : nullptr;
   uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
-  if (!plane.has_contexts) kernels().contexts(rows_around(plane, y), shape.width, plane.scale, contexts);
+  if (!plane.has_contexts) make_contexts(plane, shape, y);
   if (shape.full(y)) {
     source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first}, tables_.data(),
                                        source.states, source.begin, source.end);

@@ -63,7 +63,7 @@ struct SymbolPlane {
   SymbolRow row(const TileShape& shape, size_t y) const;
 
   Plane<uint8_t> tokens, contexts, narrow;
-  Plane<uint8_t> sizes;  ///< where there are tokens without raw bits: what contexts take for tokens
+  Plane<uint8_t> kinds;  ///< of tokens of planes (`first` is kHits): their contexts follow from those above
   Plane<uint32_t> wide;
   bool is_wide = false;
   unsigned first = 0, alphabet = 0;

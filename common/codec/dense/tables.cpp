@@ -95,7 +95,7 @@ int choose_level(uint32_t count, uint64_t total, double share_of_one, int expect
   return best;
 }
 
-constexpr double kTokenCost = 3;  // bits of a level
+constexpr double kTokenCost = 6;  // bits of a level
 
 double log2_of(uint32_t n) {
   static const auto table = [] {
