@@ -149,6 +149,35 @@ DepthImage plane(int width, int height, double slope_x, double slope_y) {
   return image;
 }
 
+DepthImage facets(int width, int height, uint32_t seed) {
+  std::mt19937 random(seed);
+  DepthImage image = plane(width, height, 0, 0);
+  const int columns = width / 5 + 2;
+  struct Corner {
+    double depth, x, y;
+  };
+  std::vector<Corner> corners(static_cast<size_t>(columns * (height / 5 + 2)));
+  for (Corner& c : corners) {
+    c.depth = 4e6 + static_cast<double>(random() % 60000);
+    c.x = 77 + static_cast<double>(random() % 100), c.y = 77 + static_cast<double>(random() % 100);
+  }
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double u = x % 5 / 5.0, v = y % 5 / 5.0;
+      const auto at = [&](int i, int j) { return corners[static_cast<size_t>((y / 5 + j) * columns + x / 5 + i)]; };
+      const auto between = [&](double Corner::*of) {
+        return u + v < 1
+                   ? at(0, 0).*of + u * (at(1, 0).*of - at(0, 0).*of) + v * (at(0, 1).*of - at(0, 0).*of)
+                   : at(1, 1).*of + (1 - u) * (at(0, 1).*of - at(1, 1).*of) + (1 - v) * (at(1, 0).*of - at(1, 1).*of);
+      };
+      const auto i = static_cast<size_t>(y * width + x);
+      image.depth[i] = static_cast<uint32_t>(between(&Corner::depth)), image.colour[i] = 0x8090A0;
+      image.normal[i] =
+          static_cast<uint16_t>(static_cast<int>(between(&Corner::x)) | static_cast<int>(between(&Corner::y)) << 8);
+    }
+  return image;
+}
+
 DepthImage random_pixels(int width, int height, double density, uint32_t seed) {
   std::mt19937 random(seed);
   DepthImage image(width, height);

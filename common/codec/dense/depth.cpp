@@ -119,8 +119,9 @@ DepthPlane::Way DepthPlane::choose_way(const TileShape& shape, bool may_mean) {
   const double by_line = static_cast<double>(linear_bits) + bits_of(linear, kSymbols),
                by_planes = static_cast<double>(plane_bits) + bits_of(planes, kSymbols),
                by_mean = static_cast<double>(mean_bits) + bits_of(means, kSymbols);
+  faceted = by_planes < by_line;
   if (may_mean && by_mean < std::min(by_line, by_planes)) return kMean;
-  return by_planes < by_line ? kPlanes : kLinear;
+  return faceted ? kPlanes : kLinear;
 }
 
 void DepthPlane::put_way(BitSink& bits, bool may_mean) const { bits.put(way, may_mean ? 2 : 1); }
@@ -194,10 +195,12 @@ void DepthPlane::extend(const TileShape& shape) {
   for (ptrdiff_t y = 0; y < h; ++y) {
     uint32_t* const row = depth.row(y);
     row[-1] = w > 1 ? 2 * row[0] - row[1] : row[0];
+    row[-2] = 2 * row[-1] - row[0];
     row[w] = w > 1 ? 2 * row[w - 1] - row[w - 2] : row[w - 1];
   }
-  for (size_t x = 0; x < w; ++x) {
+  for (ptrdiff_t x = -2; x < static_cast<ptrdiff_t>(w); ++x) {
     depth.row(-1)[x] = h > 1 ? 2 * depth.row(0)[x] - depth.row(1)[x] : depth.row(0)[x];
+    depth.row(-2)[x] = 2 * depth.row(-1)[x] - depth.row(0)[x];
     depth.row(h)[x] = h > 1 ? 2 * depth.row(h - 1)[x] - depth.row(h - 2)[x] : depth.row(h - 1)[x];
   }
 }

@@ -17,6 +17,7 @@ struct DepthPlane {
   SymbolPlane symbols;
   enum Way : uint8_t { kLinear = 0, kPlanes = 1, kMean = 2 };
   Way way = kLinear;
+  bool faceted = false;  ///< of what was encoded: many pixels lie in planes of their neighbours
 
   /// What lies above and to the left of the first pixel is `base`.
   void reset(const TileShape& shape, uint32_t base);

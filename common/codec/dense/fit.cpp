@@ -307,8 +307,9 @@ float median_off(const Features& f) {
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
-                const Plane<int16_t>* left) {
+                const Plane<int16_t>* left, double& left_over) {
   const size_t n = samples.places.size();
+  left_over = 0;
   if (n < 64 || all_same(samples, own)) return false;
   std::vector<Features> all(n + 3);  // to a multiple of four
   std::vector<float> shares(n + 3);
@@ -335,11 +336,152 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
     float terms[kTerms] = {};
     for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
     terms[kWanted] = -1;
-    solved = tokens_left(all, n, bits, [&](const Features& f) { return miss(f, terms); }) <
-             tokens_left(all, n, bits, median_off);
+    const uint64_t fitted = tokens_left(all, n, bits, [&](const Features&f) { return miss(f, terms); }),
+                   median = tokens_left(all, n, bits, median_off);
+    solved = fitted < median;
+    left_over = 3 * static_cast<double>(std::min(fitted, median)) / static_cast<double>(n);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);
+}
+
+namespace {
+
+// Features by flatness: LL and UU stand where the constant and what is wanted stand else; what is wanted, less the
+// constant, is the last.
+constexpr int kFlatTerms = 15, kFlatWanted = 15;
+constexpr int kFlatPlaces[kFlatTerms] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual, kFarLeft, kFarAbove};
+constexpr int kFlatStep = 128;  // of a weight's difference, in 2^-13
+constexpr int kFlatRounds = 3;
+constexpr double kPriorSamples = 0.3;  // how many samples say that a flatness has the weights of all
+
+struct FlatFit {
+  std::vector<Features> all;  // by flatness
+  std::vector<float> shares;
+  size_t begin[kFlatnesses + 1] = {};
+  double prior[kFlatTerms];
+  size_t count(int k) const { return begin[k + 1] - begin[k]; }
+};
+
+void load_samples(FlatFit& fit, const FlatSamples& by, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+                  const Plane<int16_t>* residual, int32_t constant) {
+  const auto flatness = [&](const Samples::Place& p) { return by.flatness->row(p.y)[p.x]; };
+  for (const auto& p : by.samples.places) ++fit.begin[flatness(p) + 1];
+  for (int k = 0; k < kFlatnesses; ++k) fit.begin[k + 1] += fit.begin[k];
+  size_t at[kFlatnesses];
+  std::copy_n(fit.begin, kFlatnesses, at);
+  fit.all.resize(by.samples.places.size() + 3), fit.shares.resize(by.samples.places.size() + 3);
+  for (const auto& p : by.samples.places) {
+    Features& f = fit.all[at[flatness(p)]++];
+    set_features(f, own, own, guide, residual, p.x, p.y);
+    const auto c = static_cast<float>(guide.row(p.y)[p.x]);
+    f.of[kFlatWanted] = f.of[kWanted] - static_cast<float>(constant) / 8192;
+    f.of[13] = static_cast<float>(own.row(p.y)[p.x - 2]) - c;
+    f.of[14] = static_cast<float>(own.row(p.y - 2)[p.x]) - c;
+  }
+}
+
+constexpr float kNear = 24;  // in 64ths of a code
+
+// Shares of the samples of one flatness by what a solution misses.
+void find_shares(FlatFit& fit, int k, const double solution[kFlatTerms], bool last) {
+  alignas(64) float terms[kTerms];
+  for (int i = 0; i < kFlatTerms; ++i) terms[i] = static_cast<float>(solution[i]);
+  terms[kFlatWanted] = -1;
+  kernels().sample_shares(&fit.all[fit.begin[k]].of, terms, fit.count(k), last ? 64 : kNear, last, fit.shares.data());
+}
+
+// The sums of its equations, too.
+void weigh_samples(FlatFit& fit, int k, const double solution[kFlatTerms], bool last, float sums[kTerms][kTerms]) {
+  find_shares(fit, k, solution, last);
+  kernels().normal_equations(&fit.all[fit.begin[k]].of, fit.shares.data(), fit.count(k), sums);
+}
+
+bool solve_flat(const FlatFit& fit, int k, const float sums[kTerms][kTerms], double solution[kFlatTerms]) {
+  Cholesky<kFlatTerms> system{};
+  for (int i = 0; i < kFlatTerms; ++i) {
+    for (int j = 0; j < kFlatTerms; ++j) system.a[i][j] = static_cast<double>(sums[std::max(i, j)][std::min(i, j)]);
+    const double strength = system.a[i][i] * kPriorSamples / static_cast<double>(fit.count(k)) + 1e-9;
+    system.a[i][i] += strength;
+    solution[i] = static_cast<double>(sums[kFlatWanted][i]) + strength * fit.prior[i];
+  }
+  if (!system.factor()) return false;
+  system.solve(solution);
+  return true;
+}
+
+double token_of_miss(float off) { return token_of(static_cast<uint32_t>(std::min(off / 32, 1e6f))); }
+
+// The sum of the tokens that a solution leaves of one flatness.
+double tokens_of(FlatFit& fit, int k, const double solution[kFlatTerms]) {
+  find_shares(fit, k, solution, false);
+  double sum = 0;
+  for (size_t s = 0; s < fit.count(k); ++s) sum += token_of_miss(1 / fit.shares[s] - kNear);
+  return sum;
+}
+
+double median_tokens(const FlatFit& fit, int k) {
+  double sum = 0;
+  for (size_t s = fit.begin[k]; s < fit.begin[k + 1]; ++s) {
+    const Features& f = fit.all[s];
+    const float low = std::min(f.of[0], f.of[1]), high = std::max(f.of[0], f.of[1]);
+    sum += token_of_miss(std::abs(std::clamp(f.of[0] + f.of[1] - f.of[2], low, high) - f.of[kFlatWanted]));
+  }
+  return sum;
+}
+
+}  // namespace
+
+bool add_flat_weights(const int16_t weights[kGuidedTerms], const FlatWeights& flat,
+                      int16_t out[kFlatnesses][kGuidedTerms]) {
+  for (int k = 0; k < kFlatnesses; ++k) {
+    int total = 0, guide = weights[kGuideHere];
+    for (const int place : kFlatPlaces) {
+      const int off = flat.off[k][place] * kFlatStep, w = weights[place] + off;
+      if (std::abs(w) > 32767) return false;
+      out[k][place] = static_cast<int16_t>(w);
+      total += std::abs(w);
+      if (place != kOtherResidual) guide -= off;
+    }
+    if (std::abs(guide) > 32767 || total + std::abs(guide) > kMostWeight) return false;
+    out[k][kGuideHere] = static_cast<int16_t>(guide);
+  }
+  return true;
+}
+
+bool fit_flat_weights(const FlatSamples& by, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+                      const Plane<int16_t>* residual, const int16_t weights[kGuidedTerms], int32_t constant,
+                      bool median, size_t pixels, FlatWeights& out) {
+  const size_t n = by.samples.places.size();
+  if (n < 256 || all_same(by.samples, own)) return false;
+  FlatFit fit;
+  load_samples(fit, by, own, guide, residual, constant);
+  for (int i = 0; i < kFlatTerms; ++i) fit.prior[i] = weights[kFlatPlaces[i]] / 8192.0;
+  double before = 0, after = 0, cost = 0;
+  for (int k = 0; k < kFlatnesses; ++k) {
+    before += median ? median_tokens(fit, k) : tokens_of(fit, k, fit.prior);
+    double solution[kFlatTerms];
+    std::copy_n(fit.prior, kFlatTerms, solution);
+    if (fit.count(k) != 0) {
+      alignas(64) float sums[kTerms][kTerms];
+      for (int round = 0; round < kFlatRounds; ++round) {
+        weigh_samples(fit, k, solution, round + 1 == kFlatRounds, sums);
+        if (!solve_flat(fit, k, sums, solution)) return false;
+      }
+    }
+    std::fill_n(out.off[k], kGuidedTerms, int16_t{0});
+    for (int i = 0; i < kFlatTerms; ++i) {
+      const double off = std::clamp(solution[i] - fit.prior[i], -3.9, 3.9);
+      const long steps = std::lround(off * 8192 / kFlatStep);
+      out.off[k][kFlatPlaces[i]] = static_cast<int16_t>(steps);
+      solution[i] = fit.prior[i] + static_cast<double>(steps) * kFlatStep / 8192;
+      cost += 1.5 + 2 * std::log2(1.0 + std::abs(static_cast<double>(steps)));
+    }
+    after += tokens_of(fit, k, solution);
+  }
+  int16_t sum[kFlatnesses][kGuidedTerms];
+  return (before - after) / 8 * static_cast<double>(pixels) / static_cast<double>(n) > 1.5 * cost &&
+         add_flat_weights(weights, out, sum);
 }
 
 }  // namespace telesplat::codec::detail

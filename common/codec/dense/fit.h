@@ -26,12 +26,36 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
 /// Weights for the plane `own`, whose values have so many `bits` of fraction, by least squares. residual: null, or of
 /// another plane. False where there is nothing to be fitted, or where the median predictor does better: on facets,
 /// whose pixels all have one normal, which no guide meets as well. left: null, or another plane of which the left
-/// neighbour is; the median predicts nothing then.
+/// neighbour is; the median predicts nothing then. left_over: the mean token of what is left, if that is known.
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
-                const Plane<int16_t>* left = nullptr);
+                const Plane<int16_t>* left, double& left_over);
 
-inline constexpr size_t kMostSamples = 700;  ///< of a tile: twice as many bring 0.01 to 0.03 bits
+/// What weights by flatness are fitted to: more samples, since each flatness needs enough.
+struct FlatSamples {
+  Samples samples;
+  const Plane<uint8_t>* flatness = nullptr;
+};
+
+/// Weights of each flatness, as differences in 2^-6 to those of all, -kMostFlat to kMostFlat. The guide at the pixel
+/// itself has none: its weight makes up for all others but the residual's.
+struct FlatWeights {
+  int16_t off[kFlatnesses][kGuidedTerms];
+};
+inline constexpr int kMostFlat = 500;
+
+/// The sums of both; false where one is too large.
+[[nodiscard]] bool add_flat_weights(const int16_t weights[kGuidedTerms], const FlatWeights& flat,
+                                    int16_t out[kFlatnesses][kGuidedTerms]);
+
+/// Weights by flatness for the plane `own` of 64ths, which `weights` and `constant` predict without them, or the median.
+/// False where they do not save what it takes to send them. pixels: how many are coded.
+bool fit_flat_weights(const FlatSamples& by, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+                      const Plane<int16_t>* residual, const int16_t weights[kGuidedTerms], int32_t constant,
+                      bool median, size_t pixels, FlatWeights& out);
+
+inline constexpr size_t kMostSamples = 700;       ///< of a tile: twice as many bring 0.01 to 0.03 bits
+inline constexpr size_t kMostFlatSamples = 2000;  ///< of a tile
 
 /// No sum of weights of this size leaves 32 bits.
 inline constexpr int kMostWeight = 120000, kMostConstant = 1 << 27;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "common/codec/golomb.h"
+
 namespace telesplat::codec::detail {
 namespace {
 
@@ -27,8 +29,9 @@ struct Chain {
         bits(kByte ? 6 : plane.bits),
         most(plane.most),
         left(value[-1] >> plane.bits) {}
-  void step(size_t x) {
-    const int64_t sum = sums[x] + (int64_t{1} << (bits + 12)) + weight * left;
+  void step(size_t x) { step(x, weight, 0); }
+  void step(size_t x, int64_t near_weight, int64_t rest) {
+    const int64_t sum = sums[x] + (int64_t{1} << (bits + 12)) + rest + near_weight * left;
     const int64_t off = int64_t{residual[x]} * (1 << 13);
     const int64_t next = (sum + off) >> (bits + 13);
     const bool plain = static_cast<uint64_t>(sum) < static_cast<uint64_t>(most + 1) << (bits + 13) &&
@@ -51,6 +54,32 @@ struct Chain {
   const int64_t weight;
   const int bits, most;
   int64_t left;
+};
+
+// The same where each flatness has weights of its own.
+struct FlatChain {
+  FlatChain(GuidedPlane& guided, size_t y)
+      : plain(guided, y),
+        flatness(guided.flatness->row(static_cast<ptrdiff_t>(y))),
+        far(plain.value[-2] >> plain.bits) {
+    for (int k = 0; k < kFlatnesses; ++k)
+      near_weight[k] = guided.sets[k][0] * (1 << 6), far_weight[k] = guided.sets[k][kFarLeft] * (1 << 6);
+  }
+  void step(size_t x) {
+    const size_t k = flatness[x];
+    const int64_t before = plain.left;
+    plain.step(x, near_weight[k], far_weight[k] * far);
+    far = before;
+  }
+  void hole(size_t x) {
+    far = plain.left;
+    plain.hole(x);
+  }
+
+  Chain<true> plain;
+  const uint8_t* const flatness;
+  int64_t near_weight[kFlatnesses], far_weight[kFlatnesses];
+  int64_t far;
 };
 
 // Values of a plane that the median predicts: of those to the left, above and between, which is exact where two facets
@@ -85,10 +114,23 @@ void run(Chain chain, const TileShape& shape, size_t y) {
   for (size_t x = 0; x < shape.width; ++x) shape.at(x, y) ? chain.step(x) : chain.hole(x);
 }
 
+// Two that need not wait for each other.
+template <class Chain>
+void run_both(Chain first, Chain second, const TileShape& shape, size_t y) {
+  if (shape.full(y)) {
+    for (size_t x = 0; x < shape.width; ++x) first.step(x), second.step(x);
+  } else {
+    for (size_t x = 0; x < shape.width; ++x)
+      shape.at(x, y) ? (first.step(x), second.step(x)) : (first.hole(x), second.hole(x));
+  }
+}
+
 template <bool kByte>
 void decode_alone(GuidedPlane& plane, const TileShape& shape, size_t y) {
   if (plane.median)
     run(MedianChain<kByte>(plane, y), shape, y);
+  else if (plane.flatness != nullptr)
+    run(FlatChain(plane, y), shape, y);
   else
     run(Chain<kByte>(plane, y), shape, y);
   plane.finish_row(shape, y);
@@ -101,7 +143,7 @@ int16_t GuidedPlane::nearest_value(int16_t by) const {
 }
 
 void GuidedPlane::reset(const TileShape& shape, int fraction, int largest) {
-  bits = fraction, most = largest;
+  bits = fraction, most = largest, flatness = nullptr;
   for (Plane<int16_t>* plane : {&values, &guide, &residuals}) plane->reset(shape.width, shape.height);
   symbols.reset(shape, bits != 6);
   sums.resize(std::max(sums.size(), shape.width + 64));
@@ -115,39 +157,50 @@ void GuidedPlane::begin(const TileShape& shape) {
   std::copy_n(guide.row(h - 1) - 1, w + 2, guide.row(h) - 1);
   std::transform(guide.row(0) - 1, guide.row(0) + w + 1, values.row(-1) - 1,
                  [&](int16_t by) { return nearest_value(by); });
+  std::copy_n(values.row(-1) - 1, w + 2, values.row(-2) - 1);
 }
 
 void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
   int16_t* const row = values.row(static_cast<ptrdiff_t>(y));
   const int16_t* const by = guide.row(static_cast<ptrdiff_t>(y));
   shape.for_each_hole(y, [&](size_t x) { row[x] = nearest_value(by[x]); });
-  row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
+  row[-2] = row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
 }
 
 GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
   const auto r = static_cast<ptrdiff_t>(y);
-  GuidedRows rows{values.row(r),
-                  values.row(r - 1),
-                  {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
-                  before != nullptr ? before->residuals.row(r) : nullptr,
-                  {},
-                  constant,
-                  bits,
-                  most};
-  std::copy_n(weights, kGuidedTerms, rows.weights);
-  return rows;
+  return {values.row(r),
+          values.row(r - 1),
+          values.row(r - 2),
+          {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
+          before != nullptr ? before->residuals.row(r) : nullptr,
+          flatness != nullptr ? flatness->row(r) : nullptr,
+          flatness != nullptr ? sets : &weights,
+          constant,
+          bits,
+          most};
 }
 
 void GuidedPlane::fit(const Samples& samples, const GuidedPlane* before, const Plane<int16_t>* left) {
   median = false;
   if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, bits, weights, constant,
-                  left))
+                  left, left_over))
     set_plain_weights();
 }
 
 void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
   fit(samples, before);
+  encode_fitted(shape, before, nullptr);
+}
+
+void GuidedPlane::encode_fitted(const TileShape& shape, const GuidedPlane* before, const FlatSamples* by_flatness) {
   median = has_plain_weights();
+  flatness = nullptr;
+  if (by_flatness != nullptr &&
+      fit_flat_weights(*by_flatness, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant,
+                       median, shape.total, flat_weights) &&
+      add_flat_weights(weights, flat_weights, sets))
+    flatness = by_flatness->flatness, median = false;
   if (median) return encode_by_median(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
@@ -200,7 +253,7 @@ void GuidedPlane::put_weights(BitSink& bits) const {
   bits.put(plain, 1);
   if (plain) bits.put(median, 1);
   if (plain) return;
-  for (const int16_t w : weights) bits.put(static_cast<uint16_t>(w), 16);
+  for (int i = 0; i < kFarLeft; ++i) bits.put(static_cast<uint16_t>(weights[i]), 16);
   bits.put(static_cast<uint32_t>(constant + (1 << (kConstantBits - 1))), kConstantBits);
 }
 
@@ -212,12 +265,42 @@ bool GuidedPlane::get_weights(BitReader& bits) {
   }
   median = false;
   int total = 0;
-  for (int16_t& w : weights) {
-    w = static_cast<int16_t>(bits.source.take(16));
-    total += std::abs(int{w});
+  weights[kFarLeft] = weights[kFarAbove] = 0;
+  for (int i = 0; i < kFarLeft; ++i) {
+    weights[i] = static_cast<int16_t>(bits.source.take(16));
+    total += std::abs(int{weights[i]});
   }
   constant = static_cast<int32_t>(bits.source.take(kConstantBits)) - (1 << (kConstantBits - 1));
   return !bits.overrun() && total <= kMostWeight && std::abs(constant) <= kMostConstant;
+}
+
+namespace {
+
+// f(difference, context) of all weights by flatness.
+template <class F>
+void for_each_flat_weight(FlatWeights& flat, F f) {
+  GolombContext own, others;
+  own.start(8), others.start(4);
+  for (auto& off : flat.off)
+    for (int i = 0; i < kGuidedTerms; ++i)
+      if (i != kGuideHere) f(off[i], i < 4 || i > 13 ? own : others);
+}
+
+}  // namespace
+
+void GuidedPlane::put_flat_weights(BitSink& bits) const {
+  FlatWeights copy = flat_weights;
+  for_each_flat_weight(copy, [&](int16_t off, GolombContext& context) { context.put(off, bits); });
+}
+
+bool GuidedPlane::get_flat_weights(BitReader& bits) {
+  bool good = !median;
+  for_each_flat_weight(flat_weights, [&](int16_t& off, GolombContext& context) {
+    const int32_t v = bits.overrun() ? kMostFlat + 1 : context.get(bits.source);
+    good &= v >= -kMostFlat && v <= kMostFlat;
+    off = good ? static_cast<int16_t>(v) : int16_t{0};
+  });
+  return good && !bits.overrun() && add_flat_weights(weights, flat_weights, sets);
 }
 
 void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
@@ -231,26 +314,23 @@ void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlan
     unfold(symbols.narrow.row(r));
   else
     unfold(symbols.wide.row(r));
-  values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
+  values.row(r)[-2] = values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
   if (!median) make_sums(shape, y, before);
 }
 
 void GuidedPlane::make_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
-  kernels().guided_sums(rows_around(y, before), shape.width, sums.data());
+  kernels().guided_sums(rows_around(y, before), shape.width, sums.data(), false);
 }
 
 void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y) {
-  if (a.median || b.median) {
+  if (a.median || b.median || (a.flatness == nullptr) != (b.flatness == nullptr)) {
     decode_alone<true>(a, shape, y), decode_alone<true>(b, shape, y);
     return;
   }
-  Chain<true> first(a, y), second(b, y);
-  if (shape.full(y)) {
-    for (size_t x = 0; x < shape.width; ++x) first.step(x), second.step(x);
-  } else {
-    for (size_t x = 0; x < shape.width; ++x)
-      shape.at(x, y) ? (first.step(x), second.step(x)) : (first.hole(x), second.hole(x));
-  }
+  if (a.flatness != nullptr)
+    run_both(FlatChain(a, y), FlatChain(b, y), shape, y);
+  else
+    run_both(Chain<true>(a, y), Chain<true>(b, y), shape, y);
   a.finish_row(shape, y), b.finish_row(shape, y);
 }
 

@@ -23,9 +23,15 @@ struct GuidedPlane {
   void fit(const Samples& samples, const GuidedPlane* before, const Plane<int16_t>* left = nullptr);
   /// Chooses weights; values -> symbols.
   void encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before);
+  /// The same once fit() was called. by_flatness: null, or by what each flatness may have weights of its own.
+  void encode_fitted(const TileShape& shape, const GuidedPlane* before, const FlatSamples* by_flatness);
   void put_weights(BitSink& bits) const;
   static constexpr size_t kMostWeightBits = 16 * kGuidedTerms + 32;
   [[nodiscard]] bool get_weights(BitReader& bits);
+  /// Those by flatness, after the others.
+  void put_flat_weights(BitSink& bits) const;
+  static constexpr size_t kMostFlatBits = kFlatnesses * kGuidedTerms * 64;
+  [[nodiscard]] bool get_flat_weights(BitReader& bits);
   /// What is known of row y before its left neighbours are, into sums.
   void make_sums(const TileShape& shape, size_t y, const GuidedPlane* before);
   /// The same, and its residuals from its symbols.
@@ -38,6 +44,10 @@ struct GuidedPlane {
   std::vector<int32_t> sums;
   int bits = 6, most = 254;
   bool median = false;  ///< predicted by the median of L, U and L + U - UL; weights are plain ones then
+  const Plane<uint8_t>* flatness = nullptr;  ///< where each flatness has weights of its own, flat_weights
+  FlatWeights flat_weights;
+  int16_t sets[kFlatnesses][kGuidedTerms];
+  double left_over = 0;  ///< after fit(): the mean token, or 0
 
  private:
   /// Half of L and of U: where there is nothing to be fitted.

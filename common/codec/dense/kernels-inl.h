@@ -146,11 +146,35 @@ static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRI
 
 static inline int32_t Within16(int32_t v) { return v < -32767 ? -32767 : v > 32767 ? 32767 : v; }
 
-static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums) {
+static void Flatness(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above, const uint32_t* RESTRICT row,
+                     size_t n, uint32_t limit, uint8_t* RESTRICT out) {
+  const uint32_t less = limit - 1;
+  const auto within = [&](uint32_t off) { return static_cast<uint32_t>(off + less <= 2 * less); };
+  for (size_t x = 0; x < n; ++x) {
+    const uint32_t here = row[x], left = row[x - 1], up = above[x];
+    out[x] = static_cast<uint8_t>(within(here - left - up + above[x - 1]) | within(here - 2 * left + row[x - 2]) << 1 |
+                                  within(here - 2 * up + above2[x]) << 2);
+  }
+}
+
+static void SumsByFlatness(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums, bool with_left) {
+  const int16_t *RESTRICT up = rows.above, *RESTRICT own = rows.own;
+  for (size_t x = 0; x < n; ++x) {
+    const int16_t* const w = rows.weights[rows.flatness[x]];
+    int32_t sum = rows.constant + w[1] * up[x] + w[2] * up[x - 1] + w[3] * up[x + 1] + w[kFarAbove] * rows.above2[x];
+    for (int i = 0; i < 9; ++i) sum += w[4 + i] * (rows.guide[i / 3] + x)[i % 3 - 1];
+    if (rows.residual != nullptr) sum += w[13] * rows.residual[x];
+    if (with_left) sum += w[0] * own[x - 1] + w[kFarLeft] * own[x - 2];
+    sums[x] = sum;
+  }
+}
+
+static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums, bool with_left) {
+  if (rows.flatness != nullptr) return SumsByFlatness(rows, n, sums, with_left);
   const int16_t *RESTRICT up = rows.above, *RESTRICT g0 = rows.guide[0], *RESTRICT g1 = rows.guide[1],
                           *RESTRICT g2 = rows.guide[2], *RESTRICT other = rows.residual;
   int32_t w[kGuidedTerms];
-  for (int i = 0; i < kGuidedTerms; ++i) w[i] = rows.weights[i];
+  for (int i = 0; i < kGuidedTerms; ++i) w[i] = rows.weights[0][i];
   const int32_t constant = rows.constant;
   for (size_t x = 0; x < n; ++x)
     sums[x] = constant + w[1] * up[x] + w[2] * up[x - 1] + w[3] * up[x + 1] + w[4] * g0[x - 1] + w[5] * g0[x] +
@@ -169,13 +193,14 @@ static constexpr size_t kPart = 256;
 
 static GuidedRows PartOf(const GuidedRows& rows, size_t begin) {
   GuidedRows part = rows;
-  part.own += begin, part.above += begin;
+  part.own += begin, part.above += begin, part.above2 += begin;
   for (auto& g : part.guide) g += begin;
   if (part.residual != nullptr) part.residual += begin;
+  if (part.flatness != nullptr) part.flatness += begin;
   return part;
 }
 
-using SumsOf = void (*)(const GuidedRows& rows, size_t n, int32_t* sums);
+using SumsOf = void (*)(const GuidedRows& rows, size_t n, int32_t* sums, bool with_left);
 
 template <SumsOf kSums>
 static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT z, uint8_t* RESTRICT tokens,
@@ -184,9 +209,9 @@ static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT 
   for (size_t begin = 0; begin < n; begin += kPart) {
     const size_t count = n - begin < kPart ? n - begin : kPart;
     const GuidedRows part = PartOf(rows, begin);
-    kSums(part, count, sums);
+    kSums(part, count, sums, part.flatness != nullptr);
     const int16_t* RESTRICT own = part.own;
-    const int32_t left = part.weights[0], most = part.most;
+    const int32_t left = part.flatness != nullptr ? 0 : part.weights[0][0], most = part.most;
     uint8_t *RESTRICT zp = z + begin, *RESTRICT tp = tokens + begin;
     int16_t* RESTRICT rp = residual + begin;
     for (size_t x = 0; x < count; ++x) {
@@ -207,9 +232,9 @@ static void GuidedResidualsWide(const GuidedRows& rows, size_t n, uint32_t* REST
   for (size_t begin = 0; begin < n; begin += kPart) {
     const size_t count = n - begin < kPart ? n - begin : kPart;
     const GuidedRows part = PartOf(rows, begin);
-    kSums(part, count, sums);
+    kSums(part, count, sums, false);
     const int16_t* RESTRICT own = part.own;
-    const int32_t left = part.weights[0], most = part.most;
+    const int32_t left = part.weights[0][0], most = part.most;
     const int bits = part.bits;
     uint32_t* RESTRICT zp = z + begin;
     uint8_t* RESTRICT tp = tokens + begin;

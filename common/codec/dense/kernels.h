@@ -40,18 +40,23 @@ inline constexpr auto kPlaneContexts = [] {
   return out;
 }();
 
-inline constexpr int kFeatures = 16;     ///< of what least squares sum up
-inline constexpr int kGuidedTerms = 14;  ///< of guided prediction: 4 neighbours, 9 of the guide, 1 of another residual
+inline constexpr int kFeatures = 16;  ///< of what least squares sum up
+/// Of guided prediction: L, U, UL, UR; 9 of the guide; another residual; LL, UU, which weigh nothing but by flatness.
+inline constexpr int kGuidedTerms = 16, kGuideHere = 8, kOtherResidual = 13, kFarLeft = 14, kFarAbove = 15;
+/// Classes of pixels by what of their depth continues that of those before: 1 the plane of L, U and UL, 2 the line of
+/// L and LL, 4 the line of U and UU.
+inline constexpr int kFlatnesses = 8;
 
 /// What predicts a row of a plane of 64ths: its own rows, a guide, and residuals that are known.
 struct GuidedRows {
-  const int16_t *own, *above;     ///< the plane's row, of which only the left neighbour is used, and the one above
-  const int16_t* guide[3];        ///< the guide's rows above, here, below
-  const int16_t* residual;        ///< of another plane's same row, in 64ths; null: none
-  int16_t weights[kGuidedTerms];  ///< in 2^-13: L, U, UL, UR; the guide's 3 x 3; the residual
-  int32_t constant;               ///< in 2^-13 of the plane's unit
-  int bits = 6;                   ///< of a value's fraction: what 64ths have
-  int32_t most = 254;             ///< the largest value that is predicted
+  const int16_t *own, *above, *above2;     ///< the plane's row, of which what is to the left is used, and those above
+  const int16_t* guide[3];                 ///< the guide's rows above, here, below
+  const int16_t* residual;                 ///< of another plane's same row, in 64ths; null: none
+  const uint8_t* flatness;                 ///< of the row's pixels; null: of all it is 0, and LL and UU weigh nothing
+  const int16_t (*weights)[kGuidedTerms];  ///< in 2^-13, of each flatness: L, U, UL, UR; the guide's 3 x 3; ...
+  int32_t constant;                        ///< in 2^-13 of the plane's unit
+  int bits = 6;                            ///< of a value's fraction: what 64ths have
+  int32_t most = 254;                      ///< the largest value that is predicted
 };
 
 /// Where a plane of room space cuts a pixel's ray: ((a x + b y + c - base code) / code - low) * scale, code being the
@@ -100,8 +105,11 @@ struct Kernels {
   /// The same as guided_residuals() by the median of L, U and L + U - UL.
   void (*median_values)(const int16_t* above, const int16_t* row, size_t n, uint8_t* z, uint8_t* tokens,
                         int16_t* residual);
-  /// All terms of guided prediction but that of the left neighbour,
-  void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums);
+  /// All terms of guided prediction but those of L and LL; with_left, which needs a flatness: these too.
+  void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums, bool with_left);
+  /// Flatness of each pixel of `row`: depth differs by less than `limit`, a power of two, from what continues it.
+  void (*flatness)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t limit,
+                   uint8_t* out);
   /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
   void (*geometry)(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
                    int16_t* gy);

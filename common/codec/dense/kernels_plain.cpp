@@ -56,6 +56,7 @@ const Kernels& plain_kernels() {
                                GuidedResidualsWide<GuidedSums>,
                                MedianValues,
                                GuidedSums,
+                               Flatness,
                                Geometry,
                                Heights,
                                Activity,

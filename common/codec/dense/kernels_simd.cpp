@@ -89,6 +89,7 @@ static const Kernels* Set() {
                                GuidedResidualsWide<GuidedSums>,
                                MedianValues,
                                GuidedSums,
+                               Flatness,
                                Geometry,
                                Heights,
                                Activity,
@@ -430,45 +431,98 @@ static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, 
 
 #if HWY_TARGET <= HWY_AVX2
 
+// Pairs of guided prediction's terms whose products are added at once; the last one is what is to the left.
+constexpr int kTermPairs[8][2] = {{1, 2}, {3, 4}, {5, 6}, {7, 8}, {9, 10}, {11, 12}, {13, kFarAbove}, {0, kFarLeft}};
+using D16 = hn::CappedTag<int16_t, 32>;
+using D32 = hn::Repartition<int32_t, D16>;
+using V16 = hn::VFromD<D16>;
+using V32 = hn::VFromD<D32>;
+constexpr D16 kD16s;
+constexpr D32 kD32s;
+
+HWY_INLINE V32 PairProducts(V16 pairs, V32 weights) {
+#if HWY_TARGET <= HWY_AVX3
+  return V32{_mm512_madd_epi16(pairs.raw, weights.raw)};
+#else
+  return V32{_mm256_madd_epi16(pairs.raw, weights.raw)};
+#endif
+}
+
+// Of each block of eight pixels the first and the last four -> pixels in their order.
+HWY_INLINE void StorePairs(V32 low, V32 high, int32_t* sums) {
+#if HWY_TARGET <= HWY_AVX3
+  const __m512i first = _mm512_set_epi64(11, 10, 3, 2, 9, 8, 1, 0), last = _mm512_set_epi64(15, 14, 7, 6, 13, 12, 5, 4);
+  hn::StoreU(V32{_mm512_permutex2var_epi64(low.raw, first, high.raw)}, kD32s, sums);
+  hn::StoreU(V32{_mm512_permutex2var_epi64(low.raw, last, high.raw)}, kD32s, sums + 16);
+#else
+  hn::StoreU(V32{_mm256_permute2x128_si256(low.raw, high.raw, 0x20)}, kD32s, sums);
+  hn::StoreU(V32{_mm256_permute2x128_si256(low.raw, high.raw, 0x31)}, kD32s, sums + 8);
+#endif
+}
+
+HWY_INLINE int32_t PairOf(const int16_t* weights, int pair) {
+  return static_cast<int32_t>(static_cast<uint16_t>(weights[kTermPairs[pair][0]]) |
+                              static_cast<uint32_t>(static_cast<uint16_t>(weights[kTermPairs[pair][1]])) << 16);
+}
+
+// The weights of each pixel's flatness: at[i] of the eight at `weights`.
+HWY_INLINE V32 ByFlatness(const int32_t* weights, V32 at) {
+#if HWY_TARGET <= HWY_AVX3
+  return V32{_mm512_permutexvar_epi32(
+      at.raw, _mm512_broadcast_i64x4(_mm256_load_si256(reinterpret_cast<const __m256i*>(weights))))};
+#else
+  return V32{_mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(weights)), at.raw)};
+#endif
+}
+
+static void PairedSumsByFlatness(const GuidedRows& rows, size_t n, int32_t* HWY_RESTRICT sums, bool with_left) {
+  const int16_t *const up = rows.above, *const g0 = rows.guide[0], *const g1 = rows.guide[1], *const g2 = rows.guide[2];
+  const int16_t* const residual = rows.residual != nullptr ? rows.residual : up;
+  const int16_t* const terms[kGuidedTerms] = {rows.own - 1, up,       up - 1,       up + 1,     g0 - 1, g0,
+                                              g0 + 1,       g1 - 1,   g1,           g1 + 1,     g2 - 1, g2,
+                                              g2 + 1,       residual, rows.own - 2, rows.above2};
+  HWY_ALIGN int32_t weights[8][kFlatnesses];
+  for (int pair = 0; pair < 8; ++pair)
+    for (int k = 0; k < kFlatnesses; ++k) {
+      weights[pair][k] = PairOf(rows.weights[k], pair);
+      if (pair == 6 && rows.residual == nullptr) weights[pair][k] &= ~0xFFFF;
+    }
+  const V32 constant = hn::Set(kD32s, rows.constant);
+  const hn::Rebind<uint8_t, D16> bytes;
+  const hn::RebindToUnsigned<D16> words;
+  for (size_t x = 0; x < n; x += hn::Lanes(kD16s)) {
+    const V16 flat = hn::BitCast(kD16s, hn::PromoteTo(words, hn::LoadU(bytes, rows.flatness + x)));
+    const V32 flat_low = hn::BitCast(kD32s, hn::InterleaveLower(kD16s, flat, hn::Zero(kD16s))),
+              flat_high = hn::BitCast(kD32s, hn::InterleaveUpper(kD16s, flat, hn::Zero(kD16s)));
+    V32 low = constant, high = constant;
+    for (int pair = 0; pair < (with_left ? 8 : 7); ++pair) {
+      const V16 a = hn::LoadU(kD16s, terms[kTermPairs[pair][0]] + x),
+                b = hn::LoadU(kD16s, terms[kTermPairs[pair][1]] + x);
+      low = hn::Add(low, PairProducts(hn::InterleaveLower(kD16s, a, b), ByFlatness(weights[pair], flat_low)));
+      high = hn::Add(high, PairProducts(hn::InterleaveUpper(kD16s, a, b), ByFlatness(weights[pair], flat_high)));
+    }
+    StorePairs(low, high, sums + x);
+  }
+}
+
 // As GuidedSums(): products of 16 bits, two at a time, which halves their number.
-static void PairedSums(const GuidedRows& rows, size_t n, int32_t* HWY_RESTRICT sums) {
-  const hn::CappedTag<int16_t, 32> d16;
-  const hn::Repartition<int32_t, decltype(d16)> d32;
-  using V16 = hn::VFromD<decltype(d16)>;
-  using V32 = hn::VFromD<decltype(d32)>;
+static void PairedSums(const GuidedRows& rows, size_t n, int32_t* HWY_RESTRICT sums, bool with_left) {
+  if (rows.flatness != nullptr) return PairedSumsByFlatness(rows, n, sums, with_left);
   const int16_t *const up = rows.above, *const g0 = rows.guide[0], *const g1 = rows.guide[1], *const g2 = rows.guide[2];
   const int16_t* const terms[12] = {up, up - 1, up + 1, g0 - 1, g0, g0 + 1, g1 - 1, g1, g1 + 1, g2 - 1, g2, g2 + 1};
   V32 weights[7];
-  for (int i = 0; i < 7; ++i) {
-    const auto low = static_cast<uint16_t>(rows.weights[1 + 2 * i]),
-               high = static_cast<uint16_t>(i < 6 ? rows.weights[2 + 2 * i] : 0);
-    weights[i] = hn::Set(d32, static_cast<int32_t>(low | static_cast<uint32_t>(high) << 16));
-  }
-  const V32 constant = hn::Set(d32, rows.constant);
-  const auto products = [](V16 pairs, V32 w) HWY_ATTR {
-#if HWY_TARGET <= HWY_AVX3
-    return V32{_mm512_madd_epi16(pairs.raw, w.raw)};
-#else
-    return V32{_mm256_madd_epi16(pairs.raw, w.raw)};
-#endif
-  };
-  for (size_t x = 0; x < n; x += hn::Lanes(d16)) {
-    V32 low = constant, high = constant;  // of each block of eight pixels, the first and the last four
+  for (int pair = 0; pair < 7; ++pair) weights[pair] = hn::Set(kD32s, PairOf(rows.weights[0], pair));
+  const V32 constant = hn::Set(kD32s, rows.constant);
+  for (size_t x = 0; x < n; x += hn::Lanes(kD16s)) {
+    V32 low = constant, high = constant;
     const auto add = [&](V16 a, V16 b, V32 w) HWY_ATTR {
-      low = hn::Add(low, products(hn::InterleaveLower(d16, a, b), w));
-      high = hn::Add(high, products(hn::InterleaveUpper(d16, a, b), w));
+      low = hn::Add(low, PairProducts(hn::InterleaveLower(kD16s, a, b), w));
+      high = hn::Add(high, PairProducts(hn::InterleaveUpper(kD16s, a, b), w));
     };
-    for (int i = 0; i < 6; ++i) add(hn::LoadU(d16, terms[2 * i] + x), hn::LoadU(d16, terms[2 * i + 1] + x), weights[i]);
-    if (rows.residual != nullptr) add(hn::LoadU(d16, rows.residual + x), hn::Zero(d16), weights[6]);
-#if HWY_TARGET <= HWY_AVX3
-    const __m512i first = _mm512_set_epi64(11, 10, 3, 2, 9, 8, 1, 0),
-                  last = _mm512_set_epi64(15, 14, 7, 6, 13, 12, 5, 4);
-    hn::StoreU(V32{_mm512_permutex2var_epi64(low.raw, first, high.raw)}, d32, sums + x);
-    hn::StoreU(V32{_mm512_permutex2var_epi64(low.raw, last, high.raw)}, d32, sums + x + 16);
-#else
-    hn::StoreU(V32{_mm256_permute2x128_si256(low.raw, high.raw, 0x20)}, d32, sums + x);
-    hn::StoreU(V32{_mm256_permute2x128_si256(low.raw, high.raw, 0x31)}, d32, sums + x + 8);
-#endif
+    for (int i = 0; i < 6; ++i)
+      add(hn::LoadU(kD16s, terms[2 * i] + x), hn::LoadU(kD16s, terms[2 * i + 1] + x), weights[i]);
+    if (rows.residual != nullptr) add(hn::LoadU(kD16s, rows.residual + x), hn::Zero(kD16s), weights[6]);
+    StorePairs(low, high, sums + x);
   }
 }
 
@@ -511,6 +565,7 @@ static const Kernels* Set() {
                                GuidedResidualsWide<PairedSums>,
                                MedianValues,
                                PairedSums,
+                               Flatness,
                                Geometry,
                                HeightsVector,
                                Activity,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdlib>
 #include <memory>
 
@@ -9,6 +10,13 @@
 
 namespace telesplat::codec::detail {
 namespace {
+
+constexpr int kMostFlatBits = 24;
+constexpr unsigned kFlatBitsBits = 5;
+constexpr double kSmooth = 2.2;  // mean tokens of both coordinates: about 3.5 bits
+// Mean tokens of a coordinate, without a bound of normals and with one, above which weights by flatness save more than
+// they take, in bits and in time.
+constexpr double kRough = 3, kRoughWithin = 1.5;
 
 struct Point {
   int x, y, z;
@@ -100,7 +108,8 @@ int PoleChoice::best() const {
 
 void NormalPlanes::reset(const TileShape& shape, int reach) {
   lattice_ = NormalLattice(reach);
-  for (GuidedPlane& p : plane) p.reset(shape, 6, lattice_.most());
+  may_be_exact_ = reach != 0, exact_ = false;
+  for (GuidedPlane& p : plane) p.reset(shape);
   activity.reset(shape.width, shape.height);
 }
 
@@ -122,8 +131,23 @@ int NormalPlanes::choose_pole(const TileShape& shape) const {
   return choice.best();
 }
 
+void NormalPlanes::be_exact() { exact_ = true, lattice_ = NormalLattice(0); }
+
+// Whether normals as they are take few bits.
+bool NormalPlanes::smooth(const TileShape& shape) {
+  double left_over = 0;
+  for (GuidedPlane& p : plane) {
+    for (size_t y = 0; y < shape.height; ++y) p.finish_row(shape, y);
+    p.fit(samples, nullptr);
+    left_over += p.left_over;
+  }
+  return left_over < kSmooth;
+}
+
 // The guide in 64ths of a code -> of the lattice's steps.
 void NormalPlanes::to_lattice(const TileShape& shape) {
+  if (lattice_.step() == 1) return;
+  for (GuidedPlane& p : plane) p.most = lattice_.most();
   for (GuidedPlane& p : plane) {
     for (size_t y = 0; y < shape.height; ++y) {
       int16_t* const row = p.guide.row(static_cast<ptrdiff_t>(y));
@@ -145,12 +169,12 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
     kernels().activity(rows(plane[0]).data(), rows(plane[1]).data(), shape.width, activity.row(r));
     activity.row(r)[-1] = activity.row(r)[0], activity.row(r)[shape.width] = activity.row(r)[shape.width - 1];
   }
-  if (lattice_.step() != 1) to_lattice(shape);
   plane[0].symbols.other = &activity;
   plane[1].symbols.other = &plane[0].symbols.tokens;
 }
 
-void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits) {
+void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour,
+                          BitSink& bits) {
   samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
   pole_ = choose_pole(shape);
   const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, false);
@@ -167,6 +191,8 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
   has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
                                                 -static_cast<int>(shape.height / 2), geometry_);
   make_guide(shape, depth, base);
+  if (may_be_exact_ && of_one_colour && smooth(shape)) be_exact();
+  to_lattice(shape);
   for (GuidedPlane& p : plane)
     for (size_t y = 0; y < shape.height; ++y) {
       int16_t* const row = p.values.row(static_cast<ptrdiff_t>(y));
@@ -174,12 +200,56 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
         for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<int16_t>(lattice_.index(row[x] >> 6) * 64);
       p.finish_row(shape, y);
     }
-  plane[0].encode(shape, samples, nullptr);
-  plane[1].encode(shape, samples, &plane[0]);
+  const FlatSamples* by_flatness = nullptr;
+  for (GuidedPlane& p : plane) {
+    const GuidedPlane* const before = &p == &plane[1] ? &plane[0] : nullptr;
+    p.fit(samples, before);
+    const bool rough = depth.faceted && p.left_over > (lattice_.step() == 1 ? kRough : kRoughWithin);
+    if (rough && by_flatness == nullptr && choose_flatness(shape, depth)) by_flatness = &flat;
+    p.encode_fitted(shape, before, rough ? by_flatness : nullptr);
+  }
+  put_header(bits);
+}
+
+void NormalPlanes::put_header(BitSink& bits) const {
   bits.put(static_cast<uint64_t>(pole_), 3);
   bits.put(has_geometry_, 1);
   if (has_geometry_) put_geometry(bits, geometry_);
+  if (may_be_exact_) bits.put(exact_, 1);
   for (const GuidedPlane& p : plane) p.put_weights(bits);
+  const bool any = plane[0].flatness != nullptr || plane[1].flatness != nullptr;
+  bits.put(any, 1);
+  if (!any) return;
+  bits.put(static_cast<uint64_t>(flat_bits_), kFlatBitsBits);
+  for (const GuidedPlane& p : plane) bits.put(p.flatness != nullptr, 1);
+  for (const GuidedPlane& p : plane)
+    if (p.flatness != nullptr) p.put_flat_weights(bits);
+}
+
+void NormalPlanes::find_flatness(const TileShape& shape, const DepthPlane& depth) {
+  flatness_.reset(shape.width, shape.height);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    kernels().flatness(depth.depth.row(r - 2), depth.depth.row(r - 1), depth.depth.row(r), shape.width,
+                       1u << flat_bits_, flatness_.row(r));
+  }
+}
+
+// Chosen so that three of four pixels lie in the plane of L, U and UL.
+bool NormalPlanes::choose_flatness(const TileShape& shape, const DepthPlane& depth) {
+  flat.samples.choose(shape, std::min<size_t>(kMostFlatSamples, shape.total / 10));
+  if (flat.samples.places.empty()) return false;
+  std::vector<uint32_t> off;
+  for (const auto& p : flat.samples.places) {
+    const uint32_t *const row = depth.depth.row(p.y) + p.x, *const above = depth.depth.row(p.y - 1) + p.x;
+    off.push_back(static_cast<uint32_t>(std::abs(static_cast<int>(row[0] - row[-1] - above[0] + above[-1]))));
+  }
+  const auto at = off.begin() + static_cast<ptrdiff_t>(off.size() * 3 / 4);
+  std::nth_element(off.begin(), at, off.end());
+  flat_bits_ = std::min(static_cast<int>(std::bit_width(*at)), kMostFlatBits);
+  find_flatness(shape, depth);
+  flat.flatness = &flatness_;
+  return true;
 }
 
 bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits) {
@@ -187,9 +257,19 @@ bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   has_geometry_ = bits.source.take(1) != 0;
   if (pole_ > kRaw) return false;
   if (has_geometry_ && !get_geometry(bits, geometry_)) return false;
+  if (may_be_exact_ && bits.source.take(1) != 0) be_exact();
   for (GuidedPlane& p : plane)
     if (!p.get_weights(bits)) return false;
+  if (bits.source.take(1) != 0) {
+    flat_bits_ = static_cast<int>(bits.source.take(kFlatBitsBits));
+    if (flat_bits_ > kMostFlatBits) return false;
+    find_flatness(shape, depth);
+    for (GuidedPlane& p : plane) p.flatness = bits.source.take(1) != 0 ? &flatness_ : nullptr;
+    for (GuidedPlane& p : plane)
+      if (p.flatness != nullptr && !p.get_flat_weights(bits)) return false;
+  }
   make_guide(shape, depth, base);
+  to_lattice(shape);
   return true;
 }
 

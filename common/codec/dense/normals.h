@@ -38,9 +38,11 @@ class PoleChoice {
 struct NormalPlanes {
   /// reach: of a NormalLattice; 0: all codes.
   void reset(const TileShape& shape, int reach);
-  /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code.
-  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits);
-  static constexpr size_t kMostBits = 256 + 2 * GuidedPlane::kMostWeightBits;
+  /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code. of_one_colour: all pixels
+  /// are, so that normals are all that is seen of them: where they are smooth they are coded as they are, whatever the
+  /// bound.
+  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour, BitSink& bits);
+  static constexpr size_t kMostBits = 256 + 2 * (GuidedPlane::kMostWeightBits + GuidedPlane::kMostFlatBits);
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
   /// Row y from its symbols, into codes of all its pixels.
   void decode_row(const TileShape& shape, size_t y, uint16_t* codes);
@@ -52,12 +54,21 @@ struct NormalPlanes {
   Plane<uint8_t> activity;
   std::vector<uint16_t> codes;  ///< of the tile's covered pixels, row by row in all its width
   Samples samples;
+  FlatSamples flat;
 
  private:
+  void put_header(BitSink& bits) const;
+  void find_flatness(const TileShape& shape, const DepthPlane& depth);
+  bool choose_flatness(const TileShape& shape, const DepthPlane& depth);
   void to_lattice(const TileShape& shape);
+  bool smooth(const TileShape& shape);
+  void be_exact();
   void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
   int choose_pole(const TileShape& shape) const;
   NormalLattice lattice_{0};
+  bool may_be_exact_ = false, exact_ = false;  ///< of streams with a bound of normals
+  Plane<uint8_t> flatness_;
+  int flat_bits_ = 0;  ///< depth that differs by less than 2^flat_bits_ from what continues it is flat
   int pole_ = kRaw;
   bool has_geometry_ = false;
   GeometryModel geometry_;

@@ -10,7 +10,8 @@ constexpr unsigned kBiasBits = 13, kShiftBits = 4;
 
 ContextRows rows_around(const SymbolPlane& plane, size_t y) {
   const auto row = static_cast<ptrdiff_t>(y);
-  return {plane.tokens.row(row - 1), plane.tokens.row(row - 2), plane.other != nullptr ? plane.other->row(row) : nullptr};
+  return {plane.tokens.row(row - 1), plane.tokens.row(row - 2),
+          plane.other != nullptr ? plane.other->row(row) : nullptr};
 }
 
 bool has_kinds(const SymbolPlane& plane) { return plane.first != 0; }

@@ -139,6 +139,13 @@ TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
       m.refinement = encode_refinement(m.image, m.bounded);
       all.push_back(std::move(m));
     }
+  const DepthImage smooth = test::render({.width = 70, .height = 90, .constant_albedo = true});
+  for (const DepthImage& image : {test::facets(70, 90, 1), smooth}) {
+    Made m{image};
+    m.bytes = encode(m.image, bounds, &m.bounded);
+    m.refinement = encode_refinement(m.image, m.bounded);
+    all.push_back(std::move(m));
+  }
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());

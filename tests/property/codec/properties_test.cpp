@@ -98,6 +98,7 @@ TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
     all.push_back(test::random_pixels(width, 9, 0.8, static_cast<uint32_t>(width)));
     all.push_back(test::random_pixels(width, 9, 0.05, static_cast<uint32_t>(width)));
   }
+  for (const int width : {63, 64, 70}) all.push_back(test::facets(width, 90, static_cast<uint32_t>(width)));
   std::vector<std::vector<uint8_t>> reference;
   for (const DepthImage& image : all) reference.push_back(encode(image));
   const auto targets = hwy::SupportedAndGeneratedTargets();

@@ -13,6 +13,7 @@ std::vector<image::DepthImage> codec_images(uint32_t seed) {
   std::vector<image::DepthImage> all;
   all.push_back(
       plane(side(), side(), static_cast<double>(random() % 2000) - 1000, static_cast<double>(random() % 2000) - 1000));
+  all.push_back(facets(70 + side(), 70 + side(), seed));
   for (const bool rough : {false, true})
     for (const bool constant : {false, true})
       all.push_back(render({.width = side(),

@@ -119,8 +119,8 @@ std::string refusal(const std::vector<uint8_t>& bytes) {
 
 TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
   // 1 x 1 pixels, nothing in it. varint depth, u8 normal, u8 colour.
-  EXPECT_EQ(refusal({0xD7, 9, 1, 1, 1, 0, 1, 0, 0}), "");
-  EXPECT_EQ(refusal({0xD7, 9, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
+  EXPECT_EQ(refusal({0xD7, 10, 1, 1, 1, 0, 1, 0, 0}), "");
+  EXPECT_EQ(refusal({0xD7, 10, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
   for (const auto& bounds : {std::vector<uint8_t>{0, 0, 0},
                              {1, 0, 0},
                              {0xFF, 0x7F, 1, 1},
@@ -129,12 +129,12 @@ TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
                              {0, 4, 0},
                              {0, 0, 16},
                              {0, 255, 255}}) {
-    std::vector<uint8_t> bytes{0xD7, 9, 1, 1, 1};
+    std::vector<uint8_t> bytes{0xD7, 10, 1, 1, 1};
     bytes.insert(bytes.end(), bounds.begin(), bounds.end());
     bytes.push_back(0);
     EXPECT_NE(refusal(bytes).find("bounds of error that nobody writes"), std::string::npos) << int(bounds[0]);
   }
-  EXPECT_NE(refusal({0xD7, 9, 1, 1, 1, 0, 1}), "");
+  EXPECT_NE(refusal({0xD7, 10, 1, 1, 1, 0, 1}), "");
 }
 
 TEST(ErrorBounds, IndicesOfDepthBeyondTheLast) {
@@ -158,14 +158,14 @@ std::string refusal_of(const std::vector<uint8_t>& bytes, const DepthImage& boun
 TEST(Refinement, Headers) {
   const DepthImage nothing(30, 20);
   const auto bytes = encode_refinement(nothing, nothing);
-  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 8, 30, 20}));
+  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 9, 30, 20}));
   EXPECT_EQ(refusal_of(bytes, nothing), "");
   EXPECT_NE(refusal_of({}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 8, 30}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD7, 9, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 8"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 8, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 8, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 9, 30}, nothing).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD7, 10, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 9"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 9, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 9, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
 }
 
 TEST(Refinement, OfWhatIsExactTakesAByteATile) {
@@ -253,10 +253,10 @@ TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((150 + 2 * x) % 256 | (100 - y) << 8);
   }
-  expect_bytes(image, {215, 9,   1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
+  expect_bytes(image, {215, 10,  1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
                        64,  150, 100, 16, 163, 15,  186, 98,  90,  36,  93,  192, 4,   69, 129, 254,
                        239, 53,  221, 2,  180, 57,  248, 197, 119, 198, 145, 198, 101, 32, 4},
-               {216, 8,   9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
+               {216, 9,   9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
                 110, 210, 128, 18, 0, 0,   111, 128, 18, 0, 25, 151, 242, 34,  0,   25, 143, 10, 10, 164, 39, 128});
 }
 
@@ -268,26 +268,27 @@ TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
     image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
     image.normal[i] = static_cast<uint16_t>(0x8040 + x * y);
   }
-  expect_bytes(
-      image, {215, 9,   1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   29,
-              76,  1,   209, 39,  254, 76,  0,   120, 23,  0,   0,   0,   0,   0,   0,   124, 194, 245, 201, 217, 170,
-              7,   165, 148, 82,  85,  85,  85,  85,  25,  244, 0,   0,   144, 127, 240, 69,  7,   84,  21,  254, 94,
-              160, 95,  70,  84,  85,  5,   0,   64,  142, 170, 85,  85,  5,   30,  3,   248, 248, 227, 31,  135, 136,
-              65,  196, 32,  98,  59,  0,   224, 1,   255, 222, 229, 213, 71,  237, 214, 90,  107, 173, 181, 214, 90,
-              107, 13,  1,   0,   0,   17,  101, 69,  9,   227, 2,   0,   52,  108, 114, 2,   83,  189, 98,  23,  177,
-              29,  239, 4,   188, 191, 122, 16,  107, 61,  13,  8,   157, 27,  238, 4,   106, 141, 238, 4,   136, 191,
-              97,  78,  229, 220, 174, 1,   157, 27,  238, 4,   158, 14,  116, 23,  165, 207, 118, 16,  118, 76,  174,
-              1,   124, 173, 99,  23,  116, 173, 239, 4,   78,  223, 214, 94},
-      {216, 8,   17,  3,   1,   239, 207, 12,  16,  0,   132, 1,   82,  0,   194, 159, 18,  224, 223, 249, 189, 207,
-       189, 245, 22,  124, 192, 237, 6,   124, 222, 141, 27,  0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,
-       0,   0,   0,   0,   128, 127, 199, 251, 247, 0,   0,   0,   0,   0,   0,   0,   0,   0,   252, 59,  174, 113,
-       141, 107, 44,  7,   248, 103, 226, 55,  152, 44,  0,   132, 195, 225, 0,   0,   128, 195, 33,  0,   226, 0,
-       64,  1,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   184, 87,  80,  0,   0,   0,   0,   111,
-       184, 240, 239, 124, 66,  0,   188, 233, 241, 24,  0,   15,  123, 66,  0,   188, 235, 2,   240, 160, 7,   28,
-       2,   0,   0,   0,   46,  247, 192, 57,  231, 156, 115, 0,   0,   17,  112, 31,  99,  102, 233, 79,  42,  83,
-       244, 0,   161, 0,   148, 98,  98,  0,   196, 128, 82,  0,   103, 133, 41,  0,   40,  80,  141, 0,   156, 18,
-       170, 0,   15,  64,  165, 0,   40,  80,  141, 0,   156, 18,  170, 0,   15,  64,  165, 0,   40,  80,  141, 0,
-       156, 18,  170, 0,   15,  64,  165, 0,   40,  80,  141, 0,   156, 18,  170, 0});
+  expect_bytes(image,
+               {215, 10,  1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   33,
+                76,  1,   225, 39,  254, 76,  0,   120, 23,  0,   0,   0,   0,   0,   0,   60,  127, 123, 112, 180, 90,
+                173, 86,  171, 213, 106, 181, 90,  173, 86,  171, 213, 10,  25,  228, 1,   0,   64,  254, 193, 23,  29,
+                80,  85,  248, 123, 129, 126, 25,  81,  85,  21,  0,   0,   57,  170, 86,  85,  21,  30,  3,   248, 248,
+                227, 31,  135, 136, 65,  196, 32,  98,  59,  0,   224, 1,   255, 222, 229, 213, 71,  237, 214, 90,  107,
+                173, 181, 214, 90,  107, 13,  2,   0,   0,   17,  101, 69,  144, 5,   182, 34,  3,   0,   138, 13,  153,
+                2,   89,  252, 43,  36,  212, 173, 159, 7,   155, 207, 94,  25,  191, 30,  117, 12,  20,  46,  158, 7,
+                217, 62,  160, 7,   68,  63,  222, 120, 190, 206, 155, 2,   20,  46,  158, 7,   250, 13,  67,  36,  183,
+                79,  100, 25,  223, 156, 153, 2,   115, 29,  39,  36,  220, 236, 161, 7,   70,  159, 0,   0},
+               {216, 9,   17,  3,   1,   239, 207, 12,  16,  0,   137, 1,   226, 79,  9,   255, 162, 47,  1,   248, 212,
+                75,  151, 0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   248, 23,  125,
+                229, 43,  0,   0,   0,   0,   0,   0,   0,   0,   0,   248, 23,  45,  133, 127, 16,  0,   191, 22,  62,
+                82,  28,  30,  7,   128, 143, 51,  26,  141, 198, 70,  163, 209, 104, 52,  108, 0,   128, 206, 243, 0,
+                124, 164, 114, 0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,
+                0,   252, 91,  95,  73,  1,   0,   0,   0,   188, 225, 194, 191, 243, 9,   1,   240, 166, 199, 99,  0,
+                60,  236, 9,   1,   240, 174, 11,  192, 131, 30,  112, 8,   0,   0,   0,   184, 220, 3,   231, 156, 115,
+                206, 1,   2,   17,  47,  55,  144, 20,  230, 174, 0,   0,   110, 159, 2,   0,   137, 171, 99,  0,   239,
+                221, 14,  0,   136, 131, 12,  0,   124, 68,  6,   0,   28,  119, 21,  0,   158, 200, 25,  0,   91,  9,
+                25,  0,   28,  119, 21,  0,   158, 200, 25,  0,   91,  9,   25,  0,   28,  119, 21,  0,   158, 200, 25,
+                0,   91,  9,   25,  0,   28,  119, 21,  0,   158, 200, 25,  0});
 }
 
 }  // namespace

@@ -15,6 +15,8 @@
 namespace telesplat::codec {
 namespace {
 
+using namespace detail;
+
 using image::DepthImage;
 
 StreamInfo expect_round_trip(const DepthImage& image) {
@@ -31,29 +33,42 @@ double bits_per_pixel(size_t bytes, const DepthImage& image) {
   return 8.0 * static_cast<double>(bytes) / static_cast<double>(image.pixels());
 }
 
-// A surface of triangles a few pixels wide: squares of four pixels, two planes each.
-DepthImage facets(int width, int height, uint32_t seed) {
-  std::mt19937 random(seed);
-  DepthImage image = test::plane(width, height, 0, 0);
-  const int columns = width / 5 + 2;
-  std::vector<double> corner(static_cast<size_t>(columns * (height / 5 + 2)));
-  for (double& c : corner) c = 4e6 + static_cast<double>(random() % 60000);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const double u = x % 5 / 5.0, v = y % 5 / 5.0;
-      const auto at = [&](int i, int j) { return corner[static_cast<size_t>((y / 5 + j) * columns + x / 5 + i)]; };
-      const double d = u + v < 1 ? at(0, 0) + u * (at(1, 0) - at(0, 0)) + v * (at(0, 1) - at(0, 0))
-                                 : at(1, 1) + (1 - u) * (at(0, 1) - at(1, 1)) + (1 - v) * (at(1, 0) - at(1, 1));
-      image.depth[static_cast<size_t>(y * width + x)] = static_cast<uint32_t>(d);
-    }
-  return image;
-}
-
 TEST(Dense, SmallTrianglesAreCodedByTheirPlanes) {
-  const DepthImage image = facets(256, 200, 3);
+  const DepthImage image = test::facets(256, 200, 3);
   const StreamInfo info = expect_round_trip(image);
   EXPECT_LT(bits_per_pixel(info.depth_bytes, image), 11.5) << "their corners alone take 15 bits of noise";
   expect_round_trip(test::masked(image, test::random_mask(256, 200, 0.7, 2)));
+}
+
+// What NormalPlanes makes of the normals of a full image.
+NormalPlanes normals_of(const DepthImage& image) {
+  TileShape shape;
+  shape.reset(static_cast<size_t>(image.width), static_cast<size_t>(image.height), nullptr);
+  DepthPlane depth;
+  depth.reset(shape, image.depth[0]);
+  for (int y = 0; y < image.height; ++y)
+    std::copy_n(image.depth.data() + y * image.width, image.width, depth.depth.row(y));
+  depth.encode(shape, image.depth[0], false);
+  depth.extend(shape);
+  NormalPlanes normals;
+  normals.reset(shape, 0);
+  normals.codes = image.normal;
+  BitWriter writer;
+  writer.start(NormalPlanes::kMostBits);
+  normals.encode(shape, depth, image.normal[0], false, writer.sink);
+  return normals;
+}
+
+TEST(Dense, NormalsOfFacetsFollowThoseOfTheSameFacet) {
+  const DepthImage image = test::facets(256, 200, 3);
+  const StreamInfo info = expect_round_trip(image);
+  const NormalPlanes normals = normals_of(image);
+  EXPECT_NE(normals.plane[0].flatness, nullptr);
+  EXPECT_NE(normals.plane[1].flatness, nullptr);
+  EXPECT_LT(bits_per_pixel(info.normal_bytes, image), 6.0);
+  expect_round_trip(test::masked(image, test::random_mask(256, 200, 0.7, 2)));
+  const DepthImage smooth = test::render({.width = 256, .height = 200});
+  EXPECT_EQ(normals_of(smooth).plane[0].flatness, nullptr) << "a surface without facets";
 }
 
 TEST(Dense, NormalsFollowFromDepth) {
