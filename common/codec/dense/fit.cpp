@@ -1,6 +1,7 @@
 #include "common/codec/dense/fit.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 
@@ -352,7 +353,7 @@ namespace {
 constexpr int kFlatTerms = 15, kFlatWanted = 15;
 constexpr int kFlatPlaces[kFlatTerms] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual, kFarLeft, kFarAbove};
 constexpr int kFlatStep = 128;  // of a weight's difference, in 2^-13
-constexpr int kFlatRounds = 3;
+constexpr int kFlatRounds = 2;
 constexpr double kPriorSamples = 0.3;  // how many samples say that a flatness has the weights of all
 
 struct FlatFit {
@@ -430,22 +431,66 @@ double median_tokens(const FlatFit& fit, int k) {
   return sum;
 }
 
+int steps_of(double off) { return static_cast<int>(std::lround(std::clamp(off, -3.9, 3.9) * 8192 / kFlatStep)); }
+
+// What a flatness says of neighbours on the same facet: the mean of L + U - UL, 2 L - LL and 2 U - UU, as far as depth
+// agrees with them.
+void predict_by_facet(int flatness, double solution[kFlatTerms]) {
+  std::fill_n(solution, kFlatTerms, 0.0);
+  const double share = 1.0 / std::popcount(static_cast<unsigned>(flatness));
+  if (flatness & 1) solution[0] += share, solution[1] += share, solution[2] -= share;
+  if (flatness & 2) solution[0] += 2 * share, solution[13] -= share;
+  if (flatness & 4) solution[1] += 2 * share, solution[14] -= share;
+}
+
+bool add_weights_of(const int16_t weights[kGuidedTerms], const int16_t steps[kGuidedTerms], int16_t out[kGuidedTerms]) {
+  int total = 0, guide = weights[kGuideHere];
+  for (const int place : kFlatPlaces) {
+    const int off = steps[place] * kFlatStep, w = weights[place] + off;
+    if (std::abs(w) > 32767) return false;
+    out[place] = static_cast<int16_t>(w);
+    total += std::abs(w);
+    if (place != kOtherResidual) guide -= off;
+  }
+  out[kGuideHere] = static_cast<int16_t>(guide);
+  return std::abs(guide) <= 32767 && total + std::abs(guide) <= kMostWeight;
+}
+
+// Weights of one flatness, from those of all, which leave tokens of the sum `by_all`, or from what it says of facets;
+// as differences to those of all. Returns what they leave.
+double fit_flatness(FlatFit& fit, int k, double by_all, const int16_t weights[kGuidedTerms],
+                    int16_t out[kGuidedTerms]) {
+  std::fill_n(out, kGuidedTerms, int16_t{0});
+  if (fit.count(k) == 0) return 0;
+  double left = by_all, trial[kFlatTerms], best[kFlatTerms];
+  std::copy_n(fit.prior, kFlatTerms, best);
+  const auto consider = [&] {
+    int16_t steps[kGuidedTerms] = {}, sums[kGuidedTerms];
+    for (int i = 0; i < kFlatTerms; ++i) {
+      steps[kFlatPlaces[i]] = static_cast<int16_t>(steps_of(trial[i] - fit.prior[i]));
+      trial[i] = fit.prior[i] + static_cast<double>(steps[kFlatPlaces[i]]) * kFlatStep / 8192;
+    }
+    if (!add_weights_of(weights, steps, sums)) return;
+    const double tokens = tokens_of(fit, k, trial);
+    if (tokens < left) left = tokens, std::copy_n(trial, kFlatTerms, best), std::copy_n(steps, kGuidedTerms, out);
+  };
+  if (k != 0) predict_by_facet(k, trial), consider();
+  std::copy_n(best, kFlatTerms, trial);
+  alignas(64) float sums[kTerms][kTerms];
+  for (int round = 0; round < kFlatRounds; ++round) {
+    weigh_samples(fit, k, trial, round + 1 == kFlatRounds, sums);
+    if (!solve_flat(fit, k, sums, trial)) return left;
+    consider();
+  }
+  return left;
+}
+
 }  // namespace
 
 bool add_flat_weights(const int16_t weights[kGuidedTerms], const FlatWeights& flat,
                       int16_t out[kFlatnesses][kGuidedTerms]) {
-  for (int k = 0; k < kFlatnesses; ++k) {
-    int total = 0, guide = weights[kGuideHere];
-    for (const int place : kFlatPlaces) {
-      const int off = flat.off[k][place] * kFlatStep, w = weights[place] + off;
-      if (std::abs(w) > 32767) return false;
-      out[k][place] = static_cast<int16_t>(w);
-      total += std::abs(w);
-      if (place != kOtherResidual) guide -= off;
-    }
-    if (std::abs(guide) > 32767 || total + std::abs(guide) > kMostWeight) return false;
-    out[k][kGuideHere] = static_cast<int16_t>(guide);
-  }
+  for (int k = 0; k < kFlatnesses; ++k)
+    if (!add_weights_of(weights, flat.off[k], out[k])) return false;
   return true;
 }
 
@@ -459,29 +504,12 @@ bool fit_flat_weights(const FlatSamples& by, const Plane<int16_t>& own, const Pl
   for (int i = 0; i < kFlatTerms; ++i) fit.prior[i] = weights[kFlatPlaces[i]] / 8192.0;
   double before = 0, after = 0, cost = 0;
   for (int k = 0; k < kFlatnesses; ++k) {
-    before += median ? median_tokens(fit, k) : tokens_of(fit, k, fit.prior);
-    double solution[kFlatTerms];
-    std::copy_n(fit.prior, kFlatTerms, solution);
-    if (fit.count(k) != 0) {
-      alignas(64) float sums[kTerms][kTerms];
-      for (int round = 0; round < kFlatRounds; ++round) {
-        weigh_samples(fit, k, solution, round + 1 == kFlatRounds, sums);
-        if (!solve_flat(fit, k, sums, solution)) return false;
-      }
-    }
-    std::fill_n(out.off[k], kGuidedTerms, int16_t{0});
-    for (int i = 0; i < kFlatTerms; ++i) {
-      const double off = std::clamp(solution[i] - fit.prior[i], -3.9, 3.9);
-      const long steps = std::lround(off * 8192 / kFlatStep);
-      out.off[k][kFlatPlaces[i]] = static_cast<int16_t>(steps);
-      solution[i] = fit.prior[i] + static_cast<double>(steps) * kFlatStep / 8192;
-      cost += 1.5 + 2 * std::log2(1.0 + std::abs(static_cast<double>(steps)));
-    }
-    after += tokens_of(fit, k, solution);
+    const double by_all = tokens_of(fit, k, fit.prior);
+    before += median ? median_tokens(fit, k) : by_all;
+    after += fit_flatness(fit, k, by_all, weights, out.off[k]);
+    for (const int place : kFlatPlaces) cost += 1.5 + 2 * std::log2(1.0 + std::abs(out.off[k][place]));
   }
-  int16_t sum[kFlatnesses][kGuidedTerms];
-  return (before - after) / 8 * static_cast<double>(pixels) / static_cast<double>(n) > 1.5 * cost &&
-         add_flat_weights(weights, out, sum);
+  return (before - after) / 8 * static_cast<double>(pixels) / static_cast<double>(n) > 1.5 * cost;
 }
 
 }  // namespace telesplat::codec::detail

@@ -48,8 +48,8 @@ inline constexpr int kMostFlat = 500;
 [[nodiscard]] bool add_flat_weights(const int16_t weights[kGuidedTerms], const FlatWeights& flat,
                                     int16_t out[kFlatnesses][kGuidedTerms]);
 
-/// Weights by flatness for the plane `own` of 64ths, which `weights` and `constant` predict without them, or the median.
-/// False where they do not save what it takes to send them. pixels: how many are coded.
+/// Weights by flatness for the plane `own` of 64ths, which `weights` and `constant` predict without them, or the median
+/// does. False where they do not save what it takes to send them. pixels: how many are coded.
 bool fit_flat_weights(const FlatSamples& by, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                       const Plane<int16_t>* residual, const int16_t weights[kGuidedTerms], int32_t constant,
                       bool median, size_t pixels, FlatWeights& out);

@@ -11,7 +11,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kMostFlatBits = 24;
+constexpr int kMostFlatBits = 24, kEnoughFlatBits = 8;  // more are chosen for depth within bounds alone
 constexpr unsigned kFlatBitsBits = 5;
 constexpr double kSmooth = 2.2;  // mean tokens of both coordinates: about 3.5 bits
 // Mean tokens of a coordinate, without a bound of normals and with one, above which weights by flatness save more than
@@ -246,7 +246,7 @@ bool NormalPlanes::choose_flatness(const TileShape& shape, const DepthPlane& dep
   }
   const auto at = off.begin() + static_cast<ptrdiff_t>(off.size() * 3 / 4);
   std::nth_element(off.begin(), at, off.end());
-  flat_bits_ = std::min(static_cast<int>(std::bit_width(*at)), kMostFlatBits);
+  flat_bits_ = std::min(static_cast<int>(std::bit_width(*at)), may_be_exact_ ? kMostFlatBits : kEnoughFlatBits);
   find_flatness(shape, depth);
   flat.flatness = &flatness_;
   return true;

@@ -40,7 +40,7 @@ inline std::vector<RefinedImage> refined_images() {
   add(render({.width = 40, .height = 30, .constant_albedo = true, .covers_all = false}), {.depth = 1u << 22});
   add(random_pixels(30, 20, 1, 4), {.normal = 2, .colour = 3});
   add(kept(plane(300, 260, 30, 20), 0.3), usual);
-  add(facets(70, 60, 2), usual);
+  add(facets(70, 90, 2), usual);
   return all;
 }
 
