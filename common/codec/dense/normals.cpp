@@ -6,8 +6,6 @@
 #include <cstdlib>
 #include <memory>
 
-#include "common/image/normal.h"
-
 namespace telesplat::codec::detail {
 namespace {
 
@@ -118,11 +116,7 @@ int NormalPlanes::choose_pole(const TileShape& shape) const {
   for (size_t y = 0; y < shape.height; ++y) {
     if (lattice_.step() != 1) break;  // within bounds another code of the same direction is as good
     const uint16_t* const row = codes.data() + y * shape.width;
-    if (shape.full(y))
-      others |= kernels().other_normals(row, shape.width);
-    else
-      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                   [&](size_t x) { others |= image::canonical_normal16(row[x]) != row[x]; });
+    shape.for_each_run(y, [&](size_t x, size_t end) { others |= kernels().other_normals(row + x, end - x); });
   }
   if (others != 0) return kRaw;
   PoleChoice choice;
