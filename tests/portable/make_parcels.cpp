@@ -125,6 +125,8 @@ bool write(const char* path) {
     add_depth(file, test::masked(image, test::band_mask(image.width, image.height, 3)));
   }
   add_depth(file, test::render({.width = 300, .height = 280, .covers_all = false}));
+  add_depth(file, test::facets(256, 200, 3));
+  add_depth(file, test::masked(test::facets(190, 180, 2), test::band_mask(190, 180, 30)));
   return file.close();
 }
 

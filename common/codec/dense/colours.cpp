@@ -36,20 +36,6 @@ class ColourTable {
 
 int8_t difference(uint32_t a, uint32_t b) { return static_cast<int8_t>(static_cast<uint8_t>(a - b)); }
 
-bool all_same(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base) {
-  for (size_t y = 0; y < shape.height; ++y) {
-    const uint32_t* const row = colours.data() + y * shape.width;
-    uint32_t other = 0;
-    if (shape.full(y))
-      for (size_t x = 0; x < shape.width; ++x) other |= row[x] ^ base;
-    else
-      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                   [&](size_t x) { other |= row[x] ^ base; });
-    if (other != 0) return false;
-  }
-  return true;
-}
-
 // Whether green says much of red and blue: judged by what neighbours differ by, in a few rows.
 bool follows_green(const TileShape& shape, const std::vector<uint32_t>& colours) {
   uint64_t apart = 0, together = 0;
@@ -95,6 +81,20 @@ bool get_height(HeightModel& height, BitReader& bits) {
 }
 
 }  // namespace
+
+bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base) {
+  for (size_t y = 0; y < shape.height; ++y) {
+    const uint32_t* const row = colours.data() + y * shape.width;
+    uint32_t other = 0;
+    if (shape.full(y))
+      for (size_t x = 0; x < shape.width; ++x) other |= row[x] ^ base;
+    else
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                   [&](size_t x) { other |= row[x] ^ base; });
+    if (other != 0) return false;
+  }
+  return true;
+}
 
 // The colours in the order in which they come, and the place of each pixel's. False where they are too many.
 bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
@@ -295,7 +295,7 @@ void ColourPlanes::try_channels(const TileShape& shape, const std::vector<uint32
 void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
                           const DepthPlane& depth, const KnownAxes& known, int reach) {
   lattice_ = ColourLattice(reach);
-  if (all_same(shape, colours, base)) {
+  if (of_one_colour(shape, colours, base)) {
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;

@@ -12,6 +12,9 @@
 
 namespace telesplat::codec::detail {
 
+/// Whether all covered pixels have that colour.
+bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t colour);
+
 struct ColourPlanes {
   enum Mode : uint8_t { kPlain = 0, kPalette = 1, kChannels = 2, kDifferences = 3 };  ///< of red and blue to green
   static constexpr size_t kMostColours = 1024;

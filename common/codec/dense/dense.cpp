@@ -78,7 +78,8 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   depth_.extend(shape_);
 
   writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
-  normals_.encode(shape_, depth_, base.normal, bounds.normal != 0 && of_one_colour(base.colour), writer_.sink);
+  normals_.encode(shape_, depth_, base.normal, bounds.normal != 0 && of_one_colour(shape_, colour_rows_, base.colour),
+                  writer_.sink);
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
 
@@ -95,16 +96,6 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   out.push_back(colours_.mode);
   out.insert(out.end(), headers.begin(), headers.end());
   put_words(out);
-}
-
-bool DenseCoder::of_one_colour(uint32_t colour) const {
-  uint32_t others = 0;
-  for (size_t y = 0; y < shape_.height; ++y)
-    shape_.for_each_run(y, [&](size_t x, size_t end) {
-      const uint32_t* const row = colour_rows_.data() + y * shape_.width;
-      for (; x < end; ++x) others |= row[x] ^ colour;
-    });
-  return others == 0;
 }
 
 // Symbols in the reverse of the order in which they are decoded.

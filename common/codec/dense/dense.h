@@ -39,7 +39,6 @@ class DenseCoder {
   static std::optional<Parts> get_parts(Reader& in);
   void begin(const TileRect& rect, const Mask* mask);
   void load(const image::DepthImage& image, const TileRect& rect);
-  bool of_one_colour(uint32_t colour) const;
   void put_words(std::vector<uint8_t>& out);
   void begin_part(const Parts& parts, size_t part);
   [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,

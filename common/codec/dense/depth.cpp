@@ -48,6 +48,7 @@ void DepthPlane::reset(const TileShape& shape, uint32_t base) {
   depth.reset(shape.width, shape.height);
   depth.fill_row(-1, base), depth.fill_row(-2, base);
   symbols.reset(shape, true);
+  in_steps = false;
 }
 
 void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
@@ -77,6 +78,7 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
 }
 
 void DepthPlane::to_indices(const TileShape& shape, const DepthLattice& lattice) {
+  in_steps = true;
   for (size_t y = 0; y < shape.height; ++y) {
     uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
     for (size_t x = 0; x < shape.width; ++x) row[x] = lattice.index(row[x]);  // 0, nothing, is an index of its own

@@ -17,7 +17,8 @@ struct DepthPlane {
   SymbolPlane symbols;
   enum Way : uint8_t { kLinear = 0, kPlanes = 1, kMean = 2 };
   Way way = kLinear;
-  bool faceted = false;  ///< of what was encoded: many pixels lie in planes of their neighbours
+  bool faceted = false;   ///< of what was encoded: many pixels lie in planes of their neighbours
+  bool in_steps = false;  ///< codes are those of indices
 
   /// What lies above and to the left of the first pixel is `base`.
   void reset(const TileShape& shape, uint32_t base);
@@ -33,7 +34,7 @@ struct DepthPlane {
   void to_codes(const TileShape& shape, const DepthLattice& lattice);
   /// The next row from its symbols. False where a covered depth would be 0, or above `most`.
   [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t most);
-  /// Continues slopes beyond the tile's edges, as geometry needs it, once all rows are known.
+  /// Continues slopes beyond the tile's edges, as geometry and flatness need it, once all rows are known.
   void extend(const TileShape& shape);
 
  private:

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 namespace telesplat::codec::detail {
 namespace {
@@ -310,8 +311,12 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
                 const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
                 const Plane<int16_t>* left, double& left_over) {
   const size_t n = samples.places.size();
-  left_over = 0;
-  if (n < 64 || all_same(samples, own)) return false;
+  left_over = std::numeric_limits<double>::infinity();
+  if (n < 64) return false;
+  if (all_same(samples, own)) {
+    left_over = 0;
+    return false;
+  }
   std::vector<Features> all(n + 3);  // to a multiple of four
   std::vector<float> shares(n + 3);
   const size_t few = n / 2;  // the first rounds need not be exact

@@ -26,7 +26,8 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
 /// Weights for the plane `own`, whose values have so many `bits` of fraction, by least squares. residual: null, or of
 /// another plane. False where there is nothing to be fitted, or where the median predictor does better: on facets,
 /// whose pixels all have one normal, which no guide meets as well. left: null, or another plane of which the left
-/// neighbour is; the median predicts nothing then. left_over: the mean token of what is left, if that is known.
+/// neighbour is; the median predicts nothing then. left_over: the mean token of what is left; infinite if that
+/// is not known, as of a plane that has a left neighbour of its own.
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
                 const Plane<int16_t>* left, double& left_over);

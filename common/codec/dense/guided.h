@@ -44,10 +44,10 @@ struct GuidedPlane {
   std::vector<int32_t> sums;
   int bits = 6, most = 254;
   bool median = false;  ///< predicted by the median of L, U and L + U - UL; weights are plain ones then
-  const Plane<uint8_t>* flatness = nullptr;  ///< where each flatness has weights of its own, flat_weights
-  FlatWeights flat_weights;
-  int16_t sets[kFlatnesses][kGuidedTerms];
-  double left_over = 0;  ///< after fit(): the mean token, or 0
+  const Plane<uint8_t>* flatness = nullptr;  ///< where each flatness has weights of its own
+  FlatWeights flat_weights;                  ///< as they are sent,
+  int16_t sets[kFlatnesses][kGuidedTerms];   ///< and added to `weights`
+  double left_over = 0;                      ///< after fit(): as fit_guided() has it
 
  private:
   /// Half of L and of U: where there is nothing to be fitted.

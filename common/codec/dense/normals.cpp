@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdlib>
 #include <memory>
 
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kMostFlatBits = 24, kEnoughFlatBits = 8;  // more are chosen for depth within bounds alone
-constexpr unsigned kFlatBitsBits = 5;
-constexpr double kSmooth = 2.2;  // mean tokens of both coordinates: about 3.5 bits
+constexpr int kMostFlatExponent = 24, kEnoughFlatExponent = 8;  // more is chosen for depth within bounds alone
+constexpr unsigned kFlatExponentBits = 5;
+constexpr double kSmooth = 2.2;  // mean tokens of both coordinates, added up: about 3.5 bits
 // Mean tokens of a coordinate, without a bound of normals and with one, above which weights by flatness save more than
 // they take, in bits and in time.
 constexpr double kRough = 3, kRoughWithin = 1.5;
@@ -127,7 +128,7 @@ int NormalPlanes::choose_pole(const TileShape& shape) const {
 
 void NormalPlanes::be_exact() { exact_ = true, lattice_ = NormalLattice(0); }
 
-// Whether normals as they are take few bits.
+// Whether normals as they are take few bits. Fits weights to them.
 bool NormalPlanes::smooth(const TileShape& shape) {
   double left_over = 0;
   for (GuidedPlane& p : plane) {
@@ -198,7 +199,8 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
   for (GuidedPlane& p : plane) {
     const GuidedPlane* const before = &p == &plane[1] ? &plane[0] : nullptr;
     p.fit(samples, before);
-    const bool rough = depth.faceted && p.left_over > (lattice_.step() == 1 ? kRough : kRoughWithin);
+    const bool rough =
+        depth.faceted && std::isfinite(p.left_over) && p.left_over > (lattice_.step() == 1 ? kRough : kRoughWithin);
     if (rough && by_flatness == nullptr && choose_flatness(shape, depth)) by_flatness = &flat;
     p.encode_fitted(shape, before, rough ? by_flatness : nullptr);
   }
@@ -214,7 +216,7 @@ void NormalPlanes::put_header(BitSink& bits) const {
   const bool any = plane[0].flatness != nullptr || plane[1].flatness != nullptr;
   bits.put(any, 1);
   if (!any) return;
-  bits.put(static_cast<uint64_t>(flat_bits_), kFlatBitsBits);
+  bits.put(static_cast<uint64_t>(flat_exponent_), kFlatExponentBits);
   for (const GuidedPlane& p : plane) bits.put(p.flatness != nullptr, 1);
   for (const GuidedPlane& p : plane)
     if (p.flatness != nullptr) p.put_flat_weights(bits);
@@ -225,7 +227,7 @@ void NormalPlanes::find_flatness(const TileShape& shape, const DepthPlane& depth
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     kernels().flatness(depth.depth.row(r - 2), depth.depth.row(r - 1), depth.depth.row(r), shape.width,
-                       1u << flat_bits_, flatness_.row(r));
+                       1u << flat_exponent_, flatness_.row(r));
   }
 }
 
@@ -240,7 +242,8 @@ bool NormalPlanes::choose_flatness(const TileShape& shape, const DepthPlane& dep
   }
   const auto at = off.begin() + static_cast<ptrdiff_t>(off.size() * 3 / 4);
   std::nth_element(off.begin(), at, off.end());
-  flat_bits_ = std::min(static_cast<int>(std::bit_width(*at)), may_be_exact_ ? kMostFlatBits : kEnoughFlatBits);
+  flat_exponent_ =
+      std::min(static_cast<int>(std::bit_width(*at)), depth.in_steps ? kMostFlatExponent : kEnoughFlatExponent);
   find_flatness(shape, depth);
   flat.flatness = &flatness_;
   return true;
@@ -255,8 +258,8 @@ bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   for (GuidedPlane& p : plane)
     if (!p.get_weights(bits)) return false;
   if (bits.source.take(1) != 0) {
-    flat_bits_ = static_cast<int>(bits.source.take(kFlatBitsBits));
-    if (flat_bits_ > kMostFlatBits) return false;
+    flat_exponent_ = static_cast<int>(bits.source.take(kFlatExponentBits));
+    if (flat_exponent_ > kMostFlatExponent) return false;
     find_flatness(shape, depth);
     for (GuidedPlane& p : plane) p.flatness = bits.source.take(1) != 0 ? &flatness_ : nullptr;
     for (GuidedPlane& p : plane)

@@ -68,7 +68,7 @@ struct NormalPlanes {
   NormalLattice lattice_{0};
   bool may_be_exact_ = false, exact_ = false;  ///< of streams with a bound of normals
   Plane<uint8_t> flatness_;
-  int flat_bits_ = 0;  ///< depth that differs by less than 2^flat_bits_ from what continues it is flat
+  int flat_exponent_ = 0;  ///< depth that differs by less than 2^flat_exponent_ from what continues it is flat
   int pole_ = kRaw;
   bool has_geometry_ = false;
   GeometryModel geometry_;

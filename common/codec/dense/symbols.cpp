@@ -179,7 +179,8 @@ bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
   }
   plane.scale.merges = static_cast<int>(bits.source.take(3));
   levels_.alphabet = plane.alphabet;
-  if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > 4 || !get_levels(bits, levels_)) return false;
+  if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > (plane.has_contexts ? 0 : 4)) return false;
+  if (!get_levels(bits, levels_)) return false;
   make_decode_tables(levels_, tables_, kContexts >> plane.scale.merges);
   return true;
 }

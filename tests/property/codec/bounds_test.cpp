@@ -11,6 +11,7 @@
 #include "common/image/normal.h"
 #include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
+#include "tests/support/masks.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::codec {
@@ -140,7 +141,8 @@ TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
       all.push_back(std::move(m));
     }
   const DepthImage smooth = test::render({.width = 70, .height = 90, .constant_albedo = true});
-  for (const DepthImage& image : {test::facets(70, 90, 1), smooth}) {
+  const DepthImage bands = test::masked(test::facets(190, 180, 2), test::band_mask(190, 180, 30));
+  for (const DepthImage& image : {test::facets(70, 90, 1), bands, smooth}) {
     Made m{image};
     m.bytes = encode(m.image, bounds, &m.bounded);
     m.refinement = encode_refinement(m.image, m.bounded);

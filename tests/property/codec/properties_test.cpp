@@ -8,6 +8,7 @@
 #include "common/codec/depth_codec.h"
 #include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
+#include "tests/support/masks.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::codec {
@@ -99,6 +100,7 @@ TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
     all.push_back(test::random_pixels(width, 9, 0.05, static_cast<uint32_t>(width)));
   }
   for (const int width : {63, 64, 70}) all.push_back(test::facets(width, 90, static_cast<uint32_t>(width)));
+  all.push_back(test::masked(test::facets(190, 180, 2), test::band_mask(190, 180, 30)));
   std::vector<std::vector<uint8_t>> reference;
   for (const DepthImage& image : all) reference.push_back(encode(image));
   const auto targets = hwy::SupportedAndGeneratedTargets();

@@ -71,6 +71,43 @@ TEST(Dense, NormalsOfFacetsFollowThoseOfTheSameFacet) {
   EXPECT_EQ(normals_of(smooth).plane[0].flatness, nullptr) << "a surface without facets";
 }
 
+// Small tiles have too few samples to tell.
+TEST(Dense, RoughNormalsWithinBoundsAreNotExactHoweverSmallTheTile) {
+  for (const int side : {16, 20, 31, 60}) {
+    DepthImage image = test::random_pixels(side, side, 1, 3), bounded;
+    std::fill(image.colour.begin(), image.colour.end(), 0x8090A0);
+    for (uint16_t& n : image.normal) n = image::canonical_normal16(n);
+    encode(image, {.normal = 1}, &bounded);
+    EXPECT_NE(bounded.normal, image.normal) << side;
+  }
+  DepthImage smooth = test::plane(90, 80, 30, 20), bounded;
+  for (size_t i = 0; i < smooth.pixels(); ++i)
+    smooth.colour[i] = 0x8090A0, smooth.normal[i] = static_cast<uint16_t>((100 + i % 90 / 9) | (110 + i / 900) << 8);
+  encode(smooth, {.normal = 1}, &bounded);
+  EXPECT_EQ(bounded.normal, smooth.normal) << "they are all that is seen of a smooth surface of one colour";
+}
+
+// Where contexts are given none are merged: tables that nobody made would be used.
+TEST(Dense, GivenContextsAreNotMerged) {
+  TileShape shape;
+  shape.reset(16, 4, nullptr);
+  for (const int merges : {0, 1, 4}) {
+    SymbolPlane plane;
+    plane.reset(shape, false);
+    plane.has_contexts = true;
+    BitWriter writer;
+    writer.start(PlaneEncoder::kMostBits);
+    writer.sink.put(0, 17);
+    writer.sink.put(static_cast<uint64_t>(merges), 3);
+    TokenLevels levels{};
+    levels.alphabet = plane.alphabet;
+    put_levels(writer.sink, levels);
+    BitReader reader;
+    reader.start(writer.bytes(), PlaneEncoder::kMostBits);
+    EXPECT_EQ(PlaneDecoder().prepare(plane, reader), merges == 0) << merges;
+  }
+}
+
 TEST(Dense, NormalsFollowFromDepth) {
   const DepthImage image = test::render({.width = 256, .height = 200});
   const StreamInfo info = expect_round_trip(image);
