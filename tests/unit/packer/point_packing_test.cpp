@@ -523,7 +523,7 @@ TEST_F(PointPackingTest, ARefusedTileIsToldTheMaster) {
 // Answers of some events at a time, to viewers that join.
 class StateAnswersTest : public PointPackingTest {
  protected:
-  static constexpr uint64_t kWindow = 60000;
+  static constexpr uint64_t kWindow = 56000;
   StateAnswersTest() : PointPackingTest({.answers = {.window_bytes = kWindow, .bytes_at_once = kWindow / 2}}) {
     wire::Welcome session = welcome();
     session.settings["packing.keep_redundant"] = 1;
