@@ -306,7 +306,7 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
 TEST(Links, BehindASlowOnePointsHaveErrorsUntilTheHeadRests) {
   for (const bool said : {false, true}) {
     if (!said && test::kSlow) continue;  // they do not fill any link
-    std::vector<std::string> flags{"--duration", "14", "--hold", "12", "--size", "640x400", "--link"};
+    std::vector<std::string> flags{"--duration", "16", "--hold", "12", "--size", "640x400", "--link"};
     flags.push_back(said ? "20ms" : "rtt=20ms,rate=300kbit");
     if (said) flags.insert(flags.end(), {"--depth-error", "1/16", "--normal-error", "2", "--colour-error", "off"});
     PipelineRun run(flags);
