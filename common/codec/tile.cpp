@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include "common/codec/mask_edges.h"
 #include "common/codec/walk.h"
 #include "common/image/normal.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
-enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
+enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kEdges = 8, kKnownBits = 15 };
 constexpr int kRamp = 8;  // beside a sparse tile's pole: a ramp's axis follows
 
 TileScratch& scratch() {
@@ -54,6 +55,9 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
   const bool few = covered * 8 < pixels && (!bounded || covered < kFewWithinBounds);
   return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
+
+// Of runs that are as short as scattered pixels' an edge takes more than what put_mask() has of pixels.
+bool has_few_edges(const Mask& mask, size_t covered) { return covered >= 4 * mask.runs(); }
 
 // What is covered of a tile.
 void look_at(Mask& mask, const image::DepthImage& image, const TileRect& rect) {
@@ -148,7 +152,8 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   const bool full = covered == pixels,
              sparse = !full &&
                       (pixels > kMaxTilePixels || is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr));
-  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
+  const bool edges = !full && has_few_edges(s.mask, covered);
+  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked) | (edges ? kEdges : 0)));
 
   size_t first = rect.first;  // of the covered pixels
   for (int y = 0; y < rect.height; ++y) {
@@ -159,7 +164,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   Pixel base{image.depth[first], image.colour[first] & 0xFFFFFF, image.normal[first]};
   if (bounds.depth != nullptr) base.depth = bounds.depth->index(base.depth);
   put_base(out, base);
-  if (!full) put_mask(out, s.mask);
+  if (!full) edges ? put_edges(out, s.mask) : put_mask(out, s.mask);
 
   if (sparse) {
     if (bounds.depth != nullptr) base.depth = bounds.depth->code(base.depth);
@@ -185,7 +190,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   if (!kind || *kind & ~kKnownBits) return std::nullopt;
   const int predictor = *kind & kPredictorBits;
   const bool full = !(*kind & kMasked), sparse = predictor == kSparse;
-  if ((!sparse && predictor != kDense) || (sparse && full)) return std::nullopt;
+  if ((!sparse && predictor != kDense) || (full && (sparse || (*kind & kEdges) != 0))) return std::nullopt;
 
   TileScratch& s = scratch();
   const auto base = get_base(in);
@@ -195,10 +200,10 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   size_t covered = pixels;
   if (!full) {
     s.mask.reset(rect.width, rect.height);
-    if (!get_mask(in, s.mask)) return std::nullopt;
+    if (!((*kind & kEdges) != 0 ? get_edges(in, s.mask) : get_mask(in, s.mask))) return std::nullopt;
     covered = s.mask.count();
     if (covered == 0) return std::nullopt;  // that is an empty tile
-    clear(image, rect);
+    if (sparse) clear(image, rect);
   }
   if (sparse) {
     if (!may_be_sparse(covered, pixels) || covered > kMostScattered) return std::nullopt;
@@ -232,7 +237,7 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     Mask& mask = scratch().mask;
     mask.reset(rect.width, rect.height);
     const size_t before = in.left();
-    if (!get_mask(in, mask)) return false;
+    if (!((*kind & kEdges) != 0 ? get_edges(in, mask) : get_mask(in, mask))) return false;
     info.mask_bytes += before - in.left();
     covered = mask.count();
   }

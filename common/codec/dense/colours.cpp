@@ -85,12 +85,13 @@ bool get_height(HeightModel& height, BitReader& bits) {
 bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base) {
   for (size_t y = 0; y < shape.height; ++y) {
     const uint32_t* const row = colours.data() + y * shape.width;
+    const uint8_t* const cover = shape.cover(y);
     uint32_t other = 0;
-    if (shape.full(y))
+    if (cover == nullptr)
       for (size_t x = 0; x < shape.width; ++x) other |= row[x] ^ base;
     else
-      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                   [&](size_t x) { other |= row[x] ^ base; });
+      for (size_t x = 0; x < shape.width; ++x)
+        other |= (row[x] ^ base) & static_cast<uint32_t>(static_cast<int8_t>(cover[x]));
     if (other != 0) return false;
   }
   return true;

@@ -102,8 +102,8 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
 void DenseCoder::put_words(std::vector<uint8_t>& out) {
   const size_t planes = 3 + colours_.planes();
   if (words_.size() < shape_.total * planes * 6 + 256) words_.resize(shape_.total * planes * 6 + 256);
-  alignas(64) uint32_t states[kLanes];
-  std::fill_n(states, kLanes, kStateLow);
+  States states;
+  states.reset(shape_);
   uint8_t* at = words_.data();
   const uint8_t* ends[kPartCount];
   for (size_t y = shape_.height; y-- > 0;)
@@ -119,14 +119,12 @@ void DenseCoder::put_words(std::vector<uint8_t>& out) {
   put_varint(out, static_cast<uint32_t>(ends[1] - ends[2]) / 2);
   put_varint(out, static_cast<uint32_t>(ends[2] - words_.data()) / 2);
   // Where there are words states follow them: kernels read beyond a word's end.
-  const bool any =
-      at != words_.data() || std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
-  const size_t lanes = any ? std::min(kLanes, shape_.width) : 0;
+  const size_t lanes = states.stored(shape_, at != words_.data());
   out.push_back(static_cast<uint8_t>(lanes));
   const size_t end = out.size();
   out.resize(end + static_cast<size_t>(at - words_.data()) + 4 * lanes);
   std::memcpy(out.data() + end, words_.data(), static_cast<size_t>(at - words_.data()));
-  std::memcpy(out.data() + out.size() - 4 * lanes, states, 4 * lanes);
+  if (lanes != 0) states.put(shape_, out.data() + out.size() - 4 * lanes);
 }
 
 std::optional<DenseCoder::Parts> DenseCoder::get_parts(Reader& in) {
@@ -146,7 +144,7 @@ std::optional<DenseCoder::Parts> DenseCoder::get_parts(Reader& in) {
     size = size_t{*count} * 2, words += size;
   }
   const auto lanes = in.u8();
-  if (!lanes || *lanes > kLanes) return std::nullopt;
+  if (!lanes || *lanes > kMostStates) return std::nullopt;
   const auto bytes = in.bytes(words + size_t{*lanes} * 4);
   if (!bytes) return std::nullopt;
   parts.words = bytes->first(words), parts.states = bytes->subspan(words);
@@ -158,17 +156,15 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   begin(rect, mask);
   const auto parts = get_parts(in);
   if (!parts) return false;
-  const size_t lanes = parts->states.size() / 4;
-  if (lanes != (lanes != 0 || !parts->words.empty() ? std::min(kLanes, shape_.width) : 0)) return false;
-  std::fill_n(source_.states, kLanes, kStateLow);
-  if (lanes != 0) std::memcpy(source_.states, parts->states.data(), 4 * lanes);
-  for (const uint32_t x : source_.states)
-    if (x < kStateLow || x >= kStateLow << 16) return false;
+  States& states = source_.states;
+  states.reset(shape_);
+  if (parts->states.size() != 4 * states.stored(shape_, !parts->words.empty() || !parts->states.empty())) return false;
+  if (!states.get(parts->states)) return false;
   source_.end = parts->words.data() + parts->words.size();
   if (!get_depth(*parts, image, rect, base, bounds.depth) || !get_normals(*parts, image, rect, base, bounds.normal) ||
       !get_colours(*parts, image, rect, base, bounds.colour))
     return false;
-  return std::all_of(source_.states, source_.states + kLanes, [](uint32_t x) { return x == kStateLow; });
+  return states.at_rest();
 }
 
 void DenseCoder::begin_part(const Parts& parts, size_t part) {
@@ -176,23 +172,22 @@ void DenseCoder::begin_part(const Parts& parts, size_t part) {
   source_.begin = source_.end - parts.word_bytes[part];
 }
 
-// row -> image, where it is covered.
+// row -> image; pixels that are not covered become 0.
 template <class T>
 void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const {
   const size_t width = static_cast<size_t>(rect.width);
   for (size_t begin = 0; begin < shape_.width; begin += width) {
     const size_t flat = y * shape_.width + begin;
     T* const to = out.data() + rect.index(0, static_cast<int>(flat / width));
-    if (shape_.mask == nullptr || shape_.full(y)) {
+    if (shape_.full(y)) {
       std::copy_n(row + begin, width, to);
       continue;
     }
-    if (shape_.width == width) {
-      shape_.for_each_run(y, [&](size_t x, size_t end) { std::copy_n(row + x, end - x, to + x); });
-      continue;
-    }
-    for (size_t x = 0; x < width; ++x)
-      if (shape_.at(begin + x, y)) to[x] = row[begin + x];
+    const uint8_t* const cover = shape_.cover(y) + begin;
+    if constexpr (sizeof(T) == 4)
+      kernels().cut_wide(cover, row + begin, width, to);
+    else
+      kernels().cut_short(cover, row + begin, width, to);
   }
 }
 

@@ -157,16 +157,14 @@ void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
   for (auto& terms : terms_)
     if (terms.size() < width + 64) terms.resize(width + 64);
   uint32_t *const terms = terms_[0].data(), *const take_left = terms_[1].data(), *const take_slope = terms_[2].data();
-  kernels().plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.wide.row(r), symbols.tokens.row(r), width, terms,
-                        take_left, take_slope);
+  kernels().plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.wide.row(r), symbols.tokens.row(r), shape.cover(y),
+                        width, terms, take_left, take_slope);
   uint32_t* const row = depth.row(r);
-  const uint32_t* const above = depth.row(r - 1);
-  shape.for_each_hole(y, [&](size_t x) { terms[x] = above[x] - above[x - 1], take_left[x] = ~0u, take_slope[x] = 0; });
   uint32_t left = row[-1], slope = 0;
   for (size_t x = 0; x < width; ++x) {
-    const uint32_t next = (terms[x] + (left & take_left[x]) + (slope & take_slope[x])) & image::kMaxDepthCode;
-    slope = next - left, left = next;
-    row[x] = next;
+    const uint32_t next = terms[x] + (left & take_left[x]) + (slope & take_slope[x]);
+    slope = next - left, left = next;  // modulo 2^32, which is as good
+    row[x] = next & image::kMaxDepthCode;
   }
 }
 
@@ -182,13 +180,7 @@ bool DepthPlane::decode_row(const TileShape& shape, size_t y, uint32_t most) {
     kernels().depth_rows(depth.row(r - 1), symbols.wide.row(r), shape.width, row);
   }
   end_row(depth, y, shape.width);
-  uint32_t largest = 0;  // of what is 1 less: 0 becomes the largest number
-  if (shape.full(y))
-    for (size_t x = 0; x < shape.width; ++x) largest = std::max(largest, row[x] - 1);
-  else
-    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                 [&](size_t x) { largest = std::max(largest, row[x] - 1); });
-  return largest < most;
+  return kernels().largest_less_one(shape.cover(y), row, shape.width) < most;  // 0 becomes the largest number
 }
 
 void DepthPlane::extend(const TileShape& shape) {

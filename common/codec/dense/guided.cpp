@@ -14,49 +14,61 @@ int median_of(int left, int up, int corner) {
   return left + up - std::clamp(corner, std::min(left, up), std::max(left, up));
 }
 
-// Values of one plane, each from the one to its left: the longest chain of a decoder. So what is nearly never needed,
-// the bounds of predictions and values, stands beside it, where a processor guesses that it is not. Bytes are 64ths and
-// mod 256.
-template <bool kByte>
+// Values of one plane, each from the one to its left: the longest chain of a decoder. So predictions and values are
+// bounded, which changes few, only where kBounded; else good() says afterwards whether all lay within bounds. Bytes are
+// 64ths and mod 256.
+template <bool kByte, bool kBounded>
 struct Chain {
   Chain(GuidedPlane& guided, size_t y)
       : plane(guided),
         value(guided.values.row(static_cast<ptrdiff_t>(y))),
         residual(plane.residuals.row(static_cast<ptrdiff_t>(y))),
-        guide(plane.guide.row(static_cast<ptrdiff_t>(y))),
         sums(plane.sums.data()),
         weight(plane.weights[0] * (1 << plane.bits)),
         bits(kByte ? 6 : plane.bits),
         most(plane.most),
         left(value[-1] >> plane.bits) {}
   void step(size_t x) { step(x, weight, 0); }
-  void step(size_t x, int64_t near_weight, int64_t rest) {
-    const int64_t sum = sums[x] + (int64_t{1} << (bits + 12)) + rest + near_weight * left;
-    const int64_t off = int64_t{residual[x]} * (1 << 13);
-    const int64_t next = (sum + off) >> (bits + 13);
-    const bool plain = static_cast<uint64_t>(sum) < static_cast<uint64_t>(most + 1) << (bits + 13) &&
-                       static_cast<uint64_t>(next) <= static_cast<uint64_t>(kByte ? 255 : most);
-    left = next;
-    if (!plain) [[unlikely]]
-      left = bounded(sum, residual[x]);
+  // Unsigned: what lies far out of bounds grows, and wraps.
+  void step(size_t x, int64_t near_weight, uint64_t rest) {
+    const int64_t off = residual[x] >> bits;
+    const uint64_t known = static_cast<uint64_t>(sums[x] + (int64_t{1} << (bits + 12)) + (off << (bits + 13))) + rest;
+    left = static_cast<int64_t>(known + product(near_weight, left)) >> (bits + 13);
+    if constexpr (kBounded) {
+      const bool plain = static_cast<uint64_t>(left - off) <= static_cast<uint64_t>(most) &&
+                         static_cast<uint64_t>(left) <= static_cast<uint64_t>(kByte ? 255 : most);
+      if (!plain) [[unlikely]]
+        left = bounded(left - off, off);
+    } else {
+      seen |= left;
+    }
     value[x] = static_cast<int16_t>(left << bits);
   }
-  void hole(size_t x) { value[x] = plane.nearest_value(guide[x]), left = value[x] >> plane.bits; }
-  int64_t bounded(int64_t sum, int16_t off) const {
-    const int64_t next = std::clamp<int64_t>(sum >> (bits + 13), 0, most) + (off >> bits);
+  bool good(const uint8_t* cover, size_t n) const {
+    if (kBounded) return true;
+    const int64_t above = (int64_t{1} << (15 - bits)) - 1;
+    return (seen & ~(kByte ? 255 : above)) == 0 &&
+           kernels().within(cover, value, residual, n, most << bits, (kByte ? 255 : most) << bits);
+  }
+  void begin(size_t x) { left = value[static_cast<ptrdiff_t>(x) - 1] >> plane.bits; }
+
+  int64_t bounded(int64_t guess, int64_t off) const {
+    const int64_t next = std::clamp<int64_t>(guess, 0, most) + off;
     return kByte ? next & 255 : std::clamp<int64_t>(next, 0, most);
   }
+  static uint64_t product(int64_t a, int64_t b) { return static_cast<uint64_t>(a) * static_cast<uint64_t>(b); }
 
   const GuidedPlane& plane;
   int16_t* const value;
-  const int16_t *const residual, *const guide;
+  const int16_t* const residual;
   const int32_t* const sums;
   const int64_t weight;
   const int bits, most;
-  int64_t left;
+  int64_t left, seen = 0;
 };
 
 // The same where each flatness has weights of its own.
+template <bool kBounded>
 struct FlatChain {
   FlatChain(GuidedPlane& guided, size_t y)
       : plain(guided, y),
@@ -68,15 +80,17 @@ struct FlatChain {
   void step(size_t x) {
     const size_t k = flatness[x];
     const int64_t before = plain.left;
-    plain.step(x, near_weight[k], far_weight[k] * far);
+    plain.step(x, near_weight[k], plain.product(far_weight[k], far));
     far = before;
   }
-  void hole(size_t x) {
-    far = plain.left;
-    plain.hole(x);
+  void begin(size_t x) {
+    plain.begin(x);
+    far = plain.value[static_cast<ptrdiff_t>(x) - 2] >> plain.bits;
   }
 
-  Chain<true> plain;
+  bool good(const uint8_t* cover, size_t n) const { return plain.good(cover, n); }
+
+  Chain<true, kBounded> plain;
   const uint8_t* const flatness;
   int64_t near_weight[kFlatnesses], far_weight[kFlatnesses];
   int64_t far;
@@ -91,49 +105,49 @@ struct MedianChain {
         value(guided.values.row(static_cast<ptrdiff_t>(y))),
         above(guided.values.row(static_cast<ptrdiff_t>(y) - 1)),
         residual(guided.residuals.row(static_cast<ptrdiff_t>(y))),
-        guide(guided.guide.row(static_cast<ptrdiff_t>(y))),
         left(value[-1]) {}
   void step(size_t x) {
     const int next = median_of(left, above[x], above[x - 1]) + residual[x];
     left = kByte ? next & 255 * 64 : std::clamp(next, 0, plane.most << plane.bits);
     value[x] = static_cast<int16_t>(left);
   }
-  void hole(size_t x) {
-    value[x] = plane.nearest_value(guide[x]);
-    left = value[x];
-  }
+  void begin(size_t x) { left = value[static_cast<ptrdiff_t>(x) - 1]; }
+  bool good(const uint8_t*, size_t) const { return true; }
 
   const GuidedPlane& plane;
   int16_t* const value;
-  const int16_t *const above, *const residual, *const guide;
+  const int16_t *const above, *const residual;
   int left;
 };
 
+// False where good() is.
 template <class Chain>
-void run(Chain chain, const TileShape& shape, size_t y) {
-  for (size_t x = 0; x < shape.width; ++x) shape.at(x, y) ? chain.step(x) : chain.hole(x);
+bool run(Chain chain, const TileShape& shape, size_t y) {
+  shape.for_each_run(y, [&](size_t x, size_t end) {
+    for (chain.begin(x); x < end; ++x) chain.step(x);
+  });
+  return chain.good(shape.cover(y), shape.width);
 }
 
 // Two that need not wait for each other.
 template <class Chain>
-void run_both(Chain first, Chain second, const TileShape& shape, size_t y) {
-  if (shape.full(y)) {
-    for (size_t x = 0; x < shape.width; ++x) first.step(x), second.step(x);
-  } else {
-    for (size_t x = 0; x < shape.width; ++x)
-      shape.at(x, y) ? (first.step(x), second.step(x)) : (first.hole(x), second.hole(x));
-  }
+bool run_both(Chain first, Chain second, const TileShape& shape, size_t y) {
+  shape.for_each_run(y, [&](size_t x, size_t end) {
+    for (first.begin(x), second.begin(x); x < end; ++x) first.step(x), second.step(x);
+  });
+  return first.good(shape.cover(y), shape.width) && second.good(shape.cover(y), shape.width);
 }
 
 template <bool kByte>
 void decode_alone(GuidedPlane& plane, const TileShape& shape, size_t y) {
-  if (plane.median)
+  if (plane.median) {
     run(MedianChain<kByte>(plane, y), shape, y);
-  else if (plane.flatness != nullptr)
-    run(FlatChain(plane, y), shape, y);
-  else
-    run(Chain<kByte>(plane, y), shape, y);
-  plane.finish_row(shape, y);
+    return;
+  }
+  const bool flat = plane.flatness != nullptr;
+  if (!plane.wild)
+    plane.wild = !(flat ? run(FlatChain<false>(plane, y), shape, y) : run(Chain<kByte, false>(plane, y), shape, y));
+  if (plane.wild) flat ? run(FlatChain<true>(plane, y), shape, y) : run(Chain<kByte, true>(plane, y), shape, y);
 }
 
 }  // namespace
@@ -143,7 +157,7 @@ int16_t GuidedPlane::nearest_value(int16_t by) const {
 }
 
 void GuidedPlane::reset(const TileShape& shape, int fraction, int largest) {
-  bits = fraction, most = largest, flatness = nullptr;
+  bits = fraction, most = largest, flatness = nullptr, wild = false;
   for (Plane<int16_t>* plane : {&values, &guide, &residuals}) plane->reset(shape.width, shape.height);
   symbols.reset(shape, bits != 6);
   sums.resize(std::max(sums.size(), shape.width + 64));
@@ -163,7 +177,8 @@ void GuidedPlane::begin(const TileShape& shape) {
 void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
   int16_t* const row = values.row(static_cast<ptrdiff_t>(y));
   const int16_t* const by = guide.row(static_cast<ptrdiff_t>(y));
-  shape.for_each_hole(y, [&](size_t x) { row[x] = nearest_value(by[x]); });
+  if (const uint8_t* const cover = shape.cover(y); cover != nullptr)
+    kernels().fill_values(cover, by, shape.width, bits, most, row);
   row[-2] = row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
 }
 
@@ -210,7 +225,6 @@ void GuidedPlane::encode_fitted(const TileShape& shape, const GuidedPlane* befor
     else
       kernels().guided_residuals_wide(rows_around(y, before), shape.width, symbols.wide.row(r), symbols.tokens.row(r),
                                       residuals.row(r));
-    shape.for_each_hole(y, [&](size_t x) { residuals.row(r)[x] = 0; });
     finish_tokens(symbols, shape, y);
   }
 }
@@ -232,7 +246,6 @@ void GuidedPlane::encode_by_median(const TileShape& shape) {
         tokens[x] = static_cast<uint8_t>(token_of(wide[x]));
       }
     }
-    shape.for_each_hole(y, [&](size_t x) { out[x] = 0; });
     finish_tokens(symbols, shape, y);
   }
 }
@@ -306,16 +319,24 @@ bool GuidedPlane::get_flat_weights(BitReader& bits) {
 void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
   const auto r = static_cast<ptrdiff_t>(y);
   int16_t* const out = residuals.row(r);
-  const auto unfold = [&](const auto* z) {
+  if (bits == 6) {
+    kernels().unfold_bytes(symbols.narrow.row(r), shape.width, out);
+  } else {
+    const uint32_t* const z = symbols.wide.row(r);
     for (size_t x = 0; x < shape.width; ++x)
       out[x] = static_cast<int16_t>((static_cast<int>(z[x] >> 1) ^ -static_cast<int>(z[x] & 1)) * (1 << bits));
-  };
-  if (bits == 6)
-    unfold(symbols.narrow.row(r));
-  else
-    unfold(symbols.wide.row(r));
-  values.row(r)[-2] = values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
+  }
+  begin_row(shape, y);
   if (!median) make_sums(shape, y, before);
+}
+
+// Values of pixels that are not covered, and borders, before the others are known: those of covered ones are written
+// over.
+void GuidedPlane::begin_row(const TileShape& shape, size_t y) {
+  int16_t* const row = values.row(static_cast<ptrdiff_t>(y));
+  const int16_t* const by = guide.row(static_cast<ptrdiff_t>(y));
+  if (!shape.full(y)) kernels().fill_values(nullptr, by, shape.width, bits, most, row);
+  row[-2] = row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
 }
 
 void GuidedPlane::make_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
@@ -327,11 +348,13 @@ void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_
     decode_alone<true>(a, shape, y), decode_alone<true>(b, shape, y);
     return;
   }
-  if (a.flatness != nullptr)
-    run_both(FlatChain(a, y), FlatChain(b, y), shape, y);
-  else
-    run_both(Chain<true>(a, y), Chain<true>(b, y), shape, y);
-  a.finish_row(shape, y), b.finish_row(shape, y);
+  const bool flat = a.flatness != nullptr;
+  if (!a.wild)
+    a.wild = !(flat ? run_both(FlatChain<false>(a, y), FlatChain<false>(b, y), shape, y)
+                    : run_both(Chain<true, false>(a, y), Chain<true, false>(b, y), shape, y));
+  if (a.wild)
+    flat ? run_both(FlatChain<true>(a, y), FlatChain<true>(b, y), shape, y)
+         : run_both(Chain<true, true>(a, y), Chain<true, true>(b, y), shape, y);
 }
 
 void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y) { decode_alone<false>(plane, shape, y); }

@@ -47,12 +47,14 @@ struct GuidedPlane {
   const Plane<uint8_t>* flatness = nullptr;  ///< where each flatness has weights of its own
   FlatWeights flat_weights;                  ///< as they are sent,
   int16_t sets[kFlatnesses][kGuidedTerms];   ///< and added to `weights`
+  bool wild = false;  ///< a row that was decoded had predictions out of bounds: others of the tile will
   double left_over = 0;                      ///< after fit(): as fit_guided() has it
 
  private:
   /// Half of L and of U: where there is nothing to be fitted.
   void set_plain_weights();
   bool has_plain_weights() const;
+  void begin_row(const TileShape& shape, size_t y);
   void encode_by_median(const TileShape& shape);
   GuidedRows rows_around(size_t y, const GuidedPlane* before) const;
 };

@@ -20,6 +20,60 @@ static inline uint8_t ByteToken(uint8_t z) {
   return static_cast<uint8_t>(Least(token, static_cast<uint16_t>((v >> 5) + 32)));
 }
 
+// 255 -> all bits, 0 -> none.
+static inline uint32_t Wide(uint8_t cover) { return static_cast<uint32_t>(static_cast<int8_t>(cover)); }
+static inline uint16_t Short(uint8_t cover) { return static_cast<uint16_t>(static_cast<int8_t>(cover)); }
+
+static void CutWide(const uint8_t* RESTRICT cover, const uint32_t* from, size_t n, uint32_t* to) {
+  for (size_t x = 0; x < n; ++x) to[x] = from[x] & Wide(cover[x]);
+}
+
+static void CutShort(const uint8_t* RESTRICT cover, const uint16_t* from, size_t n, uint16_t* to) {
+  for (size_t x = 0; x < n; ++x) to[x] = static_cast<uint16_t>(from[x] & Short(cover[x]));
+}
+
+static void KeepBytes(const uint8_t* RESTRICT cover, const uint8_t* RESTRICT from, size_t n, uint8_t* RESTRICT row) {
+  for (size_t x = 0; x < n; ++x) row[x] = static_cast<uint8_t>(from[x] ^ ((from[x] ^ row[x]) & cover[x]));
+}
+
+static void FillValues(const uint8_t* RESTRICT cover, const int16_t* RESTRICT guide, size_t n, int bits, int most,
+                       int16_t* RESTRICT row) {
+  const int16_t half = static_cast<int16_t>(1 << bits >> 1), largest = static_cast<int16_t>(most);
+  const auto nearest = [&](int16_t by) {
+    int16_t v = static_cast<int16_t>((by + half) >> bits);
+    v = v < 0 ? int16_t{0} : v;
+    return static_cast<int16_t>((v > largest ? largest : v) << bits);
+  };
+  if (cover == nullptr)
+    for (size_t x = 0; x < n; ++x) row[x] = nearest(guide[x]);
+  else
+    for (size_t x = 0; x < n; ++x) {
+      const int16_t v = nearest(guide[x]);
+      row[x] = static_cast<int16_t>(v ^ ((v ^ row[x]) & static_cast<int16_t>(Short(cover[x]))));
+    }
+}
+
+static bool Within(const uint8_t* RESTRICT cover, const int16_t* RESTRICT values, const int16_t* RESTRICT residuals,
+                   size_t n, int most_guess, int most) {
+  const uint16_t largest = static_cast<uint16_t>(most), largest_guess = static_cast<uint16_t>(most_guess);
+  uint16_t outside = 0;
+  for (size_t x = 0; x < n; ++x) {
+    const uint16_t value = static_cast<uint16_t>(values[x]), guess = static_cast<uint16_t>(values[x] - residuals[x]);
+    const uint16_t out = static_cast<uint16_t>(0 - ((value > largest) | (guess > largest_guess)));
+    outside |= static_cast<uint16_t>(out & (cover != nullptr ? Short(cover[x]) : 0xFFFF));
+  }
+  return outside == 0;
+}
+
+static uint32_t LargestLessOne(const uint8_t* RESTRICT cover, const uint32_t* RESTRICT row, size_t n) {
+  uint32_t largest = 0;
+  for (size_t x = 0; x < n; ++x) {
+    const uint32_t v = (row[x] - 1) & (cover != nullptr ? Wide(cover[x]) : ~0u);
+    largest = v > largest ? v : largest;
+  }
+  return largest;
+}
+
 static void DepthResiduals(const uint32_t* RESTRICT above, const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z,
                            uint8_t* RESTRICT tokens) {
   for (size_t x = 0; x < n; ++x) {
@@ -68,25 +122,39 @@ static void PlaneResiduals(const uint32_t* RESTRICT above2, const uint32_t* REST
 }
 
 static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above, const uint32_t* RESTRICT z,
-                       const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms, uint32_t* RESTRICT take_left,
-                       uint32_t* RESTRICT take_slope) {
+                       const uint8_t* RESTRICT tokens, const uint8_t* RESTRICT cover, size_t n,
+                       uint32_t* RESTRICT terms, uint32_t* RESTRICT take_left, uint32_t* RESTRICT take_slope) {
   for (size_t x = 0; x < n; ++x) {
-    const uint32_t up = above[x], corner = above[x - 1], right = above[x + 1];
+    const uint32_t up = above[x], corner = above[x - 1], right = above[x + 1], far_corner = above[x - 2];
+    const uint32_t far_up = above2[x], far_up_left = above2[x - 1], far_up_right = above2[x + 1],
+                   far_right = above2[x + 2];
     const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
     const uint32_t missed = (z[x] >> 1) ^ (0 - (z[x] & 1));
+    // All are made: what is read only where it is wanted takes longer.
+    const uint32_t lines[8] = {up - corner,
+                               0,
+                               right - up,
+                               2 * up - far_up,
+                               corner - far_corner,
+                               up + right - far_up_right,
+                               up + corner - far_up_left,
+                               2 * right - far_right};
     uint32_t term = up - corner + missed;
-    term = k == 0 ? up - corner + off : term;
-    term = k == 1 ? off : term;
-    term = k == 2 ? right - up + off : term;
-    term = k == 3 ? 2 * up - above2[x] + off : term;
-    term = k == 4 ? corner - above[x - 2] + off : term;
-    term = k == 5 ? up + right - above2[x + 1] + off : term;
-    term = k == 6 ? up + corner - above2[x - 1] + off : term;
-    term = k == 7 ? 2 * right - above2[x + 2] + off : term;
+    for (uint32_t plane = 0; plane < 8; ++plane) {
+      const uint32_t here = 0 - static_cast<uint32_t>(k == plane);
+      term ^= (term ^ (lines[plane] + off)) & here;
+    }
     terms[x] = term;
     const uint32_t by_row = k == 3 ? ~0u : 0u, later = k - 5 < 3 ? ~0u : 0u;
     take_left[x] = ~(by_row | later);
     take_slope[x] = k == 1 ? ~0u : 0u;
+  }
+  if (cover == nullptr) return;
+  for (size_t x = 0; x < n; ++x) {
+    const uint32_t covered = Wide(cover[x]), next = above[x] - above[x - 1];
+    terms[x] = next ^ ((terms[x] ^ next) & covered);
+    take_left[x] |= ~covered;
+    take_slope[x] &= covered;
   }
 }
 
@@ -129,6 +197,75 @@ static uint32_t OtherNormals(const uint16_t* RESTRICT codes, size_t n) {
     any |= static_cast<uint16_t>((x == 255) | (y == 255) | (side & (y < 127)) | (end & (x < 127)));
   }
   return any;
+}
+
+// A point of the octahedron's lattice.
+struct LatticePoint {
+  int16_t x, y, z;
+};
+
+static inline int16_t Size16(int16_t v) { return static_cast<int16_t>(v < 0 ? -v : v); }
+static inline int16_t Signed16(int16_t size, int16_t by) { return static_cast<int16_t>(by < 0 ? -size : size); }
+
+static inline LatticePoint PointAt(int16_t x, int16_t y) {
+  const int16_t z = static_cast<int16_t>(127 - Size16(x) - Size16(y));
+  const int16_t fold = static_cast<int16_t>(z < 0 ? -z : 0);
+  return {static_cast<int16_t>(x - Signed16(fold, x)), static_cast<int16_t>(y - Signed16(fold, y)), z};
+}
+
+// Its canonical coordinates, 0 to 254.
+static inline LatticePoint CodeAt(LatticePoint p) {
+  const int16_t x = Signed16(static_cast<int16_t>(127 - Size16(p.y)), p.x),
+                y = Signed16(static_cast<int16_t>(127 - Size16(p.x)), p.y);
+  return {static_cast<int16_t>((p.z < 0 ? x : p.x) + 127), static_cast<int16_t>((p.z < 0 ? y : p.y) + 127), 0};
+}
+
+static void TurnNormals(const uint16_t* RESTRICT codes, size_t n, int pole, int16_t* RESTRICT xs,
+                        int16_t* RESTRICT ys) {
+  const int16_t negated = static_cast<int16_t>(-(pole & 1));
+  const auto run = [&](auto turn) {
+    for (size_t i = 0; i < n; ++i) {
+      const uint16_t x = codes[i] & 255, y = codes[i] >> 8;
+      LatticePoint p =
+          turn(PointAt(static_cast<int16_t>(Least(x, 254) - 127), static_cast<int16_t>(Least(y, 254) - 127)));
+      p.z = static_cast<int16_t>((p.z ^ negated) - negated);
+      const LatticePoint code = CodeAt(p);
+      xs[i] = static_cast<int16_t>(code.x * 64), ys[i] = static_cast<int16_t>(code.y * 64);
+    }
+  };
+  if (pole < 2)
+    run([](LatticePoint p) { return LatticePoint{p.y, p.z, p.x}; });
+  else if (pole < 4)
+    run([](LatticePoint p) { return LatticePoint{p.z, p.x, p.y}; });
+  else
+    run([](LatticePoint p) { return p; });
+}
+
+static void TurnNormalsBack(const int16_t* RESTRICT xs, const int16_t* RESTRICT ys, size_t n, int pole,
+                            uint16_t* RESTRICT codes) {
+  const int16_t negated = static_cast<int16_t>(-(pole & 1));
+  const auto run = [&](auto turn) {
+    for (size_t i = 0; i < n; ++i) {
+      const uint16_t x = static_cast<uint16_t>(xs[i] >> 6), y = static_cast<uint16_t>(ys[i] >> 6);
+      LatticePoint p = PointAt(static_cast<int16_t>(Least(x, 254) - 127), static_cast<int16_t>(Least(y, 254) - 127));
+      p.z = static_cast<int16_t>((p.z ^ negated) - negated);
+      const LatticePoint code = CodeAt(turn(p));
+      codes[i] = static_cast<uint16_t>(code.x | code.y << 8);
+    }
+  };
+  if (pole < 2)
+    run([](LatticePoint p) { return LatticePoint{p.z, p.x, p.y}; });
+  else if (pole < 4)
+    run([](LatticePoint p) { return LatticePoint{p.y, p.z, p.x}; });
+  else
+    run([](LatticePoint p) { return p; });
+}
+
+static void UnfoldBytes(const uint8_t* RESTRICT z, size_t n, int16_t* RESTRICT out) {
+  for (size_t x = 0; x < n; ++x) {
+    const int16_t v = z[x];
+    out[x] = static_cast<int16_t>(static_cast<int16_t>((v >> 1) ^ -(v & 1)) * 64);
+  }
 }
 
 static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,

@@ -77,6 +77,21 @@ struct GeometryModel {
 struct Kernels {
   /// Bit x of `words` = depth[x] != 0; bits at and beyond n of the last word are 0.
   void (*covered_bits)(const uint32_t* depth, size_t n, uint64_t* words);
+  /// `words` as bytes, 255 and 0, which others take as `cover`: null stands for 255 everywhere.
+  void (*cover_bytes)(const uint64_t* words, size_t n, uint8_t* cover);
+  /// to = from where pixels are covered, else 0. Both may be the same.
+  void (*cut_wide)(const uint8_t* cover, const uint32_t* from, size_t n, uint32_t* to);
+  void (*cut_short)(const uint8_t* cover, const uint16_t* from, size_t n, uint16_t* to);
+  /// Pixels that are not covered become those of `from`.
+  void (*keep_bytes)(const uint8_t* cover, const uint8_t* from, size_t n, uint8_t* row);
+  /// Those that are not covered, of all with null, become the values nearest to the guide.
+  void (*fill_values)(const uint8_t* cover, const int16_t* guide, size_t n, int bits, int most, int16_t* row);
+  /// Whether all values of pixels that are covered are at most `most`, and less their residuals at most `most_guess`;
+  /// and none of these is negative. most and most_guess: below 2^15.
+  bool (*within)(const uint8_t* cover, const int16_t* values, const int16_t* residuals, size_t n, int most_guess,
+                 int most);
+  /// The largest number less 1, modulo 2^32, of pixels that are covered.
+  uint32_t (*largest_less_one)(const uint8_t* cover, const uint32_t* row, size_t n);
   /// z = fold(row - (left + above - above_left)) mod 2^24 and its tokens.
   void (*depth_residuals)(const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z, uint8_t* tokens);
   /// The inverse: row from z; row[-1] and above[-1] are known. All mod 2^24.
@@ -85,9 +100,10 @@ struct Kernels {
   /// a pixel lies, and how far off; others are kHits + those of z.
   void (*plane_residuals)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
                           uint8_t* tokens);
-  /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]).
-  void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
-                      uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
+  /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]). Those that
+  /// are not covered lie in the plane of L, U and UL.
+  void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens,
+                      const uint8_t* cover, size_t n, uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
   /// The kinds of such tokens: token / 5, or by how large what is missed is 8 + (token - kHits) / 16, at most 15.
   void (*plane_kinds)(const uint8_t* tokens, size_t n, uint8_t* kinds);
   /// Contexts of n such tokens from the kinds above, of which there are n + 1: those of kPlaneContexts >> merges.
@@ -96,6 +112,11 @@ struct Kernels {
   void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
   /// 0 if all of n normals are canonical (image/normal.h).
   uint32_t (*other_normals)(const uint16_t* codes, size_t n);
+  /// Coordinates in 64ths of codes that are turned by pole 0 to 5 (docs/codec.md), and the inverse.
+  void (*turn_normals)(const uint16_t* codes, size_t n, int pole, int16_t* x, int16_t* y);
+  void (*turn_normals_back)(const int16_t* x, const int16_t* y, size_t n, int pole, uint16_t* codes);
+  /// Bytes that were folded -> 64ths of -128..127.
+  void (*unfold_bytes)(const uint8_t* z, size_t n, int16_t* out);
   /// Residuals of bytes by the median predictor, folded, and their tokens.
   void (*median_residuals)(const uint8_t* above, const uint8_t* row, size_t n, uint8_t* z, uint8_t* tokens);
   /// Residuals of a plane of 64ths by guided prediction, folded mod 256, their tokens; and as 64ths of -128..127.

@@ -19,6 +19,10 @@ static void CoveredBits(const uint32_t* depth, size_t n, uint64_t* words) {
   }
 }
 
+static void CoverBytes(const uint64_t* words, size_t n, uint8_t* cover) {
+  for (size_t x = 0; x < n; ++x) cover[x] = static_cast<uint8_t>(0 - (words[x / 64] >> x % 64 & 1));
+}
+
 static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
                             float (*sums)[kFeatures]) {
   for (int i = 0; i < kFeatures; ++i)
@@ -43,6 +47,13 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 
 const Kernels& plain_kernels() {
   static constexpr Kernels all{CoveredBits,
+                               CoverBytes,
+                               CutWide,
+                               CutShort,
+                               KeepBytes,
+                               FillValues,
+                               Within,
+                               LargestLessOne,
                                DepthResiduals,
                                DepthRows,
                                PlaneResiduals,
@@ -51,6 +62,9 @@ const Kernels& plain_kernels() {
                                PlaneContexts,
                                Contexts,
                                OtherNormals,
+                               TurnNormals,
+                               TurnNormalsBack,
+                               UnfoldBytes,
                                MedianResiduals,
                                GuidedResiduals<GuidedSums>,
                                GuidedResidualsWide<GuidedSums>,

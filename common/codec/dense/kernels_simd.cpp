@@ -54,6 +54,10 @@ static void CoveredBits(const uint32_t* depth, size_t n, uint64_t* words) {
   }
 }
 
+static void CoverBytes(const uint64_t* words, size_t n, uint8_t* cover) {
+  for (size_t x = 0; x < n; ++x) cover[x] = static_cast<uint8_t>(0 - (words[x / 64] >> x % 64 & 1));
+}
+
 static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
                             float (*sums)[kFeatures]) {
   for (int i = 0; i < kFeatures; ++i)
@@ -76,6 +80,13 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 
 static const Kernels* Set() {
   static constexpr Kernels all{CoveredBits,
+                               CoverBytes,
+                               CutWide,
+                               CutShort,
+                               KeepBytes,
+                               FillValues,
+                               Within,
+                               LargestLessOne,
                                DepthResiduals,
                                DepthRows,
                                PlaneResiduals,
@@ -84,6 +95,9 @@ static const Kernels* Set() {
                                PlaneContexts,
                                Contexts,
                                OtherNormals,
+                               TurnNormals,
+                               TurnNormalsBack,
+                               UnfoldBytes,
                                MedianResiduals,
                                GuidedResiduals<GuidedSums>,
                                GuidedResidualsWide<GuidedSums>,
@@ -133,6 +147,14 @@ static void CoveredBits(const uint32_t* HWY_RESTRICT depth, size_t n, uint64_t* 
     }
     for (; i < bits; ++i) word |= uint64_t{depth[x + i] != 0} << i;
     words[x / 64] = word;
+  }
+}
+
+static void CoverBytes(const uint64_t* HWY_RESTRICT words, size_t n, uint8_t* HWY_RESTRICT cover) {
+  const hn::CappedTag<uint8_t, 64> d;
+  for (size_t x = 0; x < n; x += hn::Lanes(d)) {
+    const uint64_t bits = words[x / 64] >> x % 64;
+    hn::StoreU(hn::VecFromMask(d, hn::LoadMaskBits(d, reinterpret_cast<const uint8_t*>(&bits))), d, cover + x);
   }
 }
 
@@ -226,22 +248,35 @@ HWY_INLINE uint8_t* PutGroup(const SymbolRow& row, size_t begin, const EncodeEnt
   return out;
 }
 
-template <bool kWide>
+template <bool kWide, size_t kSets>
 HWY_INLINE uint8_t* PutAll(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out) {
-  V x[kVectors];
-  for (size_t i = 0; i < kVectors; ++i) x[i] = hn::LoadU(kD, states + i * kN);
+  V x[kSets][kVectors];
+  for (size_t i = 0; i < kSets * kVectors; ++i) x[i / kVectors][i % kVectors] = hn::LoadU(kD, states + i * kN);
   size_t begin = row.count / kLanes * kLanes;
-  if (begin != row.count) out = PutGroup<kWide>(row, begin, tables, x, row.count - begin, out);
+  const auto put = [&](size_t n) HWY_ATTR {
+    if (kSets > 1 && begin / kLanes % 2 != 0)
+      out = PutGroup<kWide>(row, begin, tables, x[kSets - 1], n, out);
+    else
+      out = PutGroup<kWide>(row, begin, tables, x[0], n, out);
+  };
+  if (begin != row.count) put(row.count - begin);
+  if (kSets > 1 && begin / kLanes % 2 != 0) begin -= kLanes, put(kLanes);
   while (begin != 0) {
-    begin -= kLanes;
-    out = PutGroup<kWide>(row, begin, tables, x, kLanes, out);
+    begin -= kSets * kLanes;
+    for (size_t set = kSets; set-- > 0;) out = PutGroup<kWide>(row, begin + set * kLanes, tables, x[set], kLanes, out);
   }
-  for (size_t i = 0; i < kVectors; ++i) hn::StoreU(x[i], kD, states + i * kN);
+  for (size_t i = 0; i < kSets * kVectors; ++i) hn::StoreU(x[i / kVectors][i % kVectors], kD, states + i * kN);
   return out;
 }
 
+template <size_t kSets>
+HWY_INLINE uint8_t* PutSets(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out) {
+  return row.wide != nullptr ? PutAll<true, kSets>(row, tables, states, out)
+                             : PutAll<false, kSets>(row, tables, states, out);
+}
+
 static uint8_t* PutSymbols(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out) {
-  return row.wide != nullptr ? PutAll<true>(row, tables, states, out) : PutAll<false>(row, tables, states, out);
+  return row.states > kLanes ? PutSets<2>(row, tables, states, out) : PutSets<1>(row, tables, states, out);
 }
 
 // Puts the first elements of v to where `to` is set, in order.
@@ -306,20 +341,32 @@ HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, size_t n
   return end;
 }
 
-template <bool kWide>
+template <bool kWide, size_t kSets>
 HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, uint32_t* states, const uint8_t* begin,
                                  const uint8_t* end) {
-  V x[kVectors];
-  for (size_t i = 0; i < kVectors; ++i) x[i] = hn::LoadU(kD, states + i * kN);
+  V x[kSets][kVectors];
+  for (size_t i = 0; i < kSets * kVectors; ++i) x[i / kVectors][i % kVectors] = hn::LoadU(kD, states + i * kN);
+  constexpr size_t kMostBytes = 6 * kLanes;  // of a group
+  const auto enough = [&](size_t groups) { return static_cast<size_t>(end - begin) >= groups * kMostBytes; };
   size_t at = 0;
-  for (; at + kLanes <= row.count && static_cast<size_t>(end - begin) >= 6 * kLanes; at += kLanes)
-    end = GetGroup<true, kWide>(row, at, kLanes, tables, x, end);
-  if (at < row.count && row.count - at < kLanes && static_cast<size_t>(end - begin) >= 6 * kLanes) {
+  for (; at + kSets * kLanes <= row.count && enough(kSets); at += kSets * kLanes)
+    for (size_t set = 0; set < kSets; ++set)
+      end = GetGroup<true, kWide>(row, at + set * kLanes, kLanes, tables, x[set], end);
+  size_t set = 0;  // of the next group
+  if (kSets > 1 && at + kLanes <= row.count && enough(1)) {
+    end = GetGroup<true, kWide>(row, at, kLanes, tables, x[0], end);
+    at += kLanes, set = 1;
+  }
+  if (at < row.count && row.count - at < kLanes && enough(1)) {
     const size_t n = row.count - at;
     HWY_ALIGN uint8_t contexts[kLanes] = {}, tokens[kLanes], narrow[kLanes];
     HWY_ALIGN uint32_t wide[kLanes];
     std::memcpy(contexts, row.contexts + at, n);
-    end = GetGroup<false, kWide>({contexts, tokens, wide, narrow, n, row.first}, 0, n, tables, x, end);
+    const DecodedRow rest{contexts, tokens, wide, narrow, n, row.first};
+    if (set == 0)
+      end = GetGroup<false, kWide>(rest, 0, n, tables, x[0], end);
+    else
+      end = GetGroup<false, kWide>(rest, 0, n, tables, x[kSets - 1], end);
     std::memcpy(row.tokens + at, tokens, n);
     if constexpr (kWide)
       std::memcpy(row.wide + at, wide, 4 * n);
@@ -327,16 +374,24 @@ HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, 
       std::memcpy(row.narrow + at, narrow, n);
     at = row.count;
   }
-  for (size_t i = 0; i < kVectors; ++i) hn::StoreU(x[i], kD, states + i * kN);
+  for (size_t i = 0; i < kSets * kVectors; ++i) hn::StoreU(x[i / kVectors][i % kVectors], kD, states + i * kN);
   for (; at < row.count && end != nullptr; at += kLanes)
-    end = PlainGetGroup(row, at, row.count - at < kLanes ? row.count - at : kLanes, tables, states, begin, end);
+    end = PlainGetGroup(row, at, row.count - at < kLanes ? row.count - at : kLanes, tables,
+                        StatesOf(states, row.states, at), begin, end);
   return end;
+}
+
+template <size_t kSets>
+HWY_INLINE const uint8_t* GetSets(const DecodedRow& row, const uint32_t* tables, uint32_t* states, const uint8_t* begin,
+                                  const uint8_t* end) {
+  return row.wide != nullptr ? GetAll<true, kSets>(row, tables, states, begin, end)
+                             : GetAll<false, kSets>(row, tables, states, begin, end);
 }
 
 static const uint8_t* GetSymbols(const DecodedRow& row, const uint32_t* tables, uint32_t* states, const uint8_t* begin,
                                  const uint8_t* end) {
-  return row.wide != nullptr ? GetAll<true>(row, tables, states, begin, end)
-                             : GetAll<false>(row, tables, states, begin, end);
+  return row.states > kLanes ? GetSets<2>(row, tables, states, begin, end)
+                             : GetSets<1>(row, tables, states, begin, end);
 }
 
 // A running sum of what the differences from the row above change by.
@@ -552,6 +607,13 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 
 static const Kernels* Set() {
   static constexpr Kernels all{CoveredBits,
+                               CoverBytes,
+                               CutWide,
+                               CutShort,
+                               KeepBytes,
+                               FillValues,
+                               Within,
+                               LargestLessOne,
                                DepthResiduals,
                                DepthRowsVector,
                                PlaneResiduals,
@@ -560,6 +622,9 @@ static const Kernels* Set() {
                                PlaneContexts,
                                Contexts,
                                OtherNormals,
+                               TurnNormals,
+                               TurnNormalsBack,
+                               UnfoldBytes,
                                MedianResiduals,
                                GuidedResiduals<PairedSums>,
                                GuidedResidualsWide<PairedSums>,

@@ -172,15 +172,15 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
                           BitSink& bits) {
   samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
   pole_ = choose_pole(shape);
-  const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, false);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
                                                                                static_cast<ptrdiff_t>(y));
     const uint16_t* const from = codes.data() + y * shape.width;
-    for (size_t x = 0; x < shape.width; ++x) {
-      const uint16_t code = turned == nullptr ? from[x] : (*turned)[from[x]];
-      x_row[x] = static_cast<int16_t>((code & 255) * 64), y_row[x] = static_cast<int16_t>((code >> 8) * 64);
-    }
+    if (pole_ != kRaw)
+      kernels().turn_normals(from, shape.width, pole_, x_row, y_row);
+    else
+      for (size_t x = 0; x < shape.width; ++x)
+        x_row[x] = static_cast<int16_t>((from[x] & 255) * 64), y_row[x] = static_cast<int16_t>((from[x] >> 8) * 64);
   }
   const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
   has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
@@ -274,16 +274,19 @@ void NormalPlanes::decode_row(const TileShape& shape, size_t y, uint16_t* out) {
   plane[0].decode_sums(shape, y, nullptr);
   plane[1].decode_sums(shape, y, &plane[0]);
   decode_values(plane[0], plane[1], shape, y);
-  const int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
-                                                                                   static_cast<ptrdiff_t>(y));
-  const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, true);
-  if (lattice_.step() == 1)
-    for (size_t x = 0; x < shape.width; ++x) out[x] = static_cast<uint16_t>(x_row[x] >> 6 | y_row[x] << 2);
+  const int16_t* rows[2];
+  for (size_t i = 0; i < 2; ++i) {
+    rows[i] = plane[i].values.row(static_cast<ptrdiff_t>(y));
+    if (lattice_.step() == 1) continue;
+    std::vector<int16_t>& codes_of = row_of_codes_[i];
+    if (codes_of.size() < shape.width) codes_of.resize(shape.width);
+    for (size_t x = 0; x < shape.width; ++x) codes_of[x] = static_cast<int16_t>(lattice_.value(rows[i][x] >> 6) * 64);
+    rows[i] = codes_of.data();
+  }
+  if (pole_ != kRaw)
+    kernels().turn_normals_back(rows[0], rows[1], shape.width, pole_, out);
   else
-    for (size_t x = 0; x < shape.width; ++x)
-      out[x] = static_cast<uint16_t>(lattice_.value(x_row[x] >> 6) | lattice_.value(y_row[x] >> 6) << 8);
-  if (turned != nullptr)
-    for (size_t x = 0; x < shape.width; ++x) out[x] = (*turned)[out[x]];
+    for (size_t x = 0; x < shape.width; ++x) out[x] = static_cast<uint16_t>(rows[0][x] >> 6 | rows[1][x] << 2);
 }
 
 }  // namespace telesplat::codec::detail

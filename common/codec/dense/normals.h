@@ -65,6 +65,7 @@ struct NormalPlanes {
   void be_exact();
   void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
   int choose_pole(const TileShape& shape) const;
+  std::vector<int16_t> row_of_codes_[2];
   NormalLattice lattice_{0};
   bool may_be_exact_ = false, exact_ = false;  ///< of streams with a bound of normals
   Plane<uint8_t> flatness_;

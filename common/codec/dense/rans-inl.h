@@ -12,8 +12,12 @@ static inline void PlainPutBits(uint32_t& x, uint32_t bits, unsigned count, uint
   x = x << count | bits;
 }
 
-static uint8_t* PlainPutSymbols(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out) {
+// Of the group whose first symbol is `first` of its row.
+static inline uint32_t* StatesOf(uint32_t* all, size_t count, size_t first) { return all + (first & (count - kLanes)); }
+
+static uint8_t* PlainPutSymbols(const SymbolRow& row, const EncodeEntry* tables, uint32_t* all, uint8_t* out) {
   for (size_t group = (row.count + kLanes - 1) / kLanes; group-- > 0;) {
+    uint32_t* const states = StatesOf(all, row.states, group * kLanes);
     const size_t begin = group * kLanes, n = row.count - begin < kLanes ? row.count - begin : kLanes;
     const uint8_t* tokens = row.tokens + begin;
     unsigned widest = 0;
@@ -89,7 +93,7 @@ static const uint8_t* PlainGetGroup(const DecodedRow& row, size_t first, size_t 
 static const uint8_t* PlainGetSymbols(const DecodedRow& row, const uint32_t* tables, uint32_t* states,
                                       const uint8_t* begin, const uint8_t* end) {
   for (size_t first = 0; first < row.count && end != nullptr; first += kLanes)
-    end =
-        PlainGetGroup(row, first, row.count - first < kLanes ? row.count - first : kLanes, tables, states, begin, end);
+    end = PlainGetGroup(row, first, row.count - first < kLanes ? row.count - first : kLanes, tables,
+                        StatesOf(states, row.states, first), begin, end);
   return end;
 }

@@ -22,6 +22,12 @@ inline constexpr unsigned kFrequencyBits = 12;
 inline constexpr uint32_t kFrequencyOne = 1u << kFrequencyBits;
 inline constexpr uint32_t kStateLow = 1u << 15;
 inline constexpr size_t kLanes = 32, kContexts = 16, kSymbols = 256;
+inline constexpr size_t kEnoughForMore = 16384;  // pixels
+inline constexpr size_t kMostStates = 2 * kLanes;
+
+/// How many states a tile has: with more, a processor need not wait for one group of symbols before it begins the next;
+/// but each takes four bytes.
+constexpr size_t states_of(size_t symbols) { return symbols < kEnoughForMore ? kLanes : kMostStates; }
 
 /// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991).
 struct EncodeEntry {
@@ -44,6 +50,7 @@ struct SymbolRow {
   const uint8_t* narrow = nullptr;  ///< z below 256
   size_t count = 0;
   unsigned first = 0;
+  size_t states = kLanes;  ///< how many take turns: kLanes or twice that
 };
 
 /// Where the symbols of a row go: the same. z of a token below `first` is that of `first`.
@@ -54,6 +61,7 @@ struct DecodedRow {
   uint8_t* narrow = nullptr;
   size_t count = 0;
   unsigned first = 0;
+  size_t states = kLanes;
 };
 
 /// Token of z < 2^24: eight a factor of two. The exponent and the first three bits after it, as a float has them.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 
 namespace telesplat::codec::detail {
 namespace {
@@ -12,6 +13,13 @@ ContextRows rows_around(const SymbolPlane& plane, size_t y) {
   const auto row = static_cast<ptrdiff_t>(y);
   return {plane.tokens.row(row - 1), plane.tokens.row(row - 2),
           plane.other != nullptr ? plane.other->row(row) : nullptr};
+}
+
+// Copies `count` elements and up to 31 bytes that follow them: both sides have room for those.
+template <class T>
+void copy_about(const T* from, size_t count, T* to) {
+  constexpr size_t kStep = 32 / sizeof(T);
+  for (size_t i = 0; i < count; i += kStep) std::memcpy(to + i, from + i, 32);
 }
 
 bool has_kinds(const SymbolPlane& plane) { return plane.first != 0; }
@@ -33,11 +41,13 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
   total = width * height;
   if (mask == nullptr) return;
   total = 0;
+  cover_bytes.reset(width, height);
   for (size_t y = 0; y < height; ++y) {
     const uint64_t* const words = mask->row(static_cast<int>(y));
     uint32_t n = 0;
     for (size_t w = 0; w < mask->words_per_row(); ++w) n += static_cast<uint32_t>(std::popcount(words[w]));
     covered[y] = n, total += n;
+    if (n != width) kernels().cover_bytes(words, width, cover_bytes.row(static_cast<ptrdiff_t>(y)));
   }
 }
 
@@ -66,10 +76,31 @@ SymbolRow SymbolPlane::row(const TileShape& shape, size_t y) const {
           first};
 }
 
+void States::reset(const TileShape& shape) {
+  count = states_of(shape.total);
+  std::fill_n(of, kMostStates, kStateLow);
+}
+
+bool States::at_rest() const {
+  return std::all_of(of, of + count, [](uint32_t x) { return x == kStateLow; });
+}
+
+size_t States::stored(const TileShape& shape, bool any_words) const {
+  return any_words || !at_rest() ? std::min(count, shape.width) : 0;
+}
+
+void States::put(const TileShape& shape, uint8_t* out) const { std::memcpy(out, of, 4 * stored(shape, true)); }
+
+bool States::get(std::span<const uint8_t> bytes) {
+  if (!bytes.empty()) std::memcpy(of, bytes.data(), bytes.size());
+  return std::all_of(of, of + count, [](uint32_t x) { return x >= kStateLow && x < kStateLow << 16; });
+}
+
 void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   uint8_t* const row = plane.tokens.row(static_cast<ptrdiff_t>(y));
   const uint8_t* const above = plane.tokens.row(static_cast<ptrdiff_t>(y) - 1);
-  shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
+  if (const uint8_t* const cover = shape.cover(y); cover != nullptr)
+    kernels().keep_bytes(cover, above, shape.width, row);
   row[-1] = row[0], row[shape.width] = row[shape.width - 1];
   if (has_kinds(plane)) kernels().plane_kinds(row, shape.width + 1, plane.kinds.row(static_cast<ptrdiff_t>(y)));
 }
@@ -147,29 +178,31 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
   make_encode_tables(levels_, tables_);
 }
 
-uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, uint32_t* states,
+uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, States& states,
                                uint8_t* out) const {
-  if (shape.full(y)) return kernels().put_symbols(plane.row(shape, y), tables_.data(), states, out);
+  SymbolRow row = plane.row(shape, y);
+  row.states = states.count;
+  if (shape.full(y)) return kernels().put_symbols(row, tables_.data(), states.of, out);
   static thread_local std::vector<uint8_t> tokens, contexts, narrow;
   static thread_local std::vector<uint32_t> wide;
-  const SymbolRow row = plane.row(shape, y);
   const size_t needed = row.count + Plane<uint8_t>::kTail;
   if (tokens.size() < needed)
     tokens.resize(needed), contexts.resize(needed), narrow.resize(needed), wide.resize(needed);
   size_t n = 0;
   shape.for_each_run(y, [&](size_t begin, size_t end) {
     const size_t count = end - begin;
-    std::copy_n(row.tokens + begin, count, tokens.data() + n);
-    std::copy_n(row.contexts + begin, count, contexts.data() + n);
+    copy_about(row.tokens + begin, count, tokens.data() + n);
+    copy_about(row.contexts + begin, count, contexts.data() + n);
     if (row.wide != nullptr)
-      std::copy_n(row.wide + begin, count, wide.data() + n);
+      copy_about(row.wide + begin, count, wide.data() + n);
     else
-      std::copy_n(row.narrow + begin, count, narrow.data() + n);
+      copy_about(row.narrow + begin, count, narrow.data() + n);
     n += count;
   });
   return kernels().put_symbols(
-      {tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr, narrow.data(), n, row.first},
-      tables_.data(), states, out);
+      {tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr, narrow.data(), n, row.first,
+       states.count},
+      tables_.data(), states.of, out);
 }
 
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
@@ -192,8 +225,8 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
   if (!plane.has_contexts) make_contexts(plane, shape, y);
   if (shape.full(y)) {
-    source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first}, tables_.data(),
-                                       source.states, source.begin, source.end);
+    source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first, source.states.count},
+                                       tables_.data(), source.states.of, source.begin, source.end);
     finish_tokens(plane, shape, y);
     return source.end != nullptr;
   }
@@ -203,28 +236,26 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
         packed_wide_.resize(needed);
   size_t n = 0;
   shape.for_each_run(y, [&](size_t begin, size_t end) {
-    std::copy_n(contexts + begin, end - begin, packed_contexts_.data() + n);
+    copy_about(contexts + begin, end - begin, packed_contexts_.data() + n);
     n += end - begin;
   });
   source.end =
       kernels().get_symbols({packed_contexts_.data(), packed_tokens_.data(),
-                             wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first},
-                            tables_.data(), source.states, source.begin, source.end);
+                             wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first,
+                             source.states.count},
+                            tables_.data(), source.states.of, source.begin, source.end);
   if (source.end == nullptr) return false;
-  if (wide != nullptr)
-    std::fill_n(wide, shape.width, 0u);
-  else
-    std::fill_n(narrow, shape.width, uint8_t{0});
   n = 0;
   shape.for_each_run(y, [&](size_t begin, size_t end) {
     const size_t count = end - begin;
-    std::copy_n(packed_tokens_.data() + n, count, tokens + begin);
+    copy_about(packed_tokens_.data() + n, count, tokens + begin);
     if (wide != nullptr)
-      std::copy_n(packed_wide_.data() + n, count, wide + begin);
+      copy_about(packed_wide_.data() + n, count, wide + begin);
     else
-      std::copy_n(packed_narrow_.data() + n, count, narrow + begin);
+      copy_about(packed_narrow_.data() + n, count, narrow + begin);
     n += count;
   });
+  if (wide != nullptr) kernels().cut_wide(shape.cover(y), wide, shape.width, wide);
   finish_tokens(plane, shape, y);
   return true;
 }

@@ -19,10 +19,13 @@ struct TileShape {
   size_t width = 0, height = 0;
   const Mask* mask = nullptr;     ///< null: all pixels are covered
   std::vector<uint32_t> covered;  ///< pixels of each row
+  Plane<uint8_t> cover_bytes;     ///< 255 where a pixel is covered, else 0; unless all are
   size_t total = 0;
 
   void reset(size_t tile_width, size_t tile_height, const Mask* tile_mask);
   bool full(size_t y) const { return covered[y] == width; }
+  /// As kernels take it: null where all of row y is covered.
+  const uint8_t* cover(size_t y) const { return full(y) ? nullptr : cover_bytes.row(static_cast<ptrdiff_t>(y)); }
   bool at(size_t x, size_t y) const { return mask == nullptr || mask->at(static_cast<int>(x), static_cast<int>(y)); }
   /// Calls f(begin, end) for the runs of pixels of row y that are covered.
   template <class F>
@@ -78,11 +81,25 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y);
 /// About what the symbols of every fourth row take in bits, without contexts.
 double rough_bits(const SymbolPlane& plane, const TileShape& shape);
 
+/// The states of one tile's coder.
+struct States {
+  alignas(64) uint32_t of[kMostStates];
+  size_t count = kLanes;  ///< that take turns
+
+  void reset(const TileShape& shape);
+  /// How many are written after a tile's words, if there are any words.
+  size_t stored(const TileShape& shape, bool any_words) const;
+  void put(const TileShape& shape, uint8_t* out) const;
+  /// What put() wrote, after reset(). False where a state is out of range.
+  [[nodiscard]] bool get(std::span<const uint8_t> bytes);
+  bool at_rest() const;  ///< as reset() leaves them
+};
+
 /// Of one plane: chooses contexts and tables, and puts them into `bits`. Leaves the plane packed: covered pixels only.
 class PlaneEncoder {
  public:
   void prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits);
-  uint8_t* put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, uint32_t* states, uint8_t* out) const;
+  uint8_t* put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, States& states, uint8_t* out) const;
   static constexpr size_t kMostBits = 32 + kMostLevelBits;
 
  private:
@@ -96,7 +113,7 @@ class PlaneEncoder {
 /// Words and states from which all planes of a tile are decoded.
 struct WordSource {
   const uint8_t *begin = nullptr, *end = nullptr;
-  alignas(64) uint32_t states[kLanes];
+  States states;
 };
 
 class PlaneDecoder {

@@ -420,22 +420,21 @@ void RefinementCoder::end_group(BitSink& bits) {
 void RefinementCoder::put_words(std::vector<uint8_t>& out) {
   const size_t most = shape_.total * planes_.size() * 6 + 256;
   if (words_.size() < most) words_.resize(most);
-  alignas(64) uint32_t states[kLanes];
-  std::fill_n(states, kLanes, kStateLow);
+  States states;
+  states.reset(shape_);
   uint8_t* at = words_.data();
   for (size_t g = group_ends_.size(); g-- > 0;)
     for (size_t y = shape_.height; y-- > 0;)
       for (size_t i = group_ends_[g], begin = g == 0 ? 0 : group_ends_[g - 1]; i-- > begin;)
         at = encoders_[i].put_row(*planes_[i], shape_, y, states, at);
   const auto bytes = static_cast<size_t>(at - words_.data());
-  const bool any = bytes != 0 || std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
-  const size_t lanes = any ? std::min(kLanes, shape_.width) : 0;
+  const size_t lanes = states.stored(shape_, bytes != 0);
   put_varint(out, static_cast<uint32_t>(bytes / 2));
   out.push_back(static_cast<uint8_t>(lanes));
   const size_t to = out.size();
   out.resize(to + bytes + 4 * lanes);
   if (bytes != 0) std::memcpy(out.data() + to, words_.data(), bytes);
-  if (lanes != 0) std::memcpy(out.data() + to + bytes, states, 4 * lanes);
+  if (lanes != 0) states.put(shape_, out.data() + to + bytes);
 }
 
 bool RefinementCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask,
@@ -448,16 +447,14 @@ bool RefinementCoder::get(Reader& in, image::DepthImage& image, const TileRect& 
   const auto lanes = in.u8();
   if (!header || !lanes) return false;
   // Kernels read beyond the words: states follow them.
-  if (*lanes != (*words != 0 || *lanes != 0 ? std::min(kLanes, shape_.width) : 0)) return false;
+  WordSource source;
+  source.states.reset(shape_);
+  if (*lanes != source.states.stored(shape_, *words != 0 || *lanes != 0)) return false;
   const auto bytes = in.bytes(uint64_t{*words} * 2 + size_t{*lanes} * 4);
   if (!bytes) return false;
-  WordSource source;
   source.begin = bytes->data();
   source.end = source.begin + size_t{*words} * 2;
-  std::fill_n(source.states, kLanes, kStateLow);
-  if (*lanes != 0) std::memcpy(source.states, source.end, size_t{*lanes} * 4);
-  for (const uint32_t x : source.states)
-    if (x < kStateLow || x >= kStateLow << 16) return false;
+  if (!source.states.get(bytes->last(size_t{*lanes} * 4))) return false;
   reader_.start(*header, kUnchecked);
   if (!decode_depth(reach, source) || !decode_normals(reach, source) || !decode_colours(reach, source)) return false;
   if (!reader_.finished() || source.end != source.begin) return false;
@@ -471,7 +468,7 @@ bool RefinementCoder::get(Reader& in, image::DepthImage& image, const TileRect& 
       if (reach.colour != 0) image.colour[to + x] = exact_colours_[row + x];
     }
   }
-  return std::all_of(source.states, source.states + kLanes, [](uint32_t x) { return x == kStateLow; });
+  return source.states.at_rest();
 }
 
 }  // namespace telesplat::codec::detail
