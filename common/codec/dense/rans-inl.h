@@ -36,7 +36,7 @@ static uint8_t* PlainPutSymbols(const SymbolRow& row, const EncodeEntry* tables,
       const EncodeEntry e = tables[row.contexts[begin + i] * kSymbols + tokens[i]];
       const uint32_t complement = e.packed >> 13 & 0xFFF;
       uint32_t& x = states[i];
-      if (x >= (kFrequencyOne - complement) << 19) PlainPutWord(x, out);
+      if (x >= (kFrequencyOne - complement) << (kStateBits - kFrequencyBits)) PlainPutWord(x, out);
       const uint32_t quotient = static_cast<uint32_t>(uint64_t{x} * e.reciprocal >> 32) >> (e.packed >> 25);
       x += (e.packed & 0x1FFF) + quotient * complement;
     }

@@ -1,9 +1,9 @@
 // Symbols <-> bits by asymmetric numeral systems (J. Duda, 2013, "range" variant, as in F. Giesen's interleaved coders,
-// 2014): 32 states that take turns, 12-bit frequencies, words of 16 bits.
+// 2014): 32 states that take turns, 11-bit frequencies, words of 16 bits.
 //
 // A symbol is a token (eight a factor of two, as the hybrid integers of JPEG XL, ISO/IEC 18181-1, C.3.3) and its raw
 // bits. State x in [2^15, 2^31):
-//   token of frequency f that starts at s:  x -> x / f * 4096 + x % f + s
+//   token of frequency f that starts at s:  x -> x / f * 2048 + x % f + s
 //   k raw bits, k <= 15:                    x -> x * 2^k + bits
 // Before either, the lower 16 bits of a state that would become too large are written. Symbol i of a row belongs to
 // state i % 32. Decoding undoes this: it reads words from the last one backwards. Of 32 symbols it undoes the tokens,
@@ -18,8 +18,9 @@
 
 namespace telesplat::codec::detail {
 
-inline constexpr unsigned kFrequencyBits = 12;
+inline constexpr unsigned kFrequencyBits = 11;
 inline constexpr uint32_t kFrequencyOne = 1u << kFrequencyBits;
+inline constexpr unsigned kStateBits = 31;  ///< of states, at most
 inline constexpr uint32_t kStateLow = 1u << 15;
 inline constexpr size_t kLanes = 32, kContexts = 16, kSymbols = 256;
 inline constexpr size_t kEnoughForMore = 16384;  // pixels
@@ -32,7 +33,7 @@ constexpr size_t states_of(size_t symbols) { return symbols < kEnoughForMore ? k
 /// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991).
 struct EncodeEntry {
   uint32_t reciprocal = 0;
-  uint32_t packed = 0;  ///< bits 0-12: what is added, 13-24: 4096 - frequency, 25-28: shift
+  uint32_t packed = 0;  ///< bits 0-12: what is added, 13-24: 2048 - frequency, 25-28: shift
 
   static EncodeEntry of(uint32_t start, uint32_t frequency) {
     if (frequency == 0) return {};

@@ -22,7 +22,7 @@
 
 namespace telesplat::volume {
 
-inline constexpr uint8_t kCoded = 3;  ///< where packed blocks have their predictor
+inline constexpr uint8_t kCoded = 4;  ///< where packed blocks have their predictor; 3 was that of 12-bit frequencies
 inline constexpr size_t kMaxTableBytes = 0xffff;
 
 /// Codes all blocks of one image.
