@@ -21,6 +21,21 @@ void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
   row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
 }
 
+// Pixels that are not covered become L + U - UL: what U differs by from the last one that is covered stays.
+void fill_holes(const uint32_t* __restrict above, const TileShape& shape, size_t y, uint32_t* __restrict row) {
+  if (shape.full(y)) return;
+  ptrdiff_t from = 0;
+  const auto fill = [&](ptrdiff_t end) {
+    const uint32_t off = row[from - 1] - above[from - 1];
+    for (ptrdiff_t x = from; x < end; ++x) row[x] = (above[x] + off) & image::kMaxDepthCode;
+  };
+  shape.for_each_run(y, [&](size_t begin, size_t end) {
+    fill(static_cast<ptrdiff_t>(begin));
+    from = static_cast<ptrdiff_t>(end);
+  });
+  fill(static_cast<ptrdiff_t>(shape.width));
+}
+
 // Four times the mean of L + U - UL, 2 L - LL, 2 U - UU and L + UR - U, all but the terms of L and LL, and 2.
 uint32_t mean_terms(const uint32_t* above2, const uint32_t* above, size_t x) {
   return 2 * above[x] - above[x - 1] - above2[x] + above[x + 1] + 2;
@@ -55,9 +70,7 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
   depth.fill_row(-1, base), depth.fill_row(-2, base);
   for (size_t y = 0; y < shape.height; ++y) {
     begin_row(depth, y);
-    uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
-    const uint32_t* const above = depth.row(static_cast<ptrdiff_t>(y) - 1);
-    shape.for_each_hole(y, [&](size_t x) { row[x] = (row[x - 1] + above[x] - above[x - 1]) & image::kMaxDepthCode; });
+    fill_holes(depth.row(static_cast<ptrdiff_t>(y) - 1), shape, y, depth.row(static_cast<ptrdiff_t>(y)));
     end_row(depth, y, shape.width);
   }
   way = choose_way(shape, may_mean);

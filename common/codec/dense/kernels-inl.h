@@ -189,12 +189,13 @@ static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint
           static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
 }
 
-static uint32_t OtherNormals(const uint16_t* RESTRICT codes, size_t n) {
+static uint32_t OtherNormals(const uint8_t* RESTRICT cover, const uint16_t* RESTRICT codes, size_t n) {
   uint16_t any = 0;
   for (size_t i = 0; i < n; ++i) {
     const uint16_t x = codes[i] & 255, y = codes[i] >> 8;
     const uint16_t side = (x == 0) | (x == 254), end = (y == 0) | (y == 254);
-    any |= static_cast<uint16_t>((x == 255) | (y == 255) | (side & (y < 127)) | (end & (x < 127)));
+    const uint16_t covered = cover != nullptr ? Short(cover[i]) : uint16_t{0xFFFF};
+    any |= static_cast<uint16_t>(((x == 255) | (y == 255) | (side & (y < 127)) | (end & (x < 127))) & covered);
   }
   return any;
 }

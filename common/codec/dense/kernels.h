@@ -110,8 +110,8 @@ struct Kernels {
   void (*plane_contexts)(const uint8_t* above, size_t n, int merges, uint8_t* contexts);
   /// Contexts of n tokens.
   void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
-  /// 0 if all of n normals are canonical (image/normal.h).
-  uint32_t (*other_normals)(const uint16_t* codes, size_t n);
+  /// 0 if all of n normals that are covered are canonical (image/normal.h).
+  uint32_t (*other_normals)(const uint8_t* cover, const uint16_t* codes, size_t n);
   /// Coordinates in 64ths of codes that are turned by pole 0 to 5 (docs/codec.md), and the inverse.
   void (*turn_normals)(const uint16_t* codes, size_t n, int pole, int16_t* x, int16_t* y);
   void (*turn_normals_back)(const int16_t* x, const int16_t* y, size_t n, int pole, uint16_t* codes);

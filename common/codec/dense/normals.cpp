@@ -116,8 +116,7 @@ int NormalPlanes::choose_pole(const TileShape& shape) const {
   uint32_t others = 0;
   for (size_t y = 0; y < shape.height; ++y) {
     if (lattice_.step() != 1) break;  // within bounds another code of the same direction is as good
-    const uint16_t* const row = codes.data() + y * shape.width;
-    shape.for_each_run(y, [&](size_t x, size_t end) { others |= kernels().other_normals(row + x, end - x); });
+    others |= kernels().other_normals(shape.cover(y), codes.data() + y * shape.width, shape.width);
   }
   if (others != 0) return kRaw;
   PoleChoice choice;

@@ -70,6 +70,8 @@ bool for_each_level(TokenLevels& levels, Code code) {
   return true;
 }
 
+constexpr uint32_t kMany = 70;  // of so many a level that is not ideal costs more than it saves
+
 // The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
 // share_of_one: of a count of 1, in 256ths of a frequency.
 int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected, bool last) {
@@ -80,6 +82,7 @@ int choose_level(uint32_t count, uint64_t total, double share_of_one, int expect
   if (count != 0) {
     const auto share = static_cast<uint32_t>(count * share_of_one);
     ideal = static_cast<int>(level_of(share < 256 ? 0 : share - 256));
+    if (count >= kMany) return std::max(ideal, 1);
     const int low = std::max(1, std::min(ideal, expected)), high = std::max({1, ideal, expected});
     for (int level = low; level <= high; ++level) {
       const float off = static_cast<float>(level - ideal), cost = 0.0216f * n * off * off + rate(level);
