@@ -161,6 +161,7 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   if (parts->states.size() != 4 * states.stored(shape_, !parts->words.empty() || !parts->states.empty())) return false;
   if (!states.get(parts->states)) return false;
   source_.end = parts->words.data() + parts->words.size();
+  source_.readable = parts->headers[0].data();
   if (!get_depth(*parts, image, rect, base, bounds.depth) || !get_normals(*parts, image, rect, base, bounds.normal) ||
       !get_colours(*parts, image, rect, base, bounds.colour))
     return false;

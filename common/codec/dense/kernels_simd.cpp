@@ -347,7 +347,11 @@ HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, 
   V x[kSets][kVectors];
   for (size_t i = 0; i < kSets * kVectors; ++i) x[i / kVectors][i % kVectors] = hn::LoadU(kD, states + i * kN);
   constexpr size_t kMostBytes = 6 * kLanes;  // of a group
-  const auto enough = [&](size_t groups) { return static_cast<size_t>(end - begin) >= groups * kMostBytes; };
+  // Words that are none are found afterwards, where what is read is memory at least.
+  const uint8_t* const lowest = row.readable != nullptr ? row.readable : begin;
+  const auto enough = [&](size_t groups) {
+    return end >= begin && static_cast<size_t>(end - lowest) >= groups * kMostBytes;
+  };
   size_t at = 0;
   for (; at + kSets * kLanes <= row.count && enough(kSets); at += kSets * kLanes)
     for (size_t set = 0; set < kSets; ++set)
@@ -375,6 +379,7 @@ HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, 
     at = row.count;
   }
   for (size_t i = 0; i < kSets * kVectors; ++i) hn::StoreU(x[i / kVectors][i % kVectors], kD, states + i * kN);
+  if (end < begin) return nullptr;
   for (; at < row.count && end != nullptr; at += kLanes)
     end = PlainGetGroup(row, at, row.count - at < kLanes ? row.count - at : kLanes, tables,
                         StatesOf(states, row.states, at), begin, end);

@@ -63,6 +63,7 @@ struct DecodedRow {
   size_t count = 0;
   unsigned first = 0;
   size_t states = kLanes;
+  const uint8_t* readable = nullptr;  ///< where what may be read begins, if that is before the words; else null
 };
 
 /// Token of z < 2^24: eight a factor of two. The exponent and the first three bits after it, as a float has them.

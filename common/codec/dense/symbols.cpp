@@ -225,7 +225,8 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
   if (!plane.has_contexts) make_contexts(plane, shape, y);
   if (shape.full(y)) {
-    source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first, source.states.count},
+    source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first, source.states.count,
+                                        source.readable},
                                        tables_.data(), source.states.of, source.begin, source.end);
     finish_tokens(plane, shape, y);
     return source.end != nullptr;
@@ -242,7 +243,7 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   source.end =
       kernels().get_symbols({packed_contexts_.data(), packed_tokens_.data(),
                              wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first,
-                             source.states.count},
+                             source.states.count, source.readable},
                             tables_.data(), source.states.of, source.begin, source.end);
   if (source.end == nullptr) return false;
   n = 0;

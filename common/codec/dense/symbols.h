@@ -113,6 +113,7 @@ class PlaneEncoder {
 /// Words and states from which all planes of a tile are decoded.
 struct WordSource {
   const uint8_t *begin = nullptr, *end = nullptr;
+  const uint8_t* readable = nullptr;  ///< at or before `begin`: from there on memory may be read
   States states;
 };
 

@@ -453,6 +453,7 @@ bool RefinementCoder::get(Reader& in, image::DepthImage& image, const TileRect& 
   const auto bytes = in.bytes(uint64_t{*words} * 2 + size_t{*lanes} * 4);
   if (!bytes) return false;
   source.begin = bytes->data();
+  source.readable = header->data();
   source.end = source.begin + size_t{*words} * 2;
   if (!source.states.get(bytes->last(size_t{*lanes} * 4))) return false;
   reader_.start(*header, kUnchecked);

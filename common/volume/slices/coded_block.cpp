@@ -21,6 +21,7 @@ constexpr size_t kSide = kBlockSide, kPlanes = 4, kGroupWidth = 16, kGroupHeight
 constexpr std::array<size_t, kPlanes> kOrder{3, 1, 0, 2};  // bytes of a pixel, as they are coded
 constexpr unsigned kBiasBits = 13, kShiftBits = 4;
 constexpr size_t kStateBytes = 4 * kLanes, kHead = 1 + 8 + kStateBytes;
+constexpr size_t kLead = 256;  // bytes before words, which lets kernels take whole groups of symbols to the end
 constexpr size_t kMostWordBytes = kBlockPixels * kPlanes * 6 + 64;
 
 const auto kTokens = [] {
@@ -257,6 +258,7 @@ struct BlockDecoder::Parts {
     if (n == 0) return end;
     DecodedRow row;
     row.contexts = packed.contexts, row.tokens = packed.tokens, row.narrow = packed.narrow, row.count = n;
+    row.readable = words.data();
     end = kernels().get_symbols(row, tables[p].data(), states, begin, end);
     n = 0;
     for_each_group(s.mask, y, [&](size_t x) {
@@ -300,9 +302,9 @@ Status BlockDecoder::decode(std::span<const uint8_t> bytes, uint32_t* pixels) {
     if (x < kStateLow || x >= kStateLow << 16) return Error{fmt::format("a coded block with a state of {}", x)};
   const auto words = bytes.subspan(kHead);
   if (words.size() % 2 != 0) return Error{fmt::format("a coded block of {} bytes of words", words.size())};
-  s.words.resize(words.size() + 128);  // kernels read beyond the end
-  std::memcpy(s.words.data() + 32, words.data(), words.size());
-  const uint8_t *begin = s.words.data() + 32, *end = begin + words.size();
+  s.words.resize(kLead + words.size() + 128);  // kernels read beyond both ends
+  std::memcpy(s.words.data() + kLead, words.data(), words.size());
+  const uint8_t *begin = s.words.data() + kLead, *end = begin + words.size();
   for (size_t p = 0; p < kPlanes; ++p)
     for (size_t y = 0; y < kSide; ++y)
       if ((end = s.get_row(p, y, states, begin, end)) == nullptr) return Error{"a coded block that ends too early"};
