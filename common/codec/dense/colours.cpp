@@ -349,15 +349,21 @@ bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   return index.get_weights(bits);
 }
 
-bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colours) {
-  const auto r = static_cast<ptrdiff_t>(y);
+void ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colours) {
   if (mode == kPalette) {
     index.decode_sums(shape, y, nullptr);
     decode_values(index, shape, y);
+  }
+  get_colours(shape, y, colours);
+}
+
+void ColourPlanes::get_colours(const TileShape& shape, size_t y, uint32_t* colours) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  if (mode == kPalette) {
     const int16_t* const row = index.values.row(r);  // none is beyond the last colour: decode_values() sees to that
     const uint32_t* const palette = palette_.data();
     for (size_t x = 0; x < shape.width; ++x) colours[x] = palette[row[x] >> 4];
-    return true;
+    return;
   }
   for (size_t c = 0; c < 3; ++c) {
     uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
@@ -378,14 +384,13 @@ bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colour
   if (lattice_.step() == 1) {
     for (size_t x = 0; x < shape.width; ++x)
       colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);
-    return true;
+    return;
   }
   uint32_t values[256];
   for (int i = 0; i < 256; ++i) values[i] = static_cast<uint32_t>(lattice_.value(i));
   for (size_t x = 0; x < shape.width; ++x)
     colours[x] =
         values[(red[x] + (g[x] & add)) & 255] << 16 | values[g[x]] << 8 | values[(blue[x] + (g[x] & add)) & 255];
-  return true;
 }
 
 }  // namespace telesplat::codec::detail

@@ -30,10 +30,13 @@ struct ColourPlanes {
   size_t header_bits() const { return mode == kPalette ? 10 * palette_.size() + (has_height_ ? 400 : 0) : 24; }
   size_t most_header_bits() const { return 4096 + 3 * 51 * kMostColours + GuidedPlane::kMostWeightBits; }
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, int reach, BitReader& bits);
-  /// Row y from its symbols, into colours of all its pixels; false where an index has no colour.
-  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t* colours);
+  /// Row y from its symbols, into colours of all its pixels. With a palette: decode_sums() and decode_values() of its
+  /// index, and get_colours().
+  void decode_row(const TileShape& shape, size_t y, uint32_t* colours);
+  void get_colours(const TileShape& shape, size_t y, uint32_t* colours);
 
   Mode mode = kPlain;
+  GuidedPlane index;  ///< into the palette
 
  private:
   struct Channel {
@@ -55,7 +58,6 @@ struct ColourPlanes {
   ColourLattice lattice_{0};                          ///< of channels
   bool has_height_ = false;
   HeightModel height_;
-  GuidedPlane index;
   std::array<Channel, 3> channel;  // green, red, blue
   Samples samples_;
 };

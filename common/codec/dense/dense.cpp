@@ -162,10 +162,11 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   if (!states.get(parts->states)) return false;
   source_.end = parts->words.data() + parts->words.size();
   source_.readable = parts->headers[0].data();
-  if (!get_depth(*parts, image, rect, base, bounds.depth) || !get_normals(*parts, image, rect, base, bounds.normal) ||
-      !get_colours(*parts, image, rect, base, bounds.colour))
+  if (!get_depth(*parts, image, rect, base, bounds.depth) || !get_normals(*parts, base, bounds.normal) ||
+      !get_colours(*parts, bounds.colour) || !states.at_rest())
     return false;
-  return states.at_rest();
+  get_values(image, rect, base);
+  return true;
 }
 
 void DenseCoder::begin_part(const Parts& parts, size_t part) {
@@ -207,41 +208,52 @@ bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const T
   return source_.end == source_.begin;
 }
 
-bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
-                             int reach) {
+bool DenseCoder::get_normals(const Parts& parts, const Pixel& base, int reach) {
   begin_part(parts, 1);
   normals_.reset(shape_, reach);
-  if (!normals_.decode_header(shape_, depth_, base.normal, reader_)) return false;
-  for (size_t i = 0; i < 2; ++i)
-    if (!decoders_[1 + i].prepare(normals_.plane[i].symbols, reader_)) return false;
+  return normals_.decode_header(shape_, depth_, base.normal, reader_) &&
+         get_symbols(1, 2, [&](size_t i) { return &normals_.plane[i].symbols; });
+}
+
+bool DenseCoder::get_colours(const Parts& parts, int reach) {
+  begin_part(parts, 2);
+  colours_.mode = parts.colour_mode;
+  return colours_.decode_header(shape_, depth_, reach, reader_) &&
+         get_symbols(3, colours_.planes(), [&](size_t i) { return &colours_.symbols(i); });
+}
+
+// All symbols of a part, row by row; what they stand for is found afterwards.
+template <class Planes>
+bool DenseCoder::get_symbols(size_t first, size_t count, Planes plane) {
+  for (size_t i = 0; i < count; ++i)
+    if (!decoders_[first + i].prepare(*plane(i), reader_)) return false;
   if (!reader_.finished()) return false;
-  if (row_codes_.size() < shape_.width) row_codes_.resize(shape_.width);
-  for (size_t y = 0; y < shape_.height; ++y) {
-    for (size_t i = 0; i < 2; ++i)
-      if (!decoders_[1 + i].get_row(normals_.plane[i].symbols, shape_, y, source_)) return false;
-    normals_.decode_row(shape_, y, row_codes_.data());
-    store(row_codes_.data(), y, image.normal, rect);
-  }
+  for (size_t y = 0; y < shape_.height; ++y)
+    for (size_t i = 0; i < count; ++i)
+      if (!decoders_[first + i].get_row(*plane(i), shape_, y, source_)) return false;
   return source_.end == source_.begin;
 }
 
-bool DenseCoder::get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
-                             int reach) {
-  begin_part(parts, 2);
-  colours_.mode = parts.colour_mode;
-  if (!colours_.decode_header(shape_, depth_, reach, reader_)) return false;
-  for (size_t i = 0; i < colours_.planes(); ++i)
-    if (!decoders_[3 + i].prepare(colours_.symbols(i), reader_)) return false;
-  if (!reader_.finished()) return false;
+// Normals and colours from their symbols.
+void DenseCoder::get_values(image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+  if (row_codes_.size() < shape_.width) row_codes_.resize(shape_.width);
   if (colour_rows_.size() < shape_.width) colour_rows_.resize(shape_.width);
   std::fill_n(colour_rows_.begin(), shape_.width, base.colour);
+  GuidedPlane &a = normals_.plane[0], &b = normals_.plane[1];
   for (size_t y = 0; y < shape_.height; ++y) {
-    for (size_t i = 0; i < colours_.planes(); ++i)
-      if (!decoders_[3 + i].get_row(colours_.symbols(i), shape_, y, source_)) return false;
-    if (colours_.planes() != 0 && !colours_.decode_row(shape_, y, colour_rows_.data())) return false;
+    normals_.decode_sums(shape_, y);
+    if (colours_.mode == ColourPlanes::kPalette) {
+      colours_.index.decode_sums(shape_, y, nullptr);
+      decode_values(a, b, colours_.index, shape_, y);
+      colours_.get_colours(shape_, y, colour_rows_.data());
+    } else {
+      decode_values(a, b, shape_, y);
+      if (colours_.planes() != 0) colours_.decode_row(shape_, y, colour_rows_.data());
+    }
+    normals_.get_codes(shape_, y, row_codes_.data());
+    store(row_codes_.data(), y, image.normal, rect);
     store(colour_rows_.data(), y, image.colour, rect);
   }
-  return source_.end == source_.begin;
 }
 
 bool DenseCoder::skip(Reader& in, StreamInfo& info) {

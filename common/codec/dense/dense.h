@@ -43,10 +43,11 @@ class DenseCoder {
   void begin_part(const Parts& parts, size_t part);
   [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
                                const DepthLattice* lattice);
-  [[nodiscard]] bool get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
-                                 int reach);
-  [[nodiscard]] bool get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
-                                 int reach);
+  [[nodiscard]] bool get_normals(const Parts& parts, const Pixel& base, int reach);
+  [[nodiscard]] bool get_colours(const Parts& parts, int reach);
+  template <class Planes>
+  [[nodiscard]] bool get_symbols(size_t first, size_t count, Planes plane);
+  void get_values(image::DepthImage& image, const TileRect& rect, const Pixel& base);
   template <class T>
   void store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const;
 

@@ -138,6 +138,20 @@ bool run_both(Chain first, Chain second, const TileShape& shape, size_t y) {
   return first.good(shape.cover(y), shape.width) && second.good(shape.cover(y), shape.width);
 }
 
+// Normals and an index.
+using ByteChain = Chain<true, false>;
+using IndexChain = Chain<false, false>;
+bool run_three(ByteChain first, ByteChain second, IndexChain third, const TileShape& shape, size_t y) {
+  shape.for_each_run(y, [&](size_t x, size_t end) {
+    first.begin(x), second.begin(x), third.begin(x);
+    for (; x < end; ++x) first.step(x), second.step(x), third.step(x);
+  });
+  const uint8_t* const cover = shape.cover(y);
+  return first.good(cover, shape.width) && second.good(cover, shape.width) && third.good(cover, shape.width);
+}
+
+bool is_plain(const GuidedPlane& plane) { return !plane.median && !plane.wild && plane.flatness == nullptr; }
+
 template <bool kByte>
 void decode_alone(GuidedPlane& plane, const TileShape& shape, size_t y) {
   if (plane.median) {
@@ -358,5 +372,13 @@ void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_
 }
 
 void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y) { decode_alone<false>(plane, shape, y); }
+
+void decode_values(GuidedPlane& a, GuidedPlane& b, GuidedPlane& index, const TileShape& shape, size_t y) {
+  if (is_plain(a) && is_plain(b) && is_plain(index)) {
+    if (run_three(ByteChain(a, y), ByteChain(b, y), IndexChain(index, y), shape, y)) return;
+    a.wild = index.wild = true;
+  }
+  decode_values(a, b, shape, y), decode_values(index, shape, y);
+}
 
 }  // namespace telesplat::codec::detail

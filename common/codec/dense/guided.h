@@ -62,5 +62,7 @@ struct GuidedPlane {
 /// Values of row y of both planes, whose sums are known.
 void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y);
 void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y);
+/// Of normals' planes and of an index: three that need not wait for each other.
+void decode_values(GuidedPlane& a, GuidedPlane& b, GuidedPlane& index, const TileShape& shape, size_t y);
 
 }  // namespace telesplat::codec::detail

@@ -269,10 +269,12 @@ bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   return true;
 }
 
-void NormalPlanes::decode_row(const TileShape& shape, size_t y, uint16_t* out) {
+void NormalPlanes::decode_sums(const TileShape& shape, size_t y) {
   plane[0].decode_sums(shape, y, nullptr);
   plane[1].decode_sums(shape, y, &plane[0]);
-  decode_values(plane[0], plane[1], shape, y);
+}
+
+void NormalPlanes::get_codes(const TileShape& shape, size_t y, uint16_t* out) {
   const int16_t* rows[2];
   for (size_t i = 0; i < 2; ++i) {
     rows[i] = plane[i].values.row(static_cast<ptrdiff_t>(y));

@@ -44,8 +44,10 @@ struct NormalPlanes {
   void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour, BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * (GuidedPlane::kMostWeightBits + GuidedPlane::kMostFlatBits);
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
-  /// Row y from its symbols, into codes of all its pixels.
-  void decode_row(const TileShape& shape, size_t y, uint16_t* codes);
+  /// Row y from its symbols, before decode_values().
+  void decode_sums(const TileShape& shape, size_t y);
+  /// Codes of all pixels of row y, after it.
+  void get_codes(const TileShape& shape, size_t y, uint16_t* codes);
 
   /// What encode() fitted; null: nothing.
   const GeometryModel* geometry() const { return has_geometry_ ? &geometry_ : nullptr; }

@@ -374,7 +374,7 @@ bool RefinementCoder::decode_colours(const Reach& reach, WordSource& source) {
       if (!decoders_[3 + i].get_row(plane(i), shape_, y, source)) return false;
     uint32_t* const out = exact_colours_.data() + y * shape_.width;
     if (!near_colours_) {
-      if (count != 0 && !colours_.decode_row(shape_, y, out)) return false;
+      if (count != 0) colours_.decode_row(shape_, y, out);
       continue;
     }
     const uint32_t* const known = known_colours_.data() + y * shape_.width;
