@@ -101,7 +101,7 @@ bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours,
 bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
   ColourTable table;
   palette_.clear(), first_.clear();
-  index.reset(shape, 4, 254);
+  index.reset(shape, GuidedPlane::kIndexBits, 254);
   for (size_t y = 0; y < shape.height; ++y) {
     const uint32_t* const from = colours.data() + y * shape.width;
     int16_t* const places = index.values.row(static_cast<ptrdiff_t>(y));
@@ -179,7 +179,7 @@ void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& dept
 
 void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
   const int last = static_cast<int>(palette_.size()) - 1;
-  index.reset(shape, 4, last);  // keeps the values
+  index.reset(shape, GuidedPlane::kIndexBits, last);  // keeps the values
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     if (has_height_)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "common/codec/golomb.h"
 
@@ -9,6 +10,8 @@ namespace telesplat::codec::detail {
 namespace {
 
 constexpr int kConstantBits = 28;
+// The sum of weights' sizes of which all sums but the left neighbour's, with residuals, are below 2^31.
+constexpr int kTame = 100000;
 
 int median_of(int left, int up, int corner) {
   return left + up - std::clamp(corner, std::min(left, up), std::max(left, up));
@@ -19,42 +22,45 @@ int median_of(int left, int up, int corner) {
 // 64ths and mod 256.
 template <bool kByte, bool kBounded>
 struct Chain {
+  static constexpr int kBits = kByte ? GuidedPlane::kNormalBits : GuidedPlane::kIndexBits;
+  static constexpr int kShift = kBits + 13;
+  static constexpr int64_t kRound = int64_t{1} << (kShift - 1);
+
   Chain(GuidedPlane& guided, size_t y)
       : plane(guided),
         value(guided.values.row(static_cast<ptrdiff_t>(y))),
         residual(plane.residuals.row(static_cast<ptrdiff_t>(y))),
         sums(plane.sums.data()),
-        weight(plane.weights[0] * (1 << plane.bits)),
-        bits(kByte ? 6 : plane.bits),
-        most(plane.most),
-        left(value[-1] >> plane.bits) {}
+        weight(plane.weights[0] * (1 << kBits)),
+        left(value[-1] >> kBits) {}
   void step(size_t x) { step(x, weight, 0); }
   // Unsigned: what lies far out of bounds grows, and wraps.
   void step(size_t x, int64_t near_weight, uint64_t rest) {
-    const int64_t off = residual[x] >> bits;
-    const uint64_t known = static_cast<uint64_t>(sums[x] + (int64_t{1} << (bits + 12)) + (off << (bits + 13))) + rest;
-    left = static_cast<int64_t>(known + product(near_weight, left)) >> (bits + 13);
+    uint64_t known = static_cast<uint64_t>(int64_t{sums[x]}) + rest;
+    if (kBounded && !plane.has_residuals) known += static_cast<uint64_t>(int64_t{residual[x]} * (1 << 13) + kRound);
+    left = static_cast<int64_t>(known + product(near_weight, left)) >> kShift;
     if constexpr (kBounded) {
-      const bool plain = static_cast<uint64_t>(left - off) <= static_cast<uint64_t>(most) &&
-                         static_cast<uint64_t>(left) <= static_cast<uint64_t>(kByte ? 255 : most);
+      const int64_t off = residual[x] >> kBits;
+      const bool plain = static_cast<uint64_t>(left - off) <= static_cast<uint64_t>(plane.most) &&
+                         static_cast<uint64_t>(left) <= static_cast<uint64_t>(kByte ? 255 : plane.most);
       if (!plain) [[unlikely]]
         left = bounded(left - off, off);
     } else {
       seen |= left;
     }
-    value[x] = static_cast<int16_t>(left << bits);
+    value[x] = static_cast<int16_t>(left << kBits);
   }
   bool good(const uint8_t* cover, size_t n) const {
     if (kBounded) return true;
-    const int64_t above = (int64_t{1} << (15 - bits)) - 1;
+    const int64_t above = (int64_t{1} << (15 - kBits)) - 1;
     return (seen & ~(kByte ? 255 : above)) == 0 &&
-           kernels().within(cover, value, residual, n, most << bits, (kByte ? 255 : most) << bits);
+           kernels().within(cover, value, residual, n, plane.most << kBits, (kByte ? 255 : plane.most) << kBits);
   }
-  void begin(size_t x) { left = value[static_cast<ptrdiff_t>(x) - 1] >> plane.bits; }
+  void begin(size_t x) { left = value[static_cast<ptrdiff_t>(x) - 1] >> kBits; }
 
   int64_t bounded(int64_t guess, int64_t off) const {
-    const int64_t next = std::clamp<int64_t>(guess, 0, most) + off;
-    return kByte ? next & 255 : std::clamp<int64_t>(next, 0, most);
+    const int64_t next = std::clamp<int64_t>(guess, 0, plane.most) + off;
+    return kByte ? next & 255 : std::clamp<int64_t>(next, 0, plane.most);
   }
   static uint64_t product(int64_t a, int64_t b) { return static_cast<uint64_t>(a) * static_cast<uint64_t>(b); }
 
@@ -63,7 +69,6 @@ struct Chain {
   const int16_t* const residual;
   const int32_t* const sums;
   const int64_t weight;
-  const int bits, most;
   int64_t left, seen = 0;
 };
 
@@ -73,7 +78,7 @@ struct FlatChain {
   FlatChain(GuidedPlane& guided, size_t y)
       : plain(guided, y),
         flatness(guided.flatness->row(static_cast<ptrdiff_t>(y))),
-        far(plain.value[-2] >> plain.bits) {
+        far(plain.value[-2] >> plain.kBits) {
     for (int k = 0; k < kFlatnesses; ++k)
       near_weight[k] = guided.sets[k][0] * (1 << 6), far_weight[k] = guided.sets[k][kFarLeft] * (1 << 6);
   }
@@ -85,7 +90,7 @@ struct FlatChain {
   }
   void begin(size_t x) {
     plain.begin(x);
-    far = plain.value[static_cast<ptrdiff_t>(x) - 2] >> plain.bits;
+    far = plain.value[static_cast<ptrdiff_t>(x) - 2] >> plain.kBits;
   }
 
   bool good(const uint8_t* cover, size_t n) const { return plain.good(cover, n); }
@@ -171,7 +176,7 @@ int16_t GuidedPlane::nearest_value(int16_t by) const {
 }
 
 void GuidedPlane::reset(const TileShape& shape, int fraction, int largest) {
-  bits = fraction, most = largest, flatness = nullptr, wild = false;
+  bits = fraction, most = largest, flatness = nullptr, wild = has_residuals = false;
   for (Plane<int16_t>* plane : {&values, &guide, &residuals}) plane->reset(shape.width, shape.height);
   symbols.reset(shape, bits != 6);
   sums.resize(std::max(sums.size(), shape.width + 64));
@@ -298,6 +303,7 @@ bool GuidedPlane::get_weights(BitReader& bits) {
     total += std::abs(int{weights[i]});
   }
   constant = static_cast<int32_t>(bits.source.take(kConstantBits)) - (1 << (kConstantBits - 1));
+  most_weight_ = total;
   return !bits.overrun() && total <= kMostWeight && std::abs(constant) <= kMostConstant;
 }
 
@@ -327,7 +333,12 @@ bool GuidedPlane::get_flat_weights(BitReader& bits) {
     good &= v >= -kMostFlat && v <= kMostFlat;
     off = good ? static_cast<int16_t>(v) : int16_t{0};
   });
-  return good && !bits.overrun() && add_flat_weights(weights, flat_weights, sets);
+  if (!good || bits.overrun() || !add_flat_weights(weights, flat_weights, sets)) return false;
+  for (const auto& set : sets)
+    most_weight_ = std::max(most_weight_, std::accumulate(set, set + kGuidedTerms, 0, [](int sum, int16_t w) {
+                              return sum + std::abs(int{w});
+                            }));
+  return true;
 }
 
 void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
@@ -341,7 +352,13 @@ void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlan
       out[x] = static_cast<int16_t>((static_cast<int>(z[x] >> 1) ^ -static_cast<int>(z[x] & 1)) * (1 << bits));
   }
   begin_row(shape, y);
-  if (!median) make_sums(shape, y, before);
+  if (median) return;
+  make_sums(shape, y, before);
+  has_residuals = most_weight_ <= kTame;
+  if (has_residuals)
+    kernels().add_residuals(out, shape.width, 1 << (bits + 12), sums.data());
+  else
+    wild = true;
 }
 
 // Values of pixels that are not covered, and borders, before the others are known: those of covered ones are written

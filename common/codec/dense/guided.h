@@ -12,7 +12,8 @@ namespace telesplat::codec::detail {
 /// Values, their guide and residuals, in 64ths, or as others are configured; symbols of the residuals.
 struct GuidedPlane {
   /// fraction: bits of a value below 1; most: the largest one. Six and 254: residuals are mod 256.
-  void reset(const TileShape& shape, int fraction = 6, int most = 254);
+  static constexpr int kNormalBits = 6, kIndexBits = 4;  ///< of a value's fraction
+  void reset(const TileShape& shape, int fraction = kNormalBits, int most = 254);
   int16_t nearest_value(int16_t guide) const;
   /// Borders of the guide, once its rows are known; and of the values above the first row.
   void begin(const TileShape& shape);
@@ -47,10 +48,12 @@ struct GuidedPlane {
   const Plane<uint8_t>* flatness = nullptr;  ///< where each flatness has weights of its own
   FlatWeights flat_weights;                  ///< as they are sent,
   int16_t sets[kFlatnesses][kGuidedTerms];   ///< and added to `weights`
+  bool has_residuals = false;  ///< `sums` have them, and half a unit, after decode_sums()
   bool wild = false;  ///< a row that was decoded had predictions out of bounds: others of the tile will
   double left_over = 0;                      ///< after fit(): as fit_guided() has it
 
  private:
+  int most_weight_ = 0;  ///< sum of sizes, of those that were decoded
   /// Half of L and of U: where there is nothing to be fitted.
   void set_plain_weights();
   bool has_plain_weights() const;

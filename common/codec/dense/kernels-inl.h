@@ -322,6 +322,10 @@ static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums,
     for (size_t x = 0; x < n; ++x) sums[x] += w[13] * other[x];
 }
 
+static void AddResiduals(const int16_t* RESTRICT residuals, size_t n, int32_t round, int32_t* RESTRICT sums) {
+  for (size_t x = 0; x < n; ++x) sums[x] += residuals[x] * (1 << 13) + round;
+}
+
 static inline int32_t Guess(int32_t sum, int bits, int32_t most) {
   const int32_t p = (sum + (1 << (bits + 12))) >> (bits + 13);
   return p < 0 ? 0 : p > most ? most : p;

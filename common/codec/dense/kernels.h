@@ -128,6 +128,8 @@ struct Kernels {
                         int16_t* residual);
   /// All terms of guided prediction but those of L and LL; with_left, which needs a flatness: these too.
   void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums, bool with_left);
+  /// sums += residuals * 2^13 + round.
+  void (*add_residuals)(const int16_t* residuals, size_t n, int32_t round, int32_t* sums);
   /// Flatness of each pixel of `row`: depth differs by less than `limit`, a power of two, from what continues it.
   void (*flatness)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t limit,
                    uint8_t* out);

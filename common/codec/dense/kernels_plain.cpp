@@ -70,6 +70,7 @@ const Kernels& plain_kernels() {
                                GuidedResidualsWide<GuidedSums>,
                                MedianValues,
                                GuidedSums,
+                               AddResiduals,
                                Flatness,
                                Geometry,
                                Heights,
