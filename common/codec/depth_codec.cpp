@@ -45,7 +45,7 @@ using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
 // after them. bounds = varint depth, u8 normal, u8 colour. flags: bounds follow; there is one tile, a sparse one.
-constexpr uint8_t kMagic = 0xD7, kVersion = 10, kBounded = 1, kOneTile = 2, kKnownFlags = kBounded | kOneTile;
+constexpr uint8_t kMagic = 0xD7, kVersion = 11, kBounded = 1, kOneTile = 2, kKnownFlags = kBounded | kOneTile;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 

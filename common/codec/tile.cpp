@@ -9,7 +9,15 @@
 namespace telesplat::codec::detail {
 namespace {
 
-enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kEdges = 8, kKnownBits = 15 };
+enum Kind : uint8_t {
+  kEmpty = 0,
+  kDense = 1,
+  kSparse = 2,
+  kPredictorBits = 3,
+  kMasked = 4,
+  kEdges = 8,
+  kKnownBits = 15
+};
 constexpr int kRamp = 8;  // beside a sparse tile's pole: a ramp's axis follows
 
 TileScratch& scratch() {

@@ -335,9 +335,8 @@ bool GuidedPlane::get_flat_weights(BitReader& bits) {
   });
   if (!good || bits.overrun() || !add_flat_weights(weights, flat_weights, sets)) return false;
   for (const auto& set : sets)
-    most_weight_ = std::max(most_weight_, std::accumulate(set, set + kGuidedTerms, 0, [](int sum, int16_t w) {
-                              return sum + std::abs(int{w});
-                            }));
+    most_weight_ = std::max(most_weight_, std::accumulate(set, set + kGuidedTerms, 0,
+                                                          [](int sum, int16_t w) { return sum + std::abs(int{w}); }));
   return true;
 }
 

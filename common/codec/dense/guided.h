@@ -48,9 +48,9 @@ struct GuidedPlane {
   const Plane<uint8_t>* flatness = nullptr;  ///< where each flatness has weights of its own
   FlatWeights flat_weights;                  ///< as they are sent,
   int16_t sets[kFlatnesses][kGuidedTerms];   ///< and added to `weights`
-  bool has_residuals = false;  ///< `sums` have them, and half a unit, after decode_sums()
-  bool wild = false;  ///< a row that was decoded had predictions out of bounds: others of the tile will
-  double left_over = 0;                      ///< after fit(): as fit_guided() has it
+  bool has_residuals = false;                ///< `sums` have them, and half a unit, after decode_sums()
+  bool wild = false;     ///< a row that was decoded had predictions out of bounds: others of the tile will
+  double left_over = 0;  ///< after fit(): as fit_guided() has it
 
  private:
   int most_weight_ = 0;  ///< sum of sizes, of those that were decoded

@@ -240,7 +240,8 @@ HWY_INLINE uint8_t* PutGroup(const SymbolRow& row, size_t begin, const EncodeEnt
     V reciprocal, packed;
     GatherEntries(tables, hn::Add(tokens[i], hn::ShiftLeft<8>(contexts)), reciprocal, packed);
     const V complement = hn::And(hn::ShiftRight<13>(packed), hn::Set(kD, 0xFFFu));
-    const V limit = hn::Sub(hn::ShiftLeft<kStateBits - kFrequencyBits>(hn::Sub(hn::Set(kD, kFrequencyOne), complement)), one);
+    const V limit =
+        hn::Sub(hn::ShiftLeft<kStateBits - kFrequencyBits>(hn::Sub(hn::Set(kD, kFrequencyOne), complement)), one);
     V y = Spill(x[i], hn::And(valid, Exceeds(x[i], limit)), out);
     const V quotient = hn::Shr(High32(y, reciprocal), hn::ShiftRight<25>(packed));
     y = hn::Add(hn::Add(y, hn::And(packed, hn::Set(kD, 0x1FFFu))), hn::Mul(quotient, complement));
@@ -316,7 +317,8 @@ HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, size_t n
     const V token = hn::ShiftRight<24>(entry);
     hn::StoreU(hn::TruncateTo(kD8, token), kD8, row.tokens + begin + i * kN);
     const V frequency = hn::Add(hn::And(hn::ShiftRight<12>(entry), hn::Set(kD, 0xFFFu)), one);
-    const V next = hn::Add(hn::Mul(frequency, hn::ShiftRight<kFrequencyBits>(x[i])), hn::And(entry, hn::Set(kD, 0xFFFu)));
+    const V next =
+        hn::Add(hn::Mul(frequency, hn::ShiftRight<kFrequencyBits>(x[i])), hn::And(entry, hn::Set(kD, 0xFFFu)));
     x[i] = Refill(kWhole ? next : hn::IfThenElse(valid, next, x[i]), end);
     V over = hn::Sub(hn::Max(token, first), first);
     if constexpr (!kWhole) over = hn::IfThenElseZero(valid, over);

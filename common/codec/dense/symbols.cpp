@@ -199,10 +199,9 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
       copy_about(row.narrow + begin, count, narrow.data() + n);
     n += count;
   });
-  return kernels().put_symbols(
-      {tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr, narrow.data(), n, row.first,
-       states.count},
-      tables_.data(), states.of, out);
+  return kernels().put_symbols({tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr,
+                                narrow.data(), n, row.first, states.count},
+                               tables_.data(), states.of, out);
 }
 
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
@@ -225,9 +224,9 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
   if (!plane.has_contexts) make_contexts(plane, shape, y);
   if (shape.full(y)) {
-    source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first, source.states.count,
-                                        source.readable},
-                                       tables_.data(), source.states.of, source.begin, source.end);
+    source.end = kernels().get_symbols(
+        {contexts, tokens, wide, narrow, shape.width, plane.first, source.states.count, source.readable},
+        tables_.data(), source.states.of, source.begin, source.end);
     finish_tokens(plane, shape, y);
     return source.end != nullptr;
   }
@@ -240,11 +239,10 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
     copy_about(contexts + begin, end - begin, packed_contexts_.data() + n);
     n += end - begin;
   });
-  source.end =
-      kernels().get_symbols({packed_contexts_.data(), packed_tokens_.data(),
-                             wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first,
-                             source.states.count, source.readable},
-                            tables_.data(), source.states.of, source.begin, source.end);
+  source.end = kernels().get_symbols(
+      {packed_contexts_.data(), packed_tokens_.data(), wide != nullptr ? packed_wide_.data() : nullptr,
+       packed_narrow_.data(), n, plane.first, source.states.count, source.readable},
+      tables_.data(), source.states.of, source.begin, source.end);
   if (source.end == nullptr) return false;
   n = 0;
   shape.for_each_run(y, [&](size_t begin, size_t end) {

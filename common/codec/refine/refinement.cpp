@@ -28,7 +28,7 @@ using detail::TileGrid;
 using detail::TileRect;
 using image::DepthImage;
 
-constexpr uint8_t kMagic = 0xD8, kVersion = 9;
+constexpr uint8_t kMagic = 0xD8, kVersion = 10;
 enum Kind : uint8_t { kSame = 0, kDense = 1, kScattered = 2, kAnew = 3 };
 constexpr int kNarrow = 16;              // pixels: tiles that are not as wide are coded as scattered ones
 constexpr int kShifts[3] = {8, 16, 0};   // green, red, blue

@@ -119,8 +119,8 @@ std::string refusal(const std::vector<uint8_t>& bytes) {
 
 TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
   // 1 x 1 pixels, nothing in it. varint depth, u8 normal, u8 colour.
-  EXPECT_EQ(refusal({0xD7, 10, 1, 1, 1, 0, 1, 0, 0}), "");
-  EXPECT_EQ(refusal({0xD7, 10, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
+  EXPECT_EQ(refusal({0xD7, 11, 1, 1, 1, 0, 1, 0, 0}), "");
+  EXPECT_EQ(refusal({0xD7, 11, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
   for (const auto& bounds : {std::vector<uint8_t>{0, 0, 0},
                              {1, 0, 0},
                              {0xFF, 0x7F, 1, 1},
@@ -129,12 +129,12 @@ TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
                              {0, 4, 0},
                              {0, 0, 16},
                              {0, 255, 255}}) {
-    std::vector<uint8_t> bytes{0xD7, 10, 1, 1, 1};
+    std::vector<uint8_t> bytes{0xD7, 11, 1, 1, 1};
     bytes.insert(bytes.end(), bounds.begin(), bounds.end());
     bytes.push_back(0);
     EXPECT_NE(refusal(bytes).find("bounds of error that nobody writes"), std::string::npos) << int(bounds[0]);
   }
-  EXPECT_NE(refusal({0xD7, 10, 1, 1, 1, 0, 1}), "");
+  EXPECT_NE(refusal({0xD7, 11, 1, 1, 1, 0, 1}), "");
 }
 
 TEST(ErrorBounds, IndicesOfDepthBeyondTheLast) {
@@ -158,14 +158,14 @@ std::string refusal_of(const std::vector<uint8_t>& bytes, const DepthImage& boun
 TEST(Refinement, Headers) {
   const DepthImage nothing(30, 20);
   const auto bytes = encode_refinement(nothing, nothing);
-  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 9, 30, 20}));
+  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 10, 30, 20}));
   EXPECT_EQ(refusal_of(bytes, nothing), "");
   EXPECT_NE(refusal_of({}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 9, 30}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD7, 10, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 9"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 9, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 9, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 10, 30}, nothing).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD7, 11, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 10"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 10, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 10, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
 }
 
 TEST(Refinement, OfWhatIsExactTakesAByteATile) {
@@ -253,10 +253,10 @@ TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((150 + 2 * x) % 256 | (100 - y) << 8);
   }
-  expect_bytes(image, {215, 10,  1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
+  expect_bytes(image, {215, 11,  1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
                        64,  150, 100, 16, 163, 15,  186, 98,  90,  36,  93,  192, 4,   69, 129, 254,
                        239, 53,  221, 2,  180, 57,  248, 197, 119, 198, 145, 198, 101, 32, 4},
-               {216, 9,   9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
+               {216, 10,  9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
                 110, 210, 128, 18, 0, 0,   111, 128, 18, 0, 25, 151, 242, 34,  0,   25, 143, 10, 10, 164, 39, 128});
 }
 
@@ -268,27 +268,26 @@ TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
     image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
     image.normal[i] = static_cast<uint16_t>(0x8040 + x * y);
   }
-  expect_bytes(image,
-               {215, 10,  1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   33,
-                76,  1,   225, 39,  254, 76,  0,   120, 23,  0,   0,   0,   0,   0,   0,   60,  127, 123, 112, 180, 90,
-                173, 86,  171, 213, 106, 181, 90,  173, 86,  171, 213, 10,  25,  228, 1,   0,   64,  254, 193, 23,  29,
-                80,  85,  248, 123, 129, 126, 25,  81,  85,  21,  0,   0,   57,  170, 86,  85,  21,  30,  3,   248, 248,
-                227, 31,  135, 136, 65,  196, 32,  98,  59,  0,   224, 1,   255, 222, 229, 213, 71,  237, 214, 90,  107,
-                173, 181, 214, 90,  107, 13,  2,   0,   0,   17,  101, 69,  144, 5,   182, 34,  3,   0,   138, 13,  153,
-                2,   89,  252, 43,  36,  212, 173, 159, 7,   155, 207, 94,  25,  191, 30,  117, 12,  20,  46,  158, 7,
-                217, 62,  160, 7,   68,  63,  222, 120, 190, 206, 155, 2,   20,  46,  158, 7,   250, 13,  67,  36,  183,
-                79,  100, 25,  223, 156, 153, 2,   115, 29,  39,  36,  220, 236, 161, 7,   70,  159, 0,   0},
-               {216, 9,   17,  3,   1,   239, 207, 12,  16,  0,   137, 1,   226, 79,  9,   255, 162, 47,  1,   248, 212,
-                75,  151, 0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   248, 23,  125,
-                229, 43,  0,   0,   0,   0,   0,   0,   0,   0,   0,   248, 23,  45,  133, 127, 16,  0,   191, 22,  62,
-                82,  28,  30,  7,   128, 143, 51,  26,  141, 198, 70,  163, 209, 104, 52,  108, 0,   128, 206, 243, 0,
-                124, 164, 114, 0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,
-                0,   252, 91,  95,  73,  1,   0,   0,   0,   188, 225, 194, 191, 243, 9,   1,   240, 166, 199, 99,  0,
-                60,  236, 9,   1,   240, 174, 11,  192, 131, 30,  112, 8,   0,   0,   0,   184, 220, 3,   231, 156, 115,
-                206, 1,   2,   17,  47,  55,  144, 20,  230, 174, 0,   0,   110, 159, 2,   0,   137, 171, 99,  0,   239,
-                221, 14,  0,   136, 131, 12,  0,   124, 68,  6,   0,   28,  119, 21,  0,   158, 200, 25,  0,   91,  9,
-                25,  0,   28,  119, 21,  0,   158, 200, 25,  0,   91,  9,   25,  0,   28,  119, 21,  0,   158, 200, 25,
-                0,   91,  9,   25,  0,   28,  119, 21,  0,   158, 200, 25,  0});
+  expect_bytes(
+      image, {215, 11,  1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   32,
+              76,  1,   225, 39,  254, 60,  0,   188, 7,   0,   0,   0,   0,   0,   0,   207, 250, 67,  180, 90,  173,
+              86,  171, 213, 106, 181, 90,  173, 86,  171, 213, 10,  25,  228, 1,   0,   64,  254, 161, 151, 12,  87,
+              21,  254, 78,  160, 92,  70,  84,  85,  5,   0,   64,  142, 170, 85,  85,  5,   30,  3,   248, 248, 227,
+              31,  135, 136, 65,  196, 32,  98,  59,  0,   224, 1,   255, 206, 229, 181, 199, 236, 214, 90,  107, 173,
+              181, 214, 90,  107, 13,  3,   0,   0,   17,  185, 1,   196, 133, 108, 132, 250, 177, 2,   0,   192, 54,
+              83,  2,   72,  247, 197, 31,  122, 6,   178, 6,   245, 215, 34,  101, 118, 167, 21,  11,  141, 191, 176,
+              6,   6,   135, 182, 6,   234, 231, 1,   0,   117, 126, 84,  2,   141, 191, 176, 6,   109, 222, 207, 31,
+              244, 63,  14,  101, 2,   71,  82,  2,   86,  7,   197, 31,  186, 39,  181, 6,   248, 71,  2,   0},
+      {216, 10,  17,  3,   1,   239, 207, 12,  16,  0,   134, 1,   226, 79,  9,   255, 146, 47,  0,   248, 196, 215,
+       174, 0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   128, 127, 201, 23,  190, 0,
+       0,   0,   0,   0,   0,   0,   0,   0,   248, 151, 44,  133, 127, 8,   0,   191, 18,  62,  14,  20,  30,  5,
+       128, 143, 50,  26,  141, 198, 70,  163, 209, 104, 52,  108, 0,   64,  231, 121, 0,   62,  206, 20,  0,   0,
+       0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   240, 111, 124, 37,  5,   0,
+       0,   0,   240, 134, 11,  255, 190, 227, 1,   240, 150, 199, 99,  0,   60,  232, 120, 0,   188, 231, 2,   240,
+       144, 211, 71,  0,   0,   0,   128, 203, 61,  112, 206, 57,  231, 28,  2,   17,  175, 153, 144, 20,  105, 175,
+       0,   0,   247, 135, 2,   0,   240, 98,  99,  0,   31,  223, 14,  0,   180, 106, 12,  0,   92,  62,  6,   0,
+       141, 106, 21,  0,   24,  169, 25,  0,   151, 117, 25,  0,   141, 106, 21,  0,   24,  169, 25,  0,   151, 117,
+       25,  0,   141, 106, 21,  0,   24,  169, 25,  0,   151, 117, 25,  0,   141, 106, 21,  0,   24,  169, 25,  0});
 }
 
 }  // namespace
