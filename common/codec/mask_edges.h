@@ -8,9 +8,9 @@
 
 namespace telesplat::codec::detail {
 
-/// Appends `mask` at `out`: few bytes where rows are like those above, more than put_mask() where pixels are scattered.
-/// As in modified modified READ (ITU-T T.6), an edge is where the edge above is, or a little beside it, or there is none
-/// any more, or it is new; which of these is coded by how likely it is.
+/// Appends `mask` at `out`: few bytes where rows are like those above, more than put_mask() has of scattered pixels. As
+/// in modified modified READ (ITU-T T.6) an edge is where the one above is, or a little beside it, or there is none any
+/// more, or it is new; which of these is coded by how likely it is. See docs/codec.md.
 void put_edges(std::vector<uint8_t>& out, const Mask& mask);
 /// Fills a mask whose size was set by reset(); false where the stream is damaged.
 [[nodiscard]] bool get_edges(Reader& in, Mask& mask);

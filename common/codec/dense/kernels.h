@@ -100,8 +100,8 @@ struct Kernels {
   /// a pixel lies, and how far off; others are kHits + those of z.
   void (*plane_residuals)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
                           uint8_t* tokens);
-  /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]). Those that
-  /// are not covered lie in the plane of L, U and UL.
+  /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]). Those
+  /// that are not covered lie in the plane of L, U and UL.
   void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens,
                       const uint8_t* cover, size_t n, uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
   /// The kinds of such tokens: token / 5, or by how large what is missed is 8 + (token - kHits) / 16, at most 15.
