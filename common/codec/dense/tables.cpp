@@ -9,9 +9,10 @@
 namespace telesplat::codec::detail {
 namespace {
 
+constexpr uint32_t kSteps[4] = {64, 76, 91, 108};  // of weights of four levels, which double then
+
 // In 256ths of a frequency, beyond the 1 that every token has.
-uint32_t weight_of(unsigned level) {
-  static constexpr uint32_t kSteps[4] = {64, 76, 91, 108};
+constexpr uint32_t weight_of(unsigned level) {
   return level < 2 ? 0 : kSteps[(level - 2) & 3] << ((level - 2) >> 2);
 }
 
@@ -70,6 +71,7 @@ bool for_each_level(TokenLevels& levels, Code code) {
   return true;
 }
 
+constexpr unsigned kMostOfNone = 12;  // the largest level of a token that never comes
 constexpr uint32_t kMany = 70;  // of so many a level that is not ideal costs more than it saves
 
 // The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
@@ -77,23 +79,35 @@ constexpr uint32_t kMany = 70;  // of so many a level that is not ideal costs mo
 int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected, bool last) {
   const auto rate = [&](int level) { return 1.5f * static_cast<float>(std::min(std::abs(level - expected), 6)); };
   const float n = static_cast<float>(count);
-  int best = 0, ideal = 0;
+  int best = 0;
   float least = 1e30f;
+  const auto consider = [&](int level, float loss) {
+    const float cost = loss + rate(level);
+    if (cost < least) least = cost, best = level;
+  };
   if (count != 0) {
     const auto share = static_cast<uint32_t>(count * share_of_one);
-    ideal = static_cast<int>(level_of(share < 256 ? 0 : share - 256));
-    if (count >= kMany) return std::max(ideal, 1);
-    const int low = std::max(1, std::min(ideal, expected)), high = std::max({1, ideal, expected});
-    for (int level = low; level <= high; ++level) {
-      const float off = static_cast<float>(level - ideal), cost = 0.0216f * n * off * off + rate(level);
-      if (cost < least) least = cost, best = level;
+    const int ideal = static_cast<int>(level_of(share < 256 ? 0 : share - 256));
+    if (count >= kMany) return ideal;
+    const int towards = std::max(expected, 1), step = towards < ideal ? -1 : 1;
+    for (int level = ideal;; level += step) {  // until what is lost alone is too much
+      const float off = static_cast<float>(level - ideal), loss = 0.0216f * n * off * off;
+      if (loss >= least) return best;
+      consider(level, loss);
+      if (level == towards) return best;
     }
-    return best;
   }
-  for (int level = last ? 1 : 0; level <= std::min(expected, 12); ++level) {
-    const float weight = level == 0 ? 0 : 1 + static_cast<float>(weight_of(static_cast<unsigned>(level))) / 256;
-    const float cost = weight * static_cast<float>(total) * (1.44f / kFrequencyOne) + rate(level);
-    if (cost < least) least = cost, best = level;
+  static constexpr auto kWeights = [] {
+    std::array<float, kMostOfNone + 1> out{};
+    for (unsigned level = 1; level <= kMostOfNone; ++level)
+      out[level] = 1 + static_cast<float>(weight_of(level)) / 256;
+    return out;
+  }();
+  const float loss_of_one = static_cast<float>(total) * (1.44f / kFrequencyOne);
+  for (int level = last ? 1 : 0; level <= std::min(expected, static_cast<int>(kMostOfNone)); ++level) {
+    const float loss = kWeights[static_cast<size_t>(level)] * loss_of_one;
+    if (loss >= least) break;
+    consider(level, loss);
   }
   return best;
 }
