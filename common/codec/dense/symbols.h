@@ -106,7 +106,8 @@ class PlaneEncoder {
   void choose_scale(SymbolPlane& plane, const TileShape& shape);
   void count(const SymbolPlane& plane, const TileShape& shape);
   TokenLevels levels_;
-  TokenCounts counts_, more_counts_;
+  TokenCounts counts_;
+  uint16_t parts_[4][kContexts * kSymbols];  ///< of counts_
   std::vector<EncodeEntry> tables_;
 };
 

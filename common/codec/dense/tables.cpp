@@ -12,9 +12,7 @@ namespace {
 constexpr uint32_t kSteps[4] = {64, 76, 91, 108};  // of weights of four levels, which double then
 
 // In 256ths of a frequency, beyond the 1 that every token has.
-constexpr uint32_t weight_of(unsigned level) {
-  return level < 2 ? 0 : kSteps[(level - 2) & 3] << ((level - 2) >> 2);
-}
+constexpr uint32_t weight_of(unsigned level) { return level < 2 ? 0 : kSteps[(level - 2) & 3] << ((level - 2) >> 2); }
 
 // The level whose weight is nearest, by ratio.
 unsigned level_of(uint32_t weight) {
@@ -72,7 +70,7 @@ bool for_each_level(TokenLevels& levels, Code code) {
 }
 
 constexpr unsigned kMostOfNone = 12;  // the largest level of a token that never comes
-constexpr uint32_t kMany = 70;  // of so many a level that is not ideal costs more than it saves
+constexpr uint32_t kMany = 70;        // of so many a level that is not ideal costs more than it saves
 
 // The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
 // share_of_one: of a count of 1, in 256ths of a frequency.
@@ -99,8 +97,7 @@ int choose_level(uint32_t count, uint64_t total, double share_of_one, int expect
   }
   static constexpr auto kWeights = [] {
     std::array<float, kMostOfNone + 1> out{};
-    for (unsigned level = 1; level <= kMostOfNone; ++level)
-      out[level] = 1 + static_cast<float>(weight_of(level)) / 256;
+    for (unsigned level = 1; level <= kMostOfNone; ++level) out[level] = 1 + static_cast<float>(weight_of(level)) / 256;
     return out;
   }();
   const float loss_of_one = static_cast<float>(total) * (1.44f / kFrequencyOne);
