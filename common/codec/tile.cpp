@@ -64,8 +64,22 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
   return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
-// Of runs that are as short as scattered pixels' an edge takes more than what put_mask() has of pixels.
-bool has_few_edges(const Mask& mask, size_t covered) { return covered >= 4 * mask.runs(); }
+// By edges or by pixels, whichever takes fewer bytes. Returns whether it is by edges.
+bool put_shorter_mask(std::vector<uint8_t>& out, const Mask& mask, size_t covered) {
+  constexpr size_t kScattered = 4, kLong = 12;  // pixels a run: below and above these nothing needs to be tried
+  const size_t runs = mask.runs(), begin = out.size();
+  if (covered < kScattered * runs) return put_mask(out, mask), false;
+  put_edges(out, mask);
+  if (covered >= kLong * runs) return true;
+  const size_t size = out.size() - begin;
+  put_mask(out, mask);
+  const bool edges = out.size() - begin >= 2 * size;
+  if (edges)
+    out.resize(begin + size);
+  else
+    out.erase(out.begin() + static_cast<ptrdiff_t>(begin), out.begin() + static_cast<ptrdiff_t>(begin + size));
+  return edges;
+}
 
 // What is covered of a tile.
 void look_at(Mask& mask, const image::DepthImage& image, const TileRect& rect) {
@@ -160,8 +174,8 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   const bool full = covered == pixels,
              sparse = !full &&
                       (pixels > kMaxTilePixels || is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr));
-  const bool edges = !full && has_few_edges(s.mask, covered);
-  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked) | (edges ? kEdges : 0)));
+  const size_t kind = out.size();
+  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
 
   size_t first = rect.first;  // of the covered pixels
   for (int y = 0; y < rect.height; ++y) {
@@ -172,7 +186,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   Pixel base{image.depth[first], image.colour[first] & 0xFFFFFF, image.normal[first]};
   if (bounds.depth != nullptr) base.depth = bounds.depth->index(base.depth);
   put_base(out, base);
-  if (!full) edges ? put_edges(out, s.mask) : put_mask(out, s.mask);
+  if (!full && put_shorter_mask(out, s.mask, covered)) out[kind] |= kEdges;
 
   if (sparse) {
     if (bounds.depth != nullptr) base.depth = bounds.depth->code(base.depth);

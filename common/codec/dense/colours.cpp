@@ -365,19 +365,26 @@ void ColourPlanes::get_colours(const TileShape& shape, size_t y, uint32_t* colou
     for (size_t x = 0; x < shape.width; ++x) colours[x] = palette[row[x] >> 4];
     return;
   }
+  const uint8_t *above[3], *z[3];
+  uint8_t* row[3];
   for (size_t c = 0; c < 3; ++c) {
-    uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
-    const uint8_t* const z = channel[c].symbols.narrow.row(r);
-    above[-1] = row[-1] = above[0];
-    int left = row[-1], corner = left;
-    for (size_t x = 0; x < shape.width; ++x) {
-      const int up = above[x], low = std::min(left, up), high = std::max(left, up);
-      const int guess = left + up - std::clamp(corner, low, high);
-      corner = up;
-      left = shape.at(x, y) ? (guess + ((z[x] >> 1) ^ -(z[x] & 1))) & 255 : up;
-      row[x] = static_cast<uint8_t>(left);
-    }
+    uint8_t* const over = channel[c].values.row(r - 1);
+    row[c] = channel[c].values.row(r), above[c] = over, z[c] = channel[c].symbols.narrow.row(r);
+    over[-1] = row[c][-1] = over[0];
+    if (!shape.full(y)) std::copy_n(over, shape.width, row[c]);  // where nothing is covered
   }
+  // Three that need not wait for each other.
+  shape.for_each_run(y, [&](size_t begin, size_t end) {
+    const auto first = static_cast<ptrdiff_t>(begin) - 1;
+    int left[3] = {row[0][first], row[1][first], row[2][first]};
+    for (size_t x = begin; x < end; ++x)
+      for (size_t c = 0; c < 3; ++c) {
+        const int up = above[c][x], corner = above[c][static_cast<ptrdiff_t>(x) - 1];
+        const int guess = left[c] + up - std::clamp(corner, std::min(left[c], up), std::max(left[c], up));
+        left[c] = (guess + ((z[c][x] >> 1) ^ -(z[c][x] & 1))) & 255;
+        row[c][x] = static_cast<uint8_t>(left[c]);
+      }
+  });
   const uint8_t *const g = channel[0].values.row(r), *const red = channel[1].values.row(r),
                        *const blue = channel[2].values.row(r);
   const uint32_t add = mode == kDifferences ? 0xFF : 0;

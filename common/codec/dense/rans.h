@@ -23,7 +23,7 @@ inline constexpr uint32_t kFrequencyOne = 1u << kFrequencyBits;
 inline constexpr unsigned kStateBits = 31;  ///< of states, at most
 inline constexpr uint32_t kStateLow = 1u << 15;
 inline constexpr size_t kLanes = 32, kContexts = 16, kSymbols = 256;
-inline constexpr size_t kEnoughForMore = 16384;  // pixels
+inline constexpr size_t kEnoughForMore = 32768;  // pixels
 inline constexpr size_t kMostStates = 2 * kLanes;
 
 /// How many states a tile has: with more, a processor need not wait for one group of symbols before it begins the next;
