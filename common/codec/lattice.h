@@ -84,11 +84,14 @@ class NormalLattice {
   int index(int value) const { return divided(value - 127 + step_ * half_ + step_ / 2); }
   int nearest(int v) const { return value(index(v)); }
   /// 64ths of a coordinate, 0 to 254 * 64 -> 64ths of a step.
-  int16_t index64(int v) const { return static_cast<int16_t>(divided(v - 64 * 127 + 64 * half_ * step_ + step_ / 2)); }
+  int16_t index64(int v) const { return static_cast<int16_t>(divided(v + offset64())); }
+  /// The same for many: max(v + offset64(), 0) * share() >> kShare.
+  int offset64() const { return 64 * half_ * step_ + step_ / 2 - 64 * 127; }
+  uint32_t share() const { return share_; }
+  static constexpr int kShare = 18;
 
  private:
   // By the step, rounded down, not below 0. As a product: exact for what coordinates can be.
-  static constexpr int kShare = 18;
   int divided(int v) const { return static_cast<int>(static_cast<uint32_t>(std::max(v, 0)) * share_ >> kShare); }
 
   int step_, half_;

@@ -21,17 +21,21 @@ void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
   row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
 }
 
-// Pixels that are not covered become L + U - UL: what U differs by from the last one that is covered stays.
-void fill_holes(const uint32_t* __restrict above, const TileShape& shape, size_t y, uint32_t* __restrict row) {
-  if (shape.full(y)) return;
+// Calls covered(begin, end) for the runs of row y, in order. Pixels that are not covered become L + U - UL: what U
+// differs by from the last one that is covered stays.
+template <class F>
+void with_holes(const uint32_t* __restrict above, const TileShape& shape, size_t y, uint32_t* __restrict row,
+                F covered) {
   ptrdiff_t from = 0;
   const auto fill = [&](ptrdiff_t end) {
     const uint32_t off = row[from - 1] - above[from - 1];
     for (ptrdiff_t x = from; x < end; ++x) row[x] = (above[x] + off) & image::kMaxDepthCode;
   };
   shape.for_each_run(y, [&](size_t begin, size_t end) {
-    fill(static_cast<ptrdiff_t>(begin));
-    from = static_cast<ptrdiff_t>(end);
+    const auto first = static_cast<ptrdiff_t>(begin), last = static_cast<ptrdiff_t>(end);
+    fill(first);
+    covered(first, last);
+    from = last;
   });
   fill(static_cast<ptrdiff_t>(shape.width));
 }
@@ -70,7 +74,8 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
   depth.fill_row(-1, base), depth.fill_row(-2, base);
   for (size_t y = 0; y < shape.height; ++y) {
     begin_row(depth, y);
-    fill_holes(depth.row(static_cast<ptrdiff_t>(y) - 1), shape, y, depth.row(static_cast<ptrdiff_t>(y)));
+    with_holes(depth.row(static_cast<ptrdiff_t>(y) - 1), shape, y, depth.row(static_cast<ptrdiff_t>(y)),
+               [](ptrdiff_t, ptrdiff_t) {});
     end_row(depth, y, shape.width);
   }
   way = choose_way(shape, may_mean);
@@ -152,16 +157,20 @@ void DepthPlane::decode_by_mean(const TileShape& shape, size_t y) {
   uint32_t* const row = depth.row(r);
   const uint32_t *const above = depth.row(r - 1), *const above2 = depth.row(r - 2);
   const uint32_t* const z = symbols.wide.row(r);
-  uint32_t past = row[-2], left = row[-1];
-  for (size_t x = 0; x < shape.width; ++x) {
-    const uint32_t sum = 4 * left - past + mean_terms(above2, above, x);
-    const uint32_t turned = 0 - static_cast<uint32_t>((sum & 3) == kAbove);
-    const uint32_t off = (z[x] >> 1) ^ (0 - (z[x] & 1));
-    uint32_t next = static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2) + ((off ^ turned) - turned);
-    if (!shape.at(x, y)) next = left + above[x] - above[x - 1];
-    past = left, left = next & image::kMaxDepthCode;
-    row[x] = left;
-  }
+  for (auto& terms : terms_)
+    if (terms.size() < shape.width + 64) terms.resize(shape.width + 64);
+  uint32_t *const terms = terms_[0].data(), *const offs = terms_[1].data();
+  for (size_t x = 0; x < shape.width; ++x)
+    terms[x] = mean_terms(above2, above, x), offs[x] = (z[x] >> 1) ^ (0 - (z[x] & 1));
+  with_holes(above, shape, y, row, [&](ptrdiff_t x, ptrdiff_t end) {
+    uint32_t past = row[x - 2], left = row[x - 1];
+    for (; x < end; ++x) {
+      const uint32_t sum = 4 * left + (terms[x] - past);
+      const uint32_t off = (sum & 3) == kAbove ? 0 - offs[x] : offs[x];
+      past = left, left = (static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2) + off) & image::kMaxDepthCode;
+      row[x] = left;
+    }
+  });
 }
 
 void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {

@@ -262,6 +262,13 @@ static void TurnNormalsBack(const int16_t* RESTRICT xs, const int16_t* RESTRICT 
     run([](LatticePoint p) { return p; });
 }
 
+static void Divide(int16_t* row, size_t n, int offset, uint32_t share) {
+  for (size_t x = 0; x < n; ++x) {
+    const int v = row[x] + offset;
+    row[x] = static_cast<int16_t>(static_cast<uint32_t>(v < 0 ? 0 : v) * share >> 18);
+  }
+}
+
 static void UnfoldBytes(const uint8_t* RESTRICT z, size_t n, int16_t* RESTRICT out) {
   for (size_t x = 0; x < n; ++x) {
     const int16_t v = z[x];

@@ -115,6 +115,8 @@ struct Kernels {
   /// Coordinates in 64ths of codes that are turned by pole 0 to 5 (docs/codec.md), and the inverse.
   void (*turn_normals)(const uint16_t* codes, size_t n, int pole, int16_t* x, int16_t* y);
   void (*turn_normals_back)(const int16_t* x, const int16_t* y, size_t n, int pole, uint16_t* codes);
+  /// row = max(row + offset, 0) * share / 2^18, rounded down: a division by a NormalLattice's step (codec/lattice.h).
+  void (*divide)(int16_t* row, size_t n, int offset, uint32_t share);
   /// Bytes that were folded -> 64ths of -128..127.
   void (*unfold_bytes)(const uint8_t* z, size_t n, int16_t* out);
   /// Residuals of bytes by the median predictor, folded, and their tokens.

@@ -64,6 +64,7 @@ const Kernels& plain_kernels() {
                                OtherNormals,
                                TurnNormals,
                                TurnNormalsBack,
+                               Divide,
                                UnfoldBytes,
                                MedianResiduals,
                                GuidedResiduals<GuidedSums>,

@@ -145,7 +145,7 @@ void NormalPlanes::to_lattice(const TileShape& shape) {
   for (GuidedPlane& p : plane) {
     for (size_t y = 0; y < shape.height; ++y) {
       int16_t* const row = p.guide.row(static_cast<ptrdiff_t>(y));
-      for (size_t x = 0; x < shape.width; ++x) row[x] = lattice_.index64(row[x]);
+      kernels().divide(row, shape.width, lattice_.offset64(), lattice_.share());
     }
     p.begin(shape);
   }
@@ -281,7 +281,10 @@ void NormalPlanes::get_codes(const TileShape& shape, size_t y, uint16_t* out) {
     if (lattice_.step() == 1) continue;
     std::vector<int16_t>& codes_of = row_of_codes_[i];
     if (codes_of.size() < shape.width) codes_of.resize(shape.width);
-    for (size_t x = 0; x < shape.width; ++x) codes_of[x] = static_cast<int16_t>(lattice_.value(rows[i][x] >> 6) * 64);
+    const auto step = static_cast<int16_t>(lattice_.step() * 64), first = static_cast<int16_t>(lattice_.value(0) * 64),
+               most = static_cast<int16_t>(lattice_.most());
+    for (size_t x = 0; x < shape.width; ++x)
+      codes_of[x] = static_cast<int16_t>(first + std::min(static_cast<int16_t>(rows[i][x] >> 6), most) * step);
     rows[i] = codes_of.data();
   }
   if (pole_ != kRaw)
