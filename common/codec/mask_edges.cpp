@@ -10,10 +10,11 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kNear = 6;        // pixels: edges that are farther from the one above are new ones
-constexpr int kSlopes = 6;      // of an edge: -2 to 2, by how many pixels it lies beside the one above, and
-constexpr uint8_t kNew = 5;     // that there was none
-constexpr unsigned kMost = 24;  // bits of a distance
+constexpr int kNear = 6;                  // pixels: edges that are farther from the one above are new ones
+constexpr int kSlopes = 6;                // of an edge: -2 to 2, by how many pixels it lies beside the one above, and
+constexpr uint8_t kNew = 5;               // that there was none
+constexpr unsigned kMost = 24;            // bits of a distance
+constexpr size_t kMostEdges = 2 * 65536;  // of a mask: larger tiles have 65535 pixels at most that are covered
 
 // How a row's last edge was told.
 enum Told : uint8_t { kNothing, kAbove, kBeside, kElsewhere };
@@ -27,7 +28,8 @@ class EdgeModel {
  public:
   explicit EdgeModel(int width) : width_(width) {}
 
-  // The edges of the next row, without its end. wanted: these and the end, for those who put them.
+  // The edges of the next row, without its end; false where there is no such row, or all have more than a mask has.
+  // wanted: these and the end, for those who put them.
   template <class Coder>
   bool code_row(const Coder& coder, const int* wanted) {
     above_.swap(row_);
@@ -46,6 +48,7 @@ class EdgeModel {
         if (over.x == width_) return true;
         row_.push_back({over.x, 2});
         at = over.x, told = kAbove;
+        if (++edges_ > kMostEdges) return false;
         continue;
       }
       if (any && coder(then < want, ended_[over.slope][told]) != 0) {
@@ -65,6 +68,7 @@ class EdgeModel {
       if (edge.x == width_) return true;
       row_.push_back(edge);
       at = edge.x;
+      if (++edges_ > kMostEdges) return false;
     }
   }
   const std::vector<Edge>& row() const { return row_; }
@@ -89,6 +93,7 @@ class EdgeModel {
   }
 
   int width_;
+  size_t edges_ = 0;  // of all rows
   std::vector<Edge> above_, row_;
   AdaptiveBit moved_[kSlopes][4][2], ended_[kSlopes][4], far_[kSlopes][2];
   AdaptiveBit negative_[kSlopes][2], more_[2][kNear][kSlopes], longer_[2][kMost];

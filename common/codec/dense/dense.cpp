@@ -145,6 +145,7 @@ std::optional<DenseCoder::Parts> DenseCoder::get_parts(Reader& in) {
   }
   const auto lanes = in.u8();
   if (!lanes || *lanes > kMostStates) return std::nullopt;
+  if (words > in.left()) return std::nullopt;
   const auto bytes = in.bytes(words + size_t{*lanes} * 4);
   if (!bytes) return std::nullopt;
   parts.words = bytes->first(words), parts.states = bytes->subspan(words);
@@ -160,8 +161,7 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   states.reset(shape_);
   if (parts->states.size() != 4 * states.stored(shape_, !parts->words.empty() || !parts->states.empty())) return false;
   if (!states.get(parts->states)) return false;
-  source_.end = parts->words.data() + parts->words.size();
-  source_.readable = parts->headers[0].data();
+  source_.start(parts->words, parts->states.size(), parts->headers[0].data());
   if (!get_depth(*parts, image, rect, base, bounds.depth) || !get_normals(*parts, base, bounds.normal) ||
       !get_colours(*parts, bounds.colour) || !states.at_rest())
     return false;

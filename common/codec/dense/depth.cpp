@@ -24,8 +24,7 @@ void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
 // Calls covered(begin, end) for the runs of row y, in order. Pixels that are not covered become L + U - UL: what U
 // differs by from the last one that is covered stays.
 template <class F>
-void with_holes(const uint32_t* __restrict above, const TileShape& shape, size_t y, uint32_t* __restrict row,
-                F covered) {
+void with_holes(const uint32_t* above, const TileShape& shape, size_t y, uint32_t* row, F covered) {
   ptrdiff_t from = 0;
   const auto fill = [&](ptrdiff_t end) {
     const uint32_t off = row[from - 1] - above[from - 1];

@@ -176,7 +176,7 @@ int16_t GuidedPlane::nearest_value(int16_t by) const {
 }
 
 void GuidedPlane::reset(const TileShape& shape, int fraction, int largest) {
-  bits = fraction, most = largest, flatness = nullptr, wild = has_residuals = false;
+  bits = fraction, most = largest, flatness = nullptr, wild = has_residuals = false, most_weight_ = 0;
   for (Plane<int16_t>* plane : {&values, &guide, &residuals}) plane->reset(shape.width, shape.height);
   symbols.reset(shape, bits != 6);
   sums.resize(std::max(sums.size(), shape.width + 64));
@@ -293,6 +293,7 @@ bool GuidedPlane::get_weights(BitReader& bits) {
   if (bits.source.take(1) != 0) {
     set_plain_weights();
     median = bits.source.take(1) != 0;
+    most_weight_ = 8192;
     return !bits.overrun();
   }
   median = false;
@@ -379,6 +380,7 @@ void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_
     return;
   }
   const bool flat = a.flatness != nullptr;
+  a.wild |= b.wild;
   if (!a.wild)
     a.wild = !(flat ? run_both(FlatChain<false>(a, y), FlatChain<false>(b, y), shape, y)
                     : run_both(Chain<true, false>(a, y), Chain<true, false>(b, y), shape, y));

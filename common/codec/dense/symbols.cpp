@@ -96,6 +96,15 @@ bool States::get(std::span<const uint8_t> bytes) {
   return std::all_of(of, of + count, [](uint32_t x) { return x >= kStateLow && x < kStateLow << 16; });
 }
 
+void WordSource::start(std::span<const uint8_t> words, size_t after, const uint8_t* before) {
+  constexpr size_t kBeyond = 64, kLead = 16 * kLanes;  // bytes
+  readable = before, end = words.data() + words.size();
+  if (after >= kBeyond) return;
+  copy_.assign(kLead + words.size() + kBeyond, 0);
+  if (!words.empty()) std::memcpy(copy_.data() + kLead, words.data(), words.size());
+  readable = copy_.data(), end = copy_.data() + kLead + words.size();
+}
+
 void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   uint8_t* const row = plane.tokens.row(static_cast<ptrdiff_t>(y));
   const uint8_t* const above = plane.tokens.row(static_cast<ptrdiff_t>(y) - 1);

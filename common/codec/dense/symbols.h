@@ -116,6 +116,14 @@ struct WordSource {
   const uint8_t *begin = nullptr, *end = nullptr;
   const uint8_t* readable = nullptr;  ///< at or before `begin`: from there on memory may be read
   States states;
+
+  /// words: all that there are, of which `begin` is set for each part. after: bytes that follow them in memory, and
+  /// before: where the memory that they lie in begins. Kernels read 64 bytes beyond `end`: where there are fewer, words
+  /// are copied.
+  void start(std::span<const uint8_t> words, size_t after, const uint8_t* before);
+
+ private:
+  std::vector<uint8_t> copy_;
 };
 
 class PlaneDecoder {

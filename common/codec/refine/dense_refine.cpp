@@ -450,11 +450,11 @@ bool RefinementCoder::get(Reader& in, image::DepthImage& image, const TileRect& 
   WordSource source;
   source.states.reset(shape_);
   if (*lanes != source.states.stored(shape_, *words != 0 || *lanes != 0)) return false;
-  const auto bytes = in.bytes(uint64_t{*words} * 2 + size_t{*lanes} * 4);
+  if (*words > in.left() / 2) return false;
+  const auto bytes = in.bytes(size_t{*words} * 2 + size_t{*lanes} * 4);
   if (!bytes) return false;
-  source.begin = bytes->data();
-  source.readable = header->data();
-  source.end = source.begin + size_t{*words} * 2;
+  source.start(bytes->first(bytes->size() - size_t{*lanes} * 4), size_t{*lanes} * 4, header->data());
+  source.begin = source.end - size_t{*words} * 2;
   if (!source.states.get(bytes->last(size_t{*lanes} * 4))) return false;
   reader_.start(*header, kUnchecked);
   if (!decode_depth(reach, source) || !decode_normals(reach, source) || !decode_colours(reach, source)) return false;

@@ -1,5 +1,7 @@
 // Streams that lie: each refused with a reason, none allocating by what it claims.
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "common/codec/depth_codec.h"
 #include "tests/support/depth_images.h"
@@ -77,6 +79,35 @@ TEST(CodecBadInput, InspectRefusesToo) {
   for (size_t length = 0; length < bytes.size(); ++length)
     EXPECT_FALSE(inspect(std::span(bytes).first(length)).ok()) << length;
   EXPECT_TRUE(inspect(bytes).ok());
+}
+
+// Kernels read 64 bytes beyond a tile's words: also where nothing follows them.
+TEST(CodecBadInput, LongHeadersBeforeNoWordsAreReadWithinTheStream) {
+  for (const int width : {64, 5}) {
+    image::DepthImage image(width, 1);
+    for (size_t i = 0; i < image.pixels(); ++i) image.depth[i] = 1000, image.colour[i] = 0x80, image.normal[i] = 0x7F7F;
+    std::vector<uint8_t> bytes = encode(image);
+    ASSERT_TRUE(decode(bytes));
+    constexpr size_t kHeaders = 5 + 1 + 8 + 1;  // of the stream, the tile's kind, base, and way of colours
+    const size_t normals = kHeaders + 1 + bytes[kHeaders];
+    ASSERT_LT(normals + bytes[normals], bytes.size());
+    const std::vector<uint8_t> words(bytes.end() - 4, bytes.end());
+    ASSERT_EQ(words, (std::vector<uint8_t>{0, 0, 0, 0})) << "no words, no states";
+    // The header of normals becomes 300 bytes of anything, with what is left behind it.
+    std::vector<uint8_t> longer(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(normals));
+    longer.push_back(0x80 | (300 & 127)), longer.push_back(300 >> 7);
+    longer.insert(longer.end(), 300, 0xFF);
+    longer.insert(longer.end(), bytes.begin() + static_cast<ptrdiff_t>(normals + 1 + bytes[normals]), bytes.end());
+    const long page = sysconf(_SC_PAGESIZE);
+    auto* const pages = static_cast<uint8_t*>(
+        mmap(nullptr, static_cast<size_t>(2 * page), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+    ASSERT_NE(pages, MAP_FAILED);
+    ASSERT_EQ(mprotect(pages + page, static_cast<size_t>(page), PROT_NONE), 0);
+    uint8_t* const at = pages + page - longer.size();
+    std::copy(longer.begin(), longer.end(), at);
+    EXPECT_FALSE(decode(std::span(at, longer.size())));
+    munmap(pages, static_cast<size_t>(2 * page));
+  }
 }
 
 }  // namespace
