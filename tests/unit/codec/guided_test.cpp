@@ -29,20 +29,22 @@ class OnTarget {
   }
 };
 
-// A plane with weights of about this size, a guide and symbols.
-void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, int size, std::mt19937& random) {
+// A plane with weights whose sizes add up to this, a guide and symbols. rough: which go anywhere; else weights cancel each
+// other, the constant is the middle, and no value comes near its bounds.
+void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, int size, bool rough,
+          std::mt19937& random) {
   plane.reset(shape, fraction, most);
   BitWriter writer;
   writer.start(GuidedPlane::kMostWeightBits);
   writer.sink.put(0, 1);
-  int left = size;
+  const int each = size / (kFarLeft - 1);
   for (int i = 0; i < kFarLeft; ++i) {
-    const int of = i == 0 ? size / 4 : static_cast<int>(random() % (size / 8));
-    const int weight = std::min({of, left, 32767});
-    left -= weight;
-    writer.sink.put(static_cast<uint16_t>(i % 2 == 0 ? -weight : weight), 16);  // they cancel, so that values are tame
+    const int weight = rough ? static_cast<int>(random() % static_cast<uint32_t>(each)) : i == 12 ? 0 : each;
+    const bool negative = rough ? random() % 3 == 0 : i % 2 != 0;
+    writer.sink.put(static_cast<uint16_t>(negative ? -weight : weight), 16);
   }
-  writer.sink.put(static_cast<uint32_t>((1 << 27) + static_cast<int>(random() % (1 << 22)) - (1 << 21)), 28);
+  const int middle = (most / 2) << (13 + fraction);
+  writer.sink.put(static_cast<uint32_t>((1 << 27) + (rough ? static_cast<int>(random() % (1 << 22)) : middle)), 28);
   BitReader reader;
   reader.start(writer.bytes(), 1024);
   ASSERT_TRUE(plane.get_weights(reader));
@@ -50,12 +52,14 @@ void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, in
   for (size_t y = 0; y < shape.height; ++y)
     for (size_t x = 0; x < shape.width; ++x) {
       const auto r = static_cast<ptrdiff_t>(y);
-      plane.guide.row(r)[x] = static_cast<int16_t>(random() % 9 == 0 ? random() % static_cast<uint32_t>(largest)
-                                                                     : static_cast<uint32_t>(largest / 2));
+      plane.guide.row(r)[x] = static_cast<int16_t>(
+          rough && random() % 9 == 0 ? random() % static_cast<uint32_t>(largest) : static_cast<uint32_t>(largest / 2));
+      const uint32_t far = fraction == GuidedPlane::kNormalBits ? 256 : 1 << 20;
+      const uint32_t z = random() % (rough ? random() % 20 == 0 ? far : 8 : random() % 8 == 0 ? 3 : 1);
       if (fraction == GuidedPlane::kNormalBits)
-        plane.symbols.narrow.row(r)[x] = static_cast<uint8_t>(random() % (random() % 20 == 0 ? 256 : 8));
+        plane.symbols.narrow.row(r)[x] = static_cast<uint8_t>(z);
       else
-        plane.symbols.wide.row(r)[x] = random() % (random() % 20 == 0 ? 1 << 20 : 8);
+        plane.symbols.wide.row(r)[x] = z;
     }
   plane.begin(shape);
 }
@@ -115,10 +119,11 @@ TEST(GuidedPlanes, DecodeToWhatThePageSays) {
       TileShape shape;
       shape.reset(kWidth, kHeight, seed % 3 == 0 ? nullptr : &mask);
       // Sums that stay far from 2^31, and such as do not; planes are used again.
+      const bool rough = (seed >> 3 & 1) != 0;
       const auto size = [&](uint32_t bit) { return (seed >> bit & 1) != 0 ? 119000 : 9000; };
-      fill(a, shape, GuidedPlane::kNormalBits, 254, size(0), random);
-      fill(b, shape, GuidedPlane::kNormalBits, 254, size(1), random);
-      fill(index, shape, GuidedPlane::kIndexBits, 1023, size(2), random);
+      fill(a, shape, GuidedPlane::kNormalBits, 254, size(0), rough, random);
+      fill(b, shape, GuidedPlane::kNormalBits, 254, size(1), rough, random);
+      fill(index, shape, GuidedPlane::kIndexBits, 1023, size(2), rough, random);
       std::vector<int> residual, other, third;
       const std::vector<int> x = values_of(a, shape, nullptr, residual), y = values_of(b, shape, &residual, other),
                              i = values_of(index, shape, nullptr, third);
