@@ -29,8 +29,8 @@ class OnTarget {
   }
 };
 
-// A plane with weights whose sizes add up to this, a guide and symbols. rough: which go anywhere; else weights cancel each
-// other, the constant is the middle, and no value comes near its bounds.
+// A plane with weights whose sizes add up to this, a guide and symbols. rough: they go anywhere; else weights cancel
+// each other, the constant is the middle, and no value comes near its bounds.
 void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, int size, bool rough,
           std::mt19937& random) {
   plane.reset(shape, fraction, most);
