@@ -1,13 +1,13 @@
 // Symbols <-> bits by asymmetric numeral systems (J. Duda, 2013, "range" variant, as in F. Giesen's interleaved coders,
-// 2014): 32 states that take turns, 11-bit frequencies, words of 16 bits.
+// 2014): 32 or 64 states that take turns, 11-bit frequencies, words of 16 bits.
 //
 // A symbol is a token (eight a factor of two, as the hybrid integers of JPEG XL, ISO/IEC 18181-1, C.3.3) and its raw
 // bits. State x in [2^15, 2^31):
 //   token of frequency f that starts at s:  x -> x / f * 2048 + x % f + s
 //   k raw bits, k <= 15:                    x -> x * 2^k + bits
 // Before either, the lower 16 bits of a state that would become too large are written. Symbol i of a row belongs to
-// state i % 32. Decoding undoes this: it reads words from the last one backwards. Of 32 symbols it undoes the tokens,
-// then raw bits above the lowest 15, then the lowest 15; and each of these from state 31 down to 0.
+// state i % 32 or 64. Decoding undoes this: it reads words from the last one backwards. Of 32 symbols it undoes the
+// tokens, then raw bits above the lowest 15, then the lowest 15; and each of these from their last state to the first.
 #pragma once
 
 #include <array>

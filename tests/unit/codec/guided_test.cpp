@@ -3,31 +3,20 @@
 #include "common/codec/dense/guided.h"
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
+#include <hwy/targets.h>
 
 #include <random>
 
 #include "common/codec/dense/normals.h"
 #include "tests/support/masks.h"
+#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
 constexpr int kWidth = 70, kHeight = 9;
 
-class OnTarget {
- public:
-  explicit OnTarget(int64_t target) { use(target); }
-  ~OnTarget() { use(0); }
-  OnTarget(const OnTarget&) = delete;
-  OnTarget& operator=(const OnTarget&) = delete;
-
- private:
-  static void use(int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
+using testing::OnTarget;
 
 // A plane with weights whose sizes add up to this, a guide and symbols. rough: they go anywhere; else weights cancel
 // each other, the constant is the middle, and no value comes near its bounds.
@@ -109,11 +98,11 @@ void expect_values(const GuidedPlane& plane, const TileShape& shape, const std::
 }
 
 TEST(GuidedPlanes, DecodeToWhatThePageSays) {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+  for (const int64_t target : testing::simd_targets()) {
     const OnTarget on(target);
     GuidedPlane a, b, index;
     for (uint32_t seed = 0; seed < 96; ++seed) {
-      SCOPED_TRACE(testing::Message() << hwy::TargetName(target) << ", " << seed);
+      SCOPED_TRACE(::testing::Message() << hwy::TargetName(target) << ", " << seed);
       std::mt19937 random(seed);
       const Mask mask = test::random_mask(kWidth, kHeight, seed % 3 == 1 ? 0.6 : 0.98, seed);
       TileShape shape;
@@ -156,7 +145,7 @@ TEST(Normals, AreTurnedAsTablesSay) {
     }
   };
   expect_turns(plain_kernels());
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+  for (const int64_t target : testing::simd_targets()) {
     const OnTarget on(target);
     expect_turns(kernels());
   }

@@ -52,7 +52,7 @@ TEST(MaskEdges, AnyMaskComesBack) {
   expect_round_trip(test::random_mask(1, 65536, 0.3, 1));
 }
 
-TEST(MaskEdges, SurfacesTakeHalfOfWhatPixelsTake) {
+TEST(MaskEdges, SurfacesTakeLessThanTwoThirdsOfWhatPixelsTake) {
   const Mask mask = discs(256);
   std::vector<uint8_t> pixels;
   put_mask(pixels, mask);
