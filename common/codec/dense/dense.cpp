@@ -79,7 +79,7 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
 
   writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
   normals_.encode(shape_, depth_, base.normal, bounds.normal != 0 && of_one_colour(shape_, colour_rows_, base.colour),
-                  writer_.sink);
+                  rect.width >= kNarrow ? axes : nullptr, writer_.sink);
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
 

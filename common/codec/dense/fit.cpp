@@ -139,6 +139,13 @@ bool quantise(const Vector9 m, const double scale[3], GeometryModel& model) {
   return true;
 }
 
+// The size that nine of ten do not exceed.
+double nine_of_ten(std::vector<double>& sizes) {
+  const auto at = sizes.begin() + static_cast<ptrdiff_t>(sizes.size() * 9 / 10);
+  std::nth_element(sizes.begin(), at, sizes.end());
+  return *at;
+}
+
 }  // namespace
 
 void Samples::choose(const TileShape& shape, size_t about) {
@@ -156,18 +163,23 @@ void Samples::choose(const TileShape& shape, size_t about) {
         places.push_back({x, y});
 }
 
-bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
-                  int y0, GeometryModel& model) {
-  if (samples.places.size() < 32 || (all_same(samples, *normal[0]) && all_same(samples, *normal[1]))) return false;
-  // Nine of ten slopes fit.
-  std::vector<double> sizes;
-  for (const auto p : samples.places) {
+// The shift by which nine of ten slopes fit.
+static int slope_shift_of(const Samples& samples, const Plane<uint32_t>& depth, size_t every, std::vector<double>& sizes) {
+  sizes.clear();
+  for (size_t i = 0; i < samples.places.size(); i += every) {
+    const auto p = samples.places[i];
     const uint32_t* const row = depth.row(p.y);
     sizes.push_back(std::max(std::abs(double(static_cast<int>(row[p.x + 1] - row[p.x - 1]))),
                              std::abs(double(static_cast<int>(depth.row(p.y + 1)[p.x] - depth.row(p.y - 1)[p.x])))));
   }
-  std::nth_element(sizes.begin(), sizes.begin() + static_cast<ptrdiff_t>(sizes.size() * 9 / 10), sizes.end());
-  model.slope_shift = shift_for(sizes[sizes.size() * 9 / 10] * 2, 32767);
+  return shift_for(nine_of_ten(sizes) * 2, 32767);
+}
+
+bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
+                  int y0, GeometryModel& model) {
+  if (samples.places.size() < 32 || (all_same(samples, *normal[0]) && all_same(samples, *normal[1]))) return false;
+  std::vector<double> sizes;
+  model.slope_shift = slope_shift_of(samples, depth, 1, sizes);
   std::vector<Slope> slopes;
   double most[3] = {1, 1, 1};
   const size_t every = std::max<size_t>(1, samples.places.size() / kSlopes);
@@ -187,8 +199,7 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   for (int i = 0; i < 3; ++i) {
     sizes.clear();
     for (const Slope& s : slopes) sizes.push_back(std::abs(s.h[i]));
-    std::nth_element(sizes.begin(), sizes.begin() + static_cast<ptrdiff_t>(sizes.size() * 9 / 10), sizes.end());
-    most[i] = std::max(1.0, sizes[sizes.size() * 9 / 10]);
+    most[i] = std::max(1.0, nine_of_ten(sizes));
     scale[i] = most[i];
   }
   model.height_shift = shift_for(most[2] * 2, 32767);
@@ -212,6 +223,24 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
     for (double& e : m) e = -e;
   const double shifted[3] = {scale[0], scale[1], scale[2] / std::pow(2.0, model.height_shift)};
   return quantise(m, shifted, model);
+}
+
+bool geometry_of(const Samples& samples, const Plane<uint32_t>& depth, const double matrix[9], int x0, int y0,
+                 GeometryModel& model) {
+  if (samples.places.size() < 32) return false;
+  const size_t every = std::max<size_t>(1, samples.places.size() / 128);
+  std::vector<double> sizes;
+  model.slope_shift = slope_shift_of(samples, depth, every, sizes);
+  sizes.clear();
+  for (size_t i = 0; i < samples.places.size(); i += every) {
+    double h[3];
+    if (slope_at(depth, samples.places[i].x, samples.places[i].y, x0, y0, model.slope_shift, h))
+      sizes.push_back(std::abs(h[2]));
+  }
+  if (sizes.empty()) return false;
+  model.height_shift = shift_for(std::max(1.0, nine_of_ten(sizes)) * 2, 32767);
+  const double scale[3] = {1, 1, std::pow(2.0, -model.height_shift)};
+  return quantise(matrix, scale, model);
 }
 
 namespace {

@@ -56,6 +56,23 @@ const Table& table(int pole, bool back) {
   return (*tables)[back][static_cast<size_t>(pole)];
 }
 
+// What turns slopes and height into normals, turned by `pole`: -1 times the inverse of the axes' transpose.
+bool normals_of(const RoomAxes& axes, int pole, double out[9]) {
+  double m[3][3], determinant = 0;
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = 0; j < 3; ++j) {
+      const size_t a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
+      m[i][j] = axes[a][c] * axes[b][d] - axes[a][d] * axes[b][c];
+      if (i == 0) determinant += axes[i][j] * m[i][j];
+    }
+  if (!(std::abs(determinant) > 0)) return false;
+  const size_t first = pole / 2 == 0 ? 1 : pole / 2 == 1 ? 2 : 0;
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = 0; j < 3; ++j)
+      out[3 * i + j] = m[(first + i) % 3][j] * (determinant > 0 ? -1 : 1) * (i == 2 && pole % 2 != 0 ? -1 : 1);
+  return true;
+}
+
 }  // namespace
 
 uint16_t turn_normal(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, false)[code]; }
@@ -168,7 +185,7 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
 }
 
 void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour,
-                          BitSink& bits) {
+                          const RoomAxes* axes, BitSink& bits) {
   samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
   pole_ = choose_pole(shape);
   for (size_t y = 0; y < shape.height; ++y) {
@@ -182,6 +199,12 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
         x_row[x] = static_cast<int16_t>((from[x] & 255) * 64), y_row[x] = static_cast<int16_t>((from[x] >> 8) * 64);
   }
   const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
+  double known[9];
+  has_geometry_ = false;
+  if (pole_ != kRaw && axes != nullptr && normals_of(*axes, pole_, known))
+    has_geometry_ = geometry_of(samples, depth.depth, known, -static_cast<int>(shape.width / 2),
+                                                -static_cast<int>(shape.height / 2), geometry_);
+  else
   has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
                                                 -static_cast<int>(shape.height / 2), geometry_);
   make_guide(shape, depth, base);
