@@ -14,24 +14,23 @@ constexpr int kShifts[3] = {8, 16, 0};  // green, red, blue
 // Colours seen, by open addressing, and what stands for each.
 class ColourTable {
  public:
-  ColourTable() { std::fill_n(colours_, kSlots, kNone); }
-  // The slot of `colour`, or the one that it should enter.
-  size_t find(uint32_t colour) const {
+  ColourTable() { std::fill_n(slots_, kSlots, Slot{}); }
+  struct Slot {
+    uint32_t colour = kNone, place = 0;
+    bool has_colour() const { return colour != kNone; }
+  };
+  /// The slot of `colour`, or the one that it should enter.
+  Slot& find(uint32_t colour) {
     size_t at = (colour * 0x9E3779B1u) >> 20;
-    while (colours_[at] != colour && colours_[at] != kNone) at = (at + 1) % kSlots;
-    return at;
+    while (slots_[at].colour != colour && slots_[at].has_colour()) [[unlikely]] at = (at + 1) % kSlots;
+    return slots_[at];
   }
-  bool has(size_t slot) const { return colours_[slot] != kNone; }
-  void enter(size_t slot, uint32_t colour, size_t place) {
-    colours_[slot] = colour, places_[slot] = static_cast<uint16_t>(place);
-  }
-  uint16_t place(size_t slot) const { return places_[slot]; }
+  void enter(uint32_t colour, size_t place) { find(colour) = {colour, static_cast<uint32_t>(place)}; }
 
  private:
   static constexpr uint32_t kNone = 0xFFFFFFFF;
   static constexpr size_t kSlots = 4096;
-  uint32_t colours_[kSlots];
-  uint16_t places_[kSlots];
+  Slot slots_[kSlots];
 };
 
 int8_t difference(uint32_t a, uint32_t b) { return static_cast<int8_t>(static_cast<uint8_t>(a - b)); }
@@ -102,30 +101,28 @@ bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32
   ColourTable table;
   palette_.clear(), first_.clear();
   index.reset(shape, GuidedPlane::kIndexBits, 254);
-  for (size_t y = 0; y < shape.height; ++y) {
+  bool fits = true;
+  const auto enter = [&](uint32_t colour, size_t x, size_t y) {
+    fits &= palette_.size() < kMostColours;
+    if (!fits) return;
+    table.enter(colour, palette_.size());
+    palette_.push_back(colour);
+    first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
+  };
+  for (size_t y = 0; y < shape.height && fits; ++y) {
     const uint32_t* const from = colours.data() + y * shape.width;
     int16_t* const places = index.values.row(static_cast<ptrdiff_t>(y));
-    const auto look_up = [&](size_t x) {
-      const uint32_t colour = from[x];
-      const size_t slot = table.find(colour);
-      if (!table.has(slot)) [[unlikely]] {
-        table.enter(slot, colour, palette_.size());
-        palette_.push_back(colour);
-        first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
+    if (!shape.full(y)) std::fill_n(places, shape.width, int16_t{0});
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (; x < end; ++x) {
+        ColourTable::Slot& slot = table.find(from[x]);
+        if (!slot.has_colour()) [[unlikely]]
+          enter(from[x], x, y);
+        places[x] = static_cast<int16_t>(slot.place);
       }
-      places[x] = static_cast<int16_t>(table.place(slot));
-    };
-    if (shape.full(y)) {
-      for (size_t x = 0; x < shape.width && palette_.size() <= kMostColours; ++x) look_up(x);
-    } else {
-      std::fill_n(places, shape.width, int16_t{0});
-      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), [&](size_t x) {
-        if (palette_.size() <= kMostColours) look_up(x);
-      });
-    }
-    if (palette_.size() > kMostColours) return false;
+    });
   }
-  return true;
+  return fits;
 }
 
 // By height where that explains the colours, else by brightness.
@@ -152,17 +149,26 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
 
 // All pixels say at which height a colour lies: few would sort colours badly that have few of them.
 void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& depth) {
-  std::vector<ColourHeight> heights(palette_.size());
-  begin_index(shape, depth);
+  constexpr size_t kTables = 4;  // so that equal colours side by side need not wait for each other
+  std::vector<uint64_t> sums(kTables * palette_.size());  // pixels, and in the lower half heights
+  find_heights(shape, depth);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const int16_t *const places = index.values.row(r), *const height = index.guide.row(r);
-    ColourHeight* const at = heights.data();
-    const auto add = [&](size_t x) { at[places[x]].sum += static_cast<uint32_t>(height[x]), ++at[places[x]].pixels; };
-    if (shape.full(y))
-      for (size_t x = 0; x < shape.width; ++x) add(x);
-    else
-      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), add);
+    uint64_t* const at = sums.data();
+    const auto add = [&](size_t x, size_t k) {
+      at[kTables * static_cast<size_t>(places[x]) + k] += uint64_t{1} << 32 | static_cast<uint32_t>(height[x]);
+    };
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (; x + kTables <= end; x += kTables)
+        for (size_t k = 0; k < kTables; ++k) add(x + k, k);
+      for (; x < end; ++x) add(x, 0);
+    });
+  }
+  std::vector<ColourHeight> heights(palette_.size());
+  for (size_t i = 0; i < sums.size(); ++i) {
+    ColourHeight& of = heights[i / kTables];
+    of.sum += static_cast<uint32_t>(sums[i]), of.pixels += static_cast<uint32_t>(sums[i] >> 32);
   }
   std::vector<uint32_t> order(palette_.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -177,14 +183,22 @@ void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& dept
   fit_knots(sorted, height_);
 }
 
-void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
+void ColourPlanes::find_heights(const TileShape& shape, const DepthPlane& depth) {
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
+                      static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
+  }
+}
+
+// From heights: find_heights() has left them where what they stand for shall be.
+void ColourPlanes::begin_index(const TileShape& shape) {
   const int last = static_cast<int>(palette_.size()) - 1;
   index.reset(shape, GuidedPlane::kIndexBits, last);  // keeps the values
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     if (has_height_)
-      kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
-                        static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
+      kernels().knots(height_, shape.width, index.guide.row(r));
     else
       std::fill_n(index.guide.row(r), shape.width, static_cast<int16_t>(last * 8));
   }
@@ -242,18 +256,18 @@ std::vector<int16_t> ColourPlanes::join_palette(int reach) {
 }
 
 // index.values: places in the palette before it was sorted.
-void ColourPlanes::encode_palette(const TileShape& shape, const DepthPlane& depth, int reach) {
+void ColourPlanes::encode_palette(const TileShape& shape, int reach) {
   ColourTable table;
-  for (size_t i = 0; i < palette_.size(); ++i) table.enter(table.find(palette_[i]), palette_[i], i);
+  for (size_t i = 0; i < palette_.size(); ++i) table.enter(palette_[i], i);
   int16_t values[kMostColours];
   for (size_t i = 0; i < palette_.size(); ++i)
-    values[i] = static_cast<int16_t>(table.place(table.find(first_[i].colour)) * 16);
+    values[i] = static_cast<int16_t>(table.find(first_[i].colour).place * 16);
   if (reach > 0) {
     const std::vector<int16_t> to = join_palette(reach);
     for (size_t i = 0; i < first_.size(); ++i)
       values[i] = static_cast<int16_t>(to[static_cast<size_t>(values[i] / 16)] * 16);
   }
-  begin_index(shape, depth);
+  begin_index(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
     for (size_t x = 0; x < shape.width; ++x) row[x] = values[row[x]];
@@ -302,7 +316,7 @@ void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& c
     mode = kPalette;
     samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 12));
     sort_palette(shape, depth, known);
-    encode_palette(shape, depth, reach);
+    encode_palette(shape, reach);
     if (reach > 0 && !has_height_) try_channels(shape, colours);
   } else {
     mode = follows_green(shape, colours) ? kDifferences : kChannels;
@@ -335,7 +349,9 @@ bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   palette_.resize(bits.source.take(10) + 1);
   has_height_ = bits.source.take(1) != 0;
   if (has_height_ && !get_height(height_, bits)) return false;
-  begin_index(shape, depth);
+  index.reset(shape, GuidedPlane::kIndexBits, static_cast<int>(palette_.size()) - 1);
+  if (has_height_) find_heights(shape, depth);
+  begin_index(shape);
   uint32_t before = 0;
   GolombContext contexts[3];
   for (GolombContext& c : contexts) c.start(8);

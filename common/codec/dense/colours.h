@@ -46,11 +46,12 @@ struct ColourPlanes {
   bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
   void sort_palette(const TileShape& shape, const DepthPlane& depth, const KnownAxes& known);
   std::vector<int16_t> join_palette(int reach);
-  void encode_palette(const TileShape& shape, const DepthPlane& depth, int reach);
+  void encode_palette(const TileShape& shape, int reach);
   void sort_by_height(const TileShape& shape, const DepthPlane& depth);
   void try_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
   void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
-  void begin_index(const TileShape& shape, const DepthPlane& depth);
+  void find_heights(const TileShape& shape, const DepthPlane& depth);
+  void begin_index(const TileShape& shape);
   void begin_channels(const TileShape& shape);
 
   std::vector<uint32_t> palette_;

@@ -164,7 +164,8 @@ void Samples::choose(const TileShape& shape, size_t about) {
 }
 
 // The shift by which nine of ten slopes fit.
-static int slope_shift_of(const Samples& samples, const Plane<uint32_t>& depth, size_t every, std::vector<double>& sizes) {
+static int slope_shift_of(const Samples& samples, const Plane<uint32_t>& depth, size_t every,
+                          std::vector<double>& sizes) {
   sizes.clear();
   for (size_t i = 0; i < samples.places.size(); i += every) {
     const auto p = samples.places[i];

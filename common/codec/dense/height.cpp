@@ -170,7 +170,6 @@ bool quantise(const Axis& axis, const std::vector<HeightSample>& samples, Height
   model.low = static_cast<int32_t>(std::floor((low * unit - base) * 16384));
   model.scale =
       static_cast<int32_t>(std::clamp(std::floor(16383 * 4096.0 / std::max(range + 1, 1025.0)), 1.0, 65535.0));
-  for (int i = 0; i < HeightModel::kKnots; ++i) model.knots[i] = static_cast<int16_t>(std::min(i * 256, 16383));
   return true;
 }
 

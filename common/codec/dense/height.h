@@ -31,7 +31,7 @@ struct KnownAxes {
 bool find_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
                double axis[3]);
 
-/// The same for heights(): with the knots that it sets these are heights from 0 to 16383.
+/// The same for heights(), without knots.
 bool fit_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
               HeightModel& model);
 

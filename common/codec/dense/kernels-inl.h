@@ -419,31 +419,29 @@ static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, con
   const uint32_t row = static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c);
   const uint32_t base = static_cast<uint32_t>(model.base);
   const int32_t low = model.low, scale = model.scale;
-  int32_t at[kPart];
-  for (size_t begin = 0; begin < n; begin += kPart) {
-    const size_t count = n - begin < kPart ? n - begin : kPart;
-    const uint32_t* RESTRICT from = depth + begin;
-    const uint32_t first = row + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0 + static_cast<int>(begin));
-    for (size_t x = 0; x < count; ++x) {
-      const int32_t code = static_cast<int32_t>(from[x] & 0xFFFFFF);
-      const int32_t sum = static_cast<int32_t>(first + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x) -
-                                               base * static_cast<uint32_t>(code));
-      int32_t size = sum < 0 ? ~sum : sum;
-      size = size < code ? size : code;
-      const int32_t up = 23 - static_cast<int32_t>((std::bit_cast<uint32_t>(static_cast<float>(code | 1)) >> 23) - 127);
-      const int32_t d = static_cast<int32_t>(static_cast<uint32_t>(code) << up >> 9 | 0x4000);
-      int32_t r = 46260 - (d * 30840 >> 15);
-      r = (r * (32768 - (d * r >> 15))) >> 14;
-      r = (r * (32768 - (d * r >> 15))) >> 14;
-      const uint32_t quotient = (static_cast<uint32_t>(size) << up >> 8) * static_cast<uint32_t>(r) >> 16;
-      const int32_t height = sum < 0 ? -static_cast<int32_t>(quotient) : static_cast<int32_t>(quotient);
-      const int32_t t = (Within16(height - low) * scale) >> 12;
-      at[x] = t < 0 ? 0 : t > 16383 ? 16383 : t;
-    }
-    for (size_t x = 0; x < count; ++x) {
-      const int32_t i = at[x] >> 8, a = model.knots[i], b = model.knots[i + 1];
-      out[begin + x] = static_cast<int16_t>(a + ((b - a) * (at[x] & 255) >> 8));
-    }
+  const uint32_t first = row + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0);
+  for (size_t x = 0; x < n; ++x) {
+    const int32_t code = static_cast<int32_t>(depth[x] & 0xFFFFFF);
+    const int32_t sum = static_cast<int32_t>(first + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x) -
+                                             base * static_cast<uint32_t>(code));
+    int32_t size = sum < 0 ? ~sum : sum;
+    size = size < code ? size : code;
+    const int32_t up = 23 - static_cast<int32_t>((std::bit_cast<uint32_t>(static_cast<float>(code | 1)) >> 23) - 127);
+    const int32_t d = static_cast<int32_t>(static_cast<uint32_t>(code) << up >> 9 | 0x4000);
+    int32_t r = 46260 - (d * 30840 >> 15);
+    r = (r * (32768 - (d * r >> 15))) >> 14;
+    r = (r * (32768 - (d * r >> 15))) >> 14;
+    const uint32_t quotient = (static_cast<uint32_t>(size) << up >> 8) * static_cast<uint32_t>(r) >> 16;
+    const int32_t height = sum < 0 ? -static_cast<int32_t>(quotient) : static_cast<int32_t>(quotient);
+    const int32_t t = (Within16(height - low) * scale) >> 12;
+    out[x] = static_cast<int16_t>(t < 0 ? 0 : t > 16383 ? 16383 : t);
+  }
+}
+
+static void Knots(const HeightModel& model, size_t n, int16_t* RESTRICT row) {
+  for (size_t x = 0; x < n; ++x) {
+    const int32_t i = row[x] >> 8, a = model.knots[i], b = model.knots[i + 1];
+    row[x] = static_cast<int16_t>(a + ((b - a) * (row[x] & 255) >> 8));
   }
 }
 

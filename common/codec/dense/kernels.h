@@ -138,8 +138,10 @@ struct Kernels {
   /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
   void (*geometry)(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
                    int16_t* gy);
-  /// Indices that heights stand for, in 16ths.
+  /// Heights in 2^-8 of a knot, 0 to 16383. model.knots is not looked at.
   void (*heights)(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out);
+  /// Heights -> the indices that they stand for, in 16ths.
+  void (*knots)(const HeightModel& model, size_t n, int16_t* row);
   /// How much the guide varies around each pixel, as tokens.
   void (*activity)(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
   /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i.

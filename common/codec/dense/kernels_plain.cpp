@@ -75,6 +75,7 @@ const Kernels& plain_kernels() {
                                Flatness,
                                Geometry,
                                Heights,
+                               Knots,
                                Activity,
                                NormalEquations,
                                SampleShares,

@@ -108,6 +108,7 @@ static const Kernels* Set() {
                                Flatness,
                                Geometry,
                                Heights,
+                               Knots,
                                Activity,
                                NormalEquations,
                                SampleShares,
@@ -440,7 +441,7 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 // table[i] of each i below 64.
-HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > Knots(const int32_t* table, hn::VFromD<hn::RebindToSigned<D> > i) {
+HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > KnotsAt(const int32_t* table, hn::VFromD<hn::RebindToSigned<D> > i) {
   const hn::RebindToSigned<D> d;
 #if HWY_TARGET <= HWY_AVX3  // tables in registers: gathers take longer
   const auto part = [&](int k) HWY_ATTR { return hn::Load(d, table + 16 * k).raw; };
@@ -453,43 +454,20 @@ HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > Knots(const int32_t* table, hn::VF
 #endif
 }
 
-// As Heights(). Both knots of a pixel are gathered at once.
-static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
-                          int16_t* HWY_RESTRICT out) {
+// As Knots(). Both knots of a pixel are gathered at once.
+static void KnotsVector(const HeightModel& model, size_t n, int16_t* HWY_RESTRICT row) {
   const hn::RebindToSigned<D> d;
-  const hn::Rebind<float, D> f;
   const hn::Rebind<int16_t, D> d16;
   HWY_ALIGN int32_t knots[HeightModel::kKnots + 15];
   for (int i = 0; i + 1 < HeightModel::kKnots; ++i)
     knots[i] = static_cast<int32_t>(static_cast<uint16_t>(model.knots[i]) |
                                     static_cast<uint32_t>(static_cast<uint16_t>(model.knots[i + 1])) << 16);
-  const auto one = hn::Set(kD, 1u), base = hn::Set(kD, static_cast<uint32_t>(model.base));
-  const auto ends = hn::Set(d, 16383), turn = hn::Set(d, 32768);
-  const auto step = hn::Set(kD, static_cast<uint32_t>(model.a) * static_cast<uint32_t>(kN));
-  auto sums =
-      hn::Add(hn::Mul(hn::Iota(kD, 0), hn::Set(kD, static_cast<uint32_t>(model.a))),
-              hn::Set(kD, static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c) +
-                              static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0)));
-  for (size_t x = 0; x < n; x += kN, sums = hn::Add(sums, step)) {
-    const auto code = hn::And(hn::LoadU(kD, depth + x), hn::Set(kD, 0xFFFFFFu));
-    const auto sum = hn::BitCast(d, hn::Sub(sums, hn::Mul(code, base)));
-    const auto negative = hn::ShiftRight<31>(sum);
-    const auto size = hn::BitCast(kD, hn::Min(hn::Xor(sum, negative), hn::BitCast(d, code)));
-    const auto exponent = hn::ShiftRight<23>(hn::BitCast(kD, hn::ConvertTo(f, hn::BitCast(d, hn::Or(code, one)))));
-    const auto up = hn::Sub(hn::Set(kD, 150u), exponent);
-    const auto divisor = hn::BitCast(d, hn::Or(hn::ShiftRight<9>(hn::Shl(code, up)), hn::Set(kD, 0x4000u)));
-    auto r = hn::Sub(hn::Set(d, 46260), hn::ShiftRight<15>(hn::Mul(divisor, hn::Set(d, 30840))));
-    r = hn::ShiftRight<14>(hn::Mul(r, hn::Sub(turn, hn::ShiftRight<15>(hn::Mul(divisor, r)))));
-    r = hn::ShiftRight<14>(hn::Mul(r, hn::Sub(turn, hn::ShiftRight<15>(hn::Mul(divisor, r)))));
-    const auto quotient =
-        hn::BitCast(d, hn::ShiftRight<16>(hn::Mul(hn::ShiftRight<8>(hn::Shl(size, up)), hn::BitCast(kD, r))));
-    const auto height = hn::Sub(hn::Xor(quotient, negative), negative);
-    const auto off = hn::Min(hn::Max(hn::Sub(height, hn::Set(d, model.low)), hn::Set(d, -32767)), hn::Set(d, 32767));
-    const auto at = hn::Min(hn::Max(hn::ShiftRight<12>(hn::Mul(off, hn::Set(d, model.scale))), hn::Zero(d)), ends);
-    const auto both = Knots(knots, hn::ShiftRight<8>(at));
+  for (size_t x = 0; x < n; x += kN) {
+    const auto at = hn::PromoteTo(d, hn::LoadU(d16, row + x));
+    const auto both = KnotsAt(knots, hn::And(hn::ShiftRight<8>(at), hn::Set(d, 63)));
     const auto a = hn::ShiftRight<16>(hn::ShiftLeft<16>(both)), b = hn::ShiftRight<16>(both);
     const auto between = hn::ShiftRight<8>(hn::Mul(hn::Sub(b, a), hn::And(at, hn::Set(d, 255))));
-    hn::StoreU(hn::DemoteTo(d16, hn::Add(a, between)), d16, out + x);
+    hn::StoreU(hn::DemoteTo(d16, hn::Add(a, between)), d16, row + x);
   }
 }
 
@@ -643,7 +621,8 @@ static const Kernels* Set() {
                                AddResiduals,
                                Flatness,
                                Geometry,
-                               HeightsVector,
+                               Heights,
+                               KnotsVector,
                                Activity,
                                NormalEquations,
                                SampleShares,

@@ -203,10 +203,10 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
   has_geometry_ = false;
   if (pole_ != kRaw && axes != nullptr && normals_of(*axes, pole_, known))
     has_geometry_ = geometry_of(samples, depth.depth, known, -static_cast<int>(shape.width / 2),
-                                                -static_cast<int>(shape.height / 2), geometry_);
+                                -static_cast<int>(shape.height / 2), geometry_);
   else
-  has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
-                                                -static_cast<int>(shape.height / 2), geometry_);
+    has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
+                                                  -static_cast<int>(shape.height / 2), geometry_);
   make_guide(shape, depth, base);
   if (may_be_exact_ && of_one_colour && smooth(shape)) be_exact();
   to_lattice(shape);

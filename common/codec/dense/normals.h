@@ -42,8 +42,8 @@ struct NormalPlanes {
   /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code. of_one_colour: all pixels
   /// are, so that normals are all that is seen of them: where they are smooth they are coded as they are, whatever the
   /// bound.
-  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour,
-              const RoomAxes* axes, BitSink& bits);
+  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour, const RoomAxes* axes,
+              BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * (GuidedPlane::kMostWeightBits + GuidedPlane::kMostFlatBits);
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
   /// Row y from its symbols, before decode_values().
