@@ -28,7 +28,7 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
   for (int i = 0; i < kFeatures; ++i)
     for (int j = 0; j <= i; ++j) {
       float sum = 0;
-      for (size_t s = 0; s < n; ++s) sum += features[s][i] * weights[s] * features[s][j];
+      for (size_t s = 0; s < n; ++s) sum += features[s][i] * (features[s][j] * weights[s]);
       sums[i][j] = sum;
     }
 }

@@ -63,7 +63,7 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
   for (int i = 0; i < kFeatures; ++i)
     for (int j = 0; j <= i; ++j) {
       float sum = 0;
-      for (size_t s = 0; s < n; ++s) sum += features[s][i] * weights[s] * features[s][j];
+      for (size_t s = 0; s < n; ++s) sum += features[s][i] * (features[s][j] * weights[s]);
       sums[i][j] = sum;
     }
 }
@@ -429,9 +429,9 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     for (int j = 0; j <= i + 7; j += static_cast<int>(hn::Lanes(d))) {
       auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
       for (size_t s = 0; s < n; ++s) {
-        const float *const f = features[s] + i, w = weights[s];
-        const auto v = hn::LoadU(d, features[s] + j);
-        const auto add = [&](auto& sum, int k) HWY_ATTR { sum = hn::Add(sum, hn::Mul(hn::Set(d, f[k] * w), v)); };
+        const float* const f = features[s] + i;
+        const auto v = hn::Mul(hn::LoadU(d, features[s] + j), hn::Set(d, weights[s]));
+        const auto add = [&](auto& sum, int k) HWY_ATTR { sum = hn::Add(sum, hn::Mul(hn::Set(d, f[k]), v)); };
         add(s0, 0), add(s1, 1), add(s2, 2), add(s3, 3), add(s4, 4), add(s5, 5), add(s6, 6), add(s7, 7);
       }
       hn::StoreU(s0, d, sums[i] + j), hn::StoreU(s1, d, sums[i + 1] + j), hn::StoreU(s2, d, sums[i + 2] + j);
