@@ -36,12 +36,12 @@ class ColourTable {
 int8_t difference(uint32_t a, uint32_t b) { return static_cast<int8_t>(static_cast<uint8_t>(a - b)); }
 
 // Whether green says much of red and blue: judged by what neighbours differ by, in a few rows.
-bool follows_green(const TileShape& shape, const std::vector<uint32_t>& colours) {
+bool follows_green(const TileShape& shape, const PixelRows<uint32_t>& colours) {
   uint64_t apart = 0, together = 0;
   for (size_t y = 0; y < shape.height; y += 8)
     for (size_t x = 1; x < shape.width; x += 2) {
       if (!shape.at(x, y) || !shape.at(x - 1, y)) continue;
-      const uint32_t a = colours[y * shape.width + x], b = colours[y * shape.width + x - 1];
+      const uint32_t a = colours.row(y)[x], b = colours.row(y)[x - 1];
       int d[3];
       for (int c = 0; c < 3; ++c) d[c] = difference(a >> kShifts[c], b >> kShifts[c]);
       for (int c = 1; c < 3; ++c)
@@ -81,9 +81,9 @@ bool get_height(HeightModel& height, BitReader& bits) {
 
 }  // namespace
 
-bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base) {
+bool of_one_colour(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t base) {
   for (size_t y = 0; y < shape.height; ++y) {
-    const uint32_t* const row = colours.data() + y * shape.width;
+    const uint32_t* const row = colours.row(y);
     const uint8_t* const cover = shape.cover(y);
     uint32_t other = 0;
     if (cover == nullptr)
@@ -97,7 +97,7 @@ bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours,
 }
 
 // The colours in the order in which they come, and the place of each pixel's. False where they are too many.
-bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
+bool ColourPlanes::make_palette(const TileShape& shape, const PixelRows<uint32_t>& colours) {
   ColourTable table;
   palette_.clear(), first_.clear();
   index.reset(shape, GuidedPlane::kIndexBits, 254);
@@ -110,7 +110,7 @@ bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32
     first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
   };
   for (size_t y = 0; y < shape.height && fits; ++y) {
-    const uint32_t* const from = colours.data() + y * shape.width;
+    const uint32_t* const from = colours.row(y);
     int16_t* const places = index.values.row(static_cast<ptrdiff_t>(y));
     if (!shape.full(y)) std::fill_n(places, shape.width, int16_t{0});
     shape.for_each_run(y, [&](size_t x, size_t end) {
@@ -276,13 +276,13 @@ void ColourPlanes::encode_palette(const TileShape& shape, int reach) {
   index.encode(shape, samples_, nullptr);
 }
 
-void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
+void ColourPlanes::encode_channels(const TileShape& shape, const PixelRows<uint32_t>& colours) {
   begin_channels(shape);
   uint8_t indices[256];
   for (int v = 0; v < 256; ++v) indices[v] = static_cast<uint8_t>(lattice_.index(v));
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    const uint32_t* const from = colours.data() + y * shape.width;
+    const uint32_t* const from = colours.row(y);
     for (size_t c = 0; c < 3; ++c) {
       uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
       for (size_t x = 0; x < shape.width; ++x) row[x] = indices[from[x] >> kShifts[c] & 255];
@@ -298,7 +298,7 @@ void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uin
 }
 
 // Steps of channels may be less than what a palette without height keeps.
-void ColourPlanes::try_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
+void ColourPlanes::try_channels(const TileShape& shape, const PixelRows<uint32_t>& colours) {
   const double by_index = rough_bits(index.symbols, shape) + static_cast<double>(header_bits()) / 4;
   mode = follows_green(shape, colours) ? kDifferences : kChannels;
   encode_channels(shape, colours);
@@ -307,7 +307,7 @@ void ColourPlanes::try_channels(const TileShape& shape, const std::vector<uint32
   if (by_index <= by_channels) mode = kPalette;
 }
 
-void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
+void ColourPlanes::encode(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t base,
                           const DepthPlane& depth, const KnownAxes& known, int reach) {
   lattice_ = ColourLattice(reach);
   if (of_one_colour(shape, colours, base)) {

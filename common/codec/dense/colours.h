@@ -13,7 +13,7 @@
 namespace telesplat::codec::detail {
 
 /// Whether all covered pixels have that colour.
-bool of_one_colour(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t colour);
+bool of_one_colour(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t colour);
 
 struct ColourPlanes {
   enum Mode : uint8_t { kPlain = 0, kPalette = 1, kChannels = 2, kDifferences = 3 };  ///< of red and blue to green
@@ -21,7 +21,7 @@ struct ColourPlanes {
 
   /// colours: row by row in all the tile's width, of covered pixels; `base`: of the first.
   /// known: of where pixels look. reach: how far a channel may be off.
-  void encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base, const DepthPlane& depth,
+  void encode(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t base, const DepthPlane& depth,
               const KnownAxes& known, int reach);
   size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
   SymbolPlane& symbols(size_t i) { return mode == kPalette ? index.symbols : channel[i].symbols; }
@@ -43,13 +43,13 @@ struct ColourPlanes {
     Plane<uint8_t> values;
     SymbolPlane symbols;
   };
-  bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
+  bool make_palette(const TileShape& shape, const PixelRows<uint32_t>& colours);
   void sort_palette(const TileShape& shape, const DepthPlane& depth, const KnownAxes& known);
   std::vector<int16_t> join_palette(int reach);
   void encode_palette(const TileShape& shape, int reach);
   void sort_by_height(const TileShape& shape, const DepthPlane& depth);
-  void try_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
-  void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
+  void try_channels(const TileShape& shape, const PixelRows<uint32_t>& colours);
+  void encode_channels(const TileShape& shape, const PixelRows<uint32_t>& colours);
   void find_heights(const TileShape& shape, const DepthPlane& depth);
   void begin_index(const TileShape& shape);
   void begin_channels(const TileShape& shape);

@@ -50,15 +50,21 @@ void DenseCoder::begin(const TileRect& rect, const Mask* mask) {
   }
 }
 
-void DenseCoder::load(const image::DepthImage& image, const TileRect& rect) {
-  const size_t pixels = shape_.width * shape_.height;
-  if (colour_rows_.size() < pixels + 64) colour_rows_.resize(pixels + 64);
-  if (normals_.codes.size() < pixels + 64) normals_.codes.resize(pixels + 64);
+void DenseCoder::load_depth(const image::DepthImage& image, const TileRect& rect) {
   for_each_segment(rect, shape_, [&](size_t from, size_t row, size_t column, size_t count) {
     std::copy_n(image.depth.data() + from, count, depth_.depth.row(static_cast<ptrdiff_t>(row)) + column);
-    std::copy_n(image.colour.data() + from, count, colour_rows_.data() + row * shape_.width + column);
-    std::copy_n(image.normal.data() + from, count, normals_.codes.data() + row * shape_.width + column);
   });
+}
+
+// Of the image itself, unless rows were joined.
+template <class T>
+PixelRows<T> DenseCoder::rows_of(const std::vector<T>& plane, const TileRect& rect, std::vector<T>& copy) const {
+  if (rect.width >= kNarrow) return {plane.data() + rect.first, rect.stride};
+  if (copy.size() < shape_.width) copy.resize(shape_.width);
+  for_each_segment(rect, shape_, [&](size_t from, size_t, size_t column, size_t count) {
+    std::copy_n(plane.data() + from, count, copy.data() + column);
+  });
+  return {copy.data(), shape_.width};
 }
 
 void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
@@ -66,7 +72,8 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   begin(rect, mask);
   depth_.reset(shape_, base.depth);
   normals_.reset(shape_, bounds.normal);
-  load(image, rect);
+  load_depth(image, rect);
+  const PixelRows<uint32_t> colours = rows_of(image.colour, rect, colour_rows_);
   if (bounds.depth != nullptr) depth_.to_indices(shape_, *bounds.depth);
   std::vector<uint8_t> headers;
   writer_.start(PlaneEncoder::kMostBits);
@@ -78,7 +85,8 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   depth_.extend(shape_);
 
   writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
-  normals_.encode(shape_, depth_, base.normal, bounds.normal != 0 && of_one_colour(shape_, colour_rows_, base.colour),
+  normals_.encode(shape_, rows_of(image.normal, rect, normal_rows_), depth_, base.normal,
+                  bounds.normal != 0 && of_one_colour(shape_, colours, base.colour),
                   rect.width >= kNarrow ? axes : nullptr, writer_.sink);
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
@@ -88,7 +96,7 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   RoomAxes about;
   if (known.axes == nullptr && normals_.geometry() != nullptr && axes_of(*normals_.geometry(), about))
     known = {.axes = &about, .exact = false};
-  colours_.encode(shape_, colour_rows_, base.colour, depth_, known, bounds.colour);
+  colours_.encode(shape_, colours, base.colour, depth_, known, bounds.colour);
   writer_.start(colours_.most_header_bits() + 3 * PlaneEncoder::kMostBits);
   colours_.put_header(writer_.sink);
   for (size_t i = 0; i < colours_.planes(); ++i) encoders_[3 + i].prepare(colours_.symbols(i), shape_, writer_.sink);
@@ -236,7 +244,7 @@ bool DenseCoder::get_symbols(size_t first, size_t count, Planes plane) {
 
 // Normals and colours from their symbols.
 void DenseCoder::get_values(image::DepthImage& image, const TileRect& rect, const Pixel& base) {
-  if (row_codes_.size() < shape_.width) row_codes_.resize(shape_.width);
+  if (normal_rows_.size() < shape_.width) normal_rows_.resize(shape_.width);
   if (colour_rows_.size() < shape_.width) colour_rows_.resize(shape_.width);
   std::fill_n(colour_rows_.begin(), shape_.width, base.colour);
   GuidedPlane &a = normals_.plane[0], &b = normals_.plane[1];
@@ -250,8 +258,8 @@ void DenseCoder::get_values(image::DepthImage& image, const TileRect& rect, cons
       decode_values(a, b, shape_, y);
       if (colours_.planes() != 0) colours_.decode_row(shape_, y, colour_rows_.data());
     }
-    normals_.get_codes(shape_, y, row_codes_.data());
-    store(row_codes_.data(), y, image.normal, rect);
+    normals_.get_codes(shape_, y, normal_rows_.data());
+    store(normal_rows_.data(), y, image.normal, rect);
     store(colour_rows_.data(), y, image.colour, rect);
   }
 }

@@ -38,7 +38,9 @@ class DenseCoder {
   };
   static std::optional<Parts> get_parts(Reader& in);
   void begin(const TileRect& rect, const Mask* mask);
-  void load(const image::DepthImage& image, const TileRect& rect);
+  void load_depth(const image::DepthImage& image, const TileRect& rect);
+  template <class T>
+  PixelRows<T> rows_of(const std::vector<T>& plane, const TileRect& rect, std::vector<T>& copy) const;
   void put_words(std::vector<uint8_t>& out);
   void begin_part(const Parts& parts, size_t part);
   [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
@@ -57,7 +59,7 @@ class DenseCoder {
   NormalPlanes normals_;
   ColourPlanes colours_;
   std::vector<uint32_t> colour_rows_;
-  std::vector<uint16_t> row_codes_;
+  std::vector<uint16_t> normal_rows_;
   PlaneEncoder encoders_[6];
   PlaneDecoder decoders_[6];
   WordSource source_;

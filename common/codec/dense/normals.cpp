@@ -129,16 +129,15 @@ void NormalPlanes::reset(const TileShape& shape, int reach) {
   activity.reset(shape.width, shape.height);
 }
 
-int NormalPlanes::choose_pole(const TileShape& shape) const {
+int NormalPlanes::choose_pole(const TileShape& shape, const PixelRows<uint16_t>& codes) const {
   uint32_t others = 0;
   for (size_t y = 0; y < shape.height; ++y) {
     if (lattice_.step() != 1) break;  // within bounds another code of the same direction is as good
-    others |= kernels().other_normals(shape.cover(y), codes.data() + y * shape.width, shape.width);
+    others |= kernels().other_normals(shape.cover(y), codes.row(y), shape.width);
   }
   if (others != 0) return kRaw;
   PoleChoice choice;
-  for (const auto p : samples.places)
-    choice.add(codes[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)]);
+  for (const auto p : samples.places) choice.add(codes.row(static_cast<size_t>(p.y))[p.x]);
   return choice.best();
 }
 
@@ -184,14 +183,14 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
   plane[1].symbols.other = &plane[0].symbols.tokens;
 }
 
-void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour,
-                          const RoomAxes* axes, BitSink& bits) {
+void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth,
+                          uint16_t base, bool of_one_colour, const RoomAxes* axes, BitSink& bits) {
   samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
-  pole_ = choose_pole(shape);
+  pole_ = choose_pole(shape, codes);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
                                                                                static_cast<ptrdiff_t>(y));
-    const uint16_t* const from = codes.data() + y * shape.width;
+    const uint16_t* const from = codes.row(y);
     if (pole_ != kRaw)
       kernels().turn_normals(from, shape.width, pole_, x_row, y_row);
     else

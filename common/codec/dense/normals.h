@@ -42,8 +42,8 @@ struct NormalPlanes {
   /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code. of_one_colour: all pixels
   /// are, so that normals are all that is seen of them: where they are smooth they are coded as they are, whatever the
   /// bound.
-  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, bool of_one_colour, const RoomAxes* axes,
-              BitSink& bits);
+  void encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth, uint16_t base,
+              bool of_one_colour, const RoomAxes* axes, BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * (GuidedPlane::kMostWeightBits + GuidedPlane::kMostFlatBits);
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
   /// Row y from its symbols, before decode_values().
@@ -56,7 +56,6 @@ struct NormalPlanes {
 
   GuidedPlane plane[2];
   Plane<uint8_t> activity;
-  std::vector<uint16_t> codes;  ///< of the tile's covered pixels, row by row in all its width
   Samples samples;
   FlatSamples flat;
 
@@ -68,7 +67,7 @@ struct NormalPlanes {
   bool smooth(const TileShape& shape);
   void be_exact();
   void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
-  int choose_pole(const TileShape& shape) const;
+  int choose_pole(const TileShape& shape, const PixelRows<uint16_t>& codes) const;
   std::vector<int16_t> row_of_codes_[2];
   NormalLattice lattice_{0};
   bool may_be_exact_ = false, exact_ = false;  ///< of streams with a bound of normals

@@ -33,4 +33,12 @@ class Plane {
   std::vector<T> elements_;
 };
 
+/// Rows of an image that a tile has, or that were copied.
+template <class T>
+struct PixelRows {
+  const T* first = nullptr;
+  size_t stride = 0;
+  const T* row(size_t y) const { return first + y * stride; }
+};
+
 }  // namespace telesplat::codec::detail

@@ -338,7 +338,8 @@ void RefinementCoder::encode_colours(const Reach& reach, BitSink& bits) {
   while (known_depth_[first] == 0) ++first;
   RoomAxes about;
   const bool has_axes = has_geometry_ && axes_of(geometry_, about);
-  colours_.encode(shape_, exact_colours_, exact_colours_[first], depth_, {.axes = has_axes ? &about : nullptr}, 0);
+  colours_.encode(shape_, {exact_colours_.data(), shape_.width}, exact_colours_[first], depth_,
+                  {.axes = has_axes ? &about : nullptr}, 0);
   for (size_t i = 0; i < colours_.planes(); ++i) other_bits += rough_bits(colours_.symbols(i), shape_);
   near_colours_ = near_bits <= other_bits + static_cast<double>(colours_.header_bits()) / 4;
   bits.put(near_colours_, 1);
