@@ -189,6 +189,10 @@ static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint
           static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
 }
 
+static void JoinBytes(const uint8_t* RESTRICT low, const uint8_t* RESTRICT high, size_t n, uint16_t* RESTRICT out) {
+  for (size_t x = 0; x < n; ++x) out[x] = static_cast<uint16_t>(low[x] | high[x] << 8);
+}
+
 static uint32_t OtherNormals(const uint8_t* RESTRICT cover, const uint16_t* RESTRICT codes, size_t n) {
   uint16_t any = 0;
   for (size_t i = 0; i < n; ++i) {

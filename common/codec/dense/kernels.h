@@ -110,6 +110,8 @@ struct Kernels {
   void (*plane_contexts)(const uint8_t* above, size_t n, int merges, uint8_t* contexts);
   /// Contexts of n tokens.
   void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
+  /// low + 256 high.
+  void (*join_bytes)(const uint8_t* low, const uint8_t* high, size_t n, uint16_t* out);
   /// 0 if all of n normals that are covered are canonical (image/normal.h).
   uint32_t (*other_normals)(const uint8_t* cover, const uint16_t* codes, size_t n);
   /// Coordinates in 64ths of codes that are turned by pole 0 to 5 (docs/codec.md), and the inverse.

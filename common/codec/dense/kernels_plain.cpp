@@ -61,6 +61,7 @@ const Kernels& plain_kernels() {
                                PlaneKinds,
                                PlaneContexts,
                                Contexts,
+                               JoinBytes,
                                OtherNormals,
                                TurnNormals,
                                TurnNormalsBack,

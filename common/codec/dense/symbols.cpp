@@ -151,14 +151,19 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
 // In four tables, so that equal symbols side by side need not wait for each other. Each has a quarter of 65536 at most.
 void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
   std::memset(parts_, 0, sizeof parts_);
+  if (joined_.size() < shape.width + 64) joined_.resize(shape.width + 64);
+  const uint16_t* const joined = joined_.data();
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    const uint8_t *const tokens = plane.tokens.row(r), *const contexts = plane.contexts.row(r);
-    const auto add = [&](uint16_t* counts, size_t x) { ++counts[contexts[x] * kSymbols + tokens[x]]; };
+    kernels().join_bytes(plane.tokens.row(r), plane.contexts.row(r), shape.width, joined_.data());
     shape.for_each_run(y, [&](size_t x, size_t end) {
-      for (; x + 4 <= end; x += 4)
-        add(parts_[0], x), add(parts_[1], x + 1), add(parts_[2], x + 2), add(parts_[3], x + 3);
-      for (; x < end; ++x) add(parts_[x % 4], x);
+      for (; x + 4 <= end; x += 4) {
+        uint64_t four;
+        std::memcpy(&four, joined + x, 8);
+        ++parts_[0][four & 0xFFFF], ++parts_[1][four >> 16 & 0xFFFF], ++parts_[2][four >> 32 & 0xFFFF],
+            ++parts_[3][four >> 48];
+      }
+      for (; x < end; ++x) ++parts_[x % 4][joined[x]];
     });
   }
   uint32_t* const counts = counts_[0].data();

@@ -108,6 +108,7 @@ class PlaneEncoder {
   TokenLevels levels_;
   TokenCounts counts_;
   uint16_t parts_[4][kContexts * kSymbols];  ///< of counts_
+  std::vector<uint16_t> joined_;             ///< a row's contexts * kSymbols + tokens
   std::vector<EncodeEntry> tables_;
 };
 
