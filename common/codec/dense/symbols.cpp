@@ -130,7 +130,8 @@ double rough_bits(const SymbolPlane& plane, const TileShape& shape) {
 
 // The finest classes that nearly all sums fit into.
 void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
-  std::array<uint32_t, 1 << kBiasBits> histogram{};
+  constexpr size_t kMostSum = 16 * (kNumberTokens - 1);  // of a number's tokens with weights 3, 2, 2, 1 and 4, 2, 2
+  std::array<uint32_t, kMostSum + 1> histogram{};
   uint32_t total = 0;
   for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 6) {
     const ContextRows rows = rows_around(plane, y);

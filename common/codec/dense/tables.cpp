@@ -16,13 +16,23 @@ constexpr uint32_t weight_of(unsigned level) { return level < 2 ? 0 : kSteps[(le
 
 // The level whose weight is nearest, by ratio.
 unsigned level_of(uint32_t weight) {
+  // By the seven bits after the highest one: how many geometric means of steps are below.
+  static constexpr auto kNearest = [] {
+    std::array<uint8_t, 128> out{};
+    for (uint32_t i = 0; i < out.size(); ++i) {
+      const uint32_t w = 2 * (128 + i) + 1;  // the middle of those that have these bits, in quarters of a step's unit
+      for (uint32_t k = 0; k < 4; ++k) {
+        const uint64_t next = k == 3 ? 2 * kSteps[0] : kSteps[k + 1];
+        out[i] = static_cast<uint8_t>(out[i] + (uint64_t{w} * w >= 16 * kSteps[k] * next));
+      }
+    }
+    return out;
+  }();
   if (weight < 32) return 1;
-  const int octave = static_cast<int>(std::bit_width(weight)) - 7;  // of 64 and more: 0 and more
-  unsigned level = octave < 0 ? 2 : 2 + 4 * static_cast<unsigned>(octave);
-  while (level + 1 < kLevels &&
-         uint64_t{weight} * weight >= uint64_t{weight_of(level)} * weight_of(level + 1))  // above their geometric mean
-    ++level;
-  return level;
+  if (weight < 64) return 2;
+  const auto bits = static_cast<unsigned>(std::bit_width(weight));
+  const uint32_t after = (bits > 8 ? weight >> (bits - 8) : weight << (8 - bits)) & 127;
+  return std::min(2 + 4 * (bits - 7) + kNearest[after], kLevels - 1u);
 }
 
 // What a level is expected to be: from the token before and, but for the first context, what that context has.
@@ -75,12 +85,18 @@ constexpr uint32_t kMany = 70;        // of so many a level that is not ideal co
 // The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
 // share_of_one: of a count of 1, in 256ths of a frequency.
 int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected, bool last) {
-  const auto rate = [&](int level) { return 1.5f * static_cast<float>(std::min(std::abs(level - expected), 6)); };
+  static constexpr auto kRates = [] {
+    std::array<float, 2 * kLevels + 1> out{};
+    for (int off = -kLevels; off <= kLevels; ++off)
+      out[static_cast<size_t>(off + kLevels)] = 1.5f * static_cast<float>(std::min(off < 0 ? -off : off, 6));
+    return out;
+  }();
+  const float* const rates = kRates.data() + kLevels - expected;
   const float n = static_cast<float>(count);
   int best = 0;
   float least = 1e30f;
   const auto consider = [&](int level, float loss) {
-    const float cost = loss + rate(level);
+    const float cost = loss + rates[level];
     if (cost < least) least = cost, best = level;
   };
   if (count != 0) {
