@@ -10,6 +10,7 @@ namespace telesplat::codec::detail {
 namespace {
 
 constexpr int kShifts[3] = {8, 16, 0};  // green, red, blue
+constexpr size_t kMostColourSamples = 700;  // of a tile
 
 // Colours seen, by open addressing, and what stands for each.
 class ColourTable {
@@ -314,7 +315,7 @@ void ColourPlanes::encode(const TileShape& shape, const PixelRows<uint32_t>& col
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
-    samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 12));
+    samples_.choose(shape, std::min<size_t>(kMostColourSamples, shape.total / 12));
     sort_palette(shape, depth, known);
     encode_palette(shape, reach);
     if (reach > 0 && !has_height_) try_channels(shape, colours);
