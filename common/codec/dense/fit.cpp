@@ -139,11 +139,43 @@ bool quantise(const Vector9 m, const double scale[3], GeometryModel& model) {
   return true;
 }
 
+constexpr size_t kLeastSlopes = 32;
+
 // The size that nine of ten do not exceed.
 double nine_of_ten(std::vector<double>& sizes) {
   const auto at = sizes.begin() + static_cast<ptrdiff_t>(sizes.size() * 9 / 10);
   std::nth_element(sizes.begin(), at, sizes.end());
   return *at;
+}
+
+// The shift by which nine of ten slopes fit; of every so many samples.
+int slope_shift_of(const Samples& samples, const Plane<uint32_t>& depth, size_t every, std::vector<double>& sizes) {
+  sizes.clear();
+  for (size_t i = 0; i < samples.places.size(); i += std::max<size_t>(1, every)) {
+    const auto p = samples.places[i];
+    const uint32_t* const row = depth.row(p.y);
+    sizes.push_back(std::max(std::abs(double(static_cast<int>(row[p.x + 1] - row[p.x - 1]))),
+                             std::abs(double(static_cast<int>(depth.row(p.y + 1)[p.x] - depth.row(p.y - 1)[p.x])))));
+  }
+  return shift_for(nine_of_ten(sizes) * 2, 32767);
+}
+
+// Those that are not too large, of every so many samples.
+std::vector<Slope> slopes_of(const Samples& samples, const Plane<uint32_t>& depth,
+                             const Plane<int16_t>* const normal[2], int x0, int y0, int shift, size_t every) {
+  std::vector<Slope> slopes;
+  for (size_t i = 0; i < samples.places.size(); i += std::max<size_t>(1, every)) {
+    const auto p = samples.places[i];
+    Slope s;
+    if (!slope_at(depth, p.x, p.y, x0, y0, shift, s.h)) continue;
+    const int cx = normal[0]->row(p.y)[p.x] / 64 - 127, cy = normal[1]->row(p.y)[p.x] / 64 - 127;
+    const int cz = 127 - std::abs(cx) - std::abs(cy), fold = std::max(-cz, 0);
+    const double x = cx + (cx >= 0 ? -fold : fold), y = cy + (cy >= 0 ? -fold : fold), z = cz;
+    const double length = std::sqrt(x * x + y * y + z * z);
+    s.n[0] = x / length, s.n[1] = y / length, s.n[2] = z / length;
+    slopes.push_back(s);
+  }
+  return slopes;
 }
 
 }  // namespace
@@ -163,39 +195,16 @@ void Samples::choose(const TileShape& shape, size_t about) {
         places.push_back({x, y});
 }
 
-// The shift by which nine of ten slopes fit.
-static int slope_shift_of(const Samples& samples, const Plane<uint32_t>& depth, size_t every,
-                          std::vector<double>& sizes) {
-  sizes.clear();
-  for (size_t i = 0; i < samples.places.size(); i += every) {
-    const auto p = samples.places[i];
-    const uint32_t* const row = depth.row(p.y);
-    sizes.push_back(std::max(std::abs(double(static_cast<int>(row[p.x + 1] - row[p.x - 1]))),
-                             std::abs(double(static_cast<int>(depth.row(p.y + 1)[p.x] - depth.row(p.y - 1)[p.x])))));
-  }
-  return shift_for(nine_of_ten(sizes) * 2, 32767);
-}
-
 bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
                   int y0, GeometryModel& model) {
-  if (samples.places.size() < 32 || (all_same(samples, *normal[0]) && all_same(samples, *normal[1]))) return false;
+  if (samples.places.size() < kLeastSlopes || (all_same(samples, *normal[0]) && all_same(samples, *normal[1])))
+    return false;
   std::vector<double> sizes;
   model.slope_shift = slope_shift_of(samples, depth, 1, sizes);
-  std::vector<Slope> slopes;
+  std::vector<Slope> slopes =
+      slopes_of(samples, depth, normal, x0, y0, model.slope_shift, samples.places.size() / kSlopes);
   double most[3] = {1, 1, 1};
-  const size_t every = std::max<size_t>(1, samples.places.size() / kSlopes);
-  for (size_t i = 0; i < samples.places.size(); i += every) {
-    const auto p = samples.places[i];
-    Slope s;
-    if (!slope_at(depth, p.x, p.y, x0, y0, model.slope_shift, s.h)) continue;
-    const int cx = normal[0]->row(p.y)[p.x] / 64 - 127, cy = normal[1]->row(p.y)[p.x] / 64 - 127;
-    const int cz = 127 - std::abs(cx) - std::abs(cy), fold = std::max(-cz, 0);
-    const double x = cx + (cx >= 0 ? -fold : fold), y = cy + (cy >= 0 ? -fold : fold), z = cz;
-    const double length = std::sqrt(x * x + y * y + z * z);
-    s.n[0] = x / length, s.n[1] = y / length, s.n[2] = z / length;
-    slopes.push_back(s);
-  }
-  if (slopes.size() < 32) return false;
+  if (slopes.size() < kLeastSlopes) return false;
   double scale[3];
   for (int i = 0; i < 3; ++i) {
     sizes.clear();
@@ -226,19 +235,18 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   return quantise(m, shifted, model);
 }
 
-bool geometry_of(const Samples& samples, const Plane<uint32_t>& depth, const double matrix[9], int x0, int y0,
-                 GeometryModel& model) {
-  if (samples.places.size() < 32) return false;
-  const size_t every = std::max<size_t>(1, samples.places.size() / 128);
-  std::vector<double> sizes;
+bool known_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
+                    int y0, const double matrix[9], GeometryModel& model) {
+  constexpr size_t kEnough = 100;      // slopes
+  constexpr double kLeastAgree = 0.7;  // mean cosine
+  if (samples.places.size() < kLeastSlopes) return false;
+  const size_t every = samples.places.size() / kEnough;
+  std::vector<double> sizes, dots;
   model.slope_shift = slope_shift_of(samples, depth, every, sizes);
+  const std::vector<Slope> slopes = slopes_of(samples, depth, normal, x0, y0, model.slope_shift, every);
+  if (!(agreement(slopes, matrix, dots) > kLeastAgree * static_cast<double>(slopes.size()))) return false;
   sizes.clear();
-  for (size_t i = 0; i < samples.places.size(); i += every) {
-    double h[3];
-    if (slope_at(depth, samples.places[i].x, samples.places[i].y, x0, y0, model.slope_shift, h))
-      sizes.push_back(std::abs(h[2]));
-  }
-  if (sizes.empty()) return false;
+  for (const Slope& s : slopes) sizes.push_back(std::abs(s.h[2]));
   model.height_shift = shift_for(std::max(1.0, nine_of_ten(sizes)) * 2, 32767);
   const double scale[3] = {1, 1, std::pow(2.0, -model.height_shift)};
   return quantise(matrix, scale, model);

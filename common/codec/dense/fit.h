@@ -23,9 +23,9 @@ struct Samples {
 bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
                   int y0, GeometryModel& model);
 
-/// The same of a matrix that is known, row by row.
-bool geometry_of(const Samples& samples, const Plane<uint32_t>& depth, const double matrix[9], int x0, int y0,
-                 GeometryModel& model);
+/// The same of a matrix that is known, row by row; false where normals do not follow it.
+bool known_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
+                    int y0, const double matrix[9], GeometryModel& model);
 
 /// Weights for the plane `own`, whose values have so many `bits` of fraction, by least squares. residual: null, or of
 /// another plane. False where there is nothing to be fitted, or where the median predictor does better: on facets,

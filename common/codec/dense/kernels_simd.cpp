@@ -233,6 +233,7 @@ static void KnotsVector(const HeightModel& model, size_t n, int16_t* HWY_RESTRIC
 
 #include "common/codec/dense/vectors/contexts-inl.h"
 #include "common/codec/dense/vectors/guided-inl.h"
+#include "common/codec/dense/vectors/surface-inl.h"
 
 static void SampleShares(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
                          float* shares) {
@@ -260,7 +261,7 @@ static const Kernels* Set() {
       Within,          LargestLessOne, DepthResiduals,  DepthRowsVector, PlaneResiduals,  PlaneTerms,
       PlaneKinds,      PlaneContexts,  PairedContexts,  JoinBytes,       OtherNormals,    TurnNormals,
       TurnNormalsBack, Divide,         UnfoldBytes,     MedianResiduals, PairedResiduals, PairedResidualsWide,
-      MedianValues,    PairedSums,     AddResiduals,    Flatness,        Geometry,        Heights,
+      MedianValues,    PairedSums,     AddResiduals,    Flatness,        PairedGeometry,        PairedHeights,
       KnotsVector,     Activity,       NormalEquations, SampleShares,    PutSymbols,      GetSymbols};
   return &all;
 }

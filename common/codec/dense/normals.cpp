@@ -183,6 +183,14 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
   plane[1].symbols.other = &plane[0].symbols.tokens;
 }
 
+bool NormalPlanes::find_geometry(const DepthPlane& depth, const Plane<int16_t>* const values[2], const RoomAxes* axes,
+                                 int x0, int y0) {
+  double known[9];
+  return (axes != nullptr && normals_of(*axes, pole_, known) &&
+          known_geometry(samples, depth.depth, values, x0, y0, known, geometry_)) ||
+         fit_geometry(samples, depth.depth, values, x0, y0, geometry_);
+}
+
 void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth,
                           uint16_t base, bool of_one_colour, const RoomAxes* axes, BitSink& bits) {
   samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
@@ -198,14 +206,8 @@ void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& cod
         x_row[x] = static_cast<int16_t>((from[x] & 255) * 64), y_row[x] = static_cast<int16_t>((from[x] >> 8) * 64);
   }
   const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
-  double known[9];
-  has_geometry_ = false;
-  if (pole_ != kRaw && axes != nullptr && normals_of(*axes, pole_, known))
-    has_geometry_ = geometry_of(samples, depth.depth, known, -static_cast<int>(shape.width / 2),
-                                -static_cast<int>(shape.height / 2), geometry_);
-  else
-    has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
-                                                  -static_cast<int>(shape.height / 2), geometry_);
+  has_geometry_ = pole_ != kRaw && find_geometry(depth, values, axes, -static_cast<int>(shape.width / 2),
+                                                 -static_cast<int>(shape.height / 2));
   make_guide(shape, depth, base);
   if (may_be_exact_ && of_one_colour && smooth(shape)) be_exact();
   to_lattice(shape);

@@ -41,7 +41,7 @@ struct NormalPlanes {
   void reset(const TileShape& shape, int reach);
   /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code. of_one_colour: all pixels
   /// are, so that normals are all that is seen of them: where they are smooth they are coded as they are, whatever the
-  /// bound.
+  /// bound. axes: of the room, from the tile's centre, or null.
   void encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth, uint16_t base,
               bool of_one_colour, const RoomAxes* axes, BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * (GuidedPlane::kMostWeightBits + GuidedPlane::kMostFlatBits);
@@ -60,6 +60,8 @@ struct NormalPlanes {
   FlatSamples flat;
 
  private:
+  bool find_geometry(const DepthPlane& depth, const Plane<int16_t>* const values[2], const RoomAxes* axes, int x0,
+                     int y0);
   void put_header(BitSink& bits) const;
   void find_flatness(const TileShape& shape, const DepthPlane& depth);
   bool choose_flatness(const TileShape& shape, const DepthPlane& depth);

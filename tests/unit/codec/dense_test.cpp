@@ -52,10 +52,9 @@ NormalPlanes normals_of(const DepthImage& image) {
   depth.extend(shape);
   NormalPlanes normals;
   normals.reset(shape, 0);
-  normals.codes = image.normal;
   BitWriter writer;
   writer.start(NormalPlanes::kMostBits);
-  normals.encode(shape, depth, image.normal[0], false, writer.sink);
+  normals.encode(shape, {image.normal.data(), shape.width}, depth, image.normal[0], false, nullptr, writer.sink);
   return normals;
 }
 

@@ -1,0 +1,186 @@
+// What depth says of surfaces, with vectors: directions of normals, and heights. Included once for every instruction set,
+// in its namespace. No include guard: that is meant.
+
+#if HWY_TARGET <= HWY_AVX2
+
+using U16 = hn::RebindToUnsigned<D16>;
+using VU16 = hn::VFromD<U16>;
+constexpr U16 kU16;
+using DU32 = hn::RebindToUnsigned<D32>;
+constexpr DU32 kDU32;
+constexpr size_t kHalf = hn::MaxLanes(D32());  // pixels of half a vector of 16 bits
+
+// Two vectors as one of 16 bits, in blocks of four pixels that InOrder() puts into their order; what does not fit becomes
+// the nearest number that does.
+HWY_INLINE V16 Packed(V32 a, V32 b) { return Joined(PairSums{a, b}); }
+
+HWY_INLINE V16 InOrder(V16 v) {
+#if HWY_TARGET <= HWY_AVX3
+  return V16{_mm512_permutexvar_epi64(_mm512_set_epi64(7, 5, 3, 1, 6, 4, 2, 0), v.raw)};
+#else
+  return V16{_mm256_permute4x64_epi64(v.raw, 0xD8)};
+#endif
+}
+
+// 2^29 / d, about, for 2^14 <= d < 2^15: below 2^15. Newton's method, as in Geometry().
+HWY_INLINE VU16 Reciprocals(VU16 d) {
+  const VU16 half = hn::Set(kU16, uint16_t{32768}), twice = hn::Add(d, d);
+  VU16 r = hn::Sub(hn::Set(kU16, uint16_t{46260}), hn::MulHigh(d, hn::Set(kU16, uint16_t{2 * 30840})));
+  for (int round = 0; round < 2; ++round) {
+    const VU16 rest = hn::Sub(half, hn::MulHigh(twice, r));
+    r = hn::MulHigh(hn::Add(r, r), hn::Add(rest, rest));
+  }
+  return r;
+}
+
+// By how many bits v, 2^0 to 2^24, must be shifted so that its highest bit becomes bit `bit`.
+HWY_INLINE hn::VFromD<DU32> ShiftTo(int bit, V32 v) {
+  const hn::Rebind<float, D32> floats;
+  const auto exponent = hn::ShiftRight<23>(hn::BitCast(kDU32, hn::ConvertTo(floats, v)));
+  return hn::Sub(hn::Set(kDU32, static_cast<uint32_t>(bit + 127)), exponent);
+}
+
+HWY_INLINE V32 ShiftUp(V32 v, hn::VFromD<DU32> by) { return hn::BitCast(kD32s, hn::Shl(hn::BitCast(kDU32, v), by)); }
+
+HWY_INLINE V32 Clamped16(V32 v) { return hn::Min(hn::Max(v, hn::Set(kD32s, -32767)), hn::Set(kD32s, 32767)); }
+
+// As Geometry().
+class GeometryVectors {
+ public:
+  GeometryVectors(const uint32_t* const depth[3], int x0, int y, const GeometryModel& model)
+      : above_(depth[0]),
+        here_(depth[1]),
+        below_(depth[2]),
+        slope_shift_(model.slope_shift),
+        height_shift_(model.height_shift),
+        y_(hn::Set(kD32s, y)),
+        first_(hn::Add(hn::Iota(kD32s, 0), hn::Set(kD32s, x0))) {
+    for (int i = 0; i < 3; ++i) {
+      by_slopes_[i] = hn::Set(kD32s, PairOf(model.matrix[i][0], model.matrix[i][1]));
+      by_height_[i] = hn::Set(kD32s, model.matrix[i][2]);
+    }
+  }
+  HWY_INLINE void Run(size_t n, int16_t* HWY_RESTRICT gx, int16_t* HWY_RESTRICT gy) const {
+    const V16 end = hn::Set(kD16s, int16_t{8128});
+    for (size_t x = 0; x < n; x += 2 * kHalf) {
+      const Direction a = At(x), b = At(x + kHalf);
+      const V16 divisor = Packed(a.divisor, b.divisor), z = Packed(a.z, b.z);
+      const V16 r = hn::BitCast(kD16s, Reciprocals(hn::BitCast(kU16, divisor)));
+      const V16 qx = Quotient(Packed(a.x, b.x), r), qy = Quotient(Packed(a.y, b.y), r);
+      const V16 fx = WithSign(hn::Sub(end, hn::Abs(qy)), qx), fy = WithSign(hn::Sub(end, hn::Abs(qx)), qy);
+      const auto behind = hn::Lt(z, hn::Zero(kD16s));
+      hn::StoreU(InOrder(hn::Add(hn::IfThenElse(behind, fx, qx), end)), kD16s, gx + x);
+      hn::StoreU(InOrder(hn::Add(hn::IfThenElse(behind, fy, qy), end)), kD16s, gy + x);
+    }
+  }
+
+ private:
+  struct Direction {
+    V32 x, y, z, divisor;  // z: only its sign counts
+  };
+  HWY_INLINE Direction At(size_t x) const {
+    const auto load = [](const uint32_t* from) HWY_ATTR { return hn::BitCast(kD32s, hn::LoadU(kDU32, from)); };
+    const auto slope = [&](V32 v) HWY_ATTR { return Clamped16(hn::ShiftRightSame(v, slope_shift_)); };
+    const V32 u = slope(hn::Sub(load(here_ + x + 1), load(here_ + x - 1))),
+              v = slope(hn::Sub(load(below_ + x), load(above_ + x)));
+    const V32 px = hn::Add(first_, hn::Set(kD32s, static_cast<int32_t>(x)));
+    const V32 twice = hn::ShiftRightSame(hn::ShiftLeft<1>(load(here_ + x)), slope_shift_);
+    const V32 height = hn::Sub(hn::Sub(twice, hn::Mul(px, u)), hn::Mul(y_, v));
+    const V32 h = Clamped16(hn::ShiftRightSame(height, height_shift_));
+    const V32 uv = hn::Or(hn::And(u, hn::Set(kD32s, 0xFFFF)), hn::ShiftLeft<16>(v));
+    V32 m[3];
+    for (int i = 0; i < 3; ++i)
+      m[i] = hn::Add(PairProducts(hn::BitCast(kD16s, uv), by_slopes_[i]), hn::Mul(h, by_height_[i]));
+    const V32 size = hn::Add(hn::Add(hn::Abs(m[0]), hn::Abs(m[1])), hn::Abs(m[2]));
+    const auto up = ShiftTo(24, hn::Or(hn::ShiftRight<6>(size), hn::Set(kD32s, 1)));
+    const auto part = [&](V32 c) HWY_ATTR { return hn::ShiftRight<16>(ShiftUp(c, up)); };
+    return {part(m[0]), part(m[1]), m[2], hn::Or(part(size), hn::Set(kD32s, 0x4000))};
+  }
+  // (n * r >> 15) * 127 >> 8.
+  static HWY_INLINE V16 Quotient(V16 n, V16 r) {
+    const V16 high = hn::MulHigh(n, r);
+    const V16 top = hn::BitCast(kD16s, hn::ShiftRight<15>(hn::BitCast(kU16, hn::Mul(n, r))));
+    return hn::MulHigh(hn::Or(hn::Add(high, high), top), hn::Set(kD16s, int16_t{127 * 256}));
+  }
+  static HWY_INLINE V16 WithSign(V16 v, V16 by) {
+    const V16 negative = hn::ShiftRight<15>(by);
+    return hn::Sub(hn::Xor(v, negative), negative);
+  }
+
+  const uint32_t *const above_, *const here_, *const below_;
+  const int slope_shift_, height_shift_;
+  const V32 y_, first_;
+  V32 by_slopes_[3], by_height_[3];
+};
+
+static void PairedGeometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
+                           int16_t* gx, int16_t* gy) {
+  GeometryVectors(depth, x0, y, model).Run(n, gx, gy);
+}
+
+// As Heights().
+class HeightVectors {
+ public:
+  HeightVectors(const uint32_t* depth, int x0, int y, const HeightModel& model)
+      : depth_(depth),
+        base_(hn::Set(kDU32, static_cast<uint32_t>(model.base))),
+        first_(hn::Add(
+            hn::Mul(hn::Iota(kDU32, 0), hn::Set(kDU32, static_cast<uint32_t>(model.a))),
+            hn::Set(kDU32, static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c) +
+                               static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0)))),
+        a_(static_cast<uint32_t>(model.a)),
+        low_(hn::Set(kD16s, static_cast<int16_t>(model.low))),
+        scale_(hn::Set(kU16, static_cast<uint16_t>(model.scale))) {}
+  HWY_INLINE void Run(size_t n, int16_t* HWY_RESTRICT out) const {
+    for (size_t x = 0; x < n; x += 2 * kHalf) {
+      const Ratio a = At(x), b = At(x + kHalf);
+      const VU16 r = Reciprocals(hn::BitCast(kU16, Packed(a.divisor, b.divisor)));
+      const V16 negative = Packed(a.negative, b.negative);
+      const V16 quotient = hn::BitCast(kD16s, hn::MulHigh(Unsigned(a.size, b.size), r));
+      const V16 height = hn::Sub(hn::Xor(quotient, negative), negative);
+      const VU16 off = hn::BitCast(kU16, hn::Max(hn::SaturatedSub(height, low_), hn::Zero(kD16s)));
+      // off * scale >> 12, or what is just too large.
+      const VU16 high = hn::Min(hn::MulHigh(off, scale_), hn::Set(kU16, uint16_t{1024}));
+      const VU16 at = hn::Or(hn::ShiftLeft<4>(high), hn::ShiftRight<12>(hn::Mul(off, scale_)));
+      hn::StoreU(InOrder(hn::BitCast(kD16s, hn::Min(at, hn::Set(kU16, uint16_t{16383})))), kD16s, out + x);
+    }
+  }
+
+ private:
+  struct Ratio {
+    V32 size, negative, divisor;
+  };
+  HWY_INLINE Ratio At(size_t x) const {
+    const auto code = hn::And(hn::LoadU(kDU32, depth_ + x), hn::Set(kDU32, 0xFFFFFFu));
+    const auto terms = hn::Add(first_, hn::Set(kDU32, a_ * static_cast<uint32_t>(x)));
+    const V32 sum = hn::BitCast(kD32s, hn::Sub(terms, hn::Mul(code, base_)));
+    const V32 negative = hn::ShiftRight<31>(sum), whole = hn::BitCast(kD32s, code);
+    const V32 size = hn::Min(hn::Xor(sum, negative), whole);
+    const auto up = ShiftTo(23, hn::Or(whole, hn::Set(kD32s, 1)));
+    return {hn::ShiftRight<8>(ShiftUp(size, up)), negative,
+            hn::Or(hn::ShiftRight<9>(ShiftUp(whole, up)), hn::Set(kD32s, 0x4000))};
+  }
+  // As Packed(), of numbers below 2^16.
+  static HWY_INLINE VU16 Unsigned(V32 a, V32 b) {
+#if HWY_TARGET <= HWY_AVX3
+    return VU16{_mm512_packus_epi32(a.raw, b.raw)};
+#else
+    return VU16{_mm256_packus_epi32(a.raw, b.raw)};
+#endif
+  }
+
+  const uint32_t* const depth_;
+  const hn::VFromD<DU32> base_, first_;
+  const uint32_t a_;
+  const V16 low_;
+  const VU16 scale_;
+};
+
+static void PairedHeights(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out) {
+  HeightVectors(depth, x0, y, model).Run(n, out);
+}
+
+#else
+constexpr auto PairedGeometry = Geometry;
+constexpr auto PairedHeights = Heights;
+#endif
