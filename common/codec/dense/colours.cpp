@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <numeric>
 
 #include "common/codec/golomb.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kShifts[3] = {8, 16, 0};  // green, red, blue
+constexpr int kShifts[3] = {8, 16, 0};      // green, red, blue
 constexpr size_t kMostColourSamples = 700;  // of a tile
 
 // Colours seen, by open addressing, and what stands for each.
@@ -171,16 +170,16 @@ void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& dept
     ColourHeight& of = heights[i / kTables];
     of.sum += static_cast<uint32_t>(sums[i]), of.pixels += static_cast<uint32_t>(sums[i] >> 32);
   }
-  std::vector<uint32_t> order(palette_.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
-    const double a = heights[i].mean(), b = heights[j].mean();
-    return a != b ? a < b : palette_[i] < palette_[j];
-  });
-  std::vector<uint32_t> palette(order.size());
+  struct Key {
+    double height;
+    uint32_t colour, place;
+    bool operator<(const Key& o) const { return height != o.height ? height < o.height : colour < o.colour; }
+  };
+  std::vector<Key> order;
+  for (uint32_t i = 0; i < palette_.size(); ++i) order.push_back({heights[i].mean(), palette_[i], i});
+  std::sort(order.begin(), order.end());
   std::vector<ColourHeight> sorted(order.size());
-  for (size_t i = 0; i < order.size(); ++i) palette[i] = palette_[order[i]], sorted[i] = heights[order[i]];
-  palette_ = palette;
+  for (size_t i = 0; i < order.size(); ++i) palette_[i] = order[i].colour, sorted[i] = heights[order[i].place];
   fit_knots(sorted, height_);
 }
 

@@ -123,17 +123,19 @@ DepthPlane::Way DepthPlane::choose_way(const TileShape& shape, bool may_mean) {
     const uint8_t* const tokens = symbols.tokens.row(r);
     kernels().plane_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
                               symbols.tokens.row(r));
-    for (size_t x = 0; x < shape.width; ++x) {
-      if (!shape.at(x, y)) continue;
-      const uint32_t token = token_of(z[x]);
-      ++linear[token], linear_bits += token >> 3;
-      ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
-    }
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (; x < end; ++x) {
+        const uint32_t token = token_of(z[x]);
+        ++linear[token], linear_bits += token >> 3;
+        ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
+      }
+    });
     if (!may_mean) continue;
     mean_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
                    symbols.tokens.row(r));
-    for (size_t x = 0; x < shape.width; ++x)
-      if (shape.at(x, y)) ++means[tokens[x]], mean_bits += tokens[x] >> 3;
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (; x < end; ++x) ++means[tokens[x]], mean_bits += tokens[x] >> 3;
+    });
   }
   const double by_line = static_cast<double>(linear_bits) + bits_of(linear, kSymbols),
                by_planes = static_cast<double>(plane_bits) + bits_of(planes, kSymbols),

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
 
 namespace telesplat::codec::detail {
 namespace {
@@ -79,12 +78,11 @@ void rank_colours(const Axis& axis, const std::vector<HeightSample>& samples, co
   for (size_t i = 0; i < first.size(); ++i) mean[i] = axis.of(first[i]);
   for (const HeightSample& s : samples) mean[s.place] += axis.of(s), count[s.place] += 1;
   for (size_t i = 0; i < mean.size(); ++i) mean[i] /= double{count[i]};
-  std::vector<uint32_t> order(first.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(),
-            [&](uint32_t i, uint32_t j) { return mean[i] != mean[j] ? mean[i] < mean[j] : i < j; });
+  std::vector<std::pair<double, uint32_t>> order;
+  for (uint32_t i = 0; i < mean.size(); ++i) order.emplace_back(mean[i], i);
+  std::sort(order.begin(), order.end());
   rank.resize(first.size());
-  for (uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+  for (uint32_t i = 0; i < order.size(); ++i) rank[order[i].second] = i;
 }
 
 // Least squares of hat functions: a tridiagonal system, which a little smoothness makes regular.
@@ -193,41 +191,52 @@ bool axes_of(const GeometryModel& g, RoomAxes& rays) {
   return true;
 }
 
+namespace {
+
+// Of colours that `axis` sorts: how far they are from what their heights say, as a share of how far they are spread.
+double unexplained(const Axis& axis, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first) {
+  std::vector<uint32_t> rank;
+  rank_colours(axis, samples, first, rank);
+  for (HeightSample& s : samples) s.index = rank[s.place];
+  const Curve curve = fit_curve(axis, samples);
+  double error = 0, spread = 0;
+  for (const HeightSample& s : samples) {
+    error += std::abs(curve.at(axis.of(s)) - s.index);
+    spread += std::abs(static_cast<double>(first.size()) / 2 - s.index);
+  }
+  return error < spread ? error / spread : 1;
+}
+
+}  // namespace
+
 bool find_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
                double axis[3]) {
+  constexpr double kWell = 0.1, kEnough = 0.25;  // unexplained
   if (samples.size() < 128 || first.size() < 8) return false;
   Axis best{};
   double least = 1e300;
-  const auto consider = [&](const Axis& axis) {
-    const double rough = roughness(axis, samples);
+  const auto consider = [&](const Axis& candidate) {
+    const double rough = roughness(candidate, samples);
     if (!(rough < least)) return false;
-    least = rough, best = axis;
+    least = rough, best = candidate;
     return true;
+  };
+  const auto choose = [&] {
+    axis[0] = best.a, axis[1] = best.b, axis[2] = best.c;
+    return unexplained(best, samples, first);
   };
   if (known.axes != nullptr)
     for (const auto& [a, b, c] : *known.axes) consider({a, b, c});
   bool exact = known.exact && least < 1e300;
+  if (exact && choose() < kWell) return true;
   if (Axis even[3]; even_axes(samples, even))
-    for (const Axis& axis : even) exact &= !consider(axis);
+    for (const Axis& candidate : even) exact &= !consider(candidate);
   if (!(least < 1e300)) return false;
-  std::vector<uint32_t> rank;
-  const auto order = [&] {
-    rank_colours(best, samples, first, rank);
-    for (HeightSample& s : samples) s.index = rank[s.place];
-  };
   for (int round = 0; round < kRounds && !exact; ++round) {
-    order();
+    choose();
     for (int step = 0; step < kSteps; ++step) improve(best, fit_curve(best, samples), samples);
   }
-  order();
-  const Curve curve = fit_curve(best, samples);
-  double error = 0, spread = 0;
-  for (const HeightSample& s : samples) {
-    error += std::abs(curve.at(best.of(s)) - s.index);
-    spread += std::abs(static_cast<double>(first.size()) / 2 - s.index);
-  }
-  axis[0] = best.a, axis[1] = best.b, axis[2] = best.c;
-  return error * 4 < spread;
+  return choose() < kEnough;
 }
 
 bool fit_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,

@@ -133,7 +133,7 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   constexpr size_t kMostSum = 16 * (kNumberTokens - 1);  // of a number's tokens with weights 3, 2, 2, 1 and 4, 2, 2
   std::array<uint32_t, kMostSum + 1> histogram{};
   uint32_t total = 0;
-  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 6) {
+  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 12) {
     const ContextRows rows = rows_around(plane, y);
     const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
     for (size_t x = y % 2; x < shape.width; x += 3, ++total)
