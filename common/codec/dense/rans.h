@@ -42,6 +42,8 @@ struct EncodeEntry {
     const uint64_t reciprocal = ((uint64_t{1} << (bits + 31)) + frequency - 1) / frequency;
     return {static_cast<uint32_t>(reciprocal), start | (kFrequencyOne - frequency) << 13 | (bits - 1) << 25};
   }
+  /// That of a token which starts so much later.
+  EncodeEntry from(uint32_t start) const { return {reciprocal, packed + start}; }
 };
 
 /// The symbols of a row that are to be put. Tokens below `first` have no raw bits; others are first + the token of z.

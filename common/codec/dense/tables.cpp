@@ -127,14 +127,17 @@ int choose_level(uint32_t count, uint64_t total, double share_of_one, int expect
 
 constexpr double kTokenCost = 6;  // bits of a level
 
-double log2_of(uint32_t n) {
+// n log2 n.
+float entropy_of(uint32_t n) {
   static const auto table = [] {
     std::array<float, 4096> out{};
-    for (uint32_t i = 1; i < out.size(); ++i) out[i] = static_cast<float>(std::log2(static_cast<double>(i)));
+    for (uint32_t i = 1; i < out.size(); ++i) out[i] = static_cast<float>(i * std::log2(static_cast<double>(i)));
     return out;
   }();
-  const int shift = std::max(0, static_cast<int>(std::bit_width(n)) - 12);
-  return static_cast<double>(table[n >> shift]) + shift;
+  if (n < table.size()) return table[n];
+  const int shift = static_cast<int>(std::bit_width(n)) - 12;
+  const uint32_t top = n >> shift;
+  return static_cast<float>(n) * (table[top] / static_cast<float>(top) + static_cast<float>(shift));
 }
 
 }  // namespace
@@ -143,11 +146,15 @@ double bits_of(const std::array<uint32_t, kSymbols>& counts, unsigned alphabet) 
   double sum = 0;
   uint32_t total = 0, present = 0;
   for (unsigned t = 0; t < alphabet; ++t)
-    if (const uint32_t n = counts[t]; n != 0) total += n, ++present, sum -= n * log2_of(n);
-  return total == 0 ? 0 : sum + total * log2_of(total) + kTokenCost * present;
+    if (const uint32_t n = counts[t]; n != 0) total += n, ++present, sum -= static_cast<double>(entropy_of(n));
+  return total == 0 ? 0 : sum + static_cast<double>(entropy_of(total)) + kTokenCost * present;
 }
 
 int merge_contexts(TokenCounts& counts, unsigned alphabet) {
+  const auto comes = [&](unsigned token) {
+    return std::any_of(counts.begin(), counts.end(), [&](const auto& c) { return c[token] != 0; });
+  };
+  while (alphabet > 0 && !comes(alphabet - 1)) --alphabet;
   double best = 0;
   for (const auto& c : counts) best += bits_of(c, alphabet);
   TokenCounts merged = counts;
@@ -223,13 +230,18 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
 }
 
 void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out) {
+  static const auto entries = [] {  // of tokens whose frequencies begin at 0
+    std::vector<EncodeEntry> all;
+    for (uint32_t f = 0; f <= kFrequencyOne; ++f) all.push_back(EncodeEntry::of(0, f));
+    return all;
+  }();
   out.resize(kContexts * kSymbols);
   std::array<uint16_t, kSymbols> frequencies;
   for (size_t c = 0; c < kContexts; ++c) {
     frequencies_of(levels.of[c], levels.alphabet, frequencies);
     uint32_t start = 0;
     for (unsigned t = 0; t < levels.alphabet; start += frequencies[t++])
-      out[c * kSymbols + t] = EncodeEntry::of(start, frequencies[t]);
+      out[c * kSymbols + t] = entries[frequencies[t]].from(start);
   }
 }
 
