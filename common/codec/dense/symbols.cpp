@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <utility>
 
 namespace telesplat::codec::detail {
 namespace {
@@ -15,11 +16,10 @@ ContextRows rows_around(const SymbolPlane& plane, size_t y) {
           plane.other != nullptr ? plane.other->row(row) : nullptr};
 }
 
-// Copies `count` elements and up to 31 bytes that follow them: both sides have room for those.
-template <class T>
-void copy_about(const T* from, size_t count, T* to) {
-  constexpr size_t kStep = 32 / sizeof(T);
-  for (size_t i = 0; i < count; i += kStep) std::memcpy(to + i, from + i, 32);
+// Copies `count` elements of each, and up to 31 that follow them: all have room for those.
+template <class... T>
+void copy_about(size_t count, std::pair<const T*, T*>... each) {
+  for (size_t i = 0; i < count; i += 32) (std::memcpy(each.second + i, each.first + i, 32 * sizeof(T)), ...);
 }
 
 bool has_kinds(const SymbolPlane& plane) { return plane.first != 0; }
@@ -41,14 +41,35 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
   total = width * height;
   if (mask == nullptr) return;
   total = 0;
+  runs.clear(), first_run.assign(1, 0);
   cover_bytes.reset(width, height);
   for (size_t y = 0; y < height; ++y) {
     const uint64_t* const words = mask->row(static_cast<int>(y));
     uint32_t n = 0;
     for (size_t w = 0; w < mask->words_per_row(); ++w) n += static_cast<uint32_t>(std::popcount(words[w]));
     covered[y] = n, total += n;
-    if (n != width) kernels().cover_bytes(words, width, cover_bytes.row(static_cast<ptrdiff_t>(y)));
+    if (n != width) {
+      kernels().cover_bytes(words, width, cover_bytes.row(static_cast<ptrdiff_t>(y)));
+      if (n != 0) add_runs(words);
+    }
+    first_run.push_back(static_cast<uint32_t>(runs.size()));
   }
+}
+
+void TileShape::add_runs(const uint64_t* words) {
+  const auto end = static_cast<uint32_t>(width);
+  uint32_t begin = end;  // of the run that has not ended
+  for (uint32_t at = 0; at < end; at += 64) {
+    uint64_t changes = words[at / 64] ^ (words[at / 64] << 1 | uint64_t{begin != end});
+    for (; changes != 0; changes &= changes - 1) {
+      const uint32_t x = at + static_cast<uint32_t>(std::countr_zero(changes));
+      if (begin == end)
+        begin = x;
+      else
+        runs.push_back({begin, x}), begin = end;
+    }
+  }
+  if (begin != end) runs.push_back({begin, end});
 }
 
 void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_number) {
@@ -177,11 +198,6 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
   for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y) make_contexts(plane, shape, y);
   count(plane, shape);
   if (!plane.has_contexts) plane.scale.merges = merge_contexts(counts_, plane.alphabet);
-  if (const int merges = plane.scale.merges; merges != 0)
-    for (size_t y = 0; y < shape.height; ++y) {
-      uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
-      for (size_t x = 0, width = shape.width; x < width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> merges);
-    }
   choose_levels(counts_, plane.alphabet, levels_);
   if (!has_kinds(plane)) {
     bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
@@ -189,33 +205,37 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
   }
   bits.put(static_cast<uint64_t>(plane.scale.merges), 3);
   put_levels(bits, levels_);
-  make_encode_tables(levels_, tables_);
+  make_encode_tables(levels_, tables_, plane.scale.merges);
 }
 
 uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, States& states,
-                               uint8_t* out) const {
+                               uint8_t* out) {
   SymbolRow row = plane.row(shape, y);
   row.states = states.count;
-  if (shape.full(y)) return kernels().put_symbols(row, tables_.data(), states.of, out);
-  static thread_local std::vector<uint8_t> tokens, contexts, narrow;
-  static thread_local std::vector<uint32_t> wide;
-  const size_t needed = row.count + Plane<uint8_t>::kTail;
-  if (tokens.size() < needed)
-    tokens.resize(needed), contexts.resize(needed), narrow.resize(needed), wide.resize(needed);
-  size_t n = 0;
-  shape.for_each_run(y, [&](size_t begin, size_t end) {
-    const size_t count = end - begin;
-    copy_about(row.tokens + begin, count, tokens.data() + n);
-    copy_about(row.contexts + begin, count, contexts.data() + n);
-    if (row.wide != nullptr)
-      copy_about(row.wide + begin, count, wide.data() + n);
-    else
-      copy_about(row.narrow + begin, count, narrow.data() + n);
-    n += count;
-  });
-  return kernels().put_symbols({tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr,
-                                narrow.data(), n, row.first, states.count},
-                               tables_.data(), states.of, out);
+  if (!shape.full(y)) {
+    const size_t needed = shape.width + Plane<uint8_t>::kTail;
+    if (packed_tokens_.size() < needed)
+      packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed),
+          packed_wide_.resize(needed);
+    size_t n = 0;
+    const auto pack = [&](auto from, auto& to) {
+      shape.for_each_run(y, [&](size_t begin, size_t end) {
+        copy_about(end - begin, std::pair{row.tokens + begin, packed_tokens_.data() + n},
+                   std::pair{row.contexts + begin, packed_contexts_.data() + n},
+                   std::pair{from + begin, to.data() + n});
+        n += end - begin;
+      });
+    };
+    if (row.wide != nullptr) {
+      pack(row.wide, packed_wide_);
+      row.wide = packed_wide_.data();
+    } else {
+      pack(row.narrow, packed_narrow_);
+      row.narrow = packed_narrow_.data();
+    }
+    row.tokens = packed_tokens_.data(), row.contexts = packed_contexts_.data();
+  }
+  return kernels().put_symbols(row, tables_.data(), states.of, out);
 }
 
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
@@ -250,7 +270,7 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
         packed_wide_.resize(needed);
   size_t n = 0;
   shape.for_each_run(y, [&](size_t begin, size_t end) {
-    copy_about(contexts + begin, end - begin, packed_contexts_.data() + n);
+    copy_about(end - begin, std::pair<const uint8_t*, uint8_t*>{contexts + begin, packed_contexts_.data() + n});
     n += end - begin;
   });
   source.end = kernels().get_symbols(
@@ -259,15 +279,17 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
       tables_.data(), source.states.of, source.begin, source.end);
   if (source.end == nullptr) return false;
   n = 0;
-  shape.for_each_run(y, [&](size_t begin, size_t end) {
-    const size_t count = end - begin;
-    copy_about(packed_tokens_.data() + n, count, tokens + begin);
-    if (wide != nullptr)
-      copy_about(packed_wide_.data() + n, count, wide + begin);
-    else
-      copy_about(packed_narrow_.data() + n, count, narrow + begin);
-    n += count;
-  });
+  const auto unpack = [&]<class T>(const std::vector<T>& from, T* to) {
+    shape.for_each_run(y, [&](size_t begin, size_t end) {
+      copy_about(end - begin, std::pair<const uint8_t*, uint8_t*>{packed_tokens_.data() + n, tokens + begin},
+                 std::pair<const T*, T*>{from.data() + n, to + begin});
+      n += end - begin;
+    });
+  };
+  if (wide != nullptr)
+    unpack(packed_wide_, wide);
+  else
+    unpack(packed_narrow_, narrow);
   if (wide != nullptr) kernels().cut_wide(shape.cover(y), wide, shape.width, wide);
   finish_tokens(plane, shape, y);
   return true;

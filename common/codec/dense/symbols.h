@@ -21,8 +21,14 @@ struct TileShape {
   std::vector<uint32_t> covered;  ///< pixels of each row
   Plane<uint8_t> cover_bytes;     ///< 255 where a pixel is covered, else 0; unless all are
   size_t total = 0;
+  struct Run {
+    uint32_t begin, end;
+  };
+  std::vector<Run> runs;            ///< of rows that are not full
+  std::vector<uint32_t> first_run;  ///< of each row, and of none after the last
 
   void reset(size_t tile_width, size_t tile_height, const Mask* tile_mask);
+  void add_runs(const uint64_t* words);  ///< of the next row
   bool full(size_t y) const { return covered[y] == width; }
   /// As kernels take it: null where all of row y is covered.
   const uint8_t* cover(size_t y) const { return full(y) ? nullptr : cover_bytes.row(static_cast<ptrdiff_t>(y)); }
@@ -31,20 +37,7 @@ struct TileShape {
   template <class F>
   void for_each_run(size_t y, F f) const {
     if (full(y)) return f(size_t{0}, width);
-    if (covered[y] == 0) return;
-    const uint64_t* const words = mask->row(static_cast<int>(y));
-    size_t begin = width;  // of the run that has not ended
-    for (size_t at = 0; at < width; at += 64) {
-      uint64_t changes = words[at / 64] ^ (words[at / 64] << 1 | uint64_t{begin != width});
-      for (; changes != 0; changes &= changes - 1) {
-        const size_t x = at + static_cast<size_t>(std::countr_zero(changes));
-        if (begin == width)
-          begin = x;
-        else
-          f(begin, x), begin = width;
-      }
-    }
-    if (begin != width) f(begin, width);
+    for (size_t i = first_run[y]; i < first_run[y + 1]; ++i) f(size_t{runs[i].begin}, size_t{runs[i].end});
   }
   /// Calls f(x) for the pixels of row y that are not covered.
   template <class F>
@@ -95,11 +88,11 @@ struct States {
   bool at_rest() const;  ///< as reset() leaves them
 };
 
-/// Of one plane: chooses contexts and tables, and puts them into `bits`. Leaves the plane packed: covered pixels only.
+/// Of one plane: chooses contexts and tables, and puts them into `bits`.
 class PlaneEncoder {
  public:
   void prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits);
-  uint8_t* put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, States& states, uint8_t* out) const;
+  uint8_t* put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, States& states, uint8_t* out);
   static constexpr size_t kMostBits = 32 + kMostLevelBits;
 
  private:
@@ -109,7 +102,9 @@ class PlaneEncoder {
   TokenCounts counts_;
   uint16_t parts_[4][kContexts * kSymbols];  ///< of counts_
   std::vector<uint16_t> joined_;             ///< a row's contexts * kSymbols + tokens
-  std::vector<EncodeEntry> tables_;
+  std::vector<EncodeEntry> tables_;          ///< of contexts before they are merged
+  std::vector<uint8_t> packed_tokens_, packed_contexts_, packed_narrow_;
+  std::vector<uint32_t> packed_wide_;
 };
 
 /// Words and states from which all planes of a tile are decoded.

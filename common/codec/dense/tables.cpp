@@ -229,7 +229,7 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
   out[last] = static_cast<uint16_t>(out[last] + free - given);  // where all weigh nothing
 }
 
-void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out) {
+void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out, int merges) {
   static const auto entries = [] {  // of tokens whose frequencies begin at 0
     std::vector<EncodeEntry> all;
     for (uint32_t f = 0; f <= kFrequencyOne; ++f) all.push_back(EncodeEntry::of(0, f));
@@ -243,6 +243,10 @@ void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out
     for (unsigned t = 0; t < levels.alphabet; start += frequencies[t++])
       out[c * kSymbols + t] = entries[frequencies[t]].from(start);
   }
+  if (merges == 0) return;
+  for (size_t c = kContexts; c-- > 0;)
+    std::copy_n(out.begin() + static_cast<ptrdiff_t>((c >> merges) * kSymbols), levels.alphabet,
+                out.begin() + static_cast<ptrdiff_t>(c * kSymbols));
 }
 
 void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out, size_t contexts) {
