@@ -61,11 +61,14 @@ HWY_INLINE uint8_t* PutGroup(const SymbolRow& row, size_t begin, const EncodeEnt
     const M valid = hn::FirstN(kD, n > i * kN ? n - i * kN : 0);
     tokens[i] = hn::IfThenElseZero(valid, Load8(row.tokens + begin + i * kN));
     bits[i] = hn::ShiftRight<3>(hn::Sub(hn::Max(tokens[i], first), first));
-    z[i] = hn::Add(LoadZ<kWide>(row, begin + i * kN), hn::Set(kD, 8u));
     widest = hn::Max(widest, bits[i]);
+  }
+  const bool any = !hn::AllTrue(kD, hn::Eq(widest, hn::Zero(kD)));
+  for (size_t i = 0; any && i < kVectors; ++i) {
+    z[i] = hn::Add(LoadZ<kWide>(row, begin + i * kN), hn::Set(kD, 8u));
     const V low = kWide ? hn::Min(bits[i], fifteen) : bits[i];
     const V limit = hn::Sub(hn::Shl(one, hn::Sub(hn::Set(kD, 31u), low)), one);
-    x[i] = Spill(x[i], hn::And(valid, Exceeds(x[i], limit)), out);
+    x[i] = Spill(x[i], Exceeds(x[i], limit), out);
     x[i] = hn::Or(hn::Shl(x[i], low), hn::And(z[i], hn::Sub(hn::Shl(one, low), one)));
   }
   if (kWide && !hn::AllFalse(kD, hn::Gt(widest, fifteen)))
@@ -174,10 +177,14 @@ HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, size_t n
       kept[i] = hn::Add(kept[i], hn::ShiftLeft<15>(hn::And(x[i], hn::Sub(hn::Shl(one, high), one))));
       x[i] = Refill(hn::Shr(x[i], high), end);
     }
+  const bool any = !hn::AllTrue(kD, hn::Eq(widest, hn::Zero(kD)));
   for (size_t i = kVectors; i-- > 0;) {
-    const V low = hn::Min(bits[i], fifteen);
-    const V z = hn::Sub(hn::Add(kept[i], hn::And(x[i], hn::Sub(hn::Shl(one, low), one))), hn::Set(kD, 8u));
-    x[i] = Refill(hn::Shr(x[i], low), end);
+    V z = hn::Sub(kept[i], hn::Set(kD, 8u));
+    if (any) {
+      const V low = hn::Min(bits[i], fifteen);
+      z = hn::Add(z, hn::And(x[i], hn::Sub(hn::Shl(one, low), one)));
+      x[i] = Refill(hn::Shr(x[i], low), end);
+    }
     if constexpr (kWide)
       hn::StoreU(z, kD, row.wide + begin + i * kN);
     else
