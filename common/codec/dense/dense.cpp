@@ -182,6 +182,14 @@ void DenseCoder::begin_part(const Parts& parts, size_t part) {
   source_.begin = source_.end - parts.word_bytes[part];
 }
 
+// Where a row of values may be made for store(): the image itself, unless rows were joined.
+template <class T>
+T* DenseCoder::row_for(std::vector<T>& out, const TileRect& rect, size_t y, std::vector<T>& scratch) const {
+  if (rect.width >= kNarrow) return out.data() + rect.index(0, static_cast<int>(y));
+  if (scratch.size() < shape_.width) scratch.resize(shape_.width);
+  return scratch.data();
+}
+
 // row -> image; pixels that are not covered become 0.
 template <class T>
 void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const {
@@ -190,7 +198,7 @@ void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRe
     const size_t flat = y * shape_.width + begin;
     T* const to = out.data() + rect.index(0, static_cast<int>(flat / width));
     if (shape_.full(y)) {
-      std::copy_n(row + begin, width, to);
+      if (to != row + begin) std::copy_n(row + begin, width, to);
       continue;
     }
     const uint8_t* const cover = shape_.cover(y) + begin;
@@ -244,23 +252,25 @@ bool DenseCoder::get_symbols(size_t first, size_t count, Planes plane) {
 
 // Normals and colours from their symbols.
 void DenseCoder::get_values(image::DepthImage& image, const TileRect& rect, const Pixel& base) {
-  if (normal_rows_.size() < shape_.width) normal_rows_.resize(shape_.width);
-  if (colour_rows_.size() < shape_.width) colour_rows_.resize(shape_.width);
-  std::fill_n(colour_rows_.begin(), shape_.width, base.colour);
   GuidedPlane &a = normals_.plane[0], &b = normals_.plane[1];
   for (size_t y = 0; y < shape_.height; ++y) {
+    uint16_t* const normals = row_for(image.normal, rect, y, normal_rows_);
+    uint32_t* const colours = row_for(image.colour, rect, y, colour_rows_);
     normals_.decode_sums(shape_, y);
     if (colours_.mode == ColourPlanes::kPalette) {
       colours_.index.decode_sums(shape_, y, nullptr);
       decode_values(a, b, colours_.index, shape_, y);
-      colours_.get_colours(shape_, y, colour_rows_.data());
+      colours_.get_colours(shape_, y, colours);
     } else {
       decode_values(a, b, shape_, y);
-      if (colours_.planes() != 0) colours_.decode_row(shape_, y, colour_rows_.data());
+      if (colours_.planes() != 0)
+        colours_.decode_row(shape_, y, colours);
+      else
+        std::fill_n(colours, shape_.width, base.colour);
     }
-    normals_.get_codes(shape_, y, normal_rows_.data());
-    store(normal_rows_.data(), y, image.normal, rect);
-    store(colour_rows_.data(), y, image.colour, rect);
+    normals_.get_codes(shape_, y, normals);
+    store(normals, y, image.normal, rect);
+    store(colours, y, image.colour, rect);
   }
 }
 

@@ -51,6 +51,8 @@ class DenseCoder {
   [[nodiscard]] bool get_symbols(size_t first, size_t count, Planes plane);
   void get_values(image::DepthImage& image, const TileRect& rect, const Pixel& base);
   template <class T>
+  T* row_for(std::vector<T>& out, const TileRect& rect, size_t y, std::vector<T>& scratch) const;
+  template <class T>
   void store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const;
 
   TileShape shape_;

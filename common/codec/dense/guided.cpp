@@ -208,6 +208,7 @@ GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
           values.row(r - 2),
           {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
           before != nullptr ? before->residuals.row(r) : nullptr,
+          nullptr,
           flatness != nullptr ? flatness->row(r) : nullptr,
           flatness != nullptr ? sets : &weights,
           constant,
@@ -347,18 +348,15 @@ void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlan
   if (bits == 6) {
     kernels().unfold_bytes(symbols.narrow.row(r), shape.width, out);
   } else {
-    const uint32_t* const z = symbols.wide.row(r);
-    for (size_t x = 0; x < shape.width; ++x)
-      out[x] = static_cast<int16_t>((static_cast<int>(z[x] >> 1) ^ -static_cast<int>(z[x] & 1)) * (1 << bits));
+    kernels().unfold_wide(symbols.wide.row(r), shape.width, bits, out);
   }
   begin_row(shape, y);
   if (median) return;
-  make_sums(shape, y, before);
   has_residuals = most_weight_ <= kTame;
-  if (has_residuals)
-    kernels().add_residuals(out, shape.width, 1 << (bits + 12), sums.data());
-  else
-    wild = true;
+  wild |= !has_residuals;
+  GuidedRows rows = rows_around(y, before);
+  if (has_residuals) rows.own_residual = out, rows.constant += 1 << (bits + 12);
+  kernels().guided_sums(rows, shape.width, sums.data(), false);
 }
 
 // Values of pixels that are not covered, and borders, before the others are known: those of covered ones are written

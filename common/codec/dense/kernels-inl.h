@@ -280,6 +280,10 @@ static void UnfoldBytes(const uint8_t* RESTRICT z, size_t n, int16_t* RESTRICT o
   }
 }
 
+static void UnfoldWide(const uint32_t* RESTRICT z, size_t n, int bits, int16_t* RESTRICT out) {
+  for (size_t x = 0; x < n; ++x) out[x] = static_cast<int16_t>(((z[x] >> 1) ^ (0 - (z[x] & 1))) << bits);
+}
+
 static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,
                             uint8_t* RESTRICT tokens) {
   for (size_t x = 0; x < n; ++x) {
@@ -306,6 +310,14 @@ static void Flatness(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT a
   }
 }
 
+static constexpr int kOwnWeight = 1 << 13;  // of a plane's own residuals
+
+static void AddOwnResiduals(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums) {
+  const int16_t* RESTRICT residual = rows.own_residual;
+  if (residual == nullptr) return;
+  for (size_t x = 0; x < n; ++x) sums[x] += residual[x] * kOwnWeight;
+}
+
 static void SumsByFlatness(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums, bool with_left) {
   const int16_t *RESTRICT up = rows.above, *RESTRICT own = rows.own;
   for (size_t x = 0; x < n; ++x) {
@@ -316,6 +328,7 @@ static void SumsByFlatness(const GuidedRows& rows, size_t n, int32_t* RESTRICT s
     if (with_left) sum += w[0] * own[x - 1] + w[kFarLeft] * own[x - 2];
     sums[x] = sum;
   }
+  AddOwnResiduals(rows, n, sums);
 }
 
 static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums, bool with_left) {
@@ -331,10 +344,7 @@ static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums,
               w[11] * g2[x] + w[12] * g2[x + 1];
   if (other != nullptr)
     for (size_t x = 0; x < n; ++x) sums[x] += w[13] * other[x];
-}
-
-static void AddResiduals(const int16_t* RESTRICT residuals, size_t n, int32_t round, int32_t* RESTRICT sums) {
-  for (size_t x = 0; x < n; ++x) sums[x] += residuals[x] * (1 << 13) + round;
+  AddOwnResiduals(rows, n, sums);
 }
 
 static inline int32_t Guess(int32_t sum, int bits, int32_t most) {
@@ -349,6 +359,7 @@ static GuidedRows PartOf(const GuidedRows& rows, size_t begin) {
   part.own += begin, part.above += begin, part.above2 += begin;
   for (auto& g : part.guide) g += begin;
   if (part.residual != nullptr) part.residual += begin;
+  if (part.own_residual != nullptr) part.own_residual += begin;
   if (part.flatness != nullptr) part.flatness += begin;
   return part;
 }

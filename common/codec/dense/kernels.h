@@ -52,6 +52,7 @@ struct GuidedRows {
   const int16_t *own, *above, *above2;     ///< the plane's row, of which what is to the left is used, and those above
   const int16_t* guide[3];                 ///< the guide's rows above, here, below
   const int16_t* residual;                 ///< of another plane's same row, in 64ths; null: none
+  const int16_t* own_residual;             ///< of the plane itself, which weigh 1; null: they are not added
   const uint8_t* flatness;                 ///< of the row's pixels; null: of all it is 0, and LL and UU weigh nothing
   const int16_t (*weights)[kGuidedTerms];  ///< in 2^-13, of each flatness: L, U, UL, UR; the guide's 3 x 3; ...
   int32_t constant;                        ///< in 2^-13 of the plane's unit
@@ -121,6 +122,8 @@ struct Kernels {
   void (*divide)(int16_t* row, size_t n, int offset, uint32_t share);
   /// Bytes that were folded -> 64ths of -128..127.
   void (*unfold_bytes)(const uint8_t* z, size_t n, int16_t* out);
+  /// The same of larger numbers, times 2^bits.
+  void (*unfold_wide)(const uint32_t* z, size_t n, int bits, int16_t* out);
   /// Residuals of bytes by the median predictor, folded, and their tokens.
   void (*median_residuals)(const uint8_t* above, const uint8_t* row, size_t n, uint8_t* z, uint8_t* tokens);
   /// Residuals of a plane of 64ths by guided prediction, folded mod 256, their tokens; and as 64ths of -128..127.
@@ -130,10 +133,9 @@ struct Kernels {
   /// The same as guided_residuals() by the median of L, U and L + U - UL.
   void (*median_values)(const int16_t* above, const int16_t* row, size_t n, uint8_t* z, uint8_t* tokens,
                         int16_t* residual);
-  /// All terms of guided prediction but those of L and LL; with_left, which needs a flatness: these too.
+  /// All terms of guided prediction but those of L and LL; with_left, which needs a flatness and no residuals of the
+  /// plane itself: these too.
   void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums, bool with_left);
-  /// sums += residuals * 2^13 + round.
-  void (*add_residuals)(const int16_t* residuals, size_t n, int32_t round, int32_t* sums);
   /// Flatness of each pixel of `row`: depth differs by less than `limit`, a power of two, from what continues it.
   void (*flatness)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t limit,
                    uint8_t* out);

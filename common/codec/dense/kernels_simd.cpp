@@ -100,12 +100,12 @@ static const Kernels* Set() {
                                TurnNormalsBack,
                                Divide,
                                UnfoldBytes,
+                               UnfoldWide,
                                MedianResiduals,
                                GuidedResiduals<GuidedSums>,
                                GuidedResidualsWide<GuidedSums>,
                                MedianValues,
                                GuidedSums,
-                               AddResiduals,
                                Flatness,
                                Geometry,
                                Heights,
@@ -256,13 +256,14 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{
-      CoveredBits,     CoverBytes,     CutWide,         CutShort,        KeepBytes,       FillValues,
-      Within,          LargestLessOne, DepthResiduals,  DepthRowsVector, PlaneResiduals,  PlaneTerms,
-      PlaneKinds,      PlaneContexts,  PairedContexts,  JoinBytes,       OtherNormals,    TurnNormals,
-      TurnNormalsBack, Divide,         UnfoldBytes,     MedianResiduals, PairedResiduals, PairedResidualsWide,
-      MedianValues,    PairedSums,     AddResiduals,    Flatness,        PairedGeometry,        PairedHeights,
-      KnotsVector,     Activity,       NormalEquations, SampleShares,    PutSymbols,      GetSymbols};
+  static constexpr Kernels all{CoveredBits,    CoverBytes,   CutWide,         CutShort,        KeepBytes,
+                               FillValues,     Within,       LargestLessOne,  DepthResiduals,  DepthRowsVector,
+                               PlaneResiduals, PlaneTerms,   PlaneKinds,      PlaneContexts,   PairedContexts,
+                               JoinBytes,      OtherNormals, TurnNormals,     TurnNormalsBack, Divide,
+                               UnfoldBytes,    UnfoldWide,   MedianResiduals, PairedResiduals, PairedResidualsWide,
+                               MedianValues,   PairedSums,   Flatness,        PairedGeometry,  PairedHeights,
+                               KnotsVector,    Activity,     NormalEquations, SampleShares,    PutSymbols,
+                               GetSymbols};
   return &all;
 }
 

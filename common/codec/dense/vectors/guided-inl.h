@@ -4,7 +4,7 @@
 #if HWY_TARGET <= HWY_AVX2
 
 // Pairs of terms whose products are added at once. What is to the left comes last, in place of kFarAbove where weights
-// are the same for all pixels.
+// are the same for all pixels; and where that is not known yet, the plane's own residuals.
 constexpr int kPairs = 8;
 constexpr int kTermPairs[kPairs][2] = {{1, 2},  {3, 4},   {5, 6},          {7, 8},
                                        {9, 10}, {11, 12}, {13, kFarAbove}, {0, kFarLeft}};
@@ -62,20 +62,24 @@ class EvenTerms {
       : up_(rows.above),
         guide_{rows.guide[0], rows.guide[1], rows.guide[2]},
         residual_(rows.residual != nullptr ? rows.residual : rows.above),
-        own_(rows.own),
-        has_last_(rows.residual != nullptr || with_left),
+        last_(with_left                      ? rows.own - 1
+              : rows.own_residual != nullptr ? rows.own_residual
+                                             : rows.above),
+        has_last_(rows.residual != nullptr || rows.own_residual != nullptr || with_left),
         constant_(hn::Set(kD32s, constant)) {
     const int16_t* const w = rows.weights[0];
     for (int i = 0; i < kLast; ++i) weights_[i] = hn::Set(kD32s, PairOf(w[kTermPairs[i][0]], w[kTermPairs[i][1]]));
-    weights_[kLast] = hn::Set(
-        kD32s, PairOf(rows.residual != nullptr ? w[kOtherResidual] : int16_t{0}, with_left ? w[0] : int16_t{0}));
+    weights_[kLast] = hn::Set(kD32s, PairOf(rows.residual != nullptr ? w[kOtherResidual] : int16_t{0},
+                                            with_left                      ? w[0]
+                                            : rows.own_residual != nullptr ? int16_t{kOwnWeight}
+                                                                           : int16_t{0}));
   }
   HWY_INLINE PairSums At(size_t x) const {
     PairSums sums{constant_, constant_};
     const int16_t *const up = up_ + x, *const g0 = guide_[0] + x, *const g1 = guide_[1] + x, *const g2 = guide_[2] + x;
     Add(sums, up, up - 1, weights_[0]), Add(sums, up + 1, g0 - 1, weights_[1]), Add(sums, g0, g0 + 1, weights_[2]);
     Add(sums, g1 - 1, g1, weights_[3]), Add(sums, g1 + 1, g2 - 1, weights_[4]), Add(sums, g2, g2 + 1, weights_[5]);
-    if (has_last_) Add(sums, residual_ + x, own_ + x - 1, weights_[kLast]);
+    if (has_last_) Add(sums, residual_ + x, last_ + x, weights_[kLast]);
     return sums;
   }
 
@@ -86,7 +90,7 @@ class EvenTerms {
     sums.low = hn::Add(sums.low, PairProducts(hn::InterleaveLower(kD16s, a, b), weights));
     sums.high = hn::Add(sums.high, PairProducts(hn::InterleaveUpper(kD16s, a, b), weights));
   }
-  const int16_t *const up_, *const guide_[3], *const residual_, *const own_;
+  const int16_t *const up_, *const guide_[3], *const residual_, *const last_;
   const bool has_last_;
   const V32 constant_;
   V32 weights_[kLast + 1];
@@ -96,22 +100,31 @@ class EvenTerms {
 class FlatTerms {
  public:
   FlatTerms(const GuidedRows& rows, int32_t constant, bool with_left)
-      : terms_{rows.own - 1,      rows.above,
-               rows.above - 1,    rows.above + 1,
-               rows.guide[0] - 1, rows.guide[0],
-               rows.guide[0] + 1, rows.guide[1] - 1,
-               rows.guide[1],     rows.guide[1] + 1,
-               rows.guide[2] - 1, rows.guide[2],
-               rows.guide[2] + 1, rows.residual != nullptr ? rows.residual : rows.above,
-               rows.own - 2,      rows.above2},
+      : terms_{rows.own_residual != nullptr ? rows.own_residual : rows.own - 1,
+               rows.above,
+               rows.above - 1,
+               rows.above + 1,
+               rows.guide[0] - 1,
+               rows.guide[0],
+               rows.guide[0] + 1,
+               rows.guide[1] - 1,
+               rows.guide[1],
+               rows.guide[1] + 1,
+               rows.guide[2] - 1,
+               rows.guide[2],
+               rows.guide[2] + 1,
+               rows.residual != nullptr ? rows.residual : rows.above,
+               rows.own - 2,
+               rows.above2},
         flatness_(rows.flatness),
-        pairs_(with_left ? kPairs : kPairs - 1),
+        pairs_(with_left || rows.own_residual != nullptr ? kPairs : kPairs - 1),
         constant_(hn::Set(kD32s, constant)) {
     for (int pair = 0; pair < kPairs; ++pair)
       for (int k = 0; k < kFlatnesses; ++k) {
         const int16_t* const w = rows.weights[k];
         weights_[pair][k] = PairOf(w[kTermPairs[pair][0]], w[kTermPairs[pair][1]]);
         if (pair == 6 && rows.residual == nullptr) weights_[pair][k] &= ~0xFFFF;
+        if (pair == 7 && rows.own_residual != nullptr) weights_[pair][k] = kOwnWeight;
       }
   }
   HWY_INLINE PairSums At(size_t x) const {
