@@ -149,7 +149,7 @@ DepthImage plane(int width, int height, double slope_x, double slope_y) {
   return image;
 }
 
-DepthImage facets(int width, int height, uint32_t seed) {
+DepthImage facets(int width, int height, uint32_t seed, int spread) {
   std::mt19937 random(seed);
   DepthImage image = plane(width, height, 0, 0);
   const int columns = width / 5 + 2;
@@ -159,7 +159,8 @@ DepthImage facets(int width, int height, uint32_t seed) {
   std::vector<Corner> corners(static_cast<size_t>(columns * (height / 5 + 2)));
   for (Corner& c : corners) {
     c.depth = 4e6 + static_cast<double>(random() % 60000);
-    c.x = 77 + static_cast<double>(random() % 100), c.y = 77 + static_cast<double>(random() % 100);
+    c.x = 127 - spread / 2 + static_cast<double>(random() % static_cast<uint32_t>(spread));
+    c.y = 127 - spread / 2 + static_cast<double>(random() % static_cast<uint32_t>(spread));
   }
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {

@@ -21,7 +21,7 @@ image::DepthImage render(const TerrainView& view);
 image::DepthImage plane(int width, int height, double slope_x, double slope_y);
 /// A surface of triangles a few pixels wide, two to a square of five pixels, whose normals go from those of one corner
 /// to those of the others. One colour.
-image::DepthImage facets(int width, int height, uint32_t seed);
+image::DepthImage facets(int width, int height, uint32_t seed, int spread = 100);
 /// Every covered pixel random in all its bits.
 image::DepthImage random_pixels(int width, int height, double density, uint32_t seed);
 

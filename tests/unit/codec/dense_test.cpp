@@ -58,8 +58,43 @@ NormalPlanes normals_of(const DepthImage& image) {
   return normals;
 }
 
+// A rough ball in front of a camera that looks along -z, its ray axes, and those of a camera that looks elsewhere.
+struct Ball {
+  static constexpr int kWidth = 256, kHeight = 200;
+  Ball() : image(kWidth, kHeight) {
+    const glm::dvec3 centre(0.3, -0.2, -3);
+    std::mt19937 random(1);
+    const auto noise = [&] { return 0.1 * (static_cast<double>(random() % 1000) / 1000 - 0.5); };
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        const auto along = [&](size_t i) { return axes[i][0] * x + axes[i][1] * y + axes[i][2]; };
+        const glm::dvec3 ray(along(0), along(1), along(2));
+        const double a = glm::dot(ray, ray), b = glm::dot(ray, centre),
+                     c = glm::dot(centre, centre) - kRadius * kRadius;
+        const double depth = (b - std::sqrt(b * b - a * c)) / a;
+        const auto i = static_cast<size_t>(y * kWidth + x);
+        image.depth[i] = image::encode_depth(depth, 0.5), image.colour[i] = 0x8090A0;
+        image.normal[i] = image::encode_normal16(
+            glm::vec3(glm::normalize((depth * ray - centre) / kRadius + glm::dvec3(noise(), noise(), noise()))));
+      }
+  }
+  static constexpr double kRadius = 2.2;
+  const RoomAxes axes = {{{0.004, 0, -0.5}, {0, -0.004, 0.4}, {0, 0, -1}}};
+  const RoomAxes other = {{{0.004, 0, -0.5}, {0, 0, -1}, {0, 0.004, -0.4}}};
+  DepthImage image;
+};
+
+TEST(Dense, WhatTheCameraSaysOfNormalsNeedsNoSamples) {
+  const Ball ball;
+  const auto fitted = encode(ball.image), known = encode(ball.image, {}, nullptr, ball.axes);
+  EXPECT_EQ(decode(known).value(), ball.image);
+  EXPECT_NE(known, fitted) << "it was not taken";
+  EXPECT_LT(static_cast<double>(known.size()), 1.002 * static_cast<double>(fitted.size()));
+  EXPECT_EQ(encode(ball.image, {}, nullptr, ball.other), fitted) << "normals that do not follow what is said";
+}
+
 TEST(Dense, NormalsOfFacetsFollowThoseOfTheSameFacet) {
-  const DepthImage image = test::facets(256, 200, 3);
+  const DepthImage image = test::facets(256, 200, 3, 130);
   const StreamInfo info = expect_round_trip(image);
   const NormalPlanes normals = normals_of(image);
   EXPECT_NE(normals.plane[0].flatness, nullptr);

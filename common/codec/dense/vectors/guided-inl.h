@@ -1,5 +1,5 @@
-// Guided prediction with vectors: products of 16 bits, two at a time, which halves their number. Included once for every
-// instruction set, in its namespace. No include guard: that is meant.
+// Guided prediction with vectors: products of 16 bits, two at a time, which halves their number. Included once for
+// every instruction set, in its namespace. No include guard: that is meant.
 
 #if HWY_TARGET <= HWY_AVX2
 

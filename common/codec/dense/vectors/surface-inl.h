@@ -1,5 +1,5 @@
-// What depth says of surfaces, with vectors: directions of normals, and heights. Included once for every instruction set,
-// in its namespace. No include guard: that is meant.
+// What depth says of surfaces, with vectors: directions of normals, and heights. Included once for every instruction
+// set, in its namespace. No include guard: that is meant.
 
 #if HWY_TARGET <= HWY_AVX2
 
@@ -10,8 +10,8 @@ using DU32 = hn::RebindToUnsigned<D32>;
 constexpr DU32 kDU32;
 constexpr size_t kHalf = hn::MaxLanes(D32());  // pixels of half a vector of 16 bits
 
-// Two vectors as one of 16 bits, in blocks of four pixels that InOrder() puts into their order; what does not fit becomes
-// the nearest number that does.
+// Two vectors as one of 16 bits, in blocks of four pixels that InOrder() puts into their order; what does not fit
+// becomes the nearest number that does.
 HWY_INLINE V16 Packed(V32 a, V32 b) { return Joined(PairSums{a, b}); }
 
 HWY_INLINE V16 InOrder(V16 v) {
@@ -33,7 +33,7 @@ HWY_INLINE VU16 Reciprocals(VU16 d) {
   return r;
 }
 
-// By how many bits v, 2^0 to 2^24, must be shifted so that its highest bit becomes bit `bit`.
+// By how many bits v, 1 to 2^24, must be shifted so that its highest bit becomes bit `bit`.
 HWY_INLINE hn::VFromD<DU32> ShiftTo(int bit, V32 v) {
   const hn::Rebind<float, D32> floats;
   const auto exponent = hn::ShiftRight<23>(hn::BitCast(kDU32, hn::ConvertTo(floats, v)));

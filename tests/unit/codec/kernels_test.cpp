@@ -1,0 +1,181 @@
+// What vectors make of rows is what the plain loops make of them, on every instruction set, whatever the rows hold.
+#include "common/codec/dense/kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "common/codec/dense/fit.h"
+#include "common/codec/dense/plane.h"
+#include "tests/support/simd_targets.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+using testing::OnTarget;
+
+constexpr size_t kWidths[] = {1, 16, 31, 64, 65, 100, 200, 256, 331};
+
+std::string name_of(int64_t target, size_t width) { return hwy::TargetName(target) + (" " + std::to_string(width)); }
+
+// Calls check(kernels, width, random) for each instruction set and width; `random` starts alike for all sets.
+template <class Check>
+void on_every_set(Check check) {
+  for (const int64_t target : testing::simd_targets()) {
+    const OnTarget on(target);
+    std::mt19937 random(5);
+    for (const size_t width : kWidths) {
+      SCOPED_TRACE(name_of(target, width));
+      for (int round = 0; round < 20; ++round) ASSERT_NO_FATAL_FAILURE(check(kernels(), width, random));
+    }
+  }
+}
+
+// Three rows of a plane and what is around them.
+template <class T, class Value>
+Plane<T> rows_of(size_t width, Value value) {
+  Plane<T> plane;
+  plane.reset(width, 3);
+  for (ptrdiff_t y = -2; y < 5; ++y)
+    for (ptrdiff_t x = -static_cast<ptrdiff_t>(Plane<T>::kLead); x < static_cast<ptrdiff_t>(width + Plane<T>::kTail);
+         ++x)
+      plane.row(y)[x] = static_cast<T>(value());
+  return plane;
+}
+
+template <class T>
+std::vector<T> row_for(size_t width) {
+  return std::vector<T>(width + Plane<T>::kTail);
+}
+
+template <class T>
+void expect_same(const std::vector<T>& a, const std::vector<T>& b, size_t width) {
+  for (size_t x = 0; x < width; ++x) ASSERT_EQ(a[x], b[x]) << x;
+}
+
+TEST(Kernels, ContextsAreThoseOfThePage) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const auto tokens = rows_of<uint8_t>(width, [&] { return random() % 4 == 0 ? random() % kNumberTokens : 3; });
+    const ContextRows rows{tokens.row(0), tokens.row(-1), random() % 2 != 0 ? tokens.row(1) : nullptr};
+    const ContextScale scale{static_cast<int>(random() % 900), static_cast<int>(random() % 15),
+                             static_cast<int>(random() % 5)};
+    auto a = row_for<uint8_t>(width), b = a;
+    set.contexts(rows, width, scale, a.data());
+    plain_kernels().contexts(rows, width, scale, b.data());
+    expect_same(a, b, width);
+    auto c = row_for<uint16_t>(width);
+    set.join_bytes(tokens.row(0), a.data(), width, c.data());
+    for (size_t x = 0; x < width; ++x) ASSERT_EQ(c[x], tokens.row(0)[x] + 256 * a[x]);
+  });
+}
+
+// Values and a guide from 0 to `most`, residuals, and weights whose sizes add up to what is allowed.
+struct Guided {
+  Guided(size_t width, int bits, int largest, std::mt19937& random) : most(largest) {
+    const auto value = [&] { return (static_cast<int>(random() % static_cast<uint32_t>(most + 1))) << bits; };
+    own = rows_of<int16_t>(width, value);
+    guide = rows_of<int16_t>(width, [&] { return random() % static_cast<uint32_t>((most << bits) + 1); });
+    residual = rows_of<int16_t>(width, [&] { return static_cast<int>(random() % 256 - 128) * 64; });
+    flatness = rows_of<uint8_t>(width, [&] { return random() % kFlatnesses; });
+    for (auto& set : weights)
+      for (int16_t& w : set)
+        w = static_cast<int16_t>(static_cast<int>(random() % (kMostWeight / 8)) - kMostWeight / 16);
+    constant = static_cast<int32_t>(random() % (2 * kMostConstant)) - kMostConstant;
+  }
+  GuidedRows rows(int bits, bool flat, bool other) const {
+    return {.own = own.row(1),
+            .above = own.row(0),
+            .above2 = own.row(-1),
+            .guide = {guide.row(0), guide.row(1), guide.row(2)},
+            .residual = other ? residual.row(0) : nullptr,
+            .own_residual = nullptr,
+            .flatness = flat ? flatness.row(0) : nullptr,
+            .weights = weights,
+            .constant = constant,
+            .bits = bits,
+            .most = most};
+  }
+  int most;
+  Plane<int16_t> own, guide, residual;
+  Plane<uint8_t> flatness;
+  int16_t weights[kFlatnesses][kGuidedTerms];
+  int32_t constant;
+};
+
+TEST(Kernels, GuidedPredictionIsThatOfThePage) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const Guided guided(width, 6, 254, random);
+    for (const bool flat : {false, true})
+      for (const bool other : {false, true}) {
+        GuidedRows rows = guided.rows(6, flat, other);
+        auto z = row_for<uint8_t>(width), plain_z = z, tokens = z, plain_tokens = z;
+        auto off = row_for<int16_t>(width), plain_off = off;
+        set.guided_residuals(rows, width, z.data(), tokens.data(), off.data());
+        plain_kernels().guided_residuals(rows, width, plain_z.data(), plain_tokens.data(), plain_off.data());
+        expect_same(z, plain_z, width), expect_same(tokens, plain_tokens, width), expect_same(off, plain_off, width);
+        auto sums = row_for<int32_t>(width), plain_sums = sums;
+        for (const bool own : {false, true}) {
+          rows.own_residual = own ? guided.residual.row(2) : nullptr;
+          set.guided_sums(rows, width, sums.data(), false);
+          plain_kernels().guided_sums(rows, width, plain_sums.data(), false);
+          expect_same(sums, plain_sums, width);
+        }
+      }
+  });
+}
+
+TEST(Kernels, IndicesArePredictedAsThePageSays) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const Guided guided(width, 4, 1 + static_cast<int>(random() % 1023), random);
+    const GuidedRows rows = guided.rows(4, false, false);
+    auto z = row_for<uint32_t>(width), plain_z = z;
+    auto tokens = row_for<uint8_t>(width), plain_tokens = tokens;
+    auto off = row_for<int16_t>(width), plain_off = off, back = off;
+    set.guided_residuals_wide(rows, width, z.data(), tokens.data(), off.data());
+    plain_kernels().guided_residuals_wide(rows, width, plain_z.data(), plain_tokens.data(), plain_off.data());
+    expect_same(z, plain_z, width), expect_same(tokens, plain_tokens, width), expect_same(off, plain_off, width);
+    set.unfold_wide(z.data(), width, 4, back.data());
+    expect_same(back, off, width);
+  });
+}
+
+TEST(Kernels, DirectionsAreThoseOfThePage) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const uint32_t rough = random() % 25;
+    const auto depth = rows_of<uint32_t>(width, [&] { return (1u << 23) + random() % (1u << rough); });
+    const uint32_t* const rows[3] = {depth.row(0), depth.row(1), depth.row(2)};
+    GeometryModel model;
+    for (auto& row : model.matrix)
+      for (int16_t& e : row) e = static_cast<int16_t>(static_cast<int>(random() % 7000) - 3500);
+    if (random() % 9 == 0) model = {};
+    model.slope_shift = static_cast<int>(random() % 16), model.height_shift = static_cast<int>(random() % 16);
+    const int x0 = -static_cast<int>(random() % 65536), y = static_cast<int>(random() % 256) - 128;
+    auto gx = row_for<int16_t>(width), gy = gx, plain_gx = gx, plain_gy = gx;
+    set.geometry(rows, width, x0, y, model, gx.data(), gy.data());
+    plain_kernels().geometry(rows, width, x0, y, model, plain_gx.data(), plain_gy.data());
+    expect_same(gx, plain_gx, width), expect_same(gy, plain_gy, width);
+  });
+}
+
+TEST(Kernels, HeightsAreThoseOfThePage) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const uint32_t least = random() % 3 == 0 ? 0 : 1u << random() % 24, rough = random() % 24;
+    const auto depth = rows_of<uint32_t>(width, [&] { return least + random() % (1u << rough); });
+    HeightModel model;
+    model.a = static_cast<int32_t>(random() >> random() % 24),
+    model.b = static_cast<int32_t>(random() >> random() % 24);
+    model.c = static_cast<int32_t>(random()), model.base = static_cast<int32_t>(random() % 3) - 1;
+    model.low = static_cast<int32_t>(random() % 65536) - 32768, model.scale = static_cast<int32_t>(random() % 65536);
+    for (int16_t& knot : model.knots) knot = static_cast<int16_t>(random() % 16384);
+    auto row = row_for<int16_t>(width), plain = row;
+    set.heights(depth.row(0), width, -100, 7, model, row.data());
+    plain_kernels().heights(depth.row(0), width, -100, 7, model, plain.data());
+    expect_same(row, plain, width);
+    set.knots(model, width, row.data());
+    plain_kernels().knots(model, width, plain.data());
+    expect_same(row, plain, width);
+  });
+}
+
+}  // namespace
+}  // namespace telesplat::codec::detail
