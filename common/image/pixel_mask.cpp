@@ -4,7 +4,7 @@ namespace telesplat::image {
 
 size_t PixelMask::count() const {
   size_t n = 0;
-  for (const uint64_t word : words_) n += static_cast<size_t>(std::popcount(word));
+  for (const uint64_t word : words_) n += set_bits(word);
   return n;
 }
 
@@ -13,7 +13,7 @@ size_t PixelMask::runs() const {
   for (int y = 0; y < height_; ++y)
     for (size_t w = 0; w < words_per_row_; ++w) {
       const uint64_t word = row(y)[w], last = w == 0 ? 0 : row(y)[w - 1] >> 63;
-      n += static_cast<size_t>(std::popcount(word & ~(word << 1 | last)));
+      n += set_bits(word & ~(word << 1 | last));
     }
   return n;
 }

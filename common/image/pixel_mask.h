@@ -38,6 +38,14 @@ class PixelMask {
   std::vector<uint64_t> words_;
 };
 
+/// How many bits are set: std::popcount(), which is a call where a processor's own instruction may not be taken for
+/// granted.
+inline uint32_t set_bits(uint64_t word) {
+  word -= word >> 1 & 0x5555555555555555;
+  word = (word & 0x3333333333333333) + (word >> 2 & 0x3333333333333333);
+  return static_cast<uint32_t>(((word + (word >> 4)) & 0x0F0F0F0F0F0F0F0F) * 0x0101010101010101 >> 56);
+}
+
 /// Calls f(x) for every set bit of one row, in order.
 template <class F>
 void for_each_set(const uint64_t* words, size_t word_count, F f) {

@@ -200,15 +200,25 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     }
 }
 
-// table[i] of each i below 64.
+// table[i] of each i below 64. Tables in registers where there are any: gathers take longer.
 HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > KnotsAt(const int32_t* table, hn::VFromD<hn::RebindToSigned<D> > i) {
   const hn::RebindToSigned<D> d;
-#if HWY_TARGET <= HWY_AVX3  // tables in registers: gathers take longer
-  const auto part = [&](int k) HWY_ATTR { return hn::Load(d, table + 16 * k).raw; };
+  const auto part = [&](int k) HWY_ATTR { return hn::Load(d, table + static_cast<int>(kN) * k).raw; };
+#if HWY_TARGET <= HWY_AVX3
   const __m512i low = _mm512_permutex2var_epi32(part(0), i.raw, part(1)),
                 high = _mm512_permutex2var_epi32(part(2), i.raw, part(3));
   const __mmask16 upper = _mm512_test_epi32_mask(i.raw, _mm512_set1_epi32(32));
   return hn::VFromD<decltype(d)>{_mm512_mask_mov_epi32(low, upper, high)};
+#elif HWY_TARGET == HWY_AVX2
+  const auto eight = [&](int k) HWY_ATTR { return _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(part(k), i.raw)); };
+  // Those of the first table where that bit of i is 0, else of the second.
+  const auto by_bit = [&](__m256i bit, __m256 first, __m256 second)
+                          HWY_ATTR { return _mm256_blendv_ps(first, second, _mm256_castsi256_ps(bit)); };
+  const __m256i bit3 = _mm256_slli_epi32(i.raw, 28), bit4 = _mm256_slli_epi32(i.raw, 27),
+                bit5 = _mm256_slli_epi32(i.raw, 26);
+  const auto sixteen = [&](int k) HWY_ATTR { return by_bit(bit3, eight(2 * k), eight(2 * k + 1)); };
+  const __m256 low = by_bit(bit4, sixteen(0), sixteen(1)), high = by_bit(bit4, sixteen(2), sixteen(3));
+  return hn::VFromD<decltype(d)>{_mm256_castps_si256(by_bit(bit5, low, high))};
 #else
   return hn::GatherIndex(d, table, i);
 #endif
@@ -256,13 +266,13 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits,    CoverBytes,   CutWide,         CutShort,        KeepBytes,
-                               FillValues,     Within,       LargestLessOne,  DepthResiduals,  DepthRowsVector,
-                               PlaneResiduals, PlaneTerms,   PlaneKinds,      PlaneContexts,   PairedContexts,
-                               JoinBytes,      OtherNormals, TurnNormals,     TurnNormalsBack, Divide,
-                               UnfoldBytes,    UnfoldWide,   MedianResiduals, PairedResiduals, PairedResidualsWide,
-                               MedianValues,   PairedSums,   Flatness,        PairedGeometry,  PairedHeights,
-                               KnotsVector,    Activity,     NormalEquations, SampleShares,    PutSymbols,
+  static constexpr Kernels all{CoveredBits,    CoverBytes,     CutWide,         CutShort,        KeepBytes,
+                               FillValues,     Within,         LargestLessOne,  DepthResiduals,  DepthRowsVector,
+                               PlaneResiduals, PlaneTerms,     PlaneKinds,      PlaneContexts,   PairedContexts,
+                               JoinBytes,      OtherNormals,   TurnNormals,     TurnNormalsBack, Divide,
+                               UnfoldBytes,    UnfoldWide,     MedianResiduals, PairedResiduals, PairedResidualsWide,
+                               MedianValues,   PairedSums,     Flatness,        PairedGeometry,  PairedHeights,
+                               KnotsVector,    PairedActivity, NormalEquations, SampleShares,    PutSymbols,
                                GetSymbols};
   return &all;
 }

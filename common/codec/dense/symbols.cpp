@@ -46,7 +46,7 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
   for (size_t y = 0; y < height; ++y) {
     const uint64_t* const words = mask->row(static_cast<int>(y));
     uint32_t n = 0;
-    for (size_t w = 0; w < mask->words_per_row(); ++w) n += static_cast<uint32_t>(std::popcount(words[w]));
+    for (size_t w = 0; w < mask->words_per_row(); ++w) n += image::set_bits(words[w]);
     covered[y] = n, total += n;
     if (n != width) {
       kernels().cover_bytes(words, width, cover_bytes.row(static_cast<ptrdiff_t>(y)));

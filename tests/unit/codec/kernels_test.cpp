@@ -157,6 +157,21 @@ TEST(Kernels, DirectionsAreThoseOfThePage) {
   });
 }
 
+TEST(Kernels, ActivityIsThatOfThePage) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const uint32_t rough = random() % 15;
+    const auto value = [&] {
+      return random() % 99 == 0 ? 254 * 64 : random() % ((1u << rough) - (rough == 14 ? 128 : 0));
+    };
+    const auto x = rows_of<int16_t>(width, value), y = rows_of<int16_t>(width, value);
+    const int16_t *const xs[3] = {x.row(0), x.row(1), x.row(2)}, *const ys[3] = {y.row(0), y.row(1), y.row(2)};
+    auto tokens = row_for<uint8_t>(width), plain = tokens;
+    set.activity(xs, ys, width, tokens.data());
+    plain_kernels().activity(xs, ys, width, plain.data());
+    expect_same(tokens, plain, width);
+  });
+}
+
 TEST(Kernels, HeightsAreThoseOfThePage) {
   on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
     const uint32_t least = random() % 3 == 0 ? 0 : 1u << random() % 24, rough = random() % 24;

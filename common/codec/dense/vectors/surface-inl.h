@@ -180,7 +180,30 @@ static void PairedHeights(const uint32_t* depth, size_t n, int x0, int y, const 
   HeightVectors(depth, x0, y, model).Run(n, out);
 }
 
+// As Activity().
+static void PairedActivity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n,
+                           uint8_t* HWY_RESTRICT tokens) {
+  const hn::Half<U16> half;
+  const hn::Rebind<float, D32> floats;
+  const hn::Rebind<uint8_t, D32> bytes;
+  for (size_t x = 0; x < n; x += 2 * kHalf) {
+    const auto apart = [&](const int16_t* a, const int16_t* b) HWY_ATTR {
+      return hn::BitCast(kU16, hn::Abs(hn::Sub(hn::LoadU(kD16s, a + x), hn::LoadU(kD16s, b + x))));
+    };
+    const VU16 sum = hn::Add(hn::Add(apart(gx[1] + 1, gx[1] - 1), apart(gx[2], gx[0])),
+                             hn::Add(apart(gy[1] + 1, gy[1] - 1), apart(gy[2], gy[0])));
+    const VU16 v = hn::Add(hn::ShiftRight<3>(sum), hn::Set(kU16, uint16_t{8}));
+    const auto store = [&](hn::VFromD<hn::Half<U16>> part, size_t at) HWY_ATTR {
+      const auto number = hn::ConvertTo(floats, hn::BitCast(kD32s, hn::PromoteTo(kDU32, part)));
+      const auto token = hn::Sub(hn::ShiftRight<20>(hn::BitCast(kDU32, number)), hn::Set(kDU32, 1040u));
+      hn::StoreU(hn::TruncateTo(bytes, token), bytes, tokens + at);
+    };
+    store(hn::LowerHalf(half, v), x), store(hn::UpperHalf(half, v), x + kHalf);
+  }
+}
+
 #else
+constexpr auto PairedActivity = Activity;
 constexpr auto PairedGeometry = Geometry;
 constexpr auto PairedHeights = Heights;
 #endif
