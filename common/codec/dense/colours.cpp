@@ -83,13 +83,14 @@ bool get_height(HeightModel& height, BitReader& bits) {
 
 bool of_one_colour(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t base) {
   for (size_t y = 0; y < shape.height; ++y) {
+    const auto [begin, end] = shape.span(y);
     const uint32_t* const row = colours.row(y);
     const uint8_t* const cover = shape.cover(y);
     uint32_t other = 0;
     if (cover == nullptr)
-      for (size_t x = 0; x < shape.width; ++x) other |= row[x] ^ base;
+      for (size_t x = begin; x < end; ++x) other |= row[x] ^ base;
     else
-      for (size_t x = 0; x < shape.width; ++x)
+      for (size_t x = begin; x < end; ++x)
         other |= (row[x] ^ base) & static_cast<uint32_t>(static_cast<int8_t>(cover[x]));
     if (other != 0) return false;
   }
@@ -186,8 +187,10 @@ void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& dept
 void ColourPlanes::find_heights(const TileShape& shape, const DepthPlane& depth) {
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
-                      static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
+    const auto [begin, end] = shape.around(y);
+    kernels().heights(depth.depth.row(r) + begin, end - begin,
+                      static_cast<int>(begin) - static_cast<int>(shape.width / 2),
+                      static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r) + begin);
   }
 }
 
@@ -197,8 +200,9 @@ void ColourPlanes::begin_index(const TileShape& shape) {
   index.reset(shape, GuidedPlane::kIndexBits, last);  // keeps the values
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
+    const TileShape::Span around = shape.around(y);
     if (has_height_)
-      kernels().knots(height_, shape.width, index.guide.row(r));
+      kernels().knots(height_, around.size(), index.guide.row(r) + around.begin);
     else
       std::fill_n(index.guide.row(r), shape.width, static_cast<int16_t>(last * 8));
   }
@@ -270,7 +274,8 @@ void ColourPlanes::encode_palette(const TileShape& shape, int reach) {
   begin_index(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
-    for (size_t x = 0; x < shape.width; ++x) row[x] = values[row[x]];
+    const auto [begin, end] = shape.span(y);
+    for (size_t x = begin; x < end; ++x) row[x] = values[row[x]];
     index.finish_row(shape, y);
   }
   index.encode(shape, samples_, nullptr);
@@ -378,7 +383,8 @@ void ColourPlanes::get_colours(const TileShape& shape, size_t y, uint32_t* colou
   if (mode == kPalette) {
     const int16_t* const row = index.values.row(r);  // none is beyond the last colour: decode_values() sees to that
     const uint32_t* const palette = palette_.data();
-    for (size_t x = 0; x < shape.width; ++x) colours[x] = palette[row[x] >> 4];
+    const auto [begin, end] = shape.span(y);
+    for (size_t x = begin; x < end; ++x) colours[x] = palette[row[x] >> 4];
     return;
   }
   const uint8_t *above[3], *z[3];

@@ -81,15 +81,17 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
   symbols.reset(shape, true, way == kPlanes ? kHits : 0);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
+    const auto [begin, end] = shape.span(y);
+    const uint32_t *const above2 = depth.row(r - 2) + begin, *const above = depth.row(r - 1) + begin,
+                          *const row = depth.row(r) + begin;
+    uint32_t* const z = symbols.wide.row(r) + begin;
+    uint8_t* const tokens = symbols.tokens.row(r) + begin;
     if (way == kMean)
-      mean_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
-                     symbols.tokens.row(r));
+      mean_residuals(above2, above, row, end - begin, z, tokens);
     else if (way == kPlanes)
-      kernels().plane_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
-                                symbols.tokens.row(r));
+      kernels().plane_residuals(above2, above, row, end - begin, z, tokens);
     else
-      kernels().depth_residuals(depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
-                                symbols.tokens.row(r));
+      kernels().depth_residuals(above, row, end - begin, z, tokens);
     finish_tokens(symbols, shape, y);
   }
 }

@@ -50,11 +50,13 @@ struct Chain {
     }
     value[x] = static_cast<int16_t>(left << kBits);
   }
-  bool good(const uint8_t* cover, size_t n) const {
+  bool good(const TileShape& shape, size_t y) const {
     if (kBounded) return true;
     const int64_t above = (int64_t{1} << (15 - kBits)) - 1;
+    const auto [begin, end] = shape.span(y);
     return (seen & ~(kByte ? 255 : above)) == 0 &&
-           kernels().within(cover, value, residual, n, plane.most << kBits, (kByte ? 255 : plane.most) << kBits);
+           kernels().within(shape.full(y) ? nullptr : shape.cover(y) + begin, value + begin, residual + begin,
+                            end - begin, plane.most << kBits, (kByte ? 255 : plane.most) << kBits);
   }
   void begin(size_t x) { left = value[static_cast<ptrdiff_t>(x) - 1] >> kBits; }
 
@@ -93,7 +95,7 @@ struct FlatChain {
     far = plain.value[static_cast<ptrdiff_t>(x) - 2] >> plain.kBits;
   }
 
-  bool good(const uint8_t* cover, size_t n) const { return plain.good(cover, n); }
+  bool good(const TileShape& shape, size_t y) const { return plain.good(shape, y); }
 
   Chain<true, kBounded> plain;
   const uint8_t* const flatness;
@@ -117,7 +119,7 @@ struct MedianChain {
     value[x] = static_cast<int16_t>(left);
   }
   void begin(size_t x) { left = value[static_cast<ptrdiff_t>(x) - 1]; }
-  bool good(const uint8_t*, size_t) const { return true; }
+  bool good(const TileShape&, size_t) const { return true; }
 
   const GuidedPlane& plane;
   int16_t* const value;
@@ -131,7 +133,7 @@ bool run(Chain chain, const TileShape& shape, size_t y) {
   shape.for_each_run(y, [&](size_t x, size_t end) {
     for (chain.begin(x); x < end; ++x) chain.step(x);
   });
-  return chain.good(shape.cover(y), shape.width);
+  return chain.good(shape, y);
 }
 
 // Two that need not wait for each other.
@@ -140,7 +142,7 @@ bool run_both(Chain first, Chain second, const TileShape& shape, size_t y) {
   shape.for_each_run(y, [&](size_t x, size_t end) {
     for (first.begin(x), second.begin(x); x < end; ++x) first.step(x), second.step(x);
   });
-  return first.good(shape.cover(y), shape.width) && second.good(shape.cover(y), shape.width);
+  return first.good(shape, y) && second.good(shape, y);
 }
 
 // Normals and an index.
@@ -151,8 +153,7 @@ bool run_three(ByteChain first, ByteChain second, IndexChain third, const TileSh
     first.begin(x), second.begin(x), third.begin(x);
     for (; x < end; ++x) first.step(x), second.step(x), third.step(x);
   });
-  const uint8_t* const cover = shape.cover(y);
-  return first.good(cover, shape.width) && second.good(cover, shape.width) && third.good(cover, shape.width);
+  return first.good(shape, y) && second.good(shape, y) && third.good(shape, y);
 }
 
 bool is_plain(const GuidedPlane& plane) { return !plane.median && !plane.wild && plane.flatness == nullptr; }
@@ -196,20 +197,22 @@ void GuidedPlane::begin(const TileShape& shape) {
 void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
   int16_t* const row = values.row(static_cast<ptrdiff_t>(y));
   const int16_t* const by = guide.row(static_cast<ptrdiff_t>(y));
-  if (const uint8_t* const cover = shape.cover(y); cover != nullptr)
-    kernels().fill_values(cover, by, shape.width, bits, most, row);
+  if (const uint8_t* const cover = shape.cover(y); cover != nullptr) {
+    const auto [begin, end] = shape.around(y);
+    kernels().fill_values(cover + begin, by + begin, end - begin, bits, most, row + begin);
+  }
   row[-2] = row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
 }
 
-GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
+GuidedRows GuidedPlane::rows_around(size_t y, size_t begin, const GuidedPlane* before) const {
   const auto r = static_cast<ptrdiff_t>(y);
-  return {values.row(r),
-          values.row(r - 1),
-          values.row(r - 2),
-          {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
-          before != nullptr ? before->residuals.row(r) : nullptr,
+  return {values.row(r) + begin,
+          values.row(r - 1) + begin,
+          values.row(r - 2) + begin,
+          {guide.row(r - 1) + begin, guide.row(r) + begin, guide.row(r + 1) + begin},
+          before != nullptr ? before->residuals.row(r) + begin : nullptr,
           nullptr,
-          flatness != nullptr ? flatness->row(r) : nullptr,
+          flatness != nullptr ? flatness->row(r) + begin : nullptr,
           flatness != nullptr ? sets : &weights,
           constant,
           bits,
@@ -239,12 +242,14 @@ void GuidedPlane::encode_fitted(const TileShape& shape, const GuidedPlane* befor
   if (median) return encode_by_median(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
+    const auto [begin, end] = shape.span(y);
+    const GuidedRows rows = rows_around(y, begin, before);
+    uint8_t* const tokens = symbols.tokens.row(r) + begin;
+    int16_t* const off = residuals.row(r) + begin;
     if (bits == 6)
-      kernels().guided_residuals(rows_around(y, before), shape.width, symbols.narrow.row(r), symbols.tokens.row(r),
-                                 residuals.row(r));
+      kernels().guided_residuals(rows, end - begin, symbols.narrow.row(r) + begin, tokens, off);
     else
-      kernels().guided_residuals_wide(rows_around(y, before), shape.width, symbols.wide.row(r), symbols.tokens.row(r),
-                                      residuals.row(r));
+      kernels().guided_residuals_wide(rows, end - begin, symbols.wide.row(r) + begin, tokens, off);
     finish_tokens(symbols, shape, y);
   }
 }
@@ -344,19 +349,19 @@ bool GuidedPlane::get_flat_weights(BitReader& bits) {
 
 void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
   const auto r = static_cast<ptrdiff_t>(y);
-  int16_t* const out = residuals.row(r);
-  if (bits == 6) {
-    kernels().unfold_bytes(symbols.narrow.row(r), shape.width, out);
-  } else {
-    kernels().unfold_wide(symbols.wide.row(r), shape.width, bits, out);
-  }
+  const auto [begin, end] = shape.span(y);
+  int16_t* const out = residuals.row(r) + begin;
+  if (bits == 6)
+    kernels().unfold_bytes(symbols.narrow.row(r) + begin, end - begin, out);
+  else
+    kernels().unfold_wide(symbols.wide.row(r) + begin, end - begin, bits, out);
   begin_row(shape, y);
   if (median) return;
   has_residuals = most_weight_ <= kTame;
   wild |= !has_residuals;
-  GuidedRows rows = rows_around(y, before);
+  GuidedRows rows = rows_around(y, begin, before);
   if (has_residuals) rows.own_residual = out, rows.constant += 1 << (bits + 12);
-  kernels().guided_sums(rows, shape.width, sums.data(), false);
+  kernels().guided_sums(rows, end - begin, sums.data() + begin, false);
 }
 
 // Values of pixels that are not covered, and borders, before the others are known: those of covered ones are written
@@ -364,12 +369,15 @@ void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlan
 void GuidedPlane::begin_row(const TileShape& shape, size_t y) {
   int16_t* const row = values.row(static_cast<ptrdiff_t>(y));
   const int16_t* const by = guide.row(static_cast<ptrdiff_t>(y));
-  if (!shape.full(y)) kernels().fill_values(nullptr, by, shape.width, bits, most, row);
+  if (!shape.full(y)) {
+    const auto [begin, end] = shape.around(y);
+    kernels().fill_values(nullptr, by + begin, end - begin, bits, most, row + begin);
+  }
   row[-2] = row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
 }
 
 void GuidedPlane::make_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
-  kernels().guided_sums(rows_around(y, before), shape.width, sums.data(), false);
+  kernels().guided_sums(rows_around(y, 0, before), shape.width, sums.data(), false);
 }
 
 void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y) {

@@ -59,7 +59,7 @@ struct GuidedPlane {
   bool has_plain_weights() const;
   void begin_row(const TileShape& shape, size_t y);
   void encode_by_median(const TileShape& shape);
-  GuidedRows rows_around(size_t y, const GuidedPlane* before) const;
+  GuidedRows rows_around(size_t y, size_t begin, const GuidedPlane* before) const;
 };
 
 /// Values of row y of both planes, whose sums are known.

@@ -84,13 +84,16 @@ void make_geometry_guide(const TileShape& shape, const DepthPlane& depth, const 
   const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
+    const auto [begin, end] = shape.around(y);
     if (geometry == nullptr) {
       std::fill_n(x_guide.row(r), shape.width, static_cast<int16_t>((base & 255) * 64));
       std::fill_n(y_guide.row(r), shape.width, static_cast<int16_t>((base >> 8) * 64));
       continue;
     }
-    const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
-    kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), *geometry, x_guide.row(r), y_guide.row(r));
+    const uint32_t* const rows[3] = {depth.depth.row(r - 1) + begin, depth.depth.row(r) + begin,
+                                     depth.depth.row(r + 1) + begin};
+    kernels().geometry(rows, end - begin, x0 + static_cast<int>(begin), y0 + static_cast<int>(y), *geometry,
+                       x_guide.row(r) + begin, y_guide.row(r) + begin);
   }
 }
 
@@ -133,7 +136,9 @@ int NormalPlanes::choose_pole(const TileShape& shape, const PixelRows<uint16_t>&
   uint32_t others = 0;
   for (size_t y = 0; y < shape.height; ++y) {
     if (lattice_.step() != 1) break;  // within bounds another code of the same direction is as good
-    others |= kernels().other_normals(shape.cover(y), codes.row(y), shape.width);
+    const auto [begin, end] = shape.span(y);
+    others |=
+        kernels().other_normals(shape.full(y) ? nullptr : shape.cover(y) + begin, codes.row(y) + begin, end - begin);
   }
   if (others != 0) return kRaw;
   PoleChoice choice;
@@ -160,8 +165,9 @@ void NormalPlanes::to_lattice(const TileShape& shape) {
   for (GuidedPlane& p : plane) p.most = lattice_.most();
   for (GuidedPlane& p : plane) {
     for (size_t y = 0; y < shape.height; ++y) {
-      int16_t* const row = p.guide.row(static_cast<ptrdiff_t>(y));
-      kernels().divide(row, shape.width, lattice_.offset64(), lattice_.share());
+      const auto [begin, end] = shape.around(y);
+      int16_t* const row = p.guide.row(static_cast<ptrdiff_t>(y)) + begin;
+      kernels().divide(row, end - begin, lattice_.offset64(), lattice_.share());
     }
     p.begin(shape);
   }
@@ -173,10 +179,12 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
   for (GuidedPlane& p : plane) p.begin(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    const auto rows = [&](const GuidedPlane& p) {
-      return std::array<const int16_t*, 3>{p.guide.row(r - 1), p.guide.row(r), p.guide.row(r + 1)};
+    const auto [begin, end] = shape.around(y);
+    const auto rows = [&, first = begin](const GuidedPlane& p) {
+      return std::array<const int16_t*, 3>{p.guide.row(r - 1) + first, p.guide.row(r) + first,
+                                           p.guide.row(r + 1) + first};
     };
-    kernels().activity(rows(plane[0]).data(), rows(plane[1]).data(), shape.width, activity.row(r));
+    kernels().activity(rows(plane[0]).data(), rows(plane[1]).data(), end - begin, activity.row(r) + begin);
     activity.row(r)[-1] = activity.row(r)[0], activity.row(r)[shape.width] = activity.row(r)[shape.width - 1];
   }
   plane[0].symbols.other = &activity;
@@ -196,13 +204,14 @@ void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& cod
   samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
   pole_ = choose_pole(shape, codes);
   for (size_t y = 0; y < shape.height; ++y) {
-    int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
-                                                                               static_cast<ptrdiff_t>(y));
-    const uint16_t* const from = codes.row(y);
+    const auto [begin, end] = shape.span(y);
+    int16_t* const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)) + begin;
+    int16_t* const y_row = plane[1].values.row(static_cast<ptrdiff_t>(y)) + begin;
+    const uint16_t* const from = codes.row(y) + begin;
     if (pole_ != kRaw)
-      kernels().turn_normals(from, shape.width, pole_, x_row, y_row);
+      kernels().turn_normals(from, end - begin, pole_, x_row, y_row);
     else
-      for (size_t x = 0; x < shape.width; ++x)
+      for (size_t x = 0; x < end - begin; ++x)
         x_row[x] = static_cast<int16_t>((from[x] & 255) * 64), y_row[x] = static_cast<int16_t>((from[x] >> 8) * 64);
   }
   const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
@@ -213,9 +222,10 @@ void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& cod
   to_lattice(shape);
   for (GuidedPlane& p : plane)
     for (size_t y = 0; y < shape.height; ++y) {
+      const auto [begin, end] = shape.span(y);
       int16_t* const row = p.values.row(static_cast<ptrdiff_t>(y));
       if (lattice_.step() != 1)
-        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<int16_t>(lattice_.index(row[x] >> 6) * 64);
+        for (size_t x = begin; x < end; ++x) row[x] = static_cast<int16_t>(lattice_.index(row[x] >> 6) * 64);
       p.finish_row(shape, y);
     }
   const FlatSamples* by_flatness = nullptr;
@@ -249,8 +259,9 @@ void NormalPlanes::find_flatness(const TileShape& shape, const DepthPlane& depth
   flatness_.reset(shape.width, shape.height);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    kernels().flatness(depth.depth.row(r - 2), depth.depth.row(r - 1), depth.depth.row(r), shape.width,
-                       1u << flat_exponent_, flatness_.row(r));
+    const auto [begin, end] = shape.span(y);
+    kernels().flatness(depth.depth.row(r - 2) + begin, depth.depth.row(r - 1) + begin, depth.depth.row(r) + begin,
+                       end - begin, 1u << flat_exponent_, flatness_.row(r) + begin);
   }
 }
 
@@ -299,22 +310,24 @@ void NormalPlanes::decode_sums(const TileShape& shape, size_t y) {
 }
 
 void NormalPlanes::get_codes(const TileShape& shape, size_t y, uint16_t* out) {
+  const auto [begin, end] = shape.span(y);
   const int16_t* rows[2];
   for (size_t i = 0; i < 2; ++i) {
-    rows[i] = plane[i].values.row(static_cast<ptrdiff_t>(y));
+    rows[i] = plane[i].values.row(static_cast<ptrdiff_t>(y)) + begin;
     if (lattice_.step() == 1) continue;
     std::vector<int16_t>& codes_of = row_of_codes_[i];
     if (codes_of.size() < shape.width) codes_of.resize(shape.width);
     const auto step = static_cast<int16_t>(lattice_.step() * 64), first = static_cast<int16_t>(lattice_.value(0) * 64),
                most = static_cast<int16_t>(lattice_.most());
-    for (size_t x = 0; x < shape.width; ++x)
+    for (size_t x = 0; x < end - begin; ++x)
       codes_of[x] = static_cast<int16_t>(first + std::min(static_cast<int16_t>(rows[i][x] >> 6), most) * step);
     rows[i] = codes_of.data();
   }
+  out += begin;
   if (pole_ != kRaw)
-    kernels().turn_normals_back(rows[0], rows[1], shape.width, pole_, out);
+    kernels().turn_normals_back(rows[0], rows[1], end - begin, pole_, out);
   else
-    for (size_t x = 0; x < shape.width; ++x) out[x] = static_cast<uint16_t>(rows[0][x] >> 6 | rows[1][x] << 2);
+    for (size_t x = 0; x < end - begin; ++x) out[x] = static_cast<uint16_t>(rows[0][x] >> 6 | rows[1][x] << 2);
 }
 
 }  // namespace telesplat::codec::detail

@@ -10,10 +10,10 @@ namespace {
 
 constexpr unsigned kBiasBits = 13, kShiftBits = 4;
 
-ContextRows rows_around(const SymbolPlane& plane, size_t y) {
+ContextRows rows_around(const SymbolPlane& plane, size_t y, size_t begin) {
   const auto row = static_cast<ptrdiff_t>(y);
-  return {plane.tokens.row(row - 1), plane.tokens.row(row - 2),
-          plane.other != nullptr ? plane.other->row(row) : nullptr};
+  return {plane.tokens.row(row - 1) + begin, plane.tokens.row(row - 2) + begin,
+          plane.other != nullptr ? plane.other->row(row) + begin : nullptr};
 }
 
 // Copies `count` elements of each, and up to 31 that follow them: all have room for those.
@@ -26,11 +26,12 @@ bool has_kinds(const SymbolPlane& plane) { return plane.first != 0; }
 
 void make_contexts(SymbolPlane& plane, const TileShape& shape, size_t y) {
   const auto row = static_cast<ptrdiff_t>(y);
-  uint8_t* const out = plane.contexts.row(row);
+  const auto [begin, end] = shape.span(y);
+  uint8_t* const out = plane.contexts.row(row) + begin;
   if (has_kinds(plane))
-    kernels().plane_contexts(plane.kinds.row(row - 1), shape.width, plane.scale.merges, out);
+    kernels().plane_contexts(plane.kinds.row(row - 1) + begin, end - begin, plane.scale.merges, out);
   else
-    kernels().contexts(rows_around(plane, y), shape.width, plane.scale, out);
+    kernels().contexts(rows_around(plane, y, begin), end - begin, plane.scale, out);
 }
 
 }  // namespace
@@ -54,6 +55,7 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
     }
     first_run.push_back(static_cast<uint32_t>(runs.size()));
   }
+  find_spans();
 }
 
 void TileShape::add_runs(const uint64_t* words) {
@@ -70,6 +72,25 @@ void TileShape::add_runs(const uint64_t* words) {
     }
   }
   if (begin != end) runs.push_back({begin, end});
+}
+
+void TileShape::find_spans() {
+  constexpr size_t kBlock = 64, kReach = 2, kMore = 8;  // rows and columns
+  spans.resize(height), spans_around.resize(height);
+  for (size_t y = 0; y < height; ++y) {
+    spans[y] = {0, full(y) ? width : 0};
+    if (!full(y) && covered[y] != 0)
+      spans[y] = {runs[first_run[y]].begin / kBlock * kBlock, runs[first_run[y + 1] - 1].end};
+  }
+  for (size_t y = 0; y < height; ++y) {
+    Span& all = spans_around[y];
+    all = {width, 0};
+    for (size_t i = y < kReach ? 0 : y - kReach; i < std::min(height, y + kReach + 1); ++i) {
+      if (covered[i] == 0) continue;
+      all.begin = std::min(all.begin, spans[i].begin), all.end = std::max(all.end, spans[i].end);
+    }
+    all = all.end == 0 ? Span{0, 0} : Span{all.begin - std::min(all.begin, kMore), std::min(width, all.end + kMore)};
+  }
 }
 
 void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_number) {
@@ -155,11 +176,13 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   std::array<uint32_t, kMostSum + 1> histogram{};
   uint32_t total = 0;
   for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 12) {
-    const ContextRows rows = rows_around(plane, y);
+    const ContextRows rows = rows_around(plane, y, 0);
     const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
-    for (size_t x = y % 2; x < shape.width; x += 3, ++total)
-      ++histogram[static_cast<size_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] +
-                                      (o == nullptr ? 0 : 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]))];
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (x += y % 2; x < end; x += 3, ++total)
+        ++histogram[static_cast<size_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] +
+                                        (o == nullptr ? 0 : 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]))];
+    });
   }
   size_t low = 0, high = histogram.size() - 1;
   for (uint32_t seen = 0; low < high && seen + histogram[low] <= total / 32; ++low) seen += histogram[low];
@@ -177,7 +200,9 @@ void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
   const uint16_t* const joined = joined_.data();
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    kernels().join_bytes(plane.tokens.row(r), plane.contexts.row(r), shape.width, joined_.data());
+    const auto [first, last] = shape.span(y);
+    kernels().join_bytes(plane.tokens.row(r) + first, plane.contexts.row(r) + first, last - first,
+                         joined_.data() + first);
     shape.for_each_run(y, [&](size_t x, size_t end) {
       for (; x + 4 <= end; x += 4) {
         uint64_t four;

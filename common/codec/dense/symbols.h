@@ -24,12 +24,24 @@ struct TileShape {
   struct Run {
     uint32_t begin, end;
   };
-  std::vector<Run> runs;            ///< of rows that are not full
-  std::vector<uint32_t> first_run;  ///< of each row, and of none after the last
+  /// Columns [begin, end) of a row.
+  struct Span {
+    size_t begin, end;
+    size_t size() const { return end - begin; }
+  };
+  std::vector<Run> runs;                  ///< of rows that are not full
+  std::vector<uint32_t> first_run;        ///< of each row, and of none after the last
+  std::vector<Span> spans, spans_around;  ///< of each row, if there is a mask
 
   void reset(size_t tile_width, size_t tile_height, const Mask* tile_mask);
   void add_runs(const uint64_t* words);  ///< of the next row
+  void find_spans();
   bool full(size_t y) const { return covered[y] == width; }
+  /// From the first pixel of row y that is covered to the last one; `begin` is a multiple of 64.
+  Span span(size_t y) const { return mask == nullptr ? Span{0, width} : spans[y]; }
+  /// All that pixels of row y and of two rows above and below are predicted from. What rows hold elsewhere is of no
+  /// consequence: of guides, and of what is made of them.
+  Span around(size_t y) const { return mask == nullptr ? Span{0, width} : spans_around[y]; }
   /// As kernels take it: null where all of row y is covered.
   const uint8_t* cover(size_t y) const { return full(y) ? nullptr : cover_bytes.row(static_cast<ptrdiff_t>(y)); }
   bool at(size_t x, size_t y) const { return mask == nullptr || mask->at(static_cast<int>(x), static_cast<int>(y)); }

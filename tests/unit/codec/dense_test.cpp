@@ -58,6 +58,25 @@ NormalPlanes normals_of(const DepthImage& image) {
   return normals;
 }
 
+// Where nothing is covered, rows of planes are left as they were.
+TEST(Dense, WhatWasCodedBeforeChangesNothing) {
+  const DepthImage holes = test::masked(test::render({.width = 256, .height = 200}), test::band_mask(256, 200, 40)),
+                   facets = test::masked(test::facets(256, 200, 3, 130), test::random_mask(256, 200, 0.6, 5)),
+                   other = test::random_pixels(256, 256, 0.9, 7);
+  for (const ErrorBounds& bounds : {ErrorBounds{}, ErrorBounds{.depth = 1u << 18, .normal = 1, .colour = 1}})
+    for (const DepthImage* image : {&holes, &facets}) {
+      std::vector<uint8_t> fresh;
+      std::thread([&] { fresh = encode(*image, bounds); }).join();  // a thread's coders have coded nothing
+      EXPECT_TRUE(decode(encode(other, bounds)).ok());
+      EXPECT_EQ(encode(*image, bounds), fresh);
+      DepthImage known;
+      EXPECT_EQ(encode(*image, bounds, &known), fresh);
+      EXPECT_TRUE(decode(encode(other)).ok());
+      EXPECT_EQ(decode(fresh).value(), known);
+      EXPECT_EQ(decode_refinement(encode_refinement(*image, known), known).value(), *image);
+    }
+}
+
 // A rough ball in front of a camera that looks along -z, its ray axes, and those of a camera that looks elsewhere.
 struct Ball {
   static constexpr int kWidth = 256, kHeight = 200;
