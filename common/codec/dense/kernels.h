@@ -75,6 +75,8 @@ struct GeometryModel {
   int slope_shift = 0, height_shift = 0;
 };
 
+inline constexpr size_t kMoreSlots = 16;
+
 struct Kernels {
   /// Bit x of `words` = depth[x] != 0; bits at and beyond n of the last word are 0.
   void (*covered_bits)(const uint32_t* depth, size_t n, uint64_t* words);
@@ -155,6 +157,8 @@ struct Kernels {
   /// is (a + b) + (c + d), where a adds up every fourth product from the first on, b from the second on, ...
   void (*sample_shares)(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
                         float* shares);
+  /// The entries of make_decode_tables() of one context; returns their end. Writes up to kMoreSlots entries more.
+  uint32_t* (*slots)(const uint16_t* frequencies, unsigned alphabet, uint32_t* out);
   /// Appends the row's symbols, the last one first, at `out`, which must have room for 6 bytes a symbol and 64 more.
   uint8_t* (*put_symbols)(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out);
   /// Takes symbols from the bytes [begin, end), the last ones first; returns what is left of them, or null where

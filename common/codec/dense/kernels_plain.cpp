@@ -80,6 +80,7 @@ const Kernels& plain_kernels() {
                                Activity,
                                NormalEquations,
                                SampleShares,
+                               PlainSlots,
                                PlainPutSymbols,
                                PlainGetSymbols};
   return all;

@@ -113,6 +113,7 @@ static const Kernels* Set() {
                                Activity,
                                NormalEquations,
                                SampleShares,
+                               PlainSlots,
                                PlainPutSymbols,
                                PlainGetSymbols};
   return &all;
@@ -272,8 +273,8 @@ static const Kernels* Set() {
                                JoinBytes,      OtherNormals,   TurnNormals,     TurnNormalsBack, Divide,
                                UnfoldBytes,    UnfoldWide,     MedianResiduals, PairedResiduals, PairedResidualsWide,
                                MedianValues,   PairedSums,     Flatness,        PairedGeometry,  PairedHeights,
-                               KnotsVector,    PairedActivity, NormalEquations, SampleShares,    PutSymbols,
-                               GetSymbols};
+                               KnotsVector,    PairedActivity, NormalEquations, SampleShares,    Slots,
+                               PutSymbols,     GetSymbols};
   return &all;
 }
 

@@ -97,3 +97,12 @@ static const uint8_t* PlainGetSymbols(const DecodedRow& row, const uint32_t* tab
                         StatesOf(states, row.states, first), begin, end);
   return end;
 }
+
+static uint32_t* PlainSlots(const uint16_t* frequencies, unsigned alphabet, uint32_t* out) {
+  for (unsigned t = 0; t < alphabet; ++t) {
+    const uint32_t count = frequencies[t];
+    for (uint32_t i = 0; i < count; ++i) out[i] = (t << 24 | (count - 1) << 12) + i;
+    out += count;
+  }
+  return out;
+}

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "common/codec/dense/kernels.h"
 #include "common/codec/golomb.h"
 
 namespace telesplat::codec::detail {
@@ -250,21 +251,14 @@ void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out
 }
 
 void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out, size_t contexts) {
-  constexpr uint32_t kStep = 8;  // entries that are written at once: what is too much is written over afterwards
-  out.resize(kContexts * kFrequencyOne + kStep);
+  out.resize(kContexts * kFrequencyOne + kMoreSlots);
   std::array<uint16_t, kSymbols> frequencies;
   for (size_t c = 0; c < contexts; ++c) {
     frequencies_of(levels.of[c], levels.alphabet, frequencies);
-    uint32_t* at = out.data() + c * kFrequencyOne;
-    const auto fill = [&](uint32_t first, uint32_t count) {
-      for (uint32_t i = 0; i < count; i += kStep)
-        for (uint32_t k = 0; k < kStep; ++k) at[i + k] = first + i + k;
-      at += count;
-    };
-    const uint32_t* const begin = at;
-    for (unsigned t = 0; t < levels.alphabet; ++t)
-      if (const uint32_t f = frequencies[t]; f != 0) fill(t << 24 | (f - 1) << 12, f);
-    if (at == begin) fill((kFrequencyOne - 1) << 12, kFrequencyOne);  // a context without tokens
+    uint32_t* const at = out.data() + c * kFrequencyOne;
+    if (kernels().slots(frequencies.data(), levels.alphabet, at) != at) continue;
+    frequencies[0] = kFrequencyOne;  // a context without tokens
+    kernels().slots(frequencies.data(), 1, at);
   }
 }
 

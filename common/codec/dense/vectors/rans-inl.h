@@ -250,3 +250,18 @@ static const uint8_t* GetSymbols(const DecodedRow& row, const uint32_t* tables, 
   return row.states > kLanes ? GetSets<2>(row, tables, states, begin, end)
                              : GetSets<1>(row, tables, states, begin, end);
 }
+
+// As PlainSlots(). What is too much is written over afterwards.
+static uint32_t* Slots(const uint16_t* frequencies, unsigned alphabet, uint32_t* out) {
+  static_assert(kN <= kMoreSlots);
+  const auto places = hn::Iota(kD, 0), step = hn::Set(kD, static_cast<uint32_t>(kN));
+  for (unsigned t = 0; t < alphabet; ++t) {
+    const uint32_t count = frequencies[t];
+    if (count == 0) continue;
+    auto entries = hn::Add(places, hn::Set(kD, t << 24 | (count - 1) << 12));
+    for (uint32_t i = 0; i < count; i += static_cast<uint32_t>(kN), entries = hn::Add(entries, step))
+      hn::StoreU(entries, kD, out + i);
+    out += count;
+  }
+  return out;
+}
