@@ -1,4 +1,5 @@
-// Where an image's pixels look, for those who encode: colours of many data follow a height in the room.
+// Where an image's pixels look, for those who encode: normals follow from that and from depth, and colours of many data
+// follow a height in the room.
 #pragma once
 
 #include <array>
@@ -12,8 +13,8 @@ namespace telesplat::codec {
 /// its own; x and y are the pixel's column and row in the image.
 using RoomAxes = std::array<std::array<double, 3>, 3>;
 
-/// As encode() in depth_codec.h, and what is decoded is as near to `image`. With `axes` colours that follow one of the
-/// room's axes take fewer bytes.
+/// As encode() in depth_codec.h, and what is decoded is as near to `image`. With `axes` normals take fewer
+/// bytes, and so do colours that follow one of the room's axes.
 std::vector<uint8_t> encode(const image::DepthImage& image, const ErrorBounds& bounds, image::DepthImage* decoded,
                             const RoomAxes& axes);
 

@@ -152,7 +152,7 @@ void improve(Axis& axis, const Curve& curve, const std::vector<HeightSample>& sa
 }
 
 // The axis in the integers of heights(), counted from the middle of the tile's heights, so that few steps of these are
-// lost. Knots are such that its results are heights themselves, 0 to 16383.
+// lost.
 bool quantise(const Axis& axis, const std::vector<HeightSample>& samples, HeightModel& model) {
   double low = 1e300, high = -1e300;
   for (const HeightSample& s : samples) low = std::min(low, axis.of(s)), high = std::max(high, axis.of(s));
@@ -174,20 +174,23 @@ bool quantise(const Axis& axis, const std::vector<HeightSample>& samples, Height
 }  // namespace
 
 bool axes_of(const GeometryModel& g, RoomAxes& rays) {
-  double m[3][3];
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) m[i][j] = j == 2 ? g.matrix[i][j] / std::pow(2.0, g.height_shift) : g.matrix[i][j];
-  // The inverse's transpose: cofactors.
+  RoomAxes m;
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = 0; j < 3; ++j) m[i][j] = j == 2 ? g.matrix[i][j] / std::pow(2.0, g.height_shift) : g.matrix[i][j];
+  return inverse_transpose(m, rays);
+}
+
+bool inverse_transpose(const RoomAxes& m, RoomAxes& out) {
   double determinant = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
-      rays[i][j] = m[a][c] * m[b][d] - m[a][d] * m[b][c];
-      if (i == 0) determinant += m[i][j] * rays[i][j];
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = 0; j < 3; ++j) {
+      const size_t a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
+      out[i][j] = m[a][c] * m[b][d] - m[a][d] * m[b][c];
+      if (i == 0) determinant += m[i][j] * out[i][j];
     }
   if (!(std::abs(determinant) > 0)) return false;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) rays[i][j] /= determinant;
+  for (auto& row : out)
+    for (double& e : row) e /= determinant;
   return true;
 }
 

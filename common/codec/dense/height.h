@@ -25,7 +25,8 @@ struct KnownAxes {
   bool exact = false;              ///< else about so
 };
 
-/// Finds the axis of room space along which colours change least: heights along it are (a x + b y + c) / code.
+/// Finds the axis of room space along which colours change least, or one that is known exactly and explains them well:
+/// heights along it are (a x + b y + c) / code.
 /// `first`: a pixel of each colour of the palette, in its order. Sets the samples' indices; false where no axis
 /// explains the colours.
 bool find_axis(const KnownAxes& known, std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
@@ -43,6 +44,9 @@ struct ColourHeight {
 
 /// Gives the model the knots at which indices of colours, which are sorted by their mean heights, lie.
 void fit_knots(const std::vector<ColourHeight>& sorted, HeightModel& model);
+
+/// Of a matrix, row by row; false where it has none.
+bool inverse_transpose(const RoomAxes& m, RoomAxes& out);
 
 /// The inverse of a geometry, which are axes, about; false where it has none.
 bool axes_of(const GeometryModel& geometry, RoomAxes& axes);

@@ -75,7 +75,7 @@ struct GeometryModel {
   int slope_shift = 0, height_shift = 0;
 };
 
-inline constexpr size_t kMoreSlots = 16;
+inline constexpr size_t kMoreSlots = 16;  ///< entries that vectors write beyond the end
 
 struct Kernels {
   /// Bit x of `words` = depth[x] != 0; bits at and beyond n of the last word are 0.

@@ -204,7 +204,9 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 // table[i] of each i below 64. Tables in registers where there are any: gathers take longer.
 HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > KnotsAt(const int32_t* table, hn::VFromD<hn::RebindToSigned<D> > i) {
   const hn::RebindToSigned<D> d;
+#if HWY_TARGET <= HWY_AVX2
   const auto part = [&](int k) HWY_ATTR { return hn::Load(d, table + static_cast<int>(kN) * k).raw; };
+#endif
 #if HWY_TARGET <= HWY_AVX3
   const __m512i low = _mm512_permutex2var_epi32(part(0), i.raw, part(1)),
                 high = _mm512_permutex2var_epi32(part(2), i.raw, part(3));
@@ -267,13 +269,13 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits,    CoverBytes,     CutWide,         CutShort,        KeepBytes,
-                               FillValues,     Within,         LargestLessOne,  DepthResiduals,  DepthRowsVector,
-                               PlaneResiduals, PlaneTerms,     PlaneKinds,      PlaneContexts,   PairedContexts,
-                               JoinBytes,      OtherNormals,   TurnNormals,     TurnNormalsBack, Divide,
-                               UnfoldBytes,    UnfoldWide,     MedianResiduals, PairedResiduals, PairedResidualsWide,
-                               MedianValues,   PairedSums,     Flatness,        PairedGeometry,  PairedHeights,
-                               KnotsVector,    PairedActivity, NormalEquations, SampleShares,    Slots,
+  static constexpr Kernels all{CoveredBits,    CoverBytes,    CutWide,         CutShort,        KeepBytes,
+                               FillValues,     Within,        LargestLessOne,  DepthResiduals,  DepthRowsVector,
+                               PlaneResiduals, PlaneTerms,    PlaneKinds,      PlaneContexts,   PairedContexts,
+                               JoinBytes,      OtherNormals,  TurnNormals,     TurnNormalsBack, Divide,
+                               UnfoldBytes,    UnfoldWide,    MedianResiduals, PairedResiduals, PairedResidualsWide,
+                               MedianValues,   PairedSums,    Flatness,        ShortGeometry,   ShortHeights,
+                               KnotsVector,    ShortActivity, NormalEquations, SampleShares,    Slots,
                                PutSymbols,     GetSymbols};
   return &all;
 }

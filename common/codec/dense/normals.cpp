@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <memory>
 
+#include "common/codec/dense/height.h"
+
 namespace telesplat::codec::detail {
 namespace {
 
@@ -56,20 +58,14 @@ const Table& table(int pole, bool back) {
   return (*tables)[back][static_cast<size_t>(pole)];
 }
 
-// What turns slopes and height into normals, turned by `pole`: -1 times the inverse of the axes' transpose.
+// What turns slopes and height into normals, which look towards the eye, turned by `pole`: -1 times the inverse of the
+// axes' transpose. False where there is none.
 bool normals_of(const RoomAxes& axes, int pole, double out[9]) {
-  double m[3][3], determinant = 0;
-  for (size_t i = 0; i < 3; ++i)
-    for (size_t j = 0; j < 3; ++j) {
-      const size_t a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
-      m[i][j] = axes[a][c] * axes[b][d] - axes[a][d] * axes[b][c];
-      if (i == 0) determinant += axes[i][j] * m[i][j];
-    }
-  if (!(std::abs(determinant) > 0)) return false;
+  RoomAxes inverse;
+  if (!inverse_transpose(axes, inverse)) return false;
   const size_t first = pole / 2 == 0 ? 1 : pole / 2 == 1 ? 2 : 0;
   for (size_t i = 0; i < 3; ++i)
-    for (size_t j = 0; j < 3; ++j)
-      out[3 * i + j] = m[(first + i) % 3][j] * (determinant > 0 ? -1 : 1) * (i == 2 && pole % 2 != 0 ? -1 : 1);
+    for (size_t j = 0; j < 3; ++j) out[3 * i + j] = inverse[(first + i) % 3][j] * (i == 2 && pole % 2 != 0 ? 1 : -1);
   return true;
 }
 

@@ -51,7 +51,7 @@ struct NormalPlanes {
   /// Codes of all pixels of row y, after it.
   void get_codes(const TileShape& shape, size_t y, uint16_t* codes);
 
-  /// What encode() fitted; null: nothing.
+  /// What encode() took of what is known, or fitted; null: nothing.
   const GeometryModel* geometry() const { return has_geometry_ ? &geometry_ : nullptr; }
 
   GuidedPlane plane[2];

@@ -173,17 +173,25 @@ double rough_bits(const SymbolPlane& plane, const TileShape& shape) {
 // The finest classes that nearly all sums fit into.
 void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   constexpr size_t kMostSum = 16 * (kNumberTokens - 1);  // of a number's tokens with weights 3, 2, 2, 1 and 4, 2, 2
+  constexpr uint32_t kEnough = 500;
   std::array<uint32_t, kMostSum + 1> histogram{};
   uint32_t total = 0;
-  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 12) {
-    const ContextRows rows = rows_around(plane, y, 0);
-    const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
-    shape.for_each_run(y, [&](size_t x, size_t end) {
-      for (x += y % 2; x < end; x += 3, ++total)
-        ++histogram[static_cast<size_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] +
-                                        (o == nullptr ? 0 : 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]))];
-    });
-  }
+  // Every so many pixels that are covered, of every so many rows.
+  const auto sample = [&](size_t first_row, size_t rows, size_t pixels) {
+    histogram.fill(0), total = 0;
+    for (size_t y = first_row, left = 0; y < shape.height; y += rows) {
+      const ContextRows around = rows_around(plane, y, 0);
+      const uint8_t *a = around.above, *b = around.above2, *o = around.other;
+      shape.for_each_run(y, [&](size_t x, size_t end) {
+        for (x += left; x < end; x += pixels, ++total)
+          ++histogram[static_cast<size_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] +
+                                          (o == nullptr ? 0 : 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]))];
+        left = x - end;
+      });
+    }
+  };
+  sample(1, 11, 3);
+  if (total < kEnough) sample(0, 1, 1);
   size_t low = 0, high = histogram.size() - 1;
   for (uint32_t seen = 0; low < high && seen + histogram[low] <= total / 32; ++low) seen += histogram[low];
   for (uint32_t seen = 0; high > low && seen + histogram[high] <= total / 32; --high) seen += histogram[high];
@@ -193,7 +201,7 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   plane.scale.bias = std::max(plane.scale.bias, 0);
 }
 
-// In four tables, so that equal symbols side by side need not wait for each other. Each has a quarter of 65536 at most.
+// In four tables, so that equal symbols side by side need not wait for each other. None has more than 65535.
 void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
   std::memset(parts_, 0, sizeof parts_);
   if (joined_.size() < shape.width + 64) joined_.resize(shape.width + 64);

@@ -245,7 +245,7 @@ void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out
       out[c * kSymbols + t] = entries[frequencies[t]].from(start);
   }
   if (merges == 0) return;
-  for (size_t c = kContexts; c-- > 0;)
+  for (size_t c = kContexts - 1; c > 0; --c)
     std::copy_n(out.begin() + static_cast<ptrdiff_t>((c >> merges) * kSymbols), levels.alphabet,
                 out.begin() + static_cast<ptrdiff_t>(c * kSymbols));
 }

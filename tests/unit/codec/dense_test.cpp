@@ -77,6 +77,35 @@ TEST(Dense, WhatWasCodedBeforeChangesNothing) {
     }
 }
 
+// What contexts are chosen from is found in every mask that is coded as a dense tile.
+TEST(Dense, ThinMasksHaveContextsToo) {
+  constexpr int kSide = 256;
+  DepthImage image(kSide, kSide);
+  std::mt19937 random(9);
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const auto i = static_cast<size_t>(y * kSide + x);
+      const uint32_t rough = static_cast<uint32_t>((x / 64 + y / 64) % 5);  // from smooth to noise
+      image.depth[i] = 4000000 + random() % (1u << 3 * rough), image.colour[i] = 0x8090A0;
+      image.normal[i] = static_cast<uint16_t>((100 + random() % (1u << rough)) | (110 + random() % (1u << rough)) << 8);
+    }
+  const auto full = static_cast<double>(encode(image).size());
+  const auto keep = [&](auto covered) {
+    DepthImage part = image;
+    for (size_t i = 0; i < part.pixels(); ++i)
+      if (!covered(i % kSide, i / kSide)) part.depth[i] = part.colour[i] = part.normal[i] = 0;
+    const auto bytes = encode(part);
+    EXPECT_EQ(inspect(bytes).value().sparse_bytes, 0u);
+    EXPECT_EQ(decode(bytes).value(), part);
+    return static_cast<double>(bytes.size()) / full;
+  };
+  EXPECT_LT(keep([](size_t x, size_t y) { return (x + y) % 2 == 0; }), 0.6);
+  EXPECT_LT(keep([](size_t, size_t y) { return y % 2 == 0; }), 0.6);
+  EXPECT_LT(keep([](size_t, size_t y) { return y % 2 == 1; }), 0.6);
+  EXPECT_LT(keep([](size_t x, size_t) { return x % 2 == 0; }), 0.6);
+  EXPECT_LT(keep([](size_t, size_t y) { return y % 11 != 1; }), 1);
+}
+
 // A rough ball in front of a camera that looks along -z, its ray axes, and those of a camera that looks elsewhere.
 struct Ball {
   static constexpr int kWidth = 256, kHeight = 200;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <string>
+#include <vector>
 
 #include "common/codec/dense/fit.h"
 #include "common/codec/dense/plane.h"
@@ -169,6 +171,25 @@ TEST(Kernels, ActivityIsThatOfThePage) {
     set.activity(xs, ys, width, tokens.data());
     plain_kernels().activity(xs, ys, width, plain.data());
     expect_same(tokens, plain, width);
+  });
+}
+
+TEST(Kernels, SlotsAreThoseOfEachToken) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    std::vector<uint16_t> frequencies(std::min<size_t>(width, kSymbols));
+    uint32_t left = kFrequencyOne;
+    for (uint16_t& f : frequencies) {
+      f = static_cast<uint16_t>(random() % 3 == 0 ? 0 : random() % 9 == 0 ? random() % (left + 1) : std::min(left, 2u));
+      left -= f;
+    }
+    frequencies.back() = static_cast<uint16_t>(frequencies.back() + left);
+    std::vector<uint32_t> slots(kFrequencyOne + kMoreSlots);
+    ASSERT_EQ(set.slots(frequencies.data(), static_cast<unsigned>(frequencies.size()), slots.data()),
+              slots.data() + kFrequencyOne);
+    size_t at = 0;
+    for (uint32_t t = 0; t < frequencies.size(); ++t)
+      for (uint32_t i = 0; i < frequencies[t]; ++i, ++at)
+        ASSERT_EQ(slots[at], t << 24 | (frequencies[t] - 1u) << 12 | i) << at;
   });
 }
 

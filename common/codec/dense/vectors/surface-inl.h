@@ -1,5 +1,5 @@
-// What depth says of surfaces, with vectors: directions of normals, and heights. Included once for every instruction
-// set, in its namespace. No include guard: that is meant.
+// What depth says of surfaces, with vectors of 16 bits: directions of normals, heights, activity. Included once for
+// every instruction set, in its namespace. No include guard: that is meant.
 
 #if HWY_TARGET <= HWY_AVX2
 
@@ -113,8 +113,8 @@ class GeometryVectors {
   V32 by_slopes_[3], by_height_[3];
 };
 
-static void PairedGeometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
-                           int16_t* gx, int16_t* gy) {
+static void ShortGeometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
+                          int16_t* gx, int16_t* gy) {
   GeometryVectors(depth, x0, y, model).Run(n, gx, gy);
 }
 
@@ -176,13 +176,13 @@ class HeightVectors {
   const VU16 scale_;
 };
 
-static void PairedHeights(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out) {
+static void ShortHeights(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out) {
   HeightVectors(depth, x0, y, model).Run(n, out);
 }
 
 // As Activity().
-static void PairedActivity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n,
-                           uint8_t* HWY_RESTRICT tokens) {
+static void ShortActivity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n,
+                          uint8_t* HWY_RESTRICT tokens) {
   const hn::Half<U16> half;
   const hn::Rebind<float, D32> floats;
   const hn::Rebind<uint8_t, D32> bytes;
@@ -203,7 +203,7 @@ static void PairedActivity(const int16_t* const gx[3], const int16_t* const gy[3
 }
 
 #else
-constexpr auto PairedActivity = Activity;
-constexpr auto PairedGeometry = Geometry;
-constexpr auto PairedHeights = Heights;
+constexpr auto ShortActivity = Activity;
+constexpr auto ShortGeometry = Geometry;
+constexpr auto ShortHeights = Heights;
 #endif
