@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 
 #include "common/codec/golomb.h"
 
@@ -15,21 +16,28 @@ constexpr size_t kMostColourSamples = 700;  // of a tile
 class ColourTable {
  public:
   ColourTable() { std::fill_n(slots_, kSlots, Slot{}); }
-  struct Slot {
-    uint32_t colour = kNone, place = 0;
-    bool has_colour() const { return colour != kNone; }
-  };
-  /// The slot of `colour`, or the one that it should enter.
-  Slot& find(uint32_t colour) {
-    size_t at = (colour * 0x9E3779B1u) >> 20;
-    while (slots_[at].colour != colour && slots_[at].has_colour()) [[unlikely]] at = (at + 1) % kSlots;
-    return slots_[at];
+  static constexpr uint32_t kNone = 0xFFFFFFFF;
+  /// What stands for `colour`, or kNone.
+  uint32_t find(uint32_t colour) const {
+    const Slot& first = slots_[hash(colour)];
+    if (first.colour == colour) [[likely]]
+      return first.place;
+    return slots_[place_of(colour)].place;
   }
-  void enter(uint32_t colour, size_t place) { find(colour) = {colour, static_cast<uint32_t>(place)}; }
+  void enter(uint32_t colour, size_t place) { slots_[place_of(colour)] = {colour, static_cast<uint32_t>(place)}; }
 
  private:
-  static constexpr uint32_t kNone = 0xFFFFFFFF;
   static constexpr size_t kSlots = 4096;
+  struct Slot {
+    uint32_t colour = kNone, place = kNone;
+  };
+  static size_t hash(uint32_t colour) { return (colour * 0x9E3779B1u) >> 20; }
+  // Where it is, or where it should enter.
+  size_t place_of(uint32_t colour) const {
+    size_t at = hash(colour);
+    while (slots_[at].colour != colour && slots_[at].colour != kNone) at = (at + 1) % kSlots;
+    return at;
+  }
   Slot slots_[kSlots];
 };
 
@@ -116,10 +124,10 @@ bool ColourPlanes::make_palette(const TileShape& shape, const PixelRows<uint32_t
     if (!shape.full(y)) std::fill_n(places, shape.width, int16_t{0});
     shape.for_each_run(y, [&](size_t x, size_t end) {
       for (; x < end; ++x) {
-        ColourTable::Slot& slot = table.find(from[x]);
-        if (!slot.has_colour()) [[unlikely]]
-          enter(from[x], x, y);
-        places[x] = static_cast<int16_t>(slot.place);
+        uint32_t place = table.find(from[x]);
+        if (place == ColourTable::kNone) [[unlikely]]
+          place = static_cast<uint32_t>(palette_.size()), enter(from[x], x, y);
+        places[x] = static_cast<int16_t>(place);
       }
     });
   }
@@ -148,17 +156,24 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
   });
 }
 
-// All pixels say at which height a colour lies: few would sort colours badly that have few of them.
+// Every second row says at which height a colour lies, and its first pixel: few would sort colours badly that have few
+// of them.
 void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& depth) {
   constexpr size_t kTables = 4;  // so that equal colours side by side need not wait for each other
   std::vector<uint64_t> sums(kTables * palette_.size());  // pixels, and in the lower half heights
   find_heights(shape, depth);
-  for (size_t y = 0; y < shape.height; ++y) {
+  constexpr auto pixel_at = [](int16_t height) { return uint64_t{1} << 32 | static_cast<uint32_t>(height); };
+  for (size_t i = 0; i < first_.size(); ++i) {
+    const auto y = static_cast<ptrdiff_t>(first_[i].y) + static_cast<ptrdiff_t>(shape.height / 2),
+               x = static_cast<ptrdiff_t>(first_[i].x) + static_cast<ptrdiff_t>(shape.width / 2);
+    sums[kTables * i] = pixel_at(index.guide.row(y)[x]);
+  }
+  for (size_t y = 0; y < shape.height; y += 2) {
     const auto r = static_cast<ptrdiff_t>(y);
     const int16_t *const places = index.values.row(r), *const height = index.guide.row(r);
     uint64_t* const at = sums.data();
     const auto add = [&](size_t x, size_t k) {
-      at[kTables * static_cast<size_t>(places[x]) + k] += uint64_t{1} << 32 | static_cast<uint32_t>(height[x]);
+      at[kTables * static_cast<size_t>(places[x]) + k] += pixel_at(height[x]);
     };
     shape.for_each_run(y, [&](size_t x, size_t end) {
       for (; x + kTables <= end; x += kTables)
@@ -263,19 +278,26 @@ std::vector<int16_t> ColourPlanes::join_palette(int reach) {
 void ColourPlanes::encode_palette(const TileShape& shape, int reach) {
   ColourTable table;
   for (size_t i = 0; i < palette_.size(); ++i) table.enter(palette_[i], i);
-  int16_t values[kMostColours];
-  for (size_t i = 0; i < palette_.size(); ++i)
-    values[i] = static_cast<int16_t>(table.find(first_[i].colour).place * 16);
+  uint16_t values[kMostColours];
+  for (size_t i = 0; i < palette_.size(); ++i) values[i] = static_cast<uint16_t>(table.find(first_[i].colour) * 16);
   if (reach > 0) {
     const std::vector<int16_t> to = join_palette(reach);
     for (size_t i = 0; i < first_.size(); ++i)
-      values[i] = static_cast<int16_t>(to[static_cast<size_t>(values[i] / 16)] * 16);
+      values[i] = static_cast<uint16_t>(to[static_cast<size_t>(values[i] / 16)] * 16);
   }
   begin_index(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
     const auto [begin, end] = shape.span(y);
-    for (size_t x = begin; x < end; ++x) row[x] = values[row[x]];
+    size_t x = begin;
+    for (; x + 4 <= end; x += 4) {
+      uint64_t four;
+      std::memcpy(&four, row + x, 8);
+      four = uint64_t{values[four & 0xFFFF]} | uint64_t{values[four >> 16 & 0xFFFF]} << 16 |
+             uint64_t{values[four >> 32 & 0xFFFF]} << 32 | uint64_t{values[four >> 48]} << 48;
+      std::memcpy(row + x, &four, 8);
+    }
+    for (; x < end; ++x) row[x] = static_cast<int16_t>(values[row[x]]);
     index.finish_row(shape, y);
   }
   index.encode(shape, samples_, nullptr);

@@ -361,6 +361,7 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
   for (size_t s = 0; s < n; ++s) {
     const auto p = samples.places[s < few ? 2 * s : std::min(2 * (s - few) + 1, n - 1)];
     set_features(all[s], own, left != nullptr ? *left : own, guide, residual, p.x, p.y);
+    if (s >= few) continue;  // theirs follow from what is found first
     const float* const f = all[s].of;
     const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
     shares[s] = 1 / (near * near);

@@ -7,10 +7,10 @@ static inline uint32_t Fold24(uint32_t difference) {
   return ((v << 1) ^ static_cast<uint32_t>(static_cast<int32_t>(v) >> 31)) >> 8;
 }
 
-static inline uint16_t Least(uint16_t a, uint16_t b) { return a < b ? a : b; }
+static constexpr uint16_t Least(uint16_t a, uint16_t b) { return a < b ? a : b; }
 
 // token_of() of z < 256: the least of the lines of which the logarithm's approximation is made.
-static inline uint8_t ByteToken(uint8_t z) {
+static constexpr uint8_t ByteToken(uint8_t z) {
   const uint16_t v = static_cast<uint16_t>(z + 8);
   uint16_t token = z;
   token = Least(token, static_cast<uint16_t>(v >> 1));

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <vector>
 
 #include "common/codec/dense/rans.h"
 
@@ -171,5 +172,8 @@ struct Kernels {
 const Kernels& kernels();
 /// Standard C++ alone.
 const Kernels& plain_kernels();
+/// The instruction sets that there are kernels for and that this machine has, as Highway numbers them, the fastest
+/// first; none where the plain set is the only one.
+std::vector<int64_t> kernel_targets();
 
 }  // namespace telesplat::codec::detail

@@ -88,6 +88,7 @@ const Kernels& plain_kernels() {
 
 #ifdef TELESPLAT_CODEC_PLAIN
 const Kernels& kernels() { return plain_kernels(); }
+std::vector<int64_t> kernel_targets() { return {}; }
 #endif
 
 }  // namespace telesplat::codec::detail

@@ -29,6 +29,8 @@ inline constexpr Places kPlaces;
 }  // namespace telesplat::codec::detail
 #endif
 
+// AVX-512 as Ice Lake and Zen 4 have it: with products that are added, and words that are gathered and looked up.
+#define HWY_WANT_AVX3_DL
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/codec/dense/kernels_simd.cpp"
 #include <hwy/foreach_target.h>
@@ -38,6 +40,12 @@ inline constexpr Places kPlaces;
 #define RESTRICT HWY_RESTRICT
 
 HWY_BEFORE_NAMESPACE();
+#undef TELESPLAT_ADDED_PRODUCTS
+#if HWY_TARGET == HWY_AVX3_DL && HWY_COMPILER_GCC_ACTUAL
+// Highway 1.0.3 names AVX-VNNI for this target, which neither of them has, where AVX512-VNNI is meant.
+#pragma GCC target("avx512vnni")
+#define TELESPLAT_ADDED_PRODUCTS
+#endif
 namespace telesplat::codec::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -129,6 +137,15 @@ constexpr size_t kN = hn::MaxLanes(D()), kVectors = kLanes / kN;
 constexpr hn::Rebind<uint16_t, D> kD16;
 constexpr hn::Rebind<uint8_t, D> kD8;
 
+// The lowest byte of each. (For AVX3_DL, TruncateTo() of Highway 1.0.3 takes others.)
+HWY_INLINE hn::VFromD<decltype(kD8)> LowBytes(V v) {
+#if HWY_TARGET <= HWY_AVX3
+  return {_mm512_cvtepi32_epi8(v.raw)};
+#else
+  return hn::TruncateTo(kD8, v);
+#endif
+}
+
 // The elements of v where `from` is set, in order, first. (Highway 1.0.3 copies its tables to the stack each time.)
 HWY_INLINE V Gathered(V v, M from) {
 #if HWY_TARGET <= HWY_AVX3
@@ -183,22 +200,28 @@ static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* 
 }
 
 // Eight rows by one vector at a time, which fit into registers.
+template <class T>
+HWY_INLINE void EightRows(T d, const float (*features)[kFeatures], const float* weights, size_t n, int i, int j,
+                          float (*sums)[kFeatures]) {
+  auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
+  for (size_t s = 0; s < n; ++s) {
+    const float* const f = features[s] + i;
+    const auto v = hn::Mul(hn::LoadU(d, features[s] + j), hn::Set(d, weights[s]));
+    const auto add = [&](auto& sum, int k) HWY_ATTR { sum = hn::Add(sum, hn::Mul(hn::Set(d, f[k]), v)); };
+    add(s0, 0), add(s1, 1), add(s2, 2), add(s3, 3), add(s4, 4), add(s5, 5), add(s6, 6), add(s7, 7);
+  }
+  hn::StoreU(s0, d, sums[i] + j), hn::StoreU(s1, d, sums[i + 1] + j), hn::StoreU(s2, d, sums[i + 2] + j);
+  hn::StoreU(s3, d, sums[i + 3] + j), hn::StoreU(s4, d, sums[i + 4] + j), hn::StoreU(s5, d, sums[i + 5] + j);
+  hn::StoreU(s6, d, sums[i + 6] + j), hn::StoreU(s7, d, sums[i + 7] + j);
+}
+
+// Of the first rows the upper half of the columns is not wanted.
 static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
                             float (*sums)[kFeatures]) {
+  const hn::CappedTag<float, 8> half;
   const hn::CappedTag<float, 16> d;
-  for (int i = 0; i < kFeatures; i += 8)
-    for (int j = 0; j <= i + 7; j += static_cast<int>(hn::Lanes(d))) {
-      auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
-      for (size_t s = 0; s < n; ++s) {
-        const float* const f = features[s] + i;
-        const auto v = hn::Mul(hn::LoadU(d, features[s] + j), hn::Set(d, weights[s]));
-        const auto add = [&](auto& sum, int k) HWY_ATTR { sum = hn::Add(sum, hn::Mul(hn::Set(d, f[k]), v)); };
-        add(s0, 0), add(s1, 1), add(s2, 2), add(s3, 3), add(s4, 4), add(s5, 5), add(s6, 6), add(s7, 7);
-      }
-      hn::StoreU(s0, d, sums[i] + j), hn::StoreU(s1, d, sums[i + 1] + j), hn::StoreU(s2, d, sums[i + 2] + j);
-      hn::StoreU(s3, d, sums[i + 3] + j), hn::StoreU(s4, d, sums[i + 4] + j), hn::StoreU(s5, d, sums[i + 5] + j);
-      hn::StoreU(s6, d, sums[i + 6] + j), hn::StoreU(s7, d, sums[i + 7] + j);
-    }
+  for (int j = 0; j < 8; j += static_cast<int>(hn::Lanes(half))) EightRows(half, features, weights, n, 0, j, sums);
+  for (int j = 0; j < 16; j += static_cast<int>(hn::Lanes(d))) EightRows(d, features, weights, n, 8, j, sums);
 }
 
 // table[i] of each i below 64. Tables in registers where there are any: gathers take longer.
@@ -291,6 +314,7 @@ namespace telesplat::codec::detail {
 HWY_EXPORT(Set);
 
 const Kernels& kernels() { return *HWY_DYNAMIC_DISPATCH(Set)(); }
+std::vector<int64_t> kernel_targets() { return hwy::SupportedAndGeneratedTargets(); }
 
 }  // namespace telesplat::codec::detail
 #endif  // HWY_ONCE

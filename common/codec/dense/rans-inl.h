@@ -16,29 +16,34 @@ static inline void PlainPutBits(uint32_t& x, uint32_t bits, unsigned count, uint
 static inline uint32_t* StatesOf(uint32_t* all, size_t count, size_t first) { return all + (first & (count - kLanes)); }
 
 static uint8_t* PlainPutSymbols(const SymbolRow& row, const EncodeEntry* tables, uint32_t* all, uint8_t* out) {
+  const auto raw_bits = [&](uint16_t symbol) {
+    const unsigned token = symbol % kSymbols;
+    return token < row.first ? 0 : (token - row.first) >> 3;
+  };
   for (size_t group = (row.count + kLanes - 1) / kLanes; group-- > 0;) {
     uint32_t* const states = StatesOf(all, row.states, group * kLanes);
     const size_t begin = group * kLanes, n = row.count - begin < kLanes ? row.count - begin : kLanes;
-    const uint8_t* tokens = row.tokens + begin;
+    const uint16_t* const symbols = row.symbols + begin;
     unsigned widest = 0;
     for (size_t i = 0; i < n; ++i) {
-      const unsigned k = tokens[i] < row.first ? 0 : (tokens[i] - row.first) >> 3, low = k < 15 ? k : 15;
+      const unsigned k = raw_bits(symbols[i]), low = k < 15 ? k : 15;
       const uint32_t z = (row.wide != nullptr ? row.wide[begin + i] : row.narrow[begin + i]) + 8;
       PlainPutBits(states[i], z & ((1u << low) - 1), low, out);
       widest = k > widest ? k : widest;
     }
     if (widest > 15)
       for (size_t i = 0; i < n; ++i) {
-        const unsigned k = tokens[i] < row.first ? 0 : (tokens[i] - row.first) >> 3;
+        const unsigned k = raw_bits(symbols[i]);
         if (k > 15) PlainPutBits(states[i], (row.wide[begin + i] + 8) >> 15 & ((1u << (k - 15)) - 1), k - 15, out);
       }
     for (size_t i = 0; i < n; ++i) {
-      const EncodeEntry e = tables[row.contexts[begin + i] * kSymbols + tokens[i]];
-      const uint32_t complement = e.packed >> 13 & 0xFFF;
+      const EncodeEntry e = tables[symbols[i]];
+      const uint32_t complement = e.packed >> EncodeEntry::kComplementAt;
       uint32_t& x = states[i];
-      if (x >= (kFrequencyOne - complement) << (kStateBits - kFrequencyBits)) PlainPutWord(x, out);
-      const uint32_t quotient = static_cast<uint32_t>(uint64_t{x} * e.reciprocal >> 32) >> (e.packed >> 25);
-      x += (e.packed & 0x1FFF) + quotient * complement;
+      if ((x + (complement << EncodeEntry::kComplementAt)) >> kStateBits != 0) PlainPutWord(x, out);
+      const uint32_t shift = e.packed >> EncodeEntry::kShiftAt & EncodeEntry::kShiftMask;
+      const uint32_t quotient = static_cast<uint32_t>(uint64_t{x} * e.reciprocal >> 32) >> shift;
+      x += (e.packed & EncodeEntry::kAddMask) + quotient * complement;
     }
   }
   return out;

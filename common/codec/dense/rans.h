@@ -30,17 +30,22 @@ inline constexpr size_t kMostStates = 2 * kLanes;
 /// but each takes four bytes.
 constexpr size_t states_of(size_t symbols) { return symbols < kEnoughForMore ? kLanes : kMostStates; }
 
-/// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991).
+/// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991). A state x is too large
+/// for it if x + the complement's bits reach 2^31.
 struct EncodeEntry {
   uint32_t reciprocal = 0;
-  uint32_t packed = 0;  ///< bits 0-12: what is added, 13-24: 2048 - frequency, 25-28: shift
+  uint32_t packed = 0;  ///< bits 0-12: what is added, 13-16: shift, 20-30: 2048 - frequency
+
+  static constexpr unsigned kShiftAt = 13, kComplementAt = kStateBits - kFrequencyBits;
+  static constexpr uint32_t kAddMask = (1u << kShiftAt) - 1, kShiftMask = 15;
 
   static EncodeEntry of(uint32_t start, uint32_t frequency) {
     if (frequency == 0) return {};
-    if (frequency == 1) return {~0u, (start + kFrequencyOne - 1) | (kFrequencyOne - 1) << 13};
+    if (frequency == 1) return {~0u, (start + kFrequencyOne - 1) | (kFrequencyOne - 1) << kComplementAt};
     const unsigned bits = static_cast<unsigned>(std::bit_width(frequency - 1));
     const uint64_t reciprocal = ((uint64_t{1} << (bits + 31)) + frequency - 1) / frequency;
-    return {static_cast<uint32_t>(reciprocal), start | (kFrequencyOne - frequency) << 13 | (bits - 1) << 25};
+    return {static_cast<uint32_t>(reciprocal),
+            start | (bits - 1) << kShiftAt | (kFrequencyOne - frequency) << kComplementAt};
   }
   /// That of a token which starts so much later.
   EncodeEntry from(uint32_t start) const { return {reciprocal, packed + start}; }
@@ -48,9 +53,9 @@ struct EncodeEntry {
 
 /// The symbols of a row that are to be put. Tokens below `first` have no raw bits; others are first + the token of z.
 struct SymbolRow {
-  const uint8_t *tokens = nullptr, *contexts = nullptr;
-  const uint32_t* wide = nullptr;   ///< z; or
-  const uint8_t* narrow = nullptr;  ///< z below 256
+  const uint16_t* symbols = nullptr;  ///< contexts * kSymbols + tokens
+  const uint32_t* wide = nullptr;     ///< z; or
+  const uint8_t* narrow = nullptr;    ///< z below 256
   size_t count = 0;
   unsigned first = 0;
   size_t states = kLanes;  ///< how many take turns: kLanes or twice that

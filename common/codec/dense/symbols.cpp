@@ -108,16 +108,6 @@ void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_nu
   kinds.fill_row(-1, 0);
 }
 
-SymbolRow SymbolPlane::row(const TileShape& shape, size_t y) const {
-  const auto r = static_cast<ptrdiff_t>(y);
-  return {tokens.row(r),
-          contexts.row(r),
-          is_wide ? wide.row(r) : nullptr,
-          is_wide ? nullptr : narrow.row(r),
-          shape.covered[y],
-          first};
-}
-
 void States::reset(const TileShape& shape) {
   count = states_of(shape.total);
   std::fill_n(of, kMostStates, kStateLow);
@@ -204,13 +194,12 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
 // In four tables, so that equal symbols side by side need not wait for each other. None has more than 65535.
 void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
   std::memset(parts_, 0, sizeof parts_);
-  if (joined_.size() < shape.width + 64) joined_.resize(shape.width + 64);
-  const uint16_t* const joined = joined_.data();
+  symbols_.reset(shape.width, shape.height);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const auto [first, last] = shape.span(y);
-    kernels().join_bytes(plane.tokens.row(r) + first, plane.contexts.row(r) + first, last - first,
-                         joined_.data() + first);
+    uint16_t* const joined = symbols_.row(r);
+    kernels().join_bytes(plane.tokens.row(r) + first, plane.contexts.row(r) + first, last - first, joined + first);
     shape.for_each_run(y, [&](size_t x, size_t end) {
       for (; x + 4 <= end; x += 4) {
         uint64_t four;
@@ -243,18 +232,20 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
 
 uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, States& states,
                                uint8_t* out) {
-  SymbolRow row = plane.row(shape, y);
-  row.states = states.count;
+  const auto r = static_cast<ptrdiff_t>(y);
+  SymbolRow row{.symbols = symbols_.row(r), .count = shape.covered[y], .first = plane.first, .states = states.count};
+  if (plane.is_wide)
+    row.wide = plane.wide.row(r);
+  else
+    row.narrow = plane.narrow.row(r);
   if (!shape.full(y)) {
     const size_t needed = shape.width + Plane<uint8_t>::kTail;
-    if (packed_tokens_.size() < needed)
-      packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed),
-          packed_wide_.resize(needed);
+    if (packed_symbols_.size() < needed)
+      packed_symbols_.resize(needed), packed_narrow_.resize(needed), packed_wide_.resize(needed);
     size_t n = 0;
     const auto pack = [&](auto from, auto& to) {
       shape.for_each_run(y, [&](size_t begin, size_t end) {
-        copy_about(end - begin, std::pair{row.tokens + begin, packed_tokens_.data() + n},
-                   std::pair{row.contexts + begin, packed_contexts_.data() + n},
+        copy_about(end - begin, std::pair{row.symbols + begin, packed_symbols_.data() + n},
                    std::pair{from + begin, to.data() + n});
         n += end - begin;
       });
@@ -266,7 +257,7 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
       pack(row.narrow, packed_narrow_);
       row.narrow = packed_narrow_.data();
     }
-    row.tokens = packed_tokens_.data(), row.contexts = packed_contexts_.data();
+    row.symbols = packed_symbols_.data();
   }
   return kernels().put_symbols(row, tables_.data(), states.of, out);
 }

@@ -68,7 +68,6 @@ struct TileShape {
 struct SymbolPlane {
   /// wide: numbers below 2^24, else below 256.
   void reset(const TileShape& shape, bool wide, unsigned first = 0);
-  SymbolRow row(const TileShape& shape, size_t y) const;
 
   Plane<uint8_t> tokens, contexts, narrow;
   Plane<uint8_t> kinds;  ///< of tokens of planes (`first` is kHits): their contexts follow from those above
@@ -112,10 +111,11 @@ class PlaneEncoder {
   void count(const SymbolPlane& plane, const TileShape& shape);
   TokenLevels levels_;
   TokenCounts counts_;
-  uint16_t parts_[4][kContexts * kSymbols];  ///< of counts_
-  std::vector<uint16_t> joined_;             ///< a row's contexts * kSymbols + tokens
-  std::vector<EncodeEntry> tables_;          ///< of contexts before they are merged
-  std::vector<uint8_t> packed_tokens_, packed_contexts_, packed_narrow_;
+  uint16_t parts_[4][kContexts * kSymbols + 96];  ///< of counts_
+  Plane<uint16_t> symbols_;                       ///< contexts * kSymbols + tokens
+  std::vector<EncodeEntry> tables_;               ///< of contexts before they are merged
+  std::vector<uint16_t> packed_symbols_;
+  std::vector<uint8_t> packed_narrow_;
   std::vector<uint32_t> packed_wide_;
 };
 

@@ -83,47 +83,56 @@ bool for_each_level(TokenLevels& levels, Code code) {
 constexpr unsigned kMostOfNone = 12;  // the largest level of a token that never comes
 constexpr uint32_t kMany = 70;        // of so many a level that is not ideal costs more than it saves
 
-// The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
-// share_of_one: of a count of 1, in 256ths of a frequency.
-int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected, bool last) {
-  static constexpr auto kRates = [] {
-    std::array<float, 2 * kLevels + 1> out{};
-    for (int off = -kLevels; off <= kLevels; ++off)
-      out[static_cast<size_t>(off + kLevels)] = 1.5f * static_cast<float>(std::min(off < 0 ? -off : off, 6));
+// Bits of a level that is `steps` from what is expected.
+constexpr int kMostStepsThatCost = 6;
+constexpr float cost_of(int steps) { return 1.5f * static_cast<float>(std::min(steps, kMostStepsThatCost)); }
+
+// The level between `ideal` and what is expected that costs the fewest bits: d steps from the ideal one cost `count`
+// tokens 0.0216 d^2 bits each.
+int nearer_level(uint32_t count, int ideal, int expected) {
+  constexpr float kLoss = 0.0216f;
+  // How many steps pay: the next one costs (2 d + 1) kLoss count more.
+  static constexpr auto kThatPay = [] {
+    std::array<uint8_t, kMany> out{};
+    for (uint32_t n = 1; n < out.size(); ++n)
+      while (out[n] < kLevels && static_cast<float>((2 * out[n] + 1) * n) * kLoss < cost_of(1)) ++out[n];
     return out;
   }();
-  const float* const rates = kRates.data() + kLevels - expected;
-  const float n = static_cast<float>(count);
-  int best = 0;
-  float least = 1e30f;
-  const auto consider = [&](int level, float loss) {
-    const float cost = loss + rates[level];
-    if (cost < least) least = cost, best = level;
-  };
-  if (count != 0) {
-    const auto share = static_cast<uint32_t>(count * share_of_one);
-    const int ideal = static_cast<int>(level_of(share < 256 ? 0 : share - 256));
-    if (count >= kMany) return ideal;
-    const int towards = std::max(expected, 1), step = towards < ideal ? -1 : 1;
-    for (int level = ideal;; level += step) {  // until what is lost alone is too much
-      const float off = static_cast<float>(level - ideal), loss = 0.0216f * n * off * off;
-      if (loss >= least) return best;
-      consider(level, loss);
-      if (level == towards) return best;
-    }
+  const int towards = std::max(expected, 1), most = std::abs(ideal - towards), apart = std::abs(ideal - expected);
+  int d = std::min<int>(kThatPay[count], most);
+  if (apart > kMostStepsThatCost) {  // the first steps save nothing
+    d = std::min(std::max(d, apart - kMostStepsThatCost), most);
+    const float n = static_cast<float>(count), off = static_cast<float>(d);
+    if (kLoss * n * off * off + cost_of(apart - d) >= cost_of(apart)) d = 0;
   }
+  return towards < ideal ? ideal - d : ideal + d;
+}
+
+// The level of a token that never comes: none, or one that is near to what is expected.
+int level_of_none(uint64_t total, int expected) {
   static constexpr auto kWeights = [] {
     std::array<float, kMostOfNone + 1> out{};
     for (unsigned level = 1; level <= kMostOfNone; ++level) out[level] = 1 + static_cast<float>(weight_of(level)) / 256;
     return out;
   }();
+  int best = 0;
+  float least = cost_of(expected);
   const float loss_of_one = static_cast<float>(total) * (1.44f / kFrequencyOne);
-  for (int level = last ? 1 : 0; level <= std::min(expected, static_cast<int>(kMostOfNone)); ++level) {
+  for (int level = 1; level <= std::min(expected, static_cast<int>(kMostOfNone)); ++level) {
     const float loss = kWeights[static_cast<size_t>(level)] * loss_of_one;
     if (loss >= least) break;
-    consider(level, loss);
+    if (const float cost = loss + cost_of(expected - level); cost < least) least = cost, best = level;
   }
   return best;
+}
+
+// The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
+// share_of_one: of a count of 1, in 256ths of a frequency.
+int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected) {
+  if (count == 0) return level_of_none(total, expected);
+  const auto share = static_cast<uint32_t>(count * share_of_one);
+  const int ideal = static_cast<int>(level_of(share < 256 ? 0 : share - 256));
+  return count >= kMany ? ideal : nearer_level(count, ideal, expected);
 }
 
 constexpr double kTokenCost = 6;  // bits of a level
@@ -187,7 +196,7 @@ void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& le
     const double share = kFrequencyOne * 256.0 / static_cast<double>(total);
     for (unsigned t = 0; t < end; ++t) {
       of[t] = static_cast<uint8_t>(present == 1 ? (counts[c][t] != 0 ? 2 : 0)
-                                                : choose_level(counts[c][t], total, share, expected(t), t + 1 == end));
+                                                : choose_level(counts[c][t], total, share, expected(t)));
       expected.next(of[t]);
     }
     before = &of;

@@ -131,6 +131,7 @@ ContextScale scale_of(const std::vector<uint32_t>& sums, uint32_t total) {
 struct PackedRow {
   alignas(64) uint8_t contexts[kSide + Plane<uint8_t>::kTail], tokens[kSide + Plane<uint8_t>::kTail],
       narrow[kSide + Plane<uint8_t>::kTail];
+  alignas(64) uint16_t symbols[kSide + Plane<uint8_t>::kTail];
   size_t count = 0;
 };
 
@@ -155,6 +156,7 @@ struct BlockCoder::Parts {
       std::memcpy(packed.narrow + packed.count, s.z[p][y] + x, kGroupWidth);
       packed.count += kGroupWidth;
     });
+    kernels().join_bytes(packed.tokens, packed.contexts, packed.count, packed.symbols);
   }
 
   void choose_scale(size_t p) {
@@ -222,7 +224,7 @@ void BlockCoder::put(size_t n, std::vector<uint8_t>& out) {
       s.pack(block, p, y);
       if (s.packed.count == 0) continue;
       SymbolRow row;
-      row.tokens = s.packed.tokens, row.contexts = s.packed.contexts, row.narrow = s.packed.narrow;
+      row.symbols = s.packed.symbols, row.narrow = s.packed.narrow;
       row.count = s.packed.count;
       at = kernels().put_symbols(row, s.tables[p].data(), states, at);
     }

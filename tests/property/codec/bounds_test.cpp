@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "common/codec/dense/kernels.h"
 #include "common/codec/depth_codec.h"
 #include "common/image/normal.h"
 #include "tests/support/codec/codec_images.h"
@@ -148,7 +149,7 @@ TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
     m.refinement = encode_refinement(m.image, m.bounded);
     all.push_back(std::move(m));
   }
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+  for (const int64_t target : detail::kernel_targets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
     for (const Made& m : all) {

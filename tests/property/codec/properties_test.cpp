@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <random>
 
+#include "common/codec/dense/kernels.h"
 #include "common/codec/depth_codec.h"
 #include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
@@ -103,7 +104,7 @@ TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
   all.push_back(test::masked(test::facets(190, 180, 2), test::band_mask(190, 180, 30)));
   std::vector<std::vector<uint8_t>> reference;
   for (const DepthImage& image : all) reference.push_back(encode(image));
-  const auto targets = hwy::SupportedAndGeneratedTargets();
+  const auto targets = detail::kernel_targets();
   for (const int64_t target : targets) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());

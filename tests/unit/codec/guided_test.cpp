@@ -98,7 +98,7 @@ void expect_values(const GuidedPlane& plane, const TileShape& shape, const std::
 }
 
 TEST(GuidedPlanes, DecodeToWhatThePageSays) {
-  for (const int64_t target : testing::simd_targets()) {
+  for (const int64_t target : kernel_targets()) {
     const OnTarget on(target);
     GuidedPlane a, b, index;
     for (uint32_t seed = 0; seed < 96; ++seed) {
@@ -145,7 +145,7 @@ TEST(Normals, AreTurnedAsTablesSay) {
     }
   };
   expect_turns(plain_kernels());
-  for (const int64_t target : testing::simd_targets()) {
+  for (const int64_t target : kernel_targets()) {
     const OnTarget on(target);
     expect_turns(kernels());
   }

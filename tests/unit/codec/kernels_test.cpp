@@ -23,7 +23,7 @@ std::string name_of(int64_t target, size_t width) { return hwy::TargetName(targe
 // Calls check(kernels, width, random) for each instruction set and width; `random` starts alike for all sets.
 template <class Check>
 void on_every_set(Check check) {
-  for (const int64_t target : testing::simd_targets()) {
+  for (const int64_t target : kernel_targets()) {
     const OnTarget on(target);
     std::mt19937 random(5);
     for (const size_t width : kWidths) {

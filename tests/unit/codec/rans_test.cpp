@@ -52,7 +52,9 @@ std::vector<uint8_t> put(const Kernels& kernels, const Symbols& s, size_t n, boo
                          uint32_t* states) {
   std::fill_n(states, kMostStates, kStateLow);
   std::vector<uint8_t> out(n * 6 + 64);
-  const SymbolRow row{s.tokens.data(), s.contexts.data(), wide ? s.wide.data() : nullptr, s.narrow.data(), n, 0, count};
+  std::vector<uint16_t> symbols(n);
+  for (size_t i = 0; i < n; ++i) symbols[i] = static_cast<uint16_t>(s.contexts[i] * kSymbols + s.tokens[i]);
+  const SymbolRow row{symbols.data(), wide ? s.wide.data() : nullptr, s.narrow.data(), n, 0, count};
   out.resize(static_cast<size_t>(kernels.put_symbols(row, s.encode.data(), states, out.data()) - out.data()));
   return out;
 }
@@ -83,7 +85,7 @@ TEST(Rans, AnySymbolsComeBackOnEveryInstructionSet) {
     const size_t count = seed % 4 < 2 ? kLanes : kMostStates;
     const auto bytes = put(plain_kernels(), s, n, wide, count, states);
     expect_symbols(plain_kernels(), s, n, wide, bytes, count, states);
-    for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    for (const int64_t target : kernel_targets()) {
       hwy::SetSupportedTargetsForTest(target);
       hwy::GetChosenTarget().Update(hwy::SupportedTargets());
       ASSERT_EQ(put(kernels(), s, n, wide, count, others), bytes) << hwy::TargetName(target);
@@ -173,8 +175,10 @@ TEST(Reciprocals, DivideExactly) {
     for (int i = 0; i < 20; ++i) {
       const uint64_t most = std::min<uint64_t>(uint64_t{f} << (kStateBits - kFrequencyBits), uint64_t{1} << 31) - 1;
       const auto x = static_cast<uint32_t>(i == 0 ? most : kStateLow + random() % (most - kStateLow + 1));
-      const uint32_t quotient = static_cast<uint32_t>(uint64_t{x} * e.reciprocal >> 32) >> (e.packed >> 25);
-      ASSERT_EQ(x + (e.packed & 0x1FFF) + quotient * (e.packed >> 13 & 0xFFF), x / f * kFrequencyOne + x % f + start)
+      const uint32_t shift = e.packed >> EncodeEntry::kShiftAt & EncodeEntry::kShiftMask;
+      const uint32_t quotient = static_cast<uint32_t>(uint64_t{x} * e.reciprocal >> 32) >> shift;
+      ASSERT_EQ(x + (e.packed & EncodeEntry::kAddMask) + quotient * (e.packed >> EncodeEntry::kComplementAt),
+                x / f * kFrequencyOne + x % f + start)
           << x << " / " << f;
     }
   }

@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
+#include "common/codec/dense/kernels.h"
 #include "common/volume/slices/block.h"
 #include "common/volume/slices/image.h"
 #include "common/volume/slices/view.h"
@@ -264,7 +265,7 @@ TEST(SliceCodec, EveryInstructionSetCodesAlike) {
   Random random(10);
   const auto image = soft(random);
   const auto bytes = encode_slice(image);
-  for (const int64_t target : testing::simd_targets()) {
+  for (const int64_t target : codec::detail::kernel_targets()) {
     const testing::OnTarget on(target);
     EXPECT_EQ(encode_slice(image), bytes);
     const auto slices = parse_slices(bytes, 256, 192, 1);

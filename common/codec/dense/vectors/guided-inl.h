@@ -28,6 +28,14 @@ HWY_INLINE V32 PairProducts(V16 pairs, V32 weights) {
 #endif
 }
 
+HWY_INLINE V32 AddProducts(V32 sum, V16 pairs, V32 weights) {
+#ifdef TELESPLAT_ADDED_PRODUCTS
+  return V32{_mm512_dpwssd_epi32(sum.raw, pairs.raw, weights.raw)};
+#else
+  return hn::Add(sum, PairProducts(pairs, weights));
+#endif
+}
+
 // Pixels in their order.
 HWY_INLINE void StorePairs(const PairSums& sums, int32_t* out) {
   const V32 low = sums.low, high = sums.high;
@@ -87,8 +95,8 @@ class EvenTerms {
   static constexpr int kLast = 6;
   static HWY_INLINE void Add(PairSums& sums, const int16_t* first, const int16_t* second, V32 weights) {
     const V16 a = hn::LoadU(kD16s, first), b = hn::LoadU(kD16s, second);
-    sums.low = hn::Add(sums.low, PairProducts(hn::InterleaveLower(kD16s, a, b), weights));
-    sums.high = hn::Add(sums.high, PairProducts(hn::InterleaveUpper(kD16s, a, b), weights));
+    sums.low = AddProducts(sums.low, hn::InterleaveLower(kD16s, a, b), weights);
+    sums.high = AddProducts(sums.high, hn::InterleaveUpper(kD16s, a, b), weights);
   }
   const int16_t *const up_, *const guide_[3], *const residual_, *const last_;
   const bool has_last_;
@@ -137,10 +145,8 @@ class FlatTerms {
     for (int pair = 0; pair < pairs_; ++pair) {
       const V16 a = hn::LoadU(kD16s, terms_[kTermPairs[pair][0]] + x),
                 b = hn::LoadU(kD16s, terms_[kTermPairs[pair][1]] + x);
-      sums.low =
-          hn::Add(sums.low, PairProducts(hn::InterleaveLower(kD16s, a, b), ByFlatness(weights_[pair], flat_low)));
-      sums.high =
-          hn::Add(sums.high, PairProducts(hn::InterleaveUpper(kD16s, a, b), ByFlatness(weights_[pair], flat_high)));
+      sums.low = AddProducts(sums.low, hn::InterleaveLower(kD16s, a, b), ByFlatness(weights_[pair], flat_low));
+      sums.high = AddProducts(sums.high, hn::InterleaveUpper(kD16s, a, b), ByFlatness(weights_[pair], flat_high));
     }
     return sums;
   }
@@ -182,25 +188,69 @@ HWY_INLINE V16 NearestOf(PairSums sums, int bits, V16 most) {
 
 HWY_INLINE V16 Folded16(V16 v) { return hn::Xor(hn::Add(v, v), hn::ShiftRight<15>(v)); }
 
-template <class Terms>
-HWY_INLINE void ByteResiduals(const Terms& terms, const GuidedRows& rows, size_t n, uint8_t* HWY_RESTRICT z,
-                              uint8_t* HWY_RESTRICT tokens, int16_t* HWY_RESTRICT residual) {
-  const hn::Rebind<uint8_t, D16> bytes;
-  const V16 most = hn::Set(kD16s, static_cast<int16_t>(rows.most)), eight = hn::Set(kD16s, int16_t{8});
-  for (size_t x = 0; x < n; x += hn::Lanes(kD16s)) {
-    const V16 guess = NearestOf(terms.At(x), 6, most);
-    const V16 off = hn::Sub(hn::ShiftRight<6>(hn::LoadU(kD16s, rows.own + x)), guess);
-    const V16 r = hn::ShiftRight<8>(hn::ShiftLeft<8>(off));
-    hn::StoreU(hn::ShiftLeft<6>(r), kD16s, residual + x);
-    const V16 folded = Folded16(r), v = hn::Add(folded, eight);
-    // As ByteToken().
+// Numbers below 256 and their tokens, as ByteToken(), of as many pixels as two vectors have.
+class ByteTokens {
+ public:
+#if HWY_TARGET <= HWY_AVX3_DL
+  ByteTokens() {
+    HWY_ALIGN static constexpr auto kTokens = [] {
+      std::array<uint8_t, 256> of{};
+      for (unsigned z = 0; z < of.size(); ++z) of[z] = ByteToken(static_cast<uint8_t>(z));
+      return of;
+    }();
+    HWY_ALIGN static constexpr auto kLowBytes = [] {
+      std::array<uint8_t, 64> of{};
+      for (size_t i = 0; i < of.size(); ++i) of[i] = static_cast<uint8_t>(2 * i);
+      return of;
+    }();
+    for (size_t i = 0; i < 4; ++i) tokens_[i] = _mm512_load_si512(kTokens.data() + 64 * i);
+    low_bytes_ = _mm512_load_si512(kLowBytes.data());
+  }
+  HWY_INLINE void Store(V16 a, V16 b, uint8_t* z, uint8_t* tokens) const {
+    const __m512i bytes = _mm512_permutex2var_epi8(a.raw, low_bytes_, b.raw),
+                  small = _mm512_permutex2var_epi8(tokens_[0], bytes, tokens_[1]),
+                  large = _mm512_permutex2var_epi8(tokens_[2], bytes, tokens_[3]);
+    _mm512_storeu_si512(z, bytes);
+    _mm512_storeu_si512(tokens, _mm512_mask_mov_epi8(small, _mm512_movepi8_mask(bytes), large));
+  }
+
+ private:
+  __m512i tokens_[4], low_bytes_;
+#else
+  HWY_INLINE void Store(V16 a, V16 b, uint8_t* z, uint8_t* tokens) const {
+    StoreOne(a, z, tokens), StoreOne(b, z + hn::Lanes(kD16s), tokens + hn::Lanes(kD16s));
+  }
+
+ private:
+  static HWY_INLINE void StoreOne(V16 folded, uint8_t* z, uint8_t* tokens) {
+    const hn::Rebind<uint8_t, D16> bytes;
+    const V16 eight = hn::Set(kD16s, int16_t{8}), v = hn::Add(folded, eight);
     V16 token = hn::Min(folded, hn::ShiftRight<1>(v)), add = eight;
     token = hn::Min(token, hn::Add(hn::ShiftRight<2>(v), add)), add = hn::Add(add, eight);
     token = hn::Min(token, hn::Add(hn::ShiftRight<3>(v), add)), add = hn::Add(add, eight);
     token = hn::Min(token, hn::Add(hn::ShiftRight<4>(v), add)), add = hn::Add(add, eight);
     token = hn::Min(token, hn::Add(hn::ShiftRight<5>(v), add));
-    hn::StoreU(hn::DemoteTo(bytes, folded), bytes, z + x);
-    hn::StoreU(hn::DemoteTo(bytes, token), bytes, tokens + x);
+    hn::StoreU(hn::DemoteTo(bytes, folded), bytes, z);
+    hn::StoreU(hn::DemoteTo(bytes, token), bytes, tokens);
+  }
+#endif
+};
+
+template <class Terms>
+HWY_INLINE void ByteResiduals(const Terms& terms, const GuidedRows& rows, size_t n, uint8_t* HWY_RESTRICT z,
+                              uint8_t* HWY_RESTRICT tokens, int16_t* HWY_RESTRICT residual) {
+  const ByteTokens byte_tokens;
+  const V16 most = hn::Set(kD16s, static_cast<int16_t>(rows.most));
+  const auto folded_at = [&](size_t x) HWY_ATTR {
+    const V16 guess = NearestOf(terms.At(x), 6, most);
+    const V16 off = hn::Sub(hn::ShiftRight<6>(hn::LoadU(kD16s, rows.own + x)), guess);
+    const V16 r = hn::ShiftRight<8>(hn::ShiftLeft<8>(off));
+    hn::StoreU(hn::ShiftLeft<6>(r), kD16s, residual + x);
+    return Folded16(r);
+  };
+  for (size_t x = 0; x < n; x += 2 * hn::Lanes(kD16s)) {
+    const V16 first = folded_at(x), second = folded_at(x + hn::Lanes(kD16s));
+    byte_tokens.Store(first, second, z + x, tokens + x);
   }
 }
 
@@ -221,12 +271,11 @@ static void PairedResidualsWide(const GuidedRows& rows, size_t n, uint32_t* HWY_
   const V16 most = hn::Set(kD16s, static_cast<int16_t>(rows.most));
   const hn::Half<D16> half;
   const hn::Rebind<float, hn::Half<D16>> floats;
-  const hn::Rebind<uint8_t, hn::Half<D16>> bytes;
   const auto store = [&](hn::VFromD<hn::Half<D16>> v, size_t x) HWY_ATTR {
     const auto folded = hn::PromoteTo(kD32s, v);
     hn::StoreU(hn::BitCast(kD, folded), kD, z + x);
     const auto exponent = hn::BitCast(kD, hn::ConvertTo(floats, hn::Add(folded, hn::Set(kD32s, 8))));
-    hn::StoreU(hn::TruncateTo(bytes, hn::Sub(hn::ShiftRight<20>(exponent), hn::Set(kD, 1040u))), bytes, tokens + x);
+    hn::StoreU(LowBytes(hn::Sub(hn::ShiftRight<20>(exponent), hn::Set(kD, 1040u))), kD8, tokens + x);
   };
   for (size_t x = 0; x < n; x += hn::Lanes(kD16s)) {
     const V16 r = hn::Sub(hn::ShiftRightSame(hn::LoadU(kD16s, rows.own + x), bits), NearestOf(terms.At(x), bits, most));

@@ -185,7 +185,6 @@ static void ShortActivity(const int16_t* const gx[3], const int16_t* const gy[3]
                           uint8_t* HWY_RESTRICT tokens) {
   const hn::Half<U16> half;
   const hn::Rebind<float, D32> floats;
-  const hn::Rebind<uint8_t, D32> bytes;
   for (size_t x = 0; x < n; x += 2 * kHalf) {
     const auto apart = [&](const int16_t* a, const int16_t* b) HWY_ATTR {
       return hn::BitCast(kU16, hn::Abs(hn::Sub(hn::LoadU(kD16s, a + x), hn::LoadU(kD16s, b + x))));
@@ -196,7 +195,7 @@ static void ShortActivity(const int16_t* const gx[3], const int16_t* const gy[3]
     const auto store = [&](hn::VFromD<hn::Half<U16>> part, size_t at) HWY_ATTR {
       const auto number = hn::ConvertTo(floats, hn::BitCast(kD32s, hn::PromoteTo(kDU32, part)));
       const auto token = hn::Sub(hn::ShiftRight<20>(hn::BitCast(kDU32, number)), hn::Set(kDU32, 1040u));
-      hn::StoreU(hn::TruncateTo(bytes, token), bytes, tokens + at);
+      hn::StoreU(LowBytes(token), kD8, tokens + at);
     };
     store(hn::LowerHalf(half, v), x), store(hn::UpperHalf(half, v), x + kHalf);
   }
