@@ -40,11 +40,11 @@ inline constexpr Places kPlaces;
 #define RESTRICT HWY_RESTRICT
 
 HWY_BEFORE_NAMESPACE();
-#undef TELESPLAT_ADDED_PRODUCTS
+#undef TELESPLAT_VNNI_AND_CD
 #if HWY_TARGET == HWY_AVX3_DL && HWY_COMPILER_GCC_ACTUAL
 // Highway 1.0.3 names AVX-VNNI for this target, which neither of them has, where AVX512-VNNI is meant.
-#pragma GCC target("avx512vnni")
-#define TELESPLAT_ADDED_PRODUCTS
+#pragma GCC target("avx512vnni,avx512cd")
+#define TELESPLAT_VNNI_AND_CD
 #endif
 namespace telesplat::codec::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -182,6 +182,8 @@ static void CoverBytes(const uint64_t* HWY_RESTRICT words, size_t n, uint8_t* HW
 
 #include "common/codec/dense/vectors/rans-inl.h"
 
+#include "common/codec/dense/vectors/planes-inl.h"
+
 // A running sum of what the differences from the row above change by.
 static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT z, size_t n,
                             uint32_t* HWY_RESTRICT row) {
@@ -292,14 +294,43 @@ static void SampleShares(const float (*features)[kFeatures], const float* terms,
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits,    CoverBytes,    CutWide,         CutShort,        KeepBytes,
-                               FillValues,     Within,        LargestLessOne,  DepthResiduals,  DepthRowsVector,
-                               PlaneResiduals, PlaneTerms,    PlaneKinds,      PlaneContexts,   PairedContexts,
-                               JoinBytes,      OtherNormals,  TurnNormals,     TurnNormalsBack, Divide,
-                               UnfoldBytes,    UnfoldWide,    MedianResiduals, PairedResiduals, PairedResidualsWide,
-                               MedianValues,   PairedSums,    Flatness,        ShortGeometry,   ShortHeights,
-                               KnotsVector,    ShortActivity, NormalEquations, SampleShares,    Slots,
-                               PutSymbols,     GetSymbols};
+  static constexpr Kernels all{CoveredBits,
+                               CoverBytes,
+                               CutWide,
+                               CutShort,
+                               KeepBytes,
+                               FillValues,
+                               Within,
+                               LargestLessOne,
+                               DepthResiduals,
+                               DepthRowsVector,
+                               PlaneResidualsVector,
+                               PlaneTermsVector,
+                               PlaneKinds,
+                               PlaneContextsVector,
+                               PairedContexts,
+                               JoinBytes,
+                               OtherNormals,
+                               TurnNormals,
+                               TurnNormalsBack,
+                               Divide,
+                               UnfoldBytes,
+                               UnfoldWide,
+                               MedianResiduals,
+                               PairedResiduals,
+                               PairedResidualsWide,
+                               MedianValues,
+                               PairedSums,
+                               Flatness,
+                               ShortGeometry,
+                               ShortHeights,
+                               KnotsVector,
+                               ShortActivity,
+                               NormalEquations,
+                               SampleShares,
+                               Slots,
+                               PutSymbols,
+                               GetSymbols};
   return &all;
 }
 

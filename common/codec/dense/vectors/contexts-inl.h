@@ -1,13 +1,62 @@
-// Contexts of tokens with vectors: products of bytes, two at a time. Included once for every instruction set, in its
+// Contexts of tokens with vectors: by products of bytes, two at a time, and by tables. Included once for every instruction set, in its
 // namespace. No include guard: that is meant.
-
-#if HWY_TARGET <= HWY_AVX2
 
 using DBytes = hn::CappedTag<uint8_t, 64>;
 using VBytes = hn::VFromD<DBytes>;
+constexpr DBytes kDBytes;
+
+// table[i] of 256.
+class ByteTable {
+ public:
+#if HWY_TARGET <= HWY_AVX3_DL
+  explicit ByteTable(const uint8_t* table) {
+    for (int i = 0; i < 4; ++i) quarters_[i] = _mm512_loadu_si512(table + 64 * i);
+  }
+  HWY_INLINE VBytes operator()(VBytes i) const {
+    const __m512i lower = _mm512_permutex2var_epi8(quarters_[0], i.raw, quarters_[1]),
+                  upper = _mm512_permutex2var_epi8(quarters_[2], i.raw, quarters_[3]);
+    return VBytes{_mm512_mask_mov_epi8(lower, _mm512_movepi8_mask(i.raw), upper)};
+  }
+
+ private:
+  __m512i quarters_[4];
+#else
+  explicit ByteTable(const uint8_t* table) : table_(table) {}
+  HWY_INLINE VBytes operator()(VBytes i) const {
+    const hn::Repartition<uint16_t, DBytes> words;
+    const VBytes low = hn::Set(kDBytes, uint8_t{15}), column = hn::And(i, low),
+                 row = hn::And(hn::BitCast(kDBytes, hn::ShiftRight<4>(hn::BitCast(words, i))), low);
+    VBytes out = hn::Zero(kDBytes);
+    HWY_UNROLL(16) for (int k = 0; k < 16; ++k) {
+      const VBytes of_row = hn::TableLookupBytes(hn::LoadDup128(kDBytes, table_ + 16 * k), column);
+      out = hn::IfThenElse(hn::Eq(row, hn::Set(kDBytes, static_cast<uint8_t>(k))), of_row, out);
+    }
+    return out;
+  }
+
+ private:
+  const uint8_t* table_;
+#endif
+};
+
+// As PlaneContexts(). Kinds are below 16.
+static void PlaneContextsVector(const uint8_t* HWY_RESTRICT above, size_t n, int merges,
+                                uint8_t* HWY_RESTRICT contexts) {
+  const hn::Repartition<uint16_t, DBytes> words;
+  const ByteTable table(kPlaneContexts.data());
+  const VBytes most = hn::Set(kDBytes, static_cast<uint8_t>(15 >> merges));
+  for (size_t x = 0; x < n; x += hn::Lanes(kDBytes)) {
+    const auto here = hn::BitCast(words, hn::LoadU(kDBytes, above + x));
+    const VBytes pair = hn::Or(hn::BitCast(kDBytes, hn::ShiftLeft<4>(here)), hn::LoadU(kDBytes, above + x + 1));
+    const auto merged = hn::ShiftRightSame(hn::BitCast(words, table(pair)), merges);
+    hn::StoreU(hn::And(hn::BitCast(kDBytes, merged), most), kDBytes, contexts + x);
+  }
+}
+
+#if HWY_TARGET <= HWY_AVX2
+
 using DSums = hn::Repartition<int16_t, DBytes>;
 using VSums = hn::VFromD<DSums>;
-constexpr DBytes kDBytes;
 constexpr DSums kDSums;
 
 HWY_INLINE VSums BytePairs(VBytes pairs, VSums weights) {

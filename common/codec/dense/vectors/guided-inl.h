@@ -29,7 +29,7 @@ HWY_INLINE V32 PairProducts(V16 pairs, V32 weights) {
 }
 
 HWY_INLINE V32 AddProducts(V32 sum, V16 pairs, V32 weights) {
-#ifdef TELESPLAT_ADDED_PRODUCTS
+#ifdef TELESPLAT_VNNI_AND_CD
   return V32{_mm512_dpwssd_epi32(sum.raw, pairs.raw, weights.raw)};
 #else
   return hn::Add(sum, PairProducts(pairs, weights));
@@ -192,30 +192,26 @@ HWY_INLINE V16 Folded16(V16 v) { return hn::Xor(hn::Add(v, v), hn::ShiftRight<15
 class ByteTokens {
  public:
 #if HWY_TARGET <= HWY_AVX3_DL
-  ByteTokens() {
-    HWY_ALIGN static constexpr auto kTokens = [] {
-      std::array<uint8_t, 256> of{};
-      for (unsigned z = 0; z < of.size(); ++z) of[z] = ByteToken(static_cast<uint8_t>(z));
-      return of;
-    }();
-    HWY_ALIGN static constexpr auto kLowBytes = [] {
-      std::array<uint8_t, 64> of{};
-      for (size_t i = 0; i < of.size(); ++i) of[i] = static_cast<uint8_t>(2 * i);
-      return of;
-    }();
-    for (size_t i = 0; i < 4; ++i) tokens_[i] = _mm512_load_si512(kTokens.data() + 64 * i);
-    low_bytes_ = _mm512_load_si512(kLowBytes.data());
-  }
+  ByteTokens() : tokens_(kTokens.data()), low_bytes_(_mm512_load_si512(kLowBytes.data())) {}
   HWY_INLINE void Store(V16 a, V16 b, uint8_t* z, uint8_t* tokens) const {
-    const __m512i bytes = _mm512_permutex2var_epi8(a.raw, low_bytes_, b.raw),
-                  small = _mm512_permutex2var_epi8(tokens_[0], bytes, tokens_[1]),
-                  large = _mm512_permutex2var_epi8(tokens_[2], bytes, tokens_[3]);
-    _mm512_storeu_si512(z, bytes);
-    _mm512_storeu_si512(tokens, _mm512_mask_mov_epi8(small, _mm512_movepi8_mask(bytes), large));
+    const VBytes bytes{_mm512_permutex2var_epi8(a.raw, low_bytes_, b.raw)};
+    hn::StoreU(bytes, kDBytes, z);
+    hn::StoreU(tokens_(bytes), kDBytes, tokens);
   }
 
  private:
-  __m512i tokens_[4], low_bytes_;
+  static constexpr auto kTokens = [] {
+    std::array<uint8_t, 256> of{};
+    for (unsigned z = 0; z < of.size(); ++z) of[z] = ByteToken(static_cast<uint8_t>(z));
+    return of;
+  }();
+  HWY_ALIGN static constexpr auto kLowBytes = [] {
+    std::array<uint8_t, 64> of{};
+    for (size_t i = 0; i < of.size(); ++i) of[i] = static_cast<uint8_t>(2 * i);
+    return of;
+  }();
+  const ByteTable tokens_;
+  const __m512i low_bytes_;
 #else
   HWY_INLINE void Store(V16 a, V16 b, uint8_t* z, uint8_t* tokens) const {
     StoreOne(a, z, tokens), StoreOne(b, z + hn::Lanes(kD16s), tokens + hn::Lanes(kD16s));

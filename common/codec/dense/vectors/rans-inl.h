@@ -261,11 +261,45 @@ HWY_INLINE V Spread(V v, M to) {
 }
 
 // Fills up the states that are below kStateLow with the words before `end`.
-HWY_INLINE V Refill(V x, const uint8_t*& end) {
-  const M low = Exceeds(hn::Set(kD, kStateLow), x);
-  end -= 2 * hn::CountTrue(kD, low);
-  const V words = hn::PromoteTo(kD, hn::LoadU(kD16, reinterpret_cast<const uint16_t*>(end)));
-  return hn::IfThenElse(low, hn::Or(hn::ShiftLeft<16>(x), Spread(words, low)), x);
+HWY_INLINE const uint8_t* Refill(V (&x)[kVectors], const uint8_t* end) {
+#if HWY_TARGET <= HWY_AVX3_DL
+  static_assert(kVectors == 2);
+  // Of the words of one vector's states, above which their lower halves come.
+  HWY_ALIGN static constexpr auto kPlaces = [] {
+    std::array<std::array<uint16_t, kLanes>, 2> of{};
+    for (size_t i = 0; i < kLanes; ++i)
+      for (size_t k = 0; k < 2; ++k) of[k][i] = static_cast<uint16_t>(i % 2 != 0 ? i - 1 : kLanes + k * kN + i / 2);
+    return of;
+  }();
+  const M first = Exceeds(hn::Set(kD, kStateLow), x[0]), second = Exceeds(hn::Set(kD, kStateLow), x[1]);
+  const __mmask32 both = _mm512_kunpackw(second.raw, first.raw);
+  end -= 2 * std::popcount(static_cast<uint32_t>(both));
+  const __m512i words = _mm512_maskz_expand_epi16(both, _mm512_loadu_si512(end));
+  const auto filled = [&](size_t k) HWY_ATTR {
+    return _mm512_permutex2var_epi16(x[k].raw, _mm512_load_si512(&kPlaces[k]), words);
+  };
+  x[0] = V{_mm512_mask_mov_epi32(x[0].raw, first.raw, filled(0))};
+  x[1] = V{_mm512_mask_mov_epi32(x[1].raw, second.raw, filled(1))};
+#else
+  HWY_UNROLL(8) for (size_t i = kVectors; i-- > 0;) {
+    const M low = Exceeds(hn::Set(kD, kStateLow), x[i]);
+    end -= 2 * hn::CountTrue(kD, low);
+    const V words = hn::PromoteTo(kD, hn::LoadU(kD16, reinterpret_cast<const uint16_t*>(end)));
+    x[i] = hn::IfThenElse(low, hn::Or(hn::ShiftLeft<16>(x[i]), Spread(words, low)), x[i]);
+  }
+#endif
+  return end;
+}
+
+// The lowest count[i] bits of each state, which leave it.
+HWY_INLINE const uint8_t* GetRaw(V (&x)[kVectors], const V (&count)[kVectors], V (&bits)[kVectors],
+                                 const uint8_t* end) {
+  const V one = hn::Set(kD, 1u);
+  HWY_UNROLL(8) for (size_t i = 0; i < kVectors; ++i) {
+    bits[i] = hn::And(x[i], hn::Sub(hn::Shl(one, count[i]), one));
+    x[i] = hn::Shr(x[i], count[i]);
+  }
+  return Refill(x, end);
 }
 
 // tables[i] of each i below 2^16, one after the other: gathers take half as long again.
@@ -298,10 +332,10 @@ HWY_INLINE V EntriesAt(const uint32_t* tables, V i) {
 template <bool kWhole, bool kWide>
 HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, size_t n, const uint32_t* tables,
                                    V (&x)[kVectors], const uint8_t* end) {
-  const auto one = hn::Set(kD, 1u), first = hn::Set(kD, row.first), fifteen = hn::Set(kD, 15u);
-  V kept[kVectors], bits[kVectors];
-  auto widest = hn::Zero(kD);
-  HWY_UNROLL(8) for (size_t i = kVectors; i-- > 0;) {
+  const V one = hn::Set(kD, 1u), first = hn::Set(kD, row.first), fifteen = hn::Set(kD, 15u);
+  V z[kVectors], bits[kVectors], raw[kVectors];
+  V widest = hn::Zero(kD);
+  HWY_UNROLL(8) for (size_t i = 0; i < kVectors; ++i) {
     const M valid = hn::FirstN(kD, kWhole ? kN : n > i * kN ? n - i * kN : 0);
     V contexts = Load8(row.contexts + begin + i * kN);
     if constexpr (!kWhole) contexts = hn::IfThenElseZero(valid, contexts);
@@ -312,30 +346,32 @@ HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, size_t n
     const V frequency = hn::Add(hn::And(hn::ShiftRight<12>(entry), hn::Set(kD, 0xFFFu)), one);
     const V next =
         hn::Add(hn::Mul(frequency, hn::ShiftRight<kFrequencyBits>(x[i])), hn::And(entry, hn::Set(kD, 0xFFFu)));
-    x[i] = Refill(kWhole ? next : hn::IfThenElse(valid, next, x[i]), end);
+    x[i] = kWhole ? next : hn::IfThenElse(valid, next, x[i]);
     V over = hn::Sub(hn::Max(token, first), first);
     if constexpr (!kWhole) over = hn::IfThenElseZero(valid, over);
     bits[i] = hn::ShiftRight<3>(over);
-    kept[i] = hn::Shl(hn::Add(hn::And(over, hn::Set(kD, 7u)), hn::Set(kD, 8u)), bits[i]);
+    z[i] = hn::Sub(hn::Shl(hn::Add(hn::And(over, hn::Set(kD, 7u)), hn::Set(kD, 8u)), bits[i]), hn::Set(kD, 8u));
     widest = hn::Max(widest, bits[i]);
   }
-  if (kWide && !hn::AllFalse(kD, hn::Gt(widest, fifteen))) HWY_UNROLL(8) for (size_t i = kVectors; i-- > 0;) {
-      const V high = hn::Sub(hn::Max(bits[i], fifteen), fifteen);
-      kept[i] = hn::Add(kept[i], hn::ShiftLeft<15>(hn::And(x[i], hn::Sub(hn::Shl(one, high), one))));
-      x[i] = Refill(hn::Shr(x[i], high), end);
+  end = Refill(x, end);
+  if (kWide && !hn::AllFalse(kD, hn::Gt(widest, fifteen))) {
+    V high[kVectors];
+    HWY_UNROLL(8) for (size_t i = 0; i < kVectors; ++i) {
+      high[i] = hn::Sub(hn::Max(bits[i], fifteen), fifteen);
+      bits[i] = hn::Min(bits[i], fifteen);
     }
-  const bool any = !hn::AllTrue(kD, hn::Eq(widest, hn::Zero(kD)));
-  HWY_UNROLL(8) for (size_t i = kVectors; i-- > 0;) {
-    V z = hn::Sub(kept[i], hn::Set(kD, 8u));
-    if (any) {
-      const V low = hn::Min(bits[i], fifteen);
-      z = hn::Add(z, hn::And(x[i], hn::Sub(hn::Shl(one, low), one)));
-      x[i] = Refill(hn::Shr(x[i], low), end);
-    }
+    end = GetRaw(x, high, raw, end);
+    HWY_UNROLL(8) for (size_t i = 0; i < kVectors; ++i) z[i] = hn::Add(z[i], hn::ShiftLeft<15>(raw[i]));
+  }
+  if (!hn::AllTrue(kD, hn::Eq(widest, hn::Zero(kD)))) {
+    end = GetRaw(x, bits, raw, end);
+    HWY_UNROLL(8) for (size_t i = 0; i < kVectors; ++i) z[i] = hn::Add(z[i], raw[i]);
+  }
+  HWY_UNROLL(8) for (size_t i = 0; i < kVectors; ++i) {
     if constexpr (kWide)
-      hn::StoreU(z, kD, row.wide + begin + i * kN);
+      hn::StoreU(z[i], kD, row.wide + begin + i * kN);
     else
-      hn::StoreU(LowBytes(z), kD8, row.narrow + begin + i * kN);
+      hn::StoreU(LowBytes(z[i]), kD8, row.narrow + begin + i * kN);
   }
   return end;
 }

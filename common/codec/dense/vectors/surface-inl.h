@@ -44,6 +44,28 @@ HWY_INLINE V32 ShiftUp(V32 v, hn::VFromD<DU32> by) { return hn::BitCast(kD32s, h
 
 HWY_INLINE V32 Clamped16(V32 v) { return hn::Min(hn::Max(v, hn::Set(kD32s, -32767)), hn::Set(kD32s, 32767)); }
 
+// The upper halves of both, which InOrderOfWords() puts into the order of pixels.
+HWY_INLINE V16 UpperWords(V32 a, V32 b) {
+#if HWY_TARGET <= HWY_AVX3
+  HWY_ALIGN static constexpr auto kUpper = [] {
+    std::array<uint16_t, 32> of{};
+    for (size_t i = 0; i < of.size(); ++i) of[i] = static_cast<uint16_t>(2 * i + 1);
+    return of;
+  }();
+  return V16{_mm512_permutex2var_epi16(a.raw, _mm512_load_si512(kUpper.data()), b.raw)};
+#else
+  return Packed(hn::ShiftRight<16>(a), hn::ShiftRight<16>(b));
+#endif
+}
+
+HWY_INLINE V16 InOrderOfWords(V16 v) {
+#if HWY_TARGET <= HWY_AVX3
+  return v;
+#else
+  return InOrder(v);
+#endif
+}
+
 // As Geometry().
 class GeometryVectors {
  public:
@@ -53,48 +75,62 @@ class GeometryVectors {
         below_(depth[2]),
         slope_shift_(model.slope_shift),
         height_shift_(model.height_shift),
-        y_(hn::Set(kD32s, y)),
-        first_(hn::Add(hn::Iota(kD32s, 0), hn::Set(kD32s, x0))) {
+        first_(hn::BitCast(kD16s, hn::Or(hn::And(hn::Add(hn::Iota(kD32s, 0), hn::Set(kD32s, x0)), LowWords()),
+                                         hn::Set(kD32s, PairOf(0, static_cast<int16_t>(y)))))) {
     for (int i = 0; i < 3; ++i) {
       by_slopes_[i] = hn::Set(kD32s, PairOf(model.matrix[i][0], model.matrix[i][1]));
-      by_height_[i] = hn::Set(kD32s, model.matrix[i][2]);
+      by_height_[i] = hn::Set(kD32s, PairOf(model.matrix[i][2], 0));
     }
   }
   HWY_INLINE void Run(size_t n, int16_t* HWY_RESTRICT gx, int16_t* HWY_RESTRICT gy) const {
     const V16 end = hn::Set(kD16s, int16_t{8128});
     for (size_t x = 0; x < n; x += 2 * kHalf) {
       const Direction a = At(x), b = At(x + kHalf);
-      const V16 divisor = Packed(a.divisor, b.divisor), z = Packed(a.z, b.z);
+      const V16 divisor = hn::Or(UpperWords(a.size, b.size), hn::Set(kD16s, int16_t{0x4000}));
+      const V16 z = UpperWords(a.z, b.z);
       const V16 r = hn::BitCast(kD16s, Reciprocals(hn::BitCast(kU16, divisor)));
-      const V16 qx = Quotient(Packed(a.x, b.x), r), qy = Quotient(Packed(a.y, b.y), r);
+      const V16 qx = Quotient(UpperWords(a.x, b.x), r), qy = Quotient(UpperWords(a.y, b.y), r);
       const V16 fx = WithSign(hn::Sub(end, hn::Abs(qy)), qx), fy = WithSign(hn::Sub(end, hn::Abs(qx)), qy);
       const auto behind = hn::Lt(z, hn::Zero(kD16s));
-      hn::StoreU(InOrder(hn::Add(hn::IfThenElse(behind, fx, qx), end)), kD16s, gx + x);
-      hn::StoreU(InOrder(hn::Add(hn::IfThenElse(behind, fy, qy), end)), kD16s, gy + x);
+      hn::StoreU(InOrderOfWords(hn::Add(hn::IfThenElse(behind, fx, qx), end)), kD16s, gx + x);
+      hn::StoreU(InOrderOfWords(hn::Add(hn::IfThenElse(behind, fy, qy), end)), kD16s, gy + x);
     }
   }
 
  private:
   struct Direction {
-    V32 x, y, z, divisor;  // z: only its sign counts
+    V32 x, y, z, size;  // shifted up, but for z, of which only the sign counts
   };
+  static HWY_INLINE V32 LowWords() { return hn::Set(kD32s, 0xFFFF); }
+  // Both as 16 bits, in pairs.
+  static HWY_INLINE V16 Slopes(V32 u, V32 v) {
+    HWY_ALIGN static constexpr uint8_t kPairs[16] = {0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15};
+    const hn::Repartition<uint8_t, D16> bytes;
+    const V16 both = hn::Max(Joined(PairSums{u, v}), hn::Set(kD16s, int16_t{-32767}));
+    return hn::BitCast(kD16s, hn::TableLookupBytes(both, hn::LoadDup128(bytes, kPairs)));
+  }
+  static HWY_INLINE hn::VFromD<DU32> ShiftOf(V32 size) {
+#ifdef TELESPLAT_VNNI_AND_CD
+    const __m512i zeros = _mm512_sub_epi32(_mm512_lzcnt_epi32(size.raw), _mm512_set1_epi32(1));
+    return {_mm512_min_epi32(zeros, _mm512_set1_epi32(24))};
+#else
+    return ShiftTo(24, hn::Or(hn::ShiftRight<6>(size), hn::Set(kD32s, 1)));
+#endif
+  }
   HWY_INLINE Direction At(size_t x) const {
     const auto load = [](const uint32_t* from) HWY_ATTR { return hn::BitCast(kD32s, hn::LoadU(kDU32, from)); };
-    const auto slope = [&](V32 v) HWY_ATTR { return Clamped16(hn::ShiftRightSame(v, slope_shift_)); };
-    const V32 u = slope(hn::Sub(load(here_ + x + 1), load(here_ + x - 1))),
-              v = slope(hn::Sub(load(below_ + x), load(above_ + x)));
-    const V32 px = hn::Add(first_, hn::Set(kD32s, static_cast<int32_t>(x)));
-    const V32 twice = hn::ShiftRightSame(hn::ShiftLeft<1>(load(here_ + x)), slope_shift_);
-    const V32 height = hn::Sub(hn::Sub(twice, hn::Mul(px, u)), hn::Mul(y_, v));
-    const V32 h = Clamped16(hn::ShiftRightSame(height, height_shift_));
-    const V32 uv = hn::Or(hn::And(u, hn::Set(kD32s, 0xFFFF)), hn::ShiftLeft<16>(v));
+    const auto slope = [&](V32 v) HWY_ATTR { return hn::ShiftRightSame(v, slope_shift_); };
+    const V16 uv = Slopes(slope(hn::Sub(load(here_ + x + 1), load(here_ + x - 1))),
+                          slope(hn::Sub(load(below_ + x), load(above_ + x))));
+    const V16 place = hn::Add(first_, hn::BitCast(kD16s, hn::Set(kD32s, static_cast<int32_t>(x & 0xFFFF))));
+    const V32 twice = slope(hn::ShiftLeft<1>(load(here_ + x)));
+    const V32 height = hn::Sub(twice, PairProducts(uv, hn::BitCast(kD32s, place)));
+    const V16 h = hn::BitCast(kD16s, Clamped16(hn::ShiftRightSame(height, height_shift_)));
     V32 m[3];
-    for (int i = 0; i < 3; ++i)
-      m[i] = hn::Add(PairProducts(hn::BitCast(kD16s, uv), by_slopes_[i]), hn::Mul(h, by_height_[i]));
+    for (int i = 0; i < 3; ++i) m[i] = AddProducts(PairProducts(uv, by_slopes_[i]), h, by_height_[i]);
     const V32 size = hn::Add(hn::Add(hn::Abs(m[0]), hn::Abs(m[1])), hn::Abs(m[2]));
-    const auto up = ShiftTo(24, hn::Or(hn::ShiftRight<6>(size), hn::Set(kD32s, 1)));
-    const auto part = [&](V32 c) HWY_ATTR { return hn::ShiftRight<16>(ShiftUp(c, up)); };
-    return {part(m[0]), part(m[1]), m[2], hn::Or(part(size), hn::Set(kD32s, 0x4000))};
+    const auto up = ShiftOf(size);
+    return {ShiftUp(m[0], up), ShiftUp(m[1], up), m[2], ShiftUp(size, up)};
   }
   // (n * r >> 15) * 127 >> 8.
   static HWY_INLINE V16 Quotient(V16 n, V16 r) {
@@ -109,7 +145,7 @@ class GeometryVectors {
 
   const uint32_t *const above_, *const here_, *const below_;
   const int slope_shift_, height_shift_;
-  const V32 y_, first_;
+  const V16 first_;  // x and y, in pairs
   V32 by_slopes_[3], by_height_[3];
 };
 
