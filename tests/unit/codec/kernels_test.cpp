@@ -151,7 +151,7 @@ TEST(Kernels, DirectionsAreThoseOfThePage) {
       for (int16_t& e : row) e = static_cast<int16_t>(static_cast<int>(random() % 7000) - 3500);
     if (random() % 9 == 0) model = {};
     model.slope_shift = static_cast<int>(random() % 16), model.height_shift = static_cast<int>(random() % 16);
-    const int x0 = -static_cast<int>(random() % 65536), y = static_cast<int>(random() % 256) - 128;
+    const int x0 = static_cast<int>(random() % (65536 - width)) - 32768, y = static_cast<int>(random() % 256) - 128;
     auto gx = row_for<int16_t>(width), gy = gx, plain_gx = gx, plain_gy = gx;
     set.geometry(rows, width, x0, y, model, gx.data(), gy.data());
     plain_kernels().geometry(rows, width, x0, y, model, plain_gx.data(), plain_gy.data());
