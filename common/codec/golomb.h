@@ -26,9 +26,9 @@ class GolombContext {
     const unsigned k = parameter();
     const uint32_t q = z >> k;
     const unsigned e = q < 2 ? 0 : static_cast<unsigned>(std::bit_width(q - 1)) - 1, ones = q < 2 ? q : 2 + e;
-    bits.put((uint64_t{1} << ones) - 1, ones + 1);
     const uint32_t above = q < 2 ? 0 : (q - 1) & ((1u << e) - 1);
-    bits.put(uint64_t{above} << k | (z & ((1u << k) - 1)), e + k);
+    const uint64_t rest = uint64_t{above} << k | (z & ((1u << k) - 1));
+    bits.put(((uint64_t{1} << ones) - 1) | rest << (ones + 1), ones + 1 + e + k);
     learn(z);
   }
   /// Any bits give some residual, below 2^25 in size.

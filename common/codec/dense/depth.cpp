@@ -114,12 +114,12 @@ void DepthPlane::to_codes(const TileShape& shape, const DepthLattice& lattice) {
   }
 }
 
-// Tries every eighth row: which tokens take fewer bits.
+// Tries every sixteenth row: which tokens take fewer bits.
 DepthPlane::Way DepthPlane::choose_way(const TileShape& shape, bool may_mean) {
   symbols.reset(shape, true, kHits);
   std::array<uint32_t, kSymbols> linear{}, planes{}, means{};
   uint64_t linear_bits = 0, plane_bits = 0, mean_bits = 0;
-  for (size_t y = 2; y < shape.height; y += 8) {
+  for (size_t y = 2; y < shape.height; y += 16) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint32_t* const z = symbols.wide.row(r);
     const uint8_t* const tokens = symbols.tokens.row(r);

@@ -267,23 +267,23 @@ void set_features(Features& out, const Plane<int16_t>& own, const Plane<int16_t>
   const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
   const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
   const int c = g1[0];
-  const int raw[kTerms] = {left.row(y)[x - 1] - c,
-                           up[0] - c,
-                           up[-1] - c,
-                           up[1] - c,
-                           g0[-1] - c,
-                           g0[0] - c,
-                           g0[1] - c,
-                           g1[-1] - c,
-                           g1[1] - c,
-                           g2[-1] - c,
-                           g2[0] - c,
-                           g2[1] - c,
-                           residual != nullptr ? residual->row(y)[x] : 0,
-                           64,
-                           row[0] - c,
-                           0};
-  for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
+  const auto off = [c](int16_t value) { return static_cast<float>(value - c); };
+  out = {off(left.row(y)[x - 1]),
+         off(up[0]),
+         off(up[-1]),
+         off(up[1]),
+         off(g0[-1]),
+         off(g0[0]),
+         off(g0[1]),
+         off(g1[-1]),
+         off(g1[1]),
+         off(g2[-1]),
+         off(g2[0]),
+         off(g2[1]),
+         residual != nullptr ? static_cast<float>(residual->row(y)[x]) : 0,
+         64,
+         off(row[0]),
+         0};
 }
 
 // How far off a solution is, whose last terms are -1 and 0, in one sample. In four parts, as vectors have them.
@@ -355,9 +355,10 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
     left_over = 0;
     return false;
   }
-  std::vector<Features> all(n + 3);  // to a multiple of four
-  std::vector<float> shares(n + 3);
-  const size_t few = n / 2;  // the first rounds need not be exact
+  static thread_local std::vector<Features> all;
+  static thread_local std::vector<float> shares;
+  if (all.size() < n + 3) all.resize(n + 3), shares.resize(n + 3);  // to a multiple of four
+  const size_t few = n / 2;                                         // the first rounds need not be exact
   for (size_t s = 0; s < n; ++s) {
     const auto p = samples.places[s < few ? 2 * s : std::min(2 * (s - few) + 1, n - 1)];
     set_features(all[s], own, left != nullptr ? *left : own, guide, residual, p.x, p.y);

@@ -192,13 +192,15 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
 }
 
 // In four tables, so that equal symbols side by side need not wait for each other. None has more than 65535.
-void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
-  std::memset(parts_, 0, sizeof parts_);
+void PlaneEncoder::count(SymbolPlane& plane, const TileShape& shape) {
+  for (auto& part : parts_)
+    for (size_t c = 0; c < kContexts; ++c) std::fill_n(part + c * kSymbols, plane.alphabet, uint16_t{0});
   symbols_.reset(shape.width, shape.height);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const auto [first, last] = shape.span(y);
     uint16_t* const joined = symbols_.row(r);
+    if (!plane.has_contexts) make_contexts(plane, shape, y);
     kernels().join_bytes(plane.tokens.row(r) + first, plane.contexts.row(r) + first, last - first, joined + first);
     shape.for_each_run(y, [&](size_t x, size_t end) {
       for (; x + 4 <= end; x += 4) {
@@ -210,14 +212,15 @@ void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
       for (; x < end; ++x) ++parts_[x % 4][joined[x]];
     });
   }
-  uint32_t* const counts = counts_[0].data();
-  for (size_t i = 0; i < kContexts * kSymbols; ++i)
-    counts[i] = uint32_t{parts_[0][i]} + parts_[1][i] + parts_[2][i] + parts_[3][i];
+  for (size_t c = 0; c < kContexts; ++c)
+    for (size_t t = 0; t < plane.alphabet; ++t) {
+      const size_t i = c * kSymbols + t;
+      counts_[c][t] = uint32_t{parts_[0][i]} + parts_[1][i] + parts_[2][i] + parts_[3][i];
+    }
 }
 
 void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
   if (!plane.has_contexts && !has_kinds(plane)) choose_scale(plane, shape);
-  for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y) make_contexts(plane, shape, y);
   count(plane, shape);
   if (!plane.has_contexts) plane.scale.merges = merge_contexts(counts_, plane.alphabet);
   choose_levels(counts_, plane.alphabet, levels_);

@@ -108,7 +108,7 @@ class PlaneEncoder {
 
  private:
   void choose_scale(SymbolPlane& plane, const TileShape& shape);
-  void count(const SymbolPlane& plane, const TileShape& shape);
+  void count(SymbolPlane& plane, const TileShape& shape);
   TokenLevels levels_;
   TokenCounts counts_;
   uint16_t parts_[4][kContexts * kSymbols + 96];  ///< of counts_

@@ -189,8 +189,10 @@ void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& le
     of.fill(0);
     uint64_t total = 0;
     unsigned present = 0, end = 0;
-    for (unsigned t = 0; t < alphabet; ++t)
-      if (counts[c][t] != 0) total += counts[c][t], ++present, end = t + 1;
+    for (unsigned t = 0; t < alphabet; ++t) {
+      const bool comes = counts[c][t] != 0;
+      total += counts[c][t], present += comes, end = comes ? t + 1 : end;
+    }
     if (total == 0) continue;
     Expected expected{before};
     const double share = kFrequencyOne * 256.0 / static_cast<double>(total);
@@ -205,8 +207,10 @@ void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& le
 
 void put_levels(BitSink& bits, const TokenLevels& levels) {
   TokenLevels copy = levels;
+  BitSink sink = bits;
   for_each_level(copy,
-                 [&](int difference, GolombContext& context) { return context.put(difference, bits), difference; });
+                 [&](int difference, GolombContext& context) { return context.put(difference, sink), difference; });
+  bits = sink;
 }
 
 bool get_levels(BitReader& bits, TokenLevels& levels) {
@@ -227,12 +231,16 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
   for (unsigned t = 0; t < alphabet; ++t)
     if (levels[t] != 0) total += weight_of(levels[t]), ++present, last = t;
   if (present == 0) return;
-  const uint64_t free = kFrequencyOne - present;
-  uint64_t sum = 0, given = 0;
+  const uint32_t free = kFrequencyOne - present;
+  // Products are below 2^53, so that quotients are rounded down as integers' are: these take longer to divide.
+  static_assert(uint64_t{kSymbols} * weight_of(kLevels - 1) * kFrequencyOne < uint64_t{1} << 53);
+  uint64_t sum = 0;
+  uint32_t given = 0;
   for (unsigned t = 0; t < alphabet; ++t) {
     if (levels[t] == 0) continue;
     sum += weight_of(levels[t]);
-    const uint64_t upto = total == 0 ? 0 : sum * free / total;
+    const auto upto =
+        total == 0 ? 0 : static_cast<uint32_t>(static_cast<double>(sum * free) / static_cast<double>(total));
     out[t] = static_cast<uint16_t>(1 + upto - given);
     given = upto;
   }
