@@ -59,8 +59,8 @@ bool fit_flat_weights(const FlatSamples& by, const Plane<int16_t>& own, const Pl
                       const Plane<int16_t>* residual, const int16_t weights[kGuidedTerms], int32_t constant,
                       bool median, size_t pixels, FlatWeights& out);
 
-inline constexpr size_t kMostSamples = 450;       ///< of normals of a tile: 700 bring 0.01 to 0.04 bits
-inline constexpr size_t kMostFlatSamples = 1300;  ///< of a tile: 2000 bring 0.03 bits of an isosurface
+inline constexpr size_t kMostSamples = 450;      ///< of normals of a tile: 700 bring 0.01 to 0.04 bits
+inline constexpr size_t kMostFlatSamples = 900;  ///< of a tile: 1300 bring 0.04 bits of an isosurface
 
 /// No sum of weights of this size leaves 32 bits.
 inline constexpr int kMostWeight = 120000, kMostConstant = 1 << 27;

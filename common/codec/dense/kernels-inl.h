@@ -32,6 +32,43 @@ static void CutShort(const uint8_t* RESTRICT cover, const uint16_t* from, size_t
   for (size_t x = 0; x < n; ++x) to[x] = static_cast<uint16_t>(from[x] & Short(cover[x]));
 }
 
+// Calls f(begin, count) for the runs of bits that are set in each word.
+template <class F>
+static inline void ForEachRun(const uint64_t* words, size_t n, F f) {
+  for (size_t x = 0; x < n; x += 64)
+    for (uint64_t left = words[x / 64]; left != 0;) {
+      const int begin = std::countr_zero(left), count = std::countr_one(left >> begin);
+      f(x + static_cast<size_t>(begin), static_cast<size_t>(count));
+      left = begin + count == 64 ? 0 : left >> (begin + count) << (begin + count);
+    }
+}
+
+template <class T>
+static inline void CopyAbout(const T* RESTRICT from, size_t count, T* RESTRICT to) {
+  for (size_t i = 0; i < count; i += 32) std::memcpy(to + i, from + i, 32 * sizeof(T));
+}
+
+template <class T>
+static void Pack(const uint64_t* words, const T* RESTRICT from, size_t n, T* RESTRICT to) {
+  ForEachRun(words, n, [&](size_t begin, size_t count) {
+    CopyAbout(from + begin, count, to);
+    to += count;
+  });
+}
+
+template <class T>
+static void Unpack(const uint64_t* words, const T* RESTRICT from, size_t n, T* RESTRICT to) {
+  ForEachRun(words, n, [&](size_t begin, size_t count) {
+    CopyAbout(from, count, to + begin);
+    from += count;
+  });
+}
+
+static void UnpackWide(const uint64_t* words, const uint8_t* cover, const uint32_t* from, size_t n, uint32_t* to) {
+  Unpack(words, from, n, to);
+  CutWide(cover, to, n, to);
+}
+
 static void KeepBytes(const uint8_t* RESTRICT cover, const uint8_t* RESTRICT from, size_t n, uint8_t* RESTRICT row) {
   for (size_t x = 0; x < n; ++x) row[x] = static_cast<uint8_t>(from[x] ^ ((from[x] ^ row[x]) & cover[x]));
 }

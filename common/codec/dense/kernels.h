@@ -86,6 +86,14 @@ struct Kernels {
   /// to = from where pixels are covered, else 0. Both may be the same.
   void (*cut_wide)(const uint8_t* cover, const uint32_t* from, size_t n, uint32_t* to);
   void (*cut_short)(const uint8_t* cover, const uint16_t* from, size_t n, uint16_t* to);
+  /// Those of n elements whose bits of `words` are set, one after the other. Up to 31 more are read and written.
+  void (*pack_bytes)(const uint64_t* words, const uint8_t* from, size_t n, uint8_t* to);
+  void (*pack_shorts)(const uint64_t* words, const uint16_t* from, size_t n, uint16_t* to);
+  void (*pack_wide)(const uint64_t* words, const uint32_t* from, size_t n, uint32_t* to);
+  /// The inverse. Bytes whose bits are not set may become anything.
+  void (*unpack_bytes)(const uint64_t* words, const uint8_t* from, size_t n, uint8_t* to);
+  /// cover: the same as `words`. Others become 0.
+  void (*unpack_wide)(const uint64_t* words, const uint8_t* cover, const uint32_t* from, size_t n, uint32_t* to);
   /// Pixels that are not covered become those of `from`.
   void (*keep_bytes)(const uint8_t* cover, const uint8_t* from, size_t n, uint8_t* row);
   /// Those that are not covered, of all with null, become the values nearest to the guide.

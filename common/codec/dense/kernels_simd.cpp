@@ -91,6 +91,11 @@ static const Kernels* Set() {
                                CoverBytes,
                                CutWide,
                                CutShort,
+                               Pack<uint8_t>,
+                               Pack<uint16_t>,
+                               Pack<uint32_t>,
+                               Unpack<uint8_t>,
+                               UnpackWide,
                                KeepBytes,
                                FillValues,
                                Within,
@@ -180,6 +185,7 @@ static void CoverBytes(const uint64_t* HWY_RESTRICT words, size_t n, uint8_t* HW
   }
 }
 
+#include "common/codec/dense/vectors/pack-inl.h"
 #include "common/codec/dense/vectors/rans-inl.h"
 
 #include "common/codec/dense/vectors/planes-inl.h"
@@ -298,6 +304,11 @@ static const Kernels* Set() {
                                CoverBytes,
                                CutWide,
                                CutShort,
+                               PackBytes,
+                               PackShorts,
+                               PackWide,
+                               UnpackBytes,
+                               UnpackWideVector,
                                KeepBytes,
                                FillValues,
                                Within,

@@ -16,12 +16,6 @@ ContextRows rows_around(const SymbolPlane& plane, size_t y, size_t begin) {
           plane.other != nullptr ? plane.other->row(row) + begin : nullptr};
 }
 
-// Copies `count` elements of each, and up to 31 that follow them: all have room for those.
-template <class... T>
-void copy_about(size_t count, std::pair<const T*, T*>... each) {
-  for (size_t i = 0; i < count; i += 32) (std::memcpy(each.second + i, each.first + i, 32 * sizeof(T)), ...);
-}
-
 bool has_kinds(const SymbolPlane& plane) { return plane.first != 0; }
 
 void make_contexts(SymbolPlane& plane, const TileShape& shape, size_t y) {
@@ -196,21 +190,22 @@ void PlaneEncoder::count(SymbolPlane& plane, const TileShape& shape) {
   for (auto& part : parts_)
     for (size_t c = 0; c < kContexts; ++c) std::fill_n(part + c * kSymbols, plane.alphabet, uint16_t{0});
   symbols_.reset(shape.width, shape.height);
+  if (joined_.size() < shape.width + Plane<uint16_t>::kTail) joined_.resize(shape.width + Plane<uint16_t>::kTail);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const auto [first, last] = shape.span(y);
-    uint16_t* const joined = symbols_.row(r);
+    uint16_t *const row = symbols_.row(r), *const joined = shape.full(y) ? row : joined_.data();
     if (!plane.has_contexts) make_contexts(plane, shape, y);
     kernels().join_bytes(plane.tokens.row(r) + first, plane.contexts.row(r) + first, last - first, joined + first);
-    shape.for_each_run(y, [&](size_t x, size_t end) {
-      for (; x + 4 <= end; x += 4) {
-        uint64_t four;
-        std::memcpy(&four, joined + x, 8);
-        ++parts_[0][four & 0xFFFF], ++parts_[1][four >> 16 & 0xFFFF], ++parts_[2][four >> 32 & 0xFFFF],
-            ++parts_[3][four >> 48];
-      }
-      for (; x < end; ++x) ++parts_[x % 4][joined[x]];
-    });
+    if (!shape.full(y)) kernels().pack_shorts(shape.words(y), joined, last, row);
+    size_t x = 0;
+    for (; x + 4 <= shape.covered[y]; x += 4) {
+      uint64_t four;
+      std::memcpy(&four, row + x, 8);
+      ++parts_[0][four & 0xFFFF], ++parts_[1][four >> 16 & 0xFFFF], ++parts_[2][four >> 32 & 0xFFFF],
+          ++parts_[3][four >> 48];
+    }
+    for (; x < shape.covered[y]; ++x) ++parts_[x % 4][row[x]];
   }
   for (size_t c = 0; c < kContexts; ++c)
     for (size_t t = 0; t < plane.alphabet; ++t) {
@@ -237,30 +232,18 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
                                uint8_t* out) {
   const auto r = static_cast<ptrdiff_t>(y);
   SymbolRow row{.symbols = symbols_.row(r), .count = shape.covered[y], .first = plane.first, .states = states.count};
-  if (plane.is_wide)
-    row.wide = plane.wide.row(r);
-  else
-    row.narrow = plane.narrow.row(r);
+  row.wide = plane.is_wide ? plane.wide.row(r) : nullptr;
+  row.narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
   if (!shape.full(y)) {
-    const size_t needed = shape.width + Plane<uint8_t>::kTail;
-    if (packed_symbols_.size() < needed)
-      packed_symbols_.resize(needed), packed_narrow_.resize(needed), packed_wide_.resize(needed);
-    size_t n = 0;
-    const auto pack = [&](auto from, auto& to) {
-      shape.for_each_run(y, [&](size_t begin, size_t end) {
-        copy_about(end - begin, std::pair{row.symbols + begin, packed_symbols_.data() + n},
-                   std::pair{from + begin, to.data() + n});
-        n += end - begin;
-      });
-    };
-    if (row.wide != nullptr) {
-      pack(row.wide, packed_wide_);
+    const size_t end = shape.span(y).end, needed = shape.width + Plane<uint8_t>::kTail;
+    if (packed_narrow_.size() < needed) packed_narrow_.resize(needed), packed_wide_.resize(needed);
+    if (plane.is_wide) {
+      kernels().pack_wide(shape.words(y), row.wide, end, packed_wide_.data());
       row.wide = packed_wide_.data();
     } else {
-      pack(row.narrow, packed_narrow_);
+      kernels().pack_bytes(shape.words(y), row.narrow, end, packed_narrow_.data());
       row.narrow = packed_narrow_.data();
     }
-    row.symbols = packed_symbols_.data();
   }
   return kernels().put_symbols(row, tables_.data(), states.of, out);
 }
@@ -295,29 +278,18 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   if (packed_tokens_.size() < needed)
     packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed),
         packed_wide_.resize(needed);
-  size_t n = 0;
-  shape.for_each_run(y, [&](size_t begin, size_t end) {
-    copy_about(end - begin, std::pair<const uint8_t*, uint8_t*>{contexts + begin, packed_contexts_.data() + n});
-    n += end - begin;
-  });
+  const uint64_t* const words = shape.words(y);
+  kernels().pack_bytes(words, contexts, shape.width, packed_contexts_.data());
   source.end = kernels().get_symbols(
       {packed_contexts_.data(), packed_tokens_.data(), wide != nullptr ? packed_wide_.data() : nullptr,
-       packed_narrow_.data(), n, plane.first, source.states.count, source.readable},
+       packed_narrow_.data(), shape.covered[y], plane.first, source.states.count, source.readable},
       tables_.data(), source.states.of, source.begin, source.end);
   if (source.end == nullptr) return false;
-  n = 0;
-  const auto unpack = [&]<class T>(const std::vector<T>& from, T* to) {
-    shape.for_each_run(y, [&](size_t begin, size_t end) {
-      copy_about(end - begin, std::pair<const uint8_t*, uint8_t*>{packed_tokens_.data() + n, tokens + begin},
-                 std::pair<const T*, T*>{from.data() + n, to + begin});
-      n += end - begin;
-    });
-  };
+  kernels().unpack_bytes(words, packed_tokens_.data(), shape.width, tokens);
   if (wide != nullptr)
-    unpack(packed_wide_, wide);
+    kernels().unpack_wide(words, shape.cover(y), packed_wide_.data(), shape.width, wide);
   else
-    unpack(packed_narrow_, narrow);
-  if (wide != nullptr) kernels().cut_wide(shape.cover(y), wide, shape.width, wide);
+    kernels().unpack_bytes(words, packed_narrow_.data(), shape.width, narrow);
   finish_tokens(plane, shape, y);
   return true;
 }

@@ -44,6 +44,8 @@ struct TileShape {
   Span around(size_t y) const { return mask == nullptr ? Span{0, width} : spans_around[y]; }
   /// As kernels take it: null where all of row y is covered.
   const uint8_t* cover(size_t y) const { return full(y) ? nullptr : cover_bytes.row(static_cast<ptrdiff_t>(y)); }
+  /// The mask's bits of row y, which is not full.
+  const uint64_t* words(size_t y) const { return mask->row(static_cast<int>(y)); }
   bool at(size_t x, size_t y) const { return mask == nullptr || mask->at(static_cast<int>(x), static_cast<int>(y)); }
   /// Calls f(begin, end) for the runs of pixels of row y that are covered.
   template <class F>
@@ -112,9 +114,9 @@ class PlaneEncoder {
   TokenLevels levels_;
   TokenCounts counts_;
   uint16_t parts_[4][kContexts * kSymbols + 96];  ///< of counts_
-  Plane<uint16_t> symbols_;                       ///< contexts * kSymbols + tokens
+  Plane<uint16_t> symbols_;                       ///< contexts * kSymbols + tokens, without holes
   std::vector<EncodeEntry> tables_;               ///< of contexts before they are merged
-  std::vector<uint16_t> packed_symbols_;
+  std::vector<uint16_t> joined_;                  ///< a row of them with holes
   std::vector<uint8_t> packed_narrow_;
   std::vector<uint32_t> packed_wide_;
 };
