@@ -125,15 +125,18 @@ class FlatTerms {
                rows.own - 2,
                rows.above2},
         flatness_(rows.flatness),
-        pairs_(with_left || rows.own_residual != nullptr ? kPairs : kPairs - 1),
+        has_last_(with_left || rows.own_residual != nullptr),
         constant_(hn::Set(kD32s, constant)) {
-    for (int pair = 0; pair < kPairs; ++pair)
+    HWY_UNROLL(8) for (int pair = 0; pair < kPairs; ++pair) {
+      HWY_ALIGN int32_t of[kFlatnesses];
       for (int k = 0; k < kFlatnesses; ++k) {
         const int16_t* const w = rows.weights[k];
-        weights_[pair][k] = PairOf(w[kTermPairs[pair][0]], w[kTermPairs[pair][1]]);
-        if (pair == 6 && rows.residual == nullptr) weights_[pair][k] &= ~0xFFFF;
-        if (pair == 7 && rows.own_residual != nullptr) weights_[pair][k] = kOwnWeight;
+        of[k] = PairOf(w[kTermPairs[pair][0]], w[kTermPairs[pair][1]]);
+        if (pair == 6 && rows.residual == nullptr) of[k] &= ~0xFFFF;
+        if (pair == 7 && rows.own_residual != nullptr) of[k] = kOwnWeight;
       }
+      weights_[pair] = OfEach(of);
+    }
   }
   HWY_INLINE PairSums At(size_t x) const {
     const hn::Rebind<uint8_t, D16> bytes;
@@ -142,30 +145,40 @@ class FlatTerms {
     const V32 flat_low = hn::BitCast(kD32s, hn::InterleaveLower(kD16s, flat, hn::Zero(kD16s))),
               flat_high = hn::BitCast(kD32s, hn::InterleaveUpper(kD16s, flat, hn::Zero(kD16s)));
     PairSums sums{constant_, constant_};
-    for (int pair = 0; pair < pairs_; ++pair) {
+    const auto add = [&](int pair) HWY_ATTR {
       const V16 a = hn::LoadU(kD16s, terms_[kTermPairs[pair][0]] + x),
                 b = hn::LoadU(kD16s, terms_[kTermPairs[pair][1]] + x);
       sums.low = AddProducts(sums.low, hn::InterleaveLower(kD16s, a, b), ByFlatness(weights_[pair], flat_low));
       sums.high = AddProducts(sums.high, hn::InterleaveUpper(kD16s, a, b), ByFlatness(weights_[pair], flat_high));
-    }
+    };
+    HWY_UNROLL(8) for (int pair = 0; pair < kPairs - 1; ++pair) add(pair);
+    if (has_last_) add(kPairs - 1);
     return sums;
   }
 
  private:
-  // The weights of each pixel's flatness: at[i] of the eight at `weights`.
-  static HWY_INLINE V32 ByFlatness(const int32_t* weights, V32 at) {
+  // All eight, as often as they fit.
+  static HWY_INLINE V32 OfEach(const int32_t* eight) {
+    const __m256i of = _mm256_load_si256(reinterpret_cast<const __m256i*>(eight));
 #if HWY_TARGET <= HWY_AVX3
-    return V32{_mm512_permutexvar_epi32(
-        at.raw, _mm512_broadcast_i64x4(_mm256_load_si256(reinterpret_cast<const __m256i*>(weights))))};
+    return V32{_mm512_broadcast_i64x4(of)};
 #else
-    return V32{_mm256_permutevar8x32_epi32(_mm256_load_si256(reinterpret_cast<const __m256i*>(weights)), at.raw)};
+    return V32{of};
+#endif
+  }
+  // The weights of each pixel's flatness: those at `at` of eight.
+  static HWY_INLINE V32 ByFlatness(V32 weights, V32 at) {
+#if HWY_TARGET <= HWY_AVX3
+    return V32{_mm512_permutexvar_epi32(at.raw, weights.raw)};
+#else
+    return V32{_mm256_permutevar8x32_epi32(weights.raw, at.raw)};
 #endif
   }
   const int16_t* const terms_[kGuidedTerms];
   const uint8_t* const flatness_;
-  const int pairs_;
+  const bool has_last_;
   const V32 constant_;
-  HWY_ALIGN int32_t weights_[kPairs][kFlatnesses];
+  V32 weights_[kPairs];
 };
 
 template <class Terms>
