@@ -86,7 +86,7 @@ struct Kernels {
   /// to = from where pixels are covered, else 0. Both may be the same.
   void (*cut_wide)(const uint8_t* cover, const uint32_t* from, size_t n, uint32_t* to);
   void (*cut_short)(const uint8_t* cover, const uint16_t* from, size_t n, uint16_t* to);
-  /// Those of n elements whose bits of `words` are set, one after the other. Up to 31 more are read and written.
+  /// Those of n elements whose bits of `words` are set, one after the other. Up to 64 more are read and written.
   void (*pack_bytes)(const uint64_t* words, const uint8_t* from, size_t n, uint8_t* to);
   void (*pack_shorts)(const uint64_t* words, const uint16_t* from, size_t n, uint16_t* to);
   void (*pack_wide)(const uint64_t* words, const uint32_t* from, size_t n, uint32_t* to);

@@ -213,5 +213,100 @@ TEST(Kernels, HeightsAreThoseOfThePage) {
   });
 }
 
+// Depth of facets: most pixels lie in one of eight planes, or up to three codes beside it.
+Plane<uint32_t> facets(size_t width, std::mt19937& random) {
+  auto depth = rows_of<uint32_t>(width, [&] { return (1u << 22) + random() % 64; });
+  if (random() % 4 == 0) return depth;
+  for (ptrdiff_t x = 2; x < static_cast<ptrdiff_t>(width); ++x) {
+    uint32_t *const row = depth.row(1), *const up = depth.row(0), *const far = depth.row(-1);
+    const uint32_t planes[8] = {row[x - 1] + up[x] - up[x - 1],     2 * row[x - 1] - row[x - 2],
+                                row[x - 1] + up[x + 1] - up[x],     2 * up[x] - far[x],
+                                row[x - 1] + up[x - 1] - up[x - 2], up[x] + up[x + 1] - far[x + 1],
+                                up[x] + up[x - 1] - far[x - 1],     2 * up[x + 1] - far[x + 2]};
+    row[x] = planes[random() % 8] + random() % 7 - 3;
+  }
+  return depth;
+}
+
+TEST(Kernels, PlanesAreThoseOfThePage) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const auto depth = facets(width, random);
+    auto z = row_for<uint32_t>(width), plain_z = z;
+    auto tokens = row_for<uint8_t>(width), plain_tokens = tokens, cover = tokens;
+    set.plane_residuals(depth.row(-1), depth.row(0), depth.row(1), width, z.data(), tokens.data());
+    plain_kernels().plane_residuals(depth.row(-1), depth.row(0), depth.row(1), width, plain_z.data(),
+                                    plain_tokens.data());
+    expect_same(z, plain_z, width), expect_same(tokens, plain_tokens, width);
+    for (uint8_t& c : cover) c = random() % 3 == 0 ? 0 : 255;
+    const uint8_t* const covered = random() % 3 == 0 ? nullptr : cover.data();
+    auto terms = row_for<uint32_t>(width), left = terms, slope = terms, plain_terms = terms, plain_left = terms,
+         plain_slope = terms;
+    set.plane_terms(depth.row(-1), depth.row(0), z.data(), tokens.data(), covered, width, terms.data(), left.data(),
+                    slope.data());
+    plain_kernels().plane_terms(depth.row(-1), depth.row(0), z.data(), tokens.data(), covered, width,
+                                plain_terms.data(), plain_left.data(), plain_slope.data());
+    expect_same(terms, plain_terms, width), expect_same(left, plain_left, width);
+    expect_same(slope, plain_slope, width);
+  });
+}
+
+TEST(Kernels, PlanesContextsAreThoseOfTheTable) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const auto kinds = rows_of<uint8_t>(width, [&] { return random() % 16; });
+    const int merges = static_cast<int>(random() % 5);
+    auto contexts = row_for<uint8_t>(width);
+    set.plane_contexts(kinds.row(0), width, merges, contexts.data());
+    for (size_t x = 0; x < width; ++x)
+      ASSERT_EQ(contexts[x], kPlaneContexts[size_t{kinds.row(0)[x]} * 16 + kinds.row(0)[x + 1]] >> merges) << x;
+  });
+}
+
+// Runs of bits that are set, of `longest` at most, and of those that are not; none from `width` on.
+std::vector<uint64_t> runs_of_bits(size_t width, size_t longest, std::mt19937& random) {
+  std::vector<uint64_t> words(width / 64 + 1);
+  bool set = random() % 2 != 0;
+  for (size_t x = 0; x < width; set = !set)
+    for (size_t left = 1 + random() % longest; left > 0 && x < width; --left, ++x)
+      words[x / 64] |= uint64_t{set} << x % 64;
+  return words;
+}
+
+template <class T>
+void expect_packed(void (*pack)(const uint64_t*, const T*, size_t, T*), const std::vector<uint64_t>& words,
+                   const std::vector<T>& values, size_t width, std::vector<T>& packed) {
+  packed = row_for<T>(width);
+  pack(words.data(), values.data(), width, packed.data());
+  size_t n = 0;
+  for (size_t x = 0; x < width; ++x)
+    if (words[x / 64] >> x % 64 & 1) {
+      ASSERT_EQ(packed[n], values[x]) << x;
+      ++n;
+    }
+}
+
+TEST(Kernels, RowsWithHolesArePackedAndUnpacked) {
+  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+    const auto words = runs_of_bits(width, size_t{1} << random() % 9, random);
+    auto bytes = row_for<uint8_t>(width), cover = bytes, packed_bytes = bytes, bytes_back = bytes;
+    auto shorts = row_for<uint16_t>(width), packed_shorts = shorts;
+    auto wide = row_for<uint32_t>(width), packed_wide = wide;
+    for (uint8_t& v : bytes) v = static_cast<uint8_t>(random());
+    for (uint16_t& v : shorts) v = static_cast<uint16_t>(random());
+    for (uint32_t& v : wide) v = static_cast<uint32_t>(random());
+    set.cover_bytes(words.data(), width, cover.data());
+    ASSERT_NO_FATAL_FAILURE(expect_packed(set.pack_bytes, words, bytes, width, packed_bytes));
+    ASSERT_NO_FATAL_FAILURE(expect_packed(set.pack_shorts, words, shorts, width, packed_shorts));
+    ASSERT_NO_FATAL_FAILURE(expect_packed(set.pack_wide, words, wide, width, packed_wide));
+    std::vector<uint32_t> wide_back(width + Plane<uint32_t>::kTail, 7);
+    set.unpack_bytes(words.data(), packed_bytes.data(), width, bytes_back.data());
+    set.unpack_wide(words.data(), cover.data(), packed_wide.data(), width, wide_back.data());
+    for (size_t x = 0; x < width; ++x) {
+      const bool covered = (words[x / 64] >> x % 64 & 1) != 0;
+      ASSERT_TRUE(!covered || bytes_back[x] == bytes[x]) << x;
+      ASSERT_EQ(wide_back[x], covered ? wide[x] : 0) << x;
+    }
+  });
+}
+
 }  // namespace
 }  // namespace telesplat::codec::detail
