@@ -1,7 +1,7 @@
 """Looks for instructions that no machine has which the codec chooses them for.
 
-Highway 1.0.3 lets compilers use AVX-VNNI for AVX3_DL, where AVX512-VNNI is meant: Ice Lake and Zen 4 have the latter alone.
-What is of AVX-512 begins with the byte 0x62.
+Highway 1.0.3 lets compilers use AVX-VNNI for AVX3_DL, where AVX512-VNNI is meant: Ice Lake and Zen 4 have the latter
+alone. What is of AVX-512 begins with the byte 0x62.
 
 usage: instructions_test.py LIBRARY
   Exit code: 0 there are none, 1 there are, 77 there is no objdump.

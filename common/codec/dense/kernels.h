@@ -150,8 +150,8 @@ struct Kernels {
   /// Flatness of each pixel of `row`: depth differs by less than `limit`, a power of two, from what continues it.
   void (*flatness)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t limit,
                    uint8_t* out);
-  /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below. Columns
-  /// x0 to x0 + n - 1 and the row y, from the tile's centre, fit into 16 bits.
+  /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
+  /// Columns x0 to x0 + n - 1 and the row y, from the tile's centre, fit into 16 bits.
   void (*geometry)(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
                    int16_t* gy);
   /// Heights in 2^-8 of a knot, 0 to 16383. model.knots is not looked at.

@@ -30,8 +30,8 @@ inline constexpr size_t kMostStates = 2 * kLanes;
 /// but each takes four bytes.
 constexpr size_t states_of(size_t symbols) { return symbols < kEnoughForMore ? kLanes : kMostStates; }
 
-/// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991). A state x is too large
-/// for it if x + the complement's bits reach 2^31.
+/// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991). A state x is too
+/// large for it if x and the bits of 2048 - frequency, where they stand, add up to 2^31 or more.
 struct EncodeEntry {
   uint32_t reciprocal = 0;
   uint32_t packed = 0;  ///< bits 0-12: what is added, 13-16: shift, 20-30: 2048 - frequency

@@ -1,5 +1,5 @@
-// Contexts of tokens with vectors: by products of bytes, two at a time, and by tables. Included once for every instruction set, in its
-// namespace. No include guard: that is meant.
+// Contexts of tokens with vectors: by products of bytes, two at a time, and by tables. Included once for every
+// instruction set, in its namespace. No include guard: that is meant.
 
 using DBytes = hn::CappedTag<uint8_t, 64>;
 using VBytes = hn::VFromD<DBytes>;

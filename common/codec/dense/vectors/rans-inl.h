@@ -50,8 +50,8 @@ HWY_INLINE __m512i Joined(__m256i low, __m256i high) {
 }
 #endif
 
-// Of the entries of kN symbols: the upper half of x * reciprocal, and what is packed. Both halves of an entry are loaded
-// at once, one entry after the other: that takes half of a gather's time.
+// Of the entries of kN symbols: the upper half of x * reciprocal, and what is packed. Both halves of an entry are
+// loaded at once, one entry after the other: that takes half of a gather's time.
 class Entries {
  public:
   HWY_INLINE void Load(const EncodeEntry* tables, const uint16_t* symbols) {
