@@ -174,7 +174,8 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
       });
     }
   };
-  sample(1, 11, 3);
+  sample(1, 16, 3);
+  if (total < kEnough) sample(1, 5, 2);
   if (total < kEnough) sample(0, 1, 1);
   size_t low = 0, high = histogram.size() - 1;
   for (uint32_t seen = 0; low < high && seen + histogram[low] <= total / 32; ++low) seen += histogram[low];
@@ -198,14 +199,15 @@ void PlaneEncoder::count(SymbolPlane& plane, const TileShape& shape) {
     if (!plane.has_contexts) make_contexts(plane, shape, y);
     kernels().join_bytes(plane.tokens.row(r) + first, plane.contexts.row(r) + first, last - first, joined + first);
     if (!shape.full(y)) kernels().pack_shorts(shape.words(y), joined, last, row);
+    const size_t n = shape.covered[y];
     size_t x = 0;
-    for (; x + 4 <= shape.covered[y]; x += 4) {
+    for (; x + 4 <= n; x += 4) {
       uint64_t four;
       std::memcpy(&four, row + x, 8);
       ++parts_[0][four & 0xFFFF], ++parts_[1][four >> 16 & 0xFFFF], ++parts_[2][four >> 32 & 0xFFFF],
           ++parts_[3][four >> 48];
     }
-    for (; x < shape.covered[y]; ++x) ++parts_[x % 4][row[x]];
+    for (; x < n; ++x) ++parts_[x % 4][row[x]];
   }
   for (size_t c = 0; c < kContexts; ++c)
     for (size_t t = 0; t < plane.alphabet; ++t) {
