@@ -1,7 +1,7 @@
 """Looks for instructions that no machine has which the codec chooses them for.
 
 Highway 1.0.3 lets compilers use AVX-VNNI for AVX3_DL, where AVX512-VNNI is meant: Ice Lake and Zen 4 have the latter
-alone. What is of AVX-512 begins with the byte 0x62.
+alone. Products of AVX-512 begin with the byte 0x62.
 
 usage: instructions_test.py LIBRARY
   Exit code: 0 there are none, 1 there are, 77 there is no objdump.
@@ -31,7 +31,7 @@ def main():
         return 1
     for line in wrong[:10]:
         print(f"of AVX-VNNI: {line}")
-    print(f"{products} products that are added, {len(wrong)} of them of AVX-VNNI")
+    print(f"{products} products that are added at once, {len(wrong)} of them of AVX-VNNI")
     return 1 if wrong else 0
 
 

@@ -29,7 +29,7 @@ inline constexpr Places kPlaces;
 }  // namespace telesplat::codec::detail
 #endif
 
-// AVX-512 as Ice Lake and Zen 4 have it: with products that are added, and words that are gathered and looked up.
+// AVX-512 as Ice Lake and Zen 4 have it: with bytes and words that are packed by masks, and looked up in tables.
 #define HWY_WANT_AVX3_DL
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/codec/dense/kernels_simd.cpp"
@@ -40,12 +40,6 @@ inline constexpr Places kPlaces;
 #define RESTRICT HWY_RESTRICT
 
 HWY_BEFORE_NAMESPACE();
-#undef TELESPLAT_VNNI_AND_CD
-#if HWY_TARGET == HWY_AVX3_DL && HWY_COMPILER_GCC_ACTUAL
-// Highway 1.0.3 names AVX-VNNI for this target, which neither of them has, where AVX512-VNNI is meant.
-#pragma GCC target("avx512vnni,avx512cd")
-#define TELESPLAT_VNNI_AND_CD
-#endif
 namespace telesplat::codec::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 

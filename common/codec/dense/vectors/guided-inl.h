@@ -28,13 +28,7 @@ HWY_INLINE V32 PairProducts(V16 pairs, V32 weights) {
 #endif
 }
 
-HWY_INLINE V32 AddProducts(V32 sum, V16 pairs, V32 weights) {
-#ifdef TELESPLAT_VNNI_AND_CD
-  return V32{_mm512_dpwssd_epi32(sum.raw, pairs.raw, weights.raw)};
-#else
-  return hn::Add(sum, PairProducts(pairs, weights));
-#endif
-}
+HWY_INLINE V32 AddProducts(V32 sum, V16 pairs, V32 weights) { return hn::Add(sum, PairProducts(pairs, weights)); }
 
 // Pixels in their order.
 HWY_INLINE void StorePairs(const PairSums& sums, int32_t* out) {

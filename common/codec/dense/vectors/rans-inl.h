@@ -262,32 +262,12 @@ HWY_INLINE V Spread(V v, M to) {
 
 // Fills up the states that are below kStateLow with the words before `end`.
 HWY_INLINE const uint8_t* Refill(V (&x)[kVectors], const uint8_t* end) {
-#if HWY_TARGET <= HWY_AVX3_DL
-  static_assert(kVectors == 2);
-  // Of the words of one vector's states, above which their lower halves come.
-  HWY_ALIGN static constexpr auto kPlaces = [] {
-    std::array<std::array<uint16_t, kLanes>, 2> of{};
-    for (size_t i = 0; i < kLanes; ++i)
-      for (size_t k = 0; k < 2; ++k) of[k][i] = static_cast<uint16_t>(i % 2 != 0 ? i - 1 : kLanes + k * kN + i / 2);
-    return of;
-  }();
-  const M first = Exceeds(hn::Set(kD, kStateLow), x[0]), second = Exceeds(hn::Set(kD, kStateLow), x[1]);
-  const __mmask32 both = _mm512_kunpackw(second.raw, first.raw);
-  end -= 2 * std::popcount(static_cast<uint32_t>(both));
-  const __m512i words = _mm512_maskz_expand_epi16(both, _mm512_loadu_si512(end));
-  const auto filled = [&](size_t k) HWY_ATTR {
-    return _mm512_permutex2var_epi16(x[k].raw, _mm512_load_si512(&kPlaces[k]), words);
-  };
-  x[0] = V{_mm512_mask_mov_epi32(x[0].raw, first.raw, filled(0))};
-  x[1] = V{_mm512_mask_mov_epi32(x[1].raw, second.raw, filled(1))};
-#else
   HWY_UNROLL(8) for (size_t i = kVectors; i-- > 0;) {
     const M low = Exceeds(hn::Set(kD, kStateLow), x[i]);
     end -= 2 * hn::CountTrue(kD, low);
     const V words = hn::PromoteTo(kD, hn::LoadU(kD16, reinterpret_cast<const uint16_t*>(end)));
     x[i] = hn::IfThenElse(low, hn::Or(hn::ShiftLeft<16>(x[i]), Spread(words, low)), x[i]);
   }
-#endif
   return end;
 }
 

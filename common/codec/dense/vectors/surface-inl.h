@@ -109,14 +109,6 @@ class GeometryVectors {
     const V16 both = hn::Max(Joined(PairSums{u, v}), hn::Set(kD16s, int16_t{-32767}));
     return hn::BitCast(kD16s, hn::TableLookupBytes(both, hn::LoadDup128(bytes, kPairs)));
   }
-  static HWY_INLINE hn::VFromD<DU32> ShiftOf(V32 size) {
-#ifdef TELESPLAT_VNNI_AND_CD
-    const __m512i zeros = _mm512_sub_epi32(_mm512_lzcnt_epi32(size.raw), _mm512_set1_epi32(1));
-    return {_mm512_min_epi32(zeros, _mm512_set1_epi32(24))};
-#else
-    return ShiftTo(24, hn::Or(hn::ShiftRight<6>(size), hn::Set(kD32s, 1)));
-#endif
-  }
   HWY_INLINE Direction At(size_t x) const {
     const auto load = [](const uint32_t* from) HWY_ATTR { return hn::BitCast(kD32s, hn::LoadU(kDU32, from)); };
     const auto slope = [&](V32 v) HWY_ATTR { return hn::ShiftRightSame(v, slope_shift_); };
@@ -129,7 +121,7 @@ class GeometryVectors {
     V32 m[3];
     for (int i = 0; i < 3; ++i) m[i] = AddProducts(PairProducts(uv, by_slopes_[i]), h, by_height_[i]);
     const V32 size = hn::Add(hn::Add(hn::Abs(m[0]), hn::Abs(m[1])), hn::Abs(m[2]));
-    const auto up = ShiftOf(size);
+    const auto up = ShiftTo(24, hn::Or(hn::ShiftRight<6>(size), hn::Set(kD32s, 1)));
     return {ShiftUp(m[0], up), ShiftUp(m[1], up), m[2], ShiftUp(size, up)};
   }
   // (n * r >> 15) * 127 >> 8.
