@@ -47,7 +47,7 @@ struct BitSink {
   uint64_t pending = 0;
   unsigned filled = 0;
 
-  /// Precondition: value < 2^count, count <= 57.
+  /// Precondition: value < 2^count, count <= 56.
   void put(uint64_t value, unsigned count) {
     pending |= value << filled;
     filled += count;

@@ -1,4 +1,4 @@
-"""Looks for instructions that no machine has which the codec chooses them for.
+"""Looks for instructions that machines may lack on which the codec chooses them.
 
 Highway 1.0.3 lets compilers use AVX-VNNI for AVX3_DL, where AVX512-VNNI is meant: Ice Lake and Zen 4 have the latter
 alone. Products of AVX-512 begin with the byte 0x62.

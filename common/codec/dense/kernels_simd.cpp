@@ -30,6 +30,7 @@ inline constexpr Places kPlaces;
 #endif
 
 // AVX-512 as Ice Lake and Zen 4 have it: with bytes and words that are packed by masks, and looked up in tables.
+// Highway 1.0.3 names AVX-VNNI for it, which neither has: tests/portable/instructions_test.py looks for that.
 #define HWY_WANT_AVX3_DL
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/codec/dense/kernels_simd.cpp"

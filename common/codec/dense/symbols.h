@@ -112,11 +112,12 @@ class PlaneEncoder {
   void choose_scale(SymbolPlane& plane, const TileShape& shape);
   void count(SymbolPlane& plane, const TileShape& shape);
   TokenLevels levels_;
-  TokenCounts counts_;
-  uint16_t parts_[4][kContexts * kSymbols + 96];  ///< of counts_
-  Plane<uint16_t> symbols_;                       ///< contexts * kSymbols + tokens, without holes
-  std::vector<EncodeEntry> tables_;               ///< of contexts before they are merged
-  std::vector<uint16_t> joined_;                  ///< a row of them with holes
+  TokenCounts counts_{};
+  /// Of counts_. They lie apart by no multiple of 4 KB: stores to one would look like those to another.
+  uint16_t parts_[4][kContexts * kSymbols + 96];
+  Plane<uint16_t> symbols_;          ///< contexts * kSymbols + tokens, without holes
+  std::vector<EncodeEntry> tables_;  ///< of contexts before they are merged
+  std::vector<uint16_t> joined_;     ///< a row of them with holes
   std::vector<uint8_t> packed_narrow_;
   std::vector<uint32_t> packed_wide_;
 };

@@ -232,7 +232,7 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
     if (levels[t] != 0) total += weight_of(levels[t]), ++present, last = t;
   if (present == 0) return;
   const uint32_t free = kFrequencyOne - present;
-  // Products are below 2^53, so that quotients are rounded down as integers' are: these take longer to divide.
+  // Products are below 2^53, so that quotients are rounded down as those of integers are. Doubles are divided faster.
   static_assert(uint64_t{kSymbols} * weight_of(kLevels - 1) * kFrequencyOne < uint64_t{1} << 53);
   uint64_t sum = 0;
   uint32_t given = 0;

@@ -198,7 +198,8 @@ void BlockCoder::put_tables(std::vector<uint8_t>& out) {
     for (size_t n = 0; n < s.count; ++n)
       for (size_t y = 0; y < kSide; ++y) {
         s.pack(*s.blocks[n], p, y);
-        for (size_t i = 0; i < s.packed.count; ++i) ++(*counts)[s.packed.contexts[i]][s.packed.tokens[i]];
+        for (size_t i = 0; i < s.packed.count; ++i)
+          ++(*counts)[s.packed.symbols[i] / kSymbols][s.packed.symbols[i] % kSymbols];
       }
     TokenLevels levels;
     choose_levels(*counts, kByteTokens, levels);

@@ -1,6 +1,5 @@
 // What bounds of error promise, in every pixel of many images; and refinements, which give the exact image back.
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -150,8 +149,7 @@ TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
     all.push_back(std::move(m));
   }
   for (const int64_t target : detail::kernel_targets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    const testing::OnTarget on(target);
     for (const Made& m : all) {
       EXPECT_EQ(encode(m.image, bounds), m.bytes) << hwy::TargetName(target) << ", " << m.image.width;
       EXPECT_TRUE(decode(m.bytes).value() == m.bounded) << hwy::TargetName(target) << ", " << m.image.width;
@@ -161,8 +159,6 @@ TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
           << hwy::TargetName(target) << ", " << m.image.width;
     }
   }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 TEST(CodecBounds, SeveralTilesAndNarrowOnes) {

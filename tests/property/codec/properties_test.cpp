@@ -1,6 +1,5 @@
 // What must hold for any image and any bytes, over many seeded ones, on every instruction set this machine has.
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <algorithm>
 #include <random>
@@ -106,15 +105,12 @@ TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
   for (const DepthImage& image : all) reference.push_back(encode(image));
   const auto targets = detail::kernel_targets();
   for (const int64_t target : targets) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    const testing::OnTarget on(target);
     for (size_t i = 0; i < all.size(); ++i) {
       EXPECT_EQ(encode(all[i]), reference[i]) << hwy::TargetName(target) << ", image " << i;
       EXPECT_TRUE(decode(reference[i]).value() == all[i]) << hwy::TargetName(target) << ", image " << i;
     }
   }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   EXPECT_GE(targets.size(), testing::kLeastTargets) << "the scalar one, and this machine's";
 }
 

@@ -1,12 +1,12 @@
 // The coder of symbols by itself: what it puts comes back, on every instruction set, in as many bits as it should take.
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <cmath>
 #include <random>
 
 #include "common/codec/dense/kernels.h"
 #include "common/codec/dense/tables.h"
+#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -86,14 +86,11 @@ TEST(Rans, AnySymbolsComeBackOnEveryInstructionSet) {
     const auto bytes = put(plain_kernels(), s, n, wide, count, states);
     expect_symbols(plain_kernels(), s, n, wide, bytes, count, states);
     for (const int64_t target : kernel_targets()) {
-      hwy::SetSupportedTargetsForTest(target);
-      hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+      const testing::OnTarget on(target);
       ASSERT_EQ(put(kernels(), s, n, wide, count, others), bytes) << hwy::TargetName(target);
       ASSERT_TRUE(std::equal(states, states + kMostStates, others)) << hwy::TargetName(target);
       expect_symbols(kernels(), s, n, wide, bytes, count, states);
     }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   }
 }
 
@@ -111,8 +108,8 @@ TEST(Rans, WordsThatAreMissingAreFound) {
   alignas(64) uint32_t states[kMostStates], copy[kMostStates];
   std::vector<uint8_t> tokens(564);
   std::vector<uint32_t> numbers(564);
-  for (const size_t count : {kLanes, kMostStates}) {
-    const auto bytes = put(kernels(), s, 500, true, count, states);
+  const auto check = [&](const Kernels& kernels, size_t count) {
+    const auto bytes = put(kernels, s, 500, true, count, states);
     for (size_t cut = 2; cut < bytes.size(); cut += 2)
       for (const size_t lead : {0, 64, 1000}) {  // bytes before them that may be read
         std::vector<uint8_t> padded(lead);
@@ -121,8 +118,16 @@ TEST(Rans, WordsThatAreMissingAreFound) {
         std::copy_n(states, kMostStates, copy);
         const DecodedRow row{s.contexts.data(), tokens.data(), numbers.data(), nullptr, 500, 0, count, padded.data()};
         const uint8_t *const begin = padded.data() + lead, *const end = padded.data() + padded.size() - 64;
-        ASSERT_EQ(kernels().get_symbols(row, s.decode.data(), copy, begin, end), nullptr) << cut;
+        ASSERT_EQ(kernels.get_symbols(row, s.decode.data(), copy, begin, end), nullptr) << cut;
       }
+  };
+  for (const size_t count : {kLanes, kMostStates}) {
+    check(plain_kernels(), count);
+    for (const int64_t target : kernel_targets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      const testing::OnTarget on(target);
+      check(kernels(), count);
+    }
   }
 }
 

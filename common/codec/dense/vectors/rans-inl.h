@@ -102,8 +102,8 @@ class Entries {
       odd = Pair(tables + (four >> 16 & 0xFFFF), tables + (four >> 48));
     }
     static HWY_INLINE __m128i Pair(const EncodeEntry* first, const EncodeEntry* second) {
-      const __m128d low = _mm_load_sd(reinterpret_cast<const double*>(first));
-      return _mm_castpd_si128(_mm_loadh_pd(low, reinterpret_cast<const double*>(second)));
+      const __m128 low = _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(first)));
+      return _mm_castps_si128(_mm_loadh_pi(low, reinterpret_cast<const __m64*>(second)));
     }
   };
 #if HWY_TARGET <= HWY_AVX3
@@ -282,6 +282,11 @@ HWY_INLINE const uint8_t* GetRaw(V (&x)[kVectors], const V (&count)[kVectors], V
   return Refill(x, end);
 }
 
+#if HWY_TARGET <= HWY_AVX2
+HWY_INLINE uint64_t LowerWord(__m128i v) { return static_cast<uint64_t>(_mm_cvtsi128_si64(v)); }
+HWY_INLINE uint64_t UpperWord(__m128i v) { return static_cast<uint64_t>(_mm_extract_epi64(v, 1)); }
+#endif
+
 // tables[i] of each i below 2^16, one after the other: gathers take half as long again.
 HWY_INLINE V EntriesAt(const uint32_t* tables, V i) {
 #if HWY_TARGET <= HWY_AVX2
@@ -291,17 +296,14 @@ HWY_INLINE V EntriesAt(const uint32_t* tables, V i) {
     of = _mm_insert_epi32(of, entry(16), 1), of = _mm_insert_epi32(of, entry(32), 2);
     return _mm_insert_epi32(of, entry(48), 3);
   };
-  const auto word = [](__m128i v, auto k) HWY_ATTR { return static_cast<uint64_t>(_mm_extract_epi64(v, k())); };
-  const std::integral_constant<int, 0> low;
-  const std::integral_constant<int, 1> high;
 #if HWY_TARGET <= HWY_AVX3
   const __m256i at = _mm512_cvtepi32_epi16(i.raw);
   const __m128i first = _mm256_castsi256_si128(at), second = _mm256_extracti128_si256(at, 1);
-  return V{Joined(Joined(four(word(first, low)), four(word(first, high))),
-                  Joined(four(word(second, low)), four(word(second, high))))};
+  return V{Joined(Joined(four(LowerWord(first)), four(UpperWord(first))),
+                  Joined(four(LowerWord(second)), four(UpperWord(second))))};
 #else
   const __m256i at = _mm256_packus_epi32(i.raw, i.raw);
-  return V{Joined(four(word(_mm256_castsi256_si128(at), low)), four(word(_mm256_extracti128_si256(at, 1), low)))};
+  return V{Joined(four(LowerWord(_mm256_castsi256_si128(at))), four(LowerWord(_mm256_extracti128_si256(at, 1))))};
 #endif
 #else
   return hn::GatherIndex(kD, tables, hn::BitCast(hn::RebindToSigned<D>(), i));

@@ -104,10 +104,10 @@ class GeometryVectors {
   static HWY_INLINE V32 LowWords() { return hn::Set(kD32s, 0xFFFF); }
   // Both as 16 bits, in pairs.
   static HWY_INLINE V16 Slopes(V32 u, V32 v) {
-    HWY_ALIGN static constexpr uint8_t kPairs[16] = {0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15};
+    HWY_ALIGN static constexpr uint8_t kPairBytes[16] = {0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15};
     const hn::Repartition<uint8_t, D16> bytes;
     const V16 both = hn::Max(Joined(PairSums{u, v}), hn::Set(kD16s, int16_t{-32767}));
-    return hn::BitCast(kD16s, hn::TableLookupBytes(both, hn::LoadDup128(bytes, kPairs)));
+    return hn::BitCast(kD16s, hn::TableLookupBytes(both, hn::LoadDup128(bytes, kPairBytes)));
   }
   HWY_INLINE Direction At(size_t x) const {
     const auto load = [](const uint32_t* from) HWY_ATTR { return hn::BitCast(kD32s, hn::LoadU(kDU32, from)); };
