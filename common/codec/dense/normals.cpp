@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMostFlatExponent = 24, kEnoughFlatExponent = 8;  // more is chosen for depth within bounds alone
 constexpr unsigned kFlatExponentBits = 5;
-constexpr double kSmooth = 1.6;  // mean tokens of both coordinates, added up: about 3 bits
+constexpr double kSmooth = 3.0;  // mean tokens of both coordinates, added up
 // Mean tokens of a coordinate, without a bound of normals and with one, above which weights by flatness save more than
 // they take, in bits and in time.
 constexpr double kRough = 3, kRoughWithin = 1.5;
