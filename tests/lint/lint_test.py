@@ -41,6 +41,8 @@ VIOLATIONS = [
         "directions", "common/core/up.cpp",
         '\n#include "services/data/data.h"\n', 2, "common/ must not include services/",
     ),
+    ("widgets", "client/viewer/panel/gui/x.cpp", 'int a;\nbool b = ImGui::Button("b");\n', 2, "ImGui::Button("),
+    ("widgets", "client/viewer/panel/gui/x.cpp", 'bool b = ImGui::SliderInt("b", &i);\n', 1, "seen() is not told"),
     ("directions", "common/core/up.cpp", '#include "tools/telesplat/run.h"\n', 1, "common/ must not include tools/"),
     ("directions", "services/data/up.cpp", '#include "tests/support/near.h"\n', 1, "services/ must not include tests/"),
     ("directions", "client/viewer/up.cpp", '#include "tools/telesplat/run.h"\n', 1, "client/ must not include tools/"),

@@ -118,4 +118,22 @@ def functions(tree):
                 )
 
 
-RULES = (folders, cmake, widths, references, functions)
+_LOGGED = re.compile(
+    r"\bImGui::(?:(?:Small|Arrow)?Button|Checkbox|RadioButton|Selectable|(?:Begin)?Combo|CollapsingHeader)\("
+)
+_SEEN = re.compile(r"\bImGui::(?:InvisibleButton|(?:V?Slider|Drag|Input|ColorEdit|ColorPicker)\w*)\(")
+
+
+def widgets(tree):
+    """Widgets of the window are made by functions of panel/gui/widgets.h, or told to its seen()."""
+    for file in tree.files(".cpp", below="client/viewer/panel/gui"):
+        for match in _LOGGED.finditer(file.code):
+            line = file.line_of(match.start())
+            yield Finding(file.path, line, "widgets", f"{match[0]}: widgets.h has a function for it")
+        for match in _SEEN.finditer(file.code):
+            if "seen(" not in file.code[max(0, match.start() - 60) : match.end() + 200]:
+                line = file.line_of(match.start())
+                yield Finding(file.path, line, "widgets", f"{match[0]}: seen() is not told of it")
+
+
+RULES = (folders, cmake, widths, references, functions, widgets)

@@ -279,6 +279,7 @@ void WindowSurface::present(const image::View& view, bool changed) {
 
 // How much of the left side it covers.
 double WindowSurface::build_panel(double now_s) {
+  const LoggedBuild logged(widget_log_);
   double width = 0;
   if (panel_.shown())
     width = show_panel(panel_, panel_view_, now_s,

@@ -19,6 +19,7 @@
 #include "client/viewer/panel/launcher_lines.h"
 #include "client/viewer/panel/panel.h"
 #include "client/viewer/panel/scene_controls.h"
+#include "client/viewer/panel/widget_log.h"
 #include "client/viewer/record/screenshots.h"
 
 namespace telesplat::viewer {
@@ -137,6 +138,7 @@ class WindowSurface final : public DisplaySurface {
   SceneViewState scene_view_;
   PanelViewState panel_view_;
   OpenViewState open_view_;
+  WidgetLog widget_log_ = WidgetLog::from_environment();
   LauncherLines launcher_;
   std::unique_ptr<ControlDesk> desk_;
   HoleMeter holes_;

@@ -20,10 +20,10 @@ std::string size_text(uint64_t bytes) {
 std::string show_entries(const FileList::Listing& listing) {
   std::string chosen;
   if (!listing.problem.empty()) ImGui::TextWrapped("%s", listing.problem.c_str());
-  if (ImGui::Selectable("..")) chosen = std::filesystem::path(listing.folder).parent_path().string();
+  if (choice("file", "..")) chosen = std::filesystem::path(listing.folder).parent_path().string();
   for (const auto& entry : listing.entries) {
     const std::string name = entry.folder ? entry.name + "/" : entry.name;
-    if (ImGui::Selectable(name.c_str())) chosen = listing.folder + "/" + entry.name;
+    if (choice("file", name)) chosen = listing.folder + "/" + entry.name;
     if (entry.folder) continue;
     const std::string size = size_text(entry.bytes);
     ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize(size.c_str()).x);
@@ -58,19 +58,21 @@ void show_open(OpenViewState& state, bool can_close, const std::function<void(co
   if (ImGui::Begin("Open a data set", can_close ? &state.shown : nullptr,
                    ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
                        ImGuiWindowFlags_NoSavedSettings)) {
+    dialog("Open", can_close ? &state.shown : nullptr);
     ImGui::TextDisabled("a mesh, a volume, a folder of slices, or julia; files can be dropped on the window too");
     ImGui::SetNextItemWidth(-letter * 9);
     const bool entered = ImGui::InputTextWithHint("##path", "path", &state.path, ImGuiInputTextFlags_EnterReturnsTrue);
+    seen("text", "path", ImGui::IsItemEdited() || entered);
     ImGui::SameLine();
-    if ((ImGui::Button("open") || entered) && !state.path.empty()) chosen = state.path, opens = true;
+    if ((button("open") || entered) && !state.path.empty()) chosen = state.path, opens = true;
     ImGui::SameLine();
-    if (ImGui::Button("julia")) chosen = "julia", opens = true;
+    if (button("julia")) chosen = "julia", opens = true;
     const auto listing = state.files.listing();
     if (listing && !listing->recent.empty()) {
       text("opened of late");
       ImGui::BeginChild("recent", {0, letter * 8}, true);
       for (const auto& path : listing->recent)
-        if (ImGui::Selectable(path.c_str())) chosen = path, opens = true;
+        if (choice("recent", path)) chosen = path, opens = true;
       ImGui::EndChild();
     }
     text(state.files.busy() ? "reading ..." : listing ? listing->folder : "");

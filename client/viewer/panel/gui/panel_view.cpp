@@ -79,9 +79,9 @@ void show_figures(const Panel& panel, double now_s) {
 void show_coupling(Panel& panel) {
   CouplingState state = panel.coupling();
   row("coupling");
-  if (ImGui::BeginCombo("##coupling", coupling_name(state.mode))) {
+  if (begin_list("coupling", coupling_name(state.mode))) {
     for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose})
-      if (ImGui::Selectable(coupling_name(mode), mode == state.mode))
+      if (choice("coupling", coupling_name(mode), mode == state.mode))
         panel.choose_coupling(coupling_state(mode, std::max(3, state.buffers)));
     ImGui::EndCombo();
   }
@@ -89,7 +89,9 @@ void show_coupling(Panel& panel) {
       "async: the display never waits; sync: each frame waits for its own view update; loose: for the next of several");
   if (state.mode == CouplingMode::kLoose) {
     row("buffers");
-    if (ImGui::SliderInt("##buffers", &state.buffers, 1, int(wire::kMaxBuffers), "%d", ImGuiSliderFlags_AlwaysClamp))
+    if (seen("slider", "buffers",
+             ImGui::SliderInt("##buffers", &state.buffers, 1, int(wire::kMaxBuffers), "%d",
+                              ImGuiSliderFlags_AlwaysClamp)))
       panel.choose_coupling(state);
   }
   if (panel.coupling_pending()) ImGui::TextDisabled("  not in force yet");
@@ -100,14 +102,14 @@ void show_background(Panel& panel, Look& look, bool& changed) {
   const uint32_t now = look.background;
   float colour[3] = {float(now >> 16 & 255) / 255, float(now >> 8 & 255) / 255, float(now & 255) / 255};
   row("background");
-  if (ImGui::ColorEdit3("##background", colour, ImGuiColorEditFlags_NoInputs)) {
+  if (seen("colour", "background", ImGui::ColorEdit3("##background", colour, ImGuiColorEditFlags_NoInputs))) {
     const auto byte = [](float v) { return uint32_t(std::clamp(v, 0.0f, 1.0f) * 255 + 0.5f); };
     look.background = byte(colour[0]) << 16 | byte(colour[1]) << 8 | byte(colour[2]);
     changed = true;
   }
   for (const auto& [name, value] : kBackgrounds) {
     ImGui::SameLine();
-    if (!ImGui::SmallButton(name)) continue;
+    if (!small_button(name)) continue;
     look.background = value;
     changed = true;
   }
@@ -115,32 +117,34 @@ void show_background(Panel& panel, Look& look, bool& changed) {
 
 void show_points_look(Look& look, double detail, bool& changed) {
   row("splats");
-  if (ImGui::BeginCombo("##splats", splat::kernel_name(look.render.kernel).data())) {
+  if (begin_list("splats", splat::kernel_name(look.render.kernel).data())) {
     for (const auto kernel : splat::kKernels)
-      if (ImGui::Selectable(splat::kernel_name(kernel).data(), kernel == look.render.kernel))
+      if (choice("splats", splat::kernel_name(kernel).data(), kernel == look.render.kernel))
         look.render.kernel = kernel, changed = true;
     ImGui::EndCombo();
   }
   row("finish");
-  changed |= ImGui::Checkbox("fill", &look.render.finish.fill);
+  changed |= checkbox("fill", &look.render.finish.fill);
   hint("pixels inside a surface that show nothing, or something farther, are filled");
   ImGui::SameLine();
-  changed |= ImGui::Checkbox("smooth", &look.render.finish.smooth);
+  changed |= checkbox("smooth", &look.render.finish.smooth);
   hint("interpolates between magnified splats of one surface");
   ImGui::SameLine();
-  changed |= ImGui::Checkbox("antialias", &look.render.finish.antialias);
+  changed |= checkbox("antialias", &look.render.finish.antialias);
   hint("silhouettes; and still pictures become finer only with it");
   row("detail");
   float most = float(look.most_detail);
   const std::string shown = fmt::format("at most %.2f, now {:.2f}", detail);
-  if (ImGui::SliderFloat("##detail", &most, float(Look::kLeastDetail), 1, shown.c_str(), ImGuiSliderFlags_AlwaysClamp))
+  if (seen("slider", "detail",
+           ImGui::SliderFloat("##detail", &most, float(Look::kLeastDetail), 1, shown.c_str(),
+                              ImGuiSliderFlags_AlwaysClamp)))
     look.most_detail = double(most), changed = true;
   hint("points drawn on each axis for a sample or a display pixel; less is coarser and faster");
   row("light");
   const int light = !look.lit ? 2 : look.head_light ? 1 : 0;
   for (const auto& [index, name] : {std::pair{0, "lit"}, {1, "head"}, {2, "unlit"}}) {
     if (index > 0) ImGui::SameLine();
-    if (!ImGui::RadioButton(name, light == index)) continue;
+    if (!radio_button(name, light == index)) continue;
     look.lit = index != 2;
     if (look.lit) look.head_light = index == 1;
     changed = true;
@@ -162,11 +166,10 @@ void show_sampling(Panel& panel) {
   SamplingWish wish = panel.sampling();
   const auto name = [](int width, int height) { return fmt::format("{} x {}", width, height); };
   row("size");
-  if (ImGui::BeginCombo("##size", wish.adaptive ? "auto" : name(wish.width, wish.height).c_str())) {
-    if (ImGui::Selectable("auto", wish.adaptive)) wish.adaptive = true;
+  if (begin_list("size", wish.adaptive ? "auto" : name(wish.width, wish.height).c_str())) {
+    if (choice("size", "auto", wish.adaptive)) wish.adaptive = true;
     for (const auto& [width, height] : kSizes)
-      if (ImGui::Selectable(name(width, height).c_str(),
-                            !wish.adaptive && wish.width == width && wish.height == height))
+      if (choice("size", name(width, height), !wish.adaptive && wish.width == width && wish.height == height))
         wish.adaptive = false, wish.width = width, wish.height = height;
     ImGui::EndCombo();
   }
@@ -174,7 +177,8 @@ void show_sampling(Panel& panel) {
   if (wish.adaptive) {
     row("at least");
     float least = float(wish.least_sampling);
-    if (ImGui::SliderFloat("##least", &least, 0.1f, 1, "%.2f of a pixel", ImGuiSliderFlags_AlwaysClamp))
+    if (seen("slider", "at least",
+             ImGui::SliderFloat("##least", &least, 0.1f, 1, "%.2f of a pixel", ImGuiSliderFlags_AlwaysClamp)))
       wish.least_sampling = double(least);
     hint("sampled pixels a displayed pixel, on each axis");
   }
@@ -186,41 +190,40 @@ void show_sampling(Panel& panel) {
 // Buttons are keys: both do the same.
 void show_pictures(Panel& panel, PanelViewState& state) {
   row("picture");
-  if (ImGui::BeginCombo("##picture",
-                        state.picture.own_size() ? picture_size(state.picture).c_str() : "as the window")) {
-    if (ImGui::Selectable("as the window", !state.picture.own_size())) state.picture.width = state.picture.height = 0;
+  if (begin_list("picture", state.picture.own_size() ? picture_size(state.picture).c_str() : "as the window")) {
+    if (choice("picture", "as the window", !state.picture.own_size())) state.picture.width = state.picture.height = 0;
     for (const auto& [width, height] : kPictures) {
       const PictureWish wish{width, height, state.picture.exr};
-      if (ImGui::Selectable(picture_size(wish).c_str(), state.picture == wish)) state.picture = wish;
+      if (choice("picture", picture_size(wish), state.picture == wish)) state.picture = wish;
     }
     ImGui::EndCombo();
   }
   row("pixels");
   int size[2] = {state.picture.width, state.picture.height};
-  if (ImGui::InputInt2("##pixels", size)) {
+  if (seen("number", "pixels", ImGui::InputInt2("##pixels", size))) {
     state.picture.width = std::clamp(size[0], 0, geometry::kMaxImageSide);
     state.picture.height = std::clamp(size[1], 0, geometry::kMaxImageSide);
   }
   hint("any size; 0: as the window");
-  if (ImGui::Button("take")) panel.choose_picture(state.picture);
+  if (button("take")) panel.choose_picture(state.picture);
   ImGui::SameLine();
-  ImGui::Checkbox("EXR with depth", &state.picture.exr);
+  checkbox("EXR with depth", &state.picture.exr);
   const auto& path = panel.path();
   row("path");
-  if (ImGui::Button(path.records ? "end" : "record")) panel.press(Key::kC);
+  if (button(path.records ? "end" : "record")) panel.press(Key::kC);
   hint("of the camera, as a CSV file that --trajectory takes");
   if (path.can_play) {
     ImGui::SameLine();
-    if (ImGui::Button(path.plays ? "take the camera" : "play")) panel.press(Key::kT);
+    if (button(path.plays ? "take the camera" : "play")) panel.press(Key::kT);
   }
   if (path.records) {
     ImGui::SameLine();
     text(fmt::format("{:.0f} s", path.recorded_s));
   }
   row("window");
-  if (ImGui::Button("full screen")) panel.press(Key::kF11);
+  if (button("full screen")) panel.press(Key::kF11);
   ImGui::SameLine();
-  if (ImGui::Button("first view")) panel.press(Key::kR);
+  if (button("first view")) panel.press(Key::kR);
 }
 
 void show_session(const Panel& panel) {
@@ -259,10 +262,11 @@ double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::
   constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                                       ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoSavedSettings;
   if (ImGui::Begin("panel", nullptr, kFixed)) {
+    dialog("panel", nullptr);
     text(panel.figures().scene.empty() ? "Telesplat" : panel.figures().scene);
     ImGui::TextDisabled("Tab hides this, F1 lists keys");
     for (const auto& line : panel.news(now_s)) ImGui::TextWrapped("%s", line.c_str());
-    if (panel.setup().opens && ImGui::Button("open ...")) panel.press(Key::kO);
+    if (panel.setup().opens && button("open ...")) panel.press(Key::kO);
     if (section("Figures", true)) show_figures(panel, now_s);
     if (section("Display", true)) show_display(panel);
     if (section("Sampling", true)) show_sampling(panel);

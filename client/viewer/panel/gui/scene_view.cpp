@@ -30,6 +30,7 @@ Plane make_plane(const char* name, float height) {
   Plane out{ImGui::GetCursorScreenPos(),
             {std::max(40.0f, ImGui::GetContentRegionAvail().x), ImGui::GetFontSize() * height}};
   ImGui::InvisibleButton(name, out.size, ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  seen("plot", name, ImGui::IsItemActive());
   ImGui::GetWindowDrawList()->AddRectFilled(out.from, {out.from.x + out.size.x, out.from.y + out.size.y},
                                             ImGui::GetColorU32(ImGuiCol_FrameBg));
   return out;
@@ -126,7 +127,7 @@ void show_chosen(SceneControls& controls, SceneViewState& state, double now_s) {
   }
   const auto p = points[size_t(state.point)];
   float colour[3] = {p.r, p.g, p.b};
-  if (ImGui::ColorEdit3("##point", colour, ImGuiColorEditFlags_NoInputs))
+  if (seen("colour", "point", ImGui::ColorEdit3("##point", colour, ImGuiColorEditFlags_NoInputs)))
     controls.edit(
         [&](TransferEditor& e) { return e.colour(now_s, size_t(state.point), colour[0], colour[1], colour[2]); });
   ImGui::SameLine();
@@ -135,7 +136,7 @@ void show_chosen(SceneControls& controls, SceneViewState& state, double now_s) {
 
 void show_transfer(SceneControls& controls, SceneViewState& state, double now_s, const std::function<void()>& save) {
   const auto& editor = controls.transfer();
-  Plane plane = make_plane("##transfer", kEditorHeight);
+  Plane plane = make_plane("curve", kEditorHeight);
   plane.left = editor.lo(), plane.right = editor.hi();
   edit_points(controls, state, plane, now_s);
   ImGui::PushClipRect(plane.from, {plane.from.x + plane.size.x, plane.from.y + plane.size.y}, true);
@@ -149,14 +150,14 @@ void show_transfer(SceneControls& controls, SceneViewState& state, double now_s,
   text(most);
   show_chosen(controls, state, now_s);
   row("preset");
-  if (ImGui::BeginCombo("##preset", "choose ...")) {
+  if (begin_list("preset", "choose ...")) {
     for (const auto& preset : volume::transfer_presets()) {
-      if (ImGui::Selectable(std::string(preset.name).c_str())) controls.choose_preset(preset.name), state.point = -1;
+      if (choice("preset", std::string(preset.name))) controls.choose_preset(preset.name), state.point = -1;
       hint(std::string(preset.text).c_str());
     }
     ImGui::EndCombo();
   }
-  if (ImGui::Button("save for ParaView")) save();
+  if (button("save for ParaView")) save();
   hint("as a JSON file of ParaView's, which --tf and telesplat ctl tf read too");
 }
 
@@ -165,19 +166,22 @@ void show_series(SceneControls& controls, double now_s) {
   int step = int(controls.value("volume.step"));
   row("step");
   const std::string shown = fmt::format("%d of {}", v.steps - 1);
-  if (ImGui::SliderInt("##step", &step, 0, v.steps - 1, shown.c_str(), ImGuiSliderFlags_AlwaysClamp))
+  if (seen("slider", "step",
+           ImGui::SliderInt("##step", &step, 0, v.steps - 1, shown.c_str(), ImGuiSliderFlags_AlwaysClamp)))
     controls.choose_step(now_s, step);
   row("steps/s");
   float speed = float(controls.value("volume.steps-per-s"));
-  if (ImGui::SliderFloat("##speed", &speed, 0, 60, "%.1f", ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic))
+  if (seen("slider", "steps/s",
+           ImGui::SliderFloat("##speed", &speed, 0, 60, "%.1f",
+                              ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)))
     controls.choose_speed(now_s, double(speed));
-  if (ImGui::Button("play")) controls.play_series(true);
+  if (button("play")) controls.play_series(true);
   ImGui::SameLine();
-  if (ImGui::Button("stop")) controls.play_series(false);
+  if (button("stop")) controls.play_series(false);
 }
 
 void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, double now_s) {
-  const std::string name(info.name), id = "##" + name;
+  const std::string name(info.name);
   double value = controls.value(name);
   row(name.c_str());
   const auto names = name == "palette"  ? julia::palette_names()
@@ -185,9 +189,9 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
                                         : std::span<const std::string_view>();
   if (!names.empty()) {
     const auto at = size_t(std::clamp(value, 0.0, double(names.size() - 1)));
-    if (ImGui::BeginCombo(id.c_str(), std::string(names[at]).c_str())) {
+    if (begin_list(name.c_str(), std::string(names[at]).c_str())) {
       for (size_t i = 0; i < names.size(); ++i)
-        if (ImGui::Selectable(std::string(names[i]).c_str(), i == at)) controls.set(now_s, info, double(i));
+        if (choice(name.c_str(), std::string(names[i]), i == at)) controls.set(now_s, info, double(i));
       ImGui::EndCombo();
     }
   } else {
@@ -197,8 +201,9 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
                  most = wide ? std::min(info.most, 2.0) : info.most;
     const auto flags =
         most / std::max(1e-9, least) > 100 && least > 0 ? ImGuiSliderFlags_Logarithmic : ImGuiSliderFlags_None;
-    if (ImGui::SliderScalar(id.c_str(), ImGuiDataType_Double, &value, &least, &most, info.whole ? "%.0f" : "%.4f",
-                            flags))
+    if (seen("slider", name.c_str(),
+             ImGui::SliderScalar(("##" + name).c_str(), ImGuiDataType_Double, &value, &least, &most,
+                                 info.whole ? "%.0f" : "%.4f", flags)))
       controls.set(now_s, info, value);
   }
   hint(std::string(info.text).c_str());
@@ -207,7 +212,7 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
 // Each track in a colour of its own and between its limits' values.
 void draw_timeline(const SceneControls& controls) {
   constexpr std::array<uint32_t, 6> kColours{0x56b4e9, 0xe69f00, 0x009e73, 0xcc79a7, 0xf0e442, 0xd55e00};
-  Plane plane = make_plane("##timeline", kTimelineHeight);
+  Plane plane = make_plane("curves", kTimelineHeight);
   plane.right = std::max(controls.timeline_s(), 1.0);
   auto& list = *ImGui::GetWindowDrawList();
   const auto& tracks = controls.timeline().tracks;
@@ -238,7 +243,7 @@ void show_key_frames(SceneControls& controls) {
       ImGui::PushID(int(t * 1000 + k));
       text(fmt::format("{}  {:.2f} s: {:.4f}", tracks[t].name, tracks[t].keys[k].t_s, tracks[t].keys[k].value));
       ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::GetFontSize() * 4.5f);
-      if (ImGui::SmallButton("take out")) gone = {t, k};
+      if (small_button("take out")) gone = {t, k};
       ImGui::PopID();
     }
   if (gone) controls.remove_key(gone->first, gone->second);
@@ -254,26 +259,26 @@ void show_timeline(SceneControls& controls, SceneViewState& state) {
   }
   const auto& info = infos[size_t(state.parameter)];
   row("parameter");
-  if (ImGui::BeginCombo("##parameter", std::string(info.name).c_str())) {
+  if (begin_list("parameter", std::string(info.name).c_str())) {
     for (size_t i = 0; i < infos.size(); ++i)
-      if (fits(infos[i]) && ImGui::Selectable(std::string(infos[i].name).c_str(), int(i) == state.parameter))
+      if (fits(infos[i]) && choice("parameter", std::string(infos[i].name), int(i) == state.parameter))
         state.parameter = int(i);
     ImGui::EndCombo();
   }
   row("at, s");
-  ImGui::InputDouble("##at", &state.key_s, 0.5, 5, "%.2f");
+  seen("number", "at, s", ImGui::InputDouble("##at", &state.key_s, 0.5, 5, "%.2f"));
   state.key_s = std::clamp(std::isfinite(state.key_s) ? state.key_s : 0.0, 0.0, SceneControls::kLongest_s);
-  if (ImGui::Button("key frame of its value now")) controls.add_key(info, state.key_s, controls.value(info.name));
+  if (button("key frame of its value now")) controls.add_key(info, state.key_s, controls.value(info.name));
   hint("move the parameter's slider, choose the time, press; values between key frames run smoothly, for ever");
   if (!controls.timeline().empty()) {
     draw_timeline(controls);
     show_key_frames(controls);
-    if (ImGui::Button("play")) controls.play();
+    if (button("play")) controls.play();
     ImGui::SameLine();
-    if (ImGui::Button("clear")) controls.clear_timeline();
+    if (button("clear")) controls.clear_timeline();
     ImGui::SameLine();
   }
-  if (ImGui::Button("stop")) controls.stop();
+  if (button("stop")) controls.stop();
 }
 
 }  // namespace

@@ -1,10 +1,13 @@
-// Small things that the parts of the panel share, between Dear ImGui's frames.
+// Small things that the parts of the panel share, between Dear ImGui's frames. Every widget that a person can use goes
+// through one of these functions, so that a WidgetLog lists it and tools/monkey reaches it.
 #pragma once
 
 #include <cstdint>
 #include <string>
 
 #include <imgui.h>
+
+#include "client/viewer/panel/widget_log.h"
 
 namespace telesplat::viewer {
 
@@ -32,8 +35,60 @@ inline void row(const char* name) {
   ImGui::SetNextItemWidth(-1);
 }
 
+/// What of the window shows the items that come next.
+inline WidgetLog::Rect visible_part() {
+  const auto& list = *ImGui::GetWindowDrawList();
+  const ImVec2 from = list.GetClipRectMin(), to = list.GetClipRectMax();
+  return {from.x, from.y, to.x, to.y};
+}
+
+/// Tells the log of the item before it, and returns `used`: what Dear ImGui's function returned for it. kind: "slider",
+/// "number", "text", "colour" and "plot" (dragged, clicked); buttons, boxes, lists and sections have functions below.
+inline bool seen(const char* kind, const char* name, bool used) {
+  if (auto* log = LoggedBuild::log()) {
+    const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
+    log->seen(kind, name, {from.x, from.y, to.x, to.y}, visible_part(), used);
+  }
+  return used;
+}
+
+inline bool button(const char* label) { return seen("button", label, ImGui::Button(label)); }
+inline bool small_button(const char* label) { return seen("button", label, ImGui::SmallButton(label)); }
+inline bool checkbox(const char* label, bool* on) { return seen("box", label, ImGui::Checkbox(label, on)); }
+inline bool radio_button(const char* label, bool on) { return seen("button", label, ImGui::RadioButton(label, on)); }
+
+/// A list that drops down, its name hidden. True: it is open, its choices come next, and ImGui::EndCombo after them.
+inline bool begin_list(const char* name, const char* shown) {
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  const WidgetLog::Rect rect{from.x, from.y, from.x + ImGui::CalcItemWidth(), from.y + ImGui::GetFrameHeight()};
+  const WidgetLog::Rect visible = visible_part();
+  const bool open = ImGui::BeginCombo((std::string("##") + name).c_str(), shown);
+  if (auto* log = LoggedBuild::log()) log->seen("list", name, rect, visible, open);
+  return open;
+}
+/// A line that can be chosen, of the list with that name.
+inline bool choice(const char* list, const std::string& label, bool chosen = false) {
+  return seen("choice", (std::string(list) + "=" + label).c_str(), ImGui::Selectable(label.c_str(), chosen));
+}
+
+/// The widgets that come next lie in this section.
 inline bool section(const char* name, bool open) {
-  return ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
+  if (auto* log = LoggedBuild::log()) log->enter("panel");
+  const bool shown = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
+  seen("section", name, ImGui::IsItemToggledOpen());
+  if (auto* log = LoggedBuild::log()) log->enter(name);
+  return shown;
+}
+
+/// The widgets that come next lie in this dialog, whose ImGui::Begin came before. open: it has a button that closes it,
+/// which was pressed if it is false.
+inline void dialog(const char* name, const bool* open) {
+  if (!LoggedBuild::log()) return;
+  LoggedBuild::log()->enter(name);
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();  // of the title
+  if (open)
+    LoggedBuild::log()->seen("button", "close", {to.x - (to.y - from.y), from.y, to.x, to.y}, {0, 0, 1e9f, 1e9f},
+                             !*open);
 }
 
 }  // namespace telesplat::viewer

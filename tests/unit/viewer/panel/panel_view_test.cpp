@@ -10,6 +10,7 @@
 
 #include "client/viewer/panel/gui/scene_view.h"
 #include "client/viewer/panel/gui/style.h"
+#include "client/viewer/panel/gui/widgets.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -150,6 +151,29 @@ TEST_P(PanelView, AHandThatClicksEverywhereOrdersNothingWrong) {
   EXPECT_TRUE(orders_.contains("coupling"));
   if (GetParam() == scene::Kind::kVolume) EXPECT_TRUE(orders_.contains("tf"));
   if (GetParam() == scene::Kind::kJulia) EXPECT_TRUE(orders_.contains("set"));
+}
+
+TEST_P(PanelView, TheLogHasItsWidgetsWhereTheyAreAndCountsTheirUse) {
+  WidgetLog log("widgets-of-no-folder/list");
+  ImGuiIO& io = ImGui::GetIO();
+  const auto logged_frame = [&] {
+    const LoggedBuild logged(log);
+    frame();
+  };
+  for (int i = 0; i < 3; ++i) logged_frame();
+  ASSERT_TRUE(log.widgets().contains("Display/coupling"));
+  EXPECT_TRUE(log.widgets().find("panel/Display")->second.reachable);
+  const auto rect = log.widgets().find("Display/coupling")->second.rect;
+  io.MousePos = {(rect.left + rect.right) / 2, (rect.top + rect.bottom) / 2};
+  for (const bool down : {false, true, false, false}) {
+    io.MouseDown[0] = down;
+    logged_frame();
+  }
+  EXPECT_EQ(log.widgets().find("Display/coupling")->second.uses, 1u);
+  EXPECT_TRUE(log.widgets().find("Display/coupling=sync")->second.reachable);
+  EXPECT_EQ(log.widgets().contains("Transfer function/curve"), GetParam() == scene::Kind::kVolume);
+  frame();
+  EXPECT_EQ(LoggedBuild::log(), nullptr);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, PanelView, testing::ValuesIn(scene::kKinds),
