@@ -46,8 +46,10 @@ void draw_histogram(const Plane& plane, const volume::Histogram& h) {
     if (h.counts[i] == 0) continue;
     const double tall = std::log1p(double(h.counts[i])) / std::log1p(double(most));
     const ImVec2 a = plane.at(h.lo + width * double(i), tall), b = plane.at(h.lo + width * double(i + 1), 0);
-    list.AddRectFilled({std::max(a.x, plane.from.x), a.y}, {std::clamp(b.x, a.x + 1, plane.from.x + plane.size.x), b.y},
-                       ink(0x5a6470));
+    // A bar may lie beside the plot: the function may end within the data. A bar has at least one pixel.
+    const float left = std::max(a.x, plane.from.x),
+                right = std::min(std::max(b.x, left + 1), plane.from.x + plane.size.x);
+    if (left < right) list.AddRectFilled({left, a.y}, {right, b.y}, ink(0x5a6470));
   }
 }
 

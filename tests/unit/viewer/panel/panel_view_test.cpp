@@ -176,6 +176,34 @@ TEST_P(PanelView, TheLogHasItsWidgetsWhereTheyAreAndCountsTheirUse) {
   EXPECT_EQ(LoggedBuild::log(), nullptr);
 }
 
+// A function may end within the data, or lie beside them; bars of the histogram then lie beside the plot.
+TEST_P(PanelView, DrawsAnyTransferFunctionOverAnyHistogram) {
+  if (GetParam() != scene::Kind::kVolume) GTEST_SKIP() << "other data have no transfer function";
+  std::vector<std::string> functions;
+  for (const auto& preset : volume::transfer_presets()) functions.emplace_back(preset.name);
+  for (const char* points :
+       {"-1000:#000000:0, 2999:#ffffff:0.5", "-1000:#000000:0, 3000:#ffffff:0.5", "0:#000000:0, 1:#ffffff:0.5",
+        "5:#000000:0, 5:#ffffff:0.5", "-9000:#000000:0, -8000:#ffffff:1", "9e3:#000000:0, 1e30:#ffffff:1",
+        "-1e30:#000000:0, 1e30:#ffffff:1", "700:#ffffff:0.5", "20%:#603010:0, 45%:#a07040:0.05, 70%:#40a040:0.4"})
+    functions.emplace_back(points);
+  for (const char* histogram : {"-1000:3000:5,0,100000,700,9,0,3", "-1e30:1e30:1,2,3", "0:1e-30:7,9",
+                                "400:400.001:1,1,1,1", "-1000:3000:0,0", "2900:9000:4,5,6"}) {
+    welcome_.facts[volume::kHistogramFact] = histogram;
+    for (const auto& text : functions) {
+      auto s = volume_session();
+      auto transfer = volume::resolve_transfer(text, s.range);
+      ASSERT_TRUE(transfer) << text << ": " << transfer.error().text;
+      s.transfer = *transfer;
+      welcome_.parameters = volume::to_parameters(s);
+      controls_.on_session(now_s_ += 10, welcome_);
+      ASSERT_EQ(controls_.transfer().transfer(), *transfer) << text;
+      ImGui::GetIO().MousePos = {200, 700};
+      frame();
+    }
+  }
+  EXPECT_TRUE(orders_.empty());
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, PanelView, testing::ValuesIn(scene::kKinds),
                          [](const auto& info) { return std::string(scene::name_of(info.param)); });
 
