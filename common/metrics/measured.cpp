@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <utility>
 
 #include "common/metrics/stages.h"
 
@@ -35,6 +37,12 @@ struct Measured::Row {
 
 double ViewerFigures::per_second(uint64_t count) const {
   return duration_s > 0 ? double(count) / std::max(duration_s, 1e-9) : 0;
+}
+
+double ViewerFigures::fps() const {
+  const double drawn_s = duration_s - still_s;
+  if (still == 0) return per_second(frames);
+  return frames > still + 1 && drawn_s > 0 ? double(frames - still) / drawn_s : 0;
 }
 
 Table* Measured::table(const std::string& name) {
@@ -78,31 +86,60 @@ void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
     if (viewer.last_s > -1e300 && *t_s > viewer.last_s) viewer.duration_s += *t_s - viewer.last_s;
     viewer.last_s = *t_s;
   }
-  if (const auto ms = row.of("inter_frame_ms"); ms && *ms > 0) {  // a viewer's first frame has none
-    inter_frame_ms.add(*ms);
-    viewer.inter_frame_ms.add(*ms);
-  }
-  row.add_to(construction_ms, "construction_ms");
+  add_delay(viewer, row);
   row.add_to(points_drawn, "points_drawn");
   row.add_to(update_age_ms, "update_age_ms");
   if (const auto lead_ms = row.of("lead_ms")) {
     headset = headset || *lead_ms != 0;
     frames_late += *lead_ms < 0;
   }
+  refreshed = refreshed || row.of("refresh_ms").value_or(0) > 0;
   refreshes_missed += row.of("missed").value_or(0);
-  const auto mode = row.of("coupling"), buffers = row.of("buffers");
-  if (mode && buffers) {
-    coupled = true;
-    const std::string name = coupling_name(*mode, *buffers);
-    const auto known = std::find_if(frames_by_coupling.begin(), frames_by_coupling.end(),
-                                    [&](const auto& c) { return c.first == name; });
-    if (known != frames_by_coupling.end())
-      ++known->second;
-    else if (frames_by_coupling.size() < kMostCouplings)
-      frames_by_coupling.emplace_back(name, 1);
-    coupling_changes += !viewer.coupling.empty() && viewer.coupling != name;
-    viewer.coupling = name;
+  add_coupling(viewer, row);
+  add_skew(row);
+}
+
+// Of a still frame nothing was drawn: how long it took says nothing.
+void Measured::add_delay(ViewerFigures& viewer, const Row& row) {
+  const double ms = row.of("inter_frame_ms").value_or(0);  // 0: a viewer's first frame has none
+  if (row.of("still").value_or(0) > 0) {
+    ++frames_still;
+    ++viewer.still;
+    viewer.still_s += ms / 1e3;
+    viewer.last_ms = 0;
+    return;
   }
+  row.add_to(construction_ms, "construction_ms");
+  if (const auto seen_ms = row.of("motion_to_photon_ms"); seen_ms && *seen_ms >= 0) {
+    motion_to_photon_ms.add(*seen_ms);
+    viewer.motion_to_photon_ms.add(*seen_ms);
+  }
+  const double before_ms = std::exchange(viewer.last_ms, ms);
+  if (!(ms > 0)) return;
+  inter_frame_ms.add(ms);
+  viewer.inter_frame_ms.add(ms);
+  if (!(before_ms > 0)) return;
+  jitter_sum_ms += std::abs(ms - before_ms);
+  ++jitters;
+}
+
+void Measured::add_coupling(ViewerFigures& viewer, const Row& row) {
+  const auto mode = row.of("coupling"), buffers = row.of("buffers");
+  if (!mode || !buffers) return;
+  coupled = true;
+  const std::string name = coupling_name(*mode, *buffers);
+  const auto known = std::find_if(frames_by_coupling.begin(), frames_by_coupling.end(),
+                                  [&](const auto& c) { return c.first == name; });
+  if (known != frames_by_coupling.end())
+    ++known->second;
+  else if (frames_by_coupling.size() < kMostCouplings)
+    frames_by_coupling.emplace_back(name, 1);
+  coupling_changes += !viewer.coupling.empty() && viewer.coupling != name;
+  viewer.coupling = name;
+}
+
+// Each of a wall's frames counts once, whoever told of it.
+void Measured::add_skew(const Row& row) {
   const auto number = row.of("wall_frame"), skew = row.of("swap_skew_ms");
   if (!number || !skew || !(*number > 0) || !(*skew >= 0)) return;
   if (*number + 2 * kMostOpenSkews < closed_skew_) close_skews();  // another wall, or another master's

@@ -24,12 +24,17 @@ struct Table {
 /// What one viewer did.
 struct ViewerFigures {
   uint64_t frames = 0, updates = 0;
+  uint64_t still = 0;  ///< of its frames: nothing was drawn for them
   double duration_s = 0;
-  Quantiles inter_frame_ms, latency_ms;
+  double still_s = 0;  ///< part of it that ended with these
+  Quantiles inter_frame_ms, motion_to_photon_ms, latency_ms;
   double last_s = -1e300;  ///< of its frames
+  double last_ms = 0;      ///< delay of the last one; 0: it has none, or is still
   std::string coupling;    ///< of the last one
 
   double per_second(uint64_t count) const;
+  /// Frames that were drawn, in the time that was not spent on still ones; 0: there were fewer than two.
+  double fps() const;
 };
 
 class Measured {
@@ -51,11 +56,17 @@ class Measured {
   /// Each by itself: they need not have begun, nor ended, together.
   const std::map<std::string, ViewerFigures>& viewers() const { return viewers_; }
 
-  // Of all viewers' frames.
-  Quantiles inter_frame_ms, construction_ms, points_drawn, update_age_ms;
-  uint64_t frames_shown = 0;
+  // Of all viewers' frames that were drawn.
+  Quantiles inter_frame_ms, construction_ms, motion_to_photon_ms;
+  /// From one delay to the next of the same viewer: how much they differ, in sum, and how often there were two.
+  double jitter_sum_ms = 0;
+  uint64_t jitters = 0;
+  // Of all their frames.
+  Quantiles points_drawn, update_age_ms;
+  uint64_t frames_shown = 0, frames_still = 0;
   bool headset = false;  ///< some frame had a lead
   uint64_t frames_late = 0;
+  bool refreshed = false;  ///< some frame had a refresh to be in time for
   double refreshes_missed = 0;
   bool coupled = false;  ///< their couplings are known
   uint64_t coupling_changes = 0;
@@ -77,6 +88,9 @@ class Measured {
  private:
   struct Row;
   void add_frame(ViewerFigures& viewer, const Row& row);
+  void add_delay(ViewerFigures& viewer, const Row& row);
+  void add_coupling(ViewerFigures& viewer, const Row& row);
+  void add_skew(const Row& row);
   void add_update(ViewerFigures& viewer, const Row& row);
   void add_stages(const Row& row);
   void close_skews();

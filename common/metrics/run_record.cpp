@@ -79,7 +79,7 @@ bool is_moment(const std::string& column) { return is_time(column) && column != 
 // Of a viewer's table. Moments count from the run's beginning.
 std::string cell_of(const std::string& column, double value, double begin_s) {
   if (is_moment(column)) return seconds(value - begin_s);
-  if (column == "display_ms" && value < 0) return "";  // no frame showed it
+  if ((column == "display_ms" || column == "motion_to_photon_ms") && value < 0) return "";  // there was none
   return is_time(column) ? seconds(value) : exact(value);
 }
 

@@ -17,17 +17,17 @@ Distribution distribution(std::vector<double> values) {
     const size_t above = std::min(below + 1, values.size() - 1);
     return values[below] + (rank - static_cast<double>(below)) * (values[above] - values[below]);
   };
-  return {std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size()), at(0.5), at(0.95),
-          at(0.99), values.back()};
+  const auto n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
+  double squares = 0;
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return {mean, at(0.5), at(0.95), at(0.99), values.back(), n > 1 ? std::sqrt(squares / (n - 1)) : 0};
 }
 
 nlohmann::ordered_json to_json(const Distribution& d) {
   const auto rounded = [](double v) { return std::round(v * 1000) / 1000; };
-  return {{"mean", rounded(d.mean)},
-          {"median", rounded(d.median)},
-          {"p95", rounded(d.p95)},
-          {"p99", rounded(d.p99)},
-          {"max", rounded(d.max)}};
+  return {{"mean", rounded(d.mean)}, {"median", rounded(d.median)}, {"p95", rounded(d.p95)},
+          {"p99", rounded(d.p99)},   {"max", rounded(d.max)},       {"sd", rounded(d.sd)}};
 }
 
 nlohmann::ordered_json distribution_json(const std::vector<double>& values) {

@@ -8,6 +8,7 @@ namespace telesplat::metrics {
 
 struct Distribution {
   double mean = 0, median = 0, p95 = 0, p99 = 0, max = 0;
+  double sd = 0;  ///< standard deviation, sqrt(sum of squared differences from the mean / (n - 1)); 0 of one value
 };
 
 /// Percentiles by linear interpolation between the nearest ranks; all 0 for no values. Values that are not finite are

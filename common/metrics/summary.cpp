@@ -172,22 +172,26 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
                        double frames_completed) {
   auto each = ordered_json::object();
   double fps = 0, updates_per_s = 0;
+  const auto drew = std::count_if(viewers.begin(), viewers.end(), [](const auto& v) { return v.second.fps() > 0; });
   for (const auto& [name, v] : viewers) {
-    fps += v.per_second(v.frames) / double(viewers.size());
+    if (v.fps() > 0) fps += v.fps() / double(drew);
     updates_per_s += v.per_second(v.updates) / double(viewers.size());
     each[name] = {{"frames", v.frames},
                   {"updates", v.updates},
                   {"duration_s", thousandths(v.duration_s)},
-                  {"fps", rate(v, v.frames)},
+                  {"frames_still", v.still},
+                  {"fps", if_measured(v.fps() > 0, hundredths(v.fps()))},
                   {"updates_per_s", rate(v, v.updates)},
+                  {"motion_to_photon_ms", distribution_json(v.motion_to_photon_ms)},
                   {"inter_frame_delay_ms", distribution_json(v.inter_frame_ms)},
                   {"view_update_latency_ms", distribution_json(v.latency_ms)}};
   }
   return {{"epochs", m.epochs()},
           {"frames", m.frames_shown},
+          {"frames_still", m.frames_still},
           {"updates", m.latency_ms.count()},
           {"duration_s", if_measured(longest_s(viewers) > 0, thousandths(longest_s(viewers)))},
-          {"fps", if_measured(longest_s(viewers) > 0, hundredths(fps))},
+          {"fps", if_measured(fps > 0, hundredths(fps))},
           {"updates_per_s", if_measured(longest_s(viewers) > 0, hundredths(updates_per_s))},
           {"by_viewer", each},
           {"frames_sampled", whole(frames_completed)}};
@@ -211,7 +215,9 @@ ordered_json how_together(const Measured& m, double incomplete) {
 
 ordered_json how_long(const Measured& m) {
   const FrameDurations durations = m.tiles().durations();
-  return {{"inter_frame_delay_ms", distribution_json(m.inter_frame_ms)},
+  return {{"motion_to_photon_ms", distribution_json(m.motion_to_photon_ms)},
+          {"inter_frame_delay_ms", distribution_json(m.inter_frame_ms)},
+          {"inter_frame_jitter_ms", if_measured(m.jitters > 0, thousandths(m.jitter_sum_ms / double(m.jitters)))},
           {"view_construction_ms", distribution_json(m.construction_ms)},
           {"view_update_latency_ms", distribution_json(m.latency_ms)},
           {"start_up_latency_ms", distribution_json(m.start_up_ms)},
@@ -296,7 +302,7 @@ ordered_json predicted(const Roster& roster, const std::string& what) {
 
 ordered_json how_heads_moved(const Measured& m, const Roster& roster) {
   return {{"frames_late", if_measured(m.headset, m.frames_late)},
-          {"refreshes_missed", if_measured(m.headset, whole(m.refreshes_missed))},
+          {"refreshes_missed", if_measured(m.headset || m.refreshed, whole(m.refreshes_missed))},
           {"predicted_by", or_null(roster.fact("viewer", "prediction"))},
           {"prediction", predicted(roster, "prediction")},
           {"pose_prediction", predicted(roster, "pose_prediction")}};

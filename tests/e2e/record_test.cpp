@@ -1,6 +1,7 @@
 // A whole run, and what it leaves behind.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "common/core/file_hash.h"
@@ -13,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 void expect_distribution(const nlohmann::json& d, const std::string& name) {
-  for (const char* key : {"mean", "median", "p95", "p99", "max"})
+  for (const char* key : {"mean", "median", "p95", "p99", "max", "sd"})
     ASSERT_TRUE(d.contains(key) && d[key].is_number()) << name << "." << key;
   EXPECT_LE(d["median"], d["p95"]) << name;
   EXPECT_LE(d["p95"], d["p99"]) << name;
@@ -61,8 +62,9 @@ TEST(Record, EveryFileIsThereAndTrue) {
                           "peak_rss_mb",
                           "errors"})
     EXPECT_TRUE(s.contains(key)) << key;
-  for (const char* key : {"inter_frame_delay_ms", "view_construction_ms", "view_update_latency_ms",
-                          "start_up_latency_ms", "sampling_ms", "packing_ms", "points_drawn"}) {
+  for (const char* key :
+       {"motion_to_photon_ms", "inter_frame_delay_ms", "view_construction_ms", "view_update_latency_ms",
+        "start_up_latency_ms", "sampling_ms", "packing_ms", "points_drawn"}) {
     ASSERT_TRUE(s.contains(key)) << key;
     expect_distribution(s[key], key);
     EXPECT_GT(s[key]["max"], 0) << key;
@@ -109,6 +111,15 @@ TEST(Record, EveryFileIsThereAndTrue) {
   for (size_t i = 0; i < samples.size(); ++i) sampled += samples[i], packed += kept[i];
   EXPECT_NEAR(double(s["redundancy_eliminated"]), 1 - packed / sampled, 1e-9);
   for (const double t : run.column("updates.csv", "latency_ms")) EXPECT_GT(t, 0);
+  // Poses of a trajectory are those of the moment at which a frame begins.
+  const auto still = run.column("frames.csv", "still"), seen = run.column("frames.csv", "motion_to_photon_ms"),
+             drawn = run.column("frames.csv", "construction_ms"), presented = run.column("frames.csv", "present_ms");
+  EXPECT_EQ(std::count(still.begin(), still.end(), 1.0), s["frames_still"]);
+  for (size_t i = 0; i < still.size(); ++i) {
+    EXPECT_GE(seen[i], still[i] != 0 ? 0 : drawn[i]) << "frame " << i;
+    EXPECT_LE(seen[i], still[i] != 0 ? 0 : drawn[i] + presented[i] + 1e-3) << "frame " << i;
+  }
+  for (const double ms : run.column("frames.csv", "refresh_ms")) EXPECT_NEAR(ms, 1000.0 / 60, 1e-9);
 
   const auto& q = s["quality"];
   ASSERT_TRUE(q.is_object());

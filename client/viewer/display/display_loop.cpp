@@ -257,12 +257,14 @@ class Display {
     if (!wall_) {
       m.camera = next_camera(m.begin_s, t_s);
       m.head = surface_.head();
+      m.posed = surface_.pose_moment().value_or(PoseMoment{m.begin_s});
       return;
     }
     const WallPace::Turn& turn = wall_->turn();
     if (!m.coupling.waits()) received_->show_state(turn.state);
     m.wall_frame = turn.frame;
     m.head = turn.head;
+    m.posed = {start_s_ + turn.t_s};
     m.camera = surface_.camera_of(turn.head);
   }
 
@@ -315,6 +317,7 @@ class Display {
     surface_.on_legend(legend);
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
     surface_.present(view_, m.drawn.changed);
+    note_seen(m);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     take_wished_picture(m.camera);
     m.presented_s = monotonic_s();
@@ -403,6 +406,14 @@ class Display {
     previous_s_ = m.end_s;
   }
 
+  // A picture that stands needs no refresh.
+  void note_seen(MeasuredFrame& m) {
+    m.seen_s = monotonic_s();
+    m.refresh_s = std::max(surface_.refresh_s(), o_.target_fps > 0 ? 1 / o_.target_fps : 0);
+    m.missed = m.drawn.still ? 0 : refreshes_missed(seen_s_, m.seen_s, m.refresh_s);
+    seen_s_ = m.seen_s;
+  }
+
   void note_swap(const WallPace::Swapped& swapped, MeasuredFrame& m) {
     wall_->presented(m.presented_s);
     m.swap_wait_s = swapped.wait_s;
@@ -464,7 +475,7 @@ class Display {
   bool view_intact_ = false;  // it holds what is on display
   DisplayResult result_;
   double due_s_ = 0;  // when the frame at hand was
-  double start_s_ = 0, previous_s_ = 0, next_picture_s_ = 0;
+  double start_s_ = 0, previous_s_ = 0, seen_s_ = 0, next_picture_s_ = 0;
   bool last_ = false;
   StallWatch stall_;
   LiveFigures live_;  // of the newest frame

@@ -12,6 +12,7 @@
 #include "client/viewer/hands/meaning.h"
 #include "client/viewer/input/look.h"
 #include "client/viewer/input/picture_wish.h"
+#include "client/viewer/input/pose_moment.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
 #include "common/image/legend.h"
@@ -57,9 +58,13 @@ class DisplaySurface {
   /// The head whose view begin_frame() returned last, and what it would have returned for another head: viewers of a
   /// wall show what one head sees.
   virtual geometry::Pose head() const = 0;
+  /// Of that head; nothing: a trajectory or a hand moves it, and it was there when the frame began.
+  virtual std::optional<PoseMoment> pose_moment() const { return std::nullopt; }
   virtual geometry::Camera camera_of(const geometry::Pose& head) const = 0;
   /// Whether frames without points are worth drawing, because somebody sees them.
   virtual bool visible() const = 0;
+  /// Seconds from one refresh of the display to the next; 0: it has none, or they are not known.
+  virtual double refresh_s() { return 0; }
   /// The session as its master tells of it, whenever that has changed.
   virtual void on_session(const std::shared_ptr<const wire::Welcome>&) {}
   /// How finely the person wants views to be sampled from now on, once after each change.

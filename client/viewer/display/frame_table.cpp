@@ -21,6 +21,9 @@ const glm::dvec3& eye(F f, size_t i) {
 }
 const glm::dquat& orientation(F f) { return f.camera.pose.orientation; }
 
+// Nothing moves in a picture that stands: -1. Clocks of several machines may differ by more than a frame takes.
+double motion_to_photon_ms(F f) { return f.drawn.still ? -1.0 : std::max(0.0, (f.seen_s - f.posed.taken_s) * 1e3); }
+
 constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"frame", [](F f) { return double(f.number); }},
     {"t_s", [](F f) { return f.begin_s - f.start_s; }},
@@ -80,9 +83,18 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"right_z", [](F f) { return eye(f, 1).z; }},
     {"lead_ms", [](F f) { return f.lead_s * 1e3; }},
     {"missed", [](F f) { return double(f.missed); }},
+    {"motion_to_photon_ms", motion_to_photon_ms},
+    {"predicted_ms", [](F f) { return f.posed.ahead_s * 1e3; }},
+    {"refresh_ms", [](F f) { return f.refresh_s * 1e3; }},
+    {"still", [](F f) { return f.drawn.still ? 1.0 : 0.0; }},
 };
 
 }  // namespace
+
+int refreshes_missed(double previous_s, double presented_s, double refresh_s) {
+  if (previous_s <= 0 || refresh_s <= 0) return 0;
+  return std::max(0, int(std::lround((presented_s - previous_s) / refresh_s)) - 1);
+}
 
 std::vector<std::string> frame_columns() { return metrics::names(kColumns); }
 std::vector<double> frame_row(const MeasuredFrame& frame) { return metrics::values(kColumns, frame); }

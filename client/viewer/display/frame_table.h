@@ -26,6 +26,9 @@ struct MeasuredFrame {
   double begin_master_s = 0;  ///< begin_s on the master's clock
   double wait_s = 0;          ///< for the update, before begin_s
   double update_age_s = 0;    ///< since the update that it shows was requested
+  double seen_s = 0;          ///< a person could see it: presented_s, in a headset the refresh that shows it
+  PoseMoment posed{};         ///< of the head that it shows
+  double refresh_s = 0;       ///< between two refreshes that it could be shown at; 0: there are none
   geometry::Camera camera{};
   geometry::Pose head{};  ///< that it was drawn for; of a screen of a wall not the camera's
   Look look{};
@@ -36,11 +39,12 @@ struct MeasuredFrame {
   double swap_wait_s = 0;    ///< from its end until the wall's frames were due
   double swap_skew_s = -1;   ///< from the first of the wall's displays to present it to the last; < 0: not known
   MeasuredEyes stereo{};
-  /// Of a headset: it was handed over so long before it was due; refreshes of the display that went by without a new
-  /// picture before it.
-  double lead_s = 0;
-  int missed = 0;
+  double lead_s = 0;  ///< of a headset: it was handed over so long before it was due
+  int missed = 0;     ///< refreshes that went by without a new picture before it
 };
+
+/// Refreshes between two moments, both presented, that showed nothing new; 0 where there are none.
+int refreshes_missed(double previous_s, double presented_s, double refresh_s);
 
 std::vector<std::string> frame_columns();
 std::vector<double> frame_row(const MeasuredFrame& frame);

@@ -43,6 +43,7 @@ class HeadlessSurface final : public DisplaySurface {
     return camera_of(head_);
   }
   geometry::Pose head() const override { return head_; }
+  std::optional<PoseMoment> pose_moment() const override { return poses_ ? poses_->moment() : std::nullopt; }
   geometry::Camera camera_of(const geometry::Pose& head) const override { return display_camera(options_, head); }
   bool visible() const override { return false; }
   void present(const image::View&, bool) override {

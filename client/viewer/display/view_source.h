@@ -26,6 +26,7 @@ struct FrameInput {
 struct DrawnFrame {
   bool empty = true;    ///< there was nothing of the scene to draw
   bool changed = true;  ///< false: the view is as FrameInput::intact found it
+  bool still = false;   ///< nothing was drawn: the picture of the frame before stands
   double chosen_s = 0;  ///< monotonic clock: what to draw was chosen
   double prepare_ms = 0, project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0,
          antialias_cpu_ms = 0;

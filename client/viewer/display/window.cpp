@@ -137,6 +137,33 @@ bool is_ascii(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
 }
 
+struct Place {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+struct Screen {
+  GLFWmonitor* monitor = nullptr;
+  const GLFWvidmode* mode = nullptr;  // null: there is none
+};
+// On which most of it lies.
+Screen screen_of(const Place& place) {
+  int count = 0;
+  GLFWmonitor** const monitors = glfwGetMonitors(&count);
+  Screen out;
+  int64_t most = -1;
+  for (int i = 0; i < count; ++i) {
+    int x = 0, y = 0;
+    glfwGetMonitorPos(monitors[i], &x, &y);
+    const GLFWvidmode* m = glfwGetVideoMode(monitors[i]);
+    if (!m) continue;
+    const int64_t width = std::min(x + m->width, place.x + place.width) - std::max(x, place.x);
+    const int64_t height = std::min(y + m->height, place.y + place.height) - std::max(y, place.y);
+    const int64_t common = std::max<int64_t>(0, width) * std::max<int64_t>(0, height);
+    if (common > most) most = common, out = {monitors[i], m};
+  }
+  return out;
+}
+
 std::string upper_case(std::string name) {
   for (char& c : name)
     if (c >= 'a' && c <= 'z') c = char(c - 'a' + 'A');
@@ -152,10 +179,8 @@ struct Window::Impl {
   Interaction* interaction = nullptr;  // while poll() runs
   bool pointer_caught = false, draws_without_gpu = false;
   std::unique_ptr<Gui> gui;
-  struct Place {
-    int x = 0, y = 0, width = 0, height = 0;
-  };
   Place before_fullscreen;
+  bool moved = false;  // since it was asked how often its screen is refreshed
   std::vector<std::string> dropped;
 
   ~Impl() {
@@ -203,6 +228,7 @@ struct Window::Impl {
     glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
       of(w).dropped.insert(of(w).dropped.end(), paths, paths + count);
     });
+    glfwSetWindowPosCallback(window, [](GLFWwindow* w, int, int) { of(w).moved = true; });
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int mods) {
       if (of(w).gui) of(w).gui->on_button(button, action, mods);
       if (action == GLFW_PRESS && of(w).gui_takes_pointer()) return;
@@ -368,7 +394,8 @@ bool Window::fullscreen() const { return !lost() && glfwGetWindowMonitor(impl_->
 
 void Window::toggle_fullscreen() {
   if (lost()) return;
-  Impl::Place& was = impl_->before_fullscreen;
+  Place& was = impl_->before_fullscreen;
+  refresh_s_ = -1;
   if (fullscreen()) {
     if (was.width == 0) was = {80, 80, 1280, 800};  // it filled the screen from the beginning
     glfwSetWindowMonitor(impl_->window, nullptr, was.x, was.y, was.width, was.height, GLFW_DONT_CARE);
@@ -376,22 +403,19 @@ void Window::toggle_fullscreen() {
   }
   glfwGetWindowPos(impl_->window, &was.x, &was.y);
   glfwGetWindowSize(impl_->window, &was.width, &was.height);
-  int count = 0;
-  GLFWmonitor** const monitors = glfwGetMonitors(&count);
-  GLFWmonitor* best = nullptr;
-  const GLFWvidmode* mode = nullptr;
-  int64_t most = -1;
-  for (int i = 0; i < count; ++i) {
-    int x = 0, y = 0;
-    glfwGetMonitorPos(monitors[i], &x, &y);
-    const GLFWvidmode* m = glfwGetVideoMode(monitors[i]);
-    if (!m) continue;
-    const int64_t width = std::min(x + m->width, was.x + was.width) - std::max(x, was.x);
-    const int64_t height = std::min(y + m->height, was.y + was.height) - std::max(y, was.y);
-    const int64_t common = std::max<int64_t>(0, width) * std::max<int64_t>(0, height);
-    if (common > most) most = common, best = monitors[i], mode = m;
-  }
+  const auto [best, mode] = screen_of(was);
   if (best) glfwSetWindowMonitor(impl_->window, best, 0, 0, mode->width, mode->height, mode->refreshRate);
+}
+
+// Asking takes a way to the window system and back.
+double Window::refresh_s() {
+  if (lost()) return 0;
+  if (refresh_s_ >= 0 && !std::exchange(impl_->moved, false)) return refresh_s_;
+  Place here;
+  glfwGetWindowPos(impl_->window, &here.x, &here.y);
+  glfwGetWindowSize(impl_->window, &here.width, &here.height);
+  const GLFWvidmode* mode = screen_of(here).mode;
+  return refresh_s_ = mode && mode->refreshRate > 0 ? 1.0 / mode->refreshRate : 0;
 }
 
 std::string Window::key_name(Key key) const {

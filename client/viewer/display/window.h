@@ -58,6 +58,8 @@ class Window {
   void set_title(const std::string& title);
   /// Fills the screen that it lies on for the most part, or becomes the window again that it was.
   void toggle_fullscreen();
+  /// Seconds between refreshes of that screen; 0: it does not tell.
+  double refresh_s();
   bool fullscreen() const;
   /// What is printed on a key of this keyboard.
   std::string key_name(Key key) const;
@@ -78,6 +80,7 @@ class Window {
 
   std::unique_ptr<Impl> impl_;
   int width_ = 0, height_ = 0;
+  double refresh_s_ = -1;  // < 0: to be asked for
 };
 
 }  // namespace telesplat::viewer

@@ -115,7 +115,11 @@ WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, s
   open_view_.shown = o.begins_empty;
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
   tell(first_keys());
-  if (o.poses) interaction_.set_tracked([poses = o.poses](double now_s) { return poses->begin_frame(now_s); });
+  if (o.poses)
+    interaction_.set_tracked([this](double now_s) {
+      tracked_ = true;
+      return options_.poses->begin_frame(now_s);
+    });
 }
 
 void WindowSurface::tell(const std::string& line) { lines_->add(line); }
@@ -155,6 +159,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   fit_views();
   const auto& o = options_.display;
   const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
+  tracked_ = false;
   head_ = interaction_.advance(now_s, playback);
   const geometry::Camera camera = camera_of(head_);
   interaction_.set_height_tangent(camera.top - camera.bottom);

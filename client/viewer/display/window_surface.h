@@ -59,6 +59,8 @@ class WindowSurface final : public DisplaySurface {
   geometry::Pose head() const override { return head_; }
   geometry::Camera camera_of(const geometry::Pose& head) const override;
   bool visible() const override { return true; }
+  std::optional<PoseMoment> pose_moment() const override { return tracked_ ? options_.poses->moment() : std::nullopt; }
+  double refresh_s() override { return window_->refresh_s(); }
   void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override;
   bool wants_picture() const override { return interaction_.wants_screenshot(); }
@@ -120,6 +122,7 @@ class WindowSurface final : public DisplaySurface {
   std::string scene_name_;
   bool had_scene_ = false;
   geometry::Pose head_;                       // of the frame at hand
+  bool tracked_ = false;                      // a tracker told it
   int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
   std::shared_ptr<const image::Legend> legend_;
   int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits

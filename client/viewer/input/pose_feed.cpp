@@ -84,7 +84,7 @@ std::optional<geometry::Pose> PoseFeed::begin_frame(double now_s) {
   began_s_ = now_s;
   const std::lock_guard lock(mutex_);
   const auto pose = head_.at(now_s, options_.ahead_s > 0 ? options_.ahead_s : frame_s_);
-  if (pose) shown_ = pose;
+  if (pose) shown_ = pose, moment_ = head_.moment();
   return pose;
 }
 

@@ -34,6 +34,8 @@ class PoseFeed {
   std::optional<geometry::Pose> begin_frame(double now_s);
   /// Where the head was shown last; nothing: nowhere.
   const std::optional<geometry::Pose>& shown() const { return shown_; }
+  /// Of that pose: when the newest one that it was made from was there, and how far beyond it was predicted.
+  const std::optional<PoseMoment>& moment() const { return moment_; }
   /// The frame that began last is on display.
   void presented(double now_s);
   /// Lines for the person.
@@ -53,6 +55,7 @@ class PoseFeed {
   mutable std::mutex mutex_;  // of head_
   TrackedHead head_;
   std::optional<geometry::Pose> shown_;
+  std::optional<PoseMoment> moment_;
   double began_s_ = 0, frame_s_ = 0;  // the frame at hand; how long frames take until they are on display
   std::atomic<bool> flooded_{false}, failed_{false}, stop_{false};
   bool flood_told_ = false, failure_told_ = false;

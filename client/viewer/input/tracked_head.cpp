@@ -35,6 +35,7 @@ std::optional<geometry::Pose> TrackedHead::at(double now_s, double ahead_s) {
   if (!newest) return std::nullopt;
   const double for_s = std::min(now_s + std::max(ahead_s, 0.0), newest->t_s + kMostAhead_s);
   const geometry::Pose expected = predictor_.predict(for_s);
+  moment_ = {newest->t_s, predicts_ ? for_s - newest->t_s : 0};
   if (now_s - arrived_s_ < kSilent_s) meter_.predicted(newest->t_s, newest->pose, for_s, expected);
   return expected;
 }

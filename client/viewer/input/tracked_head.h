@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "client/viewer/input/pose_moment.h"
 #include "common/tracking/pose_clock.h"
 #include "common/tracking/pose_predictor.h"
 #include "common/tracking/prediction_meter.h"
@@ -15,7 +16,8 @@ namespace telesplat::viewer {
 /// One thread, or one at a time. Times are those of our monotonic clock where nothing else is said.
 class TrackedHead {
  public:
-  explicit TrackedHead(tracking::Prediction method) : predictor_(method) {}
+  explicit TrackedHead(tracking::Prediction method)
+      : predicts_(method != tracking::Prediction::kNone), predictor_(method) {}
 
   /// A pose that arrived. Poses that are older than the newest are passed over and counted; where all are for
   /// kRestart_s, their sender counts time anew and is followed.
@@ -26,6 +28,8 @@ class TrackedHead {
   /// Where the head is at now_s + ahead_s. Predictions reach kMostAhead_s beyond the newest pose; of a silent tracker
   /// the head stays there. Nothing: no pose has come yet.
   std::optional<geometry::Pose> at(double now_s, double ahead_s);
+  /// Of the pose that at() returned last.
+  PoseMoment moment() const { return moment_; }
 
   /// A line for the person where something changed: poses come, no longer come, come again, cannot be read.
   std::optional<std::string> take_news(double now_s);
@@ -39,6 +43,8 @@ class TrackedHead {
   static constexpr double kSilent_s = 0.5, kRestart_s = 0.25, kMostAhead_s = 0.1;
 
  private:
+  const bool predicts_;
+  PoseMoment moment_;
   tracking::PosePredictor predictor_;
   tracking::PredictionMeter meter_;
   tracking::PoseClock clock_;

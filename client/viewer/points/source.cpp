@@ -148,6 +148,7 @@ void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFr
     base_stale_ = false;
   }
   out.changed = base || !input.intact;
+  out.still = !base;
   if (out.changed) still_.put_over(view);
   refine(input, view, out);
   if (input.begin_s - seen_s_ < kSeenPeriod_s) return;
@@ -178,6 +179,7 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
     if (drawn) {
       still_.put_over(view, *tile);
       out.changed = true;
+      out.still = false;
       tile_s_ = tile_s_ == 0 ? end_s - now_s : 0.8 * tile_s_ + 0.2 * (end_s - now_s);
     }
     base_stale_ |= still_.share() < share;  // it has lost its pixels: the picture below is to be seen again
@@ -244,6 +246,7 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
   const bool still = same_frames_ >= kStillFrames;
   if (still && pair_sharp_ && input.intact && !changes_.any && !input.with_depth && !input.with_coverage) {
     out.changed = false;
+    out.still = true;
     out.chosen_s = input.begin_s;
     if (input.begin_s - seen_s_ >= kSeenPeriod_s) {
       seen_s_ = input.begin_s;

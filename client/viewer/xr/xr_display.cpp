@@ -162,6 +162,7 @@ class XrDisplay {
     m.look = look_;
     count_missed(*begun, m);
     if (session_->take_recentring()) worker_.on_jump();
+    const double located_s = monotonic_s();
     const auto eyes = session_->locate_eyes(begun->display_time);
     if (!eyes) return session_->end_frame(*begun, nullptr);
     // A pair has another share of a frame's time than two pictures, so its source is another one.
@@ -186,6 +187,9 @@ class XrDisplay {
     session_->end_frame(*begun, &*eyes);
     m.presented_s = monotonic_s();
     m.lead_s = begun->display_s - m.presented_s;
+    m.posed = {located_s, begun->display_s - located_s};
+    m.refresh_s = begun->period_s;
+    m.seen_s = seen_at(*begun, m.lead_s);
     if (!m.drawn.empty) worker_.on_first_points(m.presented_s);
     if (source_) carry_out_orders(m);
     if (counts) record(*begun, use, m);
@@ -207,9 +211,13 @@ class XrDisplay {
   }
 
   void count_missed(const HeadsetSession::Frame& f, MeasuredFrame& m) {
-    const double passed_s = f.display_s - last_display_s_;
-    if (last_display_s_ > 0 && f.period_s > 0) m.missed = std::max(0, int(std::lround(passed_s / f.period_s)) - 1);
+    m.missed = refreshes_missed(last_display_s_, f.display_s, f.period_s);
     last_display_s_ = f.display_s;
+  }
+
+  // One that comes late is shown at a later refresh.
+  static double seen_at(const HeadsetSession::Frame& f, double lead_s) {
+    return f.display_s + (lead_s < 0 && f.period_s > 0 ? std::ceil(-lead_s / f.period_s) * f.period_s : 0);
   }
 
   // Poses are those of the moment at which they are seen. Where the head will be when an answer can be there is the

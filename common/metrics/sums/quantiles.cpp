@@ -22,6 +22,9 @@ void Quantiles::add(double value) {
   max_ = count_ ? std::max(max_, value) : value;
   ++count_;
   sum_ += value;
+  const double from_mean = value - mean_;
+  mean_ += from_mean / double(count_);
+  squares_ += from_mean * (value - mean_);
   if (count_ <= kExact) return exact_.push_back(value);
   for (const double before : exact_) put(before);
   exact_ = {};
@@ -52,7 +55,7 @@ double Quantiles::at(double p) const {
 
 Distribution Quantiles::distribution() const {
   if (count_ <= kExact) return metrics::distribution(exact_);
-  return {sum_ / double(count_), at(0.5), at(0.95), at(0.99), max_};
+  return {sum_ / double(count_), at(0.5), at(0.95), at(0.99), max_, std::sqrt(squares_ / double(count_ - 1))};
 }
 
 nlohmann::ordered_json distribution_json(const Quantiles& values) {

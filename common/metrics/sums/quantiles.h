@@ -11,7 +11,8 @@
 namespace telesplat::metrics {
 
 /// Keeps values as they are while they are few; then how many lie in each of buckets whose bounds grow by 1 %, which
-/// gives percentiles to half a percent of their value. Count, sum and greatest value are exact always.
+/// gives percentiles to half a percent of their value. Count, sum, greatest value and standard
+/// deviation are exact always.
 class Quantiles {
  public:
   static constexpr size_t kExact = 8192;  ///< values that are kept as they are
@@ -32,6 +33,7 @@ class Quantiles {
   std::map<int, uint64_t> below_, above_;  // buckets of what is negative and positive, by the logarithm of its size
   uint64_t zeros_ = 0, count_ = 0;
   double sum_ = 0, max_ = 0;
+  double mean_ = 0, squares_ = 0;  // of differences from it (Welford 1962)
 };
 
 /// null if there are no values: nothing was measured.

@@ -64,7 +64,11 @@ const Names kFrames{"frame",
                     "right_y",
                     "right_z",
                     "lead_ms",
-                    "missed"};
+                    "missed",
+                    "motion_to_photon_ms",
+                    "predicted_ms",
+                    "refresh_ms",
+                    "still"};
 
 const Names kUpdates{"request",        "frame",           "requested_s", "first_s",      "complete_s",  "latency_ms",
                      "start_up_ms",    "tiles",           "samples",     "points",       "bytes",       "eliminated",

@@ -203,6 +203,11 @@ std::string exposition(const LiveSnapshot& snapshot, const LiveFigures& figures)
   add_samplers(text, processes, figures);
   add_histogram(text, "viewer_inter_frame_delay_seconds", "From the end of a displayed frame to that of the next.",
                 figures, &LiveFigures::Viewer::inter_frame);
+  add_histogram(text, "viewer_motion_to_photon_seconds", "From a pose that was taken to the frame that shows it.",
+                figures, &LiveFigures::Viewer::motion_to_photon);
+  text.begin("viewer_refreshes_missed_total", "counter", "Refreshes of the display without a new picture.");
+  for (const auto& [viewer, v] : figures.viewers())
+    text.add("viewer_refreshes_missed_total", label_of(viewer), double(v.refreshes_missed));
   add_histogram(text, "viewer_update_latency_seconds", "From a view request to its complete update.", figures,
                 &LiveFigures::Viewer::update_latency);
   add_histogram(text, "viewer_start_up_latency_seconds", "From a view request to the first part of its update.",

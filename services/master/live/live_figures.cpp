@@ -17,12 +17,15 @@ bool make_room(std::map<std::string, V>& map) {
   return true;
 }
 
-// The column's values, in milliseconds; a first frame has no delay and tells 0.
-void add_column(const wire::MetricRows& rows, const char* name, bool zero_is_none, Histogram& out) {
-  const auto column = std::find(rows.columns.begin(), rows.columns.end(), name);
-  for (auto i = size_t(column - rows.columns.begin()); i < rows.values.size() && column != rows.columns.end();
-       i += rows.columns.size())
-    if (!zero_is_none || rows.values[i] != 0) out.add(rows.values[i] / 1e3);
+// The column's values that count by that of another column of their row (none: all do).
+template <class Add>
+void each(const wire::MetricRows& rows, const char* name, const char* unless, Add&& add) {
+  const auto place = [&](const char* column) {
+    return size_t(std::find(rows.columns.begin(), rows.columns.end(), column) - rows.columns.begin());
+  };
+  const size_t width = rows.columns.size(), at = place(name), other = place(unless);
+  for (size_t row = 0; at < width && row + width <= rows.values.size(); row += width)
+    if (other == width || rows.values[row + other] == 0) add(rows.values[row + at]);
 }
 
 }  // namespace
@@ -64,9 +67,17 @@ void LiveFigures::add_rows(const std::string& viewer, const wire::MetricRows& ro
   if (rows.table != "frames" && rows.table != "updates") return;
   Viewer* v = entry(viewers_, viewer, true);
   if (!v) return;
-  if (rows.table == "frames") return add_column(rows, "inter_frame_ms", true, v->inter_frame);
-  add_column(rows, "latency_ms", false, v->update_latency);
-  add_column(rows, "start_up_ms", false, v->start_up);
+  const auto add_to = [](Histogram& out) { return [&out](double ms) { out.add(ms / 1e3); }; };
+  if (rows.table == "updates") {
+    each(rows, "latency_ms", "", add_to(v->update_latency));
+    return each(rows, "start_up_ms", "", add_to(v->start_up));
+  }
+  each(rows, "inter_frame_ms", "still", [&](double ms) {
+    if (ms != 0) v->inter_frame.add(ms / 1e3);  // a first frame has no delay and tells 0
+  });
+  each(rows, "motion_to_photon_ms", "still", add_to(v->motion_to_photon));
+  each(rows, "missed", "",
+       [&](double missed) { v->refreshes_missed += missed > 0 && missed < 1e9 ? uint64_t(missed) : 0; });
 }
 
 void LiveFigures::add_tile(const std::string& sampler, const wire::TileDone& tile, bool here) {

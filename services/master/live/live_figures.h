@@ -44,7 +44,8 @@ class LiveFigures {
     uint64_t measured_at = 0;  ///< rises with each value of any name
   };
   struct Viewer : Named {
-    Histogram inter_frame, update_latency, start_up;
+    Histogram inter_frame, motion_to_photon, update_latency, start_up;
+    uint64_t refreshes_missed = 0;
   };
   struct Sampler : Named {
     uint64_t tiles = 0, bytes = 0, rays = 0;

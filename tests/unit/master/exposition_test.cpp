@@ -31,6 +31,19 @@ TEST(Histogram, CountsUpToEachBound) {
   EXPECT_EQ(at(10), 5u);
 }
 
+TEST(LiveFigures, LeaveOutFramesOfAPictureThatStands) {
+  LiveFigures f;
+  f.add_rows("v", {{5},
+                   "frames",
+                   {"inter_frame_ms", "motion_to_photon_ms", "missed", "still"},
+                   {0, 12, 0, 0, 16, -1, 0, 1, 50, 30, 2, 0, 16, 10, -5, 0}});
+  const auto& v = f.viewers().at("v");
+  EXPECT_EQ(v.inter_frame.count(), 2u);
+  EXPECT_EQ(v.motion_to_photon.count(), 3u);
+  EXPECT_NEAR(v.motion_to_photon.sum_s(), 0.052, 1e-12);
+  EXPECT_EQ(v.refreshes_missed, 2u);
+}
+
 TEST(LiveFigures, FollowRowsAndTiles) {
   LiveFigures f;
   f.add_rows("v", {{5}, "frames", {"frame", "inter_frame_ms"}, {0, 0, 1, 16, 2, 40}});

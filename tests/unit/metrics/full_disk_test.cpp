@@ -139,6 +139,7 @@ TEST(Quantiles, AreWithinAPercentOfTheTruth) {
   const Distribution is = sketch.distribution(), truth = distribution(all);
   EXPECT_NEAR(is.mean, truth.mean, 1e-9 * truth.mean);
   EXPECT_EQ(is.max, truth.max);
+  EXPECT_NEAR(is.sd, truth.sd, 1e-9 * truth.sd);
   EXPECT_NEAR(is.median, truth.median, 0.01 * truth.median);
   EXPECT_NEAR(is.p95, truth.p95, 0.01 * truth.p95);
   EXPECT_NEAR(is.p99, truth.p99, 0.01 * truth.p99);

@@ -194,6 +194,45 @@ TEST_F(Record, PlansSpareRays) {
   EXPECT_NE(plans.find(",5,1,1,0,0,tiles,"), std::string::npos) << plans;
 }
 
+// Six frames, of which the third and fourth stand. Figures by hand (Python's statistics module for the deviation).
+TEST_F(Record, FramesOfAPictureThatStandsAreToldApart) {
+  const std::vector<std::string> columns{
+      "t_s", "inter_frame_ms", "construction_ms", "motion_to_photon_ms", "missed", "refresh_ms", "still"};
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0.00, 0,  8, 12, 0, 10, 0,  //
+                                                                 0.01, 10, 6, 9,  0, 10, 0,  //
+                                                                 0.02, 10, 0, -1, 0, 10, 1,  //
+                                                                 0.03, 10, 0, -1, 0, 10, 1,  //
+                                                                 0.05, 20, 9, 21, 1, 10, 0,  //
+                                                                 0.08, 34, 9, 30, 2, 10, 0}}));
+  const auto s = record->summary({viewer}, {});
+  EXPECT_EQ(s["frames"], 6);
+  EXPECT_EQ(s["frames_still"], 2);
+  EXPECT_EQ(s["fps"], 66.67) << "4 frames in 80 - 20 ms";
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["frames_still"], 2);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["fps"], 66.67);
+  EXPECT_EQ(s["inter_frame_delay_ms"]["mean"], 21.333) << "10, 20, 34";
+  EXPECT_EQ(s["inter_frame_delay_ms"]["sd"], 12.055);
+  EXPECT_EQ(s["inter_frame_jitter_ms"], 14) << "20 and 34 alone follow each other";
+  EXPECT_EQ(s["view_construction_ms"]["mean"], 8);
+  EXPECT_EQ(s["motion_to_photon_ms"]["mean"], 18);
+  EXPECT_EQ(s["motion_to_photon_ms"]["median"], 16.5);
+  EXPECT_EQ(s["refreshes_missed"], 3);
+  EXPECT_TRUE(s["frames_late"].is_null()) << "there is no headset";
+}
+
+TEST_F(Record, WhatNoFrameHadIsNotMeasured) {
+  const std::vector<std::string> columns{"t_s",    "inter_frame_ms", "motion_to_photon_ms",
+                                         "missed", "refresh_ms",     "still"};
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 5, 0, 0, 0, 1, 9, -1, 0, 0, 1}}));
+  const auto s = record->summary({viewer}, {});
+  EXPECT_TRUE(s["fps"].is_null()) << "one frame was drawn";
+  for (const char* key : {"inter_frame_delay_ms", "inter_frame_jitter_ms", "refreshes_missed"})
+    EXPECT_TRUE(s[key].is_null()) << key;
+  ASSERT_TRUE(record->finish({viewer}, {}));
+  const std::string rows = text("frames.csv");
+  EXPECT_NE(rows.find(",9,,0,0,1\n"), rows.npos) << "no motion in a picture that stands: " << rows;
+}
+
 TEST_F(Record, SaysHowEvenlySamplersWereBusy) {
   for (int i = 0; i < 10; ++i) record->add_tile("a", tile(1, uint64_t(i), i));
   for (int i = 0; i < 5; ++i) record->add_tile("b", tile(1, uint64_t(10 + i), i));

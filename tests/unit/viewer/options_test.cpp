@@ -172,21 +172,40 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   f.coupling = {CouplingMode::kLoose, 5};
   f.lead_s = 0.25;
   f.missed = 3;
+  f.seen_s = 4.5;
+  f.posed = {2.75, 0.5};
+  f.refresh_s = 0.0625;
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
   f.look.head_light = true;
   f.look.background = 0xffeedd;
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 26, row.end() - 10)),
+  EXPECT_EQ((std::vector<double>(row.end() - 30, row.end() - 14)),
             (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5, 1, 0xffeedd, 0, 0, -1}));
-  EXPECT_EQ((std::vector<double>(row.end() - 10, row.end())), (std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0, 250, 3}));
+  EXPECT_EQ((std::vector<double>(row.end() - 14, row.end())),
+            (std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0, 250, 3, 1750, 500, 62.5, 0}));
   f.stereo = {stereo::Mode::kRows, {.screen_m = 0.75}};
   f.stereo.pair.eyes[0].pose.position_room = {1, 2, 3};
   f.stereo.pair.eyes[1].pose.position_room = {4, 5, 6};
   const auto seen_by_two = frame_row(f);
-  EXPECT_EQ((std::vector<double>(seen_by_two.end() - 10, seen_by_two.end() - 2)),
+  EXPECT_EQ((std::vector<double>(seen_by_two.end() - 14, seen_by_two.end() - 6)),
             (std::vector<double>{double(stereo::Mode::kRows), 0.75, 1, 2, 3, 4, 5, 6}));
+  f.drawn.still = true;
+  const auto stands = frame_row(f);
+  EXPECT_EQ((std::vector<double>(stands.end() - 4, stands.end())), (std::vector<double>{-1, 500, 62.5, 1}))
+      << "a picture that stands shows no motion";
+}
+
+TEST(ViewerTables, RefreshesThatShowedNothingNewAreMissed) {
+  const double hz = 1.0 / 60;
+  EXPECT_EQ(refreshes_missed(0, 7, hz), 0) << "nothing was presented before";
+  EXPECT_EQ(refreshes_missed(5, 5 + hz, hz), 0);
+  EXPECT_EQ(refreshes_missed(5, 5 + 1.4 * hz, hz), 0) << "clocks and swaps are a little off";
+  EXPECT_EQ(refreshes_missed(5, 5 + 2 * hz, hz), 1);
+  EXPECT_EQ(refreshes_missed(5, 5 + 6.1 * hz, hz), 5);
+  EXPECT_EQ(refreshes_missed(5, 5 + 0.1 * hz, hz), 0);
+  EXPECT_EQ(refreshes_missed(5, 6, 0), 0) << "no refresh is known";
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {

@@ -282,11 +282,15 @@ TEST_F(StillSource, ConvergesToSixteenRaysAPixelAndThenDrawsNothing) {
   EXPECT_GT(still, moving + 5);
   const int before = renders_;
   const auto picture = view_.colour;
-  EXPECT_FALSE(frame().changed);
+  const DrawnFrame stands = frame();
+  EXPECT_FALSE(stands.changed);
+  EXPECT_TRUE(stands.still);
   EXPECT_EQ(renders_, before);
   // A view that went elsewhere is filled again, without drawing.
   std::fill(view_.colour.begin(), view_.colour.end(), 7u);
-  EXPECT_TRUE(frame(false).changed);
+  const DrawnFrame filled = frame(false);
+  EXPECT_TRUE(filled.changed);
+  EXPECT_TRUE(filled.still) << "it is the picture of before";
   EXPECT_EQ(renders_, before);
   EXPECT_EQ(view_.colour, picture);
 }
@@ -298,6 +302,7 @@ TEST_F(StillSource, MovementEndsIt) {
   const int before = renders_;
   const DrawnFrame moved = frame();
   EXPECT_TRUE(moved.changed);
+  EXPECT_FALSE(moved.still);
   EXPECT_EQ(moved.refined, 0);
   EXPECT_EQ(renders_, before + 1) << "a frame of a moving head is drawn once, without sub-pixels";
 }

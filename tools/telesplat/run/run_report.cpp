@@ -85,12 +85,25 @@ void add_links(const json& s, RunReport& out) {
   for (const auto& [link, names] : whose) out.line("simulated link", fmt::format("{} (of {})", link, names));
 }
 
+// What of the display's figures not every record has.
+std::string beside_frames(const json& s) {
+  std::string out;
+  if (const json still = at(s, "frames_still"); still.is_number() && still.get<double>() > 0)
+    out += fmt::format(", {} more of a picture that stood", still.get<uint64_t>());
+  if (const json missed = at(s, "refreshes_missed"); missed.is_number())
+    out += fmt::format(", {} refreshes missed", missed.get<uint64_t>());
+  return out;
+}
+
 void add_display(const json& s, RunReport& out) {
   const std::string coupling = text(s, "coupling");
+  const json still = at(s, "frames_still");
+  const uint64_t drawn = s.at("frames").get<uint64_t>() - (still.is_number() ? still.get<uint64_t>() : 0);
   out.line("display",
-           fmt::format("{} fps over {} frames, {} coupling{}", number(at(s, "fps"), "{:.1f}"),
-                       s.at("frames").get<uint64_t>(), coupling,
+           fmt::format("{} fps over {} frames{}, {} coupling{}", number(at(s, "fps"), "{:.1f}"), drawn,
+                       beside_frames(s), coupling,
                        coupling == "loose" ? fmt::format(" of {} buffers", number(at(s, "buffers"), "{:.0f}")) : ""));
+  out.line("motion to photon", distribution(s, "motion_to_photon_ms", "ms"));
   out.line("inter-frame delay", distribution(s, "inter_frame_delay_ms", "ms"));
   out.line("view construction", distribution(s, "view_construction_ms", "ms"));
 }

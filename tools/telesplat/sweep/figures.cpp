@@ -23,6 +23,8 @@ void flatten_into(const nlohmann::ordered_json& value, const std::string& name, 
 }
 
 constexpr std::array kMeasures{
+    Measure{"motion_to_photon_ms.median", "motion to photon, median", "m2p ms", "ms", 1, 1, true, false},
+    Measure{"motion_to_photon_ms.p95", "motion to photon, 95th percentile", "m2p p95", "ms", 1, 1, true, false},
     Measure{"fps", "displayed frames a second", "fps", "1/s", 1, 1, true, false},
     Measure{"inter_frame_delay_ms.median", "inter-frame delay, median", "delay ms", "ms", 1, 1, true, true},
     Measure{"inter_frame_delay_ms.p95", "inter-frame delay, 95th percentile", "p95", "ms", 1, 1, true, false},

@@ -78,7 +78,7 @@ DrawnFrame EyePictures::draw(ViewSource& source, FrameInput input, bool spooled,
   }
   DrawnFrame drawn = source.draw_pair(input, pair_.eyes, targets);
   if (drawn.empty && !input.even_empty) return drawn;
-  if (rig_.draw_pattern(views_) || std::exchange(panel_changed_, false)) drawn.changed = true;
+  if (rig_.draw_pattern(views_) || std::exchange(panel_changed_, false)) drawn.changed = true, drawn.still = false;
   if (drawn.changed || !input.intact) rig_.compose(pair_, views_, input.with_depth, view);
   return drawn;
 }

@@ -27,6 +27,20 @@ TEST(TrackedHead, FollowsPosesInTheirOwnClock) {
   EXPECT_EQ(head.figures().late, 0u);
 }
 
+// The sender's clock is 100 s ahead; the fastest message took 5 ms.
+TEST(TrackedHead, KnowsWhenThePoseItShowsWasTaken) {
+  for (const auto method : {tracking::Prediction::kNone, tracking::Prediction::kKalman}) {
+    TrackedHead head(method);
+    for (int i = 0; i < 100; ++i) head.told(at_x(100 + i * 0.01, i * 0.01), i * 0.01 + 0.005);
+    ASSERT_TRUE(head.at(1.0, 0.02));
+    EXPECT_NEAR(head.moment().taken_s, 0.995, 1e-9) << "the newest pose, as it came";
+    EXPECT_NEAR(head.moment().ahead_s, method == tracking::Prediction::kNone ? 0 : 0.025, 1e-9);
+    ASSERT_TRUE(head.at(1.5, 0.02));
+    EXPECT_NEAR(head.moment().taken_s, 0.995, 1e-9);
+    EXPECT_NEAR(head.moment().ahead_s, method == tracking::Prediction::kNone ? 0 : TrackedHead::kMostAhead_s, 1e-9);
+  }
+}
+
 TEST(TrackedHead, ASilentTrackerLeavesTheHeadWhereItWas) {
   TrackedHead head(tracking::Prediction::kVelocity);
   for (int i = 0; i < 50; ++i) head.told(at_x(i * 0.01, i * 0.01), i * 0.01);
@@ -83,7 +97,9 @@ TEST(TrackedHead, ItsPredictionsAreMeasured) {
 
 TEST(Interaction, ATrackedHeadMovesTheCameraUntilThePersonTakesIt) {
   Interaction interaction(std::nullopt, {});
-  interaction.set_tracked([](double now_s) { return std::optional(geometry::Pose{{0.1 * now_s, 0.2, 1}, {1, 0, 0, 0}}); });
+  interaction.set_tracked([](double now_s) {
+    return std::optional(geometry::Pose{{0.1 * now_s, 0.2, 1}, {1, 0, 0, 0}});
+  });
   EXPECT_EQ(interaction.advance(3, true).position_room.x, 0.1 * 3);
   EXPECT_EQ(interaction.advance(4, false).position_room.x, 0.1 * 4);
   interaction.key(Key::kT, true);
