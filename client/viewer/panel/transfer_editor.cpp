@@ -6,6 +6,12 @@
 #include <utility>
 
 namespace telesplat::viewer {
+namespace {
+
+bool has_width(const volume::ValueRange& range) { return range.hi / 2 - range.lo / 2 > 0; }
+double room_around(double value) { return std::max(0.5, std::abs(value) / 1000); }
+
+}  // namespace
 
 void TransferEditor::on_session(double now_s, const volume::Session& session,
                                 const std::optional<volume::Histogram>& histogram) {
@@ -21,12 +27,42 @@ void TransferEditor::on_refusal() {
   changed_s_ = -1e9;
 }
 
-double TransferEditor::lo() const {
-  return std::min(range_.lo, std::max(wanted_.points.front().value, range_.lo - (range_.hi - range_.lo)));
+// One value alone is given some room around it.
+double TransferEditor::lo() const { return has_width(range_) ? range_.lo : range_.lo - room_around(range_.lo); }
+double TransferEditor::hi() const { return has_width(range_) ? range_.hi : range_.lo + room_around(range_.lo); }
+
+// Halves: a difference of two finite numbers need not be finite.
+double TransferEditor::share(double value) const {
+  return std::clamp((value / 2 - lo() / 2) / (hi() / 2 - lo() / 2), -1.0, 2.0);
 }
-double TransferEditor::hi() const {
-  const double width = std::max(range_.hi - range_.lo, 1e-9);
-  return std::max(lo() + width, std::min(wanted_.points.back().value, range_.hi + width));
+double TransferEditor::value_at(double share) const { return std::lerp(lo(), hi(), share); }
+
+// Logarithmic, since backgrounds have thousands of times as many voxels as the rest.
+std::vector<TransferEditor::Bar> TransferEditor::bars(bool logarithmic) const {
+  std::vector<Bar> out;
+  if (!histogram_) return out;
+  const auto& counts = histogram_->counts;
+  const auto height = [&](uint64_t n) { return logarithmic ? std::log1p(double(n)) : double(n); };
+  const auto edge = [&](size_t i) {
+    return share(std::lerp(histogram_->lo, histogram_->hi, double(i) / double(counts.size())));
+  };
+  double most = 0;
+  for (size_t i = 0; i < counts.size(); ++i) {
+    const Bar bar{std::max(0.0, edge(i)), std::min(1.0, edge(i + 1)), height(counts[i])};
+    if (bar.height <= 0 || bar.to <= bar.from) continue;
+    most = std::max(most, bar.height);
+    out.push_back(bar);
+  }
+  for (Bar& bar : out) bar.height /= most;
+  return out;
+}
+
+std::vector<TransferEditor::Spot> TransferEditor::curve() const {
+  std::vector<Spot> out{{0, double(wanted_.at(lo()).opacity)}};
+  for (const Point& p : wanted_.points)
+    if (p.value > lo() && p.value < hi()) out.push_back({share(p.value), double(p.opacity)});
+  out.push_back({1, double(wanted_.at(hi()).opacity)});
+  return out;
 }
 
 bool TransferEditor::change(double now_s, volume::TransferFunction next) {
@@ -41,9 +77,9 @@ bool TransferEditor::move(double now_s, size_t index, double value, double opaci
   if (index >= wanted_.points.size() || !std::isfinite(value) || !std::isfinite(opacity)) return false;
   volume::TransferFunction next = wanted_;
   auto& points = next.points;
-  const double least = index > 0 ? points[index - 1].value : lo();
-  const double most = index + 1 < points.size() ? points[index + 1].value : hi();
-  points[index].value = std::clamp(value, std::min(least, most), std::max(least, most));
+  const double least = index > 0 ? points[index - 1].value : -volume::kMaxTransferValue;
+  const double most = index + 1 < points.size() ? points[index + 1].value : volume::kMaxTransferValue;
+  points[index].value = std::clamp(value, least, most);
   points[index].opacity = float(std::clamp(opacity, 0.0, 1.0));
   return change(now_s, std::move(next));
 }
@@ -63,6 +99,22 @@ bool TransferEditor::remove(double now_s, size_t index) {
   if (index >= wanted_.points.size() || wanted_.points.size() <= 2) return false;
   volume::TransferFunction next = wanted_;
   next.points.erase(next.points.begin() + std::ptrdiff_t(index));
+  return change(now_s, std::move(next));
+}
+
+bool TransferEditor::set_window(double now_s, double window, double level) {
+  if (!std::isfinite(window) || !std::isfinite(level) || window < 0) return false;
+  constexpr double kMost = volume::kMaxTransferValue;
+  const double from = std::clamp(level - window / 2, -kMost, kMost), to = std::clamp(level + window / 2, -kMost, kMost);
+  const double first = wanted_.points.front().value, width = this->window();
+  volume::TransferFunction next = wanted_;
+  double least = from;
+  for (size_t i = 0; i < next.points.size(); ++i) {
+    double& value = next.points[i].value;
+    const double share =
+        width > 0 ? (value - first) / width : double(i) / double(std::max<size_t>(1, next.points.size() - 1));
+    value = least = std::clamp(std::lerp(from, to, share), least, to);
+  }
   return change(now_s, std::move(next));
 }
 

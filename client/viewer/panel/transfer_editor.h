@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/volume/histogram.h"
 #include "common/volume/session.h"
@@ -25,17 +26,37 @@ class TransferEditor {
   const volume::TransferFunction& transfer() const { return wanted_; }
   const std::optional<volume::Histogram>& histogram() const { return histogram_; }
   const volume::ValueRange& range() const { return range_; }
-  /// What an editor shows: the data's values, and points beyond them.
+  // ---- the axis: the data's values, whichever points there are; never empty ----
   double lo() const;
   double hi() const;
+  /// Where a value lies on the axis: 0 at lo(), 1 at hi(); beyond them -1 to 2 at most.
+  double share(double value) const;
+  double value_at(double share) const;
+  /// Of the histogram, as far as they lie on the axis.
+  struct Bar {
+    double from = 0, to = 0, height = 0;  ///< shares of the axis and of the highest bar
+  };
+  std::vector<Bar> bars(bool logarithmic) const;
+  /// Opacity over the axis, from end to end.
+  struct Spot {
+    double share = 0, opacity = 0;
+  };
+  std::vector<Spot> curve() const;
+  /// From the first to the last point: how wide, and the middle.
+  double window() const { return wanted_.points.back().value - wanted_.points.front().value; }
+  double level() const { return wanted_.points.front().value + window() / 2; }
 
   // ---- the person; true: the function has changed ----
-  /// A point stays between its neighbours; opacity 0 to 1.
+  /// A point stays between its neighbours, and may lie beyond the axis; opacity 0 to 1.
   bool move(double now_s, size_t index, double value, double opacity);
   /// On the curve, with its colour and opacity. False also where the function has no room for more.
   bool add(double now_s, double value);
   /// The last two stay.
   bool remove(double now_s, size_t index);
+  /// Moves and stretches the whole function. Points that all stood at one value are spread evenly.
+  bool set_window(double now_s, double window, double level);
+  /// From one end of the axis to the other.
+  bool fit(double now_s) { return set_window(now_s, hi() - lo(), lo() + (hi() - lo()) / 2); }
   bool colour(double now_s, size_t index, float r, float g, float b);
 
   /// The text form of what is wanted, for an order.

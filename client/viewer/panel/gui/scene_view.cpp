@@ -7,12 +7,13 @@
 #include <cmath>
 #include <optional>
 
+#include "client/viewer/panel/gui/transfer_view.h"
 #include "client/viewer/panel/gui/widgets.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr float kEditorHeight = 9, kTimelineHeight = 6, kGrab = 0.5f;  // in letters' heights
+constexpr float kTimelineHeight = 6;  // in letters' heights
 
 // Where values of a plot lie on the screen.
 struct Plane {
@@ -21,147 +22,7 @@ struct Plane {
   ImVec2 at(double x, double y) const {
     return {from.x + size.x * float((x - left) / (right - left)), from.y + size.y * float((high - y) / (high - low))};
   }
-  double x_of(float px) const { return left + double((px - from.x) / size.x) * (right - left); }
-  double y_of(float py) const { return high - double((py - from.y) / size.y) * (high - low); }
 };
-
-// An empty rectangle as wide as the panel that takes the pointer.
-Plane make_plane(const char* name, float height) {
-  Plane out{ImGui::GetCursorScreenPos(),
-            {std::max(40.0f, ImGui::GetContentRegionAvail().x), ImGui::GetFontSize() * height}};
-  ImGui::InvisibleButton(name, out.size, ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
-  seen("plot", name, ImGui::IsItemActive());
-  ImGui::GetWindowDrawList()->AddRectFilled(out.from, {out.from.x + out.size.x, out.from.y + out.size.y},
-                                            ImGui::GetColorU32(ImGuiCol_FrameBg));
-  return out;
-}
-
-// Bars whose height is the logarithm of their count: backgrounds have thousands of times as many voxels as the rest.
-void draw_histogram(const Plane& plane, const volume::Histogram& h) {
-  uint64_t most = 1;
-  for (const uint64_t n : h.counts) most = std::max(most, n);
-  const double width = (h.hi - h.lo) / double(h.counts.size());
-  auto& list = *ImGui::GetWindowDrawList();
-  for (size_t i = 0; i < h.counts.size(); ++i) {
-    if (h.counts[i] == 0) continue;
-    const double tall = std::log1p(double(h.counts[i])) / std::log1p(double(most));
-    const ImVec2 a = plane.at(h.lo + width * double(i), tall), b = plane.at(h.lo + width * double(i + 1), 0);
-    // A bar may lie beside the plot: the function may end within the data. A bar has at least one pixel.
-    const float left = std::max(a.x, plane.from.x),
-                right = std::min(std::max(b.x, left + 1), plane.from.x + plane.size.x);
-    if (left < right) list.AddRectFilled({left, a.y}, {right, b.y}, ink(0x5a6470));
-  }
-}
-
-// The colour of each value below its opacity.
-void draw_function(const Plane& plane, const volume::TransferFunction& f) {
-  auto& list = *ImGui::GetWindowDrawList();
-  constexpr int kSteps = 96;
-  for (int i = 0; i < kSteps; ++i) {
-    const double x0 = plane.left + (plane.right - plane.left) * i / kSteps,
-                 x1 = plane.left + (plane.right - plane.left) * (i + 1) / kSteps;
-    const auto p = f.at((x0 + x1) / 2);
-    const ImU32 colour = IM_COL32(int(p.r * 255), int(p.g * 255), int(p.b * 255), 150);
-    list.AddRectFilled(plane.at(x0, double(p.opacity)), plane.at(x1, 0), colour);
-  }
-  const auto line = [&](const ImVec2& a, const ImVec2& b) { list.AddLine(a, b, ink(0xf0f0f0), 1.5f); };
-  line(plane.at(plane.left, double(f.points.front().opacity)),
-       plane.at(f.points.front().value, double(f.points.front().opacity)));
-  for (size_t i = 0; i + 1 < f.points.size(); ++i)
-    line(plane.at(f.points[i].value, double(f.points[i].opacity)),
-         plane.at(f.points[i + 1].value, double(f.points[i + 1].opacity)));
-  line(plane.at(f.points.back().value, double(f.points.back().opacity)),
-       plane.at(plane.right, double(f.points.back().opacity)));
-}
-
-// The point under the pointer; -1: none.
-int point_at(const Plane& plane, const volume::TransferFunction& f, const ImVec2& pointer) {
-  int best = -1;
-  float least = ImGui::GetFontSize() * kGrab;
-  for (size_t i = 0; i < f.points.size(); ++i) {
-    const ImVec2 p = plane.at(f.points[i].value, double(f.points[i].opacity));
-    const float distance = std::hypot(p.x - pointer.x, p.y - pointer.y);
-    if (distance < least) least = distance, best = int(i);
-  }
-  return best;
-}
-
-void draw_points(const Plane& plane, const volume::TransferFunction& f, int chosen) {
-  auto& list = *ImGui::GetWindowDrawList();
-  const float radius = ImGui::GetFontSize() * 0.3f;
-  for (size_t i = 0; i < f.points.size(); ++i) {
-    const auto& p = f.points[i];
-    const ImVec2 at = plane.at(p.value, double(p.opacity));
-    if (at.x < plane.from.x - radius || at.x > plane.from.x + plane.size.x + radius) continue;
-    list.AddCircleFilled(at, radius, IM_COL32(int(p.r * 255), int(p.g * 255), int(p.b * 255), 255));
-    list.AddCircle(at, radius, int(i) == chosen ? ink(0xf0e442) : ink(0xf0f0f0), 0, int(i) == chosen ? 2.5f : 1.5f);
-  }
-}
-
-void edit_points(SceneControls& controls, SceneViewState& state, const Plane& plane, double now_s) {
-  const ImVec2 pointer = ImGui::GetIO().MousePos;
-  const auto& f = controls.transfer().transfer();
-  if (ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) {
-    if (point_at(plane, f, pointer) < 0)
-      controls.edit([&](TransferEditor& e) { return e.add(now_s, plane.x_of(pointer.x)); });
-  } else if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
-    state.point = point_at(plane, f, pointer);
-    state.drags = state.point >= 0;
-  } else if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Right)) {
-    const int index = point_at(plane, f, pointer);
-    if (index >= 0) controls.edit([&](TransferEditor& e) { return e.remove(now_s, size_t(index)); });
-    state.point = -1;
-  }
-  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) state.drags = false;
-  if (state.drags)
-    controls.edit([&](TransferEditor& e) {
-      return e.move(now_s, size_t(state.point), plane.x_of(pointer.x), plane.y_of(pointer.y));
-    });
-}
-
-void show_chosen(SceneControls& controls, SceneViewState& state, double now_s) {
-  const auto& points = controls.transfer().transfer().points;
-  if (state.point < 0 || size_t(state.point) >= points.size()) {
-    ImGui::PushTextWrapPos(0);
-    ImGui::TextDisabled("drag points; double click adds, right click takes away");
-    ImGui::PopTextWrapPos();
-    return;
-  }
-  const auto p = points[size_t(state.point)];
-  float colour[3] = {p.r, p.g, p.b};
-  if (seen("colour", "point", ImGui::ColorEdit3("##point", colour, ImGuiColorEditFlags_NoInputs)))
-    controls.edit(
-        [&](TransferEditor& e) { return e.colour(now_s, size_t(state.point), colour[0], colour[1], colour[2]); });
-  ImGui::SameLine();
-  text(fmt::format("value {:.5g}, opacity {:.3f}", p.value, p.opacity));
-}
-
-void show_transfer(SceneControls& controls, SceneViewState& state, double now_s, const std::function<void()>& save) {
-  const auto& editor = controls.transfer();
-  Plane plane = make_plane("curve", kEditorHeight);
-  plane.left = editor.lo(), plane.right = editor.hi();
-  edit_points(controls, state, plane, now_s);
-  ImGui::PushClipRect(plane.from, {plane.from.x + plane.size.x, plane.from.y + plane.size.y}, true);
-  if (editor.histogram()) draw_histogram(plane, *editor.histogram());
-  draw_function(plane, editor.transfer());
-  ImGui::PopClipRect();
-  draw_points(plane, editor.transfer(), state.point);
-  text(fmt::format("{:.5g}", plane.left));
-  const std::string most = fmt::format("{:.5g}", plane.right);
-  ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize(most.c_str()).x);
-  text(most);
-  show_chosen(controls, state, now_s);
-  row("preset");
-  if (begin_list("preset", "choose ...")) {
-    for (const auto& preset : volume::transfer_presets()) {
-      if (choice("preset", std::string(preset.name))) controls.choose_preset(preset.name), state.point = -1;
-      hint(std::string(preset.text).c_str());
-    }
-    ImGui::EndCombo();
-  }
-  if (button("save for ParaView")) save();
-  hint("as a JSON file of ParaView's, which --tf and telesplat ctl tf read too");
-}
 
 void show_series(SceneControls& controls, double now_s) {
   const auto& v = *controls.volume();
@@ -214,7 +75,8 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
 // Each track in a colour of its own and between its limits' values.
 void draw_timeline(const SceneControls& controls) {
   constexpr std::array<uint32_t, 6> kColours{0x56b4e9, 0xe69f00, 0x009e73, 0xcc79a7, 0xf0e442, 0xd55e00};
-  Plane plane = make_plane("curves", kTimelineHeight);
+  const PlotArea area = plot_area("curves", kTimelineHeight);
+  Plane plane{area.from, area.size};
   plane.right = std::max(controls.timeline_s(), 1.0);
   auto& list = *ImGui::GetWindowDrawList();
   const auto& tracks = controls.timeline().tracks;
@@ -287,7 +149,7 @@ void show_timeline(SceneControls& controls, SceneViewState& state) {
 
 void show_scene(SceneControls& controls, SceneViewState& state, double now_s, const std::function<void()>& save) {
   if (controls.kind() == scene::Kind::kVolume && controls.volume()) {
-    if (section("Transfer function", true)) show_transfer(controls, state, now_s, save);
+    if (section("Transfer function", true)) show_transfer(controls, state.transfer, now_s, save);
     if (controls.volume()->steps > 1 && section("Series", true)) show_series(controls, now_s);
   }
   if (controls.kind() != scene::Kind::kJulia) return;

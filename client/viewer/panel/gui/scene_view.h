@@ -5,16 +5,16 @@
 #include <functional>
 #include <string>
 
+#include "client/viewer/panel/gui/transfer_view.h"
 #include "client/viewer/panel/scene_controls.h"
 
 namespace telesplat::viewer {
 
-/// What the parts keep between frames: which point, which parameter.
+/// What the parts keep between frames.
 struct SceneViewState {
-  int point = -1;      ///< of the transfer function, that is chosen; -1: none
-  bool drags = false;  ///< the pointer holds it
-  int parameter = 0;   ///< index into parameter_infos(), of new key frames
-  double key_s = 5;    ///< where they go
+  TransferViewState transfer;
+  int parameter = 0;  ///< index into parameter_infos(), of new key frames
+  double key_s = 5;   ///< where they go
 };
 
 /// Builds them. Between Dear ImGui's frames. save: writes the transfer function to a file of its own choice.

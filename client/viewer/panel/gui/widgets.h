@@ -2,6 +2,7 @@
 // through one of these functions, so that a WidgetLog lists it and tools/monkey reaches it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
@@ -50,6 +51,20 @@ inline bool seen(const char* kind, const char* name, bool used) {
     log->seen(kind, name, {from.x, from.y, to.x, to.y}, visible_part(), used);
   }
   return used;
+}
+
+struct PlotArea {
+  ImVec2 from, size;
+};
+/// An empty rectangle as wide as the panel that takes the pointer. height: in letters' heights.
+inline PlotArea plot_area(const char* name, float height) {
+  const PlotArea out{ImGui::GetCursorScreenPos(),
+                     {std::max(40.0f, ImGui::GetContentRegionAvail().x), ImGui::GetFontSize() * height}};
+  ImGui::InvisibleButton(name, out.size, ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  seen("plot", name, ImGui::IsItemActive());
+  ImGui::GetWindowDrawList()->AddRectFilled(out.from, {out.from.x + out.size.x, out.from.y + out.size.y},
+                                            ImGui::GetColorU32(ImGuiCol_FrameBg));
+  return out;
 }
 
 inline bool button(const char* label) { return seen("button", label, ImGui::Button(label)); }

@@ -186,15 +186,21 @@ TEST_P(PanelView, DrawsAnyTransferFunctionOverAnyHistogram) {
         "5:#000000:0, 5:#ffffff:0.5", "-9000:#000000:0, -8000:#ffffff:1", "9e3:#000000:0, 1e30:#ffffff:1",
         "-1e30:#000000:0, 1e30:#ffffff:1", "700:#ffffff:0.5", "20%:#603010:0, 45%:#a07040:0.05, 70%:#40a040:0.4"})
     functions.emplace_back(points);
+  const volume::ValueRange ranges[] = {volume_session().range,
+                                       {.lo = 7, .hi = 7, .typical_lo = 7, .typical_hi = 7},
+                                       {.lo = -9.2e18, .hi = 9.2e18, .typical_lo = 0, .typical_hi = 1}};
   for (const char* histogram : {"-1000:3000:5,0,100000,700,9,0,3", "-1e30:1e30:1,2,3", "0:1e-30:7,9",
                                 "400:400.001:1,1,1,1", "-1000:3000:0,0", "2900:9000:4,5,6"}) {
     welcome_.facts[volume::kHistogramFact] = histogram;
-    for (const auto& text : functions) {
+    for (size_t i = 0; i < functions.size() * std::size(ranges); ++i) {
+      const std::string& text = functions[i / std::size(ranges)];
       auto s = volume_session();
+      s.range = ranges[i % std::size(ranges)];
       auto transfer = volume::resolve_transfer(text, s.range);
       ASSERT_TRUE(transfer) << text << ": " << transfer.error().text;
       s.transfer = *transfer;
       welcome_.parameters = volume::to_parameters(s);
+      for (const auto& [name, fact] : volume::to_facts(s)) welcome_.facts[name] = fact;
       controls_.on_session(now_s_ += 10, welcome_);
       ASSERT_EQ(controls_.transfer().transfer(), *transfer) << text;
       ImGui::GetIO().MousePos = {200, 700};
