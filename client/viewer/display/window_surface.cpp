@@ -277,8 +277,10 @@ void WindowSurface::present(const image::View& view, bool changed) {
   shown_ = now;
   if (now.panel)
     window_->present(view, overlays_, [&] { return build_panel(now.at_s); });
-  else
+  else {
+    const LoggedBuild nothing(widget_log_);
     window_->present(view, overlays_);
+  }
   if (options_.poses) options_.poses->presented(monotonic_s());
 }
 

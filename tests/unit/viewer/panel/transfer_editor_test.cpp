@@ -27,7 +27,7 @@ std::vector<double> values(const TransferEditor& e) {
 }
 
 TEST(TransferEditor, TheDataFillTheAxisWhereverThePointsLie) {
-  for (const std::string function : {kWide, std::string("0:#000000:0,254:#ffffff:1"), std::string("900:#ffffff:1")}) {
+  for (const std::string& function : {kWide, std::string("0:#000000:0,254:#ffffff:1"), std::string("900:#ffffff:1")}) {
     const auto e = editor_of(function, kBytes);
     EXPECT_EQ(e.lo(), 0);
     EXPECT_EQ(e.hi(), 255);
