@@ -1,6 +1,7 @@
 // What cannot be shown is refused: exit code 2, one line that names it, nothing left behind.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -91,6 +92,21 @@ const Case kCases[] = {
     {"BadTrajectory", "mesh.ply", "TERRAIN", {"--trajectory", "TRAJECTORY"}, "trajectory.csv:3"},
     {"MissingTrajectory", "mesh.ply", "TERRAIN", {"--trajectory", "no-such.csv"}, "no-such.csv"},
 };
+// Its libraries take a second to load, and as long it is not told of its parent's end.
+TEST(Import, EndsWhereTheProcessThatWantedItDiedBefore) {
+  TemporaryFolder folder;
+  const std::string path = folder / "triangle.vtk";
+  std::ofstream(path) << "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n"
+                         "POLYGONS 1 4\n3 0 1 2\n";
+  for (const bool here : {true, false}) {
+    ::setenv("TELESPLAT_IMPORT_PARENT", std::to_string(here ? getpid() : 1).c_str(), 1);
+    Program import("telesplat-import", {"vtk", path}, folder / "import");
+    EXPECT_EQ(import.wait(), here ? 0 : 1);
+    EXPECT_NE(import.out().empty(), here);
+  }
+  ::unsetenv("TELESPLAT_IMPORT_PARENT");
+}
+
 INSTANTIATE_TEST_SUITE_P(Cases, BadInput, ::testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.name; });
 

@@ -84,7 +84,7 @@ def make(folder, programs, real):
             volume(at(f"series/ball_{step}.mha"), 24, balls(24, 4 + step))
         volume(at("one value.mha"), 16, b"\7" * 4096)
         large = (((i * 7919) % 4096 - 2048) << 52 for i in range(4096))
-        volume(at("large numbers.mha"), 16, struct.pack("<4096q", *large), "MET_LONG_LONG")
+        volume(at("large numbers.mha"), 16, struct.pack("<4096q", *large), "MET_LONG")
         poses = (f"{i / 10},{math.sin(i / 9)},0.2,{math.cos(i / 9)},1,0,0,0\n" for i in range(30))
         write(at("path.csv"), "t_s,px,py,pz,qw,qx,qy,qz\n" + "".join(poses))
         points, colours = [0, 0, 0.5, 0, 255, 1, 0.5, 0], [0, 0, 0, 0, 255, 1, 1, 1]

@@ -92,6 +92,9 @@ int main(int argc, char** argv) {
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
+  // The libraries of this program take a second to load and more; the parent may have died meanwhile.
+  if (const char* parent = std::getenv(telesplat::data::kParentVariable); parent && std::atoi(parent) != getppid())
+    return 1;
   telesplat::data::end_at_cut_off_files(telesplat::data::kCutOffExit);
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what VTK prints must not get between

@@ -40,11 +40,15 @@ Result<pid_t> start_import(int input, int output, std::vector<std::string> words
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   words.insert(words.begin(), import_program());
   const std::string& program = words[0];
+  std::string parent = fmt::format("{}={}", kParentVariable, getpid());
+  std::vector<char*> surroundings{parent.data()};
+  for (char** variable = environ; *variable; ++variable) surroundings.push_back(*variable);
+  surroundings.push_back(nullptr);
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   pid_t child = -1;
-  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
+  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), surroundings.data());
   posix_spawn_file_actions_destroy(&actions);
   if (failed)
     return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program,

@@ -8,6 +8,7 @@
 namespace telesplat::data {
 
 inline constexpr const char* kImportProgram = "telesplat-import";
+inline constexpr const char* kParentVariable = "TELESPLAT_IMPORT_PARENT";  ///< its process, which waits for the report
 
 /// Writes result into the descriptor from its current position on. Returns false if that fails (errno tells).
 bool write_import_report(int descriptor, const Result<Mesh>& result);
