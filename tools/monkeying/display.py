@@ -60,6 +60,10 @@ class Hands:
         geometry = self.window.get_geometry()
         return max(1, geometry.width), max(1, geometry.height)
 
+    def title(self):
+        told = self.window.get_full_property(self.x.intern_atom("_NET_WM_NAME"), X.AnyPropertyType)
+        return bytes(told.value).decode(errors="replace") if told else ""
+
     def say(self, window, what, data):
         window.send_event(event.ClientMessage(window=window, client_type=self.x.intern_atom(what), data=(32, data)))
 
