@@ -84,6 +84,7 @@ Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net
       .sampling = {r.adaptive, r.sampling_width, r.sampling_height, o.least_sampling.value_or(r.min_scale)},
       .sampling_chosen = o.least_sampling.has_value(),
       .open = o.launched ? std::function<void(const std::string&)>(ask_to_open) : nullptr,
+      .recorded = !o.out.empty(),
       .begins_empty = o.begins_empty,
       .launcher_fd = o.launched ? STDIN_FILENO : -1};
   auto opened = WindowSurface::open(options, tell, std::make_unique<ControlDesk>(o.service.master, asking));

@@ -13,10 +13,11 @@
 
 namespace telesplat::scene {
 
-inline constexpr size_t kMaxColouringText = 8000;            ///< bytes of the text form
-inline constexpr double kMaxScalar = 1e300;                  ///< of either end of a range
-inline constexpr std::string_view kNoArray = "none";         ///< --colour-by none: the file's own colours
-inline constexpr const char* kColouringFact = "colouring";   ///< absent or empty: the file's own colours
+inline constexpr size_t kMaxColouringText = 8000;           ///< bytes of the text form
+inline constexpr double kMaxScalar = 1e300;                 ///< of either end of a range
+inline constexpr std::string_view kNoArray = "none";        ///< --colour-by none: the file's own colours
+inline constexpr const char* kColouringFact = "colouring";  ///< absent or empty: the file's own colours
+inline constexpr const char* kIsoFact = "iso";  ///< of an isosurface: "VALUE LO HI", LO and HI of its volume if known
 inline constexpr const char* kArraysFact = "arrays";         ///< to_text() of the file's arrays
 inline constexpr const char* kColourMapFact = "colour_map";  ///< colour::to_text(): of arrays that are chosen later
 /// Master -> data: "N ARRAY", have the chunks of this array (empty: of the file's colours) ready; N counts orders.

@@ -9,6 +9,7 @@
 #include "common/colour/colour_map.h"
 #include "common/volume/transfer/function.h"
 #include "services/data/kinds.h"
+#include "services/data/mesh/active_array.h"
 #include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
@@ -94,7 +95,7 @@ Table mesh_table(MeshOptions& o) {
        .help =
            "colour a mesh by an array of its PLY, VTP, VTU or VTK file: ARRAY[:MIN:MAX], ARRAY a vector's length or "
            "one of its components ARRAY.x .y .z ARRAY[0]; MIN and MAX: the ends of the colour map, default: those of "
-           "the array; none: the file's own colours",
+           "the array; none: the file's own colours; default: the active scalars that a VTP, VTU or VTK file marks",
        .fits = kMeshes,
        .reach = Reach::kRecorded},
       {.flag = "--colour-map",
@@ -167,6 +168,15 @@ Table volume_table(DataOptions& o) {
 }
 
 }  // namespace
+
+MeshOptions DataOptions::mesh_options() const {
+  MeshOptions out = mesh;
+  out.raw = volume.raw, out.series = volume.series;
+  if (!out.colouring.by.empty() || out.iso) return out;
+  out.colouring.by = active_array_of(scene);
+  out.colouring.by_file = !out.colouring.by.empty();
+  return out;
+}
 
 Table scene_table(DataOptions& o) {
   return joined(joined(placement_table(o.mesh), mesh_table(o.mesh)),

@@ -18,12 +18,8 @@ struct DataOptions {
   julia::SceneOptions julia;
   std::string companions = "folder";  ///< where a data server reads files that others name: "folder" or "anywhere"
 
-  /// What open_mesh takes.
-  MeshOptions mesh_options() const {
-    MeshOptions out = mesh;
-    out.raw = volume.raw, out.series = volume.series;
-    return out;
-  }
+  /// What open_mesh takes. Where nobody says what a mesh is coloured by, it is what its file marks (active_array.h).
+  MeshOptions mesh_options() const;
 };
 
 struct DataServiceOptions : DataOptions {

@@ -186,7 +186,11 @@ Description describe(const MeshFileFacts& facts) {
   if (facts.iso) out.json["iso"] = *facts.iso;
   if (facts.raster) describe_raster(*facts.raster, i.box_data, out);
   describe_shape(facts, out);
-  describe_arrays(i.arrays, out);
+  if (!facts.iso) describe_arrays(i.arrays, out);
+  if (!i.array.empty()) {
+    out.row("coloured by", i.array + " (--colour-by none: by the file's own colours)");
+    out.json["coloured_by"] = i.array;
+  }
   out.row("box", fmt::format("{} .. {}, {}", vector_text(i.box_data.lo), vector_text(i.box_data.hi), unit_of(facts)));
   out.row("size", extent_text(i.box_data.size()));
   out.json["box"] = box_json(i.box_data);

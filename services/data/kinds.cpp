@@ -42,6 +42,7 @@ OpenServed open_as_mesh(const DataOptions& o, const Progress& progress) {
   return serve_mesh(std::move(*store), o.scene,
                     {.as_begun = *std::move(colouring),
                      .map = *std::move(map),
+                     .iso = options.iso,
                      .open = [path = o.scene, options](const std::string& array, const Progress& working) {
                        return open_mesh_by(path, options, array, working);
                      }});

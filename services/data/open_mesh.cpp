@@ -11,7 +11,9 @@ Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const Mesh
                                              const Progress& user_progress) {
   auto by = scene::parse_colour_by(options.colouring.by);
   if (!by) return Error{fmt::format("--colour-by {}", by.error().text)};
-  return open_mesh_by(path, options, by->array, user_progress);
+  auto store = open_mesh_by(path, options, by->array, user_progress);
+  if (!options.colouring.by_file || (store && scene::make_colouring((*store)->info().arrays, *by, {}))) return store;
+  return open_mesh_by(path, options, "", user_progress);
 }
 
 Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
@@ -38,7 +40,8 @@ Result<std::optional<scene::Colouring>> colouring_of(const MeshOptions& options,
   if (!by) return Error{fmt::format("--colour-by {}", by.error().text)};
   auto map = colour_map_of(options);
   if (!map) return map.error();
-  if (by->array.empty()) return std::optional<scene::Colouring>();
+  const bool left_out = options.colouring.by_file && mesh.array != by->array;
+  if (by->array.empty() || left_out) return std::optional<scene::Colouring>();
   auto colouring = scene::make_colouring(mesh.arrays, *by, *std::move(map));
   if (!colouring) return Error{fmt::format("{}: {}", mesh.source, colouring.error().text)};
   return std::optional(*std::move(colouring));

@@ -10,6 +10,7 @@
 #include "common/core/log.h"
 #include "common/points/point_model.h"
 #include "common/scene/session.h"
+#include "common/scene/settings.h"
 #include "services/master/master_core.h"
 #include "services/master/orders/health.h"
 
@@ -155,6 +156,7 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
     stop_ = true;
     return;
   }
+  if (m.command == "done") return answer_of_launcher(peer, m);
   if (const std::string role = errand_for(m.command); !role.empty()) {
     if (const Status s = pass_on(peer, m, role, now_s); !s)
       outbox_.send(peer, wire::ControlReply{false, s.error().text});
@@ -165,6 +167,13 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   if (done) dispatch(now_s);
 }
 
+void MasterCore::answer_of_launcher(const std::string& peer, const wire::Control& m) {
+  const auto done = read_done(m);
+  outbox_.send(peer, wire::ControlReply{done.ok(), done ? "heard" : done.error().text});
+  if (!done) return;
+  if (const auto reply = errands_.answered(Errands::kLauncher, *done)) outbox_.send(reply->peer, reply->reply);
+}
+
 wire::ControlReply MasterCore::health(const wire::Control& m, double now_s) const {
   HealthQuestion question(m);
   for (const auto& [id, p] : peers_)
@@ -173,9 +182,14 @@ wire::ControlReply MasterCore::health(const wire::Control& m, double now_s) cons
   return {answer.ok(), answer ? *answer : answer.error().text};
 }
 
-// To the viewer that is named, or the first one; to all data servers of the scene, of which each knows its part. Of
-// viewers that have one name the one that was heard last is meant: it may be another's new life.
+// To the viewer that is named, else of a setting to all that are here, and of what is asked to the first one; to all
+// data servers of the scene, of which each knows its part. Of viewers that have one name the one that was heard last is
+// meant: it may be another's new life.
 Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s) {
+  if (role == Errands::kLauncher) {
+    const auto number = errands_.ask_launcher(peer, m, session_.started_by, now_s);
+    return number ? ok_status() : Status(number.error());
+  }
   const std::string wanted = role == "viewer" ? scene::value_or(m.arguments, "viewer", std::string()) : std::string();
   struct Here {
     std::string name;
@@ -197,7 +211,7 @@ Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, cons
       return Error{
           fmt::format("no {} is called \"{}\"; here is {}", role, wanted.substr(0, 64), fmt::join(names, ", "))};
   }
-  if (role == "viewer") here.resize(1);
+  if (role == "viewer" && (!wanted.empty() || !scene::setting_of_order(m.command))) here.resize(1);
   std::set<std::string> asked;
   for (const Here& h : here) asked.insert(h.id);
   const auto number = errands_.begin(peer, asked, now_s);
@@ -246,10 +260,10 @@ Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
     if (!clipped) return clipped.error();
     obeyed = *std::move(clipped);
   } else if (m.command != "epoch") {
-    return Error{fmt::format(
-        "unknown command '{}'; known: status, health, stop, epoch, set, animate, play, tf, colour, clip, coupling, "
-        "pick, where, go, overlay, probe",
-        m.command.substr(0, 64))};
+    std::set<std::string_view> known{"status", "health", "stop", "epoch", "pick", "where", "go", "probe"};
+    for (const auto& setting : scene::settings())
+      if (setting.keeper != scene::Keeper::kNotes) known.insert(setting.order);
+    return Error{fmt::format("unknown command '{}'; known: {}", m.command.substr(0, 64), fmt::join(known, ", "))};
   }
   if (obeyed.tells_all) announce(now_s);
   if (!obeyed.begins_epoch) return obeyed.answer;

@@ -49,6 +49,12 @@ std::string shortened(const std::string& fact) {
   return fact.size() <= kMostFactBytes ? fact : fact.substr(0, kMostFactBytes - 3) + "...";
 }
 
+// What the launcher is asked for (docs/protocol.md).
+void add_wishes(const Errands& errands, Json& out) {
+  for (const auto& [number, wish] : errands.wishes())
+    out["wishes"].push_back({{"number", number}, {"command", wish.command}, {"arguments", wish.arguments}});
+}
+
 Json told(const net::RunningSession& s) {
   return {{"address", s.address},
           {"pid", s.pid},
@@ -193,6 +199,7 @@ std::string MasterCore::status_json(double now_s, bool all) const {
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
   if (!clipping_.order().empty()) out["clip"] = clipping_.order();
   if (const auto failed = record_.losses().failed; !failed.empty()) out["record_failed"] = failed;
+  add_wishes(errands_, out);
   plan_->add_status(out);
   out["departed"] = departed_.count();
   // Those who are here first: an answer is one message.

@@ -61,6 +61,7 @@ class Display {
         find_spool_(spool),
         make_source_(make_source),
         wall_(wall),
+        stereo_(o.stereo),
         eyes_(o.stereo),
         look_(first_look(o.render, o.shading)),
         stall_(o.most_wait_s) {}
@@ -116,6 +117,10 @@ class Display {
     if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
     if (session != session_) surface_.on_session(session_ = std::move(session));
     if (const auto wish = surface_.take_sampling()) worker_.set_sampling(*wish);
+    if (const auto wish = surface_.take_stereo()) {
+      stereo_ = *wish;
+      eyes_ = EyePictures(stereo_);
+    }
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
@@ -310,10 +315,10 @@ class Display {
                     .with_coverage = coverage,
                     .intact = intact});
     m.end_s = monotonic_s();
-    if (eyes_.on()) m.stereo = {o_.stereo.mode, eyes_.pair()};
+    if (eyes_.on()) m.stereo = {stereo_.mode, eyes_.pair()};
     worker_.on_frame(m.end_s, sampled, m.drawn.epoch, m.drawn.update, waited.for_update);
     // A flat legend would lie in one eye's picture, or be torn by the other's.
-    const auto legend = o_.legend && !eyes_.on() ? worker_.legend_at(m.drawn.epoch) : nullptr;
+    const auto legend = eyes_.on() ? nullptr : worker_.legend_at(m.drawn.epoch);
     surface_.on_legend(legend);
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
     surface_.present(view_, m.drawn.changed);
@@ -326,7 +331,7 @@ class Display {
     source_->displayed();
     gate_.displayed();
     record(m);
-    keep(use, t_s, m, legend);
+    keep(use, t_s, m, o_.legend ? legend : nullptr);
     ++result_.frames;
     tell_of(m);
     carry_out_orders(shown_ = {m.camera, m.head, m.drawn.epoch, eyes_.pair()});
@@ -386,7 +391,7 @@ class Display {
                   .terms = worker_.terms(),
                   .pick = pick,
                   .go = [&](const geometry::Pose& pose) { return surface_.go_to(pose); },
-                  .overlay = [&](const std::string& name, bool on) { return surface_.show_overlay(name, on); }});
+                  .set = [&](const std::string& name, const std::string& value) { return surface_.set(name, value); }});
       worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});
     }
   }
@@ -464,6 +469,7 @@ class Display {
   const SourceMaker& make_source_;
   WallPace* const wall_;  // null: the display is by itself
   std::optional<MeasuredFrame> row_;
+  StereoOptions stereo_;  // of eyes_
   EyePictures eyes_;
   Shown shown_;  // last
   Look look_;

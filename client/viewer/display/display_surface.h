@@ -8,6 +8,7 @@
 
 #include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/sampling_wish.h"
+#include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/display/overlay.h"
 #include "client/viewer/hands/meaning.h"
 #include "client/viewer/input/look.h"
@@ -69,6 +70,8 @@ class DisplaySurface {
   virtual void on_session(const std::shared_ptr<const wire::Welcome>&) {}
   /// How finely the person wants views to be sampled from now on, once after each change.
   virtual std::optional<SamplingWish> take_sampling() { return std::nullopt; }
+  /// How two eyes' pictures share the display from now on, once after each change.
+  virtual std::optional<StereoOptions> take_stereo() { return std::nullopt; }
   /// The legend of the frame that is shown next; null: it has none.
   virtual void on_legend(const std::shared_ptr<const image::Legend>&) {}
   /// Shows a finished frame, drawn with the camera above. changed: it is not the one that was shown last.
@@ -94,9 +97,9 @@ class DisplaySurface {
   virtual void on_terms(const std::shared_ptr<const SceneTerms>&) {}
   /// Puts the camera there, at once. False: the head follows a trajectory.
   virtual bool go_to(const geometry::Pose&) { return false; }
-  /// Shows or hides what lies over the picture. Error: there is no such overlay.
-  virtual Status show_overlay(const std::string& /*name*/, bool /*on*/) {
-    return Error{"overlay: nobody sees this viewer's display"};
+  /// FrameHands::set().
+  virtual Status set(const std::string& /*name*/, const std::string& /*value*/) {
+    return Error{"nobody sees this viewer's display"};
   }
   /// Whether the person is done.
   virtual bool wants_to_stop() const = 0;

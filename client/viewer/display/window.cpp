@@ -434,6 +434,8 @@ double Window::content_scale() const {
 
 std::vector<std::string> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
 
+bool Window::has_gui() const { return impl_->gui != nullptr; }
+
 bool Window::gui_due(double now_s) const { return impl_->gui && impl_->gui->due(now_s); }
 
 void Window::present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui) {

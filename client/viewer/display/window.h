@@ -70,6 +70,8 @@ class Window {
   /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised. gui:
   /// builds what lies over all (Gui::prepare()); null: nothing.
   void present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui = {});
+  /// Whether what `gui` builds can be shown.
+  bool has_gui() const;
   /// Whether what `gui` builds has changed since it was presented.
   bool gui_due(double now_s) const;
 

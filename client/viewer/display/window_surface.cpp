@@ -101,16 +101,11 @@ WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, s
       interaction_(first_movement(o.movement), first_look(o.display.render, o.display.shading)),
       bookmarks_([lines](const std::string& line) { lines->add(line); }),
       lines_(std::move(lines)),
-      panel_({.look = interaction_.look(),
-              .transparent = o.display.transparent,
-              .sampling = o.sampling,
-              .sampling_chosen = o.sampling_chosen,
-              .viewer = o.viewer,
-              .shown = o.panel,
-              .opens = bool(o.open)}),
+      panel_({.transparent = o.display.transparent, .viewer = o.viewer, .shown = o.panel, .opens = bool(o.open)}),
       launcher_(o.launcher_fd),
       desk_(std::move(desk)),
       screenshots_(o.screenshot_directory, [lines = lines_](const std::string& line) { lines->add(line); }) {
+  quad_buffers_ = o.display.stereo.mode == stereo::Mode::kQuadBuffer;
   interaction_.show_panel(o.panel);
   open_view_.shown = o.begins_empty;
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
@@ -195,9 +190,10 @@ void WindowSurface::run_panel(double now_s, Look& look) {
   panel_.show(interaction_.shows_panel());
   for (const Key key : panel_.take_pressed())
     for (const bool down : {true, false}) interaction_.key(key, down);
-  if (const auto wish = panel_.take_look()) interaction_.set_look(*wish);
+  for (const auto& [name, value] : panel_.take_chosen())
+    if (const Status s = set(name, value); !s) panel_.tell(now_s, name + ": " + s.error().text, true);
   look = interaction_.look();
-  panel_.on_look(look);
+  if (panel_.shown()) panel_.on_values(values());
   panel_.on_path({.records = interaction_.records_path(),
                   .plays = interaction_.playing(),
                   .can_play = interaction_.can_play(),
@@ -269,7 +265,7 @@ void WindowSurface::keep_path() {
 // A window system may want it again at any time, without telling.
 void WindowSurface::present(const image::View& view, bool changed) {
   const Shown now{monotonic_s(), window_->width(), window_->height(), overlays_.version(),
-                  panel_.shown() || open_view_.shown};
+                  panel_.shown() || open_view_.shown || shows_legend()};
   const bool same = now.width == shown_.width && now.height == shown_.height && now.overlays == shown_.overlays &&
                     now.panel == shown_.panel && !(now.panel && window_->gui_due(now.at_s));
   if (panel_.shown() && changed && panel_.pipeline() == scene::Pipeline::kPoints) holes_.look_at(view, background_);
@@ -284,13 +280,65 @@ void WindowSurface::present(const image::View& view, bool changed) {
   if (options_.poses) options_.poses->presented(monotonic_s());
 }
 
+ViewSettings WindowSurface::settings() const {
+  const auto& d = options_.display;
+  return {.look = interaction_.look(),
+          .transparent = d.transparent,
+          .sampling = options_.sampling,
+          .stereo = d.stereo,
+          .quad_buffers = quad_buffers_,
+          .legend = d.legend};
+}
+
+std::map<std::string, std::string> WindowSurface::values() const {
+  auto out = values_of(settings());
+  out.merge(hands_.values());
+  out["fullscreen"] = window_->fullscreen() ? "on" : "off";
+  return out;
+}
+
+Status WindowSurface::set(const std::string& name, const std::string& value) {
+  const auto on = read_switch(value);
+  const bool panel = name == "panel", fullscreen = name == "fullscreen";
+  if (panel || fullscreen || hands_.values().contains(name) || name == "all") {
+    if (!on) return on.error();
+    if (panel) interaction_.show_panel(*on);
+    if (fullscreen && *on != window_->fullscreen()) window_->toggle_fullscreen();
+    return panel || fullscreen ? ok_status() : hands_.show(name, *on);
+  }
+  ViewSettings changed = settings();
+  if (const Status s = change(changed, name, value); !s) return s;
+  auto& d = options_.display;
+  const auto eyes = [](const StereoOptions& o) {
+    return std::tuple(o.mode, o.eye_separation_m, o.screen_m, o.swap_eyes);
+  };
+  if (eyes(changed.stereo) != eyes(d.stereo)) {
+    if (options_.recorded) return Error{"a run that is recorded keeps the two eyes that it began with"};
+    stereo_wish_ = d.stereo = changed.stereo;
+    fitted_width_ = 0;
+  }
+  interaction_.set_look(changed.look);
+  if (changed.sampling != options_.sampling) {
+    options_.sampling_chosen = true;
+    sampling_wish_ = options_.sampling = changed.sampling;
+  }
+  if (std::exchange(d.legend, changed.legend) != changed.legend) show_legend();
+  return ok_status();
+}
+
 // How much of the left side it covers.
 double WindowSurface::build_panel(double now_s) {
   const LoggedBuild logged(widget_log_);
   double width = 0;
   if (panel_.shown())
-    width = show_panel(panel_, panel_view_, now_s,
-                       {[&](Panel&) { show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); }); }});
+    width = show_panel(panel_, panel_view_, now_s, {[&](Panel&) {
+                         show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); });
+                         const auto book = bookmarks_.book();
+                         notes_wish_ = show_notes(book.get(), notes_view_, !picked_.empty(), now_s);
+                       }});
+  if (panel_.shown()) follow_notes();
+  legend_part_ = {};
+  if (shows_legend()) build_legend(now_s, width);
   if (panel_.shown() && interaction_.shows_help()) show_keys(key_lines());
   show_open(open_view_, !scene_.box_room.empty(), [this](const std::string& path) { open(path); });
   return width;
@@ -358,6 +406,7 @@ void WindowSurface::use_transfer_file(const std::string& path) {
 void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& session) {
   if (!session) return;
   scene_controls_.on_session(monotonic_s(), *session);
+  panel_.on_kind(scene_controls_.kind());
   // Another data set is looked at from its own first view, by who has the camera, and has nothing picked yet.
   const scene::SessionView facts(*session);
   const std::string name =
@@ -365,11 +414,12 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
   if (!facts.fact("scene").empty() && name != std::exchange(scene_name_, name) && had_scene_) {
     interaction_.back_to_first_view();
     picked_.clear();
+    notes_view_ = {};
     hands_.on_pick(std::nullopt);
   }
   had_scene_ = had_scene_ || !facts.fact("scene").empty();
-  panel_.on_told_sampling(
-      scene::SessionView(*session).setting("viewer.least_sampling", options_.sampling.least_sampling));
+  auto& least = options_.sampling.least_sampling;
+  if (!options_.sampling_chosen) least = scene::SessionView(*session).setting("viewer.least_sampling", least);
 }
 
 void WindowSurface::save_transfer() {
@@ -388,18 +438,39 @@ void WindowSurface::on_legend(const std::shared_ptr<const image::Legend>& legend
   show_legend();
 }
 
-// On a wall the tile in the lower right corner has it.
+bool WindowSurface::on_wall() const { return options_.display.wall.described || options_.display.wall.tiles() > 1; }
+
+bool WindowSurface::shows_legend() const {
+  return legend_ && options_.display.legend && window_->has_gui() && !on_wall();
+}
+
+void WindowSurface::build_legend(double now_s, double hidden) {
+  auto& colours = scene_controls_.colours();
+  image::Legend shown = *legend_;
+  const bool editable = colours.colouring() && shown.opacity.empty();
+  if (editable) std::tie(shown.lo, shown.hi) = colours.range();
+  const std::function<void(double, double)> change = [&](double lo, double hi) { colours.choose_range(now_s, lo, hi); };
+  legend_part_ = viewer::show_legend(shown, legend_view_, hidden, editable ? change : nullptr);
+}
+
+geometry::Rect WindowSurface::legend_box() const {
+  const auto& p = legend_part_;
+  const double w = window_->width(), h = window_->height();
+  return {int(p.left * w), int(p.top * h), int((p.right - p.left) * w), int((p.bottom - p.top) * h)};
+}
+
+// Of a wall the tile in the lower right corner has it; and so does a window that has no Dear ImGui.
 void WindowSurface::show_legend() {
   const WallTile& wall = options_.display.wall;
   const int tiles = wall.described ? int(wall.described->screens.size()) : wall.columns * wall.rows;
-  if (!legend_ || wall.tile != tiles - 1) return overlays_.hide("legend");
+  if (!legend_ || !options_.display.legend || shows_legend() || wall.tile != tiles - 1) return overlays_.hide("legend");
   overlays_.show("legend",
                  {image::legend_picture(*legend_, legend_width_, legend_height_), Overlay::Corner::kLowerRight});
 }
 
 void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
   if (!interaction_.take_screenshot_wish()) return;
-  if (!legend_) return screenshots_.take(view, alpha);
+  if (!legend_ || !options_.display.legend) return screenshots_.take(view, alpha);
   image::View copy{view.width, view.height, view.colour, {}};
   image::draw_legend(copy, *legend_, part_of_wall(view.width, view.height, options_.display.wall));
   screenshots_.take(copy, alpha);
@@ -428,17 +499,37 @@ std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& ca
 }
 
 void WindowSurface::take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) {
-  if (legend_) image::draw_legend(picture, *legend_, part_of_wall(picture.width, picture.height, {}));
+  if (legend_ && options_.display.legend)
+    image::draw_legend(picture, *legend_, part_of_wall(picture.width, picture.height, {}));
   screenshots_.take(picture, alpha, wish.exr);
+}
+
+notes::Shelf WindowSurface::shelf() const {
+  return notes::shelf_of(terms_->data_file, terms_->scene, notes::user_cache_folder());
+}
+
+// What the panel asked for.
+void WindowSurface::follow_notes() {
+  const NotesWish wish = std::exchange(notes_wish_, {});
+  if (!terms_) return;
+  if (wish.keep) bookmarks_.keep(shelf(), head_, wish.name);
+  if (!wish.go.empty()) bookmarks_.find(shelf(), wish.go);
+  if (!wish.remove.empty()) bookmarks_.remove(shelf(), wish.remove);
+  if (wish.remove_note > 0) bookmarks_.remove_note(shelf(), wish.remove_note);
+  if (wish.look) bookmarks_.look(shelf());
+  if (wish.text.empty()) return;
+  notes::Note note{.text = wish.text};
+  if (wish.here && !picked_.empty()) {
+    note.place = picked_.back().data;
+    if (const auto lines = cursor_lines(picked_.back(), *terms_); lines.size() > 1) note.value = lines[1];
+  }
+  bookmarks_.add(shelf(), note);
 }
 
 void WindowSurface::follow_bookmarks(const geometry::Pose& pose) {
   const bool keeps = interaction_.take_bookmark_wish(), next = interaction_.take_next_wish();
-  if ((keeps || next) && terms_) {
-    const auto shelf = notes::shelf_of(terms_->data_file, terms_->scene, notes::user_cache_folder());
-    if (keeps) bookmarks_.keep(shelf, pose);
-    if (next) bookmarks_.next(shelf);
-  }
+  if (keeps && terms_) bookmarks_.keep(shelf(), pose);
+  if (next && terms_) bookmarks_.next(shelf());
   if (const auto found = bookmarks_.take_found()) interaction_.go_to(found->pose);
 }
 

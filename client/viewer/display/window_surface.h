@@ -5,6 +5,7 @@
 
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/display_surface.h"
+#include "client/viewer/display/settings/view_settings.h"
 #include "client/viewer/display/title_line.h"
 #include "client/viewer/display/window.h"
 #include "client/viewer/hands/bookmarks.h"
@@ -12,6 +13,8 @@
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/input/pose_feed.h"
 #include "client/viewer/panel/control_desk.h"
+#include "client/viewer/panel/gui/legend_view.h"
+#include "client/viewer/panel/gui/notes_view.h"
 #include "client/viewer/panel/gui/open_view.h"
 #include "client/viewer/panel/gui/panel_view.h"
 #include "client/viewer/panel/gui/scene_view.h"
@@ -38,6 +41,7 @@ class WindowSurface final : public DisplaySurface {
     bool sampling_chosen = false;  ///< its least sampling, by a flag
     /// Asks whoever started the session for another data set; null: it is somebody else's session.
     std::function<void(const std::string& path)> open;
+    bool recorded = false;      ///< movies are made of the run: two eyes' pictures stay as they are
     bool begins_empty = false;  ///< there is nothing to see before a data set was opened
     int launcher_fd = -1;       ///< LauncherLines
   };
@@ -49,13 +53,15 @@ class WindowSurface final : public DisplaySurface {
   /// A path that is being recorded is written.
   ~WindowSurface() override;
 
+  /// What the legend covers, pixels of the window; empty: there is none.
+  geometry::Rect legend_box() const;
   int width() const { return window_->width(); }
   int height() const { return window_->height(); }
 
   void on_scene(const ShownScene& scene) override;
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   void on_session(const std::shared_ptr<const wire::Welcome>& session) override;
-  std::optional<SamplingWish> take_sampling() override { return panel_.take_sampling(); }
+  std::optional<SamplingWish> take_sampling() override { return std::exchange(sampling_wish_, std::nullopt); }
   geometry::Pose head() const override { return head_; }
   geometry::Camera camera_of(const geometry::Pose& head) const override;
   bool visible() const override { return true; }
@@ -74,7 +80,8 @@ class WindowSurface final : public DisplaySurface {
     terms_ = terms;
     hands_.on_terms(terms);
   }
-  Status show_overlay(const std::string& name, bool on) override { return hands_.show(name, on); }
+  Status set(const std::string& name, const std::string& value) override;
+  std::optional<StereoOptions> take_stereo() override { return std::exchange(stereo_wish_, std::nullopt); }
   bool go_to(const geometry::Pose& pose) override {
     interaction_.go_to(pose);
     return true;
@@ -92,8 +99,13 @@ class WindowSurface final : public DisplaySurface {
   void show_help();
   std::vector<std::string> key_lines() const;
   void show_legend();
+  bool on_wall() const;
+  bool shows_legend() const;  // as Dear ImGui draws it
+  void build_legend(double now_s, double hidden);
   void show_news(double now_s);
   void keep_path();
+  ViewSettings settings() const;
+  std::map<std::string, std::string> values() const;
   void tell(const std::string& line);
   void run_panel(double now_s, Look& look);
   double build_panel(double now_s);
@@ -105,8 +117,12 @@ class WindowSurface final : public DisplaySurface {
   void play_file(const std::string& path);
   void use_transfer_file(const std::string& path);
   void follow_bookmarks(const geometry::Pose& pose);
+  void follow_notes();
+  notes::Shelf shelf() const;  // precondition: terms_
 
-  Options options_;
+  Options options_;  // display and sampling: as the person chose since
+  std::optional<SamplingWish> sampling_wish_;
+  std::optional<StereoOptions> stereo_wish_;
   std::unique_ptr<Window> window_;
   Interaction interaction_;
   TitleLine title_;
@@ -141,11 +157,16 @@ class WindowSurface final : public DisplaySurface {
   SceneViewState scene_view_;
   PanelViewState panel_view_;
   OpenViewState open_view_;
+  LegendViewState legend_view_;
+  WindowPart legend_part_;  // what the legend covers
+  NotesViewState notes_view_;
+  NotesWish notes_wish_;
   WidgetLog widget_log_ = WidgetLog::from_environment();
   LauncherLines launcher_;
   std::unique_ptr<ControlDesk> desk_;
   HoleMeter holes_;
-  uint32_t background_ = 0;  // of the frame at hand
+  bool quad_buffers_ = false;  // the window has them
+  uint32_t background_ = 0;    // of the frame at hand
   Screenshots screenshots_;
 };
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/scene/session.h"
+#include "common/scene/settings.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -114,11 +115,14 @@ Result<std::string> go(const wire::Order& order, const FrameHands& hands) {
   return std::string("{}");
 }
 
-Result<std::string> overlay(const wire::Order& order, const FrameHands& hands) {
-  const std::string on = scene::value_or(order.arguments, "on", std::string());
-  if (on != "on" && on != "off") return Error{fmt::format("overlay: \"{}\" is not on or off", on.substr(0, 40))};
-  const Status s = hands.overlay(scene::value_or(order.arguments, "name", std::string()), on == "on");
-  if (!s) return s.error();
+Result<std::string> set(const wire::Order& order, const FrameHands& hands) {
+  const auto argument = [&](const char* name) { return scene::value_or(order.arguments, name, std::string()); };
+  const bool overlay = order.command == "overlay";
+  const std::string value = argument(overlay ? "on" : "value");
+  if (overlay && value != "on" && value != "off")
+    return Error{fmt::format("overlay: \"{}\" is not on or off", value.substr(0, 40))};
+  if (const Status s = hands.set(overlay ? argument("name") : order.command, value); !s)
+    return Error{order.command + ": " + s.error().text};
   return std::string("{}");
 }
 
@@ -128,7 +132,9 @@ Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands)
   if (order.command == "pick") return pick(order, hands);
   if (order.command == "where") return where(hands);
   if (order.command == "go") return go(order, hands);
-  if (order.command == "overlay") return overlay(order, hands);
+  if (const auto* setting = scene::setting_of_order(order.command);
+      setting && setting->keeper == scene::Keeper::kViewer)
+    return set(order, hands);
   return Error{fmt::format("a viewer does not know the order '{}'", order.command.substr(0, 64))};
 }
 

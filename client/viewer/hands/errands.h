@@ -21,8 +21,9 @@ struct FrameHands {
   std::function<std::optional<Pick>(double x_pix, double y_pix, double opacity)> pick;
   /// Puts the camera there. False: the head follows a trajectory.
   std::function<bool(const geometry::Pose&)> go;
-  /// Shows or hides what lies over the picture. Error: there is no such overlay, or nobody sees them.
-  std::function<Status(const std::string& name, bool on)> overlay;
+  /// Changes a setting of this viewer (scene::settings()), or shows and hides what lies over the picture ("axes", ...:
+  /// on or off). Error: it cannot have this value, or nobody sees it.
+  std::function<Status(const std::string& name, const std::string& value)> set;
 };
 
 /// JSON. Error: what is wrong with the order, for the person.
@@ -32,6 +33,7 @@ struct FrameHands {
 ///   where  {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
 ///   go     "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
 ///   overlay  "name", "on": on or off. {}
+///   an order of scene::settings() that a viewer keeps   "value". {}
 Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands);
 
 inline constexpr double kPickOpacity = volume::kSolid;

@@ -41,7 +41,13 @@ Status HandOverlays::show(const std::string& name, bool on) {
       shown_.erase(known);
   }
   if (found) return ok_status();
-  return Error{fmt::format("overlay: \"{}\" is none of axes, scale, cursor, fps and all", name.substr(0, 40))};
+  return Error{fmt::format("\"{}\" is none of axes, scale, cursor, fps and all", name.substr(0, 40))};
+}
+
+std::map<std::string, std::string> HandOverlays::values() const {
+  std::map<std::string, std::string> out;
+  for (const char* name : kNames) out[name] = shows(name) ? "on" : "off";
+  return out;
 }
 
 void HandOverlays::toggle_all() {

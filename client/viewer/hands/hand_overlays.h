@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -22,6 +23,8 @@ class HandOverlays {
   Status show(const std::string& name, bool on);
   void toggle_all();
   bool shows(const std::string& name) const { return shown_.contains(name); }
+  /// "on" or "off" of each, by its name.
+  std::map<std::string, std::string> values() const;
   bool any() const { return !shown_.empty(); }
 
   void on_terms(std::shared_ptr<const SceneTerms> terms) { terms_ = std::move(terms); }

@@ -21,12 +21,7 @@ std::vector<Panel::Plot> make_plots() {
 
 }  // namespace
 
-Panel::Panel(Setup setup)
-    : setup_(std::move(setup)),
-      shown_(setup_.shown),
-      look_(setup_.look),
-      sampling_(setup_.sampling),
-      plots_(make_plots()) {}
+Panel::Panel(Setup setup) : setup_(std::move(setup)), shown_(setup_.shown), plots_(make_plots()) {}
 
 // Means of half a second: single frames say nothing about them.
 void Panel::count_rates(const PanelFigures& f) {
@@ -91,11 +86,14 @@ std::vector<std::string> Panel::news(double now_s) const {
   return {messages_.back().text};
 }
 
-void Panel::choose_look(const Look& look) {
-  look_ = look;
-  look_.most_detail = std::clamp(look.most_detail, Look::kLeastDetail, 1.0);
-  if (setup_.transparent) look_.background = setup_.look.background;
-  wished_look_ = look_;
+std::string Panel::value(const std::string& order) const {
+  const auto found = values_.find(order);
+  return found == values_.end() ? std::string() : found->second;
+}
+
+void Panel::choose(const std::string& order, const std::string& value) {
+  values_[order] = value;
+  chosen_.emplace_back(order, value);
 }
 
 void Panel::choose_coupling(const CouplingState& wish) {
@@ -105,17 +103,6 @@ void Panel::choose_coupling(const CouplingState& wish) {
   if (coupling.mode == CouplingMode::kLoose) arguments["buffers"] = std::to_string(coupling.buffers);
   wished_coupling_ = coupling;
   order({"coupling", std::move(arguments), "coupling"});
-}
-
-void Panel::on_told_sampling(double least) {
-  if (!setup_.sampling_chosen) sampling_.least_sampling = least;
-}
-
-void Panel::choose_sampling(const SamplingWish& sampling) {
-  if (sampling == sampling_) return;
-  setup_.sampling_chosen = true;
-  sampling_ = sampling;
-  wished_sampling_ = sampling;
 }
 
 }  // namespace telesplat::viewer

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,9 +11,7 @@
 #include <vector>
 
 #include "client/viewer/coupling/coupling.h"
-#include "client/viewer/coupling/sampling_wish.h"
 #include "client/viewer/input/interaction.h"
-#include "client/viewer/input/look.h"
 #include "client/viewer/input/picture_wish.h"
 #include "client/viewer/panel/history.h"
 #include "client/viewer/panel/order.h"
@@ -41,11 +40,8 @@ struct PanelFigures {
 class Panel {
  public:
   struct Setup {
-    Look look;
     bool transparent = false;  ///< the background is not the person's to choose
-    SamplingWish sampling;
-    bool sampling_chosen = false;  ///< its least sampling, by a flag
-    std::string viewer;            ///< this viewer's name, for orders that are meant for it alone
+    std::string viewer;        ///< this viewer's name, for orders that are meant for it alone
     bool shown = false;
     bool opens = false;  ///< other data sets can be opened here
   };
@@ -82,10 +78,11 @@ class Panel {
   void on_figures(const PanelFigures& figures);
   /// The session shows a scene of this kind.
   void on_scene(scene::Pipeline pipeline) { pipeline_ = pipeline; }
+  void on_kind(std::optional<scene::Kind> kind) { kind_ = kind; }
   /// Whether a plot means something for what is shown: slice images have no holes.
   bool means_something(const Plot& plot) const;
-  /// What keys changed.
-  void on_look(const Look& look) { look_ = look; }
+  /// The window's settings as texts, by their orders (scene::settings()).
+  void on_values(std::map<std::string, std::string> values) { values_ = std::move(values); }
   void on_answer(double now_s, const OrderAnswer& answer);
   /// Nothing: the master did not answer; then `problem` says why.
   void on_status(double now_s, const std::optional<SessionStatus>& status, const std::string& problem);
@@ -99,9 +96,10 @@ class Panel {
   const std::vector<Plot>& plots() const { return plots_; }
   double frames_a_second() const { return frames_a_second_; }
   scene::Pipeline pipeline() const { return pipeline_; }
+  std::optional<scene::Kind> kind() const { return kind_; }
   const Setup& setup() const { return setup_; }
-  const Look& look() const { return look_; }
-  const SamplingWish& sampling() const { return sampling_; }
+  /// Empty: it is not known.
+  std::string value(const std::string& order) const;
   /// The coupling in force, or the one that was ordered and is not in force yet.
   const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.coupling; }
   bool coupling_pending() const { return wished_coupling_.has_value(); }
@@ -113,19 +111,16 @@ class Panel {
   std::vector<std::string> news(double now_s) const;
 
   // ---- the person ----
-  void choose_look(const Look& look);
+  /// As an order of `telesplat ctl` to this window.
+  void choose(const std::string& order, const std::string& value);
   void choose_coupling(const CouplingState& coupling);
-  void choose_sampling(const SamplingWish& sampling);
-  /// What the session tells viewers to sample at least; nothing where the person or a flag chose.
-  void on_told_sampling(double least);
   /// As if the person pressed this key.
   void press(Key key) { pressed_.push_back(key); }
   void choose_picture(const PictureWish& wish) { wished_picture_ = wish; }
   void order(Order order) { orders_.push_back(std::move(order)); }
 
   // ---- what comes of it, once each ----
-  std::optional<Look> take_look() { return std::exchange(wished_look_, std::nullopt); }
-  std::optional<SamplingWish> take_sampling() { return std::exchange(wished_sampling_, std::nullopt); }
+  std::vector<std::pair<std::string, std::string>> take_chosen() { return std::exchange(chosen_, {}); }
   std::vector<Key> take_pressed() { return std::exchange(pressed_, {}); }
   std::optional<PictureWish> take_picture() { return std::exchange(wished_picture_, std::nullopt); }
   std::vector<Order> take_orders() { return std::exchange(orders_, {}); }
@@ -135,15 +130,14 @@ class Panel {
 
   Setup setup_;
   bool shown_;
-  Look look_;
-  SamplingWish sampling_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
+  std::optional<scene::Kind> kind_;
   PanelFigures figures_, rated_;  // the newest; those that rates were last counted from
   double frames_a_second_ = 0;
   std::vector<Plot> plots_;
   std::optional<CouplingState> wished_coupling_;
-  std::optional<Look> wished_look_;
-  std::optional<SamplingWish> wished_sampling_;
+  std::map<std::string, std::string> values_;
+  std::vector<std::pair<std::string, std::string>> chosen_;
   std::vector<Order> orders_;
   std::vector<Key> pressed_;
   std::optional<PictureWish> wished_picture_;

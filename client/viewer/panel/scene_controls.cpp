@@ -21,6 +21,8 @@ constexpr double kFirstLength_s = 10;
 void SceneControls::on_session(double now_s, const wire::Welcome& session) {
   kind_ = scene::SessionView(session).kind();
   told_ = session.parameters;
+  colours_.on_session(now_s, session);
+  cut_.on_session(now_s, session);
   std::erase_if(wishes_, [&](const auto& w) {
     const auto told = told_.find(w.first);
     return now_s - w.second.since_s > kPatience_s || (told != told_.end() && told->second == w.second.value);
@@ -39,6 +41,8 @@ void SceneControls::on_session(double now_s, const wire::Welcome& session) {
 void SceneControls::on_answer(const OrderAnswer& answer) {
   if (answer.obeyed) return;
   if (answer.order.command == "tf") transfer_.on_refusal();
+  if (answer.order.command == "colour") colours_.on_refusal();
+  if (answer.order.command == "clip") cut_.on_refusal();
   if (answer.order.command == "set")
     for (const auto& [name, value] : answer.order.arguments) wishes_.erase(name);
 }

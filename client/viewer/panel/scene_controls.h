@@ -1,5 +1,6 @@
-// What a person can change of a session's scene: a volume's transfer function and step, a Julia set's parameters and
-// timeline. Orders come out, as `telesplat ctl` gives them. No window, no OpenGL, no sockets.
+// What a person can change of a session's scene: its colours, what is cut away, a volume's transfer function and step,
+// a Julia set's parameters and timeline. Orders come out, as `telesplat ctl` gives them. No window, no OpenGL, no
+// sockets.
 #pragma once
 
 #include <functional>
@@ -9,6 +10,8 @@
 #include <vector>
 
 #include "client/viewer/panel/order.h"
+#include "client/viewer/panel/scene/colour_controls.h"
+#include "client/viewer/panel/scene/cut_controls.h"
 #include "client/viewer/panel/transfer_editor.h"
 #include "common/julia/parameters.h"
 #include "common/julia/timeline.h"
@@ -24,7 +27,7 @@ class SceneControls {
   static constexpr double kPatience_s = 3;    ///< a value that was set is shown until the session has it, so long
   static constexpr double kLongest_s = 3600;  ///< of a timeline
 
-  explicit SceneControls(Give give) : give_(std::move(give)) {}
+  explicit SceneControls(Give give) : give_(std::move(give)), colours_(give_), cut_(give_) {}
 
   // ---- facts ----
   void on_session(double now_s, const wire::Welcome& session);
@@ -34,6 +37,9 @@ class SceneControls {
 
   std::optional<scene::Kind> kind() const { return kind_; }
   const std::string& playing() const { return playing_; }
+
+  ColourControls& colours() { return colours_; }
+  CutControls& cut() { return cut_; }
 
   // ---- volumes ----
   const TransferEditor& transfer() const { return transfer_; }
@@ -68,6 +74,8 @@ class SceneControls {
   void wish(double now_s, const std::string& name, double value);
 
   Give give_;
+  ColourControls colours_;
+  CutControls cut_;
   std::optional<scene::Kind> kind_;
   TransferEditor transfer_;
   std::optional<volume::Session> volume_;

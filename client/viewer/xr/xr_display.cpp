@@ -205,7 +205,9 @@ class XrDisplay {
                   .terms = worker_.terms(),
                   .pick = [&](double x, double y, double opacity) { return source_->pick(left_, x, y, opacity); },
                   .go = [](const geometry::Pose&) { return false; },
-                  .overlay = [](const std::string&, bool) -> Status { return Error{"overlay: a headset has none"}; }});
+                  .set = [](const std::string&, const std::string&) -> Status {
+                    return Error{"a headset's display keeps what it began with"};
+                  }});
       worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});
     }
   }

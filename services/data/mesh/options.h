@@ -19,6 +19,7 @@ struct StoreOptions : PlacementOptions {
 /// What a mesh is coloured by, as people give it.
 struct ColouringOptions {
   std::string by;               ///< scene::parse_colour_by(); empty: the file's own colours
+  bool by_file = false;         ///< `by` is what the file marks: its own colours count where that is no good
   std::string map = "viridis";  ///< colour::resolve_colour_map()
 };
 

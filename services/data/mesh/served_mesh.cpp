@@ -50,6 +50,7 @@ class ServedMesh final : public Served {
         title_(std::move(title)),
         as_begun_(std::move(colours.as_begun)),
         map_(std::move(colours.map)),
+        iso_(colours.iso),
         stores_(store_, as_begun_ ? as_begun_->array : "", std::move(colours.open)) {}
 
   scene::Kind kind() const override { return scene::Kind::kMesh; }
@@ -73,7 +74,13 @@ class ServedMesh final : public Served {
                         {"up", info.up},
                         {"from_cache", info.from_cache ? "true" : "false"},
                         {"content_hash", fmt::format("{:016x}", info.content_hash)}});
-    if (!info.arrays.empty()) hello.facts[scene::kArraysFact] = scene::to_text(info.arrays);
+    if (iso_) {
+      hello.facts[scene::kIsoFact] = fmt::format("{}", *iso_);
+      if (!info.arrays.empty() && !info.arrays[0].spans.empty())
+        hello.facts[scene::kIsoFact] += fmt::format(" {} {}", info.arrays[0].spans[0].lo, info.arrays[0].spans[0].hi);
+    } else if (!info.arrays.empty()) {
+      hello.facts[scene::kArraysFact] = scene::to_text(info.arrays);
+    }
     if (as_begun_) hello.facts[scene::kColouringFact] = scene::to_text(*as_begun_);
     hello.facts[scene::kColourMapFact] = colour::to_text(map_);
     if (const auto rotation = rotation_for_up(info.up); rotation && !info.box_data.empty())
@@ -144,6 +151,7 @@ class ServedMesh final : public Served {
   const std::string title_;
   const std::optional<scene::Colouring> as_begun_;
   const colour::ColourMap map_;
+  const std::optional<double> iso_;
   ArrayStores stores_;
   ListLimit lists_;
   InstanceId master_;

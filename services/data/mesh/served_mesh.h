@@ -16,6 +16,7 @@ namespace telesplat::data {
 struct ServedColours {
   std::optional<scene::Colouring> as_begun;  ///< nothing: the file's own colours
   colour::ColourMap map;                     ///< of arrays that are asked for later
+  std::optional<double> iso;                 ///< of an isosurface: its value
   /// Opens the same mesh with this array in its chunks (empty: none), making the store if need be. Called in a thread
   /// of its own; what progress throws ends it.
   std::function<Result<std::shared_ptr<MeshStore>>(const std::string& array, const Progress& progress)> open;

@@ -82,7 +82,10 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
   }
   auto mesh = import("VTK's surface", {"iso", name}, input);
   close(input);
-  if (mesh) mesh->frame = volume.box();
+  if (!mesh) return mesh;
+  mesh->frame = volume.box();
+  // The store keeps what other values a surface may have.
+  mesh->arrays = {{.name = "value", .unit = {}, .spans = {{volume.lo, volume.hi}}}};
   return mesh;
 }
 

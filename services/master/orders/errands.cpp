@@ -2,14 +2,35 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <utility>
+
+#include "common/scene/session.h"
+#include "common/scene/settings.h"
 
 namespace telesplat::master {
 
 Result<uint64_t> Errands::begin(const std::string& peer, std::set<std::string> asked, double now_s) {
   if (errands_.size() >= kMost) return Error{fmt::format("{} orders wait for their answers, limit {}", kMost, kMost)};
-  errands_[++last_] = {peer, std::move(asked), {}, now_s + kPatience_s};
+  errands_[++last_] = {peer, std::move(asked), {}, now_s + kPatience_s, {}};
   return last_;
+}
+
+Result<uint64_t> Errands::ask_launcher(const std::string& peer, const wire::Control& order,
+                                       const std::string& started_by, double now_s) {
+  if (started_by.empty() || started_by == "hand")
+    return Error{fmt::format("{}: this session was started by hand: whoever started its processes starts and ends them",
+                             order.command)};
+  auto number = begin(peer, {kLauncher}, now_s);
+  if (number) errands_[*number].wish = order;
+  return number;
+}
+
+std::map<uint64_t, wire::Control> Errands::wishes() const {
+  std::map<uint64_t, wire::Control> out;
+  for (const auto& [number, errand] : errands_)
+    if (errand.wish) out.emplace(number, *errand.wish);
+  return out;
 }
 
 std::optional<Errands::Reply> Errands::answered(const std::string& from, const wire::OrderAnswer& answer) {
@@ -50,9 +71,24 @@ std::vector<Errands::Reply> Errands::overdue(double now_s) {
 }
 
 std::string errand_for(const std::string& command) {
-  for (const char* of_viewer : {"pick", "where", "go", "overlay"})
+  for (const char* of_viewer : {"pick", "where", "go"})
     if (command == of_viewer) return "viewer";
-  return command == "probe" ? "data" : "";
+  if (command == "probe") return "data";
+  const auto* setting = scene::setting_of_order(command);
+  if (!setting) return "";
+  return setting->keeper == scene::Keeper::kViewer     ? "viewer"
+         : setting->keeper == scene::Keeper::kLauncher ? Errands::kLauncher
+                                                       : "";
+}
+
+Result<wire::OrderAnswer> read_done(const wire::Control& m) {
+  const std::string number = scene::value_or(m.arguments, "number", std::string());
+  wire::OrderAnswer out{.ok = scene::value_or(m.arguments, "ok", std::string()) == "true",
+                        .text = scene::value_or(m.arguments, "text", std::string())};
+  const auto read = std::from_chars(number.data(), number.data() + number.size(), out.number);
+  if (number.empty() || read.ec != std::errc() || read.ptr != number.data() + number.size())
+    return Error{fmt::format("done: \"{}\" is no order's number", number.substr(0, 40))};
+  return out;
 }
 
 }  // namespace telesplat::master

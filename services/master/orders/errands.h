@@ -26,6 +26,13 @@ class Errands {
   /// An order that these processes (routing ids) have been sent, under this number; the first answer that is good
   /// counts, and if none is the last one. Error: too many are under way.
   Result<uint64_t> begin(const std::string& peer, std::set<std::string> asked, double now_s);
+  /// Likewise an order to the launcher, which is no process of the session: it finds the order among wishes(), and
+  /// answers as kLauncher. Only sessions that a launcher started have one.
+  Result<uint64_t> ask_launcher(const std::string& peer, const wire::Control& order, const std::string& started_by,
+                                double now_s);
+  static constexpr const char* kLauncher = "launcher";
+  /// Orders to the launcher that have no answer yet, by their numbers.
+  std::map<uint64_t, wire::Control> wishes() const;
   /// from: who answers. Of each that was asked one answer counts. Nothing: others may still answer, nobody waits for it
   /// any more, or this one was not asked.
   std::optional<Reply> answered(const std::string& from, const wire::OrderAnswer& answer);
@@ -40,12 +47,16 @@ class Errands {
     std::set<std::string> open;  // who has not answered yet
     std::string refusal;         // what the last one said that could not; empty: none did yet
     double until_s = 0;
+    std::optional<wire::Control> wish;  // for the launcher
   };
   uint64_t last_ = 0;
   std::map<uint64_t, Errand> errands_;
 };
 
-/// Who carries out an order of `telesplat ctl`: "viewer" or "data"; empty: it is none that the master passes on.
+/// Who carries out an order of `telesplat ctl`: "viewer", "data" or Errands::kLauncher; empty: the master does.
 std::string errand_for(const std::string& command);
+
+/// "done", by which the launcher answers: arguments "number", "ok" (true or false) and "text". Error: it is no answer.
+Result<wire::OrderAnswer> read_done(const wire::Control& command);
 
 }  // namespace telesplat::master

@@ -275,10 +275,24 @@ class Errands : public testing::Test {
                      return out;
                    },
                    .go = [this](const geometry::Pose& p) { return gone = p, true; },
-                   .overlay = [](const std::string&, bool) { return ok_status(); }};
+                   .set = [this](const std::string& name, const std::string& value) -> Status {
+                     if (value == "wrong") return Error{"it is wrong"};
+                     return changed[name] = value, ok_status();
+                   }};
+  std::map<std::string, std::string> changed;
   double opacity = 0;
   geometry::Pose gone;
 };
+
+TEST_F(Errands, ASettingOfTheWindowIsChangedOrRefusedByItsName) {
+  EXPECT_TRUE(order("splat", {{"value", "ewa"}}));
+  EXPECT_EQ(changed["splat"], "ewa");
+  EXPECT_TRUE(order("overlay", {{"name", "axes"}, {"on", "off"}}));
+  EXPECT_EQ(changed["axes"], "off");
+  EXPECT_EQ(order("stereo", {{"value", "wrong"}}).error().text, "stereo: it is wrong");
+  EXPECT_FALSE(order("overlay", {{"name", "axes"}, {"on", "perhaps"}}));
+  EXPECT_FALSE(order("clip", {{"value", "off"}})) << "the master's";
+}
 
 TEST_F(Errands, APickIsToldInTheDatasTerms) {
   const auto done = order("pick", {{"at", "200,100"}});

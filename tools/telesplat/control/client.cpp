@@ -60,6 +60,10 @@ void ControlClient::request_status() {
   if (line().socket.send(wire::Control{"status", {}})) ++line_->due;
 }
 
+void ControlClient::tell(const std::string& command, const std::map<std::string, std::string>& arguments) {
+  if (line().socket.send(wire::Control{command, arguments})) ++line_->due;
+}
+
 std::optional<nlohmann::json> ControlClient::poll_status() {
   std::optional<nlohmann::json> out;
   if (!line_) return out;

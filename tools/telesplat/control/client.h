@@ -28,6 +28,8 @@ class ControlClient {
   /// Sends "status" without waiting; poll_status() gives the answer once it is there, unless ask() or order() comes
   /// before.
   void request_status();
+  /// Says something whose answer nobody waits for.
+  void tell(const std::string& command, const std::map<std::string, std::string>& arguments);
   /// Nobody takes connections at the master's address any more, since the last answer.
   bool nobody_there() const;
   std::optional<nlohmann::json> poll_status();

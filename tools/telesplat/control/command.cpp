@@ -14,6 +14,7 @@
 #include "tools/telesplat/control/hands.h"
 #include "tools/telesplat/control/list.h"
 #include "tools/telesplat/control/orders.h"
+#include "tools/telesplat/control/settings.h"
 #include "tools/telesplat/control/status_text.h"
 
 namespace telesplat::launcher {
@@ -104,6 +105,7 @@ Command control_command() {
   out.commands.push_back(coupling_command());
   for (Command& command : hands_commands()) out.commands.push_back(std::move(command));
   for (const Order& order : orders()) out.commands.push_back(order_command(order));
+  for (Command& command : setting_commands()) out.commands.push_back(std::move(command));
   return out;
 }
 

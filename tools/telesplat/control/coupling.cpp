@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "common/scene/settings.h"
 #include "common/wire/limits.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/control/choice.h"
@@ -52,7 +53,7 @@ int order(CouplingOptions o, const options::Given& given) {
 }  // namespace
 
 Command coupling_command() {
-  return make_command("coupling", "change how displays and server wait for each other", table, order);
+  return make_command("coupling", scene::help_of_order("coupling"), table, order);
 }
 
 }  // namespace telesplat::launcher

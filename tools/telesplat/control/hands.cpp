@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "common/notes/shelf.h"
+#include "common/scene/settings.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/control/choice.h"
 #include "tools/telesplat/control/json_fields.h"
@@ -286,8 +287,8 @@ int keep_notes(KeptOptions o, const options::Given& given) {
 std::vector<Command> hands_commands() {
   return {make_command("pick", "what lies at places of a viewer's display, in the data's own coordinates", pick_table,
                        pick),
-          make_command("bookmark", "views of the data set that are kept beside it", bookmark_table, bookmark),
-          make_command("notes", "notes about the data set that are kept beside it", notes_table, keep_notes)};
+          make_command("bookmark", scene::help_of_order("bookmark"), bookmark_table, bookmark),
+          make_command("notes", scene::help_of_order("notes"), notes_table, keep_notes)};
 }
 
 }  // namespace telesplat::launcher

@@ -10,6 +10,7 @@
 #include "common/julia/flags.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/colouring.h"
+#include "common/scene/settings.h"
 #include "common/volume/session.h"
 
 namespace telesplat::launcher {
@@ -146,45 +147,44 @@ Result<Arguments> clip_arguments(const Words& words, ControlClient&) {
   return Arguments{{"clip", text}};
 }
 
-}  // namespace
-
-const std::vector<Order>& orders() {
-  static const std::vector<Order> all{
+// Without a help it is that of the settings that it changes.
+std::vector<Order> all_orders() {
+  std::vector<Order> all{
       {.name = "stop", .help = "end the session: the master writes the record, everyone exits", .words = {}},
       {.name = "epoch", .help = "drop all points and sample anew", .words = {}},
-      {.name = "set",
-       .help = "change a Julia set's parameters, or a series' volume.step",
-       .words = "NAME=VALUE, such as c.y=0.3 or volume.step=3",
-       .read = set_arguments},
+      {.name = "set", .words = "NAME=VALUE, such as c.y=0.3 or volume.step=3", .read = set_arguments},
       {.name = "animate",
-       .help = "change parameters with time, or play a series",
        .words = "a timeline as --animate of run takes it, or off; for a series of volumes on or off",
        .read = animate_arguments},
       {.name = "play",
-       .help = "go on with an animation or a series, pause it, or go a step",
        .words = "play, pause, or step N: N steps of a series, or tenths of a second of an animation, farther on (back "
                 "if it is below 0)",
        .read = play_arguments},
       {.name = "overlay",
-       .help = "show or hide what lies over a window's picture",
        .words = "NAME on or NAME off; NAME is axes, scale, cursor, fps or all",
        .read = overlay_arguments},
       {.name = "tf",
-       .help = "change a volume's transfer function",
        .words = "as --tf of run: a preset (" + preset_names() +
                 "), a ParaView JSON file, or points VALUE:COLOUR:OPACITY,...",
        .read = transfer_arguments},
       {.name = "colour",
-       .help = "colour a mesh by another array, range or colour map",
        .words = "ARRAY[:MIN:MAX] as --colour-by of run, or none; map NAME, NAME as --colour-map of run; or both: ARRAY "
                 "map NAME",
        .read = colour_arguments},
       {.name = "clip",
-       .help = "cut part of the data away, so that what lies behind is seen",
        .words = "in the data's own coordinates: plane x>=50% (x, y, z; >= or <=; a number or a share of the data's "
                 "box) or plane A,B,C,D keeps A x + B y + C z >= D; box X0,Y0,Z0,X1,Y1,Z1 keeps the inside; several "
                 "are separated by \";\"; off: nothing is cut away",
        .read = clip_arguments}};
+  for (Order& order : all)
+    if (order.help.empty()) order.help = scene::help_of_order(order.name);
+  return all;
+}
+
+}  // namespace
+
+const std::vector<Order>& orders() {
+  static const std::vector<Order> all = all_orders();
   return all;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 
 #include "common/core/clock.h"
@@ -42,13 +43,34 @@ Status Pipeline::start_servers() {
   Member packer{
       .role = "packer", .name = "packer", .arguments = packer_arguments(o), .nice = o.viewer.xr ? nice : nice / 2};
   if (const Status s = group_.start(std::move(packer)); !s) return s;
-  for (int i = 1; i <= o.samplers; ++i) {
-    Member sampler{
-        .role = "sampler", .name = fmt::format("sampler-{}", i), .arguments = sampler_arguments(o), .nice = nice};
-    for (const auto place : {links::Place::kSampler, links::Place::kData})
-      if (const Status s = put_link(place, place == links::Place::kData ? "data" : sampler.name, sampler); !s) return s;
-    if (const Status s = group_.start(std::move(sampler)); !s) return s;
+  while (last_sampler_ < o.samplers)
+    if (const Status s = start_sampler(++last_sampler_); !s) return s;
+  return ok_status();
+}
+
+Status Pipeline::start_sampler(int number) {
+  Member sampler{.role = "sampler",
+                 .name = fmt::format("sampler-{}", number),
+                 .arguments = sampler_arguments(options_),
+                 .nice = options_.background_servers ? 10 : 0};
+  for (const auto place : {links::Place::kSampler, links::Place::kData})
+    if (const Status s = put_link(place, place == links::Place::kData ? "data" : sampler.name, sampler); !s) return s;
+  return group_.start(std::move(sampler));
+}
+
+// One that is told to finish hands back what it holds; its end is no reason to start it again.
+Status Pipeline::set_samplers(int count) {
+  if (!options_.join_master.empty()) return Error{"samplers: the session is another's, and so are its samplers"};
+  std::vector<Member*> here;
+  for (Member& m : group_.members())
+    if (m.role == "sampler" && m.process && !m.given_up) here.push_back(&m);
+  options_.samplers = count;
+  for (; int(here.size()) > count; here.pop_back()) {
+    here.back()->given_up = true;
+    here.back()->process->signal(SIGTERM);
   }
+  for (int n = int(here.size()); n < count; ++n)
+    if (const Status s = start_sampler(++last_sampler_); !s) return s;
   return ok_status();
 }
 
@@ -65,8 +87,10 @@ Status Pipeline::start_data() {
   return ok_status();
 }
 
-Status Pipeline::open(const RunOptions& options) {
+Status Pipeline::open(const RunOptions& options, bool goes_back) {
   group_.end("data");
+  before_.reset();
+  if (goes_back) before_ = options_.data;
   chosen_ = true;
   progress_.clear();
   options_.data = options.data;
@@ -171,6 +195,11 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     const State state = m.again_s ? start_again(m, news) : ended(m, news);
     if (state != State::kRunning) return state;
   }
+  if (std::exchange(goes_back_, false)) {
+    RunOptions back = options_;
+    back.data = *before_;
+    if (const Status s = open(back); !s) news.push_back(s.error().text);
+  }
   if (progress_ != told_progress_) {
     told_progress_ = progress_;
     tell_viewers(progress_.empty() ? "progress" : "progress " + progress_);
@@ -209,6 +238,7 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
     m.given_up = true;
     progress_.clear();
     tell_viewers("problem " + news.back());
+    goes_back_ = before_.has_value();
     return State::kRunning;
   }
   const double now_s = monotonic_s();

@@ -61,7 +61,12 @@ class Pipeline {
   /// Says something to the viewers that it started with a window (viewer::LauncherLines).
   void tell_viewers(const std::string& line);
   /// The session goes on with the data set of these options: other data servers take the place of those that are there.
-  Status open(const RunOptions& options);
+  /// goes_back: where they cannot be served, those that were there before are again.
+  Status open(const RunOptions& options, bool goes_back = false);
+  /// What the data set is read with that is shown.
+  const data::DataServiceOptions& data() const { return options_.data; }
+  /// From now on so many samplers run here: others are started, or the newest ones told to finish.
+  Status set_samplers(int count);
   /// Ends everything: viewers first, then a "stop" to the master, then whoever is left.
   void finish();
   /// After that: somebody could not write all of the record.
@@ -71,6 +76,7 @@ class Pipeline {
   Pipeline(const RunOptions& options, ProcessGroup group);
   Status start_servers();
   Status start_data();
+  Status start_sampler(int number);
   Status start_viewers(double clock_from_s);
   Status start_wall();
   /// Puts the link of a place, if there is one, before a process that is not started yet, or before several: starts its
@@ -94,6 +100,9 @@ class Pipeline {
   bool chosen_ = false;  // the data set, by a person at a window: one that cannot be read does not end the session
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;
+  std::optional<data::DataServiceOptions> before_;  // shown again if what was chosen cannot be
+  bool goes_back_ = false;                          // to that, with the next supervise()
+  int last_sampler_ = 0;                            // number
 };
 
 }  // namespace telesplat::launcher

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "client/viewer/display/window.h"
@@ -20,6 +21,7 @@
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/client.h"
+#include "tools/telesplat/control/wishes.h"
 #include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/after_run.h"
 #include "tools/telesplat/run/live_figures.h"
@@ -132,6 +134,7 @@ class Run {
       }
       if (const auto status = control.poll_status()) {
         heard = true;
+        if (o_.join_master.empty()) follow_orders(*status, pipeline, control);
         read_status(*status, figures, live);
       }
       if (!heard && monotonic_s() - begin_s > kSilence_s) {
@@ -154,6 +157,49 @@ class Run {
     if (opened) return;
     pipeline.tell_viewers("problem " + opened.error().text);
     progress_.line("telesplat: " + opened.error().text);
+  }
+
+  // What people ordered of this process, by way of the master (scene::Keeper::kLauncher).
+  void follow_orders(const nlohmann::json& status, Pipeline& pipeline, ControlClient& control) {
+    for (const Wish& wish : wishes_of(status)) {
+      if (!obeyed_.emplace(wish.master, wish.number).second) continue;
+      const auto done = obey(wish, pipeline);
+      control.tell("done", {{"number", fmt::format("{}", wish.number)},
+                            {"ok", done ? "true" : "false"},
+                            {"text", done ? *done : done.error().text}});
+    }
+  }
+
+  Result<std::string> obey(const Wish& wish, Pipeline& pipeline) {
+    if (wish.order == "samplers") {
+      RunOptions wanted = o_;
+      if (const Status s = options::set(*options::find(table(wanted), "--samplers"), wish.value); !s) return s.error();
+      if (const Status s = pipeline.set_samplers(wanted.samplers); !s) return s.error();
+      return fmt::format("{} sampler{}", wanted.samplers, wanted.samplers == 1 ? "" : "s");
+    }
+    const Status opened = wish.order == "open" ? try_open(pipeline, wish.value) : reopen(pipeline, wish);
+    if (!opened) return opened.error();
+    return wish.order == "open" ? "opening " + wish.value
+                                : fmt::format("the data set is opened anew: {} {}", wish.order, wish.value);
+  }
+
+  // The same data set, read with another value of a flag.
+  Status reopen(Pipeline& pipeline, const Wish& wish) {
+    if (!o_.out.empty()) return Error{wish.order + ": a session that is recorded keeps its data set"};
+    RunOptions other = o_;
+    other.data = pipeline.data();
+    const options::Table flags = data::scene_table(other.data);
+    const auto* flag = options::find(flags, "--" + wish.order);
+    if (!flag || other.data.scene.empty()) return Error{wish.order + ": no data set is shown"};
+    const auto before = scene_of(other.data);
+    if (!before) return before.error();
+    if (const Status s = options::refuse_misfits(flags, {"--" + wish.order}, (*before)->kind(), other.data.scene); !s)
+      return s;
+    if (const Status s = options::set(*flag, wish.value); !s) return s;
+    const auto scene = scene_of(other.data);
+    if (!scene) return scene.error();
+    if (const Status s = (*scene)->check(); !s) return s;
+    return pipeline.open(other, true);
   }
 
   Status try_open(Pipeline& pipeline, const std::string& wish) {
@@ -271,8 +317,9 @@ class Run {
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
   bool folder_existed_ = false, record_failed_ = false;
-  std::string master_folder_;         // where the session's record is; empty: not known, or nowhere
-  std::vector<std::string> results_;  // of the viewers of a joined session
+  std::string master_folder_;                       // where the session's record is; empty: not known, or nowhere
+  std::vector<std::string> results_;                // of the viewers of a joined session
+  std::set<std::pair<uint64_t, uint64_t>> obeyed_;  // orders: master, number
   PassingFolder logs_;
   tools::ProgressLine progress_;
   AfterRun after_{o_, scene_.get(), movie_, progress_};  // last: it uses the others

@@ -7,9 +7,10 @@
 #include <array>
 #include <cmath>
 
+#include "client/viewer/panel/gui/setting_rows.h"
 #include "client/viewer/panel/gui/widgets.h"
-#include "common/splat/kernel_traits.h"
-#include "common/wire/limits.h"
+#include "common/geometry/camera.h"
+#include "common/image/shading.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -17,13 +18,7 @@ namespace {
 constexpr float kWidth = 24, kPlotHeight = 2.4f;              // in letters' heights
 constexpr size_t kColumns = 160;                              // of a plot
 constexpr ImU32 kProblem = IM_COL32(0xd5, 0x5e, 0x00, 0xff);  // Okabe and Ito's vermilion
-constexpr std::array<std::pair<int, int>, 6> kSizes{
-    {{640, 400}, {960, 600}, {1280, 800}, {1600, 1000}, {1920, 1200}, {2560, 1600}}};
 constexpr std::array<std::pair<int, int>, 4> kPictures{{{1920, 1080}, {2560, 1600}, {3840, 2160}, {7680, 4320}}};
-// Backgrounds that data of any colour stands out from.
-constexpr std::array<std::pair<const char*, uint32_t>, 4> kBackgrounds{
-    {{"night", 0x141820}, {"black", 0x000000}, {"grey", 0x777777}, {"white", 0xffffff}}};
-
 std::string picture_size(const PictureWish& wish) { return fmt::format("{} x {}", wish.width, wish.height); }
 
 // From 0 to a round number above all values.
@@ -74,117 +69,6 @@ void show_figures(const Panel& panel, double now_s) {
   for (const auto& plot : panel.plots()) {
     if (panel.means_something(plot)) show_plot(plot, now_s);
   }
-}
-
-void show_coupling(Panel& panel) {
-  CouplingState state = panel.coupling();
-  row("coupling");
-  if (begin_list("coupling", coupling_name(state.mode))) {
-    for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose})
-      if (choice("coupling", coupling_name(mode), mode == state.mode))
-        panel.choose_coupling(coupling_state(mode, std::max(3, state.buffers)));
-    ImGui::EndCombo();
-  }
-  hint(
-      "async: the display never waits; sync: each frame waits for its own view update; loose: for the next of several");
-  if (state.mode == CouplingMode::kLoose) {
-    row("buffers");
-    if (seen("slider", "buffers",
-             ImGui::SliderInt("##buffers", &state.buffers, 1, int(wire::kMaxBuffers), "%d",
-                              ImGuiSliderFlags_AlwaysClamp)))
-      panel.choose_coupling(state);
-  }
-  if (panel.coupling_pending()) ImGui::TextDisabled("  not in force yet");
-}
-
-void show_background(Panel& panel, Look& look, bool& changed) {
-  if (panel.setup().transparent) return;
-  const uint32_t now = look.background;
-  float colour[3] = {float(now >> 16 & 255) / 255, float(now >> 8 & 255) / 255, float(now & 255) / 255};
-  row("background");
-  if (seen("colour", "background", ImGui::ColorEdit3("##background", colour, ImGuiColorEditFlags_NoInputs))) {
-    const auto byte = [](float v) { return uint32_t(std::clamp(v, 0.0f, 1.0f) * 255 + 0.5f); };
-    look.background = byte(colour[0]) << 16 | byte(colour[1]) << 8 | byte(colour[2]);
-    changed = true;
-  }
-  for (const auto& [name, value] : kBackgrounds) {
-    ImGui::SameLine();
-    if (!small_button(name)) continue;
-    look.background = value;
-    changed = true;
-  }
-}
-
-void show_points_look(Look& look, double detail, bool& changed) {
-  row("splats");
-  if (begin_list("splats", splat::kernel_name(look.render.kernel).data())) {
-    for (const auto kernel : splat::kKernels)
-      if (choice("splats", splat::kernel_name(kernel).data(), kernel == look.render.kernel))
-        look.render.kernel = kernel, changed = true;
-    ImGui::EndCombo();
-  }
-  row("finish");
-  changed |= checkbox("fill", &look.render.finish.fill);
-  hint("pixels inside a surface that show nothing, or something farther, are filled");
-  ImGui::SameLine();
-  changed |= checkbox("smooth", &look.render.finish.smooth);
-  hint("interpolates between magnified splats of one surface");
-  ImGui::SameLine();
-  changed |= checkbox("antialias", &look.render.finish.antialias);
-  hint("silhouettes; and still pictures become finer only with it");
-  row("detail");
-  float most = float(look.most_detail);
-  const std::string shown = fmt::format("at most %.2f, now {:.2f}", detail);
-  if (seen("slider", "detail",
-           ImGui::SliderFloat("##detail", &most, float(Look::kLeastDetail), 1, shown.c_str(),
-                              ImGuiSliderFlags_AlwaysClamp)))
-    look.most_detail = double(most), changed = true;
-  hint("points drawn on each axis for a sample or a display pixel; less is coarser and faster");
-  row("light");
-  const int light = !look.lit ? 2 : look.head_light ? 1 : 0;
-  for (const auto& [index, name] : {std::pair{0, "lit"}, {1, "head"}, {2, "unlit"}}) {
-    if (index > 0) ImGui::SameLine();
-    if (!radio_button(name, light == index)) continue;
-    look.lit = index != 2;
-    if (look.lit) look.head_light = index == 1;
-    changed = true;
-  }
-  hint("lit: a light from the upper left and the head's; head: the head's alone; unlit: colours as they are");
-}
-
-void show_display(Panel& panel) {
-  show_coupling(panel);
-  Look look = panel.look();
-  bool changed = false;
-  if (panel.pipeline() == scene::Pipeline::kPoints) show_points_look(look, panel.figures().detail, changed);
-  show_background(panel, look, changed);
-  if (changed) panel.choose_look(look);
-}
-
-void show_sampling(Panel& panel) {
-  const auto& f = panel.figures();
-  SamplingWish wish = panel.sampling();
-  const auto name = [](int width, int height) { return fmt::format("{} x {}", width, height); };
-  row("size");
-  if (begin_list("size", wish.adaptive ? "auto" : name(wish.width, wish.height).c_str())) {
-    if (choice("size", "auto", wish.adaptive)) wish.adaptive = true;
-    for (const auto& [width, height] : kSizes)
-      if (choice("size", name(width, height), !wish.adaptive && wish.width == width && wish.height == height))
-        wish.adaptive = false, wish.width = width, wish.height = height;
-    ImGui::EndCombo();
-  }
-  hint("auto: as fine as view updates in time allow; else so many pixels, in the window's shape");
-  if (wish.adaptive) {
-    row("at least");
-    float least = float(wish.least_sampling);
-    if (seen("slider", "at least",
-             ImGui::SliderFloat("##least", &least, 0.1f, 1, "%.2f of a pixel", ImGuiSliderFlags_AlwaysClamp)))
-      wish.least_sampling = double(least);
-    hint("sampled pixels a displayed pixel, on each axis");
-  }
-  row("now");
-  text(f.sampled_width > 0 ? name(f.sampled_width, f.sampled_height) : "-");
-  panel.choose_sampling(wish);
 }
 
 // Buttons are keys: both do the same.
@@ -264,13 +148,22 @@ double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::
   if (ImGui::Begin("panel", nullptr, kFixed)) {
     dialog("panel", nullptr);
     text(panel.figures().scene.empty() ? "Telesplat" : panel.figures().scene);
-    ImGui::TextDisabled("Tab hides this, F1 lists keys");
+    if (small_button("hide")) panel.press(Key::kTab);
+    ImGui::SameLine();
+    ImGui::TextDisabled("as Tab does; F1 lists keys");
     for (const auto& line : panel.news(now_s)) ImGui::TextWrapped("%s", line.c_str());
     if (panel.setup().opens && button("open ...")) panel.press(Key::kO);
     if (section("Figures", true)) show_figures(panel, now_s);
     if (section("Display", true)) show_display(panel);
-    if (section("Sampling", true)) show_sampling(panel);
+    if (panel.pipeline() == scene::Pipeline::kPoints && section("Light", false))
+      setting_list(panel, "shading",
+                   std::vector<std::string>(image::kShadingNames.begin(), image::kShadingNames.end()));
     for (const auto& show : more) show(panel);
+    if (section("Over the picture", false)) show_over_the_picture(panel);
+    if (section("Sampling", false)) show_sampling(panel);
+    if (section("Samplers", false)) show_samplers(panel, state.settings);
+    if (section("Stereo", false)) show_stereo(panel);
+    if (section("Data", false)) show_data(panel, state.settings, panel.kind());
     if (section("Pictures and paths", false)) show_pictures(panel, state);
     if (section("Session", false)) show_session(panel);
     if (section("Messages", true)) show_messages(panel);

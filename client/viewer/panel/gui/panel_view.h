@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "client/viewer/panel/gui/settings_view.h"
 #include "client/viewer/panel/panel.h"
 
 namespace telesplat::viewer {
@@ -14,6 +15,7 @@ using PanelSection = std::function<void(Panel&)>;
 /// What the panel keeps between frames that nobody else needs.
 struct PanelViewState {
   PictureWish picture;
+  SettingsViewState settings;
 };
 
 /// Builds the panel. Between Dear ImGui's frames, now_s: monotonic clock. Returns its width: it lies at the left side,

@@ -148,10 +148,14 @@ void show_timeline(SceneControls& controls, SceneViewState& state) {
 }  // namespace
 
 void show_scene(SceneControls& controls, SceneViewState& state, double now_s, const std::function<void()>& save) {
+  if (controls.colours().iso() && section("Isosurface", true)) show_isosurface(controls.colours(), state.colours);
+  if (controls.kind() == scene::Kind::kMesh && !controls.colours().iso() && section("Colours", true))
+    show_colours(controls.colours(), now_s);
   if (controls.kind() == scene::Kind::kVolume && controls.volume()) {
     if (section("Transfer function", true)) show_transfer(controls, state.transfer, now_s, save);
     if (controls.volume()->steps > 1 && section("Series", true)) show_series(controls, now_s);
   }
+  if (controls.kind() && section("Cut", false)) show_cut(controls.cut(), state.colours, now_s);
   if (controls.kind() != scene::Kind::kJulia) return;
   if (section("Parameters", true))
     for (const auto& info : julia::parameter_infos())

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "client/viewer/panel/gui/colour_view.h"
 #include "client/viewer/panel/gui/transfer_view.h"
 #include "client/viewer/panel/scene_controls.h"
 
@@ -12,6 +13,7 @@ namespace telesplat::viewer {
 
 /// What the parts keep between frames.
 struct SceneViewState {
+  ColourViewState colours;
   TransferViewState transfer;
   int parameter = 0;  ///< index into parameter_infos(), of new key frames
   double key_s = 5;   ///< where they go

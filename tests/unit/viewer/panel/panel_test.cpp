@@ -92,7 +92,7 @@ TEST_F(HoleMeterTest, ASingleHoleIsFoundInOneOfTheTurns) {
 
 class PanelTest : public testing::Test {
  protected:
-  static Panel::Setup setup() { return {.look = {}, .sampling = {}, .viewer = "viewer-1"}; }
+  static Panel::Setup setup() { return {.viewer = "viewer-1"}; }
   Panel panel_{setup()};
 };
 
@@ -125,30 +125,16 @@ TEST_F(PanelTest, HolesThatAreNotKnownArePlottedNowhere) {
   EXPECT_TRUE(panel_.means_something(panel_.plots()[0]));
 }
 
-TEST_F(PanelTest, ALookIsTakenOnceAndStaysWithinItsLimits) {
-  EXPECT_FALSE(panel_.take_look());
-  Look look;
-  look.render.kernel = splat::Kernel::kEwa;
-  look.most_detail = 0.01;
-  look.background = 0xffffff;
-  panel_.choose_look(look);
-  const auto taken = panel_.take_look();
-  ASSERT_TRUE(taken);
-  EXPECT_EQ(taken->render.kernel, splat::Kernel::kEwa);
-  EXPECT_EQ(taken->most_detail, Look::kLeastDetail);
-  EXPECT_EQ(taken->background, 0xffffffu);
-  EXPECT_FALSE(panel_.take_look());
-}
-
-TEST_F(PanelTest, ATransparentBackgroundStays) {
-  auto s = setup();
-  s.transparent = true;
-  s.look.background = 0;
-  Panel panel(s);
-  Look look = s.look;
-  look.background = 0xffffff;
-  panel.choose_look(look);
-  EXPECT_EQ(panel.take_look()->background, 0u);
+TEST_F(PanelTest, WhatIsChosenOfTheWindowIsTakenOnceAndShownAtOnce) {
+  EXPECT_EQ(panel_.value("splat"), "");
+  panel_.on_values({{"splat", "disc"}, {"legend", "on"}});
+  panel_.choose("splat", "ewa");
+  EXPECT_EQ(panel_.value("splat"), "ewa");
+  EXPECT_EQ(panel_.value("legend"), "on");
+  EXPECT_EQ(panel_.take_chosen(), (std::vector<std::pair<std::string, std::string>>{{"splat", "ewa"}}));
+  EXPECT_TRUE(panel_.take_chosen().empty());
+  panel_.on_values({{"splat", "disc"}});
+  EXPECT_EQ(panel_.value("splat"), "disc") << "the window did not take it";
 }
 
 TEST_F(PanelTest, ACouplingIsOrderedForThisViewerAndPendingUntilItIsInForce) {
@@ -183,16 +169,6 @@ TEST_F(PanelTest, WhatIsRefusedIsToldAndNotPendingAnyMore) {
   EXPECT_EQ(panel_.messages().back().text, "epoch: epoch 2");
 }
 
-TEST_F(PanelTest, SamplingIsWishedOnceForEachChange) {
-  panel_.choose_sampling({});
-  EXPECT_FALSE(panel_.take_sampling());
-  panel_.choose_sampling({.adaptive = false, .width = 640, .height = 400});
-  const auto wish = panel_.take_sampling();
-  ASSERT_TRUE(wish);
-  EXPECT_EQ(wish->width, 640);
-  EXPECT_FALSE(panel_.take_sampling());
-}
-
 TEST_F(PanelTest, NewsAreWhatIsMissingElseAYoungMessage) {
   EXPECT_TRUE(panel_.news(0).empty());
   panel_.tell(10, "screenshot: a.png");
@@ -218,15 +194,6 @@ TEST_F(PanelTest, AServiceThatIsMissingForAMomentIsNotTold) {
   EXPECT_EQ(panel_.messages().size(), 3u);
   panel_.on_progress("reading a.ply 43 %");
   EXPECT_EQ(panel_.news(14), std::vector<std::string>{"reading a.ply 43 %"});
-}
-
-TEST_F(PanelTest, WhatTheSessionTellsToSampleIsShownUntilThePersonChooses) {
-  panel_.on_told_sampling(0.4);
-  EXPECT_EQ(panel_.sampling().least_sampling, 0.4);
-  EXPECT_FALSE(panel_.take_sampling()) << "it is in force already";
-  panel_.choose_sampling({.adaptive = true, .least_sampling = 0.8});
-  panel_.on_told_sampling(0.4);
-  EXPECT_EQ(panel_.sampling().least_sampling, 0.8);
 }
 
 TEST_F(PanelTest, MessagesAreBounded) {

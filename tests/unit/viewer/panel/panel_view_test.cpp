@@ -8,9 +8,12 @@
 #include <random>
 #include <set>
 
+#include "client/viewer/display/settings/view_settings.h"
+#include "client/viewer/panel/gui/notes_view.h"
 #include "client/viewer/panel/gui/scene_view.h"
 #include "client/viewer/panel/gui/style.h"
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/scene/settings.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -28,6 +31,15 @@ wire::Welcome session_of(scene::Kind kind) {
   wire::Welcome w;
   w.facts["kind"] = std::string(scene::name_of(kind));
   if (kind == scene::Kind::kJulia) w.parameters = julia::to_map(julia::presets()[0].parameters);
+  if (kind == scene::Kind::kMesh) {
+    const std::vector<scene::ArrayInfo> arrays{{.name = "heat", .spans = {{-3, 5}}},
+                                               {.name = "age", .spans = {{0, 1}}}};
+    w.facts[scene::kArraysFact] = scene::to_text(arrays);
+    w.facts[scene::kColouringFact] =
+        scene::to_text(*scene::make_colouring(arrays, {"heat"}, *colour::find_colour_map("viridis")));
+  }
+  w.facts[scene::kPlacementFact] = scene::to_text(
+      scene::placement_of(glm::dmat3(1.0), {{0, 0, 0}, {2, 1, 1}}, {{-1, -0.5f, -0.5f}, {1, 0.5f, 0.5f}}));
   if (kind != scene::Kind::kVolume) return w;
   const auto s = volume_session();
   w.facts.merge(volume::to_facts(s));
@@ -38,7 +50,7 @@ wire::Welcome session_of(scene::Kind kind) {
 
 class PanelView : public testing::TestWithParam<scene::Kind> {
  protected:
-  PanelView() : panel_({.look = {}, .sampling = {}, .viewer = "viewer-1", .shown = true, .opens = true}) {
+  PanelView() : panel_({.viewer = "viewer-1", .shown = true, .opens = true}) {
     context_ = ImGui::CreateContext();
     ImGuiIO& io = ImGui::GetIO();
     io.IniFilename = nullptr;
@@ -49,6 +61,8 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
     int width = 0, height = 0;
     io.Fonts->GetTexDataAsAlpha8(&pixels, &width, &height);
     panel_.on_scene(scene::pipeline_of(GetParam()));
+    panel_.on_kind(GetParam());
+    settings_.sampling = {.adaptive = true};
     welcome_ = session_of(GetParam());
     controls_.on_session(0, welcome_);
   }
@@ -63,22 +77,28 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
                        .latency_ms = 90,
                        .points_drawn = 100'000,
                        .hole_share = 0.01,
+                       .coupling = coupling_,
                        .scene = "a scene"});
     ImGui::NewFrame();
-    show_panel(panel_, view_, now_s_,
-               {[&](Panel&) { show_scene(controls_, scene_view_, now_s_, [this] { ++saved_; }); }});
+    show_panel(panel_, view_, now_s_, {[&](Panel&) {
+                 show_scene(controls_, scene_view_, now_s_, [this] { ++saved_; });
+                 notes_ = show_notes(&book_, notes_view_, true, now_s_);
+               }});
     ImGui::Render();
     for (auto& order : panel_.take_orders()) check(order);
-    if (const auto look = panel_.take_look()) {
-      EXPECT_GE(look->most_detail, Look::kLeastDetail);
-      EXPECT_LE(look->background, 0xffffffu);
-      ++looks_;
+    for (const auto& [name, value] : panel_.take_chosen()) {
+      ++chosen_;
+      if (overlays_.contains(name)) {
+        EXPECT_TRUE(value == "on" || value == "off") << name << " " << value;
+        overlays_[name] = value;
+      } else if (const Status s = change(settings_, name, value); !s) {
+        // These two need what the window began with.
+        EXPECT_TRUE(name == "stereo" && (value == "autostereo" || value == "quad-buffer")) << s.error().text;
+      }
     }
-    if (const auto wish = panel_.take_sampling()) {
-      EXPECT_TRUE(wish->adaptive || (wish->width >= 16 && wish->height >= 16));
-      EXPECT_TRUE(wish->least_sampling >= 0.1 && wish->least_sampling <= 1) << wish->least_sampling;
-      ++samplings_;
-    }
+    auto values = values_of(settings_);
+    values.insert(overlays_.begin(), overlays_.end());
+    panel_.on_values(std::move(values));
     if (const auto wish = panel_.take_picture()) {
       EXPECT_TRUE(wish->width >= 0 && wish->width <= geometry::kMaxImageSide);
       EXPECT_TRUE(wish->height >= 0 && wish->height <= geometry::kMaxImageSide);
@@ -105,6 +125,14 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
     } else if (order.command == "animate") {
       const std::string& text = order.arguments.at("timeline");
       EXPECT_TRUE(text == "on" || text == "off" || julia::parse_timeline(text)) << text;
+    } else if (order.command == "colour") {
+      if (order.arguments.contains("array")) EXPECT_TRUE(scene::parse_colour_by(order.arguments.at("array")));
+      if (order.arguments.contains("map")) EXPECT_TRUE(colour::from_text(order.arguments.at("map")));
+    } else if (order.command == "clip") {
+      EXPECT_TRUE(scene::parse_clip(order.arguments.at("clip"))) << order.arguments.at("clip");
+    } else if (const auto* setting = scene::setting_of_order(order.command);
+               setting && setting->keeper == scene::Keeper::kLauncher) {
+      EXPECT_FALSE(order.arguments.at("value").empty());
     } else {
       EXPECT_EQ(order.command, "coupling");
       EXPECT_EQ(order.arguments.at("viewer"), "viewer-1");
@@ -118,7 +146,13 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
   SceneViewState scene_view_;
   wire::Welcome welcome_;
   double now_s_ = 1;
-  int saved_ = 0, looks_ = 0, samplings_ = 0;
+  CouplingState coupling_;
+  ViewSettings settings_;
+  std::map<std::string, std::string> overlays_{{"axes", "off"}, {"scale", "off"}, {"cursor", "off"}, {"fps", "off"}};
+  notes::Book book_{{{"a view", {}, ""}}, {{1, "a note", glm::dvec3(1, 2, 3), "", ""}}};
+  NotesViewState notes_view_;
+  NotesWish notes_;
+  int saved_ = 0, chosen_ = 0;
   std::set<std::string> orders_;
 };
 
@@ -147,10 +181,56 @@ TEST_P(PanelView, AHandThatClicksEverywhereOrdersNothingWrong) {
     if (number(10) == 0) io.AddInputCharactersUTF8("9e9");
     if (number(40) == 0) controls_.on_session(now_s_, welcome_);
   }
-  EXPECT_GT(looks_, 0);
-  EXPECT_TRUE(orders_.contains("coupling"));
+  EXPECT_GT(chosen_, 0);
+  EXPECT_FALSE(orders_.empty());
   if (GetParam() == scene::Kind::kVolume) EXPECT_TRUE(orders_.contains("tf"));
   if (GetParam() == scene::Kind::kJulia) EXPECT_TRUE(orders_.contains("set"));
+}
+
+// All sections are opened; what needs an isosurface or loose coupling gets it.
+TEST_P(PanelView, HasEverySettingOfItsKind) {
+  WidgetLog log("widgets-of-no-folder/list");
+  ImGuiIO& io = ImGui::GetIO();
+  io.DisplaySize = {1280, 6000};
+  const auto logged_frame = [&] {
+    const LoggedBuild logged(log);
+    frame();
+  };
+  const auto look_at_all = [&] {
+    for (const char* section : {"Light", "Over the picture", "Sampling", "Samplers", "Stereo", "Data", "Cut",
+                                "Bookmarks and notes", "Pictures and paths", "Colours", "Isosurface"}) {
+      logged_frame();
+      const auto found = log.widgets().find("panel/" + std::string(section));
+      if (found == log.widgets().end() || !found->second.here) continue;
+      const auto rect = found->second.rect;
+      io.MousePos = {(rect.left + rect.right) / 2, (rect.top + rect.bottom) / 2};
+      const float before = ImGui::GetIO().DisplaySize.y;
+      for (const bool down : {false, true, false, false}) {
+        io.MouseDown[0] = down;
+        logged_frame();
+      }
+      EXPECT_EQ(before, ImGui::GetIO().DisplaySize.y);
+    }
+  };
+  panel_.on_figures({.now_s = now_s_, .coupling = coupling_state(CouplingMode::kLoose, 3)});
+  coupling_ = coupling_state(CouplingMode::kLoose, 3);
+  look_at_all();
+  if (GetParam() == scene::Kind::kMesh) {
+    welcome_.facts[scene::kIsoFact] = "3 0 10";
+    controls_.on_session(now_s_, welcome_);
+    logged_frame();
+    logged_frame();
+  }
+  for (const auto& setting : scene::settings()) {
+    if (!setting.kinds.has(GetParam())) continue;
+    const bool elsewhere = setting.widget.find('/') != setting.widget.npos;
+    const std::string widget(setting.widget.empty() ? setting.name : setting.widget);
+    const std::string whole = elsewhere ? widget : std::string(setting.section) + "/" + widget;
+    EXPECT_TRUE(log.widgets().contains(whole)) << "the panel has no " << whole;
+  }
+  if (GetParam() == scene::Kind::kJulia)
+    for (const auto& info : julia::parameter_infos())
+      if (info.animates) EXPECT_TRUE(log.widgets().contains("Parameters/" + std::string(info.name))) << info.name;
 }
 
 TEST_P(PanelView, TheLogHasItsWidgetsWhereTheyAreAndCountsTheirUse) {

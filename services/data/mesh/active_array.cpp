@@ -1,0 +1,73 @@
+#include "services/data/mesh/active_array.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "services/data/base/mapped_file.h"
+#include "services/data/mesh/reader.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr size_t kMostName = 200;
+constexpr size_t kNoMark = std::string_view::npos;
+
+// What the readers take for colours of the mesh.
+bool names_colours(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  for (const char* colours : {"rgb", "rgba", "color", "colors", "colours", "color_0"})
+    if (name == colours) return true;
+  return false;
+}
+
+// Of an XML tag "<PointData ... Scalars="NAME" ...>".
+std::string attribute(std::string_view tag, std::string_view name) {
+  const size_t at = tag.find(" " + std::string(name) + "=\"");
+  if (at == kNoMark) return {};
+  const size_t begin = at + name.size() + 3, end = tag.find('"', begin);
+  return end == kNoMark || end - begin > kMostName ? std::string() : std::string(tag.substr(begin, end - begin));
+}
+
+std::string active_of_xml(std::string_view text) {
+  text = text.substr(0, text.find("<AppendedData"));
+  for (const char* part : {"<PointData", "<CellData"}) {
+    const size_t at = text.find(part);
+    if (at == kNoMark) continue;
+    const std::string_view tag = text.substr(at, text.find('>', at) - at);
+    if (std::string name = attribute(tag, "Scalars"); !name.empty()) return name;
+  }
+  return {};
+}
+
+// "SCALARS NAME TYPE" below "POINT_DATA N" or "CELL_DATA N"; the first one is active.
+std::string active_of_legacy(std::string_view text) {
+  for (const char* part : {"\nPOINT_DATA ", "\nCELL_DATA "}) {
+    const size_t from = text.find(part);
+    if (from == kNoMark) continue;
+    const std::string_view other = part[1] == 'P' ? "\nCELL_DATA " : "\nPOINT_DATA ";
+    const size_t at = text.find("\nSCALARS ", from);
+    if (at == kNoMark || at > text.find(other, from)) continue;
+    const size_t begin = at + 9, end = text.find_first_of(" \n\r", begin);
+    if (end != kNoMark && end - begin <= kMostName) return std::string(text.substr(begin, end - begin));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string active_array(std::string_view text) {
+  const std::string_view head = text.substr(0, 1024);
+  std::string name = head.find("<VTKFile") != kNoMark     ? active_of_xml(text)
+                     : head.starts_with("# vtk DataFile") ? active_of_legacy(text)
+                                                          : std::string();
+  return names_colours(name) ? std::string() : name;
+}
+
+std::string active_array_of(const std::string& path) {
+  const auto file = MappedFile::open(path);
+  if (!file) return {};
+  const auto text = (*file)->text();
+  return has_arrays(detect_format(text, path).format) ? active_array(text) : std::string();
+}
+
+}  // namespace telesplat::data
