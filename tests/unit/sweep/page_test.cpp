@@ -102,7 +102,7 @@ TEST(SweepPage, HasAPlotForEachFigureAndPanel) {
   EXPECT_EQ(count(page, "data-tip="), 24u);
   EXPECT_EQ(count(page, "<circle "), 24u);
   EXPECT_EQ(count(page, "<polyline "), 8u);
-  EXPECT_NE(page.find("<h1>Sweep mine</h1>"), std::string::npos);
+  EXPECT_NE(page.find("<h1>Sweep of julia: samplers, coupling, splat</h1>"), std::string::npos);
   EXPECT_EQ(page.find("http"), std::string::npos) << "it needs nothing from elsewhere";
   EXPECT_EQ(page.find("nan"), std::string::npos);
 }
@@ -117,6 +117,16 @@ TEST(SweepPage, NumbersStandInTheirOrder) {
   ASSERT_NE(ten, std::string::npos);
   EXPECT_LT(one, two);
   EXPECT_LT(two, ten);
+}
+
+TEST(SweepPage, ValuesOfUpTo24LettersStandWhole) {
+  Grid grid;
+  grid.scene = "data/lucy.ply";
+  grid.axes = {{"link", {"local", "50ms:20mbit", "rtt=40ms,rate=100mbit,jitter=5ms"}}};
+  const std::string page = to_html(record_of(grid), manifest_of(grid), "/nowhere/sweep");
+  EXPECT_NE(page.find(">50ms:20mbit<title>"), std::string::npos);
+  EXPECT_EQ(page.find(">rtt=40ms,rate=100mbit,jitter=5ms<title>"), std::string::npos) << "a plot has a width";
+  EXPECT_NE(page.find("<h1>Sweep of lucy.ply: link</h1>"), std::string::npos);
 }
 
 TEST(SweepPage, TellsNoiseAndFailures) {

@@ -220,6 +220,14 @@ std::string facts(const SweepRecord& record, const Manifest& m) {
   return out + "</dl>\n";
 }
 
+// "Sweep of lucy.ply: coupling, link"
+std::string title_of(const Grid& grid) {
+  std::string out = "Sweep";
+  if (!grid.scene.empty()) out += " of " + std::filesystem::path(grid.scene).filename().string();
+  for (size_t i = 0; i < grid.axes.size(); ++i) out += (i ? ", " : ": ") + grid.axes[i].flag;
+  return out;
+}
+
 }  // namespace
 
 PlotLayout layout_of(const Grid& grid) {
@@ -249,10 +257,10 @@ PlotLayout layout_of(const Grid& grid) {
 std::string to_html(const SweepRecord& record, const Manifest& manifest, const std::string& directory) {
   std::vector<std::string> noisy;
   for (const Noise& n : noises(record)) noisy.push_back(sentence(record, n));
-  const std::string name = std::filesystem::path(directory).filename().string();
+  const std::string name = title_of(record.grid);
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width\">\n<title>Sweep {0}</title>\n<style>{1}</style></head><body>\n<h1>Sweep {0}</h1>\n"
+      "content=\"width=device-width\">\n<title>{0}</title>\n<style>{1}</style></head><body>\n<h1>{0}</h1>\n"
       "{2}{3}{4}<h2>Figures</h2>\n<p>Median of the runs of each configuration; whiskers from the least to the most."
       "</p>\n{5}{6}<div id=\"tip\" hidden></div><script>{7}</script></body></html>\n",
       escaped(name), page_style(), facts(record, manifest), list_of("Too noisy", "noise", noisy),

@@ -31,7 +31,7 @@ svg .t { fill: var(--ink) } svg .n { text-anchor: end } svg .k { text-anchor: mi
 .legend { margin: 4px 0 } .legend span { margin-right: 12px } .legend i { display: inline-block; width: 10px; height: 10px;
   background: currentColor; border-radius: 2px; margin-right: 5px }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums } th, td { padding: 3px 9px; text-align: right;
-  border-bottom: 1px solid var(--grid); white-space: nowrap } th { color: var(--faint); font-weight: 600 }
+  border-bottom: 1px solid var(--grid) } td.f { white-space: nowrap } th { color: var(--faint); font-weight: 600 }
 .f { text-align: left } a { color: var(--c0) }
 #tip { position: fixed; pointer-events: none; white-space: pre; background: var(--ink); color: var(--paper); padding: 5px 9px;
   border-radius: 4px; font-size: 12px; z-index: 9 }

@@ -14,10 +14,16 @@ namespace {
 // Pixels of SVG.
 constexpr double kLeft = 46, kRight = 8, kTop = 20, kBottom = 22, kHeight = 110;
 constexpr double kLeastCategory = 62, kSeries = 15, kGap = 14, kWhisker = 3;
+constexpr double kLetter = 6.2, kMostLetters = 24;  // of a category's name
 constexpr double kAlike = 1e-9;
 constexpr double kBeside = 7;  // between lines, so that their whiskers do not cover each other
 
-double column_width(const Plot& plot) { return std::max(kLeastCategory, double(plot.series.size()) * kSeries + kGap); }
+double column_width(const Plot& plot) {
+  double letters = 0;
+  for (const std::string& name : plot.categories)
+    letters = std::max(letters, std::min(double(name.size()), kMostLetters));
+  return std::max({kLeastCategory, letters * kLetter + kGap, double(plot.series.size()) * kSeries + kGap});
+}
 
 class Drawing {
  public:
@@ -57,7 +63,7 @@ class Drawing {
       add("<text class=\"n\" x=\"{:.1f}\" y=\"{:.1f}\">{:.6g}</text>", kLeft - 5, y(v) + 3.5,
           std::abs(v) < scale_.step / 100 ? 0.0 : v);
     }
-    const auto letters = size_t(std::max(4.0, column_ / 6.2));
+    const auto letters = size_t(std::max(4.0, column_ / kLetter));
     for (size_t c = 0; c < plot_.categories.size(); ++c)
       add("<text class=\"k\" x=\"{:.1f}\" y=\"{:.1f}\">{}<title>{}</title></text>", kLeft + column_ * (double(c) + 0.5),
           kTop + kHeight + 15, escaped(tools::shortened(plot_.categories[c], letters)), escaped(plot_.categories[c]));
