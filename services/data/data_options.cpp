@@ -109,15 +109,10 @@ Table mesh_table(MeshOptions& o) {
        .is_file = true},
       {.flag = "--cache",
        .value = folder(o.cache_dir),
-       .help = "folder of the chunk store; default: telesplat in the user's cache folder",
-       .fits = kMeshes,
+       .help = "folder of the chunk store, which meshes alone have; default: telesplat in the user's cache folder",
        .reach = Reach::kRecorded,
        .not_in_scene = "where data sets are kept"},
-      {.flag = "!--no-cache",
-       .value = &o.use_cache,
-       .help = "keep no chunk store",
-       .fits = kMeshes,
-       .reach = Reach::kRecorded},
+      {.flag = "!--no-cache", .value = &o.use_cache, .help = "keep no chunk store", .reach = Reach::kRecorded},
   };
 }
 

@@ -38,6 +38,7 @@ bool is_mesh_file(const std::string& path);
 std::string why_no_mesh(const std::string& path);
 
 struct VolumeFileFacts {
+  std::string path;  ///< as it was asked for
   VolumeSource source;
   Volume volume;                         ///< the first step, without its voxels
   uint64_t file_bytes = 0;               ///< of all steps; a DICOM folder's files together

@@ -124,6 +124,7 @@ void describe_steps(const VolumeFileFacts& facts, Description& out) {
 Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOptions& options,
                                        const PlacementOptions& placement, const Progress& progress) {
   VolumeFileFacts facts;
+  facts.path = path;
   const auto source = find_volume(path, options.raw, options.series);
   if (!source) return source.error();
   facts.source = *source;
@@ -155,9 +156,10 @@ Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOpti
 }
 
 Description describe(const VolumeFileFacts& facts) {
-  Description out("volume", fmt::format("{}: a volume{}", facts.source.name,
+  Description out("volume", fmt::format("{}: a volume{}", facts.path,
                                         facts.source.steps.size() > 1 ? " that changes with time" : ""));
   out.row("format", fmt::format("{}, {}", facts.volume.format, bytes_text(facts.file_bytes)));
+  out.json["path"] = facts.path;
   out.json["name"] = facts.source.name;
   out.json["format"] = facts.volume.format;
   out.json["bytes"] = facts.file_bytes;

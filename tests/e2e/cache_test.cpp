@@ -34,13 +34,17 @@ class Cache : public testing::Test {
 };
 
 TEST_F(Cache, ProgressIsToldInWordsAndGrowthOnce) {
-  write_terrain(folder_ / "terrain.ply", 50);
+  write_terrain(folder_ / "terrain.ply", 50), write_terrain(folder_ / "small.ply", 4);
+  EXPECT_EQ(data("small.ply")->out().find("note "), std::string::npos) << "a small cache is not worth a word";
+  for (const auto& entry : fs::directory_iterator(folder_ / "cache"))
+    if (entry.path().extension() == ".mesh") fs::resize_file(entry.path(), 1'200'000'000);
   auto first = data("terrain.ply");
   EXPECT_TRUE(wait_until([&] { return first->out().find("\nnote ") != std::string::npos; }));
   const std::string told = first->out();
-  for (const char* part : {"progress identifying terrain.ply 1.000", "progress reading terrain.ply 1.000",
-                           "progress sorting into chunks 1.000", "progress writing the store 1.000",
-                           "note telesplat: the cache holds 1 store, ", "telesplat cache limit 20GB bounds it"})
+  for (const char* part :
+       {"progress identifying terrain.ply 1.000", "progress reading terrain.ply 1.000",
+        "progress sorting into chunks 1.000", "progress writing the store 1.000",
+        "note telesplat: the cache holds 2 stores, 1.2 GB, ", "telesplat cache limit 20GB bounds it"})
     EXPECT_NE(told.find(part), std::string::npos) << part << " in\n" << told;
   for (const char* part : {"hash", "classify", "progress write ", "progress chunk "})
     EXPECT_EQ(told.find(part), std::string::npos) << part << " in\n" << told;

@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -79,6 +80,54 @@ TEST_F(Inspect, ARasterThatRunTakesIsNoPicture) {
   EXPECT_EQ(json["room"]["up"], "-y");
 }
 
+// A loop over files of all kinds needs no exception.
+TEST_F(Inspect, EveryKindTakesTheCachesFlagsAndIsCalledAsItWasTyped) {
+  write_terrain(folder_ / "hill.ply", 4), write_volume(folder_ / "balls.mha"), write_png(folder_ / "dem.png", 16);
+  for (const auto& [file, what] :
+       {std::pair{"hill.ply", ": a mesh\n"}, {"balls.mha", ": a volume\n"}, {"dem.png", ": an elevation raster\n"}}) {
+    ASSERT_EQ(inspect({folder_ / file, "--no-cache"}), 0) << err_;
+    EXPECT_TRUE(tells(folder_ / file + what)) << out_;
+    ASSERT_EQ(inspect({folder_ / file, "--cache", folder_ / "cache"}), 0) << err_;
+    EXPECT_FALSE(tells("the cache holds")) << "some kilobytes are not worth a word: " << out_;
+  }
+  EXPECT_EQ(inspect({"julia", "--no-cache"}), 0) << err_;
+}
+
+// As small GeoTIFFs are: 8 bits a sample, one strip; with a place by its corner and the size of a sample in degrees.
+void write_tiff(const std::string& path, bool placed) {
+  const auto put = [](std::string& to, uint64_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) to += char(value >> (8 * i));
+  };
+  constexpr uint32_t kSide = 16, kPixels = 8, kTable = kPixels + kSide * kSide;
+  const uint16_t entries = placed ? 11 : 9;
+  const uint32_t doubles = kTable + 2 + entries * 12u + 4;
+  std::string out = "II*";
+  out += '\0';
+  put(out, kTable, 4);
+  for (uint32_t i = 0; i < kSide * kSide; ++i) out += char(i % 251);
+  put(out, entries, 2);
+  const auto entry = [&](uint16_t tag, uint16_t type, uint32_t count, uint32_t value) {
+    put(out, tag, 2), put(out, type, 2), put(out, count, 4), put(out, value, 4);
+  };
+  entry(256, 4, 1, kSide), entry(257, 4, 1, kSide), entry(258, 3, 1, 8), entry(259, 3, 1, 1), entry(262, 3, 1, 1);
+  entry(273, 4, 1, kPixels), entry(277, 3, 1, 1), entry(278, 4, 1, kSide), entry(279, 4, 1, kSide * kSide);
+  if (placed) entry(33550, 12, 3, doubles), entry(33922, 12, 6, doubles + 24);
+  put(out, 0, 4);
+  for (const double d : {0.001, 0.001, 0.0, 0.0, 0.0, 0.0, 12.0, 50.0, 0.0}) {
+    uint64_t bits = 0;
+    std::memcpy(&bits, &d, sizeof bits);
+    put(out, bits, 8);
+  }
+  std::ofstream(path, std::ios::binary) << out;
+}
+
+TEST_F(Inspect, ARasterOf8BitsHasHeightsIfItHasAPlace) {
+  write_tiff(folder_ / "photo.tif", false), write_tiff(folder_ / "dem.tif", true);
+  expect_refused({folder_ / "photo.tif", "--no-cache"}, "photo.tif: has samples of 8 bits and no place on earth");
+  ASSERT_EQ(inspect({folder_ / "dem.tif", "--no-cache"}), 0) << err_;
+  EXPECT_TRUE(tells("an elevation raster") && tells("of Byte") && tells("west 12")) << out_;
+}
+
 TEST_F(Inspect, WarningsDoNotGetIntoTheJson) {
   write_terrain(folder_ / "hill.ply", 4);
   const std::vector<std::string> arguments{folder_ / "hill.ply", "--cache", folder_ / "cache", "--json"};
@@ -99,8 +148,11 @@ TEST_F(Inspect, WhatRunRefusesIsRefusedAlike) {
   expect_refused({folder_ / "cube.raw"}, "--raw 64x64x64:u8");
   expect_refused({folder_ / "cube.raw", "--raw", "64x64x64:u9"}, "\"u9\" is no type");
   expect_refused({"julia", "--up", "z"}, "--up: julia is a Julia set");
-  expect_refused({"julia", "--cache", folder_ / "cache"}, "--cache: julia is no mesh");
-  expect_refused({folder_ / "empty"}, "summary.json");
+  for (const std::vector<std::string>& flags : {std::vector<std::string>{}, {"--no-cache"}, {"--tf", "bone"}}) {
+    std::vector<std::string> arguments{folder_ / "empty"};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    expect_refused(arguments, "empty: is a folder that holds neither a finished run, which has a summary.json, nor a");
+  }
   expect_refused({folder_ / "none.ply"}, "none.ply: no such file");
   expect_refused({folder_ / "dem.png", "--out", "a.npy"}, "--out: ");
   expect_refused({folder_ / "dem.png", "--near", "nan"}, "--near");

@@ -58,7 +58,6 @@ const Wrong kWrong[] = {
     {"RawWithoutALayout", "balls.raw", {}, "could be --raw 16x16x16:u8"},
     {"LayoutOfWhatTellsIt", "lying.mha", {"--raw", "16x16x18:u8"}, "which tells its layout itself: leave out --raw"},
     {"SeriesOfAFile", "lying.mha", {"--series", "1"}, "--series: "},
-    {"CacheOfAVolume", "balls.raw", {"--raw", "16x16x16:u8", "--no-cache"}, "--no-cache: "},
     {"RawTooLarge", "balls.raw", {"--raw", "16x16x17:u8"}, "balls.raw"},
     {"RawTooSmall", "balls.raw", {"--raw", "16x16x15:u8"}, "balls.raw"},
     {"RawUnreadable", "balls.raw", {"--raw", "16x16:u8"}, "16x16:u8"},

@@ -106,6 +106,23 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
   return ok_status();
 }
 
+// What is no elevation.
+Status refuse_picture(GDALDatasetH dataset, const std::string& path) {
+  if (const int bands = GDALGetRasterCount(dataset); bands != 1)
+    return Error{fmt::format("{}: has {} bands: a picture, not an elevation raster, which has one", path, bands)};
+  const GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
+  if (GDALDataTypeIsComplex(GDALGetRasterDataType(band)))
+    return Error{fmt::format("{}: has complex samples, not heights", path)};
+  if (GDALGetRasterDataType(band) != GDT_Byte) return ok_status();
+  if (GDALGetRasterColorTable(band))
+    return Error{fmt::format("{}: has a palette: a picture, not an elevation raster", path)};
+  if (placement_of(dataset).georeferenced) return ok_status();
+  return Error{
+      fmt::format("{}: has samples of 8 bits and no place on earth: a picture, not an elevation raster; "
+                  "--texture drapes it over one",
+                  path)};
+}
+
 }  // namespace
 
 Result<ElevationRaster> read_elevation(const std::string& path, const std::string& texture) {
@@ -114,16 +131,11 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
   auto opened = open(path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH dataset = opened->get();
-  const int w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset), bands = GDALGetRasterCount(dataset);
-  if (bands != 1)
-    return Error{fmt::format("{}: has {} bands: a picture, not an elevation raster, which has one", path, bands)};
+  const int w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
+  if (const Status s = refuse_picture(dataset, path); !s) return s.error();
   if (w < 2 || h < 2 || w > kMaxSide || h > kMaxSide)
     return Error{fmt::format("{}: a raster of {} x {} samples, limits 2 and {}", path, w, h, kMaxSide)};
   const GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
-  if (GDALDataTypeIsComplex(GDALGetRasterDataType(band)))
-    return Error{fmt::format("{}: has complex samples, not heights", path)};
-  if (GDALGetRasterDataType(band) == GDT_Byte && GDALGetRasterColorTable(band))
-    return Error{fmt::format("{}: has a palette: a picture, not an elevation raster", path)};
 
   ElevationRaster out;
   while (int64_t{(w + out.step - 1) / out.step} * ((h + out.step - 1) / out.step) > kMaxRasterSamples) ++out.step;

@@ -23,7 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kLimitFile = "limit";
-constexpr size_t kMostLine = 8192;  // of what a .used file may tell
+constexpr uint64_t kWorthAWord = 1'000'000'000;  // bytes of a cache without a limit, before its growth is told
+constexpr size_t kMostLine = 8192;               // of what a .used file may tell
 
 // The stem of a file that is ours; empty: it is not.
 std::string stem_of(const fs::directory_entry& entry) {
@@ -216,13 +217,13 @@ std::string after_growth(const std::string& folder) {
   if (!stores) return {};
   uint64_t bytes = 0;
   for (const CachedStore& store : *stores) bytes += store.bytes;
+  if (!limit && bytes < kWorthAWord) return {};
+  if (limit && !(removed && removed->stores > 0)) return {};
   std::string out =
       fmt::format("the cache holds {} store{}, {}{}, in {}", stores->size(), stores->size() == 1 ? "" : "s",
                   size_text(bytes), limit ? " of at most " + size_text(*limit) : "", short_path(folder));
   if (!limit) return out + "; telesplat cache limit 20GB bounds it";
-  if (removed && removed->stores > 0)
-    out += fmt::format("; {} unused for longest removed, {}", removed->stores, size_text(removed->bytes));
-  return out;
+  return out + fmt::format("; {} unused for longest removed, {}", removed->stores, size_text(removed->bytes));
 }
 
 std::string size_text(uint64_t bytes) {

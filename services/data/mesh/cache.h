@@ -54,7 +54,8 @@ std::optional<uint64_t> cache_limit(const std::string& folder);
 /// Remembers it in the folder, which is made if it is not there. nullopt: there is none from now on.
 Status set_cache_limit(const std::string& folder, std::optional<uint64_t> limit);
 
-/// Once a store was made: keeps to the limit, and tells in one line what the folder holds.
+/// Once a store was made: keeps to the limit. Tells in one line what the folder holds, where stores were removed for
+/// the limit, or where it has none and holds a gigabyte or more.
 std::string after_growth(const std::string& folder);
 
 /// "1.7 GB", and the other way round: "20GB", "1.5 TB", "500M", "1000".

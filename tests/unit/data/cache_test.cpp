@@ -157,10 +157,12 @@ TEST_F(CacheFolder, TheLimitHoldsWheneverAStoreIsMade) {
   EXPECT_EQ(names(), (std::vector<std::string>{"dddd", "eeeee"})) << "both are, or were";
 }
 
-TEST_F(CacheFolder, GrowthIsToldOnceAndOnlyThen) {
+TEST_F(CacheFolder, GrowthIsToldOnceAndOnlyOfALargeFolder) {
+  EXPECT_TRUE(opened("none")->info().notes.empty());
+  fs::resize_file(stores().at(0).stem + ".mesh", 1'200'000'000);
   const auto made = opened("one");
   ASSERT_EQ(made->info().notes.size(), 1u);
-  EXPECT_TRUE(made->info().notes[0].starts_with("the cache holds 1 store, ")) << made->info().notes[0];
+  EXPECT_TRUE(made->info().notes[0].starts_with("the cache holds 2 stores, 1.2 GB, in ")) << made->info().notes[0];
   EXPECT_TRUE(made->info().notes[0].ends_with("; telesplat cache limit 20GB bounds it")) << made->info().notes[0];
   EXPECT_TRUE(opened("one")->info().notes.empty());
 }

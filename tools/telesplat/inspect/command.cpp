@@ -126,6 +126,9 @@ int inspect(InspectOptions o, const options::Given& given) {
   if (path != julia::kSceneWord && !fs::exists(path, error))
     return tools::complain({fmt::format("{}: no such file", path)});
   const Subject subject = subject_of(o.data);
+  // A folder of anything else, whatever the flags.
+  if (subject == Subject::kRun && !fs::exists(path + "/summary.json", error))
+    return tools::complain(inspect_run(path).error());
   if (const Status s = refuse_misfits(o, given, subject); !s) return tools::complain(s.error());
   const auto told = subject == Subject::kData    ? inspect_data(o.data)
                     : subject == Subject::kRun   ? inspect_run(path)

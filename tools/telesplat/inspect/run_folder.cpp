@@ -77,8 +77,8 @@ Result<data::Description> inspect_run(const std::string& directory) {
   auto summary = tools::read_json_object(directory + "/summary.json");
   if (!summary)
     return Error{
-        fmt::format("{}: is a folder without a readable summary.json, so it is not a finished run, and it "
-                    "holds no volume either ({})",
+        fmt::format("{}: is a folder that holds neither a finished run, which has a summary.json, nor a volume: DICOM "
+                    "slices or a numbered series of volume files ({})",
                     directory, summary.error().text)};
   data::Description out("run", fmt::format("{}: a run", directory));
   out.json["path"] = directory;
