@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <filesystem>
+#include <vector>
 
 #include "common/core/log.h"
 #include "common/metrics/run_folder.h"
@@ -46,7 +48,7 @@ Status check_own(const std::string& directory) {
   const fs::path named = own.has_filename() ? own : own.parent_path();
   if (!metrics::folder_id(named).empty() || !metrics::folder_id(named.parent_path()).empty()) return ok_status();
   const auto files = metrics::recorded_files(named);
-  if (files.empty()) return ok_status();
+  if (files.empty()) return metrics::refuse_strangers(named, metrics::Logs::kOthers);
   return Error{fmt::format("{}: holds a record already ({}{}); give another --out", directory, files.front(),
                            files.size() > 1 ? ", ..." : "")};
 }
@@ -88,6 +90,21 @@ uint64_t SessionRecord::files_failed() {
   if (slices_) slices_->flush();
   return uint64_t(spool_ && spool_->failed() > 0) + uint64_t(events_ && events_->failed()) +
          uint64_t(slices_ && slices_->failed());
+}
+
+std::string SessionRecord::failure() {
+  if (files_failed() == 0) return {};
+  std::vector<std::string> what;
+  int error = 0;
+  const auto look = [&](int e, const std::string& name) {
+    if (e == 0) return;
+    what.push_back(name);
+    if (error == 0) error = e;
+  };
+  if (spool_) look(spool_->error(), fmt::format("{} pictures", spool_->failed()));
+  if (events_) look(events_->error(), "points.events");
+  if (slices_) look(slices_->error(), "slices.events");
+  return fmt::format("{}: {}", fmt::join(what, ", "), std::strerror(error));
 }
 
 void SessionRecord::follow(const wire::Welcome& session) {

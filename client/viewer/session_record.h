@@ -41,6 +41,8 @@ class SessionRecord {
   /// How many files could not be written to their end, the frames to be counting as one. What is waiting to be written
   /// of them is, first. Worker's thread; after the session any.
   uint64_t files_failed();
+  /// Those files, and why: "3 pictures, points.events: No space left on device"; empty: all was written.
+  std::string failure();
 
  private:
   explicit SessionRecord(const Options& options) : options_(options) {}

@@ -34,10 +34,11 @@ int fail(const Error& error) {
 }
 
 // The launcher reads it: this is no reason to end the session for others.
-int not_recorded(const std::string& directory) {
-  if (!isatty(STDOUT_FILENO)) std::printf("record failed\n");
+int not_recorded(const std::string& directory, const std::string& why) {
+  const std::string text = fmt::format("{}: not all of the record could be written: {}", directory, why);
+  if (!isatty(STDOUT_FILENO)) std::printf("record failed %s\n", text.c_str());
   std::fflush(stdout);
-  return fail({fmt::format("{}: not all of the record could be written", directory)});
+  return fail({text});
 }
 
 // To the person: on a terminal as it is, else marked so that the launcher passes it on.
@@ -66,8 +67,8 @@ Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net
                                                      const std::shared_ptr<PoseFeed>& poses) {
   if (!o.window) {
     if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
-    auto made = std::make_unique<HeadlessSurface>(o.display, o.movement);
-    if (poses) made->follow(poses, tell);
+    auto made = std::make_unique<HeadlessSurface>(o.display, o.movement, tell);
+    if (poses) made->follow(poses);
     return std::unique_ptr<DisplaySurface>(std::move(made));
   }
   const std::string folder = o.out.empty() ? "." : o.out;
@@ -320,7 +321,8 @@ int run(ViewerOptions o) {
   const int code = farewell(o, *asking, served);
   if (!lost.empty()) return fail({lost});
   if (!developed) log::error("{}", developed.error().text);
-  if (code == 0 && (!developed || (*record)->files_failed() > 0)) return not_recorded((*record)->directory());
+  const std::string failed = developed ? (*record)->failure() : developed.error().text;
+  if (code == 0 && !failed.empty()) return not_recorded((*record)->directory(), failed);
   return code;
 }
 

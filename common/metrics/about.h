@@ -15,6 +15,7 @@ namespace telesplat::metrics {
 /// What a record lacks. rows: by file.
 struct RecordLosses {
   std::vector<std::string> failed;       ///< files that could not be written to their end
+  std::string why;                       ///< what the system said of one of them: "No space left on device"
   std::map<std::string, uint64_t> lost;  ///< their rows
   std::map<std::string, uint64_t> cut;   ///< rows beyond the limit of a file
 };

@@ -82,6 +82,7 @@ void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
   if (const auto t_s = row.of("t_s")) {
     ++frames_shown;
     ++viewer.frames;
+    viewer.frames_of_views += row.of("request").value_or(0) > 0;
     // A viewer that was started again counts its time anew.
     if (viewer.last_s > -1e300 && *t_s > viewer.last_s) viewer.duration_s += *t_s - viewer.last_s;
     viewer.last_s = *t_s;

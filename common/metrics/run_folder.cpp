@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <random>
 
 #include "common/core/log.h"
@@ -202,12 +201,28 @@ Status refuse_links(const std::string& directory, Logs logs) {
                   directory, found.links.front())};
 }
 
+Status refuse_strangers(const std::string& directory, Logs logs) {
+  std::error_code error;
+  std::vector<std::string> strangers;
+  for (const auto& entry : fs::directory_iterator(directory, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool log = logs == Logs::kOthers && (name == "logs" || name.ends_with(".log"));
+    if (!log && !(is_folder(entry.path()) && fs::is_empty(entry.path(), error))) strangers.push_back(name);
+  }
+  if (strangers.empty() || !folder_id(directory).empty()) return ok_status();
+  std::sort(strangers.begin(), strangers.end());
+  return Error{
+      fmt::format("{}: is not empty and holds no run, but {}; give another --out", directory, list_of(strangers))};
+}
+
 Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs) {
   std::error_code error;
   fs::create_directories(directory, error);
   if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
   if (const Status s = refuse_links(directory, logs); !s) return s.error();
   const Found found = look_into(directory, logs);
+  if (found.files.empty())
+    if (const Status s = refuse_strangers(directory, logs); !s) return s.error();
   if (!found.files.empty() && !overwrite)
     return Error{fmt::format("{}: holds a record already ({}); give another --out, or --overwrite to replace it",
                              directory, list_of(found.files))};
@@ -218,10 +233,7 @@ Result<std::string> begin_folder(const std::string& directory, bool overwrite, L
     if (const Status s = set_aside(directory, found); !s) return s.error();
   const std::string path = directory + "/" + kIdFile, id = new_id();
   if (fs::is_symlink(fs::symlink_status(path, error))) return Error{path + ": is a symbolic link; remove it"};
-  std::ofstream out(path);
-  out << kIdWord << id << "\n";
-  out.close();
-  if (!out) return Error{fmt::format("{}: cannot be written to", directory)};
+  if (const Status s = write_whole(path, fmt::format("{}{}\n", kIdWord, id)); !s) return s.error();
   return id;
 }
 

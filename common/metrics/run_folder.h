@@ -16,11 +16,14 @@ enum class Logs { kOurs, kOthers };
 /// link is followed. run.id is left out.
 std::vector<std::string> recorded_files(const std::string& directory, Logs logs = Logs::kOurs);
 
+/// Error: the folder holds something, and no run: a record would be scattered in a person's files. Whoever starts a
+/// session by hand may have put its logs there.
+Status refuse_strangers(const std::string& directory, Logs logs);
 /// Makes `directory` the folder of a new record: makes it if need be, and writes run.id into it. Returns the new id.
-/// Error, naming the folder: it cannot be written to; it holds a record already and overwrite is not set; it is to be
-/// overwritten, but is no record; a name of ours is a symbolic link. With overwrite the files of the record before, and
-/// nothing else, are set aside in ".replaced" in the folder: the new record may come to nothing. Folders of ours that
-/// are empty then are removed.
+/// Error, naming the folder: it cannot be written to; it holds other things and no run; it holds a record already and
+/// overwrite is not set; it is to be overwritten, but is no record; a name of ours is a symbolic link. With overwrite
+/// the files of the record before, and nothing else, are set aside in ".replaced" in the folder: the new record may
+/// come to nothing. Folders of ours that are empty then are removed.
 Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs);
 /// Whether a master that is started again may go on with the record in the folder (RecordOptions::goes_on): it was
 /// begun by one that told its lives.

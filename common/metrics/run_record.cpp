@@ -118,6 +118,9 @@ Error cannot_write(const std::string& path) {
   return Error{fmt::format("{}: cannot write into it: {}", path, std::strerror(errno))};
 }
 
+// What the system said, which ends such an error.
+std::string reason_of(const Error& error) { return error.text.substr(error.text.rfind(": ") + 2); }
+
 void append(std::vector<std::string>& cells, const std::vector<std::string>& more) {
   cells.insert(cells.end(), more.begin(), more.end());
 }
@@ -267,8 +270,10 @@ bool RunRecord::open_late(Csv csv, const std::vector<std::string>& columns) {
   if (file(csv).is_open()) return true;
   if (!file(csv).open(path_of(file_of(csv)), options_.table_bytes)) {
     if (std::find(unwritten_.begin(), unwritten_.end(), file_of(csv)) == unwritten_.end()) {
+      const Error error = cannot_write(path_of(file_of(csv)));
       unwritten_.push_back(file_of(csv));
-      log::error("{}; the run goes on without it", cannot_write(path_of(file_of(csv))).text);
+      why_ = reason_of(error);
+      log::error("{}; the run goes on without it", error.text);
     }
     return false;
   }
@@ -290,10 +295,10 @@ void RunRecord::add_plan(const std::string& viewer, const PlanRow& plan) {
 }
 
 RecordLosses RunRecord::losses() const {
-  RecordLosses out{.failed = unwritten_, .lost = {}, .cut = {}};
+  RecordLosses out{.failed = unwritten_, .why = why_, .lost = {}, .cut = {}};
   const auto look = [&out](const TextFile& file) {
     const std::string name = file.path().substr(file.path().rfind('/') + 1);
-    if (!file.status()) out.failed.push_back(name);
+    if (!file.status()) out.failed.push_back(name), out.why = reason_of(file.status().error());
     if (file.rows_lost() > 0) out.lost[name] = file.rows_lost();
     if (file.rows_cut() > 0) out.cut[name] = file.rows_cut();
   };
@@ -315,7 +320,7 @@ Status RunRecord::write_file(const std::string& name, const std::string& text) {
   if (directory_.empty()) return ok_status();
   unlink(path_of(kRoom).c_str());
   Status written = write_whole(path_of(name), text);
-  if (!written) unwritten_.push_back(name);
+  if (!written) unwritten_.push_back(name), why_ = reason_of(written.error());
   return written;
 }
 
@@ -327,12 +332,12 @@ Status RunRecord::finish(const std::vector<Process>& processes, const std::map<s
   if (lives() > 1) measured_ = read_back(directory_, lives_);
   const auto text =
       summary(processes, counters, about).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-  if (const Status written = write_file("summary.json", text); !written) return written;
-  if (measured_.frames().rows > 0) point_latest(directory_);
-  const auto failed = losses().failed;
-  if (failed.empty()) return ok_status();
-  return Error{fmt::format("{}: not all of the record could be written: {} {} incomplete", directory_,
-                           fmt::join(failed, ", "), failed.size() == 1 ? "is" : "are")};
+  const Status written = write_file("summary.json", text);
+  if (written && measured_.frames().rows > 0) point_latest(directory_);
+  const RecordLosses lost = losses();
+  if (lost.failed.empty()) return ok_status();
+  return Error{fmt::format("{}: not all of the record could be written: {}: {}", directory_,
+                           fmt::join(lost.failed, ", "), lost.why)};
 }
 
 }  // namespace telesplat::metrics

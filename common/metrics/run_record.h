@@ -96,6 +96,7 @@ class RunRecord {
   TextFile lives_file_;
   TraceFile trace_;
   std::vector<std::string> unwritten_;  // other files
+  std::string why_;                     // what the system said of the last of them
 };
 
 }  // namespace telesplat::metrics

@@ -177,6 +177,7 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
     if (v.fps() > 0) fps += v.fps() / double(drew);
     updates_per_s += v.per_second(v.updates) / double(viewers.size());
     each[name] = {{"frames", v.frames},
+                  {"frames_of_views", v.frames_of_views},
                   {"updates", v.updates},
                   {"duration_s", thousandths(v.duration_s)},
                   {"frames_still", v.still},

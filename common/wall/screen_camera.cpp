@@ -110,6 +110,30 @@ bool is_plane(const Wall& wall) {
   });
 }
 
+double shown_share(const Wall& wall, const geometry::Pose& head, const geometry::Box& box) {
+  const geometry::Pose in_room = wall_in_room(wall, head);
+  const auto on = [&](const Screen& s, const glm::dvec3& point) {
+    const auto at = seen_at(s, in_room, head.position_room, point);
+    return at && at->x >= -s.width_m / 2 - s.bezel.left && at->x <= s.width_m / 2 + s.bezel.right &&
+           at->y >= -s.height_m / 2 - s.bezel.bottom && at->y <= s.height_m / 2 + s.bezel.top;
+  };
+  const auto shown = [&](double share) {
+    for (int i = 0; i < 8; ++i) {
+      const glm::dvec3 corner(i & 1 ? box.hi.x : box.lo.x, i & 2 ? box.hi.y : box.lo.y, i & 4 ? box.hi.z : box.lo.z);
+      const auto shows = [&](const Screen& s) { return on(s, share * corner); };
+      if (std::none_of(wall.screens.begin(), wall.screens.end(), shows)) return false;
+    }
+    return true;
+  };
+  if (shown(1)) return 1;
+  double low = 0, high = 1;
+  for (int i = 0; i < 20; ++i) {
+    const double middle = (low + high) / 2;
+    (shown(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
 geometry::Camera fitting_frustum(const Wall& wall, double near_m) {
   Edges e = is_plane(wall) ? edges_of_plane(wall) : edges_around(wall);
   e.left = std::clamp(e.left, -kMostTangent, -kLeastTangent),

@@ -28,6 +28,10 @@ std::optional<glm::dvec2> seen_at(const Screen& screen, const geometry::Pose& wa
 /// its edges, for others 100 degrees across at most. Data are fitted into it. Its pixels are as fine as the screens'.
 geometry::Camera fitting_frustum(const Wall& wall, double near_m);
 
+/// At what share of its size about the room's origin all corners of the box are on some screen, bezels counted in; 1:
+/// they are as it stands.
+double shown_share(const Wall& wall, const geometry::Pose& head_room, const geometry::Box& box_room);
+
 /// All screens lie in one plane, and have its axes.
 bool is_plane(const Wall& wall);
 

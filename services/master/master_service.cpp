@@ -283,7 +283,7 @@ int run(const MasterServiceOptions& o) {
   service.serve();
   service.say_goodbye();
   if (const Status s = service.write_record(); !s) {
-    if (o.started_by != "hand") std::printf("record failed\n");  // the launcher reads it
+    if (o.started_by != "hand") std::printf("record failed %s\n", s.error().text.c_str());  // the launcher reads it
     return fail(1, s.error());
   }
   return 0;

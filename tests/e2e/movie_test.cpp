@@ -157,15 +157,24 @@ TEST(Movie, WithoutFfmpegIsASequenceOfPicturesAndTellsHowToGoOn) {
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
   const std::string path = std::getenv("PATH");
   setenv("PATH", "/nowhere", 1);
-  const Outcome made = movie(run, run.folder() / "flight.mp4", {"--fps", "10"});
-  const Outcome again = movie(run, run.folder() / "flight.mp4", {"--fps", "10"});
+  const std::string file = run.folder() / "ada's flight.mp4";
+  const Outcome made = movie(run, file, {"--fps", "10"});
+  const Outcome again = movie(run, file, {"--fps", "10"});
   setenv("PATH", path.c_str(), 1);
-  EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_TRUE(fs::exists(run.folder() / "flight-frames/000000.png"));
-  EXPECT_TRUE(fs::exists(run.folder() / "flight-frames/000009.png"));
-  EXPECT_FALSE(fs::exists(run.folder() / "flight.mp4"));
-  EXPECT_NE(made.out.find("ffmpeg -framerate 10 -i"), std::string::npos) << made.out;
+  EXPECT_EQ(made.code, 1) << "there is no movie: " << made.err;
+  EXPECT_TRUE(fs::exists(run.folder() / "ada's flight-frames/000000.png"));
+  EXPECT_TRUE(fs::exists(run.folder() / "ada's flight-frames/000009.png"));
+  EXPECT_FALSE(fs::exists(file));
   EXPECT_EQ(again.code, 2) << "pictures of two movies would mix";
+  // A shell takes the command as it stands: each word arrives as it was meant.
+  const size_t at = made.out.find("ffmpeg -framerate 10 -i");
+  ASSERT_NE(at, std::string::npos) << made.out;
+  std::ofstream(run.folder() / "typed") << "ffmpeg() { printf '%s\\n' \"$@\"; }\n"
+                                        << made.out.substr(at, made.out.find('\n', at) - at) << "\n";
+  ASSERT_EQ(std::system(fmt::format("bash '{}' > '{}'", run.folder() / "typed", run.folder() / "words").c_str()), 0);
+  const std::string words = read_text(run.folder() / "words");
+  EXPECT_NE(words.find("\ncrop=trunc(iw/2)*2:trunc(ih/2)*2\n"), std::string::npos) << words;
+  EXPECT_TRUE(words.ends_with("\n" + file + "\n")) << words;
 }
 
 TEST(Movie, IsRefusedBeforeTheRunBegins) {

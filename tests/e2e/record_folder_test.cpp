@@ -89,6 +89,25 @@ TEST(RecordFolder, WhatIsNoRecordIsNeverRemoved) {
   EXPECT_EQ(read_text(folder / "precious"), "mine");
 }
 
+TEST(RecordFolder, APersonsFolderIsRefusedAndStaysAsItIs) {
+  const TemporaryFolder folder;
+  small(folder);
+  fs::create_directories(folder / "data/images");
+  std::ofstream(folder / "data/crater.csv") << "mine";
+  std::ofstream(folder / "data/images/holiday.png") << "mine";
+  const auto refused = [&](const char* program, const std::vector<std::string>& arguments) {
+    Program run(program, arguments, folder / "run");
+    EXPECT_EQ(run.wait(30), 2) << program;
+    const std::string why = folder / "data" + ": is not empty and holds no run, but crater.csv, images";
+    EXPECT_NE(run.err().find(why), std::string::npos) << program << ": " << run.err();
+    EXPECT_EQ(std::distance(fs::recursive_directory_iterator(folder / "data"), {}), 3) << program;
+  };
+  refused("telesplat", short_run(folder, folder / "data", {}));
+  refused("telesplat", short_run(folder, folder / "data", {"--overwrite"}));
+  refused("telesplat-master", {"--bind", "tcp://127.0.0.1:*", "--out", folder / "data"});
+  refused("telesplat-viewer", {"--master", "tcp://127.0.0.1:7", "--size", "64x64", "--out", folder / "data"});
+}
+
 TEST(RecordFolder, OneThatCannotBeWrittenToIsNamed) {
   const TemporaryFolder folder;
   small(folder);

@@ -7,7 +7,6 @@
 #include "common/core/version.h"
 #include "common/options/parser.h"
 #include "tools/common/complain.h"
-#include "tools/telesplat/scene/scene_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -28,8 +27,8 @@ void declare(options::Parser& parser, const std::vector<Command>& commands, Pars
 // The command's name stays in front of what its scene file says.
 Status expand(const std::vector<Command>& commands, std::vector<std::string>& arguments) {
   for (const Command& command : commands) {
-    if (!command.takes_scene_file || arguments.empty() || arguments.front() != command.name) continue;
-    auto expanded = expand_scene_file({arguments.begin() + 1, arguments.end()}, command.table);
+    if (!command.expand || arguments.empty() || arguments.front() != command.name) continue;
+    auto expanded = command.expand({arguments.begin() + 1, arguments.end()}, command.table);
     if (!expanded) return expanded.error();
     arguments.resize(1);
     arguments.insert(arguments.end(), std::make_move_iterator(expanded->begin()),
@@ -52,9 +51,17 @@ void put_flags_behind(const std::vector<Command>& commands, std::vector<std::str
   }
 }
 
+// `help ctl pick` means `ctl pick --help`.
+void put_help_behind(std::vector<std::string>& arguments) {
+  if (arguments.empty() || arguments.front() != "help") return;
+  arguments.erase(arguments.begin());
+  arguments.emplace_back("--help");
+}
+
 }  // namespace
 
 int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments) {
+  put_help_behind(arguments);
   if (const Status s = expand(commands, arguments); !s) return tools::complain(s.error());
   put_flags_behind(commands, arguments);
   options::Parser parser(about);

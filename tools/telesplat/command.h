@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/result.h"
 #include "common/options/table.h"
 
 namespace telesplat::launcher {
@@ -15,7 +16,8 @@ struct Command {
   options::Table table;  ///< its flags
   /// Exit code: 0 done, 1 failed, 2 bad usage or input, 130 interrupted.
   std::function<int(const options::Given&)> run;
-  bool takes_scene_file = false;  ///< an argument that ends in .toml stands for the flags in that file
+  /// Its arguments, with the flags of a scene file in place of that file's name; null: it takes none.
+  Result<std::vector<std::string>> (*expand)(std::vector<std::string> arguments, const options::Table& table) = nullptr;
   std::string footer;             ///< at the end of --help
   std::vector<Command> commands;  ///< its sub-commands, instead of flags
 };
@@ -48,7 +50,7 @@ Command autostereo_command();
 Command top_command();
 Command keys_command();
 
-/// `commands`, and two more that tell of all of them: completion and man.
+/// `commands`, and three more that tell of all of them: help, completion and man.
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);
 
 /// Runs the command that the arguments name; --help prints and ends the program, bad usage too, with code 2.

@@ -17,20 +17,23 @@ namespace telesplat::viewer {
 
 class HeadlessSurface final : public DisplaySurface {
  public:
-  HeadlessSurface(const DisplayOptions& options, HeadMovement movement)
-      : options_(options), movement_(std::move(movement)) {
+  using Tell = std::function<void(const std::string&)>;
+
+  /// tell: lines for the person.
+  HeadlessSurface(const DisplayOptions& options, HeadMovement movement, Tell tell = {})
+      : options_(options), movement_(std::move(movement)), tell_(std::move(tell)) {
     if (movement_.recorded) trajectory_ = *movement_.recorded;
   }
 
-  /// These poses move the head as soon as they come. tell: lines about them for the person.
-  void follow(std::shared_ptr<PoseFeed> poses, std::function<void(const std::string&)> tell) {
-    poses_ = std::move(poses);
-    tell_ = std::move(tell);
-  }
+  /// These poses move the head as soon as they come.
+  void follow(std::shared_ptr<PoseFeed> poses) { poses_ = std::move(poses); }
 
   /// A head that moves already stays on its way.
   void on_scene(const ShownScene& scene) override {
     if (!moves_) trajectory_ = movement_.trajectory(scene.box_room, fitting_camera(options_));
+    if (told_ || !tell_) return;
+    told_ = true;
+    if (const auto news = cut_off_by_wall(options_, trajectory_.at(0), scene.box_room)) tell_(*news);
   }
   geometry::Camera begin_frame(double now_s, double t_s, Look&) override {
     const auto& o = options_;
@@ -59,10 +62,10 @@ class HeadlessSurface final : public DisplaySurface {
   DisplayOptions options_;
   HeadMovement movement_;
   std::shared_ptr<PoseFeed> poses_;
-  std::function<void(const std::string&)> tell_;
+  Tell tell_;
   geometry::Trajectory trajectory_ = geometry::Trajectory::still({});
   geometry::Pose head_;
-  bool moves_ = false;
+  bool moves_ = false, told_ = false;
 };
 
 }  // namespace telesplat::viewer

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
 #include "common/wall/unrolled.h"
@@ -75,6 +77,19 @@ geometry::Camera fitting_camera(const DisplayOptions& o) {
   if (o.wall.described) return wall::fitting_frustum(*o.wall.described, o.near_m);
   const stereo::Size eye = o.stereo.eye_size(o.width, o.height);
   return geometry::make_camera({}, o.fov_deg, eye.width * o.wall.columns, eye.height * o.wall.rows, o.near_m);
+}
+
+std::optional<std::string> cut_off_by_wall(const DisplayOptions& o, const geometry::Pose& head,
+                                           const geometry::Box& box) {
+  const auto& wall = o.wall.described;
+  if (!wall || wall->anchor != wall::Anchor::kRoom || o.wall.tile != 0) return std::nullopt;
+  const double share = wall::shown_share(*wall, head, box);
+  if (share >= 1 || share <= 0) return std::nullopt;
+  const glm::dvec3 size = glm::dvec3(box.hi) - glm::dvec3(box.lo);
+  return fmt::format(
+      "the screens of {} do not show all of the data to a head where it begins; with --room-size {:.3g} "
+      "they do",
+      wall->name, 0.99 * share * std::max({size.x, size.y, size.z}));
 }
 
 }  // namespace telesplat::viewer

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/core/result.h"
@@ -47,5 +48,10 @@ struct DisplayOptions;
 geometry::Camera display_camera(const DisplayOptions& options, const geometry::Pose& head);
 /// What the whole wall shows, for data to be fitted into.
 geometry::Camera fitting_camera(const DisplayOptions& options);
+
+/// Of the first screen of a wall that stands in the room: what to do where the wall does not show all of the data to a
+/// head there. Nothing: it does, or the data are fitted into the display anyway.
+std::optional<std::string> cut_off_by_wall(const DisplayOptions& options, const geometry::Pose& head,
+                                           const geometry::Box& box_room);
 
 }  // namespace telesplat::viewer

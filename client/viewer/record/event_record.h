@@ -30,6 +30,7 @@ class EventRecorder {
   /// Everything so far is on disk.
   void flush() { file_.flush(); }
   bool failed() const { return file_.failed(); }
+  int error() const { return file_.error(); }  ///< as RecordWriter's
 
  private:
   explicit EventRecorder(RecordWriter file) : file_(std::move(file)) {}

@@ -154,8 +154,9 @@ void FrameSpool::write_loop() {
 
 // The disk may have room again later.
 void FrameSpool::on_failure(int error) {
-  if (failed_++ == 0)
-    log::error("{}: frames cannot be written: {}; the session goes on without them", directory_, std::strerror(error));
+  if (failed_++ > 0) return;
+  error_ = error;
+  log::error("{}: frames cannot be written: {}; the session goes on without them", directory_, std::strerror(error));
 }
 
 void FrameSpool::flush() {

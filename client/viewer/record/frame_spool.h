@@ -57,6 +57,7 @@ class FrameSpool {
   uint64_t dropped() const { return dropped_; }
   /// Frames that could not be written, which was logged once.
   uint64_t failed() const { return failed_; }
+  int error() const { return error_; }  ///< errno of the first of them
 
  private:
   FrameSpool() = default;
@@ -71,6 +72,7 @@ class FrameSpool {
   std::vector<image::View> free_;
   bool stop_ = false, writing_ = false;
   std::atomic<uint64_t> dropped_ = 0, failed_ = 0;
+  std::atomic<int> error_ = 0;
   std::thread thread_;
 };
 

@@ -54,11 +54,12 @@ void RecordWriter::write(std::string_view type, std::string_view body) {
 }
 
 void RecordWriter::flush() {
-  if (!failed_ && std::fflush(file_.get()) != 0) fail(errno);
+  if (!failed() && std::fflush(file_.get()) != 0) fail(errno);
 }
 
 void RecordWriter::fail(int error) {
-  full_ = failed_ = true;
+  full_ = true;
+  error_ = error;
   log::error("{}: cannot be written: {}; the session goes on without the rest of it", path_, std::strerror(error));
 }
 

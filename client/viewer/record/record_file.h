@@ -30,7 +30,8 @@ class RecordWriter {
   /// Nothing more is written: the limit was reached, or the disk is full.
   bool full() const { return full_; }
   /// Something could not be written, which was logged once; the file ends before it.
-  bool failed() const { return failed_; }
+  bool failed() const { return error_ != 0; }
+  int error() const { return error_; }  ///< errno of that; 0: all was written
   /// Everything so far is on disk, unless it failed.
   void flush();
 
@@ -39,7 +40,8 @@ class RecordWriter {
   std::string path_;
   const char* what_ = "";
   uint64_t bytes_ = 0, max_bytes_ = 0;
-  bool full_ = false, failed_ = false;
+  bool full_ = false;
+  int error_ = 0;
 
   void fail(int error);
 };

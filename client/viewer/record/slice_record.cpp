@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cstring>
 
 #include "client/viewer/slices/receiver.h"
@@ -22,14 +23,14 @@ static_assert(sizeof(GridBody) == 144);
 }  // namespace
 
 bool SliceRecorder::ready() {
-  if (file_ || failed_) return !failed_;
+  if (file_ || error_) return file_.has_value();
   auto file = RecordWriter::open(path_, kMagic, max_bytes_, "slice images");
-  failed_ = !file;
-  if (failed_)
-    log::error("{}; slice images are not recorded", file.error().text);
-  else
+  error_ = file ? 0 : errno;
+  if (file)
     file_ = std::move(*file);
-  return !failed_;
+  else
+    log::error("{}; slice images are not recorded", file.error().text);
+  return file_.has_value();
 }
 
 void SliceRecorder::add(const volume::Grid& grid, const wire::SliceFrame& frame) {

@@ -25,7 +25,8 @@ class SliceRecorder {
   void add(const volume::Grid& grid, const wire::SliceFrame& frame);
   /// Everything so far is on disk.
   void flush();
-  bool failed() const { return failed_ || (file_ && file_->failed()); }
+  bool failed() const { return error() != 0; }
+  int error() const { return file_ ? file_->error() : error_; }  ///< as RecordWriter's
 
  private:
   bool ready();
@@ -34,7 +35,7 @@ class SliceRecorder {
   const uint64_t max_bytes_;
   std::optional<RecordWriter> file_;
   std::optional<volume::Grid> grid_;  // the last one written
-  bool failed_ = false;               // the file could not be made
+  int error_ = 0;                     // the file could not be made
 };
 
 /// Finds the frames of a record again, in order.

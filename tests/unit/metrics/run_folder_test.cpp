@@ -40,6 +40,17 @@ TEST_F(RunFolder, ARecordWithinItIsAnotherRuns) {
     EXPECT_TRUE(has(other + std::string("/frames.csv")) && has(other + std::string("/run.id"))) << other;
 }
 
+TEST_F(RunFolder, LogsAndEmptyFoldersAreNoStrangers) {
+  put("today/master.log");
+  std::filesystem::create_directories(folder + "/today/images");
+  EXPECT_TRUE(refuse_strangers(folder + "/today", Logs::kOthers))
+      << "whoever starts a session by hand keeps them there";
+  EXPECT_FALSE(refuse_strangers(folder + "/today", Logs::kOurs));
+  put("today/images/holiday.png");
+  EXPECT_FALSE(begin_folder(folder + "/today", true, Logs::kOthers));
+  EXPECT_FALSE(has("today/run.id"));
+}
+
 TEST_F(RunFolder, AReplacedRecordComesBackIfTheNewOneComesToNothing) {
   const auto first = begin_folder(folder, false, Logs::kOurs);
   ASSERT_TRUE(first.ok());

@@ -60,5 +60,30 @@ TEST(TitleLine, CountsWhatIsDrawn) {
   EXPECT_NE(text->find("12.31 M samples drawn, 2.10 M pixels cached"), std::string::npos) << *text;
 }
 
+// The front edges of a cube s times 1 m across are seen s / 2 above the middle: (1.3 - s / 2) of 0.7 times 0.15 m.
+TEST(Wall, OneInTheRoomTellsTheRoomSizeThatItShowsWhole) {
+  const auto wall = wall::parse_wall(
+      "[wall]\nname = \"desk\"\nposition = [0.0, 0.0, 0.6]\n[head]\nposition = [0.0, 0.0, 0.7]\n"
+      "[[screen]]\nposition = [0.0, 0.0, 0.0]\nsize = [0.6, 0.3]\nresolution = [160, 80]\n",
+      "desk.toml");
+  ASSERT_TRUE(wall.ok()) << wall.error().text;
+  const geometry::Pose head{{0, 0, 1.3}, glm::dquat(1, 0, 0, 0)};
+  const geometry::Box cube{glm::vec3(-0.5f), glm::vec3(0.5f)};
+  const double share = 0.15 * 1.3 / 0.7 / (0.5 + 0.075 / 0.7);
+  EXPECT_NEAR(wall::shown_share(*wall, head, cube), share, 1e-5);
+  EXPECT_EQ(wall::shown_share(*wall, head, {cube.lo * float(share * 0.999), cube.hi * float(share * 0.999)}), 1);
+
+  DisplayOptions o;
+  o.wall.described = std::make_shared<const wall::Wall>(*wall);
+  std::vector<std::string> told;
+  HeadlessSurface surface(o, {.eye = head.position_room}, [&](const std::string& line) { told.push_back(line); });
+  ShownScene scene;
+  scene.box_room = cube;
+  surface.on_scene(scene);
+  surface.on_scene(scene);
+  EXPECT_EQ(told, std::vector<std::string>{"the screens of desk do not show all of the data to a head where it begins; "
+                                           "with --room-size 0.454 they do"});
+}
+
 }  // namespace
 }  // namespace telesplat::viewer

@@ -45,7 +45,7 @@ int movie(MovieCommandOptions o, const options::Given&) {
     return tools::complain({fmt::format("interrupted; {} was not made", o.movie.file)}, kInterrupted);
   if (!report->written) return tools::complain(report->written.error(), 1);
   for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
-  return 0;
+  return report->instead ? 1 : 0;
 }
 
 }  // namespace

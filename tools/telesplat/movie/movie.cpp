@@ -37,13 +37,15 @@ std::string cut_short(const Screen& screen, double t_s) {
       screen.record_file(), screen.frame().number, t_s, screen.duration_s());
 }
 
-// How to make a movie of pictures.
+// How to make a movie of pictures: a line for a shell.
 std::string advice(const MovieTarget& target, double fps) {
+  std::string command = fmt::format("ffmpeg -framerate {} -i {}", fps, shell_quoted(target.pattern()));
+  for (const char* word : {"-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-vf",
+                           "crop=trunc(iw/2)*2:trunc(ih/2)*2", target.wanted_video.c_str()})
+    command += " " + shell_quoted(word);
   return fmt::format(
-      "ffmpeg is not installed, so there are pictures instead of {}; where it is, this makes the movie of them:\n"
-      "  ffmpeg -framerate {} -i {} -c:v libx264 -crf 18 -pix_fmt yuv420p -vf "
-      "crop=trunc(iw/2)*2:trunc(ih/2)*2 {}",
-      target.wanted_video, fps, shell_quoted(target.pattern()), shell_quoted(target.wanted_video));
+      "ffmpeg is not installed, so there are pictures instead of {}; where it is, this makes the movie of them:\n  {}",
+      target.wanted_video, command);
 }
 
 class Movie {
@@ -99,7 +101,9 @@ class Movie {
                                         screen_.drawn(), screen_.run().frames.size()));
     if (screen_.run().transparent && !pictures)
       report_.lines.push_back("a video has no transparency: the background is black; a folder of pictures has alpha");
-    if (!target.wanted_video.empty()) report_.lines.push_back(advice(target, plan_.options.fps));
+    if (target.wanted_video.empty()) return;
+    report_.lines.push_back(advice(target, plan_.options.fps));
+    report_.instead = true;
   }
 
   Screen& screen_;

@@ -26,6 +26,7 @@ Result<MoviePlan> plan_movie(const MovieOptions& options, const char* size_flag)
 
 struct MovieReport {
   std::vector<std::string> lines;  ///< for the person: what was made, and what it is short of
+  bool instead = false;            ///< there are pictures in place of the movie, since ffmpeg is not installed
   bool interrupted = false;        ///< should_stop said so: nothing was made
   Status written = ok_status();    ///< what went wrong with writing it, if anything: nothing was made
 };

@@ -1,6 +1,7 @@
 #include "tools/telesplat/run/after_run.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -64,6 +65,25 @@ int AfterRun::run(bool stopped, const std::string& master_folder) {
   return movie ? movie : report;
 }
 
+int AfterRun::tell_unseen(bool stopped) const {
+  const auto summary = tools::read_json_file(o_.out + "/summary.json");
+  std::vector<std::string> unseen;
+  const auto viewers = summary.is_object() ? summary.value("by_viewer", nlohmann::json::object()) : nlohmann::json();
+  for (const auto& [name, figures] : viewers.items())
+    if (figures.value("frames_of_views", uint64_t{1}) == 0) unseen.push_back(name);
+  if (unseen.empty()) return 0;
+  const bool none = unseen.size() == viewers.size();
+  constexpr size_t kNamed = 5;
+  const std::string names =
+      fmt::format("{}{}", fmt::join(unseen.begin(), unseen.begin() + std::min(kNamed, unseen.size()), ", "),
+                  unseen.size() > kNamed ? ", ..." : "");
+  tools::complain({fmt::format(
+      "{}; it takes more time (--duration), or fewer viewers and pixels",
+      none ? "no frame shows the data: the run ended before a view was complete"
+           : fmt::format("{} of {} viewers never showed a complete view: {}", unseen.size(), viewers.size(), names))});
+  return none && !stopped ? 1 : 0;
+}
+
 int AfterRun::verify(bool stopped) {
   if (o_.viewer.display.verify_every == 0) return 0;
   if (!o_.join_master.empty()) {
@@ -112,7 +132,7 @@ int AfterRun::make_the_movie(bool stopped) {
   if (!report->written) return tools::complain(report->written.error(), 1);
   for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
   if (report->interrupted) progress_.line(fmt::format("interrupted: {} was not made; {}", file, later));
-  return report->interrupted ? kInterrupted : 0;
+  return report->interrupted ? kInterrupted : report->instead ? 1 : 0;
 }
 
 int AfterRun::make_the_report(bool stopped) {

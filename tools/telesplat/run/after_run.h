@@ -29,6 +29,9 @@ class AfterRun {
   /// All that follows. stopped: the run was, before its end. master_folder: of a joined session, if it is known. Exit
   /// code: 0, 1 something went wrong, 2 the data cannot be read any more, 130 a signal came.
   int run(bool stopped, const std::string& master_folder);
+  /// Tells which viewers showed no complete view of the data. Exit code: 1 where none did, though the run lasted to its
+  /// end.
+  int tell_unseen(bool stopped) const;
   /// Raw frames that no step will need any more.
   void drop_spools() const;
 

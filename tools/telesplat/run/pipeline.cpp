@@ -105,7 +105,11 @@ void Pipeline::finish() {
     if (!m.process) continue;
     read(m);
     const bool records = m.role == "master" || m.role == "packer";
-    record_failed_ |= m.record_failed || (records && m.process->ended() && m.process->exit_code() == 1);
+    if (!m.record_failed.empty())
+      record_failures_.push_back(m.record_failed);
+    else if (records && m.process->ended() && m.process->exit_code() == 1)
+      record_failures_.push_back(fmt::format("{}: not all of the record could be written; {} says: {}", options_.out,
+                                             m.name, group_.last_log_line(m.name)));
   }
 }
 
@@ -172,6 +176,12 @@ Status Pipeline::start_wall() {
   return start_viewers(now + kWallLead_s);
 }
 
+pid_t Pipeline::display() {
+  for (Member& m : group_.members())
+    if (m.role == "viewer") return m.process && !m.process->ended() ? m.process->pid() : 0;
+  return 0;
+}
+
 std::vector<std::string> Pipeline::viewers() {
   std::vector<std::string> out;
   for (const Member& m : group_.members())
@@ -227,7 +237,8 @@ Consequence consequence_of(const Ended& e) {
 
 Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const int code = m.process->exit_code();
-  const auto follows = consequence_of({m.role, code, m.restarts.lately(monotonic_s()), chosen_, m.record_failed});
+  const auto follows =
+      consequence_of({m.role, code, m.restarts.lately(monotonic_s()), chosen_, !m.record_failed.empty()});
   if (follows == Consequence::kNone) return State::kRunning;
   if (follows == Consequence::kFinish) return State::kFinished;
   if (follows != Consequence::kRestart) {
@@ -274,7 +285,7 @@ void Pipeline::read_progress(const std::string& member, const std::string& told)
 void Pipeline::read(Member& m) {
   for (const auto& line : m.process->read_lines()) {
     if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
-    if (line == "record failed") m.record_failed = true;
+    if (line.starts_with("record failed ")) m.record_failed = line.substr(14);
     if (line.starts_with("note ")) notes_.push_back(line.substr(5));
     if (line.starts_with("open ") && m.told) wishes_.push_back(line.substr(5));
   }

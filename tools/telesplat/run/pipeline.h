@@ -44,6 +44,8 @@ class Pipeline {
   const std::string& master_endpoint() const { return group_.endpoint(); }
   /// By which its master is asked.
   const net::Access& access() const { return group_.access(); }
+  /// The process of its first viewer; 0: it does not run.
+  pid_t display();
   /// Names of the viewers that were started.
   std::vector<std::string> viewers();
 
@@ -69,8 +71,8 @@ class Pipeline {
   Status set_samplers(int count);
   /// Ends everything: viewers first, then a "stop" to the master, then whoever is left.
   void finish();
-  /// After that: somebody could not write all of the record.
-  bool record_failed() const { return record_failed_; }
+  /// After that: what could not be written of the record, a line a process; empty: it is whole.
+  const std::vector<std::string>& record_failures() const { return record_failures_; }
 
  private:
   Pipeline(const RunOptions& options, ProcessGroup group);
@@ -93,10 +95,10 @@ class Pipeline {
   ProcessGroup group_;
   std::string progress_;
   std::map<std::string, tools::TimeLeft> time_left_;  // by member
-  std::vector<std::string> notes_, wishes_;
+  std::vector<std::string> notes_, wishes_, record_failures_;
   std::string told_progress_;                  // the viewers
   std::map<std::string, std::string> relays_;  // where they listen, by name
-  bool has_viewers_ = false, record_failed_ = false;
+  bool has_viewers_ = false;
   bool chosen_ = false;  // the data set, by a person at a window: one that cannot be read does not end the session
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;

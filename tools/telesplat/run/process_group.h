@@ -22,10 +22,10 @@ struct Member {
   std::string name;
   std::vector<std::string> arguments;  ///< beside name, log level and the master's address
   int nice = 0;
-  bool joins = true;           ///< is told where the master is
-  bool told = false;           ///< ChildProcess::tell() reaches it
-  bool given_up = false;       ///< it has ended, and nothing follows from that
-  bool record_failed = false;  ///< it said that it could not write all of the record
+  bool joins = true;          ///< is told where the master is
+  bool told = false;          ///< ChildProcess::tell() reaches it
+  bool given_up = false;      ///< it has ended, and nothing follows from that
+  std::string record_failed;  ///< what it could not write of the record, as it said; empty: nothing
   Restarts restarts;
   std::optional<double> again_s;  ///< it has died, and is to be started again then (monotonic_s())
   std::optional<ChildProcess> process;

@@ -24,10 +24,12 @@
 #include "tools/telesplat/control/wishes.h"
 #include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/after_run.h"
+#include "tools/telesplat/run/children/processor_wait.h"
 #include "tools/telesplat/run/live_figures.h"
 #include "tools/telesplat/run/overwrite.h"
 #include "tools/telesplat/run/pipeline.h"
 #include "tools/telesplat/run/run_keys.h"
+#include "tools/telesplat/scene/scene_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -79,13 +81,13 @@ class Run {
     auto pipeline = Pipeline::start(o_);
     if (!pipeline) return not_started(pipeline.error());
     if (o_.join_master.empty())
-      progress_.line(fmt::format("session at {}; telesplat ctl status asks it", pipeline->master_endpoint()));
+      progress_.line(fmt::format("session at {}; telesplat ctl status shows it", pipeline->master_endpoint()));
     const State state = watch(*pipeline);
     // From here on a signal is another one: what is at hand is left out.
     const bool stopped = state == State::kRunning;
     if (stopped) net::forget_stop();
     pipeline->finish();
-    record_failed_ = pipeline->record_failed();
+    record_failures_ = pipeline->record_failures();
     if (!o_.join_master.empty()) ask_for_results(*pipeline);
     if (state != State::kBadInput && !o_.out.empty()) after_.develop_pictures();
     for (const auto& n : pipeline->take_notes()) progress_.line(n);
@@ -93,7 +95,7 @@ class Run {
     if (o_.out.empty()) return 0;
     if (after_.displayed()) settle_replaced();
     if (stopped && net::stop_requested()) return end_at_once();
-    if (!after_.displayed()) return nothing_displayed(stopped);
+    if (!after_.displayed()) return record_failures_.empty() ? nothing_displayed(stopped) : tell_failures();
     return complete(stopped);
   }
 
@@ -130,6 +132,7 @@ class Run {
       for (const auto& wish : pipeline.take_wishes()) open(pipeline, wish);
       if (monotonic_s() - asked_s > kAskEvery_s) {
         control.request_status();
+        if (const pid_t display = pipeline.display()) busy_.look(display, monotonic_s());
         asked_s = monotonic_s();
       }
       if (const auto status = control.poll_status()) {
@@ -211,11 +214,8 @@ class Run {
     other.data.scene = wish;
     const auto scene = scene_of(other.data);
     if (!scene) return scene.error();
-    // Meshes alone have a cache, and a data server of others refuses to be told where.
-    if ((*scene)->kind() == scene::Kind::kMesh) {
-      other.data.mesh.cache_dir = o_.data.mesh.cache_dir;
-      other.data.mesh.use_cache = o_.data.mesh.use_cache;
-    }
+    other.data.mesh.cache_dir = o_.data.mesh.cache_dir;
+    other.data.mesh.use_cache = o_.data.mesh.use_cache;
     if (const Status s = (*scene)->check(); !s) return s;
     keep_recent(wish);
     return pipeline.open(other);
@@ -281,6 +281,11 @@ class Run {
     return stopped ? kInterrupted : 1;
   }
 
+  int tell_failures() const {
+    for (const auto& failure : record_failures_) tools::complain({failure});
+    return 1;
+  }
+
   int end_at_once() {
     after_.drop_spools();
     std::error_code error;
@@ -301,10 +306,13 @@ class Run {
     const int code = after_.run(stopped, master_folder_);
     if (!net::stop_requested() || code == 0) after_.drop_spools();
     if (code != 0) return code;
-    if (record_failed_)
-      return tools::complain({o_.out + ": not all of the record could be written; errors of summary.json and the logs "
-                                       "tell what is missing"},
-                             1);
+    if (!record_failures_.empty()) return tell_failures();
+    if (busy_.share() > ProcessorWait::kMuch)
+      progress_.line(
+          fmt::format("telesplat: this machine was too busy: the display waited for a processor {:.0f} % of the time, "
+                      "from which delays come, and leases that expire",
+                      100 * busy_.share()));
+    if (const int unseen = o_.viewer.window ? 0 : after_.tell_unseen(stopped)) return unseen;
     const bool again = net::stop_requested();
     if (again)
       progress_.line("telesplat: interrupted; the record lacks what is made after the run");
@@ -316,7 +324,9 @@ class Run {
   RunOptions o_;
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
-  bool folder_existed_ = false, record_failed_ = false;
+  bool folder_existed_ = false;
+  std::vector<std::string> record_failures_;
+  ProcessorWait busy_;
   std::string master_folder_;                       // where the session's record is; empty: not known, or nowhere
   std::vector<std::string> results_;                // of the viewers of a joined session
   std::set<std::pair<uint64_t, uint64_t>> obeyed_;  // orders: master, number
@@ -362,7 +372,7 @@ int run(RunOptions o, const options::Given& given) {
 
 Command make(const char* name, const char* help, std::shared_ptr<RunOptions> defaults) {
   Command out = make_command(name, help, table, run, std::move(defaults));
-  out.takes_scene_file = true;
+  out.expand = expand_scene_file;
   return out;
 }
 

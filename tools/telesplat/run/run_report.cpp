@@ -170,9 +170,10 @@ void add_quality(const json& s, RunReport& out) {
 
 void add_errors(const json& s, RunReport& out) {
   const auto& e = s.at("errors");
-  out.line("errors", fmt::format("{} messages rejected, {} gaps resynchronised, {} leases expired",
+  const uint64_t expired = e.at("leases_expired").get<uint64_t>();
+  out.line("errors", fmt::format("{} messages rejected, {} gaps resynchronised, {} leases expired{}",
                                  e.at("messages_rejected").get<uint64_t>(), e.at("gaps_resynced").get<uint64_t>(),
-                                 e.at("leases_expired").get<uint64_t>()));
+                                 expired, expired > 0 ? " (a slow sampler's work went to another)" : ""));
 }
 
 // How a person names the folder next: runs/latest, where that is this run.
@@ -186,8 +187,11 @@ std::string name_of(const std::string& directory) {
 // What to do with the record. Nothing is replayed of volumes, and without what the viewer received.
 void print_next(const std::string& directory) {
   std::error_code error;
-  std::printf("\nEverything lies in %s (summary.json, frames.csv, updates.csv, tiles.csv, trace.json, images/)\n",
-              directory.c_str());
+  std::string there;
+  for (const char* file : {"summary.json", "frames.csv", "updates.csv", "tiles.csv", "trace.json", "images/"})
+    if (const std::string path = directory + "/" + file; fs::exists(path, error) && !fs::is_empty(path, error))
+      there += (there.empty() ? "" : ", ") + std::string(file);
+  std::printf("\nEverything lies in %s (%s)\n", directory.c_str(), there.c_str());
   const std::string name = name_of(directory);
   const auto scene = recorded_scene(directory);
   if (scene && (*scene)->pipeline() == scene::Pipeline::kPoints && fs::exists(directory + "/points.events", error))

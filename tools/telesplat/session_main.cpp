@@ -1,0 +1,14 @@
+// telesplat as the containers' images have it: what a running session is asked and told with, and keys. The whole
+// launcher reads data sets and pictures, whose libraries are 400 MB.
+#include "common/net/service.h"
+#include "tools/telesplat/command.h"
+
+int main(int argc, char** argv) {
+  using namespace telesplat;
+  return net::guarded_main([&] {
+    const std::string about = "telesplat in a container: asks and tells a running session, and makes keys";
+    return launcher::run_commands(about,
+                                  {launcher::control_command(), launcher::top_command(), launcher::keys_command()},
+                                  {argv + 1, argv + argc});
+  });
+}
