@@ -183,7 +183,7 @@ Status Parser::Impl::read(const std::string& called, std::vector<std::string> ar
   try {
     app->parse(std::move(arguments));
   } catch (const CLI::ExtrasError&) {
-    return Error{fmt::format("{} is one too many for {}", shown(app->remaining(true).front()), command)};
+    return Error{fmt::format("{}: {} takes no more arguments", shown(app->remaining(true).front()), command)};
   } catch (const CLI::RequiredError& e) {
     const std::string_view what = e.what();
     return Error{

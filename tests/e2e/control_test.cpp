@@ -81,7 +81,7 @@ size_t widest_line(const std::string& text) {
 TEST_F(Sessions, CtlFindsWhatRunStarted) {
   PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing());
-  EXPECT_TRUE(holds(run.program().err(), "session at " + run.master() + "; telesplat ctl status asks it"))
+  EXPECT_TRUE(holds(run.program().err(), "session at " + run.master() + "; telesplat ctl status shows it"))
       << run.program().err();
   EXPECT_EQ(files(), 1u);
 

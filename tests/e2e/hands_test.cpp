@@ -97,7 +97,12 @@ TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
   EXPECT_EQ(back["colour"], "#2828dc");
   EXPECT_TRUE(wait_until([&] { return value(run.status(), "viewer-1", "epoch") > epoch; }, 10)) << "it reports";
   EXPECT_EQ(run.status()["clip"], "plane z<=0");
+  std::string told;
+  EXPECT_EQ(ctl(run, {"clip"}, &told), 0);
+  EXPECT_EQ(told, "plane z<=0\n");
   ASSERT_EQ(ctl(run, {"clip", "off"}), 0);
+  EXPECT_EQ(ctl(run, {"clip"}, &told), 0);
+  EXPECT_EQ(told, "off\n");
   ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object() && p["data"][2].get<double>() > 0; }));
 
   std::string err;

@@ -125,6 +125,20 @@ const Case kCases[] = {
 
 INSTANTIATE_TEST_SUITE_P(All, Usage, ::testing::ValuesIn(kCases), [](const auto& info) { return info.param.name; });
 
+TEST(UsageOfHelp, HelpNamesACommandOrOneOfItsOwn) {
+  TemporaryFolder folder;
+  const auto said = [&](const std::vector<std::string>& arguments, int code = 0) {
+    Program program("telesplat", arguments, folder / "program");
+    EXPECT_EQ(program.wait(30), code) << program.err();
+    return code == 0 ? program.out() : program.err();
+  };
+  EXPECT_EQ(said({"help"}), said({"--help"}));
+  EXPECT_EQ(said({"help", "run"}), said({"run", "--help"}));
+  EXPECT_EQ(said({"help", "ctl", "clip"}), said({"ctl", "clip", "--help"}));
+  EXPECT_NE(said({"--help"}).find("\n  help "), std::string::npos) << "it is told";
+  EXPECT_EQ(said({"help", "rnu"}, 2), "telesplat: rnu: no such command of telesplat; did you mean run?\n");
+}
+
 // What a scene file says is refused with its line.
 TEST(UsageOfSceneFiles, NamesFileAndLine) {
   TemporaryFolder folder;

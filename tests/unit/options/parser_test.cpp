@@ -63,7 +63,7 @@ TEST(Parser, WordsForLaterAreReadWithoutEnding) {
   EXPECT_EQ(wrong({"a.ply", "--speed", "3"}), "");
   EXPECT_EQ(wrong({"a.ply", "--sped", "3"}), "--sped: no such flag of program run; did you mean --speed?");
   EXPECT_EQ(wrong({"a.ply", "--speed", "30"}), "--speed 30: is not between 0 and 10");
-  EXPECT_EQ(wrong({"a.ply", "b.ply"}), "b.ply is one too many for program run");
+  EXPECT_EQ(wrong({"a.ply", "b.ply"}), "b.ply: program run takes no more arguments");
   EXPECT_EQ(wrong({"a.ply", "--speed"}), "--speed: its value is missing");
   EXPECT_NE(wrong({}).find("program run needs scene"), std::string::npos);
   EXPECT_EQ(wrong({"--help"}), "--help: is of program run alone");
@@ -90,7 +90,7 @@ TEST(ParserDeathTest, BadUsageEndsWithTwoAndSaysWhy) {
               "program: --speed nan: is not between 0 and 10");
   EXPECT_EXIT(parsed({"a", "--speed", "fast"}), testing::ExitedWithCode(2), "--speed fast: is not a number");
   EXPECT_EXIT(parsed({}), testing::ExitedWithCode(2), "^program: program needs scene; program --help tells");
-  EXPECT_EXIT(parsed({"a", "b"}), testing::ExitedWithCode(2), "^program: b is one too many for program\n$");
+  EXPECT_EXIT(parsed({"a", "b"}), testing::ExitedWithCode(2), "^program: b: program takes no more arguments\n$");
   EXPECT_EXIT(parsed({"a", "--speed"}), testing::ExitedWithCode(2), "^program: --speed: its value is missing\n$");
 }
 
@@ -119,7 +119,7 @@ TEST(ParserDeathTest, AWrongCommandIsNamedAndTheNearestOneSuggested) {
   EXPECT_EXIT(parse({"view"}), two, "^program: program view needs a command: all\n$");
   EXPECT_EXIT(parse({"run", "a", "--sped", "3"}), two, "--sped: no such flag of program run; did you mean --speed");
   EXPECT_EXIT(parse({"--speed", "3", "run"}), two, "--speed: no such flag of program; flags follow the command");
-  EXPECT_EXIT(parse({"run", "a", "b"}), two, "^program: b is one too many for program run\n$");
+  EXPECT_EXIT(parse({"run", "a", "b"}), two, "^program: b: program run takes no more arguments\n$");
 }
 
 TEST(ParserDeathTest, TellsItsVersion) {

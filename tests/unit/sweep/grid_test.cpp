@@ -138,7 +138,7 @@ TEST(SweepCheck, IsWhatRunItselfSays) {
   EXPECT_EQ(wrong({"julia", "--durration", "3"}),
             "--durration: no such flag of telesplat run; did you mean --duration?");
   EXPECT_EQ(wrong({"julia", "--samplers=x"}), "--samplers x: is not a whole number");
-  EXPECT_EQ(wrong({"julia", "x"}), "x is one too many for telesplat run");
+  EXPECT_EQ(wrong({"julia", "x"}), "x: telesplat run takes no more arguments");
   EXPECT_EQ(wrong({"julia", "--duration"}), "--duration: its value is missing");
   EXPECT_NE(wrong({"/no/such.ply"}).find("/no/such.ply"), std::string::npos);
   EXPECT_NE(wrong({"julia", "--up", "z"}), "") << "a flag that the scene does not have";

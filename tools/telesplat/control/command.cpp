@@ -74,12 +74,23 @@ int show_status(StatusOptions o, const options::Given& given) {
   return 0;
 }
 
+// What an order without words asks for. Exit code.
+int print_shown(ControlClient& client, const std::string& key) {
+  const auto answer = client.ask("status", kPatience_s);
+  if (!answer) return tools::complain(answer.error(), 1);
+  const auto status = nlohmann::json::parse(*answer, nullptr, false);
+  const std::string shown = status.is_object() ? status.value(key, std::string("off")) : "off";
+  std::printf("%s\n", shown.c_str());
+  return 0;
+}
+
 // A master that refuses was asked for something wrong.
 int give_order(OrderOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
   int exit_code = 0;
   const auto client = reach(o.session, given, exit_code);
   if (!client) return exit_code;
+  if (o.words.empty() && !o.order.shown.empty()) return print_shown(*client, o.order.shown);
   auto arguments = o.order.read ? o.order.read(o.words, *client) : Result<Order::Arguments>(Order::Arguments{});
   if (!arguments) return tools::complain(arguments.error(), client->unanswered() ? 1 : 2);
   const auto reply = client->order(o.order.name, kPatience_s, *arguments);

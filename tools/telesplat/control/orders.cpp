@@ -174,8 +174,9 @@ std::vector<Order> all_orders() {
       {.name = "clip",
        .words = "in the data's own coordinates: plane x>=50% (x, y, z; >= or <=; a number or a share of the data's "
                 "box) or plane A,B,C,D keeps A x + B y + C z >= D; box X0,Y0,Z0,X1,Y1,Z1 keeps the inside; several "
-                "are separated by \";\"; off: nothing is cut away",
-       .read = clip_arguments}};
+                "are separated by \";\"; off: nothing is cut away; without words: prints what is cut away",
+       .read = clip_arguments,
+       .shown = "clip"}};
   for (Order& order : all)
     if (order.help.empty()) order.help = scene::help_of_order(order.name);
   return all;

@@ -18,6 +18,7 @@ struct Order {
   std::string words;  ///< help of the words that follow; empty: none may
   /// What the words come to. Error: what is wrong with them; a person typed them. It may ask the master.
   Result<Arguments> (*read)(const std::vector<std::string>& words, ControlClient& client) = nullptr;
+  std::string shown;  ///< without words it prints this of the session's status, or "off"; empty: it does not
 };
 
 const std::vector<Order>& orders();
