@@ -105,7 +105,8 @@ class Files(unittest.TestCase):
 
     def test_each_has_its_own_keys_alone(self):
         keys = {
-            "master": {"server.key", "server.pub", "allowed.toml"},
+            # Whoever may enter its container may ask and end the session: telesplat ctl.
+            "master": {"server.key", "server.pub", "allowed.toml", "operator.key"},
             "data": {"server.key", "server.pub", "allowed.toml", "data.key"},
             "packer": {"server.key", "server.pub", "allowed.toml", "packer.key"},
             "sampler": {"server.pub", "sampler.key"},
@@ -163,6 +164,15 @@ class Files(unittest.TestCase):
         for line in re.findall(r'HEALTHCHECK.*', (COMPOSE / "Dockerfile").read_text()):
             for flag in re.findall(r'"(--[a-z-]+)"', line):
                 self.assertIn(flag, known["telesplat-health"])
+
+    def test_pages_have_the_order_that_works(self):
+        """prepare makes keys with what is in the images, and up needs keys."""
+        for page in (COMPOSE / "README.md", COMPOSE / "compose.yaml", ROOT / "docs/deploying.md"):
+            text = page.read_text()
+            prepare = text.index("compose/prepare  ")
+            block = text[max(0, prepare - 200):prepare + 300]
+            order = [block.index(step) for step in (" build ", "compose/prepare  ", " up ")]
+            self.assertEqual(order, sorted(order), page)
 
     def test_variables_are_told(self):
         told = (COMPOSE / "README.md").read_text() + (ROOT / "docs/deploying.md").read_text()

@@ -4,6 +4,7 @@ goes without Slurm. Programs are stand-ins here; tests/e2e has real ones."""
 
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -40,6 +41,28 @@ class Scripts(unittest.TestCase):
     def lines(self, name):
         file = self.path / name
         return file.read_text().splitlines() if file.exists() else []
+
+    # ---- prepare -----------------------------------------------------------------------------------------------------
+
+    def prepare(self, image):
+        tree = self.path / "tree/compose"
+        tree.mkdir(parents=True)
+        shutil.copy(COMPOSE / "prepare", tree / "prepare")
+        self.program("docker", f"""echo "$*" >> asked
+case $1 in image) exit {0 if image else 1} ;; run) touch tree/compose/keys/server.key ;; esac""")
+        return self.run_script(tree / "prepare"), tree
+
+    def test_prepare_says_how_the_images_are_made(self):
+        done, tree = self.prepare(image=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("docker compose -f compose/compose.yaml --profile julia build", done.stderr)
+        self.assertFalse((tree / ".env").exists())
+
+    def test_prepare_makes_keys_with_the_image(self):
+        done, tree = self.prepare(image=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(self.lines("asked")[-1], r"^run .*--entrypoint telesplat telesplat-master keys /keys$")
+        self.assertIn("TELESPLAT_USER=", (tree / ".env").read_text())
 
     # ---- stay --------------------------------------------------------------------------------------------------------
 

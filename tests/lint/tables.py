@@ -90,7 +90,7 @@ FLOORS = {
     ],
     "tools": [
         ["tools/common"],
-        ["tools/health", "tools/make_keys", "tools/make_terrain", "tools/make_volume", "tools/pose_replay",
+        ["tools/health", "tools/make_terrain", "tools/make_volume", "tools/pose_replay",
          "tools/wan_relay", "tools/xr_test_runtime"],
         ["tools/telesplat/command.h"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
