@@ -66,6 +66,7 @@ int run_commands(const std::string& about, const std::vector<Command>& commands,
   put_flags_behind(commands, arguments);
   options::Parser parser(about);
   parser.version(version());
+  parser.footer("telesplat help COMMAND tells what a command does, and its flags.");
   Parsers parsers;
   declare(parser, commands, parsers);
   parser.parse_or_exit("telesplat", std::move(arguments));

@@ -50,7 +50,7 @@ Command autostereo_command();
 Command top_command();
 Command keys_command();
 
-/// `commands`, and three more that tell of all of them: help, completion and man.
+/// `commands`, and two more that tell of all of them: completion and man.
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);
 
 /// Runs the command that the arguments name; --help prints and ends the program, bad usage too, with code 2.

@@ -142,7 +142,6 @@ int complete(const options::Manual& all, const std::string& shell) {
 }  // namespace
 
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands) {
-  commands.push_back({.name = "help", .help = "tell what a command does and its flags", .table = {}, .run = {}});
   const auto completion_options = std::make_shared<CompletionOptions>();
   const auto man_options = std::make_shared<ManOptions>();
   commands.push_back({.name = "completion",
