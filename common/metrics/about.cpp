@@ -99,6 +99,7 @@ ordered_json what_was_done(const About& about, const std::vector<Process>& proce
                    {"machines", machines(processes)},     {"data", data_of(roster)},
                    {"trajectory", trajectory_of(roster)}, {"asked", asked_of(roster)},
                    {"settings", about.settings}};
+  out["label"] = text_or_null(about.label);
   if (about.begin.unix_ns) out["begin_monotonic_s"] = about.begin.monotonic_s;
   return out;
 }

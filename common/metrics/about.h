@@ -28,6 +28,7 @@ struct About {
   std::map<std::string, double> settings;  ///< of the session, as everyone was told them
   size_t lives = 1;                        ///< masters that wrote the record, one after the other
   RecordLosses losses;
+  std::string label;  ///< what reports call the run; empty: its folder's name
 };
 
 /// Facts by which processes tell the record what the figures do not: tables of session.toml, "\n[table]\nkey = ...\n".

@@ -172,6 +172,7 @@ Quantiles Measured::swap_skew_ms() const {
 void Measured::add_update(ViewerFigures& viewer, const Row& row) {
   row.add_to(start_up_ms, "start_up_ms");
   points_received += row.of("points").value_or(0);
+  extra_points += row.of("extra_points").value_or(0);
   const auto ms = row.of("latency_ms");
   if (!ms || row.of("left_out").value_or(0) != 0) return;
   ++viewer.updates;

@@ -79,7 +79,7 @@ class Measured {
   Quantiles latency_ms;
   // Of all.
   Quantiles start_up_ms;
-  double points_received = 0;
+  double points_received = 0, extra_points = 0;
 
   // Of the stages of updates.
   std::map<std::string, Quantiles> stages_ms;

@@ -24,15 +24,16 @@ Distribution distribution(std::vector<double> values) {
   return {mean, at(0.5), at(0.95), at(0.99), values.back(), n > 1 ? std::sqrt(squares / (n - 1)) : 0};
 }
 
-nlohmann::ordered_json to_json(const Distribution& d) {
-  const auto rounded = [](double v) { return std::round(v * 1000) / 1000; };
+nlohmann::ordered_json to_json(const Distribution& d, int digits) {
+  const double scale = std::pow(10, digits);
+  const auto rounded = [&](double v) { return std::round(v * scale) / scale; };
   return {{"mean", rounded(d.mean)}, {"median", rounded(d.median)}, {"p95", rounded(d.p95)},
           {"p99", rounded(d.p99)},   {"max", rounded(d.max)},       {"sd", rounded(d.sd)}};
 }
 
-nlohmann::ordered_json distribution_json(const std::vector<double>& values) {
+nlohmann::ordered_json distribution_json(const std::vector<double>& values, int digits) {
   const bool any = std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-  return any ? to_json(distribution(values)) : nlohmann::ordered_json();
+  return any ? to_json(distribution(values), digits) : nlohmann::ordered_json();
 }
 
 }  // namespace telesplat::metrics

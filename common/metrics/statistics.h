@@ -15,8 +15,9 @@ struct Distribution {
 /// left out.
 Distribution distribution(std::vector<double> values);
 
-nlohmann::ordered_json to_json(const Distribution& d);
+/// digits: behind the point.
+nlohmann::ordered_json to_json(const Distribution& d, int digits = 3);
 /// The distribution of these values; null if there are none: nothing was measured.
-nlohmann::ordered_json distribution_json(const std::vector<double>& values);
+nlohmann::ordered_json distribution_json(const std::vector<double>& values, int digits = 3);
 
 }  // namespace telesplat::metrics

@@ -52,14 +52,19 @@ struct Traffic {
   bool eliminates = true;  ///< points: of slice images nothing is eliminated
 };
 
-Traffic traffic(const Measured& m, const Roster& roster) {
+bool has_slices(const std::string& kind_name) {
+  const auto kind = scene::kind_named(kind_name);
+  return kind && scene::pipeline_of(*kind) == scene::Pipeline::kSlices;
+}
+
+/// points: that viewers inserted.
+Traffic traffic(const Measured& m, bool slices, double points) {
   Traffic out;
   const double samples = m.tiles().samples(), kept = m.tiles().kept();
   out.bytes_sent = m.tiles().bytes_sent();
   out.sampled = samples > 0;
-  const auto kind = scene::kind_named(roster.fact("data", "kind"));
-  out.bytes_consumed = roster.counted("viewer", "points_received") * kRawBytesPerPoint;
-  if (kind && scene::pipeline_of(*kind) == scene::Pipeline::kSlices) {
+  out.bytes_consumed = points * kRawBytesPerPoint;
+  if (slices) {
     // Samples are voxels, and kept are pixels that they made.
     out.eliminates = false;
     out.bytes_raw = kept * kRawBytesPerSlicePixel;
@@ -301,10 +306,13 @@ ordered_json predicted(const Roster& roster, const std::string& what) {
           {"over_none_deg", if_measured(none_deg > 0, thousandths(deg / none_deg))}};
 }
 
-ordered_json how_heads_moved(const Measured& m, const Roster& roster) {
+ordered_json how_in_time(const Measured& m) {
   return {{"frames_late", if_measured(m.headset, m.frames_late)},
-          {"refreshes_missed", if_measured(m.headset || m.refreshed, whole(m.refreshes_missed))},
-          {"predicted_by", or_null(roster.fact("viewer", "prediction"))},
+          {"refreshes_missed", if_measured(m.headset || m.refreshed, whole(m.refreshes_missed))}};
+}
+
+ordered_json how_heads_moved(const Roster& roster) {
+  return {{"predicted_by", or_null(roster.fact("viewer", "prediction"))},
           {"prediction", predicted(roster, "prediction")},
           {"pose_prediction", predicted(roster, "pose_prediction")}};
 }
@@ -325,9 +333,12 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_coupled(measured));
   out.update(how_long(measured));
   out.update(how_together(measured, counter("swaps_incomplete")));
-  out.update(how_heads_moved(measured, roster));
+  out.update(how_in_time(measured));
+  out.update(how_heads_moved(roster));
   out["clock"] = clocks(processes);
-  out.update(how_much(traffic(measured, roster), run_s, viewers));
+  out.update(
+      how_much(traffic(measured, has_slices(roster.fact("data", "kind")), roster.counted("viewer", "points_received")),
+               run_s, viewers));
   out.update(how_exact(measured.tiles(), roster));
   out.update(what_was_steered(measured.tiles()));
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));
@@ -352,6 +363,23 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
         {"record_lost", rows_of(about.losses.lost)},
         {"record_cut", rows_of(about.losses.cut)}}}});
   return out;
+}
+
+void measure_again(const Measured& m, ordered_json& summary) {
+  const auto text = [&](const char* key) {
+    return summary.contains(key) && summary[key].is_string() ? summary[key].get<std::string>() : std::string();
+  };
+  const bool slices = has_slices(text("kind"));
+  ordered_json again = how_often(m, m.viewers(), 0);
+  for (const ordered_json& part :
+       {how_coupled(m), how_long(m), how_together(m, 0), how_in_time(m), what_was_steered(m.tiles()),
+        how_much(traffic(m, slices, slices ? 0 : m.points_received + m.extra_points), longest_s(m.viewers()),
+                 std::max<double>(1, double(m.viewers().size())))})
+    again.update(part);
+  again["points_drawn"] = distribution_json(m.points_drawn);
+  again["update_age_ms"] = distribution_json(m.update_age_ms);
+  for (const char* counted : {"frames_sampled", "swaps_incomplete"}) again.erase(counted);
+  summary.update(again);
 }
 
 }  // namespace telesplat::metrics

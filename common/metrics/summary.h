@@ -16,5 +16,7 @@ namespace telesplat::metrics {
 /// measured, and where a figure has no meaning for the scene, it is null.
 nlohmann::ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
                                  const std::map<std::string, double>& counters, const About& about);
+/// Puts what `measured` tells in the place of what this summary has of it; what only processes tell stays.
+void measure_again(const Measured& measured, nlohmann::ordered_json& summary);
 
 }  // namespace telesplat::metrics

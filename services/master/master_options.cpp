@@ -284,6 +284,10 @@ options::Table record_table(MasterServiceOptions& o) {
            .value = &o.trace_limit_mb,
            .help = "MB that the record's trace.json has at most; 0: no limit",
            .limits = options::Range{0.0, 1e9},
+           .not_in_scene = kWhatIsKept},
+          {.flag = "--label",
+           .value = &o.label,
+           .help = "name of the run in its summary and in reports",
            .not_in_scene = kWhatIsKept}};
 }
 

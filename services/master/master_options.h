@@ -19,6 +19,7 @@ struct MasterServiceOptions {
   std::string started_by = "hand";                      ///< as net::RunningSession has it
   int metrics_port = 0;                                 ///< HTTP, for programs that watch; 0: none
   std::string metrics_address = "127.0.0.1";
+  std::string label;    ///< of the record, in reports; empty: none
   std::string animate;  ///< as julia::parse_timeline takes it; empty: what the data server says
 };
 

@@ -127,7 +127,8 @@ class MasterService {
                                .version = version(),
                                .begin = record_->begin(),
                                .end_unix_ns = metrics::begin_now().unix_ns,
-                               .settings = core_.settings()};
+                               .settings = core_.settings(),
+                               .label = options_.label};
     // It is among the files that finish() tells of.
     if (const Status s = record_->write_file("session.toml", session_text(options_, core_, about, processes)); !s)
       log::error("{}", s.error().text);

@@ -156,7 +156,7 @@ OUTSIDE_HEADERS = [
     # Which ThreadSanitizer can watch.
     (r"((oneapi/)?tbb(\.h|/(tbb\.h|parallel_.*|task_group\.h|flow.*))|execution)", ["common/parallel"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
-    (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/wan_relay"]),
+    (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/common/inference.cpp", "tools/wan_relay"]),
     (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),
 ]
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include "client/viewer/display/eyes/eye_pictures.h"
 #include "client/viewer/hands/errands.h"
@@ -269,7 +270,9 @@ class Display {
     if (!m.coupling.waits()) received_->show_state(turn.state);
     m.wall_frame = turn.frame;
     m.head = turn.head;
-    m.posed = {start_s_ + turn.t_s};
+    // The display that leads took it after the frame before the last one was presented. Its clock is ours, unless
+    // viewers were started by hand.
+    m.posed = {std::clamp(start_s_ + turn.t_s, seen_before_s_, m.begin_s)};
     m.camera = surface_.camera_of(turn.head);
   }
 
@@ -416,7 +419,7 @@ class Display {
     m.seen_s = monotonic_s();
     m.refresh_s = std::max(surface_.refresh_s(), o_.target_fps > 0 ? 1 / o_.target_fps : 0);
     m.missed = m.drawn.still ? 0 : refreshes_missed(seen_s_, m.seen_s, m.refresh_s);
-    seen_s_ = m.seen_s;
+    seen_before_s_ = std::exchange(seen_s_, m.seen_s);
   }
 
   void note_swap(const WallPace::Swapped& swapped, MeasuredFrame& m) {
@@ -481,7 +484,7 @@ class Display {
   bool view_intact_ = false;  // it holds what is on display
   DisplayResult result_;
   double due_s_ = 0;  // when the frame at hand was
-  double start_s_ = 0, previous_s_ = 0, seen_s_ = 0, next_picture_s_ = 0;
+  double start_s_ = 0, previous_s_ = 0, seen_s_ = 0, seen_before_s_ = 0, next_picture_s_ = 0;
   bool last_ = false;
   StallWatch stall_;
   LiveFigures live_;  // of the newest frame

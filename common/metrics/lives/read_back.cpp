@@ -35,12 +35,31 @@ uint64_t take_line(std::istream& in, std::string& line) {
   }
 }
 
+/// The column that tells when what a row is about began; of the others nobody asks.
+const char* began_in(Csv csv) {
+  switch (csv) {
+    case Csv::kFrames:
+      return "begin_s";
+    case Csv::kTiles:
+      return "leased_s";
+    case Csv::kPlans:
+      return "asked_s";
+    case Csv::kEpochs:
+    case Csv::kAssignment:
+      return "";
+    case Csv::kUpdates:
+    case Csv::kStages:
+      break;
+  }
+  return "requested_s";
+}
+
 /// The rows of a table, one after the other. Those that are cut off, too long or of another number of cells are left
 /// out.
 class Rows {
  public:
-  Rows(const std::string& directory, Csv csv, const std::vector<Life>& lives)
-      : in_(directory + "/" + file_of(csv)), csv_(csv), lives_(lives) {
+  Rows(const std::string& directory, Csv csv, const std::vector<Life>& lives, double from_s)
+      : in_(directory + "/" + file_of(csv)), csv_(csv), lives_(lives), from_s_(from_s) {
     std::string line;
     at_ = take_line(in_, line);
     if (at_ > 0) columns_ = csv_cells(line);
@@ -53,7 +72,7 @@ class Rows {
       at_ += bytes;
       if (bytes > kMostOfLine) continue;
       cells_ = csv_cells(line);
-      if (cells_.size() == columns_.size()) return true;
+      if (cells_.size() == columns_.size() && !(number_of(began_in(csv_)) < from_s_)) return true;
     }
     return false;
   }
@@ -73,6 +92,7 @@ class Rows {
   std::ifstream in_;
   const Csv csv_;
   const std::vector<Life>& lives_;
+  const double from_s_;
   Cells columns_, cells_;
   size_t life_ = 1;
   uint64_t at_ = 0;
@@ -157,14 +177,14 @@ std::vector<std::string> header_of(const std::string& path) {
   return bytes > 0 && bytes <= kMostOfLine ? csv_cells(line) : Cells();
 }
 
-Measured read_back(const std::string& directory, const std::vector<Life>& lives) {
+Measured read_back(const std::string& directory, const std::vector<Life>& lives, double from_s) {
   Measured out;
-  const auto rows = [&](Csv csv) { return Rows(directory, csv, lives); };
+  const auto rows = [&](Csv csv) { return Rows(directory, csv, lives, from_s); };
   read_table(rows(Csv::kFrames), "frames", out);
   read_table(rows(Csv::kUpdates), "updates", out);
   read_table(rows(Csv::kStages), "stages", out);
   read_sampled(rows(Csv::kTiles), rows(Csv::kPlans), out);
-  for (Rows epochs = rows(Csv::kEpochs); epochs.next();) out.add_epoch();
+  for (Rows epochs(directory, Csv::kEpochs, lives, -1e300); epochs.next();) out.add_epoch();
   return out;
 }
 

@@ -9,8 +9,9 @@
 
 namespace telesplat::metrics {
 
-/// What the tables in `directory` add up to. Rows that cannot be read are left out.
-Measured read_back(const std::string& directory, const std::vector<Life>& lives);
+/// What the tables in `directory` add up to. Rows that cannot be read are left out, and those of what began before
+/// from_s: frames, requests, leases and plans, since the run's beginning.
+Measured read_back(const std::string& directory, const std::vector<Life>& lives, double from_s = -1e300);
 /// Columns of a table's header; none if it has no whole one.
 std::vector<std::string> header_of(const std::string& path);
 

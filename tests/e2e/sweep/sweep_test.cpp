@@ -63,6 +63,11 @@ TEST_F(Sweeps, GoOnWhereTheyWereInterrupted) {
   ASSERT_EQ(second.wait(120), 0) << second.err();
   EXPECT_EQ(done(), 4u);
   EXPECT_EQ(summary_id("coupling-sync/1"), id) << "what was done is not done again";
+  EXPECT_NE(read_text(folder / "sweep/coupling-async/2/summary.json").find("\"label\": \"coupling=async, run 2\""),
+            std::string::npos);
+  EXPECT_NE(read_text(folder / "sweep/cells.csv").find("\ncoupling-async,async,motion_to_photon_ms.median,2,"),
+            std::string::npos);
+  EXPECT_NE(second.out().find("! two runs of each configuration"), std::string::npos) << second.out();
   EXPECT_NE(second.out().find("2/2"), std::string::npos) << second.out();
   const auto table = tools::CsvTable::read(folder / "sweep/sweep.csv", {});
   ASSERT_TRUE(table) << table.error().text;

@@ -82,6 +82,59 @@ TEST(ReportRun, WithoutASummaryIsToldFromItsTables) {
     EXPECT_NE(notes.find(told), notes.npos) << told;
 }
 
+TEST(ReportRun, FramesOfAPictureThatStandsAreNoDelays) {
+  const TemporaryFolder folder;
+  write(folder / "frames.csv",
+        "viewer,frame,t_s,inter_frame_ms,construction_ms,begin_s,motion_to_photon_ms,still\n"
+        "viewer-1,0,0,0,5,2,9,0\nviewer-1,1,0.02,20,5,2.02,12,0\nviewer-1,2,0.04,20,0,2.04,,1\n"
+        "viewer-1,3,0.08,40,9,2.08,30,0\n");
+  auto run = run_json(folder.path(), "r", 1);
+  EXPECT_EQ(run.at("spreads").at("inter_frame_ms").at("n"), 2);
+  EXPECT_EQ(run.at("spreads").at("inter_frame_ms").at("mean"), 30);
+  EXPECT_EQ(run.at("spreads").at("motion_to_photon_ms").at("n"), 3);
+  EXPECT_EQ(run.at("series").at("motion_to_photon_ms")[0].at("v").dump(), "[9.0,12.0,30.0]");
+  EXPECT_NEAR(run.at("figures").at("fps").get<double>(), 2 / 0.06, 0.01);
+  EXPECT_TRUE(run.at("intervals").empty()) << "too few frames";
+  run = run_json(folder.path(), "r", 1, {}, 0.03);
+  EXPECT_EQ(run.at("spreads").at("inter_frame_ms").at("mean"), 40) << "the beginning is left out";
+  EXPECT_EQ(run.at("series").at("motion_to_photon_ms")[0].at("t").dump(), "[0.04]");
+  EXPECT_NE(run.at("notes").dump().find("the first 0.03 s are left out"), std::string::npos);
+}
+
+TEST(ReportRun, FiguresHaveIntervals) {
+  const TemporaryFolder folder;
+  std::string frames = "viewer,frame,begin_s,inter_frame_ms,motion_to_photon_ms\n";
+  for (int i = 0; i < 200; ++i)
+    frames += "viewer-1," + std::to_string(i) + "," + std::to_string(i / 50.0) + ",20," + std::to_string(i % 20) + "\n";
+  write(folder / "frames.csv", frames);
+  const auto run = run_json(folder.path(), "r", 1);
+  EXPECT_EQ(run.at("intervals").at("delay_median").dump(), "[20.0,20.0]");
+  const auto interval = run.at("intervals").at("m2p_median");
+  EXPECT_LT(interval[0].get<double>(), 9.5);
+  EXPECT_GT(interval[1].get<double>(), 9.5);
+}
+
+TEST(ReportNames, AreLabelsBeforeFolders) {
+  const TemporaryFolder folder;
+  for (const char* name : {"1", "2"}) write(folder / (name + std::string("/frames.csv")), kFrames);
+  write(folder / "2/summary.json", R"({"label": "coupling=sync, run 2"})");
+  ReportOptions o{.runs = {folder / "1", folder / "2"}, .no_plots = true};
+  tools::ProgressLine progress(1);
+  const auto page_of = [&](const ReportOptions& options) {
+    const auto settled = settle_report(options);
+    const auto made =
+        settled ? make_report(*settled, progress, [] { return false; }) : Result<ReportMade>(settled.error());
+    if (!made) return made.error().text;
+    std::ifstream in(made->page);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  EXPECT_NE(page_of(o).find("<title>Telesplat report: 1 and coupling=sync, run 2</title>"), std::string::npos);
+  o.labels = {"before", "after"};
+  EXPECT_NE(page_of(o).find("<title>Telesplat report: before and after</title>"), std::string::npos);
+  o.labels = {"before"};
+  EXPECT_EQ(page_of(o), "--label: 1 are given for 2 runs; each run needs one");
+}
+
 TEST(ReportRun, OfNothingButItsIdHasNoFiguresAndNoHarm) {
   const TemporaryFolder folder;
   write(folder / "run.id", "telesplat-run 0123456789abcdef\n");

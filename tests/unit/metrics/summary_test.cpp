@@ -86,6 +86,8 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                           "errors"})
     EXPECT_TRUE(s.contains(key)) << key;
   EXPECT_EQ(s["primitives"], 1234);
+  EXPECT_TRUE(s["label"].is_null());
+  EXPECT_EQ(record->summary({}, {}, {.label = "before"})["label"], "before");
   EXPECT_EQ(s["samplers"], 1);
   EXPECT_EQ(s["frames"], 3);
   EXPECT_EQ(s["fps"], 1.5);

@@ -130,7 +130,9 @@ TEST_F(SweepManifest, ARunThatDidNotEndIsReplaced) {
   const Manifest m = begin_manifest(small(), "1.0", "/here");
   const Sweep sweep(m, folder, "", 0);
   const std::string out = folder + "/coupling-sync_samplers-2/1";
-  std::vector<std::string> expected{"run", "julia", "--duration", "2", "--coupling=sync", "--samplers=2", "--out", out};
+  std::vector<std::string> expected{
+      "run",          "julia", "--duration", "2",       "--coupling=sync",
+      "--samplers=2", "--out", out,          "--label", "coupling=sync samplers=2, run 1"};
   EXPECT_EQ(sweep.command({1, 1}), expected);
   fs::create_directories(out);
   expected.emplace_back("--overwrite");

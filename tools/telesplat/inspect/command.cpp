@@ -25,6 +25,7 @@ namespace fs = std::filesystem;
 struct InspectOptions {
   data::DataOptions data;  // its scene: the path
   bool json = false;
+  double skip_s = 0;
   std::string out;               // .npy or .exr file for depth; empty: none
   std::optional<double> near_m;  // of a depth image of which nothing tells it
 };
@@ -32,6 +33,10 @@ struct InspectOptions {
 options::Table own_table(InspectOptions& o) {
   return {
       {.flag = "--json", .value = &o.json, .help = "print all that is known, as JSON"},
+      {.flag = "--skip",
+       .value = &o.skip_s,
+       .help = "of run folders: seconds after the first displayed frame that figures leave out: its warming up",
+       .limits = options::Range{0.0, 1e6}},
       {.flag = "--out",
        .value = &o.out,
        .help = "of depth images and pictures with depth: write the depth in metres, rows from the top, infinity where "
@@ -88,6 +93,7 @@ Status refuse_misfits(const InspectOptions& o, const options::Given& given, Subj
     const bool fits = options::find(data, flag) ? subject == Subject::kData
                       : flag == "--out"         ? deep
                       : flag == "--near"        ? subject == Subject::kDepthImage
+                      : flag == "--skip"        ? subject == Subject::kRun
                                                 : true;
     if (!fits)
       return Error{fmt::format("{}: {} is {}, which has no {}", flag, o.data.scene, kWords[size_t(subject)], flag)};
@@ -131,7 +137,7 @@ int inspect(InspectOptions o, const options::Given& given) {
     return tools::complain(inspect_run(path).error());
   if (const Status s = refuse_misfits(o, given, subject); !s) return tools::complain(s.error());
   const auto told = subject == Subject::kData    ? inspect_data(o.data)
-                    : subject == Subject::kRun   ? inspect_run(path)
+                    : subject == Subject::kRun   ? inspect_run(path, o.skip_s)
                     : subject == Subject::kStore ? inspect_store(path)
                                                  : inspect_with_depth(o, subject);
   if (!told) return tools::complain(told.error());

@@ -7,7 +7,7 @@
 #include <map>
 #include <sstream>
 
-#include "tools/common/json_file.h"
+#include "tools/telesplat/record/skip.h"
 #include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/scene/scene.h"
 
@@ -73,8 +73,9 @@ void describe_files(const std::string& directory, data::Description& out) {
 
 }  // namespace
 
-Result<data::Description> inspect_run(const std::string& directory) {
-  auto summary = tools::read_json_object(directory + "/summary.json");
+Result<data::Description> inspect_run(const std::string& directory, double skip_s) {
+  auto summary = summary_without_beginning(directory, skip_s);
+  if (!summary && skip_s > 0) return summary.error();
   if (!summary)
     return Error{
         fmt::format("{}: is a folder that holds neither a finished run, which has a summary.json, nor a volume: DICOM "
@@ -83,7 +84,7 @@ Result<data::Description> inspect_run(const std::string& directory) {
   data::Description out("run", fmt::format("{}: a run", directory));
   out.json["path"] = directory;
   out.json["summary"] = *std::move(summary);
-  if (const auto report = read_report(directory)) {
+  if (const auto report = read_report(directory, skip_s)) {
     out.row("shown", report->head);
     for (const auto& [what, value] : report->lines) out.row(what, value);
   } else {

@@ -72,7 +72,12 @@ struct Measure {
 };
 
 constexpr Measure kFigures[] = {
-    {"fps", "fps", "frames a second", "1/s", "displayed frames / duration, mean over the viewers", 1, 1, "tile"},
+    {"m2p_median", "motion_to_photon_ms.median", "motion to photon, median", "ms",
+     "from the moment a pose was taken to the frame that shows it", 1, -1, "tile", "motion_to_photon_ms.median"},
+    {"m2p_p95", "motion_to_photon_ms.p95", "motion to photon, p95", "ms", "95 of 100 frames are faster", 1, -1, "tile",
+     "motion_to_photon_ms.p95"},
+    {"fps", "fps", "frames a second", "1/s", "drawn frames / the time that they took, mean over the viewers", 1, 1,
+     "tile"},
     {"delay_median", "inter_frame_delay_ms.median", "inter-frame delay, median", "ms",
      "end of a frame minus end of the one before", 1, -1, "tile", "inter_frame_ms.median"},
     {"delay_p95", "inter_frame_delay_ms.p95", "inter-frame delay, p95", "ms", "95 of 100 frames are faster", 1, -1,
@@ -108,6 +113,20 @@ constexpr Measure kFigures[] = {
      "average time between frames, the reciprocal of the frame rate", 1, -1, "measure", "inter_frame_ms.mean"},
 
     {"frames", "frames", "frames displayed", "", "", 1, 0, "more", "inter_frame_ms.n"},
+    {"still", "frames_still", "of these, frames of a picture that stood", "", "nothing was drawn for them", 1, 0,
+     "more"},
+    {"missed", "refreshes_missed", "refreshes missed", "", "refreshes of the display without a new picture", 1, -1,
+     "more"},
+    {"m2p_max", "motion_to_photon_ms.max", "motion to photon, longest", "ms", "", 1, -1, "more",
+     "motion_to_photon_ms.max"},
+    {"m2p_sd", "motion_to_photon_ms.sd", "motion to photon, standard deviation", "ms", "", 1, -1, "more",
+     "motion_to_photon_ms.sd"},
+    {"delay_sd", "inter_frame_delay_ms.sd", "inter-frame delay, standard deviation", "ms", "", 1, -1, "more",
+     "inter_frame_ms.sd"},
+    {"jitter", "inter_frame_jitter_ms", "inter-frame delay, jitter", "ms",
+     "mean difference of two delays that follow each other", 1, -1, "more"},
+    {"latency_sd", "view_update_latency_ms.sd", "view update latency, standard deviation", "ms", "", 1, -1, "more",
+     "latency_ms.sd"},
     {"updates", "updates", "view updates", "", "", 1, 0, "more", "latency_ms.n"},
     {"duration", "duration_s", "duration", "s", "from the first frame to the last", 1, 0, "more"},
     {"delay_max", "inter_frame_delay_ms.max", "inter-frame delay, longest", "ms", "", 1, -1, "more",
@@ -140,8 +159,9 @@ void add_counted(const ordered_json& spreads, const RunTables& t, ordered_json& 
   const double s = t.duration_s();
   if (!(s > 0)) return;
   out["duration"] = rounded(s);
-  for (const auto& [key, of] : {std::pair{"fps", "inter_frame_ms.n"}, {"updates_per_s", "latency_ms.n"}})
-    if (const auto n = at(spreads, of); n.is_number()) out[key] = rounded(n.get<double>() / s);
+  if (const auto n = at(spreads, "inter_frame_ms.n"); n.is_number() && s > t.still_s())
+    out["fps"] = rounded(n.get<double>() / (s - t.still_s()));
+  if (const auto n = at(spreads, "latency_ms.n"); n.is_number()) out["updates_per_s"] = rounded(n.get<double>() / s);
 }
 
 }  // namespace

@@ -23,6 +23,14 @@ options::Table table(ReportOptions& o) {
            .value = &o.plots,
            .help = "folder of plots for papers (PNG, through Python's matplotlib); default: plots beside the page, of "
                    "several runs report-plots"},
+          {.flag = "--label",
+           .value = &o.labels,
+           .help = "what the page calls a run; once for each, in their order; default: what telesplat run --label "
+                   "called it, else its folder's name"},
+          {.flag = "--skip",
+           .value = &o.skip_s,
+           .help = "seconds after the first displayed frame of each run that are left out: its warming up",
+           .limits = options::Range{0.0, 1e6}},
           {.flag = "--no-plots", .value = &o.no_plots, .help = "draw no plots for papers"}};
 }
 

@@ -10,6 +10,7 @@
 #include "common/core/version.h"
 #include "common/core/whole_file.h"
 #include "common/metrics/run_folder.h"
+#include "tools/telesplat/record/skip.h"
 #include "tools/telesplat/report/about_part.h"
 #include "tools/telesplat/report/page.h"
 #include "tools/telesplat/report/picture_part.h"
@@ -23,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr size_t kMostRuns = 12;
+constexpr size_t kMostRuns = 12, kLongestName = 100;
 constexpr size_t kLeastBuckets = 500;  // of a series over time, however many runs there are
 
 bool is_run(const std::string& directory) {
@@ -41,16 +42,23 @@ fs::path without_slash(const std::string& directory) {
   return path;
 }
 
-// Names by which runs are told apart: those of their folders, of "latest" and of "." what they stand for; with a
-// number where two are alike.
-std::vector<std::string> names_of(const std::vector<std::string>& runs) {
+// What the run was called when it began, else its folder; of "latest" and of "." what they stand for.
+std::string name_of(const std::string& run) {
+  if (const auto s = read_summary(run); s.is_object())
+    if (const auto label = s.find("label"); label != s.end() && label->is_string() && !label->empty())
+      if (const auto text = label->get<std::string>(); !text.empty()) return text;
+  std::error_code error;
+  const fs::path real = fs::canonical(run, error);
+  return (error ? without_slash(run) : real).filename().string();
+}
+
+// Names by which runs are told apart; with a number where two are alike.
+std::vector<std::string> names_of(const ReportOptions& o) {
   std::vector<std::string> out;
   std::set<std::string> taken;
-  for (const auto& run : runs) {
-    std::error_code error;
-    const fs::path real = fs::canonical(run, error);
-    std::string name = to_utf8((error ? without_slash(run) : real).filename().string()).substr(0, 100);
-    name = to_utf8(name.empty() ? "run" : name);
+  for (size_t i = 0; i < o.runs.size(); ++i) {
+    const std::string given = o.labels.empty() ? name_of(o.runs[i]) : o.labels[i];
+    const std::string name = to_utf8(to_utf8(given.empty() ? "run" : given).substr(0, kLongestName));
     std::string own = name;
     for (int n = 2; !taken.insert(own).second; ++n) own = fmt::format("{} ({})", name, n);
     out.push_back(own);
@@ -77,6 +85,11 @@ Result<ReportOptions> settle_report(ReportOptions o) {
     return Error{fmt::format("{} runs are given, a page compares at most {}", o.runs.size(), kMostRuns)};
   for (const auto& run : o.runs)
     if (!is_run(run)) return Error{fmt::format("{}: is no run folder", run)};
+  if (!o.labels.empty() && o.labels.size() != o.runs.size())
+    return Error{fmt::format("--label: {} are given for {} runs; each run needs one", o.labels.size(), o.runs.size())};
+  for (const auto& run : o.runs)
+    if (o.skip_s > 0 && read_summary(run).is_object())
+      if (const auto later = summary_without_beginning(run, o.skip_s); !later) return later.error();
   const bool several = o.runs.size() > 1;
   if (o.out.empty()) {
     const fs::path first = without_slash(o.runs.front());
@@ -91,9 +104,17 @@ Result<ReportOptions> settle_report(ReportOptions o) {
   return o;
 }
 
-ordered_json run_json(const std::string& directory, const std::string& name, size_t runs, const PageLimits& limits) {
-  const ordered_json summary = read_summary(directory);
-  RunTables tables = read_run_tables(directory, kind_of(summary));
+ordered_json run_json(const std::string& directory, const std::string& name, size_t runs, const PageLimits& limits,
+                      double skip_s) {
+  ordered_json summary = read_summary(directory);
+  if (summary.is_object())
+    if (auto later = summary_without_beginning(directory, skip_s)) summary = *std::move(later);
+  RunTables tables = read_run_tables(directory, kind_of(summary), skip_s);
+  if (skip_s > 0)
+    tables.notes.push_back(
+        fmt::format("the first {} s are left out (--skip); memory, errors and points cached are of "
+                    "the whole run",
+                    skip_s));
   if (!summary.is_object())
     tables.notes.emplace_back(
         "summary.json is not there or cannot be read: the run has not ended in order; what is told here comes from its "
@@ -104,6 +125,7 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   out["duration_s"] = tables.duration_s();
   out["spreads"] = spreads(tables);
   out["figures"] = figures_json(summary, out["spreads"], tables);
+  out["intervals"] = intervals_json(tables);
   PageLimits own = limits;
   own.buckets = std::max(std::min(limits.buckets, kLeastBuckets), limits.buckets / runs);
   out["series"] = time_series(tables, own);
@@ -118,12 +140,12 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
 }
 
 Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& progress, const ShouldStop& should_stop) {
-  const auto names = names_of(o.runs);
+  const auto names = names_of(o);
   ordered_json data{{"version", version()}, {"figures", figure_kinds()}, {"runs", ordered_json::array()}};
   ReportMade made;
   for (size_t i = 0; i < o.runs.size(); ++i) {
     progress.show(fmt::format("report: reading {}, run {} of {}", names[i], i + 1, o.runs.size()));
-    data["runs"].push_back(run_json(o.runs[i], names[i], o.runs.size()));
+    data["runs"].push_back(run_json(o.runs[i], names[i], o.runs.size(), {}, o.skip_s));
     if (should_stop()) {
       made.interrupted = true;
       return made;

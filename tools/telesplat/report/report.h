@@ -13,9 +13,11 @@
 namespace telesplat::launcher {
 
 struct ReportOptions {
-  std::vector<std::string> runs;  ///< folders; the first is what others are compared with
-  std::string out;                ///< the page; empty: report.html in the run, or beside the first of several runs
-  std::string plots;              ///< folder of plots; empty: "plots" beside the page, STEM-plots of several runs
+  std::vector<std::string> runs;    ///< folders; the first is what others are compared with
+  std::vector<std::string> labels;  ///< what the page calls them; none: as summary.json and folders do
+  double skip_s = 0;                ///< of each run, left out
+  std::string out;                  ///< the page; empty: report.html in the run, or beside the first of several runs
+  std::string plots;                ///< folder of plots; empty: "plots" beside the page, STEM-plots of several runs
   bool no_plots = false;
 };
 
@@ -26,12 +28,13 @@ struct ReportMade {
   bool interrupted = false;        ///< should_stop said so: nothing was written
 };
 
-/// Where the page and the plots go. Error: no run, or a folder that is none.
+/// Where the page and the plots go. Error: no run, a folder that is none, a label too few or too many, or a run that is
+/// no longer than what is left out.
 Result<ReportOptions> settle_report(ReportOptions options);
 
 /// What a page shows of one run. runs: how many share the limits of the page.
 nlohmann::ordered_json run_json(const std::string& directory, const std::string& name, size_t runs,
-                                const PageLimits& limits = {});
+                                const PageLimits& limits = {}, double skip_s = 0);
 
 /// Reads the runs and writes page and plots. Error: something cannot be written. Precondition: settle_report().
 Result<ReportMade> make_report(const ReportOptions& options, tools::ProgressLine& progress,

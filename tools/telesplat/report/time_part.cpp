@@ -1,9 +1,13 @@
 #include "tools/telesplat/report/time_part.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
+#include "tools/common/inference.h"
 #include "tools/telesplat/report/reading/thinning.h"
 
 namespace telesplat::launcher {
@@ -18,9 +22,6 @@ constexpr double kLeastBin_s = 0.5;
 constexpr int kMostBins = 600;
 
 double bin_of(const RunTables& t) { return std::max(kLeastBin_s, t.duration_s() / kMostBins); }
-
-// First frames have no frame before them.
-bool is_first(const RunTables& t, size_t row) { return !(t.frames->numbers("inter_frame_ms")[row] > 0); }
 
 // A series a viewer, in the order in which they come.
 template <class Value>
@@ -52,11 +53,11 @@ void add_frames(const RunTables& t, const PageLimits& limits, ordered_json& out)
     const auto& column = frames.numbers(name);
     keep(out, name, by_viewer(frames, t.frame_s, 0, limits, [&](size_t row) { return column[row] * scale; }));
   };
-  const auto& delay = frames.numbers("inter_frame_ms");
-  keep(out, "inter_frame_ms",
-       by_viewer(frames, t.frame_s, 0, limits, [&](size_t row) { return is_first(t, row) ? NAN : delay[row]; }));
-  for (const char* name : {"construction_ms", "points_drawn", "points_cached", "update_age_ms", "view_error_deg"})
-    plain(name);
+  for (const char* name : {"motion_to_photon_ms", "inter_frame_ms", "construction_ms"}) {
+    const auto column = t.of_drawn(name);
+    keep(out, name, by_viewer(frames, t.frame_s, 0, limits, [&](size_t row) { return column[row]; }));
+  }
+  for (const char* name : {"points_drawn", "points_cached", "update_age_ms", "view_error_deg"}) plain(name);
   const auto& error = frames.numbers("view_error_m");
   keep(out, "view_error_mm", by_viewer(frames, t.frame_s, 0, limits, [&](size_t row) { return error[row] * 1000; }));
 }
@@ -85,21 +86,21 @@ void add_updates(const RunTables& t, const PageLimits& limits, ordered_json& out
   for (size_t i = 0; i < points.size(); ++i)
     if (!t.slices && std::isfinite(extra[i])) points[i] += extra[i];
   const double bytes = t.slices ? kBytesOfSlicePixel : kBytesOfPoint;
-  keep(out, "consuming_mb_s", one("consuming", rate_of(t, complete, points, bytes / kMega), limits));
+  keep(out, "consuming_mb_s", one("added", rate_of(t, complete, points, bytes / kMega), limits));
 }
 
 void add_tiles(const RunTables& t, const PageLimits& limits, ordered_json& out) {
   const LooseTable& tiles = *t.tiles;
   const double bytes = t.slices ? kBytesOfSlicePixel : kBytesOfRawSample;
   keep(out, "generating_mb_s",
-       one("generating",
+       one("sampled",
            rate_of(t, tiles.numbers("encode_end_s"), tiles.numbers(t.slices ? "kept" : "samples"), bytes / kMega),
            limits));
   std::vector<double> sent_s = tiles.numbers("published_s");
   const auto& packed = tiles.numbers("packed_s");
   for (size_t i = 0; i < sent_s.size(); ++i)
     if (!std::isfinite(sent_s[i])) sent_s[i] = packed[i];
-  keep(out, "transfer_mb_s", one("transfer", rate_of(t, sent_s, tiles.numbers("bytes_sent"), 1 / kMega), limits));
+  keep(out, "transfer_mb_s", one("sent", rate_of(t, sent_s, tiles.numbers("bytes_sent"), 1 / kMega), limits));
 }
 
 // When the frames of quality.csv were displayed. They are the first viewer's; without frames.csv its own clock counts.
@@ -148,16 +149,34 @@ ordered_json time_series(const RunTables& t, const PageLimits& limits) {
 ordered_json spreads(const RunTables& t) {
   ordered_json out = ordered_json::object();
   if (t.frames) {
-    std::vector<double> delay = t.frames->numbers("inter_frame_ms");
-    std::erase_if(delay, [](double ms) { return !(ms > 0); });
-    out["inter_frame_ms"] = spread_json(std::move(delay));
-    out["construction_ms"] = spread_json(t.frames->numbers("construction_ms"));
+    for (const char* name : {"motion_to_photon_ms", "inter_frame_ms", "construction_ms"})
+      out[name] = spread_json(t.of_drawn(name));
     out["update_age_ms"] = spread_json(t.frames->numbers("update_age_ms"));
   }
   if (t.updates) {
     out["latency_ms"] = spread_json(t.updates->numbers("latency_ms"));
     out["start_up_ms"] = spread_json(t.updates->numbers("start_up_ms"));
   }
+  return out;
+}
+
+ordered_json intervals_json(const RunTables& t) {
+  ordered_json out = ordered_json::object();
+  const auto add = [&](const char* key, const LooseTable& table, const std::vector<double>& column) {
+    std::map<std::string_view, std::vector<double>> by_viewer;
+    for (size_t row = 0; row < column.size(); ++row)
+      if (std::isfinite(column[row])) by_viewer[table.texts("viewer")[row]].push_back(column[row]);
+    std::vector<double> values;  // one viewer's after the other's
+    for (const auto& [viewer, own] : by_viewer) values.insert(values.end(), own.begin(), own.end());
+    const auto found = tools::block_intervals(values, std::array{0.5, 0.95});
+    for (size_t i = 0; i < found.size(); ++i)
+      out[fmt::format("{}_{}", key, i == 0 ? "median" : "p95")] = {rounded(found[i].low), rounded(found[i].high)};
+  };
+  if (t.frames) {
+    add("m2p", *t.frames, t.of_drawn("motion_to_photon_ms"));
+    add("delay", *t.frames, t.of_drawn("inter_frame_ms"));
+  }
+  if (t.updates) add("latency", *t.updates, t.updates->numbers("latency_ms"));
   return out;
 }
 

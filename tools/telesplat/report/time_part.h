@@ -11,9 +11,13 @@ namespace telesplat::launcher {
 /// viewer. What there are no rows for is not there.
 nlohmann::ordered_json time_series(const RunTables& tables, const PageLimits& limits);
 
-/// Distributions over all viewers, first frames left out: inter_frame_ms, construction_ms, latency_ms, start_up_ms,
-/// update_age_ms.
+/// Distributions over all viewers, of frames that were drawn: motion_to_photon_ms, inter_frame_ms (first frames left
+/// out), construction_ms; and latency_ms, start_up_ms, update_age_ms.
 nlohmann::ordered_json spreads(const RunTables& tables);
+
+/// How far off figures may be because the run did not last longer (tools::block_intervals): [low, high] by the figure's
+/// key, m2p, delay and latency, each with _median and _p95.
+nlohmann::ordered_json intervals_json(const RunTables& tables);
 
 /// The stages of view updates: of each how long it took in updates over time and in all of them; null without
 /// stages.csv.

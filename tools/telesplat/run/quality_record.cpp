@@ -21,11 +21,7 @@ std::string change_columns(const VerifiedView& v) {
 }
 
 // Quality lies in thousandths: more digits than of times.
-ordered_json precise(const std::vector<double>& values) {
-  if (values.empty()) return nullptr;
-  const auto d = metrics::distribution(values);
-  return {{"mean", d.mean}, {"median", d.median}, {"p95", d.p95}, {"p99", d.p99}, {"max", d.max}};
-}
+ordered_json precise(const std::vector<double>& values) { return metrics::distribution_json(values, 9); }
 
 ordered_json last_view(const std::vector<VerifiedView>& views) {
   if (views.empty()) return nullptr;

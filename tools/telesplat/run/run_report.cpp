@@ -7,8 +7,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "tools/common/json_file.h"
 #include "tools/telesplat/movie/movie_target.h"
+#include "tools/telesplat/record/skip.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -202,9 +202,8 @@ void print_next(const std::string& directory) {
 
 }  // namespace
 
-Result<RunReport> read_report(const std::string& directory) {
-  const std::string path = directory + "/summary.json";
-  const auto read = tools::read_json_object(path);
+Result<RunReport> read_report(const std::string& directory, double skip_s) {
+  const auto read = summary_without_beginning(directory, skip_s);
   if (!read) return read.error();
   const json s = *read;
   try {
@@ -216,7 +215,7 @@ Result<RunReport> read_report(const std::string& directory) {
     add_errors(s, out);
     return out;
   } catch (const json::exception&) {  // a file that somebody else wrote
-    return Error{path + ": lacks a figure, or has another thing in its place"};
+    return Error{directory + "/summary.json: lacks a figure, or has another thing in its place"};
   }
 }
 

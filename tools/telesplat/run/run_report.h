@@ -17,7 +17,7 @@ struct RunReport {
 };
 
 /// Of DIR/summary.json; figures that were not measured say so. Error: there is none, or a figure is missing.
-Result<RunReport> read_report(const std::string& directory);
+Result<RunReport> read_report(const std::string& directory, double skip_s = 0);
 
 /// Prints it; nothing if there is no summary.
 void print_report(const std::string& directory);

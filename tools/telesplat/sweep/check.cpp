@@ -17,6 +17,7 @@ struct Refused {
 };
 constexpr Refused kRefused[] = {
     {"--out", "the sweep gives each run a folder of its own"},
+    {"--label", "its runs are called by what varies"},
     {"--overwrite", "the sweep replaces what it did not finish, and nothing else"},
     {"--master", "each run of a sweep is a session of its own"},
     {"--movie", "all runs would write one file; telesplat movie makes one of a run's folder"},

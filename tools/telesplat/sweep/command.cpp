@@ -19,6 +19,7 @@
 #include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/process_group.h"
 #include "tools/telesplat/run/run_options.h"
+#include "tools/telesplat/sweep/cells/cells.h"
 #include "tools/telesplat/sweep/page.h"
 #include "tools/telesplat/sweep/sweep.h"
 #include "tools/telesplat/sweep/tables.h"
@@ -32,7 +33,7 @@ struct SweepOptions {
   std::string scene, out;
   std::vector<std::string> vary, flags;
   std::optional<int> repeat, shuffle;
-  double run_limit_s = 0;
+  double run_limit_s = 0, skip_s = 0;
   bool dry_run = false;
 };
 
@@ -107,21 +108,24 @@ void list(const Sweep& sweep) {
 }
 
 // Writes and prints what is there; the exit code that follows from it.
-Result<int> conclude(const Sweep& sweep, const std::string& directory) {
-  const SweepRecord record = read_record(sweep.manifest(), directory);
+Result<int> conclude(const Sweep& sweep, const std::string& directory, double skip_s) {
+  const SweepRecord record = read_record(sweep.manifest(), directory, skip_s);
   if (const Status s = write_whole(directory + "/sweep.csv", to_csv(record)); !s) return s.error();
-  if (const Status s = write_whole(directory + "/sweep.html", to_html(record, sweep.manifest(), directory)); !s)
+  if (const Status s = write_whole(directory + "/cells.csv", cells_csv(record)); !s) return s.error();
+  if (const Status s = write_whole(directory + "/sweep.html", to_html(record, sweep.manifest(), directory, skip_s)); !s)
     return s.error();
   std::printf("%s", to_text(record).c_str());
   for (const Noise& n : noises(record)) std::printf("! %s\n", sentence(record, n).c_str());
+  if (const std::string few = too_few(record.grid); !few.empty()) std::printf("! %s\n", few.c_str());
   const auto failed = failures(record);
   for (const std::string& f : failed) std::printf("failed: %s\n", f.c_str());
-  std::printf("\nreport: %s/sweep.html\ntable: %s/sweep.csv\n", directory.c_str(), directory.c_str());
+  std::printf("\nreport: %s/sweep.html\ntable: %s/sweep.csv\nmeans, intervals, tests: %s/cells.csv\n",
+              directory.c_str(), directory.c_str(), directory.c_str());
   std::fflush(stdout);
   return failed.empty() ? 0 : 1;
 }
 
-int carry_out(Sweep& sweep, const std::string& directory) {
+int carry_out(Sweep& sweep, const std::string& directory, double skip_s) {
   tools::ProgressLine progress;
   const size_t to_do = sweep.to_do().size();
   const Manifest& m = sweep.manifest();
@@ -133,7 +137,7 @@ int carry_out(Sweep& sweep, const std::string& directory) {
   const auto end = sweep.carry_out(progress);
   progress.close();
   if (!end) return tools::complain(end.error(), 1);
-  const auto code = conclude(sweep, directory);
+  const auto code = conclude(sweep, directory, skip_s);
   if (!code) return tools::complain(code.error(), 1);
   if (*end == Sweep::End::kDone) return *code;
   std::fprintf(stderr, "telesplat: interrupted; %zu of %zu runs are done, telesplat sweep --out %s goes on\n",
@@ -182,7 +186,7 @@ int sweep(SweepOptions o, const options::Given&) {
   if (!claim) return tools::complain(claim.error());
   if (const Status s = write_manifest(sweep.manifest(), directory); !s) return tools::complain(s.error());
   net::install_signal_handlers();
-  return carry_out(sweep, directory);
+  return carry_out(sweep, directory, o.skip_s);
 }
 
 options::Table sweep_table(SweepOptions& o) {
@@ -210,6 +214,10 @@ options::Table sweep_table(SweepOptions& o) {
        .value = &o.run_limit_s,
        .help = "seconds after which a run has failed; 0: ten times what it is asked to last, and ten minutes",
        .limits = options::Range{0, 1e6}},
+      {.flag = "--skip",
+       .value = &o.skip_s,
+       .help = "seconds after the first displayed frame of each run that figures leave out: its warming up",
+       .limits = options::Range{0.0, 1e6}},
       {.flag = "--dry-run", .value = &o.dry_run, .help = "check everything, print the runs, start none"}};
 }
 

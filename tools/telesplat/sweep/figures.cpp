@@ -23,17 +23,29 @@ void flatten_into(const nlohmann::ordered_json& value, const std::string& name, 
 }
 
 constexpr std::array kMeasures{
-    Measure{"motion_to_photon_ms.median", "motion to photon, median", "m2p ms", "ms", 1, 1, true, false},
-    Measure{"motion_to_photon_ms.p95", "motion to photon, 95th percentile", "m2p p95", "ms", 1, 1, true, false},
-    Measure{"fps", "displayed frames a second", "fps", "1/s", 1, 1, true, false},
-    Measure{"inter_frame_delay_ms.median", "inter-frame delay, median", "delay ms", "ms", 1, 1, true, true},
-    Measure{"inter_frame_delay_ms.p95", "inter-frame delay, 95th percentile", "p95", "ms", 1, 1, true, false},
-    Measure{"view_update_latency_ms.median", "view update latency, median", "latency ms", "ms", 1, 1, true, true},
-    Measure{"updates_per_s", "view updates a second", "updates/s", "1/s", 2, 1, true, false},
-    Measure{"update_age_ms.p95", "age of the displayed update, 95th percentile", "age p95", "ms", 0, 1, true, false},
-    Measure{"data_transfer_rate_mb_s", "sent to viewers", "MB/s", "MB/s", 2, 1, true, false},
-    Measure{"quality.psnr_db.median", "PSNR, median", "PSNR dB", "dB", 2, 1, false, false},
-    Measure{"quality.hole_fraction.mean", "holes, mean", "holes %", "%", 3, 100, true, false}};
+    Measure{"motion_to_photon_ms.median", "motion to photon, median", "m2p ms", "ms",
+            "How old the head's pose is when the frame drawn for it is seen. Less is better.", 1, 1, true, false},
+    Measure{"motion_to_photon_ms.p95", "motion to photon, 95th percentile", "m2p p95", "ms",
+            "The same of the slow frames: 95 of 100 are faster.", 1, 1, true, false},
+    Measure{"fps", "displayed frames a second", "fps", "1/s",
+            "How often the picture was drawn anew. More is better, up to what the display shows.", 1, 1, true, false},
+    Measure{"inter_frame_delay_ms.median", "inter-frame delay, median", "delay ms", "ms",
+            "Time from one drawn frame to the next. Less is better.", 1, 1, true, true},
+    Measure{"inter_frame_delay_ms.p95", "inter-frame delay, 95th percentile", "p95", "ms",
+            "The same of the slow frames: 95 of 100 are faster.", 1, 1, true, false},
+    Measure{"view_update_latency_ms.median", "view update latency, median", "latency ms", "ms",
+            "From a request for a view until all of it is there. Less is better.", 1, 1, true, true},
+    Measure{"updates_per_s", "view updates a second", "updates/s", "1/s",
+            "How many requested views became complete. More is better.", 2, 1, true, false},
+    Measure{"update_age_ms.p95", "age of the displayed update, 95th percentile", "age p95", "ms",
+            "How long ago the newest data in a picture were asked for. Less is better.", 0, 1, true, false},
+    Measure{"data_transfer_rate_mb_s", "sent to viewers", "MB/s", "MB/s",
+            "What the network carried to the viewers. Less is better for the same picture.", 2, 1, true, false},
+    Measure{"quality.psnr_db.median", "PSNR, median", "PSNR dB", "dB",
+            "How like the pictures are to ones drawn from all data without a network. More is better.", 2, 1, false,
+            false},
+    Measure{"quality.hole_fraction.mean", "holes, mean", "holes %", "%",
+            "Pixels that show no data where there should be some. Less is better.", 3, 100, true, false}};
 
 }  // namespace
 

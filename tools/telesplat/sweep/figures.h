@@ -22,6 +22,7 @@ struct Measure {
   const char* title;  ///< for people
   const char* brief;  ///< head of a column
   const char* unit;
+  const char* help;  ///< what it says, in a sentence
   int decimals;
   double scale;         ///< shown = measured * scale
   bool from_zero;       ///< an axis begins at 0

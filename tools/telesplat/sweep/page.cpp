@@ -9,6 +9,7 @@
 #include <map>
 
 #include "common/core/machine.h"
+#include "tools/telesplat/sweep/cells/cells.h"
 #include "tools/telesplat/sweep/page_parts.h"
 #include "tools/telesplat/sweep/plot.h"
 #include "tools/telesplat/sweep/tables.h"
@@ -83,8 +84,9 @@ class Plots {
         least = std::min(least, s->least), most = std::max(most, s->most);
     if (least > most) return {};  // nobody measured it
     const Scale scale = scale_of(least * figure.scale, most * figure.scale, figure.from_zero);
-    std::string out = fmt::format("<section class=\"figure\"><h3>{} <small>{}</small></h3><div class=\"row\">\n",
-                                  escaped(figure.title), escaped(figure.unit));
+    std::string out =
+        fmt::format("<section class=\"figure\"><h3>{} <small>{}</small></h3><p>{}</p><div class=\"row\">\n",
+                    escaped(figure.title), escaped(figure.unit), escaped(figure.help));
     for (const auto& [title, members] : panels_) out += to_svg(plot(figure, title, members), scale) + "\n";
     return out + "</div></section>\n";
   }
@@ -187,7 +189,42 @@ std::string table_of(const SweepRecord& record, const std::string& directory) {
     }
     out += fmt::format("<td>{}</td></tr>\n", run_links(record, c, directory));
   }
-  return out + "</tbody></table></div><p>Median of the runs, and least..most in brackets.</p></section>\n";
+  return out +
+         "</tbody></table></div><p>Median of the runs, and least..most in brackets. The numbers at the end lead to "
+         "each "
+         "run's report.</p></section>\n";
+}
+
+// "+3.1 (-0.2 to +6.4), p 0.06"; bold where it is a difference.
+std::string difference_cell(const Cell& cell) {
+  if (!cell.difference) return "<td>-</td>";
+  const auto shown = [&](double v) { return fmt::format("{:+.{}f}", v * cell.figure->scale, cell.figure->decimals); };
+  const auto& d = *cell.difference;
+  return fmt::format("<td{}>{} ({} to {}), p {:.2g}</td>", cell.differs() ? " class=\"differs\"" : "", shown(d.mean),
+                     shown(d.interval.low), shown(d.interval.high), cell.p_holm);
+}
+
+std::string differences_of(const SweepRecord& record) {
+  const auto cells = cells_of(record);
+  if (std::none_of(cells.begin(), cells.end(), [](const Cell& c) { return c.difference.has_value(); })) return {};
+  const size_t count = record.configurations.size();
+  std::string out = fmt::format(
+      "<section><h2>Differences from {}</h2><p>Whether other configurations differ from the first one, or the runs "
+      "only "
+      "happened to: difference of the means, its 95 % interval, and p, the share of sweeps without any difference in "
+      "which chance alone would show as large a one. Bold: p is below {}. Welch's t test over the runs; p raised after "
+      "Holm for all comparisons of a figure.</p><div class=\"wide\"><table><thead><tr><th class=\"f\"></th>",
+      escaped(words(record.grid, record.configurations.front())), kDiffers);
+  for (size_t i = 0; i < cells.size(); i += count)
+    out +=
+        fmt::format("<th>{} <small>{}</small></th>", escaped(cells[i].figure->brief), escaped(cells[i].figure->unit));
+  out += "</tr></thead><tbody>\n";
+  for (size_t c = 1; c < count; ++c) {
+    out += fmt::format("<tr><td class=\"f\">{}</td>", escaped(words(record.grid, record.configurations[c])));
+    for (size_t i = 0; i < cells.size(); i += count) out += difference_cell(cells[i + c]);
+    out += "</tr>\n";
+  }
+  return out + "</tbody></table></div></section>\n";
 }
 
 std::string load_line(const SweepRecord& record) {
@@ -254,17 +291,21 @@ PlotLayout layout_of(const Grid& grid) {
   return out;
 }
 
-std::string to_html(const SweepRecord& record, const Manifest& manifest, const std::string& directory) {
+std::string to_html(const SweepRecord& record, const Manifest& manifest, const std::string& directory, double skip_s) {
   std::vector<std::string> noisy;
   for (const Noise& n : noises(record)) noisy.push_back(sentence(record, n));
+  std::vector<std::string> few;
+  if (const std::string line = too_few(record.grid); !line.empty()) few.push_back(line);
+  if (skip_s > 0) few.push_back(fmt::format("the first {} s of each run are left out (--skip)", skip_s));
   const std::string name = title_of(record.grid);
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\">\n<title>{0}</title>\n<style>{1}</style></head><body>\n<h1>{0}</h1>\n"
-      "{2}{3}{4}<h2>Figures</h2>\n<p>Median of the runs of each configuration; whiskers from the least to the most."
-      "</p>\n{5}{6}<div id=\"tip\" hidden></div><script>{7}</script></body></html>\n",
+      "{2}{8}{3}{4}<h2>Figures</h2>\n<p>Median of the runs of each configuration; whiskers from the least to the most."
+      "</p>\n{5}{9}{6}<div id=\"tip\" hidden></div><script>{7}</script></body></html>\n",
       escaped(name), page_style(), facts(record, manifest), list_of("Too noisy", "noise", noisy),
-      list_of("Failed", "failed", failures(record)), Plots(record).html(), table_of(record, directory), page_script());
+      list_of("Failed", "failed", failures(record)), Plots(record).html(), table_of(record, directory), page_script(),
+      list_of("Notes", "notes", few), differences_of(record));
 }
 
 }  // namespace telesplat::launcher

@@ -19,6 +19,7 @@ struct PlotLayout {
 PlotLayout layout_of(const Grid& grid);
 
 /// directory: of the sweep; a run's own report, and its folder, are linked where they are there.
-std::string to_html(const SweepRecord& record, const Manifest& manifest, const std::string& directory);
+std::string to_html(const SweepRecord& record, const Manifest& manifest, const std::string& directory,
+                    double skip_s = 0);
 
 }  // namespace telesplat::launcher

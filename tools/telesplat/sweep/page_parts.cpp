@@ -32,7 +32,8 @@ svg .t { fill: var(--ink) } svg .n { text-anchor: end } svg .k { text-anchor: mi
   background: currentColor; border-radius: 2px; margin-right: 5px }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums } th, td { padding: 3px 9px; text-align: right;
   border-bottom: 1px solid var(--grid) } td.f { white-space: nowrap } th { color: var(--faint); font-weight: 600 }
-.f { text-align: left } a { color: var(--c0) }
+.differs { font-weight: 700 } section.figure { max-width: 100% } section.figure p { color: var(--faint); max-width: 60em;
+  margin: 0 0 2px; font-size: 12.5px } .f { text-align: left } a { color: var(--c0) }
 #tip { position: fixed; pointer-events: none; white-space: pre; background: var(--ink); color: var(--paper); padding: 5px 9px;
   border-radius: 4px; font-size: 12px; z-index: 9 }
 )css";

@@ -2,32 +2,27 @@
 
 #include <fmt/format.h>
 
-#include "tools/common/json_file.h"
+#include "tools/telesplat/record/skip.h"
 
 namespace telesplat::launcher {
-namespace {
-
-std::optional<Figures> read_figures(const std::string& path) {
-  const auto summary = tools::read_json_file(path);
-  if (!summary.is_object()) return std::nullopt;
-  return flatten(summary);
-}
-
-}  // namespace
-
-std::optional<Spread> SweepRecord::spread(size_t configuration, const std::string& figure) const {
-  std::vector<double> values;
+std::vector<double> SweepRecord::values(size_t configuration, const std::string& figure) const {
+  std::vector<double> out;
   for (const SweptRun& run : runs)
     if (run.configuration == configuration)
-      if (const double* value = find(run.figures, figure)) values.push_back(*value);
-  return values.empty() ? std::nullopt : std::optional(spread_of(std::move(values)));
+      if (const double* value = find(run.figures, figure)) out.push_back(*value);
+  return out;
+}
+
+std::optional<Spread> SweepRecord::spread(size_t configuration, const std::string& figure) const {
+  std::vector<double> all = values(configuration, figure);
+  return all.empty() ? std::nullopt : std::optional(spread_of(std::move(all)));
 }
 
 std::string run_folder(const Configuration& configuration, int repetition) {
   return fmt::format("{}/{}", configuration.name, repetition);
 }
 
-SweepRecord read_record(const Manifest& m, const std::string& directory) {
+SweepRecord read_record(const Manifest& m, const std::string& directory, double skip_s) {
   SweepRecord out{m.grid, m.configurations, {}};
   for (size_t c = 0; c < m.configurations.size(); ++c)
     for (int repetition = 1; repetition <= m.grid.repeat; ++repetition) {
@@ -35,9 +30,11 @@ SweepRecord read_record(const Manifest& m, const std::string& directory) {
       if (const auto found = m.outcomes.find({m.configurations[c].name, repetition}); found != m.outcomes.end())
         run.outcome = found->second;
       if (run.outcome && run.outcome->done) {
-        auto figures = read_figures(directory + "/" + run.folder + "/summary.json");
-        if (figures)
-          run.figures = std::move(*figures);
+        const std::string folder = directory + "/" + run.folder;
+        if (const auto summary = summary_without_beginning(folder, skip_s))
+          run.figures = flatten(*summary);
+        else if (skip_s > 0 && summary_without_beginning(folder, 0))
+          run.outcome->done = false, run.outcome->reason = summary.error().text;
         else
           run.outcome.reset();
       }

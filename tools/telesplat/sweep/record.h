@@ -23,15 +23,18 @@ struct SweepRecord {
   std::vector<Configuration> configurations;
   std::vector<SweptRun> runs;  ///< configuration after configuration
 
-  /// Of a figure over the finished runs of a configuration; nothing: no run has it.
+  /// A figure of the finished runs of a configuration that have it.
+  std::vector<double> values(size_t configuration, const std::string& figure) const;
+  /// Over these; nothing: no run has it.
   std::optional<Spread> spread(size_t configuration, const std::string& figure) const;
 };
 
 /// "coupling-sync/2"
 std::string run_folder(const Configuration& configuration, int repetition);
 
-/// Reads the summaries of all runs that are done. A run whose summary.json is gone or broken counts as not done.
-SweepRecord read_record(const Manifest& manifest, const std::string& directory);
+/// Reads the summaries of all runs that are done, without the first skip_s seconds of each. A run whose summary.json is
+/// gone or broken counts as not done, one that is no longer than skip_s as failed.
+SweepRecord read_record(const Manifest& manifest, const std::string& directory, double skip_s = 0);
 
 /// A configuration whose runs differ so much in a main figure that the machine, rather than the configuration, may be
 /// what was measured.

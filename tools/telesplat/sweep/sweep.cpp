@@ -88,6 +88,9 @@ std::vector<std::string> Sweep::command(const NextRun& run) const {
   const auto own = arguments(manifest_.grid, manifest_.configurations[run.configuration], run_flags());
   out.insert(out.end(), own.begin(), own.end());
   out.insert(out.end(), {"--out", folder(run)});
+  std::string label = words(manifest_.grid, manifest_.configurations[run.configuration]);
+  if (manifest_.grid.repeat > 1) label += fmt::format(", run {}", run.repetition);
+  out.insert(out.end(), {"--label", std::move(label)});
   // What lies there is of a run that did not end.
   std::error_code error;
   if (fs::exists(folder(run), error)) out.emplace_back("--overwrite");

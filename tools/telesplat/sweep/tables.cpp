@@ -66,12 +66,12 @@ std::vector<std::string> run_cells(const SweepRecord& record, const SweptRun& ru
   return out;
 }
 
+}  // namespace
+
 void add_line(std::string& out, const std::vector<std::string>& cells) {
   for (size_t i = 0; i < cells.size(); ++i) out += (i ? "," : "") + csv_field(cells[i]);
   out += "\n";
 }
-
-}  // namespace
 
 std::string to_csv(const SweepRecord& record) {
   std::vector<std::string> columns{"configuration", "repetition"};

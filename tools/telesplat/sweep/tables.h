@@ -11,6 +11,9 @@ namespace telesplat::launcher {
 /// machine's load, then every number of its summary by name; empty where a run has none.
 std::string to_csv(const SweepRecord& record);
 
+/// Appends a line of comma-separated values.
+void add_line(std::string& out, const std::vector<std::string>& cells);
+
 /// A row a configuration: median, and least..most where runs differ, of the main figures that were measured. "!" behind
 /// a value: its runs differ too much (noises()).
 std::string to_text(const SweepRecord& record);

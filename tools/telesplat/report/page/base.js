@@ -147,6 +147,8 @@ R.section = function (id, title, ...children) {
   return out;
 };
 R.sections = [];
+// A sentence that says what a part of the page shows.
+R.help = (text) => R.el("p", { class: "muted help", text });
 R.legendOfRuns = () =>
   R.el("div", { class: "legend" }, R.runs.map((run, i) => R.el("span", {}, R.runSwatch(i), run.name)));
 R.runSwatch = function (i) {

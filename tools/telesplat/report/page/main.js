@@ -4,6 +4,7 @@
 R.header();
 R.tiles();
 R.notes();
+R.photons();
 R.delays();
 R.stages();
 R.timelines();

@@ -179,6 +179,7 @@ def timeline(run):
 def main(folder):
     runs = json.load(sys.stdin)["runs"]
     figures = {
+        "motion-to-photon": over_time(runs, "motion_to_photon_ms", "motion to photon, ms"),
         "inter-frame-delay": over_time(runs, "inter_frame_ms", "inter-frame delay, ms", lines=True),
         "inter-frame-delay-cdf": cumulative(runs),
         "stages": stacked(runs),

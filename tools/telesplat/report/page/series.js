@@ -84,6 +84,7 @@ R.chart = function (title, series, options) {
   const thin = series.filter((s) => s.of > s.t.length);
   const panel = R.el("div", { class: "panel" + (options.wide ? " wide" : "") },
     R.el("div", { class: "chart-head" }, R.el("h3", { text: title + (options.unit ? ", " + options.unit : "") }), R.el("span", {}, whole, " ", log)),
+    options.help ? R.help(options.help) : null,
     series.length > 1 && !options.noLegend ? R.seriesLegend(series) : null, box,
     thin.length ? R.el("div", { class: "muted small", text: `Thinned: ${thin.map((s) => `${R.number(s.t.length)} of ${R.number(s.of)} values`).join(", ")}; of each part of the time the least and the greatest stay.` }) : null,
     cap ? R.el("div", { class: "muted small", text: `${R.number(cap.above)} of the values lie above the axis.` }) : null);
@@ -192,30 +193,41 @@ R.chartOf = function (title, names, options) {
   return series.length ? R.chart(title, series, options || {}) : null;
 };
 
+R.photons = function () {
+  const over = R.chartOf("Motion to photon", "motion_to_photon_ms", { unit: "ms", high: true, wide: true, log: true });
+  const shapes = R.distribution("motion_to_photon_ms");
+  if (!over && !shapes.length) return;
+  R.section("photon", "Motion to photon",
+    R.help("How old the head's pose is when a person sees the frame that was drawn for it: the lag that is felt when the head turns. Low and even is good; frames for which nothing was drawn have none."),
+    R.el("div", { class: "grid" }, over, shapes));
+};
+
 R.delays = function () {
   const over = R.chartOf("Inter-frame delay", "inter_frame_ms", { unit: "ms", lines: R.hertz, high: true, wide: true, log: true });
-  const shapes = R.distribution();
+  const shapes = R.distribution("inter_frame_ms", true);
   if (!over && !shapes.length) return;
   R.section("delay", "Inter-frame delay",
-    R.el("p", { class: "muted", text: "Time from the end of a frame to the end of the next. All charts over time zoom together: drag to zoom, double-click to see all; the time counts from the first displayed frame." }),
+    R.help("Time from the end of a frame to the end of the next; frames of a picture that stood are left out. Below the dashed line of a display, each of its refreshes gets a new picture. All charts over time zoom together: drag to zoom, double-click to see all; the time counts from the first frame of this page."),
     R.el("div", { class: "grid" }, over, shapes));
 };
 
 R.overTime = function () {
   const measured = [
-    R.chartOf("Update age", "update_age_ms", { unit: "ms", log: true }),
-    R.chartOf("View update latency", "latency_ms", { unit: "ms", log: true, points: true }),
-    R.chartOf("View construction", "construction_ms", { unit: "ms", log: true }),
-    R.chartOf("View updates a second", "updates_per_s", { unit: "1/s" }),
+    R.chartOf("Update age", "update_age_ms", { unit: "ms", log: true, help: "How long ago the newest data in the picture were asked for. It grows until the next update arrives." }),
+    R.chartOf("View update latency", "latency_ms", { unit: "ms", log: true, points: true, help: "How long each view took from the viewer's request until all of it was there." }),
+    R.chartOf("View construction", "construction_ms", { unit: "ms", log: true, help: "How long the viewer needed to draw each frame from what it had." }),
+    R.chartOf("View updates a second", "updates_per_s", { unit: "1/s", help: "How many requested views became complete in each second." }),
     ...(R.several
-      ? [R.chartOf("Data generating rate", "generating_mb_s", { unit: "MB/s" }), R.chartOf("Data transfer rate", "transfer_mb_s", { unit: "MB/s" }), R.chartOf("Data consuming rate", "consuming_mb_s", { unit: "MB/s" })]
-      : [R.chartOf("Data rates", ["generating_mb_s", "transfer_mb_s", "consuming_mb_s"], { unit: "MB/s", log: true })]),
-    R.chartOf("Points cached", "points_cached", {}),
-    R.chartOf("Points drawn", "points_drawn", {}),
-    R.chartOf("View error, distance", "view_error_mm", { unit: "mm" }),
-    R.chartOf("View error, angle", "view_error_deg", { unit: "degrees" }),
-    R.chartOf("Holes", "holes_percent", { unit: "% of object pixels", points: true }),
-    R.chartOf("PSNR against direct rendering", "psnr_db", { unit: "dB", points: true, free: true }),
+      ? [R.chartOf("Sampled", "generating_mb_s", { unit: "MB/s", help: "What the samplers made, before anything was left out or compressed." }),
+         R.chartOf("Sent", "transfer_mb_s", { unit: "MB/s", help: "What went over the network to the viewers." }),
+         R.chartOf("Added to the viewer's model", "consuming_mb_s", { unit: "MB/s", help: "What viewers put into their models, uncompressed." })]
+      : [R.chartOf("Data rates", ["generating_mb_s", "transfer_mb_s", "consuming_mb_s"], { unit: "MB/s", log: true, help: "Sampled: what samplers made, uncompressed. Sent: what went over the network after leaving out what viewers have, and compression. Added: what viewers put into their models, uncompressed." })]),
+    R.chartOf("Points cached", "points_cached", { help: "How many points the viewer held." }),
+    R.chartOf("Points drawn", "points_drawn", { help: "How many of them each frame drew." }),
+    R.chartOf("Head moved since the data were asked for", "view_error_mm", { unit: "mm", help: "How far the head is from where it was when the newest data in the picture were asked for. The larger, the more of the view may be missing at edges." }),
+    R.chartOf("Head turned since the data were asked for", "view_error_deg", { unit: "degrees", help: "How much the head has turned since then." }),
+    R.chartOf("Holes", "holes_percent", { unit: "% of object pixels", points: true, help: "Pixels that show the background, or something far behind, where the data have a surface." }),
+    R.chartOf("PSNR against direct rendering", "psnr_db", { unit: "dB", points: true, free: true, help: "How like the picture is to one that was drawn from all data without a network. More is better; above 40 differences are hard to see." }),
   ].filter((c) => c);
-  if (measured.length) R.section("time", "Over time", R.el("div", { class: "grid" }, measured));
+  if (measured.length) R.section("time", "Over time", R.help("What went on while the run lasted, all on one time axis."), R.el("div", { class: "grid" }, measured));
 };

@@ -1,4 +1,4 @@
-// Distributions of the inter-frame delay: histogram and cumulative, over a logarithmic scale of milliseconds.
+// Distributions of frames' delays: histogram and cumulative, over a logarithmic scale of milliseconds.
 "use strict";
 
 const BINS_PER_OCTAVE = 16;
@@ -12,7 +12,7 @@ function extent(spreads) {
 }
 
 // A plot whose x is logarithmic; draw(context, x(ms), y(share), area), hover(ms) gives rows.
-function logPlot(title, [low, high], top, yLabel, draw, hover) {
+function logPlot(title, help, [low, high], top, yLabel, lines, draw, hover) {
   const height = 236, left = 46, bottom = 24, right = 10, above = 20;
   let width = 0;
   const span = Math.log(high / low);
@@ -41,7 +41,7 @@ function logPlot(title, [low, high], top, yLabel, draw, hover) {
         c.moveTo(x(ms), height - bottom);
         c.lineTo(x(ms), height - bottom + 4);
         c.stroke();
-        c.fillText(R.number(ms) + (x(ms) < w - 60 ? "" : " ms"), x(ms), height - 7);
+        c.fillText(R.number(ms) + (x(ms) < w - 60 ? "" : " ms"), Math.min(x(ms), w - 24), height - 7);
       }
     draw(c, x, y);
     c.strokeStyle = c.fillStyle = R.css("--mark");
@@ -49,7 +49,7 @@ function logPlot(title, [low, high], top, yLabel, draw, hover) {
     c.lineWidth = 1;
     // Above the picture; where there is no room the middle one goes without.
     const narrow = x(1000 / 60) - x(1000 / 90) < 110, none = x(1000 / 60) - x(1000 / 90) < 50;
-    for (const line of R.hertz) {
+    for (const line of lines) {
       if (line.x < low || line.x > high) continue;
       c.beginPath();
       c.moveTo(x(line.x), above);
@@ -69,17 +69,18 @@ function logPlot(title, [low, high], top, yLabel, draw, hover) {
     R.tip(e, head, rows);
   });
   canvas.addEventListener("mouseleave", R.hideTip);
-  return R.el("div", { class: "panel" }, R.el("h3", { text: title }), canvas);
+  return R.el("div", { class: "panel" }, R.el("h3", { text: title }), R.help(help), canvas);
 }
 
-R.distribution = function () {
-  const runs = R.runs.map((run, i) => [run, i]).filter(([run]) => run.spreads.inter_frame_ms);
+// key: of run.spreads. refreshes: its frames are held against those of displays.
+R.distribution = function (key, refreshes) {
+  const runs = R.runs.map((run, i) => [run, i]).filter(([run]) => run.spreads[key]);
   if (!runs.length) return [];
-  const spreads = runs.map(([run]) => run.spreads.inter_frame_ms);
+  const spreads = runs.map(([run]) => run.spreads[key]), lines = refreshes ? R.hertz : [];
   const range = extent(spreads);
   const shares = spreads.map((s) => new Map(s.bins.map(([bin, count]) => [bin, count / s.n])));
   const top = Math.max(...shares.map((m) => Math.max(...m.values())));
-  const histogram = logPlot("Distribution: share of frames in each step of delay", range, top * 1.05, (v) => R.percent(v, 2),
+  const histogram = logPlot("Distribution", "Which delays are usual: the higher a bar, the more frames took that long.", range, top * 1.05, (v) => R.percent(v, 2), lines,
     (c, x, y) => shares.forEach((bins, k) => {
       c.fillStyle = c.strokeStyle = R.colour(runs[k][1]);
       for (const [bin, share] of bins) {
@@ -101,7 +102,7 @@ R.distribution = function () {
     const [a, p] = s.quantiles[i], next = s.quantiles[i + 1];
     return next && next[0] > a ? p + ((ms - a) / (next[0] - a)) * (next[1] - p) : p;
   };
-  const cumulative = logPlot("Share of frames at most as slow", range, 1, (v) => R.percent(v, 3),
+  const cumulative = logPlot("Share of frames at most as slow", "The farther left the curve rises, the faster the frames; where it reaches 95 % is the p95.", range, 1, (v) => R.percent(v, 3), lines,
     (c, x, y) => spreads.forEach((s, k) => {
       c.strokeStyle = R.colour(runs[k][1]);
       c.lineWidth = 1.8;
@@ -112,12 +113,13 @@ R.distribution = function () {
       c.stroke();
     }),
     (ms) => [`at most ${R.number(ms, 3)}\u202fms`, spreads.map((s, k) => [runs[k][0].name, R.percent(shareUpTo(s, ms), 4), R.colour(runs[k][1])])]);
+  const hertz = refreshes ? ["60", "72", "90"] : [];
   const rows = runs.map(([run, i], k) => R.el("tr", {},
     R.el("td", {}, R.several ? R.runSwatch(i) : null, R.several ? run.name : "frames"),
-    ["60", "72", "90"].map((hz) => R.el("td", { class: "number", text: R.percent(spreads[k].within[hz], 4) })),
-    ["median", "p95", "p99", "max"].map((q) => R.el("td", { class: "number", text: R.withUnit(spreads[k][q], "ms") }))));
+    hertz.map((hz) => R.el("td", { class: "number", text: R.percent(spreads[k].within[hz], 4) })),
+    ["median", "p95", "p99", "max", "sd"].map((q) => R.el("td", { class: "number", text: R.withUnit(spreads[k][q], "ms") }))));
   const table = R.el("div", { class: "panel wide" },
-    R.table([{ text: "" }, ...[60, 72, 90].map((hz) => ({ text: "within " + hz + " Hz", number: true })), ...["median", "p95", "p99", "longest"].map((q) => ({ text: q, number: true }))], rows),
-    R.el("p", { class: "muted small", text: "Within: the delay is at most 5 % longer than the period of such a display (16.7, 13.9, 11.1 ms)." }));
+    R.table([{ text: "" }, ...hertz.map((hz) => ({ text: "within " + hz + " Hz", number: true })), ...["median", "p95", "p99", "longest", "standard deviation"].map((q) => ({ text: q, number: true }))], rows),
+    refreshes ? R.el("p", { class: "muted small", text: "Within: the delay is at most 5 % longer than the period of such a display (16.7, 13.9, 11.1 ms)." }) : null);
   return [histogram, cumulative, table];
 };

@@ -28,7 +28,7 @@ R.stages = function () {
   });
   const thin = with_.filter((run) => run.stages.of > run.stages.t.length);
   R.section("stages", "Where the time went",
-    R.el("p", { class: "muted" }, "The stages of each view update, from its request to the insertion of its last points, in the tile that came last. Blue is the network, orange are queues, green is work."),
+    R.el("p", { class: "muted" }, "What each view update spent its time on, from the viewer's request until its last points were there, followed along the part of the view that came last. Blue: something travels over the network. Orange: it waits for somebody who is busy. Green: somebody works on it. The largest colour is what to speed up first."),
     thin.length ? R.el("p", { class: "muted small", text: `Thinned over time: of each of ${thin[0].stages.t.length} parts the slowest update is shown (${thin.map((run) => `${R.number(run.stages.of)} updates`).join(", ")}). Tables count all.` }) : null,
     R.el("div", { class: "grid" }, with_.length > 1 ? R.stageComparison(with_) : null, boxes));
 };
@@ -45,8 +45,11 @@ R.stageComparison = function (runs) {
   const rows = kinds.map((kind) => row(kind.label, kind.group, (s) => (s.stages.find((x) => x.key === kind.key) || {}).row));
   rows.push(row("latency", "", (s) => s.latency_row));
   const heads = runs.flatMap((run, i) => [{ text: run.name, number: true, swatch: R.runs.indexOf(run) }, i > 0 ? { text: "difference", number: true } : null]);
-  return R.el("div", { class: "panel wide" }, R.el("h3", { text: "Medians of the stages" }), R.table([{ text: "stage" }, { text: "" }, ...heads.filter((h) => h)], rows));
+  return R.el("div", { class: "panel wide" }, R.el("h3", { text: "Medians of the stages" }), R.help("The middle value of each stage, side by side; \u2713 marks the fastest."), R.table([{ text: "stage" }, { text: "" }, ...heads.filter((h) => h)], rows));
 };
+// Whether the stages can be trusted: clocks of several machines may differ.
+R.stageCheck = (s) => (s.off < 0.01 ? "The stages of each update add up to its latency." : `The stages of an update differ from its latency by up to ${R.percent(s.off)}.`) +
+  (s.negative ? ` ${R.number(s.negative)} stages are shorter than nothing: the machines' clocks differ by that much.` : "");
 R.id = (v) => (v === null || v === undefined || v < 0 ? "-" : String(v));
 R.stageColours = function (s) {
   const of = (group) => s.stages.filter((x) => x.group === group);
@@ -84,5 +87,5 @@ R.stageTable = function (run, colours) {
   if (s.display_row) rows.push(R.el("tr", {}, R.el("td", { text: "then, to the end of the first frame that shows it" }), R.el("td"), cells(s.display_row)));
   return R.el("div", {},
     R.table([{ text: "stage" }, { text: "" }, { text: "median", number: true }, { text: "p95", number: true }, { text: "mean", number: true }, { text: "share of the mean", number: true }], rows),
-    R.el("p", { class: "muted small", text: `Of ${R.number(s.of)} updates. Stages add up to the latency to ${R.percent(s.off)} at worst; ${s.negative} are negative.` }));
+    R.el("p", { class: "muted small", text: `Of ${R.number(s.of)} updates. ` + R.stageCheck(s) }));
 };

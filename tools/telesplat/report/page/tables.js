@@ -37,9 +37,9 @@ R.tiles = function () {
     if (values.every((v) => v === null)) continue;
     const tile = R.el("div", { class: "tile", title: kind.meaning }, R.el("div", { class: "what", text: kind.label }));
     if (!R.several)
-      tile.append(R.el("div", { class: "value" }, R.number(values[0]), R.el("small", { text: kind.unit })));
+      tile.append(R.el("div", {}, R.el("div", { class: "value" }, R.number(values[0]), R.el("small", { text: kind.unit })), R.interval(R.runs[0], kind)));
     else
-      values.forEach((v, i) => tile.append(R.el("div", { class: "of-run" }, R.runSwatch(i), R.withUnit(v, kind.unit))));
+      values.forEach((v, i) => tile.append(R.el("div", { class: "of-run" }, R.runSwatch(i), R.withUnit(v, kind.unit), R.interval(R.runs[i], kind))));
     box.append(tile);
   }
   const errors = R.runs.map(R.errorsOf);
@@ -50,7 +50,11 @@ R.tiles = function () {
     box.append(tile);
   }
   document.getElementById("main").append(box);
+  if (R.runs.some((run) => Object.keys(run.intervals).length))
+    document.getElementById("main").append(R.help("Small figures are 95 % confidence intervals: how far the value may be off because the run did not last longer. Frames depend on those before them, so whole blocks of time were drawn again and again (circular block bootstrap). They say nothing of another run on another day: repeat it (telesplat sweep) for that."));
 };
+// How far off a figure may be; null: that is not known.
+R.interval = (run, kind) => (run.intervals[kind.key] ? R.el("div", { class: "interval", text: run.intervals[kind.key].map((v) => R.number(v, 3)).join(" to ") }) : null);
 R.errorsOf = (run) =>
   R.data.figures.filter((f) => f.table === "error").reduce((sum, f) => sum + (R.figure(run, f.key) || 0), 0) +
   run.logs.reduce((sum, log) => sum + log.errors, 0);
@@ -79,7 +83,7 @@ R.about = function () {
       values.map((v) => R.el("td", { class: "wrap" + (differs ? " differs" : "") + (what === "command" ? " mono" : ""), text: v || "-" })));
   });
   rows.push(R.el("tr", {}, R.el("td", { class: "muted", text: "folder" }), R.runs.map((run) => R.el("td", { class: "wrap", text: run.directory }))));
-  R.section("about", "What was run", R.el("div", { class: "panel" },
+  R.section("about", "What was run", R.help("What is needed to do it again."), R.el("div", { class: "panel" },
     R.table([{ text: "" }, ...R.runHeads(false)], rows),
     R.several ? R.el("p", { class: "muted small", text: "What differs is marked." }) : null));
 };
@@ -120,7 +124,7 @@ R.figureHead = function (withMeaning) {
 R.measures = function () {
   const kinds = R.data.figures.filter((f) => f.table === "measure");
   R.section("measures", "The seven measures",
-    R.el("p", { class: "muted", text: "As the thesis defines them (section 6.2). Latencies and construction times are medians, the inter-frame delay is the mean, rates are means over the run." }),
+    R.el("p", { class: "muted", text: "The figures by which the thesis behind this program judges a pipeline (section 6.2). Latencies and construction times are medians, the inter-frame delay is the mean, rates are means over the run." }),
     R.el("div", { class: "panel" }, R.table(R.figureHead(true), R.figureRows(kinds, true))));
 };
 R.allFigures = function () {
@@ -128,6 +132,7 @@ R.allFigures = function () {
   const rows = R.figureRows(kinds, false);
   if (!rows.length) return;
   R.section("figures", R.several ? "Differences" : "Further figures",
+    R.several ? null : R.help("What else was measured over the whole run."),
     R.several ? R.el("p", { class: "muted", text: `Differences are from ${R.runs[0].name}; the best one is marked with \u2713, where more or less is better and it is so by 1 % or more.` }) : null,
     R.el("div", { class: "panel" }, R.table(R.figureHead(false), rows)));
 };
@@ -146,12 +151,12 @@ R.errors = function () {
       body.push(R.el("pre", { class: log.errors ? "error-line" : "", text: log.lines.join("\n") }));
     }
   });
-  R.section("errors", "Errors and warnings", R.el("div", { class: "panel" }, body));
+  R.section("errors", "Errors and warnings", R.help("Messages and work that were lost, and what processes complained about. All zero is good."), R.el("div", { class: "panel" }, body));
 };
 
 R.configuration = function () {
   const boxes = R.runs.map((run, i) => R.el("details", {},
     R.el("summary", {}, R.several ? R.runSwatch(i) : null, R.several ? run.name : "session.toml"),
     R.el("pre", { text: run.config === null ? "session.toml is not there." : run.config })));
-  R.section("configuration", "Configuration", R.el("div", { class: "panel" }, boxes));
+  R.section("configuration", "Configuration", R.help("All settings of the session, as telesplat run takes them again."), R.el("div", { class: "panel" }, boxes));
 };

@@ -4,6 +4,14 @@
 const ROLES = ["viewer", "packer", "sampler", "data", "master", ""];
 const LANES = ["display", "update", "receive", "epochs"];
 const SPAN_HUES = { "display frame": 214, "wait for update": 45, "view update": 262, view: 262, decode: 178, insert: 150, pack: 22, plan: 330, settle: 55, sample: 128, encode: 90, "add chunks": 195, "add voxels": 195, lease: 240, "epoch held": 0, fetch: 195, publish: 10 };
+// Names of spans, in the order in which a view update meets them.
+const SPAN_WORDS = {
+  "view update": "from a viewer's request until the whole view is there", view: "a view, from its turn at the master until it is complete", lease: "a sampler has this tile to do",
+  plan: "the packer finds out which rays of a view are needed", "plan of extra rays": "the packer looks for rays worth casting beyond what the view asked for", "add chunks": "a sampler builds what it needs to cast rays into new data", "add voxels": "a sampler takes new voxels in", "arrange voxels": "a sampler orders its voxels for the direction of view",
+  sample: "a sampler casts the rays of a tile", encode: "a sampler compresses what it sampled", pack: "the packer drops what viewers have and compresses the rest",
+  settle: "the packer adds what it has sent to its own copy of the model", decode: "a viewer unpacks what came", insert: "a viewer adds it to its model", refine: "points that were sent with small errors become exact",
+  "display frame": "a viewer draws a frame", "wait for update": "a viewer waits before it draws, as its coupling asks", "epoch held": "a viewer shows the old scene until the new one covers the view",
+};
 const ROW = 17, GUTTER = 148, AXIS = 22, STRIP = 16, MOST_SUB_ROWS = 8;
 
 function spanColour(name) {
@@ -179,11 +187,11 @@ class Timeline {
   }
 
   label(c, name, e, x0, x1, y) {
-    const ids = ["request", "frame", "tile"].map((k) => [k, this.trace[k][e.k]]).filter(([, v]) => v >= 0).map(([k, v]) => k[0] + v).join(" ");
+    const ids = ["request", "frame", "tile"].map((k) => [k, this.trace[k][e.k]]).filter(([, v]) => v >= 0).map(([k, v]) => k + " " + v).join(", ");
     c.fillStyle = R.dark() ? "#f4f7fb" : "#10202e";
     c.textAlign = "left";
     const room = Math.floor((x1 - x0 - 6) / 6);
-    const text = ids && name.length + ids.length + 1 <= room ? name + " " + ids : name;
+    const text = ids && name.length + ids.length + 2 <= room ? name + ": " + ids : name;
     if (text.length <= room) c.fillText(text, x0 + 3, y + 11);
     else if (room > 4) c.fillText(text.slice(0, room - 1) + "\u2026", x0 + 3, y + 11);
   }
@@ -285,7 +293,9 @@ R.sameScale = function (lines) {
 R.timelines = function () {
   const lines = R.runs.map((run, i) => (run.trace.why ? null : new Timeline(run, i)));
   R.section("timeline", "Workflow timeline",
-    R.el("p", { class: "muted" }, "As figures 6.1 to 6.3 of the thesis. A ", R.el("i", { text: "display frame" }), " is a view construction, the yellow line below from end to end the inter-frame delay, a ", R.el("i", { text: "view update" }),
-      " the view update latency. Drag to move; buttons, or the wheel after a click, zoom; a double-click goes back. Hovering tells each span and shows what belongs to the same request or tile."),
+    R.help("Who did what when: a row for each process, a bar for each thing it did. Drag to move; buttons, or the wheel after a click, zoom; a double-click goes back. Pointing at a bar tells its times and marks what belongs to the same request or tile."),
+    R.el("details", { class: "muted" }, R.el("summary", { text: "What the bars are" }), R.el("dl", { class: "words" },
+      Object.entries(SPAN_WORDS).filter(([name]) => R.runs.some((run) => (run.trace.names || []).includes(name))).flatMap(([name, words]) => [R.el("dt", { text: name }), R.el("dd", { text: words })])),
+      R.el("p", { text: "The yellow line below the frames goes from the end of one to the end of the next: the inter-frame delay." })),
     R.sameScale(lines).map((line, i) => (line ? line.panel() : R.el("div", { class: "notes", text: (R.several ? R.runs[i].name + ": " : "") + "no timeline: " + R.runs[i].trace.why }))));
 };

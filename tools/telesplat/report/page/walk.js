@@ -5,7 +5,7 @@ R.walk = function () {
   const runs = R.runs.map((run, i) => [run, i]).filter(([run]) => run.walk);
   const pictures = R.runs.filter((run) => run.pictures.shown.length || run.pictures.compared.length);
   if (!runs.length && !pictures.length) return;
-  const section = R.section("walk", "The walk");
+  const section = R.section("walk", "The walk", R.help("Where the head went, and what it saw there."));
   if (runs.length) section.append(R.el("div", { class: "walk" }, R.map(runs), R.shownPictures()));
   else section.append(R.shownPictures());
   const compared = R.comparedPictures();
@@ -14,7 +14,7 @@ R.walk = function () {
 
 const MAP_COLOURS = {
   time: ["time", (w) => w.t, "s"], inter_frame_ms: ["inter-frame delay", (w) => w.inter_frame_ms, "ms"],
-  update_age_ms: ["update age", (w) => w.update_age_ms, "ms"], view_error_deg: ["view error", (w) => w.view_error_deg, "degrees"],
+  update_age_ms: ["update age", (w) => w.update_age_ms, "ms"], view_error_deg: ["head turned since the data were asked for", (w) => w.view_error_deg, "degrees"],
   holes_percent: ["holes, where verified", null, "%"],
 };
 
@@ -53,11 +53,11 @@ R.map = function (runs) {
     R.time.point(m.t[i]);
     R.tip(e, (R.several ? run.name + ", " : "") + R.number(m.t[i], 5) + "\u202fs", [
       ["frame", R.id(m.frame[i])], ["position", [m.x[i], m.y[i], m.z[i]].map((v) => R.number(v, 3)).join(", ") + "\u202fm"],
-      ["inter-frame delay", R.withUnit(m.inter_frame_ms[i], "ms")], ["update age", R.withUnit(m.update_age_ms[i], "ms")], ["view error", R.withUnit(m.view_error_deg[i], "degrees")]]);
+      ["inter-frame delay", R.withUnit(m.inter_frame_ms[i], "ms")], ["update age", R.withUnit(m.update_age_ms[i], "ms")], ["turned since the data were asked for", R.withUnit(m.view_error_deg[i], "degrees")]]);
   });
   canvas.addEventListener("mouseleave", () => { R.hideTip(); R.time.point(null); });
   const thin = runs.filter(([run]) => run.walk.of > run.walk.t.length);
-  return R.el("div", { class: "panel" }, R.el("div", { class: "chart-head" }, R.el("h3", { text: "From above" }), choice), canvas, key,
+  return R.el("div", { class: "panel" }, R.el("div", { class: "chart-head" }, R.el("h3", { text: "From above" }), choice), R.help("Where the head was in the room, and at which places things went well or badly. Numbers are the pictures beside."), canvas, key,
     thin.length ? R.el("div", { class: "muted small", text: `${thin.map(([run]) => `${run.walk.t.length} of ${R.number(run.walk.of)} poses`).join(", ")}: of each part the frame that came latest.` }) : null);
 };
 

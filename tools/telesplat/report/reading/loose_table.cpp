@@ -113,6 +113,19 @@ const std::vector<double>& LooseTable::numbers(const std::string& name) const {
   return found->second;
 }
 
+void LooseTable::leave_out_below(const std::string& column, double least) {
+  const std::vector<double> by = numbers(column);
+  const auto cut = [&](auto& values) {
+    size_t kept = 0;
+    for (size_t row = 0; row < by.size(); ++row)
+      if (!(by[row] < least)) std::swap(values[kept++], values[row]);
+    values.resize(kept);
+    rows_ = kept;
+  };
+  for (auto& [name, values] : numbers_) cut(values);
+  for (auto& [name, values] : texts_) cut(values);
+}
+
 const std::vector<std::string>& LooseTable::texts(const std::string& name) const {
   const auto found = texts_.find(name);
   CHECK(found != texts_.end());

@@ -26,6 +26,8 @@ class LooseTable {
   const std::vector<double>& numbers(const std::string& name) const;
   /// Valid UTF-8, at most 200 bytes each; empty if the file has no such column.
   const std::vector<std::string>& texts(const std::string& name) const;
+  /// Leaves out the rows whose value in this column, which was asked for, is less.
+  void leave_out_below(const std::string& column, double least);
 
  private:
   size_t rows_ = 0, damaged_ = 0;

@@ -21,6 +21,8 @@ const Names kFrameNumbers{"frame",
                           "inter_frame_ms",
                           "construction_ms",
                           "wait_ms",
+                          "motion_to_photon_ms",
+                          "still",
                           "points_drawn",
                           "points_cached",
                           "update_age_ms",
@@ -76,6 +78,17 @@ void place_frames(RunTables& t) {
   for (const double s : begin) t.frame_s.push_back(s - t.origin_s);
 }
 
+void leave_out_beginning(RunTables& t, double skip_s) {
+  const double from_s = t.origin_s + skip_s;
+  for (auto& [table, column, least] : {std::tuple{&t.frames, t.frames->has("begin_s") ? "begin_s" : "t_s", from_s},
+                                       {&t.updates, "requested_s", from_s},
+                                       {&t.stages, "requested_s", from_s},
+                                       {&t.tiles, "encode_end_s", from_s},
+                                       {&t.quality, "t_s", skip_s}})
+    if (*table) (*table)->leave_out_below(column, least);
+  t.frame_s.clear();
+}
+
 // Without frames the others tell when things began.
 void place_without_frames(RunTables& t) {
   double first = INFINITY, last = -INFINITY;
@@ -90,7 +103,21 @@ void place_without_frames(RunTables& t) {
 
 }  // namespace
 
-RunTables read_run_tables(const std::string& directory, const std::string& kind) {
+double RunTables::still_s() const {
+  double out = 0;
+  for (size_t row = 0; row < drawn.size(); ++row)
+    if (const double ms = frames->numbers("inter_frame_ms")[row]; !drawn[row] && ms > 0) out += ms / 1e3;
+  return out;
+}
+
+std::vector<double> RunTables::of_drawn(const std::string& column) const {
+  std::vector<double> out = frames->numbers(column);
+  for (size_t row = 0; row < drawn.size(); ++row)
+    if (!drawn[row] || (column == "inter_frame_ms" && !(out[row] > 0))) out[row] = NAN;  // a first frame has no delay
+  return out;
+}
+
+RunTables read_run_tables(const std::string& directory, const std::string& kind, double skip_s) {
   RunTables t;
   t.slices = kind == "volume";
   const Names viewer{"viewer"};
@@ -102,10 +129,13 @@ RunTables read_run_tables(const std::string& directory, const std::string& kind)
                   stage_numbers(), viewer, t.notes);
   t.quality =
       read(directory, "quality.csv", "no holes and PSNR (the run had no --verify)", kQualityNumbers, {}, t.notes);
-  if (t.frames)
-    place_frames(t);
-  else
+  if (!t.frames) {
     place_without_frames(t);
+    return t;
+  }
+  place_frames(t);
+  if (skip_s > 0) leave_out_beginning(t, skip_s), place_frames(t);
+  for (const double still : t.frames->numbers("still")) t.drawn.push_back(!(still > 0));
   return t;
 }
 

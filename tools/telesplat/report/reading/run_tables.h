@@ -16,10 +16,15 @@ struct RunTables {
   double origin_s = 0;             ///< begin of the first displayed frame, since the run's beginning
   double end_s = 0;                ///< of the last one
   std::vector<double> frame_s;     ///< begin of each row of frames, since origin_s
+  std::vector<char> drawn;         ///< whether each row of frames is of a frame that was drawn
   std::vector<std::string> notes;  ///< one line each: what is missing or damaged, and what the page lacks for it
 
   bool has_frames() const { return frames.has_value(); }
   double duration_s() const { return end_s - origin_s; }
+  /// The time that frames took for which nothing was drawn.
+  double still_s() const;
+  /// A column of frames, NaN where nothing was drawn, or what is measured has no such value.
+  std::vector<double> of_drawn(const std::string& column) const;
 };
 
 /// What bounds a page.
@@ -35,6 +40,7 @@ struct PageLimits {
 };
 
 /// kind: of the scene, "mesh", "julia", "volume" or empty.
-RunTables read_run_tables(const std::string& directory, const std::string& kind);
+/// skip_s: what began sooner after the first displayed frame is left out.
+RunTables read_run_tables(const std::string& directory, const std::string& kind, double skip_s = 0);
 
 }  // namespace telesplat::launcher

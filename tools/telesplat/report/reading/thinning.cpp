@@ -136,14 +136,9 @@ ordered_json spread_json(std::vector<double> values) {
     const auto end = std::upper_bound(values.begin(), values.end(), kSlack * 1000 / hz);
     within[fmt::format("{}", hz)] = rounded(double(end - values.begin()) / double(values.size()));
   }
-  return {{"n", values.size()},
-          {"mean", rounded(d.mean)},
-          {"median", rounded(d.median)},
-          {"p95", rounded(d.p95)},
-          {"p99", rounded(d.p99)},
-          {"max", rounded(d.max)},
-          {"bins", bins_of(values)},
-          {"quantiles", quantiles_of(values)},
+  return {{"n", values.size()},    {"mean", rounded(d.mean)}, {"median", rounded(d.median)},
+          {"p95", rounded(d.p95)}, {"p99", rounded(d.p99)},   {"max", rounded(d.max)},
+          {"sd", rounded(d.sd)},   {"bins", bins_of(values)}, {"quantiles", quantiles_of(values)},
           {"within", within}};
 }
 

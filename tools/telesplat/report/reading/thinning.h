@@ -36,8 +36,8 @@ nlohmann::ordered_json series_json(const std::string& label, const Series& serie
 Series rate(const std::vector<double>& t_s, const std::vector<double>& amounts, double begin_s, double end_s,
             double bin_s);
 
-/// How values are distributed: {"n", "mean", "median", "p95", "p99", "max", "bins": [[first edge's exponent, count]],
-/// "quantiles": [[value, share of values up to it]], "within": {"60": share, ...}}; null if there are none.
+/// How values are distributed: {"n", "mean", "median", "p95", "p99", "max", "sd", "bins": [[first edge's exponent,
+/// count]], "quantiles": [[value, share of values up to it]], "within": {"60": share, ...}}; null if there are none.
 /// A bin k holds values from 2^(k/16) to 2^((k+1)/16), so that bins of all runs are the same. `within` tells the share
 /// of values at most 5 % longer than the period of that many Hz, in ms.
 nlohmann::ordered_json spread_json(std::vector<double> values);
