@@ -160,10 +160,12 @@ void VirtualDisplay::button(int number, bool down) {
   XFlush(display_of(connection_));
 }
 
-void VirtualDisplay::tap(const std::string& keysym) {
+void VirtualDisplay::tap(const std::string& keysym, const std::string& with) {
   Display* d = display_of(connection_);
-  const KeyCode code = XKeysymToKeycode(d, XStringToKeysym(keysym.c_str()));
-  for (const bool down : {true, false}) XTestFakeKeyEvent(d, code, down, CurrentTime);
+  const auto code = [&](const std::string& name) { return XKeysymToKeycode(d, XStringToKeysym(name.c_str())); };
+  if (!with.empty()) XTestFakeKeyEvent(d, code(with), True, CurrentTime);
+  for (const bool down : {true, false}) XTestFakeKeyEvent(d, code(keysym), down, CurrentTime);
+  if (!with.empty()) XTestFakeKeyEvent(d, code(with), False, CurrentTime);
   XFlush(d);
 }
 

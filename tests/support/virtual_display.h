@@ -34,8 +34,8 @@ class VirtualDisplay {
   // Events reach the window in the order of these calls. Positions are pixels of the window.
   void move_pointer(WindowId window, int x, int y);
   void button(int number, bool down);
-  /// Presses and releases; keysym: an X name, "p" or "F12".
-  void tap(const std::string& keysym);
+  /// Presses and releases; keysym: an X name, "p" or "F12". with: the same of a key that is held meanwhile, or empty.
+  void tap(const std::string& keysym, const std::string& with = "");
   void resize(WindowId window, int width, int height);
   /// Drops a file, as a file manager does (XDND). False: the window did not ask for it.
   bool drop_file(WindowId window, const std::string& path);

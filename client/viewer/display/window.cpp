@@ -133,6 +133,15 @@ std::optional<Key> key_of(int glfw_key) {
   return std::nullopt;
 }
 
+// What is printed on a key, in upper case; 0: no Latin letter.
+char letter_of(int glfw_key, int scancode) {
+  const char* name = glfwGetKeyName(glfw_key, scancode);
+  const char c = name && *name && !name[1] ? *name : '\0';
+  if (c >= 'a' && c <= 'z') return char(c - 'a' + 'A');
+  // A keyboard of another script has control letters where a US one has them.
+  return glfw_key >= GLFW_KEY_A && glfw_key <= GLFW_KEY_Z && (!c || (c & 0x80)) ? char(glfw_key) : '\0';
+}
+
 bool is_ascii(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
 }
@@ -178,6 +187,7 @@ struct Window::Impl {
   std::unique_ptr<FramePresenter> presenter;
   Interaction* interaction = nullptr;  // while poll() runs
   bool pointer_caught = false, draws_without_gpu = false;
+  bool writes = false;  // the key that was pressed last is meant for a text
   std::unique_ptr<Gui> gui;
   Place before_fullscreen;
   bool moved = false;  // since it was asked how often its screen is refreshed
@@ -210,17 +220,33 @@ struct Window::Impl {
     return gui->takes_pointer(x, y);
   }
 
+  // A letter goes to the text that has the focus or that the dialog waits for, else it is a command, never both: the
+  // letter that opens the dialog is not the first of its path.
+  void on_key(int key, int scancode, int action, int mods) {
+    if (!interaction) return;
+    const bool dialog = interaction->shows_dialog(), field = gui && gui->takes_text();
+    if (action == GLFW_PRESS) writes = dialog || field;  // a key that is held goes on as it began
+    if (gui && action == GLFW_PRESS && key == GLFW_KEY_ESCAPE && gui->close_popup()) return;
+    if (gui) gui->on_key(key, scancode, action, mods);
+    if (action == GLFW_REPEAT) return;
+    const bool down = action == GLFW_PRESS;
+    if (down && (mods & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER))) {
+      const char letter = mods == GLFW_MOD_CONTROL ? letter_of(key, scancode) : '\0';
+      if (letter && (!writes || letter == 'Q')) interaction->control(letter);
+      return;
+    }
+    if (down && field && !(dialog && key == GLFW_KEY_ESCAPE)) return;
+    if (const auto known = key_of(key)) interaction->key(*known, down);
+    if (gui) gui->expect_text(interaction->shows_dialog());
+  }
+
   void listen() {
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
-      const bool typed = of(w).gui && of(w).gui->takes_text();
-      if (of(w).gui) of(w).gui->on_key(key, scancode, action, mods);
-      if (typed && action != GLFW_RELEASE) return;
-      if (const auto known = key_of(key); known && action != GLFW_REPEAT && of(w).interaction)
-        of(w).interaction->key(*known, action == GLFW_PRESS);
+      of(w).on_key(key, scancode, action, mods);
     });
     glfwSetCharCallback(window, [](GLFWwindow* w, unsigned code) {
-      if (of(w).gui) of(w).gui->on_character(code);
+      if (of(w).gui && of(w).writes) of(w).gui->on_character(code);
     });
     glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) {
       if (of(w).gui) of(w).gui->on_enter(entered);
@@ -376,6 +402,7 @@ void Window::poll(Interaction& interaction) {
     impl_->pointer_caught = interaction.wants_pointer();
     glfwSetInputMode(impl_->window, GLFW_CURSOR, impl_->pointer_caught ? GLFW_CURSOR_DISABLED : GLFW_CURSOR_NORMAL);
   }
+  if (impl_->gui) impl_->gui->expect_text(interaction.shows_dialog());
   read_size();
 }
 

@@ -107,7 +107,8 @@ WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, s
       screenshots_(o.screenshot_directory, [lines = lines_](const std::string& line) { lines->add(line); }) {
   quad_buffers_ = o.display.stereo.mode == stereo::Mode::kQuadBuffer;
   interaction_.show_panel(o.panel);
-  open_view_.shown = o.begins_empty;
+  interaction_.set_dialog(bool(o.open), has_scene());
+  interaction_.show_dialog(o.begins_empty);
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
   tell(first_keys());
   if (o.poses)
@@ -188,8 +189,7 @@ geometry::Camera WindowSurface::camera_of(const geometry::Pose& head) const {
 // What is asked for goes out, what came is taken in; nothing here waits.
 void WindowSurface::run_panel(double now_s, Look& look) {
   panel_.show(interaction_.shows_panel());
-  for (const Key key : panel_.take_pressed())
-    for (const bool down : {true, false}) interaction_.key(key, down);
+  for (const Key key : panel_.take_pressed()) interaction_.press(key);
   for (const auto& [name, value] : panel_.take_chosen())
     if (const Status s = set(name, value); !s) panel_.tell(now_s, name + ": " + s.error().text, true);
   look = interaction_.look();
@@ -340,7 +340,8 @@ double WindowSurface::build_panel(double now_s) {
   legend_part_ = {};
   if (shows_legend()) build_legend(now_s, width);
   if (panel_.shown() && interaction_.shows_help()) show_keys(key_lines());
-  show_open(open_view_, !scene_.box_room.empty(), [this](const std::string& path) { open(path); });
+  show_open(open_view_, has_scene(), [this](const std::string& path) { open(path); });
+  interaction_.show_dialog(open_view_.shown);
   return width;
 }
 
@@ -350,14 +351,11 @@ void WindowSurface::take_launcher_lines(double now_s) {
     if (line.starts_with("progress ")) panel_.on_progress(line.substr(9));
     if (!line.starts_with("problem ")) continue;
     panel_.tell(now_s, line.substr(8), true);
-    open_view_.shown = scene_.box_room.empty() || open_view_.shown;
+    if (scene_.box_room.empty()) interaction_.show_dialog(true);
   }
-  if (interaction_.take_open_wish()) {
-    if (options_.open)
-      open_view_ = {.shown = !open_view_.shown};
-    else
-      open("");
-  }
+  interaction_.set_dialog(bool(options_.open), has_scene());
+  if (interaction_.take_open_wish()) open("");
+  if (interaction_.shows_dialog() != open_view_.shown) open_view_ = {.shown = interaction_.shows_dialog()};
 }
 
 void WindowSurface::open(const std::string& path) {

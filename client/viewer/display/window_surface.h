@@ -113,6 +113,8 @@ class WindowSurface final : public DisplaySurface {
   void take_launcher_lines(double now_s);
   void take_dropped();
   void open(const std::string& path);
+  // Or is about to have one.
+  bool has_scene() const { return !options_.begins_empty || !scene_.box_room.empty(); }
   static Status readable(const std::string& path);
   void play_file(const std::string& path);
   void use_transfer_file(const std::string& path);

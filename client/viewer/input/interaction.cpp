@@ -1,7 +1,6 @@
 #include "client/viewer/input/interaction.h"
 
 #include <algorithm>
-#include <string_view>
 #include <utility>
 
 namespace telesplat::viewer {
@@ -9,92 +8,53 @@ namespace {
 
 // Between the poses of a recorded path, so that their times differ in the file too.
 constexpr double kLeastStep_s = 1e-5;
+constexpr double kQuitWithin_s = 3;  // between the two presses of Q
 
-constexpr char kLetters[] = "ABCDEFHINOPQRSTWX";  // in the order of Key
-static_assert(sizeof kLetters - 1 == size_t(Key::k1));
-
-// "[" and "]" hold the letter of a key, or a function key's number.
-struct HelpLine {
-  const char *keys, *what;
-};
-constexpr HelpLine kHelp[] = {
-    {"left drag", "orbit around the data set"},
-    {"middle, [^]+left", "pan"},
-    {"wheel", "nearer, farther (in flight: faster, slower)"},
-    {"Tab", "show, hide the panel"},
-    {"[F]", "fly: [W] [A] [S] [D], [E] up, [Q] down, the mouse looks around, [^] is faster"},
-    {"[R]", "back to the first view"},
-    {"[T]", "play the recorded head movement (--trajectory, or [C]), or take the camera"},
-    {"[C]", "begin, end recording the camera's path; it is written as path-DATE.csv"},
-    {"[1] [2] [3] [4]", "splats: square, disc, ellipse, ewa (not of volumes)"},
-    {"[5] [6] [7]", "finish: fill pin-holes, smooth, antialias (not of volumes)"},
-    {"[8]", "shading on, off (not of volumes)"},
-    {"[X]", "what lies under the cursor; of the last two picks the distance, of three the angle"},
-    {"[B], [N]", "keep a bookmark of this view beside the data set; go to the next bookmark"},
-    {"[I]", "show, hide axes, scale, cursor and frame rate"},
-    {"[P], F12", "screenshot, into images/ of the run folder or the current folder"},
-    {"[O]", "open another data set, where the session is this window's own"},
-    {"F11", "full screen, or a window again"},
-    {"F1, [H]", "show, hide these keys"},
-    {"Esc", "leave flight; quit"},
-    {"[Q]", "quit (not in flight)"},
-};
-
-Key key_of(char mark) {
-  if (mark == '^') return Key::kShift;
-  if (mark >= '1' && mark <= '8') return Key(int(Key::k1) + mark - '1');
-  return Key(std::string_view(kLetters).find(mark));
-}
-
-std::string named(std::string_view text, const KeyNames& name) {
-  std::string out;
-  for (size_t i = 0; i < text.size(); ++i) {
-    if (text[i] == '[' && i + 2 < text.size() && text[i + 2] == ']') {
-      out += name(key_of(text[i + 1]));
-      i += 2;
-    } else {
-      out += text[i];
-    }
-  }
-  return out;
-}
+// What a letter is part of, where a path is typed.
+bool writes(Key key) { return key < Key::kF1; }
 
 }  // namespace
-
-std::string us_name(Key key) {
-  static constexpr std::pair<Key, const char*> kNames[] = {{Key::kF1, "F1"},      {Key::kF11, "F11"},
-                                                           {Key::kF12, "F12"},    {Key::kTab, "Tab"},
-                                                           {Key::kEscape, "Esc"}, {Key::kShift, "shift"}};
-  for (const auto& [named, name] : kNames)
-    if (named == key) return name;
-  if (key >= Key::k1 && key <= Key::k8) return std::string(1, char('1' + int(key) - int(Key::k1)));
-  return std::string(1, kLetters[size_t(key)]);
-}
-
-std::vector<std::string> key_help(const KeyNames& name) {
-  constexpr size_t kWhat = 21;  // column of the second part
-  std::vector<std::string> out;
-  for (const auto& [keys, what] : kHelp) {
-    std::string line = named(keys, name);
-    line.resize(std::max(line.size() + 1, kWhat), ' ');
-    out.push_back(line + named(what, name));
-  }
-  return out;
-}
-
-std::string first_keys() {
-  return "F1 shows all keys: Tab shows the panel, left drag orbits, the wheel goes nearer, F flies, R goes back, P "
-         "takes a screenshot, Q "
-         "quits";
-}
 
 Interaction::Interaction(std::optional<geometry::Trajectory> recorded, const Look& look)
     : recorded_(std::move(recorded)), look_(look), playing_(recorded_.has_value()), held_(kKeys) {}
 
 void Interaction::key(Key key, bool down) {
   const bool was_down = held_[size_t(key)];
-  held_[size_t(key)] = down;
-  if (down && !was_down) pressed(key);
+  const bool typed = shows_dialog_ && (writes(key) || key == Key::kTab);
+  held_[size_t(key)] = down && !typed;
+  if (down && !was_down && !typed) press(key);
+}
+
+void Interaction::control(char letter) {
+  if (letter == 'Q') quit_ = true;
+}
+
+void Interaction::show_dialog(bool shown) {
+  if (shown && !shows_dialog_) {
+    controls_.set_flying(false);
+    focus_lost();
+  }
+  shows_dialog_ = shown;
+}
+
+// What lies above the rest first. The program goes on: who closes one thing too many loses nothing.
+void Interaction::close_what_is_open() {
+  if (shows_dialog_ && can_close_)
+    shows_dialog_ = false;
+  else if (shows_help_)
+    shows_help_ = false;
+  else if (controls_.flying())
+    controls_.set_flying(false);
+  else
+    notes_.push_back("Ctrl+Q quits");
+}
+
+void Interaction::quit_or_ask() {
+  if (controls_.flying()) return;
+  const double now_s = last_s_.value_or(0);
+  quit_ = quit_ || (asked_to_quit_s_ && now_s - *asked_to_quit_s_ <= kQuitWithin_s);
+  asked_to_quit_s_ = now_s;
+  if (!quit_) notes_.push_back("press " + key_names_(Key::kQ) + " once more to quit");
 }
 
 void Interaction::toggle(bool& flag, const char* name) {
@@ -174,8 +134,20 @@ void Interaction::show_help() {
   for (auto& line : key_help(key_names_)) notes_.push_back(std::move(line));
 }
 
-void Interaction::pressed(Key key) {
-  if (choose_look(key)) return;
+// Whether the key asks others for something.
+bool Interaction::make_wish(Key key) {
+  static constexpr std::pair<Key, bool Interaction::*> kWishes[] = {
+      {Key::kP, &Interaction::screenshot_},   {Key::kF12, &Interaction::screenshot_},
+      {Key::kF11, &Interaction::fullscreen_}, {Key::kB, &Interaction::bookmark_wish_},
+      {Key::kN, &Interaction::next_wish_},    {Key::kI, &Interaction::overlay_wish_},
+      {Key::kX, &Interaction::pick_wish_}};
+  for (const auto& [of, wish] : kWishes)
+    if (of == key) return this->*wish = true;
+  return false;
+}
+
+void Interaction::press(Key key) {
+  if (choose_look(key) || make_wish(key)) return;
   switch (key) {
     case Key::kF:
       take_camera();
@@ -189,10 +161,6 @@ void Interaction::pressed(Key key) {
       return play_or_take();
     case Key::kC:
       return records_path_ ? end_path() : begin_path();
-    case Key::kP:
-    case Key::kF12:
-      screenshot_ = true;
-      return;
     case Key::kF1:
     case Key::kH:
       return show_help();
@@ -200,36 +168,20 @@ void Interaction::pressed(Key key) {
       shows_panel_ = !shows_panel_;
       return;
     case Key::kO:
-      open_ = true;
-      return;
-    case Key::kF11:
-      fullscreen_ = true;
-      return;
-    case Key::kB:
-      bookmark_wish_ = true;
-      return;
-    case Key::kN:
-      next_wish_ = true;
-      return;
-    case Key::kI:
-      overlay_wish_ = true;
-      return;
-    case Key::kX:
-      pick_wish_ = true;
-      return;
+      open_ = !can_open_;
+      return show_dialog(can_open_ && !shows_dialog_);
     case Key::kEscape:
-      if (!controls_.flying()) quit_ = true;
-      controls_.set_flying(false);
-      return;
+      return close_what_is_open();
     case Key::kQ:
-      if (!controls_.flying()) quit_ = true;
-      return;
+      return quit_or_ask();
     default:
       return;  // held keys
   }
 }
 
-void Interaction::button(MouseButton button, bool down) { (button == MouseButton::kLeft ? left_ : middle_) = down; }
+void Interaction::button(MouseButton button, bool down) {
+  if (button != MouseButton::kRight) (button == MouseButton::kLeft ? left_ : middle_) = down;
+}
 
 void Interaction::move(double x, double y) {
   const glm::dvec2 to(x, y), from = pointer_.value_or(to);
@@ -306,8 +258,6 @@ void Interaction::record_pose(double now_s, const geometry::Pose& pose) {
 }
 
 Interaction::Path Interaction::take_path() { return std::exchange(finished_path_, {}); }
-bool Interaction::take_open_wish() { return std::exchange(open_, false); }
-bool Interaction::take_fullscreen_wish() { return std::exchange(fullscreen_, false); }
 bool Interaction::take_screenshot_wish() { return std::exchange(screenshot_, false); }
 std::vector<std::string> Interaction::take_notes() { return std::exchange(notes_, {}); }
 

@@ -9,58 +9,11 @@
 #include <vector>
 
 #include "client/viewer/input/camera_controls.h"
+#include "client/viewer/input/keys.h"
 #include "client/viewer/input/look.h"
 #include "common/scene/kind.h"
 
 namespace telesplat::viewer {
-
-/// Keys that mean something here. They are places on the keyboard, named by what is printed there on a US one: W A S D
-/// lie under one hand on every keyboard.
-enum class Key {
-  kA,
-  kB,
-  kC,
-  kD,
-  kE,
-  kF,
-  kH,
-  kI,
-  kN,
-  kO,
-  kP,
-  kQ,
-  kR,
-  kS,
-  kT,
-  kW,
-  kX,
-  k1,
-  k2,
-  k3,
-  k4,
-  k5,
-  k6,
-  k7,
-  k8,
-  kF1,
-  kF11,
-  kF12,
-  kTab,
-  kEscape,
-  kShift
-};
-inline constexpr size_t kKeys = size_t(Key::kShift) + 1;
-enum class MouseButton { kLeft, kMiddle };
-
-/// What a key is called: what is printed on it where the person sits.
-using KeyNames = std::function<std::string(Key)>;
-/// As it is printed on a US keyboard.
-std::string us_name(Key key);
-
-/// Keys and mouse, a line each: for F1, for --help and for documentation.
-std::vector<std::string> key_help(const KeyNames& name = us_name);
-/// The ones to begin with, in one line.
-std::string first_keys();
 
 class Interaction {
  public:
@@ -71,6 +24,10 @@ class Interaction {
 
   // ---- events; positions and movements in window heights, +y down ----
   void key(Key key, bool down);
+  /// What a button of the panel does that stands for a key.
+  void press(Key key);
+  /// A letter while control is held down: the one that is printed on the key, in upper case.
+  void control(char letter);
   void button(MouseButton button, bool down);
   void move(double x, double y);
   void wheel(double steps);
@@ -107,9 +64,15 @@ class Interaction {
   bool shows_help() const { return shows_help_; }
   bool shows_panel() const { return shows_panel_; }
   void show_panel(bool shown) { shows_panel_ = shown; }
+  /// The dialog that opens data sets. While it is shown no letter is a command, and Escape closes it, unless it is all
+  /// that there is to look at.
+  bool shows_dialog() const { return shows_dialog_; }
+  void show_dialog(bool shown);
+  /// Whether there is such a dialog, and whether there is something to look at beside it.
+  void set_dialog(bool can_open, bool can_close) { can_open_ = can_open, can_close_ = can_close; }
   /// True once after each press of the key for it.
-  bool take_fullscreen_wish();
-  bool take_open_wish();
+  bool take_fullscreen_wish() { return std::exchange(fullscreen_, false); }
+  bool take_open_wish() { return std::exchange(open_, false); }
   /// For the lines that tell of keys.
   void set_key_names(KeyNames names) { key_names_ = std::move(names); }
   bool records_path() const { return records_path_; }
@@ -136,7 +99,9 @@ class Interaction {
   std::vector<std::string> take_notes();
 
  private:
-  void pressed(Key key);
+  bool make_wish(Key key);
+  void close_what_is_open();
+  void quit_or_ask();
   void play_or_take();
   bool choose_look(Key key);
   void show_help();
@@ -155,6 +120,8 @@ class Interaction {
   bool overlay_wish_ = false, pick_wish_ = false, bookmark_wish_ = false, next_wish_ = false;
   bool playing_ = false, quit_ = false, screenshot_ = false, shows_help_ = false;
   bool shows_panel_ = false, fullscreen_ = false, open_ = false;
+  bool shows_dialog_ = false, can_open_ = false, can_close_ = true;
+  std::optional<double> asked_to_quit_s_;
   KeyNames key_names_ = us_name;
   bool records_path_ = false, has_own_path_ = false;
   bool goes_home_ = false;   // with the next frame

@@ -168,7 +168,7 @@ TEST_F(PanelTest, OnADenseScreenLettersHaveMorePixels) {
   EXPECT_TRUE(panel_is(window, true));
   EXPECT_TRUE(wait_until([&] { return std::abs(panel_width(shown(window)) - 2 * kPanelWidth) < 40; }))
       << panel_width(shown(window));
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
@@ -195,7 +195,7 @@ TEST_F(PanelTest, ACheckMarkChangesHowFramesAreDrawn) {
   EXPECT_TRUE(wait_until([&] { return finish() == 6; })) << finish() << ": 1 fill, 2 smooth, 4 antialias";
   click(window, fill);
   EXPECT_TRUE(wait_until([&] { return finish() == 7; })) << finish();
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
@@ -224,17 +224,43 @@ TEST_F(PanelTest, AWindowWithoutADataSetOpensOneByAWordOfTheDialog) {
   // Letters that are typed are no keys of the window; what is not there is said, and the picture stays.
   display_->tap("o");
   EXPECT_TRUE(wait_until(has_dialog));
-  click(window, {480 - 18 * kLetter, dialog_top + 59});
-  for (const char* key : {"slash", "q", "period", "p", "l", "y", "Return"}) {
-    display_->tap(key);
-    std::this_thread::sleep_for(std::chrono::milliseconds(150));
-  }
-  EXPECT_TRUE(wait_until([&] { return view.err().find("/q.ply") != std::string::npos; })) << view.err();
+  for (const char* key : {"slash", "q", "period", "p", "l", "y"}) display_->tap(key);
+  EXPECT_TRUE(wait_until([&] {
+    display_->tap("Return");
+    return view.err().find("telesplat: /q.ply") != std::string::npos;
+  })) << view.err();
   EXPECT_TRUE(wait_until([&] { return display_->title(window).find(" fps, ") != std::string::npos; }));
   EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"), "julia\n");
   display_->tap("o");
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(view.wait(60), 0) << view.err();
+}
+
+// Each letter of the path is also a command, and Escape is the key that closes dialogs everywhere.
+TEST_F(PanelTest, TheDialogTakesTheLettersAndEscapeClosesIt) {
+  PipelineRun run({"--trajectory", "still"}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  const auto has_dialog = [&] {
+    const auto v = display_->content(window);
+    return v && alike(at(*v, v->width / 2, v->height - 30), 0x171819);
+  };
+  display_->tap("o");
+  for (const char* key : {"n", "o", "f", "i", "p", "q", "q"}) display_->tap(key);
+  EXPECT_TRUE(wait_until(has_dialog));
+  display_->tap("Escape");
+  EXPECT_TRUE(wait_until([&] { return !has_dialog(); }));
+  // Again and again, with nothing open.
+  for (int i = 0; i < 3; ++i) display_->tap("Escape");
+  EXPECT_TRUE(wait_until([&] { return run.program().err().find("Ctrl+Q quits\n") != std::string::npos; }))
+      << run.program().err();
+  display_->tap("3");
+  EXPECT_TRUE(wait_until([&] { return run.program().err().find("splats: ellipse") != std::string::npos; }))
+      << run.program().err();
+  for (const char* done : {"bookmark", "screenshot", "once more"})
+    EXPECT_EQ(run.program().err().find(done), std::string::npos) << run.program().err();
+  for (int i = 0; i < 2; ++i) display_->tap("q");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
 TEST_F(PanelTest, ADataSetThatKillsItsServerDoesNotEndTheWindow) {
@@ -296,7 +322,7 @@ TEST_F(PanelTest, AFileThatIsDroppedIsOpenedInTheSameWindow) {
   ASSERT_TRUE(display_->drop_file(window, folder_ / "path.csv"));
   EXPECT_TRUE(wait_until([&] { return view.err().find("playing " + (folder_ / "path.csv")) != std::string::npos; }))
       << view.err();
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(view.wait(60), 0) << view.err();
 }
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/geometry/trajectory.h"
+#include "common/net/control.h"
 #include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
@@ -207,7 +208,7 @@ TEST_F(WindowTest, TellsItsKeysOnTheTerminalAndInTheWindow) {
   EXPECT_LE(ink(*picture), 200);
   display_->tap("h");
   EXPECT_TRUE(shows(false));
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
@@ -233,7 +234,7 @@ TEST_F(WindowTest, TheLegendLiesInTheWindowAndInScreenshots) {
   const auto picture = image::read_view(screenshots(run.out() + "/images")[0]);
   ASSERT_TRUE(picture);
   EXPECT_GT(ink(*picture), 200);
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
@@ -299,7 +300,7 @@ TEST_F(WindowTest, AMovieShowsWhatKeysHadChanged) {
     display_->tap(key);
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
   for (const char* column : {"splat", "finish", "lit"}) {
     const auto values = run.column("frames.csv", column);
@@ -319,7 +320,7 @@ TEST_F(WindowTest, KeysOfPointsDoNothingToAVolume) {
     EXPECT_TRUE(wait_until([&] { return run.program().err().find(line) != std::string::npos; })) << run.program().err();
   }
   EXPECT_EQ(run.program().err().find("splats:"), std::string::npos);
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
@@ -354,7 +355,7 @@ TEST_F(WindowTest, LeavesNothingBehindUnlessTold) {
     if (interrupt)
       program.signal(SIGINT);
     else
-      display_->tap("Escape");
+      display_->tap("q", "Control_L");
     EXPECT_EQ(program.wait(60), 0) << program.err();
     EXPECT_TRUE(none_runs(pids));
     EXPECT_TRUE(fs::is_empty(folder / "tmp"));
@@ -376,11 +377,23 @@ TEST_F(WindowTest, JoinsARunningSessionAndLeavesIt) {
   Program guest("telesplat", {"view", "--master", run.master(), "--size", "320x200", "--sampling-size", "320x200"},
                 run.folder() / "guest");
   ASSERT_NE(live_window(guest), 0u);
-  display_->tap("q");
+  display_->tap("q", "Control_L");
   EXPECT_EQ(guest.wait(60), 0) << guest.err();
   EXPECT_TRUE(is_running(run.program().pid())) << "a guest ended the session";
   EXPECT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
+}
+
+TEST_F(WindowTest, AGuestIsToldWhoEndedTheSession) {
+  PipelineRun run({"--duration", "0", "--trajectory", "still"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  Program guest("telesplat", {"view", "--master", run.master(), "--size", "320x200", "--sampling-size", "320x200"},
+                run.folder() / "guest");
+  ASSERT_NE(live_window(guest), 0u);
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_EQ(guest.wait(60), 0) << guest.err();
+  EXPECT_NE(guest.err().find("the session was ended by " + net::this_person() + "\n"), std::string::npos)
+      << guest.err();
 }
 
 // It leaves nothing on disk that would tell its address, but says it, and telesplat ctl finds it.

@@ -4,6 +4,7 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <epoxy/gl.h>
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +19,8 @@ namespace {
 
 constexpr double kPeriod_s = 0.1;  // of plots and figures while nothing happens
 constexpr int kRelease = 0;        // GLFW_RELEASE
-constexpr int kAfterEvent = 2;     // builds: hovering and layouts settle in the second
+constexpr size_t kMostWaiting = 4096;
+constexpr int kAfterEvent = 2;  // builds: hovering and layouts settle in the second
 
 // The texture has the window's size; both have their first row at the bottom.
 constexpr const char* kVertexShader = R"(#version 330 core
@@ -68,8 +70,10 @@ struct Gui::Impl {
   int opaque = 0;           // pixels at the window's left that nothing shines through
   double built_at_s = -1e9;
   int builds_due = kAfterEvent;
-  std::set<int> pressed;      // keys, since the last build
-  std::vector<int> released;  // of these
+  std::set<int> pressed;             // keys, since the last build
+  std::vector<int> released;         // of these
+  std::vector<unsigned> characters;  // that wait for the text that they are meant for
+  bool expects_text = false, popup = false, closes_popup = false;
 
   ~Impl() {
     if (gl) ImGui_ImplOpenGL3_Shutdown();
@@ -144,7 +148,13 @@ void Gui::on_key(int key, int scancode, int action, int mods) {
 }
 void Gui::on_character(unsigned code) {
   stir();
-  if (shows()) ImGui_ImplGlfw_CharCallback(impl_->window, code);
+  if ((shows() || impl_->expects_text) && impl_->characters.size() < kMostWaiting) impl_->characters.push_back(code);
+}
+void Gui::expect_text(bool expected) { impl_->expects_text = expected; }
+bool Gui::close_popup() {
+  if (!impl_->popup || !shows()) return false;
+  stir();
+  return impl_->closes_popup = true;
 }
 void Gui::on_button(int button, int action, int mods) {
   stir();
@@ -184,8 +194,14 @@ void Gui::build_texture(const Place& place, const std::function<double()>& build
     ImGui_ImplOpenGL3_DestroyFontsTexture();
   ImGui_ImplOpenGL3_NewFrame();
   if (ImGui::GetIO().Fonts->TexID == nullptr) ImGui_ImplOpenGL3_CreateFontsTexture();
+  if (takes_text())
+    for (const unsigned code : std::exchange(m.characters, {})) ImGui_ImplGlfw_CharCallback(m.window, code);
+  else if (!m.expects_text)
+    m.characters.clear();
   ImGui::NewFrame();
+  if (std::exchange(m.closes_popup, false) && !GImGui->OpenPopupStack.empty()) ImGui::ClosePopupToLevel(0, true);
   m.opaque = std::clamp(int(build() * pixels_a_unit), 0, place.width);
+  m.popup = ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopup);
   ImGui::Render();
   m.pressed.clear();
   for (const int key : std::exchange(m.released, {})) ImGui_ImplGlfw_KeyCallback(m.window, key, 0, kRelease, 0);

@@ -35,6 +35,10 @@ class Gui {
   bool takes_pointer(double x, double y) const;
   /// Whether keys are meant for a text that is being written.
   bool takes_text() const;
+  /// Letters that come from now on are meant for a text, though it does not have the focus yet: they wait for it.
+  void expect_text(bool expected);
+  /// Closes the list or the colours that an item opened. False: nothing is open.
+  bool close_popup();
   /// Whether it has something else to show than before.
   bool due(double now_s) const;
 
