@@ -210,6 +210,7 @@ std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& contex
 struct Served {
   DisplayResult display;
   bool session_ended = false;
+  std::string why;       // it has ended, for people
   bool refused = false;  // by the master
   bool failed = false;   // nothing came any more
 };
@@ -250,6 +251,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const Display& d
     served.display =
         run_display(o.display, *display.surface, make_source, gate, worker, frames, spans, spool, wall.get());
   served.session_ended = worker.shutdown_requested();
+  served.why = worker.shutdown_reason();
   served.refused = worker.refused();
   served.failed = worker.failed();
   return served;
@@ -285,7 +287,9 @@ int farewell(const ViewerOptions& o, const net::Access& asking, const Served& se
   const int otherwise = served.failed ? 1 : 0;
   if (!o.end_session) return otherwise;
   if (!served.session_ended && !net::stop_requested())
-    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s, {}, asking); !answer)
+    if (const auto answer =
+            net::ask_master(o.service.master, "stop", kMasterPatience_s, {{"by", net::this_person()}}, asking);
+        !answer)
       log::warn("the session could not be ended: {}", answer.error().text);
   if (served.display.frames == 0) log::error("the session ended before anything was shown");
   return served.display.frames == 0 ? 1 : otherwise;
@@ -314,6 +318,7 @@ int run(ViewerOptions o) {
 
   const Served served = serve(o, *access, *display, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
+  if (o.window && served.session_ended && !served.why.empty()) tell(served.why);
   const std::string lost = display->surface ? display->surface->failure() : "";
   display->surface.reset();  // the window goes at once, however much there is to write
   FrameSpool* const spool = (*record)->spool();

@@ -176,7 +176,9 @@ void ViewerWorker::receive_control() {
   link_.receive();
   for (auto& answer : orders_.take_answers()) link_.answer(answer.number, answer.ok, std::move(answer.text));
   if (link_.refused()) refused_ = true;
-  if (link_.shutdown_requested()) shutdown_ = true;
+  if (!link_.shutdown_requested() || shutdown_) return;
+  why_ = link_.shutdown_reason();
+  shutdown_ = true;
 }
 
 void ViewerWorker::follow_session() {

@@ -68,6 +68,8 @@ class ViewerWorker {
   /// True once one view update is complete.
   bool first_update_complete() const { return updates_ > 0; }
   bool shutdown_requested() const { return shutdown_; }
+  /// Once that is true: what the master says why, for people; empty: nothing.
+  const std::string& shutdown_reason() const { return why_; }
   /// Its thread ended by an exception, which was logged: nothing comes any more.
   bool failed() const { return failed_; }
   /// The master does not let it in with its keys.
@@ -169,6 +171,7 @@ class ViewerWorker {
   int sampled_width_ = 0, sampled_height_ = 0;
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
+  std::string why_;  // written before shutdown_
   std::atomic<bool> shutdown_{false}, failed_{false}, refused_{false}, stop_{false};
   std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
   std::atomic<double> longest_gap_ms_{0};  // between two displayed frames

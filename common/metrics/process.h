@@ -16,6 +16,7 @@ struct Process {
   std::map<std::string, std::string> facts;
   std::map<std::string, double> values;  ///< newest status report
   bool replaced = false;                 ///< it died and another of its name took its place
+  bool lost = false;                     ///< it ended without a goodbye
 };
 
 }  // namespace telesplat::metrics

@@ -11,6 +11,10 @@ size_t Roster::count(const std::string& role) const {
   return size_t(std::ranges::count_if(processes_, [&](const Process& p) { return p.role == role && !p.replaced; }));
 }
 
+size_t Roster::lost(const std::string& role) const {
+  return size_t(std::ranges::count_if(processes_, [&](const Process& p) { return p.role == role && p.lost; }));
+}
+
 std::string Roster::fact(const std::string& role, const std::string& key) const {
   const std::string* found = nullptr;
   for (const Process& p : processes_) {

@@ -16,6 +16,8 @@ class Roster {
 
   /// Processes of a role, each life but the last left out.
   size_t count(const std::string& role) const;
+  /// Lives of a role that ended without a goodbye.
+  size_t lost(const std::string& role) const;
   /// What the first of a role that has this fact says, of viewers the one that records into the session's own folder;
   /// empty if none does.
   std::string fact(const std::string& role, const std::string& key) const;

@@ -359,6 +359,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
         {"keys_refused", whole(roster.counted("", "keys_refused"))},
         {"gaps_resynced", whole(roster.counted("viewer", "gaps_resynced"))},
         {"leases_expired", whole(counter("leases_expired"))},
+        {"viewers_lost", roster.lost("viewer")},
         {"record_failed", about.losses.failed.size() + whole(roster.counted("", kRecordFailed))},
         {"record_lost", rows_of(about.losses.lost)},
         {"record_cut", rows_of(about.losses.cut)}}}});

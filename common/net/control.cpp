@@ -1,10 +1,20 @@
 #include "common/net/control.h"
 
 #include <fmt/format.h>
+#include <pwd.h>
+#include <unistd.h>
 
 #include "common/core/clock.h"
+#include "common/net/service.h"
 
 namespace telesplat::net {
+
+std::string this_person() {
+  char text[1024];
+  passwd entry{}, *found = nullptr;
+  const bool known = getpwuid_r(getuid(), &entry, text, sizeof text, &found) == 0 && found;
+  return fmt::format("{} of {}", known ? found->pw_name : fmt::format("user {}", getuid()), host_name());
+}
 
 std::string refusal_of_master(const Socket& socket, const std::string& endpoint) {
   const auto refusal = socket.refusal();

@@ -12,6 +12,9 @@ namespace telesplat::net {
 inline constexpr SocketOptions kControlSocket{
     .high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes, .linger_ms = 0, .watch_connecting = true};
 
+/// Who runs this program, for others: "ada of node7". Told as the argument "by" of "stop".
+std::string this_person();
+
 /// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer,
 /// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once where
 /// nothing takes connections, or our keys are not taken. Answers to earlier commands that are there by then are

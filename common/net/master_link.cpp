@@ -134,7 +134,7 @@ bool MasterLink::handle(const Message& message) {
   if (message.type == wire::Shutdown::kName) {
     if (const auto shutdown = socket_.decode<wire::Shutdown>(message)) {
       if (welcomed_ || session_)
-        log::debug("shutdown: {}", shutdown->reason);
+        shutdown_reason_ = printable(shutdown->reason);
       else
         log::error("the master refuses this process: {}", printable(shutdown->reason));
       shutdown_ = true;

@@ -49,6 +49,8 @@ class MasterLink {
   int version() const { return version_; }
   /// The session is over for this process: its end was told, or the master does not let it in.
   bool shutdown_requested() const { return shutdown_; }
+  /// What the master says why the session ends; empty: it has said nothing.
+  const std::string& shutdown_reason() const { return shutdown_reason_; }
   /// The master does not let it in with its keys (why was logged): bad usage, exit code 2.
   bool refused() const { return refused_; }
   /// This machine's monotonic time on the master's clock.
@@ -74,6 +76,7 @@ class MasterLink {
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;
+  std::string shutdown_reason_;
   bool shutdown_ = false, welcomed_ = false, refused_ = false, warned_ = false;
   Obey obey_;
   ClockEstimate clock_;

@@ -179,7 +179,7 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   if (!at_once.empty()) p.leases_at_once = std::clamp(std::atoi(at_once.c_str()), 0, kMaxWaitingLeases);
   if (p.gone) p.reports.clear();
   p.seen_s = now_s;
-  p.gone = p.refused = false;
+  p.gone = p.refused = p.process.lost = false;
   live_.set_here(m.role, m.name, true);
   return p;
 }
@@ -277,6 +277,7 @@ void MasterCore::forget_viewer(const wire::Hello& hello) {
 
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
+  p.process.lost = !said_goodbye;
   p.put_off.reset();
   if (routing_id == leading_packer_) leading_packer_.clear();
   live_.set_here(p.hello.role, p.hello.name, false);

@@ -76,6 +76,7 @@ class MasterCore {
   size_t remembered() const { return peers_.size(); }
   InstanceId instance() const { return instance_; }
   bool stop_requested() const { return stop_; }
+  const std::string& stop_reason() const { return stop_reason_; }
   /// True once everyone who was told to finish has said goodbye.
   bool everyone_left() const;
 
@@ -201,6 +202,7 @@ class MasterCore {
   bool announce_due_ = false;
   double now_s_ = 0;  // of what came last
   bool stop_ = false;
+  std::string stop_reason_ = "the session was ended";
 };
 
 }  // namespace telesplat::master

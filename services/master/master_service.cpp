@@ -106,7 +106,7 @@ class MasterService {
   /// Tells everyone to finish, and listens to their last words.
   void say_goodbye() {
     file_.reset();  // nobody shall find what ends
-    core_.shut_down(net::stop_requested() ? "the master was told to stop" : "stop was commanded");
+    core_.shut_down(net::stop_requested() ? "the session's master was told to stop" : core_.stop_reason());
     const auto patience_s = [] { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; };
     for (const double begin = monotonic_s(); !core_.everyone_left() && monotonic_s() - begin < patience_s();)
       serve_for(10);

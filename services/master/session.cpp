@@ -8,6 +8,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/utf8.h"
 #include "common/points/point_model.h"
 #include "common/scene/session.h"
 #include "common/scene/settings.h"
@@ -17,7 +18,8 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMostNamed = 16;  // viewers, in an answer
+constexpr size_t kMostNamed = 16;     // viewers, in an answer
+constexpr size_t kMostOfEnder = 100;  // bytes of who ends the session
 
 }  // namespace
 
@@ -154,6 +156,8 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   if (m.command == "stop") {
     outbox_.send(peer, wire::ControlReply{true, "stopping"});
     stop_ = true;
+    if (const std::string by = scene::value_or(m.arguments, "by", std::string()); !by.empty())
+      stop_reason_ = "the session was ended by " + to_utf8(by.substr(0, kMostOfEnder));
     return;
   }
   if (m.command == "done") return answer_of_launcher(peer, m);

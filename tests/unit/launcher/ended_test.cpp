@@ -28,6 +28,14 @@ TEST(EndedProcess, ViewersAreNot) {
   EXPECT_EQ(consequence_of({"viewer", kRefused, 0, true}), Consequence::kRefuse);
 }
 
+TEST(EndedProcess, AViewerThatDiesDoesNotEndTheSessionOfOthers) {
+  for (const int code : {1, 128 + 6, 128 + 9, kCrashed}) {
+    EXPECT_EQ(consequence_of({.role = "viewer", .code = code, .others = true}), Consequence::kGiveUp) << code;
+    EXPECT_EQ(consequence_of({.role = "viewer", .code = code, .others = false}), Consequence::kFail) << code;
+  }
+  EXPECT_EQ(consequence_of({.role = "viewer", .code = kRefused, .others = true}), Consequence::kRefuse);
+}
+
 // Its window stays, whatever the data set does to its server; other servers are as before.
 TEST(EndedProcess, ADataSetThatWasChosenAtAWindowDoesNotEndTheSession) {
   EXPECT_EQ(consequence_of({"data", kRefused, 0, true}), Consequence::kGiveUp);

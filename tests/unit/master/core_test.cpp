@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/core/log.h"
+#include "common/core/utf8.h"
 #include "common/metrics/tables/viewer_tables.h"
 #include "services/master/master_core.h"
 
@@ -468,6 +469,30 @@ TEST_F(Master, CommandsAreObeyedOrRefused) {
     core.on(peer, wire::Goodbye{}, 2);
   }
   EXPECT_TRUE(core.everyone_left());
+}
+
+TEST_F(Master, WhoEndsTheSessionIsToldToAll) {
+  join_all();
+  core.on("c", wire::Control{"stop", {{"by", "ada of node7"}}}, 1);
+  EXPECT_EQ(core.stop_reason(), "the session was ended by ada of node7");
+  // Whoever asks chooses the text.
+  core.on("c", wire::Control{"stop", {{"by", std::string(5000, '\xff')}}}, 1);
+  EXPECT_TRUE(valid_utf8(core.stop_reason()));
+  EXPECT_LT(core.stop_reason().size(), 500u);
+}
+
+TEST_F(Master, AViewerThatEndsWithoutAGoodbyeIsKnownToBeLost) {
+  join_all();
+  const auto lost = [&] {
+    const auto all = core.processes();
+    return std::count_if(all.begin(), all.end(), [](const auto& p) { return p.role == "viewer" && p.lost; });
+  };
+  core.undeliverable("v");
+  EXPECT_EQ(lost(), 1);
+  core.on("v", hello("viewer", "v", 5), 2);  // its link was broken, no more
+  EXPECT_EQ(lost(), 0);
+  core.on("v", wire::Goodbye{{5}}, 3);
+  EXPECT_EQ(lost(), 0);
 }
 
 TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {

@@ -33,8 +33,9 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                      true};
   Process packer{"packer", "packer", 3, {}, {{"points", 1000}, {"model_bytes", 20000}, {"peak_rss_mb", 30}}};
   Process sampler{"sampler", "sampler-1", 4, {}, {{"peak_rss_mb", 40}}};
-  ASSERT_TRUE(
-      record->finish({data, old_packer, packer, sampler, viewer}, {{"leases_expired", 4}, {"tiles_released", 6}}));
+  Process killed{"viewer", "viewer-1", 5, {}, {}, true, true};
+  ASSERT_TRUE(record->finish({data, killed, old_packer, packer, sampler, viewer},
+                             {{"leases_expired", 4}, {"tiles_released", 6}}));
   const auto s = nlohmann::json::parse(text("summary.json"), nullptr, false);
   ASSERT_TRUE(s.is_object());
   for (const char* key : {"schema",
@@ -105,6 +106,7 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
   EXPECT_EQ(s["limits"]["messages_refused"], 8);
   EXPECT_EQ(s["limits"]["queue_refused"], 1);
   EXPECT_EQ(s["errors"]["leases_expired"], 4);
+  EXPECT_EQ(s["errors"]["viewers_lost"], 1);
   EXPECT_EQ(s["peak_rss_mb"]["sampler"], nlohmann::json::array({40.0}));
   const std::string tiles = text("tiles.csv");
   EXPECT_EQ(std::count(tiles.begin(), tiles.end(), '\n'), 4);

@@ -8,6 +8,7 @@
 
 #include "common/core/whole_file.h"
 #include "common/julia/flags.h"
+#include "common/net/control.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/colouring.h"
 #include "common/scene/settings.h"
@@ -150,7 +151,13 @@ Result<Arguments> clip_arguments(const Words& words, ControlClient&) {
 // Without a help it is that of the settings that it changes.
 std::vector<Order> all_orders() {
   std::vector<Order> all{
-      {.name = "stop", .help = "end the session: the master writes the record, everyone exits", .words = {}},
+      {.name = "stop",
+       .help = "end the session: the master writes the record, everyone exits",
+       .words = {},
+       .read =
+           [](const auto&, auto&) {
+             return Result<Order::Arguments>({{"by", net::this_person()}});
+           }},
       {.name = "epoch", .help = "drop all points and sample anew", .words = {}},
       {.name = "set", .words = "NAME=VALUE, such as c.y=0.3 or volume.step=3", .read = set_arguments},
       {.name = "animate",

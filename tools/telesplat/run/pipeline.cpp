@@ -1,6 +1,7 @@
 #include "tools/telesplat/run/pipeline.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <csignal>
@@ -230,6 +231,7 @@ Consequence consequence_of(const Ended& e) {
   if (e.record_failed && e.code == 1) return master ? Consequence::kFinish : Consequence::kNone;  // all else is well
   const bool refused = e.code == 2;
   if (!refused && !viewer && e.restarts < Restarts::kMost) return Consequence::kRestart;
+  if (viewer && !refused && e.others) return Consequence::kGiveUp;
   // A window stays, and another data set can be opened in it.
   if (e.role == "data" && e.chosen) return Consequence::kGiveUp;
   return refused ? Consequence::kRefuse : Consequence::kFail;
@@ -237,20 +239,18 @@ Consequence consequence_of(const Ended& e) {
 
 Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const int code = m.process->exit_code();
+  const bool others = m.role == "viewer" && !viewing_beside(m).empty();
   const auto follows =
-      consequence_of({m.role, code, m.restarts.lately(monotonic_s()), chosen_, !m.record_failed.empty()});
+      consequence_of({m.role, code, m.restarts.lately(monotonic_s()), chosen_, !m.record_failed.empty(), others});
   if (follows == Consequence::kNone) return State::kRunning;
   if (follows == Consequence::kFinish) return State::kFinished;
-  if (follows != Consequence::kRestart) {
-    const std::string last = group_.last_log_line(m.name);
-    news.push_back(code == 2 && m.role != "viewer" ? last
-                                                   : fmt::format("{} ended with code {}: {}", m.name, code, last));
-    if (follows != Consequence::kGiveUp) return follows == Consequence::kRefuse ? State::kBadInput : State::kFailed;
-    m.given_up = true;
-    progress_.clear();
-    tell_viewers("problem " + news.back());
-    goes_back_ = before_.has_value();
+  if (follows == Consequence::kGiveUp) {
+    give_up(m, news);
     return State::kRunning;
+  }
+  if (follows != Consequence::kRestart) {
+    news.push_back(last_words(m));
+    return follows == Consequence::kRefuse ? State::kBadInput : State::kFailed;
   }
   const double now_s = monotonic_s();
   m.again_s = m.restarts.died(now_s);
@@ -258,6 +258,34 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again{}", m.name,
                              code > 128 ? "signal" : "code", code > 128 ? code - 128 : code, when));
   return start_again(m, news);
+}
+
+std::string Pipeline::last_words(const Member& m) {
+  const int code = m.process->exit_code();
+  const std::string last = group_.last_log_line(m.name);
+  if (code == 2 && m.role != "viewer") return last;
+  return fmt::format("{} ended with code {}{}{}", m.name, code, last.empty() ? "" : ": ", last);
+}
+
+std::vector<std::string> Pipeline::viewing_beside(const Member& member) {
+  std::vector<std::string> out;
+  for (const Member& m : group_.members())
+    if (m.role == "viewer" && &m != &member && m.process && !m.process->ended()) out.push_back(m.name);
+  return out;
+}
+
+void Pipeline::give_up(Member& m, std::vector<std::string>& news) {
+  m.given_up = true;
+  std::string line = last_words(m);
+  if (m.role == "viewer") {
+    viewer_died_ = true;
+    line += fmt::format("; the session goes on for {}", fmt::join(viewing_beside(m), ", "));
+  } else {
+    progress_.clear();
+    goes_back_ = before_.has_value();
+  }
+  news.push_back(line);
+  tell_viewers("problem " + line);
 }
 
 Pipeline::State Pipeline::start_again(Member& m, std::vector<std::string>& news) {

@@ -23,11 +23,12 @@ struct Ended {
   int restarts = 0;            ///< how often it was started again in the last minute (Restarts::lately)
   bool chosen = false;         ///< it serves a data set that a person chose at a window
   bool record_failed = false;  ///< it said that it could not write all of the record, and nothing else was wrong
+  bool others = false;         ///< a viewer: others that the launcher started are there
 };
 enum class Consequence {
   kNone,
   kRestart,
-  kGiveUp,  ///< the session goes on without it, and its window tells why
+  kGiveUp,  ///< the session goes on without it, and its windows tell why
   kFinish,  ///< the session's end, in order
   kFail,    ///< the same, as an error
   kRefuse,  ///< the same: what it was given cannot be used
@@ -51,8 +52,9 @@ class Pipeline {
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
   /// Looks after the children; does not wait. Servers that die are started again, the master at its old address, unless
-  /// they die too often (Restarts); a viewer's death ends the run, which is finished when all viewers are. A data set
-  /// that was chosen at a window and cannot be served does not end it. `news` gets lines for the person.
+  /// they die too often (Restarts). The death of the last viewer that is left ends the run, which is finished when all
+  /// viewers are. A data set that was chosen at a window and cannot be served does not end it. `news` gets lines for
+  /// the person.
   State supervise(std::vector<std::string>& news);
   /// "reading a.ply 43 %, 12 s left" and the like, from the children's progress lines; empty: nothing to tell.
   const std::string& progress() const { return progress_; }
@@ -73,6 +75,8 @@ class Pipeline {
   void finish();
   /// After that: what could not be written of the record, a line a process; empty: it is whole.
   const std::vector<std::string>& record_failures() const { return record_failures_; }
+  /// A viewer has died, and the session went on for the others.
+  bool viewer_died() const { return viewer_died_; }
 
  private:
   Pipeline(const RunOptions& options, ProcessGroup group);
@@ -85,6 +89,12 @@ class Pipeline {
   /// relay the first time.
   Status put_link(links::Place place, const std::string& name, Member& before);
   void read(Member& member);
+  /// Names of the viewers that run, this one left out.
+  std::vector<std::string> viewing_beside(const Member& member);
+  /// How it ended, and the last line that it logged.
+  std::string last_words(const Member& member);
+  /// It has ended, and the session goes on without it.
+  void give_up(Member& member, std::vector<std::string>& news);
   void read_progress(const std::string& member, const std::string& told);
   /// What the end of a process means for the run.
   State ended(Member& member, std::vector<std::string>& news);
@@ -98,7 +108,7 @@ class Pipeline {
   std::vector<std::string> notes_, wishes_, record_failures_;
   std::string told_progress_;                  // the viewers
   std::map<std::string, std::string> relays_;  // where they listen, by name
-  bool has_viewers_ = false;
+  bool has_viewers_ = false, viewer_died_ = false;
   bool chosen_ = false;  // the data set, by a person at a window: one that cannot be read does not end the session
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;

@@ -12,6 +12,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
+#include "common/net/control.h"
 #include "common/net/service.h"
 #include "tools/telesplat/control/client.h"
 #include "tools/telesplat/run/children/log_limit.h"
@@ -131,7 +132,8 @@ void ProcessGroup::finish() {
   Member* master = find("master");
   if (master && master->process && !master->process->ended() && !endpoint_.empty()) {
     ControlClient control(endpoint_, access_);
-    if (net::stop_requested() || !control.ask("stop", 2)) master->process->signal(SIGTERM);
+    if (net::stop_requested() || !control.ask("stop", 2, {{"by", net::this_person()}}))
+      master->process->signal(SIGTERM);
     for (const double until = monotonic_s() + kSoon_s; !master->process->ended() && monotonic_s() < until;)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     // Who said hello while the session ended has not heard of it, and the master waits for them.

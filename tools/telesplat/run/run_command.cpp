@@ -88,11 +88,12 @@ class Run {
     if (stopped) net::forget_stop();
     pipeline->finish();
     record_failures_ = pipeline->record_failures();
+    viewer_died_ = pipeline->viewer_died();
     if (!o_.join_master.empty()) ask_for_results(*pipeline);
     if (state != State::kBadInput && !o_.out.empty()) after_.develop_pictures();
     for (const auto& n : pipeline->take_notes()) progress_.line(n);
     if (state == State::kBadInput || state == State::kFailed) return clear_up(state);
-    if (o_.out.empty()) return 0;
+    if (o_.out.empty()) return viewer_died_ ? 1 : 0;
     if (after_.displayed()) settle_replaced();
     if (stopped && net::stop_requested()) return end_at_once();
     if (!after_.displayed()) return record_failures_.empty() ? nothing_displayed(stopped) : tell_failures();
@@ -307,6 +308,7 @@ class Run {
     if (!net::stop_requested() || code == 0) after_.drop_spools();
     if (code != 0) return code;
     if (!record_failures_.empty()) return tell_failures();
+    if (viewer_died_) return tools::complain({"a viewer died before the end; the record has what it told"}, 1);
     if (busy_.share() > ProcessorWait::kMuch)
       progress_.line(
           fmt::format("telesplat: this machine was too busy: the display waited for a processor {:.0f} % of the time, "
@@ -324,7 +326,7 @@ class Run {
   RunOptions o_;
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
-  bool folder_existed_ = false;
+  bool folder_existed_ = false, viewer_died_ = false;
   std::vector<std::string> record_failures_;
   ProcessorWait busy_;
   std::string master_folder_;                       // where the session's record is; empty: not known, or nowhere
