@@ -7,6 +7,7 @@
 namespace telesplat::geometry {
 namespace {
 
+constexpr int kSettle = 20;
 constexpr double kFarthest_m = 2e5;  // from the box's centre: cameras farther than 1e6 m are refused
 
 struct Shape {
@@ -68,6 +69,33 @@ struct Stand {
   double distance;
 };
 
+// The axes of a view: `back` leads to the eye.
+struct Axes {
+  glm::dvec3 back, right, up;
+  explicit Axes(const glm::dvec3& to_eye)
+      : back(to_eye),
+        right(std::hypot(back.x, back.z) > 1e-9 ? glm::normalize(glm::dvec3(back.z, 0, -back.x)) : glm::dvec3(1, 0, 0)),
+        up(glm::cross(back, right)) {}
+};
+
+// The corners of a box as a view sees them. Moving its eye aside, so that the target of depth d is seen at the tangent
+// m, makes x + m d of each x; the condition |x + m d - m (d - z)| <= tangent (d - z) is that of a corner at x + m z,
+// where z counts from the target. target_z: of the target, from the box's centre towards the eye.
+template <class F>
+void for_corners(const Shape& s, const Axes& axes, double middle_x, double target_z, F use) {
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 p = s.half * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+    const double z = glm::dot(p, axes.back);
+    use(glm::dvec3(glm::dot(p, axes.right) + middle_x * (z - target_z), glm::dot(p, axes.up), z));
+  }
+}
+
+// From `distance` before the target, which is seen at the tangent middle_x.
+Pose pose_before(const glm::dvec3& target, double distance, const Axes& axes, double middle_x) {
+  glm::dmat3 turned(axes.right, axes.up, axes.back);
+  return {target + axes.back * distance - axes.right * (middle_x * distance), glm::normalize(glm::quat_cast(turned))};
+}
+
 Stand stand_at(const Shape& s, const Demands& demands, double tilt_rad) {
   const double aside = std::clamp(demands.aside(), -kFarthest_m, kFarthest_m);
   const double distance = demands.distance() - aside * std::tan(tilt_rad);
@@ -82,17 +110,31 @@ double suitable_tilt_rad(const Box& box) {
   return (10 + 24 / (1 + slender * slender)) * 3.14159265358979323846 / 180;
 }
 
-Pose fitted_view(const Box& box, const Camera& frustum) {
+Pose fitted_view(const Box& box, const Camera& frustum, double middle_x) {
   const Shape s = shape_of(box);
   const double tilt = suitable_tilt_rad(box);
-  const glm::dvec3 back(0, std::sin(tilt), std::cos(tilt)), right(1, 0, 0), up = glm::cross(back, right);
-  Demands demands(half_tangents(frustum), frustum.near_m);
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 p = s.half * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
-    demands.add({glm::dot(p, right), glm::dot(p, up), glm::dot(p, back)});
+  const Axes axes({0, std::sin(tilt), std::cos(tilt)});
+  // Where the target is decides how far the eye is moved aside, and so where the target is: it settles soon.
+  Stand stand{s.centre, 0};
+  for (int i = 0; i < (middle_x == 0 ? 1 : kSettle); ++i) {
+    Demands demands(half_tangents(frustum), frustum.near_m);
+    const double target_z = glm::dot(stand.target - s.centre, axes.back);
+    for_corners(s, axes, middle_x, target_z, [&](const glm::dvec3& p) { demands.add(p); });
+    stand = stand_at(s, demands, tilt);
   }
-  const Stand stand = stand_at(s, demands, tilt);
-  return look_at(stand.target + back * stand.distance, stand.target);
+  return pose_before(stand.target, stand.distance, axes, middle_x);
+}
+
+Pose fitted_view_from(const glm::dvec3& back, const Box& box, const Camera& frustum, double middle_x) {
+  const Shape s = shape_of(box);
+  const Axes axes(back);
+  const glm::dvec2 tangents = half_tangents(frustum);
+  double distance = 1e-5;
+  for_corners(s, axes, middle_x, 0, [&](const glm::dvec3& p) {
+    distance = std::max(
+        {distance, p.z + std::abs(p.x) / tangents.x, p.z + std::abs(p.y) / tangents.y, p.z + frustum.near_m * 1.01});
+  });
+  return pose_before(s.centre, std::min(distance, kFarthest_m), axes, middle_x);
 }
 
 Trajectory fitted_orbit(const Box& box, const Camera& frustum, double period_s) {

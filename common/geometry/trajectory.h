@@ -34,6 +34,8 @@ class Trajectory {
   Pose at(double t_s) const;
   /// Seconds from first to last sample; 0 for still and orbit.
   double duration_s() const;
+  /// Whether the head rests after duration_s().
+  bool ends() const { return !repeats_ && duration_s() > 0; }
   /// From now on it begins again where it ends.
   void repeat() { repeats_ = true; }
 

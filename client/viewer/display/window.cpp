@@ -18,12 +18,14 @@
 #include "client/viewer/display/frame_presenter.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/within.h"
 #include "common/gl/egl_context.h"
 
 namespace telesplat::viewer {
 namespace {
 
 constexpr int kSmallestSide = 120;
+constexpr int kSmallestPicture = 16;  // pixels a side: window managers need not keep to the size above
 
 std::string last_error() {
   const char* text = nullptr;
@@ -187,6 +189,7 @@ struct Window::Impl {
   std::unique_ptr<FramePresenter> presenter;
   Interaction* interaction = nullptr;  // while poll() runs
   bool pointer_caught = false, draws_without_gpu = false;
+  int hidden = 0;       // pixels at the left
   bool writes = false;  // the key that was pressed last is meant for a text
   std::unique_ptr<Gui> gui;
   Place before_fullscreen;
@@ -231,10 +234,12 @@ struct Window::Impl {
     if (action == GLFW_REPEAT) return;
     const bool down = action == GLFW_PRESS;
     if (down && (mods & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER))) {
-      const char letter = mods == GLFW_MOD_CONTROL ? letter_of(key, scancode) : '\0';
-      if (letter && (!writes || letter == 'Q')) interaction->control(letter);
+      const bool control = (mods & ~GLFW_MOD_SHIFT) == GLFW_MOD_CONTROL;
+      const char letter = control ? letter_of(key, scancode) : '\0';
+      if (letter && (!writes || letter == 'Q')) interaction->control(letter, mods & GLFW_MOD_SHIFT);
       return;
     }
+    if (down && !writes && (mods & GLFW_MOD_SHIFT) && interaction->shifted(letter_of(key, scancode))) return;
     if (down && field && !(dialog && key == GLFW_KEY_ESCAPE)) return;
     if (const auto known = key_of(key)) interaction->key(*known, down);
     if (gui) gui->expect_text(interaction->shows_dialog());
@@ -258,9 +263,11 @@ struct Window::Impl {
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int mods) {
       if (of(w).gui) of(w).gui->on_button(button, action, mods);
       if (action == GLFW_PRESS && of(w).gui_takes_pointer()) return;
-      if (!of(w).interaction || (button != GLFW_MOUSE_BUTTON_LEFT && button != GLFW_MOUSE_BUTTON_MIDDLE)) return;
-      of(w).interaction->button(button == GLFW_MOUSE_BUTTON_LEFT ? MouseButton::kLeft : MouseButton::kMiddle,
-                                action == GLFW_PRESS);
+      static constexpr std::pair<int, MouseButton> kButtons[] = {{GLFW_MOUSE_BUTTON_LEFT, MouseButton::kLeft},
+                                                                 {GLFW_MOUSE_BUTTON_MIDDLE, MouseButton::kMiddle},
+                                                                 {GLFW_MOUSE_BUTTON_RIGHT, MouseButton::kRight}};
+      for (const auto& [code, known] : kButtons)
+        if (code == button && of(w).interaction) of(w).interaction->button(known, action == GLFW_PRESS);
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
       if (of(w).gui) of(w).gui->on_move();
@@ -388,8 +395,8 @@ void Window::read_size() {
   int width = 0, height = 0;
   glfwGetFramebufferSize(impl_->window, &width, &height);
   if (width <= 0 || height <= 0) return;  // minimised
-  width_ = std::min(width, geometry::kMaxImageSide);
-  height_ = std::min(height, geometry::kMaxImageSide);
+  width_ = within(width, kSmallestPicture, geometry::kMaxImageSide);
+  height_ = within(height, kSmallestPicture, geometry::kMaxImageSide);
 }
 
 void Window::poll(Interaction& interaction) {
@@ -456,12 +463,13 @@ std::string Window::key_name(Key key) const {
 double Window::content_scale() const {
   float x = 1, y = 1;
   if (!lost()) glfwGetWindowContentScale(impl_->window, &x, &y);
-  return std::clamp(double(std::max(x, y)), 0.5, 8.0);
+  return within(double(std::max(x, y)), 0.5, 8.0);
 }
 
 std::vector<std::string> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
 
 bool Window::has_gui() const { return impl_->gui != nullptr; }
+int Window::hidden() const { return impl_->hidden; }
 
 bool Window::gui_due(double now_s) const { return impl_->gui && impl_->gui->due(now_s); }
 
@@ -473,6 +481,7 @@ void Window::present(const image::View& view, const Overlays& overlays, const st
   const Current current(*this);
   const Gui::Place place{width, height, content_scale()};
   const int hidden = impl_->gui ? impl_->gui->prepare(place, monotonic_s(), gui) : 0;
+  impl_->hidden = hidden;
   impl_->presenter->draw(view, width, height, overlays, hidden);
   if (impl_->gui) impl_->gui->show(place);
   if (impl_->draws_without_gpu) glFinish();  // which the swap would do; the display may go away until it is done

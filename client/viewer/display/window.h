@@ -51,8 +51,8 @@ class Window {
   bool closing() const;
   /// The connection to the window system broke: nothing is shown any more, and nothing of it can be freed.
   bool lost() const;
-  /// Pixels of the content, which on fine screens are more than screen coordinates; the last ones while it is
-  /// minimised.
+  /// Pixels of the content, 16 at least, which on fine screens are more than screen coordinates; the last ones while it
+  /// is minimised.
   int width() const { return width_; }
   int height() const { return height_; }
   void set_title(const std::string& title);
@@ -72,6 +72,8 @@ class Window {
   void present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui = {});
   /// Whether what `gui` builds can be shown.
   bool has_gui() const;
+  /// How many columns of pixels at the left of what was presented nothing shines through.
+  int hidden() const;
   /// Whether what `gui` builds has changed since it was presented.
   bool gui_due(double now_s) const;
 

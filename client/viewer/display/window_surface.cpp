@@ -10,12 +10,16 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/within.h"
+#include "common/geometry/fit.h"
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
 namespace {
 
 constexpr double kShowAgain_s = 0.1, kPoint_s = 0.1;
+constexpr double kSteps = 32;         // of the window's width
+constexpr double kMostCovered = 0.6;  // of the window's width; else its first view is that of all of it
 constexpr size_t kMostPicks = 3, kMostPicture_pixels = 100'000'000;
 constexpr uintmax_t kMostDropped_bytes = 64'000'000;
 
@@ -28,7 +32,7 @@ std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement)
 // As large as the keys fit into the window.
 int help_scale(const std::vector<std::string>& lines, int width, int height) {
   const image::View smallest = text_panel(lines, 1);
-  return std::clamp(std::min(width / (smallest.width + 12), height / (2 * smallest.height)), 1, 4);
+  return within(std::min(width / (smallest.width + 12), height / (2 * smallest.height)), 1, 4);
 }
 
 // A name that no file has.
@@ -136,23 +140,56 @@ geometry::Camera WindowSurface::whole(const geometry::Pose& pose) const {
 void WindowSurface::on_scene(const ShownScene& scene) {
   scene_ = scene;
   panel_.on_scene(scene.pipeline);
-  fitted_width_ = 0;
+  fitted_ = {};
+}
+
+// What panel and legend leave free. Walls and two eyes have no part that is.
+WindowSurface::FreePart WindowSurface::free_part() const {
+  const auto& o = options_.display;
+  FreePart out{whole({}), 0};
+  if (o.wall.described || o.wall.tiles() > 1 || o.stereo.on()) return out;
+  const double left = double(window_->hidden()) / window_->width();
+  // A legend that was dragged to the left is the person's own matter. In steps, as its numbers change.
+  const bool at_right = shows_legend() && legend_part_.left > 0.5;
+  const double right = at_right ? std::ceil((1 - legend_part_.left) * kSteps) / kSteps : 0;
+  if (!(left + right <= kMostCovered)) return out;
+  geometry::Camera& c = out.frustum;
+  out.middle_x = (left - right) * (c.right - c.left) / 2;
+  for (double* side : {&c.left, &c.right}) *side *= 1 - left - right;
+  return out;
 }
 
 // The first view suits the window as it is; the camera follows it until the person takes it.
 void WindowSurface::fit_views() {
-  if (scene_.box_room.empty() || (fitted_width_ == window_->width() && fitted_height_ == window_->height())) return;
-  fitted_width_ = window_->width();
-  fitted_height_ = window_->height();
+  if (scene_.box_room.empty()) return;
+  const FreePart part = free_part();
+  const auto& f = part.frustum;
+  const std::array<double, 4> now{f.right, f.top, part.middle_x, double(window_->width())};
+  if (now == fitted_) return;
+  fitted_ = now;
   const auto& movement = options_.movement;
-  interaction_.set_scene(scene_.pipeline, scene_.box_room, movement.first_view(scene_.box_room, whole({})));
+  const double middle_x = movement.eye ? 0 : part.middle_x;
+  interaction_.set_scene(scene_.pipeline, scene_.box_room, movement.first_view(scene_.box_room, f, middle_x), middle_x);
   if (movement.orbits) interaction_.set_recorded(movement.trajectory(scene_.box_room, whole({})));
+}
+
+// Along an axis of the data, from its positive or its negative end.
+void WindowSurface::look_from(const Side& side) {
+  if (scene_.box_room.empty()) return;
+  glm::dvec3 back(0.0);
+  back[side.axis] = side.negative ? -1 : 1;
+  if (terms_ && terms_->placed) back = glm::normalize(glm::dmat3(terms_->placement.data_to_room) * back);
+  const FreePart part = free_part();
+  interaction_.travel(geometry::fitted_view_from(back, scene_.box_room, part.frustum, part.middle_x),
+                      "view from " + side_name(side));
 }
 
 geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look) {
   window_->poll(interaction_);
   if (interaction_.take_fullscreen_wish()) window_->toggle_fullscreen();
   fit_views();
+  for (const auto& side : {interaction_.take_side_wish(), panel_.take_side()})
+    if (side) look_from(*side);
   const auto& o = options_.display;
   const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
   tracked_ = false;
@@ -207,15 +244,24 @@ void WindowSurface::run_panel(double now_s, Look& look) {
   for (auto& line : lines) panel_.tell(now_s, std::move(line));
   if (!desk_) return;
   desk_->watch(panel_.shown() || scene_.box_room.empty() || panel_.figures().waits_s > 0);
-  for (auto& order : panel_.take_orders()) desk_->give(std::move(order));
+  for (auto& order : panel_.take_orders()) give(std::move(order), false);
   for (const auto& answer : desk_->take_answers()) {
     panel_.on_answer(now_s, answer);
     scene_controls_.on_answer(answer);
+    if (const auto back = order_undo_.answered(answer))
+      interaction_.undo().did(now_s, {answer.order.command, [this, back] { give(*back, true); },
+                                      [this, order = answer.order] { give(order, true); }, answer.order.subject});
   }
   const auto news = desk_->take_news();
   if (!news) return;
   panel_.on_status(now_s, news->status, news->problem);
   if (news->status) scene_controls_.on_animation(news->status->animation);
+}
+
+void WindowSurface::give(Order order, bool undoes) {
+  if (!desk_) return;
+  order_undo_.given(order, undoes);
+  desk_->give(std::move(order));
 }
 
 // What a person should know who does not see the panel.
@@ -315,7 +361,7 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
   if (eyes(changed.stereo) != eyes(d.stereo)) {
     if (options_.recorded) return Error{"a run that is recorded keeps the two eyes that it began with"};
     stereo_wish_ = d.stereo = changed.stereo;
-    fitted_width_ = 0;
+    fitted_ = {};
   }
   interaction_.set_look(changed.look);
   if (changed.sampling != options_.sampling) {
@@ -405,6 +451,7 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
   if (!session) return;
   scene_controls_.on_session(monotonic_s(), *session);
   panel_.on_kind(scene_controls_.kind());
+  order_undo_.on_session(session);
   // Another data set is looked at from its own first view, by who has the camera, and has nothing picked yet.
   const scene::SessionView facts(*session);
   const std::string name =
@@ -534,9 +581,11 @@ void WindowSurface::follow_bookmarks(const geometry::Pose& pose) {
 // The cursor's overlay follows it a few times a second.
 std::optional<glm::dvec2> WindowSurface::points_at() {
   tells_pick_ = interaction_.take_pick_wish();
+  centres_ = centres_ || interaction_.take_centre_wish();
   const double now_s = monotonic_s();
   const auto pointer = interaction_.pointer();
-  if (!pointer || (!tells_pick_ && (!hands_.shows("cursor") || now_s - pointed_s_ < kPoint_s))) return std::nullopt;
+  if (!pointer || (!tells_pick_ && !centres_ && (!hands_.shows("cursor") || now_s - pointed_s_ < kPoint_s)))
+    return std::nullopt;
   pointed_s_ = now_s;
   const glm::dvec2 at = *pointer * double(window_->height());
   if (!(at.x >= 0 && at.y >= 0 && at.x < window_->width() && at.y < window_->height())) return std::nullopt;
@@ -545,6 +594,7 @@ std::optional<glm::dvec2> WindowSurface::points_at() {
 
 void WindowSurface::on_pick(const std::optional<Pick>& pick) {
   hands_.on_pick(pick);
+  if (std::exchange(centres_, false) && pick) interaction_.centre_on(pick->position_room);
   if (!std::exchange(tells_pick_, false) || !terms_) return;
   if (!pick) return tell("nothing lies under the cursor");
   if (picked_.size() == kMostPicks) picked_.erase(picked_.begin());

@@ -1,6 +1,7 @@
 // The display in a window: the person moves the camera, or a recorded head does.
 #pragma once
 
+#include <array>
 #include <functional>
 
 #include "client/viewer/display/display_options.h"
@@ -20,6 +21,7 @@
 #include "client/viewer/panel/gui/scene_view.h"
 #include "client/viewer/panel/hole_meter.h"
 #include "client/viewer/panel/launcher_lines.h"
+#include "client/viewer/panel/order_undo.h"
 #include "client/viewer/panel/panel.h"
 #include "client/viewer/panel/scene_controls.h"
 #include "client/viewer/panel/widget_log.h"
@@ -95,7 +97,14 @@ class WindowSurface final : public DisplaySurface {
   WindowSurface(const Options& options, std::unique_ptr<Window> window, std::shared_ptr<Lines> lines,
                 std::unique_ptr<ControlDesk> desk);
   geometry::Camera whole(const geometry::Pose& pose) const;
+  // Of the window: its frustum, whose middle lies at a tangent from the view's axis.
+  struct FreePart {
+    geometry::Camera frustum;
+    double middle_x;
+  };
+  FreePart free_part() const;
   void fit_views();
+  void look_from(const Side& side);
   void show_help();
   std::vector<std::string> key_lines() const;
   void show_legend();
@@ -112,6 +121,7 @@ class WindowSurface final : public DisplaySurface {
   void save_transfer();
   void take_launcher_lines(double now_s);
   void take_dropped();
+  void give(Order order, bool undoes);
   void open(const std::string& path);
   // Or is about to have one.
   bool has_scene() const { return !options_.begins_empty || !scene_.box_room.empty(); }
@@ -135,13 +145,14 @@ class WindowSurface final : public DisplaySurface {
   Bookmarks bookmarks_;
   std::vector<PickedPlace> picked_;  // the last ones, three at most
   bool tells_pick_ = false;          // the person asked for it, not the cursor's overlay
+  bool centres_ = false;             // a double click
   double pointed_s_ = -1e9;
   ShownScene scene_;
   std::string scene_name_;
   bool had_scene_ = false;
-  geometry::Pose head_;                       // of the frame at hand
-  bool tracked_ = false;                      // a tracker told it
-  int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
+  geometry::Pose head_;             // of the frame at hand
+  bool tracked_ = false;            // a tracker told it
+  std::array<double, 4> fitted_{};  // what the first view suits; zeros: nothing yet
   std::shared_ptr<const image::Legend> legend_;
   int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits
   struct Shown {
@@ -156,6 +167,7 @@ class WindowSurface final : public DisplaySurface {
   std::shared_ptr<Lines> lines_;
   Panel panel_;
   SceneControls scene_controls_{[this](Order order) { panel_.order(std::move(order)); }};
+  OrderUndo order_undo_;
   SceneViewState scene_view_;
   PanelViewState panel_view_;
   OpenViewState open_view_;

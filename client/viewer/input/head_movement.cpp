@@ -14,8 +14,9 @@ constexpr double kFarthest_m = 1e5;
 
 }  // namespace
 
-geometry::Pose HeadMovement::first_view(const geometry::Box& box, const geometry::Camera& frustum) const {
-  if (!eye) return geometry::fitted_view(box, frustum);
+geometry::Pose HeadMovement::first_view(const geometry::Box& box, const geometry::Camera& frustum,
+                                        double middle_x) const {
+  if (!eye) return geometry::fitted_view(box, frustum, middle_x);
   return geometry::look_at(*eye, look_at.value_or((glm::dvec3(box.lo) + glm::dvec3(box.hi)) * 0.5));
 }
 

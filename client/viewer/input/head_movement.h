@@ -16,8 +16,9 @@ struct HeadMovement {
   /// Where the first view stands and looks, metres in the room; nothing: fitted to the data set, its centre.
   std::optional<glm::dvec3> eye, look_at;
 
-  /// The first view of a data set. frustum: what the whole picture shows; its pose means nothing.
-  geometry::Pose first_view(const geometry::Box& box_room, const geometry::Camera& frustum) const;
+  /// The first view of a data set. frustum: what the whole picture shows, or the part that is free, whose middle lies
+  /// at the tangent middle_x; its pose means nothing.
+  geometry::Pose first_view(const geometry::Box& box_room, const geometry::Camera& frustum, double middle_x = 0) const;
   /// What the head follows.
   geometry::Trajectory trajectory(const geometry::Box& box_room, const geometry::Camera& frustum) const;
 };

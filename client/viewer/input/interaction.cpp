@@ -8,7 +8,8 @@ namespace {
 
 // Between the poses of a recorded path, so that their times differ in the file too.
 constexpr double kLeastStep_s = 1e-5;
-constexpr double kQuitWithin_s = 3;  // between the two presses of Q
+constexpr double kDoubleClick_s = 0.4, kDoubleClick = 0.01;  // between the clicks; window heights
+constexpr double kQuitWithin_s = 3;                          // between the two presses of Q
 
 // What a letter is part of, where a path is typed.
 bool writes(Key key) { return key < Key::kF1; }
@@ -25,8 +26,17 @@ void Interaction::key(Key key, bool down) {
   if (down && !was_down && !typed) press(key);
 }
 
-void Interaction::control(char letter) {
+void Interaction::control(char letter, bool shift) {
   if (letter == 'Q') quit_ = true;
+  if (letter == 'Z' && !shift) notes_.push_back(undo_.undo());
+  if (letter == 'Y' || (letter == 'Z' && shift)) notes_.push_back(undo_.redo());
+}
+
+bool Interaction::shifted(char letter) {
+  if (letter < 'X' || letter > 'Z' || controls_.flying()) return false;
+  const Side side{letter - 'X', false};
+  side_ = side_wish_ = side_ == side ? Side{side.axis, true} : side;
+  return true;
 }
 
 void Interaction::show_dialog(bool shown) {
@@ -57,9 +67,24 @@ void Interaction::quit_or_ask() {
   if (!quit_) notes_.push_back("press " + key_names_(Key::kQ) + " once more to quit");
 }
 
-void Interaction::toggle(bool& flag, const char* name) {
-  flag = !flag;
-  notes_.push_back(std::string(name) + (flag ? " on" : " off"));
+// Its own doing is what a person takes back, not what the display does with it.
+void Interaction::change_look(const Look& look, const char* subject) {
+  if (look == look_) return;
+  undo_.did(last_s_.value_or(0),
+            {"look", [this, before = look_] { look_ = before; }, [this, look] { look_ = look; }, subject});
+  look_ = look;
+}
+
+void Interaction::move_camera(const std::string& what, const std::function<void()>& move) {
+  take_camera();
+  const CameraControls::View before = controls_.view();
+  move();
+  const auto go = [this](const CameraControls::View& to) {
+    take_camera();
+    controls_.travel(to);
+  };
+  undo_.did(last_s_.value_or(0),
+            {what, [go, before] { go(before); }, [go, after = controls_.view()] { go(after); }, ""});
 }
 
 void Interaction::take_camera() {
@@ -70,9 +95,19 @@ void Interaction::take_camera() {
 }
 
 void Interaction::go_to(const geometry::Pose& pose) {
-  playing_ = plays_path_ = false;
-  controls_.set_flying(false);
-  controls_.take_over(pose);
+  move_camera("view", [&] {
+    playing_ = plays_path_ = false;
+    controls_.set_flying(false);
+    controls_.take_over(pose, true);
+  });
+}
+
+void Interaction::travel(const geometry::Pose& pose, const std::string& what) {
+  move_camera(what, [&] { controls_.travel(pose); });
+}
+
+void Interaction::centre_on(const glm::dvec3& place) {
+  move_camera("centre", [&] { controls_.centre_on(place); });
 }
 
 void Interaction::play_or_take() {
@@ -111,20 +146,28 @@ void Interaction::end_path() {
 bool Interaction::choose_look(Key key) {
   if (key < Key::k1 || key > Key::k8) return false;
   const int number = int(key) - int(Key::k1) + 1;
+  Look look = look_;
+  const auto toggle = [&](bool& flag, const char* name) {
+    flag = !flag;
+    notes_.push_back(std::string(name) + (flag ? " on" : " off"));
+  };
   if (pipeline_ != scene::Pipeline::kPoints) {
     notes_.push_back("key " + std::to_string(number) + " has no meaning for volumes");
-  } else if (key == Key::k5) {
-    toggle(look_.render.finish.fill, "fill");
-  } else if (key == Key::k6) {
-    toggle(look_.render.finish.smooth, "smooth");
-  } else if (key == Key::k7) {
-    toggle(look_.render.finish.antialias, "antialias");
-  } else if (key == Key::k8) {
-    toggle(look_.lit, "shading");
-  } else {
-    if (const auto kernel = splat::kernel_of_key(char('0' + number))) look_.render.kernel = *kernel;
-    notes_.push_back("splats: " + std::string(splat::kernel_name(look_.render.kernel)));
+    return true;
   }
+  if (key == Key::k5) {
+    toggle(look.render.finish.fill, "fill");
+  } else if (key == Key::k6) {
+    toggle(look.render.finish.smooth, "smooth");
+  } else if (key == Key::k7) {
+    toggle(look.render.finish.antialias, "antialias");
+  } else if (key == Key::k8) {
+    toggle(look.lit, "shading");
+  } else {
+    if (const auto kernel = splat::kernel_of_key(char('0' + number))) look.render.kernel = *kernel;
+    notes_.push_back("splats: " + std::string(splat::kernel_name(look.render.kernel)));
+  }
+  change_look(look, "");
   return true;
 }
 
@@ -154,9 +197,7 @@ void Interaction::press(Key key) {
       controls_.set_flying(!controls_.flying());
       return;
     case Key::kR:
-      take_camera();
-      controls_.reset();
-      return;
+      return move_camera("first view", [this] { controls_.reset(); });
     case Key::kT:
       return play_or_take();
     case Key::kC:
@@ -180,18 +221,26 @@ void Interaction::press(Key key) {
 }
 
 void Interaction::button(MouseButton button, bool down) {
-  if (button != MouseButton::kRight) (button == MouseButton::kLeft ? left_ : middle_) = down;
+  (button == MouseButton::kLeft ? left_ : button == MouseButton::kMiddle ? middle_ : right_) = down;
+  if (button != MouseButton::kLeft || !down || controls_.flying()) return;
+  const Click now{last_s_.value_or(0), pointer_.value_or(glm::dvec2(0))};
+  centre_wish_ = click_ && now.s - click_->s <= kDoubleClick_s && glm::distance(now.at, click_->at) <= kDoubleClick;
+  click_ = centre_wish_ ? std::nullopt : std::optional(now);
 }
 
 void Interaction::move(double x, double y) {
   const glm::dvec2 to(x, y), from = pointer_.value_or(to);
   pointer_ = to;
   const double dx = to.x - from.x, dy = to.y - from.y;
-  const bool panning = middle_ || (left_ && held_[size_t(Key::kShift)]);
-  if (!controls_.flying() && !left_ && !panning) return;
+  const bool shift = held_[size_t(Key::kShift)], panning = middle_ || (left_ && shift);
+  if (!controls_.flying() && !left_ && !panning && !right_) return;
   take_camera();
-  if (!controls_.flying() && panning)
+  if (controls_.flying())
+    controls_.orbit(dx, dy);
+  else if (panning)
     controls_.pan(dx, dy, height_tangent_);
+  else if (right_)
+    shift ? controls_.roll(dx) : controls_.dolly(dy);
   else
     controls_.orbit(dx, dy);
 }
@@ -203,12 +252,13 @@ void Interaction::wheel(double steps) {
 
 void Interaction::focus_lost() {
   std::fill(held_.begin(), held_.end(), false);
-  left_ = middle_ = false;
+  left_ = middle_ = right_ = false;
 }
 
-void Interaction::set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home) {
+void Interaction::set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home,
+                            double middle_x) {
   pipeline_ = pipeline;
-  controls_.set_scene(box_room, home);
+  controls_.set_scene(box_room, home, middle_x);
 }
 
 void Interaction::set_recorded(geometry::Trajectory recorded) {
@@ -226,10 +276,19 @@ void Interaction::play(geometry::Trajectory path) {
 geometry::Pose Interaction::advance(double now_s, bool playback) {
   const double dt_s = last_s_ ? std::max(0.0, now_s - *last_s_) : 0.0;
   last_s_ = now_s;
-  if (std::exchange(goes_home_, false)) controls_.reset();
+  if (std::exchange(goes_home_, false)) {
+    if (path_is_over()) take_camera();
+    controls_.reset();
+  }
   const geometry::Pose pose = next_pose(now_s, dt_s, playback);
   if (records_path_) record_pose(now_s, pose);
   return pose;
+}
+
+// The head stands where it ended.
+bool Interaction::path_is_over() const {
+  const bool plays = playing_ && (!tracked_ || plays_path_);
+  return plays && recorded_->ends() && playback_s_ >= recorded_->duration_s();
 }
 
 void Interaction::set_tracked(Tracked tracked) {

@@ -11,6 +11,7 @@
 #include "client/viewer/input/camera_controls.h"
 #include "client/viewer/input/keys.h"
 #include "client/viewer/input/look.h"
+#include "client/viewer/input/undo.h"
 #include "common/scene/kind.h"
 
 namespace telesplat::viewer {
@@ -21,13 +22,17 @@ class Interaction {
 
   /// recorded: a head movement that T plays; without, T does nothing. It plays from the beginning if there is one.
   Interaction(std::optional<geometry::Trajectory> recorded, const Look& look);
+  Interaction(const Interaction&) = delete;  // what can be undone refers to it
+  Interaction& operator=(const Interaction&) = delete;
 
   // ---- events; positions and movements in window heights, +y down ----
   void key(Key key, bool down);
   /// What a button of the panel does that stands for a key.
   void press(Key key);
-  /// A letter while control is held down: the one that is printed on the key, in upper case.
-  void control(char letter);
+  /// A letter while control is held down, and perhaps shift: the one that is printed on the key, in upper case.
+  void control(char letter, bool shift = false);
+  /// The same while shift alone is. False: it means what it means without.
+  bool shifted(char letter);
   void button(MouseButton button, bool down);
   void move(double x, double y);
   void wheel(double steps);
@@ -36,7 +41,9 @@ class Interaction {
 
   // ---- every frame ----
   /// What there is to see, its box, and the view that R leads back to.
-  void set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home);
+  /// Home shows the middle of it at the tangent middle_x.
+  void set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home,
+                 double middle_x = 0);
   /// What T plays from now on, unless the person recorded a path.
   void set_recorded(geometry::Trajectory recorded);
   /// What R does, but whoever has the camera keeps it: to the first view of the scene that is told before the next
@@ -56,7 +63,7 @@ class Interaction {
 
   const Look& look() const { return look_; }
   /// In place of what keys chose; they go on from it.
-  void set_look(const Look& look) { look_ = look; }
+  void set_look(const Look& look) { change_look(look, "look"); }
   bool wants_to_quit() const { return quit_; }
   /// In flight the mouse turns the head: the pointer should be caught and hidden.
   bool wants_pointer() const { return controls_.flying(); }
@@ -91,8 +98,17 @@ class Interaction {
   /// Likewise of the keys that keep a bookmark and that lead to the next one.
   bool take_bookmark_wish() { return std::exchange(bookmark_wish_, false); }
   bool take_next_wish() { return std::exchange(next_wish_, false); }
+  /// The side that somebody wants to see the data from, once after each press of its keys.
+  std::optional<Side> take_side_wish() { return std::exchange(side_wish_, std::nullopt); }
+  /// True once after each double click: centre_on() what lies under the pointer.
+  bool take_centre_wish() { return std::exchange(centre_wish_, false); }
   /// The person's camera goes on from there, at once.
   void go_to(const geometry::Pose& pose);
+  /// The person's camera goes there. what: for the line of undo.
+  void travel(const geometry::Pose& pose, const std::string& what);
+  void centre_on(const glm::dvec3& place_room);
+  /// What was done to the picture.
+  UndoStack& undo() { return undo_; }
   /// True once after each press of the screenshot key.
   bool take_screenshot_wish();
   /// Lines to tell the person, since the last call.
@@ -104,12 +120,14 @@ class Interaction {
   void quit_or_ask();
   void play_or_take();
   bool choose_look(Key key);
+  void change_look(const Look& look, const char* subject);
+  void move_camera(const std::string& what, const std::function<void()>& move);
+  bool path_is_over() const;
   void show_help();
   void take_camera();
   void begin_path();
   void record_pose(double now_s, const geometry::Pose& pose);
   geometry::Pose next_pose(double now_s, double dt_s, bool playback);
-  void toggle(bool& flag, const char* name);
 
   std::optional<geometry::Trajectory> recorded_;
   Tracked tracked_;
@@ -132,7 +150,15 @@ class Interaction {
   std::optional<double> last_s_;
   std::optional<glm::dvec2> pointer_;
   std::vector<bool> held_;
-  bool left_ = false, middle_ = false;
+  bool left_ = false, middle_ = false, right_ = false;
+  struct Click {
+    double s = 0;
+    glm::dvec2 at{0.0};
+  };
+  std::optional<Click> click_;            // of the left button; the next may make it a double one
+  std::optional<Side> side_wish_, side_;  // side_: the one that was asked for last
+  bool centre_wish_ = false;
+  UndoStack undo_;
   std::vector<std::string> notes_;
 };
 

@@ -18,9 +18,14 @@ constexpr HelpLine kHelp[] = {
     {"left drag", "orbit around the data set"},
     {"middle, [^]+left", "pan"},
     {"wheel", "nearer, farther (in flight: faster, slower)"},
+    {"right drag", "nearer (up), farther (down)"},
+    {"[^]+right", "tilt to the side"},
+    {"double click", "what lies there comes to the middle and is what the camera turns about"},
     {"Tab", "show, hide the panel"},
     {"[F]", "fly: [W] [A] [S] [D], [E] up, [Q] down, the mouse looks around, [^] is faster"},
     {"[R]", "back to the first view"},
+    {"[^]+X Y Z", "from the side of +X, +Y, +Z of the data; again: from that of -X, -Y, -Z"},
+    {"Ctrl+Z", "undo what changed the picture; Ctrl+[^]+Z, Ctrl+Y: do it again"},
     {"[T]", "play the recorded head movement (--trajectory, or [C]), or take the camera"},
     {"[C]", "begin, end recording the camera's path; it is written as path-DATE.csv"},
     {"[1] [2] [3] [4]", "splats: square, disc, ellipse, ewa (not of volumes)"},
@@ -34,8 +39,8 @@ constexpr HelpLine kHelp[] = {
     {"F11", "full screen, or a window again"},
     {"F1, [H]", "show, hide these keys"},
     {"Esc", "close the dialog or these keys, leave flight"},
-    {"[Q] twice", "quit (not in flight)"},
     {"Ctrl+Q", "quit at once"},
+    {"[Q] twice", "quit (not in flight)"},
 };
 
 Key key_of(char mark) {
@@ -58,6 +63,8 @@ std::string named(std::string_view text, const KeyNames& name) {
 }
 
 }  // namespace
+
+std::string side_name(const Side& side) { return {side.negative ? '-' : '+', char('X' + side.axis)}; }
 
 std::string us_name(Key key) {
   static constexpr std::pair<Key, const char*> kNames[] = {{Key::kF1, "F1"},      {Key::kF11, "F11"},

@@ -46,6 +46,15 @@ enum class Key {
 inline constexpr size_t kKeys = size_t(Key::kShift) + 1;
 enum class MouseButton { kLeft, kMiddle, kRight };
 
+/// A side of the data, as their own axes name it: +X, -X, ...
+struct Side {
+  int axis = 0;
+  bool negative = false;
+  bool operator==(const Side&) const = default;
+};
+/// "+X"
+std::string side_name(const Side& side);
+
 /// What a key is called: what is printed on it where the person sits.
 using KeyNames = std::function<std::string(Key)>;
 /// As it is printed on a US keyboard.

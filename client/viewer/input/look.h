@@ -18,6 +18,12 @@ struct Look {
   double most_detail = 1;  ///< splat::SelectionOptions::detail is no more, kLeastDetail to 1
 };
 
+inline bool operator==(const Look& a, const Look& b) {
+  return a.render.kernel == b.render.kernel &&
+         splat::finish_bits(a.render.finish) == splat::finish_bits(b.render.finish) && a.lit == b.lit &&
+         a.head_light == b.head_light && a.background == b.background && a.most_detail == b.most_detail;
+}
+
 /// The lights and the background of a look.
 inline void put_into(const Look& look, image::ShadingParameters& shading) {
   const auto lights = image::shading_named(look.head_light ? "head" : "lit");

@@ -10,6 +10,7 @@
 #include "common/core/clock.h"
 #include "common/core/guarded.h"
 #include "common/core/log.h"
+#include "common/core/within.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -89,7 +90,7 @@ std::optional<geometry::Pose> PoseFeed::begin_frame(double now_s) {
 }
 
 void PoseFeed::presented(double now_s) {
-  const double frame_s = std::clamp(now_s - began_s_, 0.0, kMostFrame_s);
+  const double frame_s = within(now_s - began_s_, 0.0, kMostFrame_s);
   frame_s_ = frame_s_ == 0 ? frame_s : 0.9 * frame_s_ + 0.1 * frame_s;
 }
 

@@ -116,11 +116,14 @@ class Panel {
   void choose_coupling(const CouplingState& coupling);
   /// As if the person pressed this key.
   void press(Key key) { pressed_.push_back(key); }
+  /// To see the data from there.
+  void choose_side(const Side& side) { side_ = side; }
   void choose_picture(const PictureWish& wish) { wished_picture_ = wish; }
   void order(Order order) { orders_.push_back(std::move(order)); }
 
   // ---- what comes of it, once each ----
   std::vector<std::pair<std::string, std::string>> take_chosen() { return std::exchange(chosen_, {}); }
+  std::optional<Side> take_side() { return std::exchange(side_, std::nullopt); }
   std::vector<Key> take_pressed() { return std::exchange(pressed_, {}); }
   std::optional<PictureWish> take_picture() { return std::exchange(wished_picture_, std::nullopt); }
   std::vector<Order> take_orders() { return std::exchange(orders_, {}); }
@@ -140,6 +143,7 @@ class Panel {
   std::vector<std::pair<std::string, std::string>> chosen_;
   std::vector<Order> orders_;
   std::vector<Key> pressed_;
+  std::optional<Side> side_;
   std::optional<PictureWish> wished_picture_;
   PathState path_;
   std::string progress_;

@@ -9,6 +9,7 @@
 
 #include "client/viewer/panel/gui/setting_rows.h"
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/core/within.h"
 #include "common/geometry/camera.h"
 #include "common/image/shading.h"
 
@@ -52,7 +53,7 @@ void show_plot(const Panel::Plot& plot, double now_s) {
   int count = 0;
   for (size_t i = 0; i < kColumns; ++i) {
     if (std::isnan(columns[i])) continue;
-    const double share = std::clamp(double(columns[i]) / top, 0.0, 1.0);
+    const double share = within(double(columns[i]) / top, 0.0, 1.0);
     line[size_t(count++)] = {from.x + size.x * float(i) / float(kColumns - 1), to.y - 1 - float(share) * (size.y - 2)};
   }
   if (count > 1) list.AddPolyline(line.data(), count, ink(plot.colour), ImDrawFlags_None, ImGui::GetFontSize() / 9);
@@ -85,8 +86,8 @@ void show_pictures(Panel& panel, PanelViewState& state) {
   row("pixels");
   int size[2] = {state.picture.width, state.picture.height};
   if (seen("number", "pixels", ImGui::InputInt2("##pixels", size))) {
-    state.picture.width = std::clamp(size[0], 0, geometry::kMaxImageSide);
-    state.picture.height = std::clamp(size[1], 0, geometry::kMaxImageSide);
+    state.picture.width = within(size[0], 0, geometry::kMaxImageSide);
+    state.picture.height = within(size[1], 0, geometry::kMaxImageSide);
   }
   hint("any size; 0: as the window");
   if (button("take")) panel.choose_picture(state.picture);
@@ -108,6 +109,13 @@ void show_pictures(Panel& panel, PanelViewState& state) {
   if (button("full screen")) panel.press(Key::kF11);
   ImGui::SameLine();
   if (button("first view")) panel.press(Key::kR);
+  row("view from");
+  for (int i = 0; i < 6; ++i) {
+    const Side side{i / 2, i % 2 == 1};
+    if (i > 0) ImGui::SameLine();
+    if (small_button(side_name(side).c_str())) panel.choose_side(side);
+  }
+  hint("an axis of the data: +X is where x grows");
 }
 
 void show_session(const Panel& panel) {

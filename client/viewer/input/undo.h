@@ -1,0 +1,66 @@
+// What a person did to the picture, so that it can be taken back and done again.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace telesplat::viewer {
+
+/// Something that was done.
+struct Deed {
+  std::string what;  ///< for people: "first view"
+  std::function<void()> undo, redo;
+  /// A later deed of the same subject within kOne_s makes one with this: a slider that is dragged. Empty: none does.
+  std::string subject;
+};
+
+/// Deeds in their order, the newest kMost. One thread.
+class UndoStack {
+ public:
+  static constexpr size_t kMost = 200;
+  static constexpr double kOne_s = 1;
+
+  /// It is done already. What was taken back before cannot be done again then.
+  void did(double now_s, Deed deed) {
+    deeds_.resize(done_);
+    const bool goes_on = !deeds_.empty() && !deed.subject.empty() && deeds_.back().subject == deed.subject &&
+                         now_s - newest_s_ <= kOne_s;
+    newest_s_ = now_s;
+    if (goes_on) {
+      deeds_.back().redo = std::move(deed.redo);
+      return;
+    }
+    deeds_.push_back(std::move(deed));
+    if (deeds_.size() > kMost) deeds_.pop_front();
+    done_ = deeds_.size();
+  }
+
+  bool can_undo() const { return done_ > 0; }
+  bool can_redo() const { return done_ < deeds_.size(); }
+  /// Takes the newest deed back, or does again what was taken back last. Returns a line that tells it.
+  std::string undo() {
+    if (!can_undo()) return "there is nothing to undo";
+    const Deed deed = deeds_[--done_];
+    newest_s_ = -1e9;
+    deed.undo();
+    return "undone: " + deed.what;
+  }
+  std::string redo() {
+    if (!can_redo()) return "there is nothing to do again";
+    const Deed deed = deeds_[done_++];
+    newest_s_ = -1e9;
+    deed.redo();
+    return "done again: " + deed.what;
+  }
+
+ private:
+  std::deque<Deed> deeds_;
+  size_t done_ = 0;  // of them; those after it were taken back
+  double newest_s_ = -1e9;
+};
+
+}  // namespace telesplat::viewer
