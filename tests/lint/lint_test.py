@@ -43,6 +43,7 @@ VIOLATIONS = [
     ),
     ("widgets", "client/viewer/panel/gui/x.cpp", 'int a;\nbool b = ImGui::Button("b");\n', 2, "ImGui::Button("),
     ("widgets", "client/viewer/panel/gui/x.cpp", 'bool b = ImGui::SliderInt("b", &i);\n', 1, "seen() is not told"),
+    ("clamps", "client/viewer/panel/x.cpp", "int a;\nint b = std::clamp(a, lo, hi);\n", 2, "within()"),
     ("directions", "common/core/up.cpp", '#include "tools/telesplat/run.h"\n', 1, "common/ must not include tools/"),
     ("directions", "services/data/up.cpp", '#include "tests/support/near.h"\n', 1, "services/ must not include tests/"),
     ("directions", "client/viewer/up.cpp", '#include "tools/telesplat/run.h"\n', 1, "client/ must not include tools/"),

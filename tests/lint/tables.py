@@ -137,8 +137,7 @@ OUTSIDE_HEADERS = [
      ["common/gl", "client/viewer/display/window.cpp", "client/viewer/xr", "tools/xr_test_runtime"]),
     (r"openxr/.*", ["client/viewer/xr", "tools/xr_test_runtime"]),
     (r"GLFW/.*", ["client/viewer/display/window.cpp"]),
-    (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui", "tests/unit/viewer/panel/panel_view_test.cpp",
-      "tests/unit/viewer/panel/legend_view_test.cpp"]),
+    (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui", "tests/unit/viewer/panel"]),
     (r"GL/.*", []),
     (r"CLI/.*", ["common/options/parser.cpp"]),
     (

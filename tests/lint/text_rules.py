@@ -136,4 +136,17 @@ def widgets(tree):
                 yield Finding(file.path, line, "widgets", f"{match[0]}: seen() is not told of it")
 
 
-RULES = (folders, cmake, widths, references, functions, widgets)
+# What a person or an order can reach in a window.
+_WITHIN_REACH = ("panel", "display", "input", "hands")
+
+
+def clamps(tree):
+    """What a person can reach in a window uses within() for bounds: std::clamp ends the program where they cross."""
+    for folder in _WITHIN_REACH:
+        for file in tree.files(".cpp", ".h", below=f"client/viewer/{folder}"):
+            for match in re.finditer(r"\bstd::clamp\(", file.code):
+                line = file.line_of(match.start())
+                yield Finding(file.path, line, "clamps", "std::clamp: common/core/within.h has within()")
+
+
+RULES = (folders, cmake, widths, references, functions, widgets, clamps)

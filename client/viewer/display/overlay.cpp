@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/core/within.h"
 #include "common/image/canvas.h"
 
 namespace telesplat::viewer {
@@ -38,7 +39,7 @@ image::View text_panel(const std::vector<std::string>& lines, int scale) {
 geometry::Rect place_overlay(const Overlay& overlay, int window_width, int window_height, int hidden) {
   using Corner = Overlay::Corner;
   const int margin = std::min({kMargin, window_width / 8, window_height / 8});
-  const int left = std::clamp(hidden, 0, std::max(0, window_width - 4 * margin - 1));
+  const int left = within(hidden, 0, std::max(0, window_width - 4 * margin - 1));
   const double room_x = window_width - left - 2 * margin, room_y = window_height - 2 * margin;
   const double scale = std::min({1.0, room_x / overlay.picture.width, room_y / overlay.picture.height});
   const int width = std::max(1, int(overlay.picture.width * scale));

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "common/core/within.h"
 #include "common/image/canvas.h"
 
 namespace telesplat::viewer {
@@ -79,7 +80,7 @@ std::string HandOverlays::state(const geometry::Camera& camera) const {
 }
 
 image::View HandOverlays::picture(const geometry::Camera& camera, const geometry::Box& box_room) const {
-  const int scale = std::clamp(camera.height / 400, 1, 4);
+  const int scale = within(camera.height / 400, 1, 4);
   std::vector<std::string> lines;
   if (shows("fps")) lines.push_back(fmt::format("{:.0f} fps", fps_));
   if (shows("cursor"))

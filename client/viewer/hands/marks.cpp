@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
+#include "common/core/within.h"
 #include "common/image/canvas.h"
 
 namespace telesplat::viewer {
@@ -25,7 +26,7 @@ void draw_line(image::View& view, glm::dvec2 a, glm::dvec2 b, double thickness, 
   for (int y = std::max(int(lo.y), 0); y < std::min(int(hi.y) + 1, view.height); ++y)
     for (int x = std::max(int(lo.x), 0); x < std::min(int(hi.x) + 1, view.width); ++x) {
       const glm::dvec2 p(x + 0.5, y + 0.5);
-      const double t = std::clamp(glm::dot(p - a, along) / length2, 0.0, 1.0);
+      const double t = within(glm::dot(p - a, along) / length2, 0.0, 1.0);
       if (glm::distance(p, a + t * along) <= thickness / 2)
         view.colour[size_t(y) * size_t(view.width) + size_t(x)] = colour;
     }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "common/core/within.h"
 #include "common/image/normal.h"
 #include "common/splat/facing.h"
 
@@ -83,7 +84,7 @@ glm::dvec4 look_up(const volume::LayerImage& image, double x, double y) {
 uint32_t packed(const glm::dvec4& premultiplied) {
   const double scale = premultiplied.w > 0 ? 255 / premultiplied.w : 0;
   uint32_t out = 0;
-  for (int c = 0; c < 3; ++c) out = out << 8 | uint32_t(std::clamp(premultiplied[c] * scale + 0.5, 0.0, 255.0));
+  for (int c = 0; c < 3; ++c) out = out << 8 | uint32_t(within(premultiplied[c] * scale + 0.5, 0.0, 255.0));
   return out;
 }
 
@@ -147,7 +148,7 @@ std::optional<Pick> pick_volume(const volume::VolumeFrame& frame, const geometry
     if (sum.w / 255 < opacity || !(texel.w > 0)) continue;
     const Depths depths = depths_of(frame, layer, camera, x_pix, y_pix);
     if (depths.far_m < camera.near_m) continue;
-    const double share = std::clamp((opacity - before) / (sum.w / 255 - before), 0.0, 1.0);
+    const double share = within((opacity - before) / (sum.w / 255 - before), 0.0, 1.0);
     Pick out;
     out.depth_m = std::max(depths.near_m + share * (depths.far_m - depths.near_m), camera.near_m);
     out.position_room = camera.unproject(x_pix, y_pix, out.depth_m);

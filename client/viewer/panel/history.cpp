@@ -6,8 +6,10 @@
 
 namespace telesplat::viewer {
 
+constexpr double kMostValue = 1e30;  // what a plot is drawn with has float coordinates
+
 void History::add(double t_s, double value) {
-  if (!std::isfinite(t_s) || !std::isfinite(value)) return;
+  if (!std::isfinite(t_s) || !(std::abs(value) < kMostValue)) return;
   if (!samples_.empty() && t_s < samples_.back().t_s) samples_.clear();
   samples_.push_back({t_s, value});
   // One that is older stays: the plot's left edge goes on from it.

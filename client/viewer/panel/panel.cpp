@@ -1,7 +1,9 @@
 #include "client/viewer/panel/panel.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "common/core/within.h"
 #include "common/wire/limits.h"
 
 namespace telesplat::viewer {
@@ -40,6 +42,7 @@ void Panel::on_figures(const PanelFigures& f) {
   if (f.updates != figures_.updates) plots_[kLatency].history.add(f.now_s, f.latency_ms);
   plots_[kPoints].name = std::string(f.drawn_name) + " drawn";
   plots_[kPoints].history.add(f.now_s, double(f.points_drawn) / 1e6);
+  if (std::isnan(f.hole_share)) plots_[kHoles].history = History(kSpan_s);
   plots_[kHoles].history.add(f.now_s, f.hole_share * 100);
   count_rates(f);
   figures_ = f;
@@ -97,7 +100,7 @@ void Panel::choose(const std::string& order, const std::string& value) {
 }
 
 void Panel::choose_coupling(const CouplingState& wish) {
-  CouplingState coupling = coupling_state(wish.mode, std::clamp(wish.buffers, 1, int(wire::kMaxBuffers)));
+  CouplingState coupling = coupling_state(wish.mode, within(wish.buffers, 1, int(wire::kMaxBuffers)));
   if (coupling == this->coupling()) return;
   std::map<std::string, std::string> arguments{{"coupling", coupling_name(coupling.mode)}, {"viewer", setup_.viewer}};
   if (coupling.mode == CouplingMode::kLoose) arguments["buffers"] = std::to_string(coupling.buffers);

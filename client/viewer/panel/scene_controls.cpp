@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/core/within.h"
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
@@ -64,13 +65,13 @@ void SceneControls::wish(double now_s, const std::string& name, double value) {
 void SceneControls::choose_step(double now_s, int step) {
   if (!volume_) return;
   series_plays_ = false;
-  wish(now_s, "volume.step", std::clamp(step, 0, volume_->steps - 1));
+  wish(now_s, "volume.step", within(step, 0, volume_->steps - 1));
 }
 
 void SceneControls::choose_speed(double now_s, double steps_a_second) {
   if (!volume_) return;
   series_plays_ = steps_a_second > 0;
-  wish(now_s, "volume.steps-per-s", std::clamp(steps_a_second, 0.0, 1000.0));
+  wish(now_s, "volume.steps-per-s", within(steps_a_second, 0.0, 1000.0));
 }
 
 void SceneControls::play_series(bool plays) {
@@ -86,7 +87,7 @@ double SceneControls::value(std::string_view name) const {
 
 void SceneControls::set(double now_s, const julia::ParameterInfo& info, double value) {
   if (!info.animates || !std::isfinite(value)) return;
-  value = std::clamp(info.whole ? std::round(value) : value, info.least, info.most);
+  value = within(info.whole ? std::round(value) : value, info.least, info.most);
   if (value != this->value(info.name)) wish(now_s, std::string(info.name), value);
 }
 
@@ -98,8 +99,8 @@ double SceneControls::timeline_s() const {
 
 void SceneControls::add_key(const julia::ParameterInfo& info, double t_s, double value) {
   if (!info.animates || info.whole || !std::isfinite(t_s) || !std::isfinite(value)) return;
-  t_s = std::clamp(t_s, 0.0, kLongest_s);
-  value = std::clamp(value, info.least, info.most);
+  t_s = within(t_s, 0.0, kLongest_s);
+  value = within(value, info.least, info.most);
   auto& tracks = timeline_.tracks;
   auto track = std::find_if(tracks.begin(), tracks.end(), [&](const auto& t) { return t.name == info.name; });
   if (track == tracks.end()) {

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <utility>
 
+#include "common/core/within.h"
+
 namespace telesplat::viewer {
 namespace {
 
@@ -33,7 +35,7 @@ double TransferEditor::hi() const { return has_width(range_) ? range_.hi : range
 
 // Halves: a difference of two finite numbers need not be finite.
 double TransferEditor::share(double value) const {
-  return std::clamp((value / 2 - lo() / 2) / (hi() / 2 - lo() / 2), -1.0, 2.0);
+  return within((value / 2 - lo() / 2) / (hi() / 2 - lo() / 2), -1.0, 2.0);
 }
 double TransferEditor::value_at(double share) const { return std::lerp(lo(), hi(), share); }
 
@@ -79,8 +81,8 @@ bool TransferEditor::move(double now_s, size_t index, double value, double opaci
   auto& points = next.points;
   const double least = index > 0 ? points[index - 1].value : -volume::kMaxTransferValue;
   const double most = index + 1 < points.size() ? points[index + 1].value : volume::kMaxTransferValue;
-  points[index].value = std::clamp(value, least, most);
-  points[index].opacity = float(std::clamp(opacity, 0.0, 1.0));
+  points[index].value = within(value, least, most);
+  points[index].opacity = float(within(opacity, 0.0, 1.0));
   return change(now_s, std::move(next));
 }
 
@@ -105,7 +107,7 @@ bool TransferEditor::remove(double now_s, size_t index) {
 bool TransferEditor::set_window(double now_s, double window, double level) {
   if (!std::isfinite(window) || !std::isfinite(level) || window < 0) return false;
   constexpr double kMost = volume::kMaxTransferValue;
-  const double from = std::clamp(level - window / 2, -kMost, kMost), to = std::clamp(level + window / 2, -kMost, kMost);
+  const double from = within(level - window / 2, -kMost, kMost), to = within(level + window / 2, -kMost, kMost);
   const double first = wanted_.points.front().value, width = this->window();
   volume::TransferFunction next = wanted_;
   double least = from;
@@ -113,7 +115,7 @@ bool TransferEditor::set_window(double now_s, double window, double level) {
     double& value = next.points[i].value;
     const double share =
         width > 0 ? (value - first) / width : double(i) / double(std::max<size_t>(1, next.points.size() - 1));
-    value = least = std::clamp(std::lerp(from, to, share), least, to);
+    value = least = within(std::lerp(from, to, share), least, to);
   }
   return change(now_s, std::move(next));
 }
@@ -122,7 +124,7 @@ bool TransferEditor::colour(double now_s, size_t index, float r, float g, float 
   if (index >= wanted_.points.size()) return false;
   volume::TransferFunction next = wanted_;
   Point& p = next.points[index];
-  p.r = std::clamp(r, 0.0f, 1.0f), p.g = std::clamp(g, 0.0f, 1.0f), p.b = std::clamp(b, 0.0f, 1.0f);
+  p.r = within(r, 0.0f, 1.0f), p.g = within(g, 0.0f, 1.0f), p.b = within(b, 0.0f, 1.0f);
   return change(now_s, std::move(next));
 }
 

@@ -263,6 +263,56 @@ TEST_F(PanelTest, TheDialogTakesTheLettersAndEscapeClosesIt) {
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
+// Window managers need not keep to the least size that a window asks for.
+TEST_F(PanelTest, AWindowOfOnePixelGoesOn) {
+  for (const char* stereo : {"off", "side-by-side"}) {
+    PipelineRun run({"--panel", "on", "--stereo", stereo, "--trajectory", "still"}, "", "view");
+    const auto window = live_window(run.program());
+    ASSERT_NE(window, 0u);
+    display_->tap("h");
+    for (const auto& [width, height] : {std::pair{1, 1}, {1, 500}, {700, 1}, {30, 30}, {360, 200}, {900, 600}}) {
+      display_->resize(window, width, height);
+      const auto frames = run.column("frames.csv", "frame").size();
+      EXPECT_TRUE(wait_until([&] { return run.column("frames.csv", "frame").size() > frames + 3; }))
+          << width << " x " << height << ": " << run.program().err();
+    }
+    EXPECT_TRUE(panel_is(window, true));
+    display_->tap("q", "Control_L");
+    EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  }
+}
+
+// The first view leaves free what the panel covers, and follows it as long as nobody has moved the camera.
+TEST_F(PanelTest, TheFirstViewIsFittedToWhatThePanelLeavesFree) {
+  PipelineRun run({"--panel", "on", "--size", "960x720", "--trajectory", "still"}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  ASSERT_TRUE(panel_is(window, true));
+  // The columns right of the panel that show something else than the background.
+  const auto shows = [&](int from) {
+    const auto v = shown(window);
+    Place out{1 << 20, -1};
+    for (int y = 0; y < v.height; ++y)
+      for (int x = from; x < v.width; ++x)
+        if (at(v, x, y) != 0x141820) out = {std::min(out.x, x), std::max(out.y, x)};
+    return out;
+  };
+  const auto beside_panel = [&] {
+    const Place p = shows(kPanelWidth + 2);
+    return p.x > kPanelWidth + 5 && p.y < 955 && p.y - p.x > 300;
+  };
+  EXPECT_TRUE(wait_until(beside_panel)) << shows(kPanelWidth).x << " " << shows(kPanelWidth).y;
+  display_->tap("Tab");
+  EXPECT_TRUE(wait_until([&] {
+    const Place p = shows(0);
+    return p.x > 5 && p.x < kPanelWidth && std::abs(p.x + p.y - 960) < 60;
+  })) << shows(0).x;
+  display_->tap("Tab");
+  EXPECT_TRUE(wait_until(beside_panel));
+  display_->tap("q", "Control_L");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
 TEST_F(PanelTest, ADataSetThatKillsItsServerDoesNotEndTheWindow) {
   Program view("telesplat", {"view", "--size", "960x720", "--sampler-threads", "1", "--panel", "off"},
                folder_ / "view");

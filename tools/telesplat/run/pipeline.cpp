@@ -269,7 +269,7 @@ std::string Pipeline::last_words(const Member& m) {
 
 std::vector<std::string> Pipeline::viewing_beside(const Member& member) {
   std::vector<std::string> out;
-  for (const Member& m : group_.members())
+  for (Member& m : group_.members())
     if (m.role == "viewer" && &m != &member && m.process && !m.process->ended()) out.push_back(m.name);
   return out;
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/core/within.h"
 #include "common/geometry/stereo.h"
 #include "common/stereo/autostereo/panel_file.h"
 #include "common/stereo/compose.h"
@@ -74,7 +75,7 @@ EyePair EyeRig::eyes(const geometry::Camera& head, const glm::dquat& turned, dou
   }
   const auto in_room = [&](glm::dvec3 on_axes) {
     const double nearest_m = options_.panel ? stereo::nearest_eye_m(*options_.panel) : kNearestEye_m / scale;
-    on_axes.z = std::clamp(on_axes.z, nearest_m, std::max(kFarthestEye_m, nearest_m));
+    on_axes.z = within(on_axes.z, nearest_m, std::max(kFarthestEye_m, nearest_m));
     return screen.pose.position_room + screen.pose.orientation * (on_axes * scale);
   };
   return recorded_eyes(options_, head, screen_m, {in_room(middle - to_right), in_room(middle + to_right)});
@@ -83,7 +84,7 @@ EyePair EyeRig::eyes(const geometry::Camera& head, const glm::dquat& turned, dou
 geometry::Camera EyeRig::sampled(const EyePair& pair, const geometry::Box& scene_room) {
   const double depth_m = scene_room.empty() ? pair.screen_m : nearest_depth(pair.head, scene_room);
   // By steps: a head that all but rests asks for one and the same view.
-  const double steps = std::floor(kStepsAnOctave * std::log2(std::clamp(depth_m, kNearest_m, kFarthest_m)));
+  const double steps = std::floor(kStepsAnOctave * std::log2(within(depth_m, kNearest_m, kFarthest_m)));
   return geometry::widened_for(pair.head, pair.eyes, std::exp2(steps / kStepsAnOctave));
 }
 

@@ -9,6 +9,7 @@
 
 #include "client/viewer/panel/gui/setting_rows.h"
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/core/within.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -126,7 +127,7 @@ void show_isosurface(ColourControls& colours, ColourViewState& state) {
   seen("slider", "iso", changed);
   if (changed) state.iso = value;
   if (ImGui::IsItemDeactivatedAfterEdit()) {
-    colours.choose_iso(range.empty() ? value : std::clamp(value, range.lo, range.hi));
+    colours.choose_iso(range.empty() ? value : within(value, range.lo, range.hi));
     state.iso.reset();
   }
   if (!range.empty()) ImGui::TextDisabled("values of the volume %.5g to %.5g", range.lo, range.hi);

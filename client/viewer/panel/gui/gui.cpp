@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "client/viewer/panel/gui/style.h"
+#include "common/core/within.h"
 #include "common/gl/program.h"
 
 namespace telesplat::viewer {
@@ -105,7 +106,7 @@ struct Gui::Impl {
   bool scissor(const Area& area, int from) const {
     const ImGuiIO& io = ImGui::GetIO();
     const double sx = io.DisplayFramebufferScale.x, sy = io.DisplayFramebufferScale.y;
-    const auto pixel = [](double v, int most) { return int(std::clamp(v, 0.0, double(most))); };
+    const auto pixel = [](double v, int most) { return int(within(v, 0.0, double(most))); };
     const int left = std::max(from, pixel(area.left * sx - 1, width)), top = pixel(area.top * sy - 1, height);
     const int right = pixel(area.right * sx + 2, width), bottom = pixel(area.bottom * sy + 2, height);
     if (right <= left || bottom <= top) return false;
@@ -200,7 +201,7 @@ void Gui::build_texture(const Place& place, const std::function<double()>& build
     m.characters.clear();
   ImGui::NewFrame();
   if (std::exchange(m.closes_popup, false) && !GImGui->OpenPopupStack.empty()) ImGui::ClosePopupToLevel(0, true);
-  m.opaque = std::clamp(int(build() * pixels_a_unit), 0, place.width);
+  m.opaque = within(int(build() * pixels_a_unit), 0, place.width);
   m.popup = ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopup);
   ImGui::Render();
   m.pressed.clear();

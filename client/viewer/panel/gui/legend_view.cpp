@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/core/within.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -43,7 +44,7 @@ float draw_numbers(const image::Legend& legend, const image::Ticks& ticks, const
     // In halves, because the difference of large numbers may be infinite.
     const double share =
         legend.hi > legend.lo ? (tick.value / 2 - legend.lo / 2) / (legend.hi / 2 - legend.lo / 2) : 0.5;
-    const float y = from.y + size.y * float(1 - std::clamp(share, 0.0, 1.0));
+    const float y = from.y + size.y * float(1 - within(share, 0.0, 1.0));
     list.AddLine({right, y}, {right + letter * 0.3f, y}, ink(0xf4f4f4));
     list.AddText({right + letter * 0.45f, y - letter / 2}, ink(0xf4f4f4), tick.label.c_str());
     width = std::max(width, ImGui::CalcTextSize(tick.label.c_str()).x);
@@ -112,7 +113,7 @@ WindowPart show_legend(const image::Legend& legend, LegendViewState& state, doub
   if (ImGui::Begin("legend", nullptr, kFlags)) {
     dialog("legend", nullptr);
     const float height = std::max(4 * letter, window.y * kShareOfHeight);
-    const int most = std::clamp(int(height / (2 * letter)), 2, 7);
+    const int most = within(int(height / (2 * letter)), 2, 7);
     const auto ticks = image::nice_ticks(legend.lo, legend.hi, most);
     ImGui::PushTextWrapPos(std::max(letter * 6, window.x / 4));
     if (!legend.title.empty()) text(legend.title);

@@ -9,6 +9,7 @@
 
 #include "client/viewer/panel/gui/transfer_view.h"
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/core/within.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -51,7 +52,7 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
                      : name == "colour" ? julia::colour_names()
                                         : std::span<const std::string_view>();
   if (!names.empty()) {
-    const auto at = size_t(std::clamp(value, 0.0, double(names.size() - 1)));
+    const auto at = size_t(within(value, 0.0, double(names.size() - 1)));
     if (begin_list(name.c_str(), std::string(names[at]).c_str())) {
       for (size_t i = 0; i < names.size(); ++i)
         if (choice(name.c_str(), std::string(names[i]), i == at)) controls.set(now_s, info, double(i));
@@ -131,7 +132,7 @@ void show_timeline(SceneControls& controls, SceneViewState& state) {
   }
   row("at, s");
   seen("number", "at, s", ImGui::InputDouble("##at", &state.key_s, 0.5, 5, "%.2f"));
-  state.key_s = std::clamp(std::isfinite(state.key_s) ? state.key_s : 0.0, 0.0, SceneControls::kLongest_s);
+  state.key_s = within(std::isfinite(state.key_s) ? state.key_s : 0.0, 0.0, SceneControls::kLongest_s);
   if (button("key frame of its value now")) controls.add_key(info, state.key_s, controls.value(info.name));
   hint("move the parameter's slider, choose the time, press; values between key frames run smoothly, for ever");
   if (!controls.timeline().empty()) {

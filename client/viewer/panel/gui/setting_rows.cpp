@@ -7,6 +7,7 @@
 
 #include "client/viewer/panel/gui/widgets.h"
 #include "common/core/check.h"
+#include "common/core/within.h"
 #include "common/scene/settings.h"
 
 namespace telesplat::viewer {
@@ -39,7 +40,7 @@ void setting_slider(Panel& panel, const char* name, double least, double most, c
   const std::string id = std::string("##") + name;
   if (seen("slider", name,
            ImGui::SliderFloat(id.c_str(), &value, float(least), float(most), format, ImGuiSliderFlags_AlwaysClamp)))
-    panel.choose(name, fmt::format("{:.6g}", std::clamp(double(value), least, most)));
+    panel.choose(name, fmt::format("{:.6g}", within(double(value), least, most)));
 }
 
 void setting_box(Panel& panel, const char* name) {

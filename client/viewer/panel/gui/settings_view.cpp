@@ -11,6 +11,7 @@
 #include "client/viewer/input/look.h"
 #include "client/viewer/panel/gui/setting_rows.h"
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/core/within.h"
 #include "common/image/shading.h"
 #include "common/splat/kernel_traits.h"
 #include "common/stereo/mode.h"
@@ -64,7 +65,7 @@ void show_background(Panel& panel) {
   float colour[3] = {float(now >> 16 & 255) / 255, float(now >> 8 & 255) / 255, float(now & 255) / 255};
   setting_row("background");
   if (seen("colour", "background", ImGui::ColorEdit3("##background", colour, ImGuiColorEditFlags_NoInputs))) {
-    const auto byte = [](float v) { return int(std::clamp(v, 0.0f, 1.0f) * 255 + 0.5f); };
+    const auto byte = [](float v) { return int(within(v, 0.0f, 1.0f) * 255 + 0.5f); };
     panel.choose("background", fmt::format("#{:02x}{:02x}{:02x}", byte(colour[0]), byte(colour[1]), byte(colour[2])));
   }
   for (const auto& [name, value] : kBackgrounds) {
@@ -153,7 +154,7 @@ void show_samplers(Panel& panel, SettingsViewState& state) {
            ImGui::SliderInt("##samplers", &wanted, 1, std::max(8, here), "%d", ImGuiSliderFlags_None)))
     state.samplers = wanted;
   if (!ImGui::IsItemDeactivatedAfterEdit()) return;
-  ask(panel, "samplers", fmt::format("{}", std::clamp(wanted, 1, kMostSamplers)));
+  ask(panel, "samplers", fmt::format("{}", within(wanted, 1, kMostSamplers)));
   state.samplers.reset();
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/viewer/panel/gui/widgets.h"
+#include "common/core/within.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -15,8 +16,7 @@ constexpr float kEditorHeight = 9, kGrab = 0.5f;  // in letters' heights
 
 // Values beyond the axis lie at its ends.
 ImVec2 at(const PlotArea& area, double share, double height) {
-  return {area.from.x + area.size.x * float(std::clamp(share, 0.0, 1.0)),
-          area.from.y + area.size.y * float(1 - height)};
+  return {area.from.x + area.size.x * float(within(share, 0.0, 1.0)), area.from.y + area.size.y * float(1 - height)};
 }
 ImVec2 at(const PlotArea& area, const TransferEditor& editor, const TransferEditor::Point& p) {
   return at(area, editor.share(p.value), double(p.opacity));
@@ -77,7 +77,7 @@ void draw_points(const PlotArea& area, const TransferEditor& editor, int chosen)
 void edit_points(SceneControls& controls, TransferViewState& state, const PlotArea& area, double now_s) {
   const ImVec2 pointer = ImGui::GetIO().MousePos;
   const auto& editor = controls.transfer();
-  const double value = editor.value_at(std::clamp(double((pointer.x - area.from.x) / area.size.x), 0.0, 1.0));
+  const double value = editor.value_at(within(double((pointer.x - area.from.x) / area.size.x), 0.0, 1.0));
   if (ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) {
     if (point_at(area, editor, pointer) < 0) controls.edit([&](TransferEditor& e) { return e.add(now_s, value); });
   } else if (ImGui::IsItemHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
@@ -100,7 +100,7 @@ void show_chosen(SceneControls& controls, TransferViewState& state, double now_s
   row("point");
   int number = state.point + 1;
   if (seen("number", "point", ImGui::InputInt("##number", &number))) state.point = std::max(number, 1) - 1;
-  state.point = std::clamp(state.point, 0, int(points.size()) - 1);
+  state.point = within(state.point, 0, int(points.size()) - 1);
   hint("drag points; double click adds one, right click takes one away");
   const auto index = size_t(state.point);
   const auto p = points[index];

@@ -81,9 +81,17 @@ inline bool begin_list(const char* name, const char* shown) {
   if (auto* log = LoggedBuild::log()) log->seen("list", name, rect, visible, open);
   return open;
 }
-/// A line that can be chosen, of the list with that name.
+/// A line that can be chosen, of the list with that name. The label is shown as it is, whatever it holds: Dear ImGui
+/// takes "##" for the end of one, and ends the program at an empty one.
 inline bool choice(const char* list, const std::string& label, bool chosen = false) {
-  return seen("choice", (std::string(list) + "=" + label).c_str(), ImGui::Selectable(label.c_str(), chosen));
+  ImGui::PushID(label.data(), label.data() + label.size());
+  const bool used = ImGui::Selectable("##choice", chosen);
+  ImGui::PopID();
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
+  ImGui::GetWindowDrawList()->AddText(
+      {from.x + ImGui::GetStyle().ItemSpacing.x / 2, (from.y + to.y - ImGui::GetFontSize()) / 2},
+      ImGui::GetColorU32(ImGuiCol_Text), label.data(), label.data() + label.size());
+  return seen("choice", (std::string(list) + "=" + label).c_str(), used);
 }
 
 /// The widgets that come next lie in this section.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/within.h"
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
@@ -36,7 +37,7 @@ std::array<CutControls::Kept, 3> CutControls::kept() const {
       const double at = plane.value / plane.normal[axis];
       const double share = plane.percent || !(extent > 0) ? at : (at - lo) / extent * 100;
       auto& end = plane.normal[axis] > 0 ? out[size_t(axis)].from : out[size_t(axis)].to;
-      end = std::clamp(share, 0.0, 100.0);
+      end = within(share, 0.0, 100.0);
     }
   return out;
 }
@@ -49,8 +50,8 @@ double CutControls::value(int axis, double percent) const {
 void CutControls::keep(double now_s, int axis, Kept wanted) {
   if (!std::isfinite(wanted.from) || !std::isfinite(wanted.to)) return;
   auto all = kept();
-  wanted.from = std::clamp(wanted.from, 0.0, 100 - kLeastKept);
-  wanted.to = std::clamp(wanted.to, wanted.from + kLeastKept, 100.0);
+  wanted.from = within(wanted.from, 0.0, 100 - kLeastKept);
+  wanted.to = within(wanted.to, wanted.from + kLeastKept, 100.0);
   all[size_t(axis)] = wanted;
   std::string text;
   for (int a = 0; a < 3; ++a) {

@@ -84,6 +84,15 @@ TEST_F(HoleMeterTest, CountsNarrowGapsInAnObjectAndNoWideOnes) {
   EXPECT_DOUBLE_EQ(measure(), 2.0 / double(40 - HoleMeter::kWidest - 1));
 }
 
+TEST_F(HoleMeterTest, SaysNothingOfThinLines) {
+  for (int x = 4; x < 60; x += 6)
+    for (int y = 0; y < 32; ++y) at(x, y) = at(x + 1, y) = 0xffa0a0a0;
+  EXPECT_TRUE(std::isnan(measure()));
+  object(10, 50);  // a surface behind them
+  at(20, 7) = kBackground;
+  EXPECT_GT(measure(), 0);
+}
+
 TEST_F(HoleMeterTest, ASingleHoleIsFoundInOneOfTheTurns) {
   object(0, 64);
   at(33, 7) = kBackground;
