@@ -1,8 +1,11 @@
 #include "common/core/machine.h"
 
+#include <sched.h>
 #include <sys/sysinfo.h>
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -22,6 +25,28 @@ std::string cpu_info(const std::string& key) {
   return {};
 }
 
+// Processors' worth of time that a group of this folder has; 0: no limit, or the system does not tell.
+double quota_of(const std::filesystem::path& group) {
+  std::ifstream in(group / "cpu.max");
+  double quota_us = 0, period_us = 0;  // or "max 100000", which is no number
+  return in >> quota_us >> period_us && period_us > 0 ? quota_us / period_us : 0;
+}
+
+// The least of this process's control group and those around it; 0: no limit.
+double least_quota() {
+  std::ifstream in("/proc/self/cgroup");
+  std::string line;
+  while (std::getline(in, line) && !line.starts_with("0::")) {
+  }
+  if (!line.starts_with("0::/")) return 0;
+  const std::filesystem::path root = "/sys/fs/cgroup";
+  double out = 0;
+  for (auto group = root / line.substr(4);; group = group.parent_path()) {
+    if (const double quota = quota_of(group); quota > 0) out = out > 0 ? std::min(out, quota) : quota;
+    if (group.string().size() <= root.string().size() + 1) return out;
+  }
+}
+
 bool plain(const std::string& argument) {
   constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_./:=,+@%";
   return !argument.empty() && argument.find_first_not_of(kPlain) == argument.npos;
@@ -33,10 +58,17 @@ Machine this_machine() {
   Machine out;
   out.processor = cpu_info("model name");
   if (out.processor.empty()) out.processor = cpu_info("Model");  // of ARM boards
-  out.cores = int(std::thread::hardware_concurrency());
+  out.cores = usable_processors();
   struct sysinfo info {};
   if (sysinfo(&info) == 0) out.memory_mb = double(info.totalram) * info.mem_unit / 1e6;
   return out;
+}
+
+int usable_processors() {
+  cpu_set_t set;
+  int out = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : int(std::thread::hardware_concurrency());
+  if (const double quota = least_quota(); quota > 0) out = std::min(out, int(std::ceil(quota)));
+  return std::max(out, 1);
 }
 
 std::string shell_line(const std::vector<std::string>& arguments) {

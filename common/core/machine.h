@@ -8,10 +8,14 @@ namespace telesplat {
 
 struct Machine {
   std::string processor;  ///< model; empty: the system does not tell
-  int cores = 0;          ///< that this process may use; 0: the system does not tell
+  int cores = 0;          ///< usable_processors()
   double memory_mb = 0;   ///< 0: the system does not tell
 };
 Machine this_machine();
+
+/// How many processors this process may use, at least 1: those that it may run on (taskset, cpusets), and no more than
+/// its control group's share of time comes to (cpu.max, as of containers with --cpus). std::thread does not count so.
+int usable_processors();
 
 /// Arguments as a shell would take them: what needs quotes has some.
 std::string shell_line(const std::vector<std::string>& arguments);

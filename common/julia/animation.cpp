@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <future>
-#include <thread>
+
+#include "common/core/machine.h"
 
 namespace telesplat::julia {
 namespace {
@@ -67,7 +68,7 @@ Status validate(const Parameters& start, const Timeline& timeline) {
 AnimatedBounds animated_bounds(const Parameters& start, const Timeline& timeline,
                                const std::function<void(size_t, size_t)>& progress) {
   const auto times = instants(timeline, kBoxes);
-  const size_t lanes = std::max(1u, std::thread::hardware_concurrency());
+  const auto lanes = size_t(usable_processors());
   AnimatedBounds out;
   for (size_t begin = 0; begin < times.size(); begin += lanes) {
     std::vector<std::future<geometry::DBox>> boxes;

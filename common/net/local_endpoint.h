@@ -24,4 +24,13 @@ inline bool is_local(std::string_view endpoint) {
   return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
+/// With 127.0.0.1 for localhost: ZeroMQ binds to addresses and interfaces alone.
+inline std::string numeric_host(const std::string& endpoint) {
+  constexpr std::string_view kLocal = "tcp://localhost:";
+  return endpoint.starts_with(kLocal) ? "tcp://127.0.0.1:" + endpoint.substr(kLocal.size()) : endpoint;
+}
+
+/// tcp://[ADDRESS]:PORT, for which a socket needs ZeroMQ's option.
+inline bool is_ipv6(std::string_view endpoint) { return endpoint.starts_with("tcp://["); }
+
 }  // namespace telesplat::net

@@ -42,6 +42,7 @@ Result<std::unique_ptr<PlainSubscriber>> PlainSubscriber::connect(const std::str
   try {
     set_common(impl->socket, limits, limits.most_bytes);
     impl->socket.set(zmq::sockopt::subscribe, "");
+    if (is_ipv6(endpoint)) impl->socket.set(zmq::sockopt::ipv6, 1);
     impl->socket.connect(endpoint);
     impl->endpoint = endpoint;
   } catch (const zmq::error_t& e) {
@@ -100,7 +101,8 @@ Result<std::unique_ptr<PlainPublisher>> PlainPublisher::bind(const std::string& 
   try {
     set_common(impl->socket, limits, kSubscriptionBytes);
     impl->socket.set(zmq::sockopt::xpub_verboser, 1);
-    impl->socket.bind(endpoint);
+    if (is_ipv6(endpoint)) impl->socket.set(zmq::sockopt::ipv6, 1);
+    impl->socket.bind(numeric_host(endpoint));
     impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& e) {
     return Error{fmt::format("cannot bind to {}: {}", endpoint, e.what())};

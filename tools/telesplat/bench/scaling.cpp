@@ -12,6 +12,7 @@
 #include "client/viewer/display/size_text.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/machine.h"
 #include "common/geometry/trajectory.h"
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
@@ -49,7 +50,7 @@ class Study {
       : options_(o), scene_(std::move(scene)), flags_(julia::to_flags(o.scene)), camera_(camera) {
     report_.width = camera.width;
     report_.height = camera.height;
-    report_.cores = int(std::max(1u, std::thread::hardware_concurrency()));
+    report_.cores = usable_processors();
     report_.scene = scene_.title;
   }
 

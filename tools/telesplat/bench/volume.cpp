@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "common/core/machine.h"
 #include "common/geometry/trajectory.h"
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
@@ -91,7 +92,7 @@ class VolumeStudy {
  public:
   VolumeStudy(const VolumeBenchOptions& o, int width, int height) : options_(o), width_(width), height_(height) {
     report_.size = o.size;
-    report_.cores = int(std::max(1u, std::thread::hardware_concurrency()));
+    report_.cores = usable_processors();
     report_.buffers = o.buffers;
   }
 
