@@ -70,6 +70,26 @@ def messages(tree):
             yield Finding(tables.PROTOCOL_PAGE, line, "messages", f"**{name}** is no message of {tables.MESSAGES}")
 
 
+_PAGE_VERSION = re.compile(r"\bversion (?:is )?(\d+)\.|^`v` is (\d+)\.", re.IGNORECASE)
+
+
+def version(tree):
+    """docs/protocol.md says the version that the code speaks, wherever it says one."""
+    if not tree.exists(tables.PROTOCOL_PAGE) or not tree.exists(tables.VERSION_FILE):
+        return
+    declared = re.search(r"\bkProtocolVersion = (\d+);", tree.file(tables.VERSION_FILE).without_comments)
+    found = 0
+    for number, line in enumerate(tree.file(tables.PROTOCOL_PAGE).lines, 1):
+        if match := _PAGE_VERSION.search(line):
+            found += 1
+            said = match[1] or match[2]
+            if said != declared[1]:
+                text = f"says version {said}; {tables.VERSION_FILE} has {declared[1]}"
+                yield Finding(tables.PROTOCOL_PAGE, number, "version", text)
+    if not found:
+        yield Finding(tables.PROTOCOL_PAGE, 1, "version", f"says no version; {tables.VERSION_FILE} has {declared[1]}")
+
+
 # ---- flags -----------------------------------------------------------------------------------------------------------
 
 # A string that is one flag, or several names of one: "--a", "!--a", "-o,--output", "--a,--b".
@@ -261,4 +281,4 @@ def paths(tree):
                     yield Finding(file.path, number, "paths", f"there is no {match[1]}")
 
 
-RULES = (messages, flags, columns, links, paths, sentences)
+RULES = (messages, version, flags, columns, links, paths, sentences)

@@ -24,7 +24,8 @@ CLEAN = {
     "client/viewer/viewer_worker.cpp": "const Column<Row> kColumns[] = {\n"
     '    {"t_s", [](const Row& r) { return r.t; }},\n    {"wait_ms", &Row::wait}};\n',
     "docs/architecture.md": "# Map\n## Where to start\nRead `common/core/result.h`.\n",
-    "docs/protocol.md": "**hello** - first.\n",
+    "common/wire/limits.h": "inline constexpr uint64_t kProtocolVersion = 9;\n",
+    "docs/protocol.md": "Version 9.\n**hello** - first.\n`v` is 9.\n",
     "docs/flags.md": "| `--up` | |\n",
     "docs/metrics.md": "## frames.csv\n| column | unit |\n|---|---|\n| viewer, t_s | s |\n| wait_ms | ms |\n"
     "## Others\n",
@@ -91,6 +92,9 @@ VIOLATIONS = [
         3, '"gone" of "hello" does not stand',
     ),
     ("messages", "docs/protocol.md", "**hello** - first.\n\n**gone** - was once.\n", 3, "**gone** is no message"),
+    ("version", "docs/protocol.md", "Version 9.\n**hello** - first.\n`v` is 8.\n", 3, "says version 8; common/wire"),
+    ("version", "docs/protocol.md", "Version 10.\n**hello** - first.\n", 1, "says version 10; common/wire"),
+    ("version", "docs/protocol.md", "**hello** - first.\n", 1, "says no version"),
     ("flags", "services/data/x.cpp", 'Table t{{.flag = "--room-size,--room"}};\n', 1, "--room-size does not stand"),
     ("flags", "services/data/x.cpp", '\nTable t{{.flag = "!--no-cache"}};\n', 2, "--no-cache does not stand"),
     ("flags", "tools/telesplat/x.cpp", 'app.add_option("-o,--output", o, "where");\n', 1, "--output does not stand"),

@@ -170,6 +170,7 @@ LONG_FUNCTIONS = {}
 
 MESSAGES = "common/wire/"  # files below it declare messages: kName = "..."
 PROTOCOL_PAGE = "docs/protocol.md"
+VERSION_FILE = "common/wire/limits.h"  # kProtocolVersion
 FLAGS_PAGE = "docs/flags.md"
 METRICS_PAGE = "docs/metrics.md"
 # Flags of programs that are not ours, which ours start.
