@@ -5,7 +5,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <thread>
 
 #include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
@@ -15,6 +14,7 @@
 #include "common/core/clock.h"
 #include "common/core/file_hash.h"
 #include "common/core/log.h"
+#include "common/core/machine.h"
 #include "common/metrics/about.h"
 #include "common/net/control.h"
 
@@ -129,7 +129,7 @@ Result<Display> open_display(ViewerOptions& o, const net::Access& asking, const 
 Result<Renderers> open_renderers(ViewerOptions& o) {
   auto renderers = Renderers::make(o.renderer, o.threads);
   if (renderers && std::string_view(renderers->name()) == "cpu")
-    o.display.threads = o.threads > 0 ? o.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+    o.display.threads = o.threads > 0 ? o.threads : usable_processors();
   return renderers;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <list>
@@ -471,10 +472,13 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
     }
     impl_->watch_connections();
     impl_->socket.set(zmq::sockopt::handshake_ivl, int(kHandshake_s * 1e3));
-    impl_->socket.bind(endpoint);
+    if (is_ipv6(endpoint)) impl_->socket.set(zmq::sockopt::ipv6, 1);
+    impl_->socket.bind(numeric_host(endpoint));
     return impl_->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& e) {
-    return Error{fmt::format("{}: cannot bind to {}: {}", impl_->name, endpoint, e.what())};
+    const char* const hint =
+        e.num() == ENODEV ? "; an address of this machine, * or the name of a network interface is meant" : "";
+    return Error{fmt::format("{}: cannot bind to {}: {}{}", impl_->name, endpoint, e.what(), hint)};
   }
 }
 
@@ -491,7 +495,8 @@ Status Socket::connect(const std::string& endpoint) {
     const auto way = impl_->way_to(endpoint);
     if (!way) return Error{fmt::format("{}: {}", impl_->name, way.error().text)};
     if (!impl_->home.access.keys()) impl_->warn_of_clear(endpoint);
-    impl_->socket.connect(*way);
+    if (is_ipv6(*way)) impl_->socket.set(zmq::sockopt::ipv6, 1);
+    impl_->socket.connect(numeric_host(*way));
     return ok_status();
   } catch (const zmq::error_t& e) {
     return Error{fmt::format("{}: cannot connect to {}: {}", impl_->name, endpoint, e.what())};

@@ -1,13 +1,11 @@
 #include "services/sampler/sampler_service.h"
 
-#include <sched.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <optional>
-#include <thread>
 
 #include "common/core/clock.h"
+#include "common/core/machine.h"
 #include "common/metrics/recorder.h"
 #include "common/net/master_link.h"
 #include "common/scene/session.h"
@@ -25,12 +23,6 @@ constexpr double kIdle_s = 0.1;         // the longest wait: then status reports
 constexpr double kSpanFlush_s = 1;      // between two deliveries of spans
 constexpr double kSendAgain_s = 0.025;  // between two tries to send
 constexpr double kSendFor_s = 1;        // to a packer that is slow or being restarted
-
-// That this process may run on: so many threads oneTBB takes unless told otherwise.
-int cores() {
-  cpu_set_t set;
-  return sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : int(std::thread::hardware_concurrency());
-}
 
 class SamplerService {
  public:
@@ -75,9 +67,7 @@ class SamplerService {
     hello.role = "sampler";
     hello.name = o.service.name;
     hello.instance = instance;
-    hello.facts = {{"sampler", o.kind},
-                   {"threads", std::to_string(o.threads > 0 ? o.threads : cores())},
-                   {"leases", std::to_string(kLeases)}};
+    hello.facts = {{"sampler", o.kind}, {"threads", std::to_string(o.threads)}, {"leases", std::to_string(kLeases)}};
     if (!o.service.link.empty()) hello.facts["link"] = o.service.link;
     return hello;
   }
@@ -225,7 +215,9 @@ class SamplerService {
 
 }  // namespace
 
-int run(const SamplerOptions& o) {
+int run(const SamplerOptions& given) {
+  SamplerOptions o = given;
+  if (o.threads == 0) o.threads = usable_processors();
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();

@@ -35,8 +35,15 @@ std::string secret_path(const std::string& folder, std::string_view name) {
   return fmt::format("{}/{}{}", folder, name, kSecretEnd);
 }
 
-// What was meant for what is missing.
-std::string remedy(const std::string& folder) { return fmt::format("telesplat keys {} makes keys", folder); }
+// What was meant for what is missing. A bundle, which was made from another folder, is not completed: keys that are
+// made in it are let in nowhere.
+std::string remedy(const std::string& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::exists(fmt::format("{}/{}", folder, kServerFile), error) &&
+      !key_names(folder).empty())
+    return "who made this bundle can make another: telesplat keys FOLDER BUNDLE --bundle NAME";
+  return fmt::format("telesplat keys {} makes keys", folder);
+}
 
 Result<std::string> read_server_public(const std::string& folder) {
   const std::string path = fmt::format("{}/{}", folder, kServerPublicFile);

@@ -22,6 +22,37 @@ TEST(Control, NobodyIsSaidAtOnce) {
   }
 }
 
+TEST(Control, MastersAreAskedAtLocalhostAndByIPv6) {
+  for (const std::string address : {"tcp://localhost:*", "tcp://[::1]:*"}) {
+    Context context;
+    Socket master(context, Kind::kRouter, "master");
+    const auto endpoint = master.bind(address);
+    ASSERT_TRUE(endpoint.ok()) << endpoint.error().text;
+    const std::string asked = address.substr(0, address.size() - 1) + endpoint->substr(endpoint->rfind(':') + 1);
+    EXPECT_FALSE(asked.ends_with('*'));
+    std::thread thread([&] {
+      for (const double until = monotonic_s() + kLong_s; monotonic_s() < until;) {
+        wait_readable({&master}, 20);
+        const auto message = master.receive();
+        if (message) return void(master.send(wire::ControlReply{true, "here"}, message->peer));
+      }
+    });
+    const auto answer = ask_master(asked, "status", kLong_s);
+    thread.join();
+    ASSERT_TRUE(answer.ok()) << answer.error().text;
+    EXPECT_EQ(*answer, "here");
+  }
+}
+
+TEST(Control, HostsAreBoundToByTheirAddresses) {
+  Context context;
+  Socket master(context, Kind::kRouter, "master");
+  const auto bound = master.bind("tcp://lab.example:7700", true);
+  ASSERT_FALSE(bound.ok());
+  EXPECT_TRUE(bound.error().text.ends_with("an address of this machine, * or the name of a network interface is meant"))
+      << bound.error().text;
+}
+
 TEST(Control, SomebodyWhoSaysNothingIsWaitedFor) {
   Context context;
   Socket silent(context, Kind::kRouter, "silent");

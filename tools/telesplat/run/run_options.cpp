@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <thread>
 
+#include "common/core/machine.h"
 #include "common/image/measures/reference.h"
 #include "common/net/master_address.h"
 #include "common/net/service.h"
@@ -314,7 +314,7 @@ std::vector<std::string> packer_arguments(const RunOptions& o) {
 }
 
 std::vector<std::string> sampler_arguments(const RunOptions& o) {
-  const int cores = int(std::max(1u, std::thread::hardware_concurrency()));
+  const int cores = usable_processors();
   sampler::SamplerOptions s = o.sampler;
   if (s.threads == 0) s.threads = std::max(1, cores / o.samplers);
   return arguments(s);

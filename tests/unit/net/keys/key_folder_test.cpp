@@ -200,7 +200,14 @@ TEST(KeyFiles, EachProcessFindsItsOwn) {
   const auto missing = read_keys(laptop, {Role::kSampler}, false);
   ASSERT_FALSE(missing.ok());
   EXPECT_EQ(missing.error().text,
-            laptop + ": there is no key of a sampler (anna is a viewer's); telesplat keys " + laptop + " makes keys");
+            laptop +
+                ": there is no key of a sampler (anna is a viewer's); who made this bundle can make another: "
+                "telesplat keys FOLDER BUNDLE --bundle NAME");
+  fs::remove(keys.path() + "/sampler.key");
+  const auto lost = read_keys(keys.path(), {Role::kSampler}, false);
+  ASSERT_FALSE(lost.ok());
+  EXPECT_TRUE(lost.error().text.ends_with("telesplat keys " + keys.path() + " makes keys")) << lost.error().text;
+  EXPECT_TRUE(keys.maker().make_missing().ok());
   EXPECT_FALSE(read_keys(laptop, {}, true).ok()) << "it cannot bind";
   EXPECT_FALSE(bundle(keys.path(), keys.maker().allowed(), "anna", laptop).ok()) << "it is there already";
   EXPECT_FALSE(bundle(keys.path(), keys.maker().allowed(), "nobody", laptop + "2").ok());
