@@ -125,7 +125,9 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
   BackgroundHash hash(recorded.files);
   served.begin(link.instance());
   link.on_order([&](const wire::Order& order) {
-    if (const auto why = served.refuse(order)) link.answer(order.number, false, *why);
+    const auto answer = served.carry_out(order);
+    if (!answer) return link.answer(order.number, false, answer.error().text);
+    if (*answer) link.answer(order.number, true, **answer);
   });
   net::PeerRates rates(o.max_messages);
   const auto status = [&] { return status_of(served, requests, rates); };

@@ -41,8 +41,8 @@ void take(const Volume& v, VolumeFileFacts& facts) {
   const double scale = v.hi > v.lo ? double(facts.histogram.size()) / (v.hi - v.lo) : 0;
   for (size_t at = 0; at < count; ++at)
     ++facts.histogram[std::min(size_t(std::max(0.0, (v.value(at) - v.lo) * scale)), facts.histogram.size() - 1)];
-  facts.volume = {v.size,   v.index_to_data, v.unit, v.type, v.scale,      v.offset, {},
-                  v.format, v.hounsfield,    v.lo,   v.hi,   v.not_finite, v.remark};
+  facts.volume = {v.size, v.index_to_data, v.unit,       v.space, v.type, v.scale,      v.offset,
+                  {},     v.format,        v.hounsfield, v.lo,    v.hi,   v.not_finite, v.remark};
 }
 
 std::string unit_of(const VolumeFileFacts& facts) {

@@ -2,6 +2,8 @@
 // of them.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <map>
 #include <optional>
 #include <string>
@@ -50,9 +52,10 @@ class Served {
   virtual Status follow(const wire::Welcome& /*session*/) { return ok_status(); }
   /// Answers a request, now or later. A message that is none is rejected at its socket.
   virtual void answer(const net::Message& /*request*/, const Outlets& /*outlets*/) {}
-  /// An order of the master's. Nothing: it will be answered over outlets.master, else why not.
-  virtual std::optional<std::string> refuse(const wire::Order& order) {
-    return order.command + ": the scene is no volume, so no values lie in it";
+  /// An order of the master's. Its answer; nothing: it will be answered over outlets.master. Error: why not.
+  virtual Result<std::optional<std::string>> carry_out(const wire::Order& order) {
+    return Error{fmt::format("a data server of {} does not know the order '{}'", scene::described(kind()),
+                             order.command.substr(0, 64))};
   }
   /// Sends what has been worked off meanwhile, where that has a thread of its own.
   virtual void send_finished(const Outlets& /*outlets*/) {}

@@ -264,7 +264,7 @@ Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
     if (!clipped) return clipped.error();
     obeyed = *std::move(clipped);
   } else if (m.command != "epoch") {
-    std::set<std::string_view> known{"status", "health", "stop", "epoch", "pick", "where", "go", "probe"};
+    std::set<std::string_view> known{"status", "health", "stop", "epoch", "pick", "where", "go", "measure", "probe"};
     for (const auto& setting : scene::settings())
       if (setting.keeper != scene::Keeper::kNotes) known.insert(setting.order);
     return Error{fmt::format("unknown command '{}'; known: {}", m.command.substr(0, 64), fmt::join(known, ", "))};

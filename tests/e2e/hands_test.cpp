@@ -1,12 +1,16 @@
 // Pointing, cutting, keeping: what `telesplat ctl` asks of sessions that run, and what it tells.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 
 #include "common/geometry/clip.h"
 #include "tests/support/pipeline_run.h"
+#include "tests/support/virtual_display.h"
 #include "tools/common/csv_table.h"
 
 namespace telesplat::test {
@@ -75,17 +79,19 @@ TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
   ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object(); }));
   // The middle of the front board, in the file's own millimetres.
   const Json front = pick(run, {"50%,50%"})["picks"][0];
-  EXPECT_NEAR(front["data"][0].get<double>(), 1000, 1);
-  EXPECT_NEAR(front["data"][1].get<double>(), 0, 1);
-  EXPECT_NEAR(front["data"][2].get<double>(), 30, 0.5);
-  EXPECT_NEAR(front["normal"][2].get<double>(), 1, 0.02);
+  EXPECT_NEAR(front["data"][0].get<double>(), 1000, 1e-4);
+  EXPECT_NEAR(front["data"][1].get<double>(), 0, 1e-4);
+  EXPECT_NEAR(front["data"][2].get<double>(), 30, 1e-4);
+  EXPECT_LT(front["error"].get<double>(), 1e-3) << "a flat board is exact to floats";
+  EXPECT_FALSE(front.contains("estimate"));
+  EXPECT_NEAR(front["normal"][2].get<double>(), 1, 1e-6);
   EXPECT_EQ(front["colour"], "#dc2828");
   // Places beside it, their distances, the right angle at the middle.
   const Json three = pick(run, {"60%,50%", "50%,50%", "50%,60%"});
   ASSERT_EQ(three["distances"].size(), 2u);
   const double across = three["picks"][0]["data"][0].get<double>() - 1000;
-  EXPECT_NEAR(three["distances"][0].get<double>(), across, 1.5);
-  EXPECT_NEAR(three["angle_deg"].get<double>(), 90, 2);
+  EXPECT_NEAR(three["distances"][0].get<double>(), across, 1e-3);
+  EXPECT_NEAR(three["angle_deg"].get<double>(), 90, 1e-3);
   EXPECT_TRUE(pick(run, {"1,1"})["picks"][0].is_null());
 
   // The front board is cut away: the one behind it is seen.
@@ -93,7 +99,7 @@ TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
   ASSERT_EQ(ctl(run, {"clip", "plane z<=0"}), 0);
   ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object() && p["data"][2].get<double>() < 0; }));
   const Json back = pick(run, {"50%,50%"})["picks"][0];
-  EXPECT_NEAR(back["data"][2].get<double>(), -20, 0.5);
+  EXPECT_NEAR(back["data"][2].get<double>(), -20, 1e-4);
   EXPECT_EQ(back["colour"], "#2828dc");
   EXPECT_TRUE(wait_until([&] { return value(run.status(), "viewer-1", "epoch") > epoch; }, 10)) << "it reports";
   EXPECT_EQ(run.status()["clip"], "plane z<=0");
@@ -106,6 +112,8 @@ TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
   ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object() && p["data"][2].get<double>() > 0; }));
 
   std::string err;
+  EXPECT_EQ(ctl(run, {"measure"}, nullptr, &err), 2);
+  EXPECT_NE(err.find("no window"), std::string::npos) << err;
   EXPECT_EQ(ctl(run, {"clip", "plane z<"}, nullptr, &err), 2);
   EXPECT_EQ(ctl(run, {"pick", "5000,1"}, nullptr, &err), 2);
   EXPECT_NE(err.find("outside"), std::string::npos) << err;
@@ -120,6 +128,107 @@ TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
   ASSERT_EQ(table->rows(), 3u);
   EXPECT_EQ(table->text(0, *clip), "");
   EXPECT_EQ(geometry::clip_from_text(table->text(1, *clip))->planes.size(), 1u);
+}
+
+// A sheet z = 5 sin(x / 20) + 0.1 y of 100 x 100 with an array of 300 + 10 sin(y / 15) + z.
+void write_sheet(const std::string& path) {
+  constexpr int kSide = 150;
+  const auto height = [](double x, double y) { return 5 * std::sin(x / 20) + 0.1 * y; };
+  std::ofstream out(path);
+  out << "ply\nformat ascii 1.0\nelement vertex " << (kSide + 1) * (kSide + 1)
+      << "\nproperty float x\nproperty float y\nproperty float z\nproperty float heat\nelement face "
+      << 2 * kSide * kSide << "\nproperty list uchar int vertex_indices\nend_header\n";
+  out.precision(9);
+  for (int j = 0; j <= kSide; ++j)
+    for (int i = 0; i <= kSide; ++i) {
+      const double x = 100.0 * i / kSide, y = 100.0 * j / kSide, z = height(x, y);
+      out << x << " " << y << " " << z << " " << 300 + 10 * std::sin(y / 15) + z << "\n";
+    }
+  for (int j = 0; j < kSide; ++j)
+    for (int i = 0; i < kSide; ++i) {
+      const int a = j * (kSide + 1) + i, b = a + 1, c = a + kSide + 1, d = c + 1;
+      out << "3 " << a << " " << b << " " << d << "\n3 " << a << " " << d << " " << c << "\n";
+    }
+}
+
+TEST_F(Hands, APicksValueIsThatOfItsPlace) {
+  const std::string mesh = folder_ / "sheet.ply";
+  write_sheet(mesh);
+  auto flags = looking();
+  flags.insert(flags.end(), {"--colour-by", "heat"});
+  PipelineRun run(flags, mesh);
+  ASSERT_TRUE(run.wait_showing());
+  ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object() && p.contains("error"); }));
+  int picked = 0;
+  for (int n = 0; n < 21; n += 3) {
+    std::vector<std::string> places;
+    for (int i = n; i < n + 3; ++i) places.push_back(fmt::format("{}%,{}%", 34 + 1.6 * i, 35 + (i * 7) % 31));
+    for (const Json& p : pick(run, places)["picks"]) {
+      if (!p.is_object()) continue;
+      ++picked;
+      const double x = p["data"][0], y = p["data"][1], z = p["data"][2];
+      ASSERT_TRUE(p.contains("error") && p.contains("value_error")) << p.dump();
+      EXPECT_LE(std::abs(z - 5 * std::sin(x / 20) - 0.1 * y), p["error"].get<double>()) << p.dump();
+      EXPECT_LE(std::abs(p["value"].get<double>() - (300 + 10 * std::sin(y / 15) + z)), p["value_error"].get<double>())
+          << p.dump();
+      EXPECT_LT(p["error"].get<double>(), 0.1);
+      EXPECT_LT(p["value_error"].get<double>(), 0.1);
+    }
+  }
+  EXPECT_GE(picked, 18);
+  EXPECT_EQ(run.stop(), 0);
+}
+
+// A raster of 30 m in UTM with heights of 2000 + 300 sin(column / 12) metres, shown three times as high.
+TEST_F(Hands, ATerrainsPickHasTheFilesCoordinatesAndTrueHeights) {
+  const std::string raster = folder_ / "ridges.asc";
+  constexpr int kColumns = 160, kRows = 120;
+  std::ofstream out(raster);
+  out << "ncols " << kColumns << "\nnrows " << kRows
+      << "\nxllcorner 432100\nyllcorner 5212300\ncellsize 30\nNODATA_value -9999\n";
+  const auto height = [](double x) { return 2000 + 300 * std::sin((x - 432100) / 30 / 12); };
+  for (int row = 0; row < kRows; ++row)
+    for (int column = 0; column < kColumns; ++column)
+      out << fmt::format("{:.3f}{}", height(432100 + 30 * (column + 0.5)), column + 1 < kColumns ? " " : "\n");
+  out.close();
+  std::ofstream(folder_ / "ridges.prj")
+      << R"(PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],)"
+         R"(PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],)"
+         R"(PARAMETER["latitude_of_origin",0],PARAMETER["central_meridian",9],PARAMETER["scale_factor",0.9996],)"
+         R"(PARAMETER["false_easting",500000],PARAMETER["false_northing",0],UNIT["metre",1]])";
+  PipelineRun run({"--duration", "0", "--trajectory", "still", "--z-scale", "3", "--sampling-size", "320x200",
+                   "--cache", folder_ / "cache"},
+                  raster);
+  ASSERT_TRUE(run.wait_showing());
+  ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object() && p.contains("error"); }));
+  const Json answer = pick(run, {"45%,50%", "50%,50%", "56%,58%"});
+  for (const Json& p : answer["picks"]) {
+    ASSERT_TRUE(p.is_object() && p.contains("error")) << p.dump();
+    const double x = p["data"][0], y = p["data"][1], z = p["data"][2];
+    EXPECT_TRUE(x > 432100 && x < 432100 + 30 * kColumns && y > 5212300 && y < 5212300 + 30 * kRows) << p.dump();
+    EXPECT_LE(std::abs(z - height(x)), p["error"].get<double>());
+    EXPECT_LT(p["error"].get<double>(), 15);
+    EXPECT_EQ(p["unit"], "m");
+    EXPECT_NE(p["place"].get<std::string>().find("UTM zone 32N"), std::string::npos) << p["place"];
+  }
+  const auto along = [&](int a) {
+    return answer["picks"][0]["data"][a].get<double>() - answer["picks"][1]["data"][a].get<double>();
+  };
+  EXPECT_NEAR(answer["distances"][0].get<double>(), std::hypot(along(0), along(1), along(2)), 1e-6) << "true lengths";
+  // A cut at a height is one at the true height.
+  ASSERT_EQ(ctl(run, {"clip", "plane z<=1900"}), 0);
+  ASSERT_TRUE(wait_until(
+      [&] {
+        int below = 0;
+        for (const Json& p : pick(run, {"45%,50%", "50%,50%", "55%,60%"})["picks"])
+          if (p.is_object()) {
+            if (p["data"][2].get<double>() > 1900.01) return false;
+            ++below;
+          }
+        return below > 0;
+      },
+      40));
+  EXPECT_EQ(run.stop(), 0);
 }
 
 // What is displayed of a cut scene is what rays see of it.
@@ -150,7 +259,8 @@ TEST_F(Hands, APickOfAVolumeTellsItsValue) {
   const Json place = pick(run, {"50%,50%"})["picks"][0];
   EXPECT_GT(place["value"].get<double>(), 0);
   EXPECT_LE(place["value"].get<double>(), 255);
-  EXPECT_LT(place["value_error"].get<double>(), 2);
+  ASSERT_TRUE(place.contains("value_error") && place.contains("error")) << place.dump();
+  EXPECT_GE(place["value_error"].get<double>(), 0.5) << "half a level at least";
   EXPECT_FALSE(place.contains("normal"));
   EXPECT_EQ(ctl(run, {"play", "pause"}), 2) << "one step has nothing to play";
   EXPECT_EQ(run.stop(), 0);
@@ -206,6 +316,58 @@ TEST_F(Hands, AnAnimationIsPausedAndGoesStepByStep) {
   EXPECT_NEAR(now(), paused, 1e-6);
   ASSERT_EQ(ctl(run, {"play"}), 0);
   EXPECT_TRUE(wait_until([&] { return std::abs(now() - paused) > 0.08; }, 20));
+  EXPECT_EQ(run.stop(), 0);
+}
+
+// Marks lie in the window, and are listed, taken away and saved from elsewhere.
+TEST_F(Hands, AWindowKeepsWhatIsMeasured) {
+  if (!VirtualDisplay::installed()) GTEST_SKIP() << "Xvfb is not installed";
+  VirtualDisplay display;
+  ASSERT_TRUE(display.ready());
+  const std::string mesh = folder_ / "boards.ply";
+  write_boards(mesh);
+  PipelineRun run({"--size", "640x480", "--eye", "0,0,0.9", "--up", "y", "--cache", folder_ / "cache"}, mesh, "view");
+  ASSERT_TRUE(run.wait_showing());
+  ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object(); }));
+  std::string out, err;
+  ASSERT_EQ(ctl(run, {"measure", "add", "45%,50%", "55%,50%"}, &out, &err), 0) << err;
+  const auto list = [&] {
+    EXPECT_EQ(ctl(run, {"measure", "--json"}, &out, &err), 0) << err;
+    return Json::parse(out, nullptr, false)["places"];
+  };
+  ASSERT_TRUE(wait_until([&] {
+    const Json places = list();
+    return places.size() == 2 && places[0].contains("error") && places[1].contains("error");
+  }));
+  const Json places = list();
+  EXPECT_NEAR(places[0]["data"][2].get<double>(), 30, 1e-4);
+  EXPECT_NEAR(places[1]["distance"].get<double>(),
+              places[1]["data"][0].get<double>() - places[0]["data"][0].get<double>(), 1e-3);
+  // Yellow lies where the line is.
+  const auto window = display.find(" fps, ");
+  ASSERT_TRUE(window);
+  const auto yellow = [&] {
+    const auto seen = display.content(*window);
+    if (!seen) return false;
+    for (int y = seen->height / 2 - 6; y < seen->height / 2 + 6; ++y)
+      if ((seen->colour[size_t(y) * size_t(seen->width) + size_t(seen->width) * 47 / 100] & 0xffffff) == 0xf0e442)
+        return true;
+    return false;
+  };
+  EXPECT_TRUE(wait_until(yellow));
+  // The key measures what lies under the pointer.
+  display.move_pointer(*window, 320, 260);
+  display.tap("x");
+  EXPECT_TRUE(wait_until([&] { return list().size() == 3; }));
+  const std::string table = folder_ / "places.csv";
+  ASSERT_EQ(ctl(run, {"measure", "save", table}, &out, &err), 0) << err;
+  const std::string text = read_text(table);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 4) << text;
+  EXPECT_EQ(ctl(run, {"measure", "remove", "77"}, &out, &err), 2);
+  ASSERT_EQ(ctl(run, {"measure", "remove", "1"}, &out, &err), 0) << err;
+  EXPECT_EQ(list().size(), 2u);
+  ASSERT_EQ(ctl(run, {"measure", "clear"}), 0);
+  EXPECT_TRUE(wait_until([&] { return !yellow(); }));
   EXPECT_EQ(run.stop(), 0);
 }
 

@@ -368,7 +368,10 @@ class NoMemory final : public VolumeStore {
   Result<volume::Voxels> voxels(int, int, int, const volume::LevelSet&, const volume::LevelSet&) override {
     throw std::bad_alloc();
   }
-  Result<std::optional<double>> value_at(int, const glm::dvec3&) override { throw std::bad_alloc(); }
+  Result<scene::Probed> cast(int, const volume::TransferFunction&, const geometry::Clip&,
+                             const scene::Probe&) override {
+    throw std::bad_alloc();
+  }
   Result<std::vector<uint32_t>> slice_weights(int, const volume::LevelSet&) override { throw std::bad_alloc(); }
 
  private:

@@ -59,6 +59,7 @@ def order(chance):
         "play": ["play", "pause", "step 1", "step -1", "step 100000", "step x"],
         "overlay": [f"{pick(['axes', 'scale', 'cursor', 'fps', 'all', 'nothing'])} {pick(['on', 'off', 'x'])}"],
         "pick": [f"{share},50%", f"{share},50% 40%,40%", f"{share},50% 40%,40% 60%,60%", "x"],
+        "measure": ["list", f"add {share},50%", f"add {share},50% 40%,40%", "remove 1", "clear", ""],
         "bookmark": ["list", "add a", "go a", "go nothing", "remove a", ""],
         "notes": ["list", "add a --at 50%,50%", "add b", "remove 1", "remove 90", ""],
         "splat": ["square", "disc", "ellipse", "ewa", "nothing"],

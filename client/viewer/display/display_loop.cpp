@@ -379,7 +379,7 @@ class Display {
     surface_.on_terms(worker_.terms());
     if (const auto at = surface_.points_at()) {
       const auto aim = eyes_.aim(frame.camera, frame.eyes, *at);
-      surface_.on_pick(source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity));
+      surface_.on_pick(source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity), frame.epoch);
     }
     const geometry::Camera display = eyes_.display(frame.camera);
     const auto pick = [&](double x, double y, double opacity) {
@@ -394,7 +394,8 @@ class Display {
                   .terms = worker_.terms(),
                   .pick = pick,
                   .go = [&](const geometry::Pose& pose) { return surface_.go_to(pose); },
-                  .set = [&](const std::string& name, const std::string& value) { return surface_.set(name, value); }});
+                  .set = [&](const std::string& name, const std::string& value) { return surface_.set(name, value); },
+                  .measurements = surface_.measurements()});
       worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});
     }
   }

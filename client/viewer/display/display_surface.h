@@ -10,7 +10,7 @@
 #include "client/viewer/coupling/sampling_wish.h"
 #include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/display/overlay.h"
-#include "client/viewer/hands/meaning.h"
+#include "client/viewer/hands/measurements.h"
 #include "client/viewer/input/look.h"
 #include "client/viewer/input/picture_wish.h"
 #include "client/viewer/input/pose_moment.h"
@@ -91,8 +91,10 @@ class DisplaySurface {
   /// A place of the frame that was displayed of which somebody wants to know what lies there: a share of its width and
   /// height, from the upper left corner; nothing: nobody does.
   virtual std::optional<glm::dvec2> points_at() { return std::nullopt; }
-  /// What lies there; nothing: nothing does.
-  virtual void on_pick(const std::optional<Pick>&) {}
+  /// What lies there, in this epoch; nothing: nothing does.
+  virtual void on_pick(const std::optional<Pick>&, EpochId) {}
+  /// What the person measured; null: this display shows none.
+  virtual Measurements* measurements() { return nullptr; }
   /// What the session's data are told in; null: that is not known yet.
   virtual void on_terms(const std::shared_ptr<const SceneTerms>&) {}
   /// Puts the camera there, at once. False: the head follows a trajectory.

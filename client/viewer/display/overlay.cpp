@@ -38,6 +38,7 @@ image::View text_panel(const std::vector<std::string>& lines, int scale) {
 
 geometry::Rect place_overlay(const Overlay& overlay, int window_width, int window_height, int hidden) {
   using Corner = Overlay::Corner;
+  if (overlay.corner == Corner::kNone) return {overlay.x, overlay.y, overlay.picture.width, overlay.picture.height};
   const int margin = std::min({kMargin, window_width / 8, window_height / 8});
   const int left = within(hidden, 0, std::max(0, window_width - 4 * margin - 1));
   const double room_x = window_width - left - 2 * margin, room_y = window_height - 2 * margin;

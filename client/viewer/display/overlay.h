@@ -13,9 +13,10 @@ namespace telesplat::viewer {
 
 /// A picture in a corner of the window, at its own size; smaller where the window is too small for it.
 struct Overlay {
-  enum class Corner { kUpperLeft, kUpperRight, kLowerLeft, kLowerRight };
+  enum class Corner { kUpperLeft, kUpperRight, kLowerLeft, kLowerRight, kNone };
   image::View picture;  ///< 0xAARRGGBB, not premultiplied: 0xff opaque, 0 nothing
   Corner corner = Corner::kUpperLeft;
+  int x = 0, y = 0;  ///< with kNone: where its upper left pixel lies, at its own size
 };
 
 /// What lies over the frames at present, by names that their owners choose ("help"). Used by the display's thread.

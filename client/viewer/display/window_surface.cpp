@@ -9,7 +9,9 @@
 #include <mutex>
 #include <utility>
 
+#include "client/viewer/hands/errands.h"
 #include "common/core/clock.h"
+#include "common/core/whole_file.h"
 #include "common/core/within.h"
 #include "common/geometry/fit.h"
 #include "common/scene/session.h"
@@ -20,7 +22,7 @@ namespace {
 constexpr double kShowAgain_s = 0.1, kPoint_s = 0.1;
 constexpr double kSteps = 32;         // of the window's width
 constexpr double kMostCovered = 0.6;  // of the window's width; else its first view is that of all of it
-constexpr size_t kMostPicks = 3, kMostPicture_pixels = 100'000'000;
+constexpr size_t kMostPicture_pixels = 100'000'000;
 constexpr uintmax_t kMostDropped_bytes = 64'000'000;
 
 // What plays from the beginning. An orbit is fitted once it is known around what.
@@ -178,7 +180,7 @@ void WindowSurface::look_from(const Side& side) {
   if (scene_.box_room.empty()) return;
   glm::dvec3 back(0.0);
   back[side.axis] = side.negative ? -1 : 1;
-  if (terms_ && terms_->placed) back = glm::normalize(glm::dmat3(terms_->placement.data_to_room) * back);
+  if (terms_) back = glm::normalize(glm::dmat3(terms_->placement.data_to_room) * back);
   const FreePart part = free_part();
   interaction_.travel(geometry::fitted_view_from(back, scene_.box_room, part.frustum, part.middle_x),
                       "view from " + side_name(side));
@@ -207,6 +209,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
     else
       overlays_.hide("hands");
   }
+  show_marks(camera);
   show_help();
   show_news(now_s);
   keep_path();
@@ -245,7 +248,13 @@ void WindowSurface::run_panel(double now_s, Look& look) {
   if (!desk_) return;
   desk_->watch(panel_.shown() || scene_.box_room.empty() || panel_.figures().waits_s > 0);
   for (auto& order : panel_.take_orders()) give(std::move(order), false);
+  for (auto& probe : measurements_.take_probes()) desk_->give({"probe", std::move(probe), {}});
   for (const auto& answer : desk_->take_answers()) {
+    if (answer.order.command == "probe") {
+      const std::string line = measurements_.on_answer(answer.order.arguments, answer.obeyed, answer.text);
+      if (!line.empty()) tell(line);
+      continue;
+    }
     panel_.on_answer(now_s, answer);
     scene_controls_.on_answer(answer);
     if (const auto back = order_undo_.answered(answer))
@@ -379,8 +388,9 @@ double WindowSurface::build_panel(double now_s) {
   if (panel_.shown())
     width = show_panel(panel_, panel_view_, now_s, {[&](Panel&) {
                          show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); });
+                         show_measurements(measurements_, [this] { save_measurements(); });
                          const auto book = bookmarks_.book();
-                         notes_wish_ = show_notes(book.get(), notes_view_, !picked_.empty(), now_s);
+                         notes_wish_ = show_notes(book.get(), notes_view_, !measurements_.empty(), now_s);
                        }});
   if (panel_.shown()) follow_notes();
   legend_part_ = {};
@@ -458,7 +468,7 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
       facts.fact("scene") + '\n' + facts.fact("data_file") + '\n' + facts.fact(scene::kPlacementFact);
   if (!facts.fact("scene").empty() && name != std::exchange(scene_name_, name) && had_scene_) {
     interaction_.back_to_first_view();
-    picked_.clear();
+    measurements_.clear();
     notes_view_ = {};
     hands_.on_pick(std::nullopt);
   }
@@ -564,9 +574,10 @@ void WindowSurface::follow_notes() {
   if (wish.look) bookmarks_.look(shelf());
   if (wish.text.empty()) return;
   notes::Note note{.text = wish.text};
-  if (wish.here && !picked_.empty()) {
-    note.place = picked_.back().data;
-    if (const auto lines = cursor_lines(picked_.back(), *terms_); lines.size() > 1) note.value = lines[1];
+  if (wish.here && !measurements_.empty()) {
+    const scene::ToldPlace& newest = measurements_.rows().back().back().told;
+    note.place = newest.data;
+    note.value = scene::value_text(newest);
   }
   bookmarks_.add(shelf(), note);
 }
@@ -592,17 +603,33 @@ std::optional<glm::dvec2> WindowSurface::points_at() {
   return at / glm::dvec2(window_->width(), window_->height());
 }
 
-void WindowSurface::on_pick(const std::optional<Pick>& pick) {
+void WindowSurface::on_pick(const std::optional<Pick>& pick, EpochId epoch) {
   hands_.on_pick(pick);
   if (std::exchange(centres_, false) && pick) interaction_.centre_on(pick->position_room);
   if (!std::exchange(tells_pick_, false) || !terms_) return;
   if (!pick) return tell("nothing lies under the cursor");
-  if (picked_.size() == kMostPicks) picked_.erase(picked_.begin());
-  picked_.push_back(meaning_of(*pick, *terms_));
-  for (const auto& line : cursor_lines(picked_.back(), *terms_)) tell("picked " + line);
-  const Measured measured = measure(picked_, *terms_);
-  if (!measured.distances.empty()) tell("distance " + length_text(measured.distances.back(), measured.unit));
-  if (measured.angle_deg) tell(fmt::format("angle {:.4g} degrees", *measured.angle_deg));
+  if (const auto added = measurements_.add(*pick, *terms_, epoch, kPickOpacity); !added) tell(added.error().text);
+}
+
+// Only while it looks otherwise than before. Of two eyes each would need its own.
+void WindowSurface::show_marks(const geometry::Camera& camera) {
+  const auto& [p, q] = camera.pose;
+  const bool shown = !measurements_.empty() && options_.display.stereo.mode == stereo::Mode::kOff;
+  const std::string state = !shown ? ""
+                                   : fmt::format("{} {} {} {} {} {} {} {} {} {} {}", measurements_.version(), p.x, p.y,
+                                                 p.z, q.w, q.x, q.y, q.z, camera.left, camera.width, camera.height);
+  if (state == std::exchange(marks_shown_, state)) return;
+  auto marks = shown ? draw_marks(measurements_, camera, within(camera.height / 400, 1, 4)) : MarksPicture{};
+  if (marks.view.width == 0) return overlays_.hide("marks");
+  overlays_.show("marks", {std::move(marks.view), Overlay::Corner::kNone, marks.x, marks.y});
+}
+
+void WindowSurface::save_measurements() {
+  const std::string name = dated_path(options_.path_directory + "/measurements-", ".csv");
+  std::error_code error;
+  std::filesystem::create_directories(options_.path_directory, error);
+  const Status saved = write_whole(name, measurements_.csv());
+  tell(saved ? "measurements: " + name : saved.error().text);
 }
 
 void WindowSurface::report(const LiveFigures& figures) {

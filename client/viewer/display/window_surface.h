@@ -15,6 +15,7 @@
 #include "client/viewer/input/pose_feed.h"
 #include "client/viewer/panel/control_desk.h"
 #include "client/viewer/panel/gui/legend_view.h"
+#include "client/viewer/panel/gui/measurements_view.h"
 #include "client/viewer/panel/gui/notes_view.h"
 #include "client/viewer/panel/gui/open_view.h"
 #include "client/viewer/panel/gui/panel_view.h"
@@ -77,7 +78,8 @@ class WindowSurface final : public DisplaySurface {
   void take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) override;
   void report(const LiveFigures& figures) override;
   std::optional<glm::dvec2> points_at() override;
-  void on_pick(const std::optional<Pick>& pick) override;
+  void on_pick(const std::optional<Pick>& pick, EpochId epoch) override;
+  Measurements* measurements() override { return &measurements_; }
   void on_terms(const std::shared_ptr<const SceneTerms>& terms) override {
     terms_ = terms;
     hands_.on_terms(terms);
@@ -131,6 +133,8 @@ class WindowSurface final : public DisplaySurface {
   void follow_bookmarks(const geometry::Pose& pose);
   void follow_notes();
   notes::Shelf shelf() const;  // precondition: terms_
+  void show_marks(const geometry::Camera& camera);
+  void save_measurements();
 
   Options options_;  // display and sampling: as the person chose since
   std::optional<SamplingWish> sampling_wish_;
@@ -143,9 +147,10 @@ class WindowSurface final : public DisplaySurface {
   HandOverlays hands_{text_panel};
   std::shared_ptr<const SceneTerms> terms_;
   Bookmarks bookmarks_;
-  std::vector<PickedPlace> picked_;  // the last ones, three at most
-  bool tells_pick_ = false;          // the person asked for it, not the cursor's overlay
-  bool centres_ = false;             // a double click
+  Measurements measurements_;
+  std::string marks_shown_;  // the state that the overlay of their marks shows; empty: there is none
+  bool tells_pick_ = false;  // the person asked for it, not the cursor's overlay
+  bool centres_ = false;     // a double click
   double pointed_s_ = -1e9;
   ShownScene scene_;
   std::string scene_name_;

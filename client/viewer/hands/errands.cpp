@@ -51,40 +51,93 @@ Result<glm::dvec2> place(std::string_view text, const geometry::Camera& camera) 
   return glm::dvec2(*x, *y);
 }
 
-Result<std::string> pick(const wire::Order& order, const FrameHands& hands) {
+struct Pointed {
+  glm::dvec2 pixel;
+  std::optional<Pick> pick;
+};
+
+// What lies at the places that an order names.
+Result<std::vector<Pointed>> point(const wire::Order& order, const FrameHands& hands, double& opacity) {
   if (!hands.terms) return Error{"pick: nothing is shown yet"};
   const std::string at = scene::value_or(order.arguments, "at", std::string());
   const auto wanted = split(at, ' ');
   if (wanted.empty() || wanted.size() > kMostPicks)
     return Error{fmt::format("pick: {} places, one to {} are possible", wanted.size(), kMostPicks)};
-  double opacity = kPickOpacity;
+  opacity = kPickOpacity;
   if (const auto given = order.arguments.find("opacity"); given != order.arguments.end()) {
     const auto read = number(given->second);
     if (!read || !(*read > 0 && *read <= 1))
       return Error{fmt::format("pick: the opacity {} is not above 0 and up to 1", given->second.substr(0, 40))};
     opacity = *read;
   }
-  Json picks = Json::array();
-  std::vector<PickedPlace> places;
+  std::vector<Pointed> out;
   for (const auto text : wanted) {
     const auto pixel = place(text, hands.camera);
     if (!pixel) return pixel.error();
-    const auto found = hands.pick(pixel->x, pixel->y, opacity);
-    if (!found) {
+    out.push_back({*pixel, hands.pick(pixel->x, pixel->y, opacity)});
+  }
+  return out;
+}
+
+Result<std::string> pick(const wire::Order& order, const FrameHands& hands) {
+  double opacity = 0;
+  const auto pointed = point(order, hands, opacity);
+  if (!pointed) return pointed.error();
+  Json picks = Json::array();
+  for (const Pointed& p : *pointed) {
+    if (!p.pick) {
       picks.push_back(nullptr);
       continue;
     }
-    places.push_back(meaning_of(*found, *hands.terms));
-    Json told = to_json(places.back(), *hands.terms);
-    told["pixel"] = {pixel->x, pixel->y};
+    Json told = scene::to_json(meaning_of(*p.pick, *hands.terms), hands.terms->placement);
+    told["colour"] = fmt::format("#{:06x}", p.pick->colour);
+    told["depth_m"] = p.pick->depth_m;
+    told["spacing_m"] = p.pick->spacing_m;
+    told["pixel"] = {p.pixel.x, p.pixel.y};
+    told["probe"] = scene::to_arguments(probe_of(*p.pick, hands.epoch, opacity));
     picks.push_back(std::move(told));
   }
-  Json out{{"picks", std::move(picks)}, {"epoch", hands.epoch.value}};
-  const Measured measured = measure(places, *hands.terms);
-  out["distances"] = measured.distances;
-  if (measured.angle_deg) out["angle_deg"] = *measured.angle_deg;
-  out["unit"] = measured.unit;
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return Json{{"picks", std::move(picks)},
+              {"epoch", hands.epoch.value},
+              {"placement", Json::parse(scene::to_text(hands.terms->placement))}}
+      .dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Status add_places(const wire::Order& order, const FrameHands& hands) {
+  double opacity = 0;
+  const auto pointed = point(order, hands, opacity);
+  if (!pointed) return pointed.error();
+  for (const Pointed& p : *pointed)
+    if (!p.pick) return Error{fmt::format("measure: nothing lies at {:g},{:g}", p.pixel.x, p.pixel.y)};
+  hands.measurements->begin_row();
+  for (const Pointed& p : *pointed)
+    if (const auto number = hands.measurements->add(*p.pick, *hands.terms, hands.epoch, opacity); !number)
+      return number.error();
+  hands.measurements->begin_row();
+  return ok_status();
+}
+
+Result<std::string> measure(const wire::Order& order, const FrameHands& hands) {
+  if (!hands.measurements) return Error{"measure: this viewer has no window; ctl pick measures without one"};
+  Measurements& all = *hands.measurements;
+  const std::string what = scene::value_or(order.arguments, "do", std::string());
+  auto done = ok_status();
+  if (what == "csv") return Json{{"csv", all.csv()}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (what == "add") {
+    done = add_places(order, hands);
+  } else if (what == "remove") {
+    const std::string text = scene::value_or(order.arguments, "number", std::string());
+    const auto which = number(text);
+    done = which && *which >= 0 && *which < 1e15
+               ? all.remove(uint64_t(*which))
+               : Status(Error{fmt::format("measure: \"{}\" is no place's number", text.substr(0, 40))});
+  } else if (what == "clear") {
+    all.clear();
+  } else if (what != "list") {
+    return Error{fmt::format("measure: \"{}\" is none of list, add, remove, clear and csv", what.substr(0, 40))};
+  }
+  if (!done) return done.error();
+  return all.list();
 }
 
 std::string where(const FrameHands& hands) {
@@ -132,6 +185,7 @@ Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands)
   if (order.command == "pick") return pick(order, hands);
   if (order.command == "where") return where(hands);
   if (order.command == "go") return go(order, hands);
+  if (order.command == "measure") return measure(order, hands);
   if (const auto* setting = scene::setting_of_order(order.command);
       setting && setting->keeper == scene::Keeper::kViewer)
     return set(order, hands);

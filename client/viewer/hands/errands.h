@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/viewer/hands/meaning.h"
+#include "client/viewer/hands/measurements.h"
 #include "client/viewer/hands/order_desk.h"
 
 namespace telesplat::viewer {
@@ -24,16 +25,19 @@ struct FrameHands {
   /// Changes a setting of this viewer (scene::settings()), or shows and hides what lies over the picture ("axes", ...:
   /// on or off). Error: it cannot have this value, or nobody sees it.
   std::function<Status(const std::string& name, const std::string& value)> set;
+  Measurements* measurements = nullptr;  ///< null: there is no window that shows some
 };
 
 /// JSON. Error: what is wrong with the order, for the person.
 ///   pick   "at": "X,Y" or "X%,Y%", up to three separated by blanks, pixels of the display from its upper left corner;
-///          "opacity" (0.25): of volumes. {"picks": [null or as to_json(PickedPlace)], "distances", "angle_deg",
-///          "unit"}
+///          "opacity" (0.25): of volumes. {"picks": [null or as to_json(ToldPlace), "colour", "depth_m", "spacing_m",
+///          "pixel", "probe": arguments of the order that asks the data server], "epoch", "placement"}
 ///   where  {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
 ///   go     "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
 ///   overlay  "name", "on": on or off. {}
 ///   an order of scene::settings() that a viewer keeps   "value". {}
+///   measure  "do": "list", "add" ("at" and "opacity" as pick has them: a row of places), "remove" ("number"), "clear",
+///            "csv". Measurements::list(), or {"csv": Measurements::csv()}
 Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands);
 
 inline constexpr double kPickOpacity = volume::kSolid;

@@ -42,7 +42,7 @@ class HandOverlays {
   TextPanel panel_;
   std::set<std::string> shown_;
   std::shared_ptr<const SceneTerms> terms_;
-  std::optional<PickedPlace> place_;
+  std::optional<scene::ToldPlace> place_;
   double fps_ = 0, counted_s_ = 0, drawn_s_ = -1e9;
   uint64_t counted_ = 0;
   std::string drawn_;  // what the overlay on display shows; empty: there is none

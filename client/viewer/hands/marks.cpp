@@ -19,24 +19,26 @@ constexpr uint32_t kGround = 0xa0101418, kInk = 0xfff0f0f0, kRim = 0xff101418;
 constexpr uint32_t kAxes[3] = {0xffd55e00, 0xff009e73, 0xff56b4e9};
 constexpr int kPadding = 4;  // dots of a letter
 
-// A line of `thickness` pixels; pixels whose centres lie within half of it.
+}  // namespace
+
 void draw_line(image::View& view, glm::dvec2 a, glm::dvec2 b, double thickness, uint32_t colour) {
-  const glm::dvec2 lo = glm::min(a, b) - thickness, hi = glm::max(a, b) + thickness, along = b - a;
-  const double length2 = std::max(glm::dot(along, along), 1e-9);
-  for (int y = std::max(int(lo.y), 0); y < std::min(int(hi.y) + 1, view.height); ++y)
-    for (int x = std::max(int(lo.x), 0); x < std::min(int(hi.x) + 1, view.width); ++x) {
+  const glm::dvec2 along = b - a;
+  const double length2 = std::max(glm::dot(along, along), 1e-9), length = std::sqrt(length2);
+  const double lo_y = std::min(a.y, b.y) - thickness, hi_y = std::max(a.y, b.y) + thickness;
+  const double lo_x = std::min(a.x, b.x) - thickness, hi_x = std::max(a.x, b.x) + thickness;
+  // In a row, only the pixels near where the line crosses it.
+  const double reach = std::abs(along.y) > 1e-6 * length ? thickness * length / std::abs(along.y) : hi_x - lo_x;
+  for (int y = std::max(int(lo_y), 0); y < std::min(int(hi_y) + 1, view.height); ++y) {
+    const double at = a.x + along.x * ((y + 0.5 - a.y) / (std::abs(along.y) > 1e-9 ? along.y : 1e-9));
+    const double from = std::max(lo_x, std::min(at - reach, hi_x)), to = std::min(hi_x, std::max(at + reach, lo_x));
+    for (int x = std::max(int(from), 0); x < std::min(int(to) + 1, view.width); ++x) {
       const glm::dvec2 p(x + 0.5, y + 0.5);
       const double t = within(glm::dot(p - a, along) / length2, 0.0, 1.0);
       if (glm::distance(p, a + t * along) <= thickness / 2)
         view.colour[size_t(y) * size_t(view.width) + size_t(x)] = colour;
     }
+  }
 }
-
-std::string numbers(const glm::dvec3& v) {
-  return fmt::format("{:.6g}  {:.6g}  {:.6g}", v.x + 0.0, v.y + 0.0, v.z + 0.0);
-}
-
-}  // namespace
 
 image::View axes_picture(const geometry::Camera& camera, const SceneTerms& terms, int side) {
   image::Canvas canvas(side, side, kGround);
@@ -56,7 +58,7 @@ image::View axes_picture(const geometry::Camera& camera, const SceneTerms& terms
     draw_line(out, middle, end, side / 16.0 + 2, kRim);
     draw_line(out, middle, end, side / 16.0, kAxes[axis]);
     image::Canvas letter(image::kGlyphWidth * scale, image::kGlyphHeight * scale, 0);
-    letter.text(0, 0, std::string(1, "xyz"[axis]), kInk, scale);
+    letter.text(0, 0, std::string(1, scene::axis_letters(terms.placement.coordinates.space)[axis]), kInk, scale);
     const glm::dvec2 at = middle + (reach + side * 0.08) * glm::dvec2(d.x, -d.y);
     image::blend(out, letter.view(), int(at.x) - image::kGlyphWidth * scale / 2,
                  int(at.y) - image::kGlyphHeight * scale / 2);
@@ -71,14 +73,15 @@ double middle_depth_m(const geometry::Camera& camera, const geometry::Box& box_r
 
 std::optional<ScaleBar> scale_bar(const geometry::Camera& camera, const SceneTerms& terms, double depth_m, int width) {
   if (!(depth_m > camera.near_m) || width < 1) return std::nullopt;
-  const double units_a_pixel = depth_m / camera.focal_x() * (terms.placed ? terms.placement.units_per_metre() : 1);
+  const glm::dvec3 right = camera.pose.orientation * glm::dvec3(depth_m / camera.focal_x(), 0, 0);
+  const double units_a_pixel = terms.placement.length_of(right);
   const double most = units_a_pixel * width;
   if (!(most > 0) || !std::isfinite(most)) return std::nullopt;
   const double power = std::pow(10, std::floor(std::log10(most)));
   double length = power;
   for (const double factor : {2.0, 5.0})
     if (factor * power <= most) length = factor * power;
-  return ScaleBar{length, length / units_a_pixel, length_text(length, terms.placement.unit)};
+  return ScaleBar{length, length / units_a_pixel, scene::length_text(length, terms.placement.unit)};
 }
 
 image::View scale_picture(const ScaleBar& bar, int scale) {
@@ -93,13 +96,10 @@ image::View scale_picture(const ScaleBar& bar, int scale) {
   return out;
 }
 
-std::vector<std::string> cursor_lines(const std::optional<PickedPlace>& place, const SceneTerms& terms) {
+std::vector<std::string> cursor_lines(const std::optional<scene::ToldPlace>& place, const SceneTerms& terms) {
   if (!place) return {"nothing under the cursor"};
-  std::vector<std::string> out{numbers(place->data) + (terms.placement.unit.empty() ? "" : " " + terms.placement.unit)};
-  if (place->value && terms.colouring)
-    out.push_back(fmt::format("{} {:.4g} +- {:.1g}{}", terms.colouring->array,
-                              (place->value->lo + place->value->hi) / 2, (place->value->hi - place->value->lo) / 2,
-                              terms.colouring->unit.empty() ? "" : " " + terms.colouring->unit));
+  std::vector<std::string> out{scene::place_text(terms.placement, place->data)};
+  if (std::string value = scene::value_text(*place); !value.empty()) out.push_back(std::move(value));
   return out;
 }
 

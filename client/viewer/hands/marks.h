@@ -26,8 +26,11 @@ std::optional<ScaleBar> scale_bar(const geometry::Camera& camera, const SceneTer
 /// scale: pixels a side of a letter's dot.
 image::View scale_picture(const ScaleBar& bar, int scale);
 
+/// A line of `thickness` pixels: those whose centres lie within half of it get the colour.
+void draw_line(image::View& view, glm::dvec2 a, glm::dvec2 b, double thickness, uint32_t colour);
+
 /// What lies under the cursor, a line each; without a pick one that says so.
-std::vector<std::string> cursor_lines(const std::optional<PickedPlace>& place, const SceneTerms& terms);
+std::vector<std::string> cursor_lines(const std::optional<scene::ToldPlace>& place, const SceneTerms& terms);
 
 /// Depth of the middle of a box along the camera's axis, metres.
 double middle_depth_m(const geometry::Camera& camera, const geometry::Box& box_room);

@@ -1,20 +1,13 @@
 #include "client/viewer/hands/meaning.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <glm/geometric.hpp>
-#include <glm/trigonometric.hpp>
-#include <nlohmann/json.hpp>
 
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // A colour that is farther from all of a map's is none of them: the largest difference of a channel.
 constexpr int kNearColour = 3;
@@ -25,8 +18,6 @@ int difference(uint32_t a, uint32_t b) {
   return out;
 }
 
-Json numbers(const glm::dvec3& v) { return {v.x + 0.0, v.y + 0.0, v.z + 0.0}; }
-
 }  // namespace
 
 SceneTerms terms_of(const wire::Welcome& session) {
@@ -34,7 +25,6 @@ SceneTerms terms_of(const wire::Welcome& session) {
   SceneTerms out;
   if (const auto placement = scene::placement_from_text(view.fact(scene::kPlacementFact))) {
     out.placement = *placement;
-    out.placed = true;
   } else {
     out.placement.unit = "m";
   }
@@ -61,46 +51,18 @@ std::optional<ValueRange> value_of_colour(const scene::Colouring& colouring, uin
   return ValueRange{colouring.lo + first * step, colouring.lo + (last + 1) * step};
 }
 
-PickedPlace meaning_of(const Pick& pick, const SceneTerms& terms) {
-  PickedPlace out{.room = pick.position_room,
-                  .data = terms.placed ? terms.placement.to_data(pick.position_room) : pick.position_room,
-                  .pick = pick,
-                  .value = std::nullopt};
-  if (terms.colouring) out.value = value_of_colour(*terms.colouring, pick.colour);
-  return out;
-}
-
-nlohmann::ordered_json to_json(const PickedPlace& place, const SceneTerms& terms) {
-  Json out{{"room", numbers(place.room)},
-           {"data", numbers(place.data)},
-           {"unit", terms.placement.unit},
-           {"colour", fmt::format("#{:06x}", place.pick.colour)},
-           {"depth_m", place.pick.depth_m},
-           {"error_m", place.pick.error_m},
-           {"error", place.pick.error_m * (terms.placed ? terms.placement.units_per_metre() : 1)}};
-  if (glm::length(place.pick.normal_room) > 0)
-    out["normal"] =
-        numbers(terms.placed ? terms.placement.direction_to_data(place.pick.normal_room) : place.pick.normal_room);
+scene::ToldPlace meaning_of(const Pick& pick, const SceneTerms& terms) {
+  scene::ToldPlace out{.room = pick.position_room, .data = terms.placement.to_data(pick.position_room)};
+  out.estimate = "from what the viewer shows";
+  if (glm::length(pick.normal_room) > 0) out.normal_data = terms.placement.direction_to_data(pick.normal_room);
   if (!terms.colouring) return out;
-  out["array"] = terms.colouring->array;
-  out["array_unit"] = terms.colouring->unit;
-  out["value"] = place.value ? Json((place.value->lo + place.value->hi) / 2) : Json();
-  if (place.value) out["value_error"] = (place.value->hi - place.value->lo) / 2;
+  out.array = terms.colouring->array, out.array_unit = terms.colouring->unit;
+  if (const auto range = value_of_colour(*terms.colouring, pick.colour)) out.value = (range->lo + range->hi) / 2;
   return out;
 }
 
-Measured measure(std::span<const PickedPlace> places, const SceneTerms& terms) {
-  Measured out{.distances = {}, .angle_deg = std::nullopt, .unit = terms.placement.unit};
-  for (size_t i = 1; i < places.size(); ++i) out.distances.push_back(glm::distance(places[i - 1].data, places[i].data));
-  if (places.size() != 3) return out;
-  const glm::dvec3 a = places[0].data - places[1].data, b = places[2].data - places[1].data;
-  if (glm::length(a) > 0 && glm::length(b) > 0)
-    out.angle_deg = glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
-  return out;
-}
-
-std::string length_text(double length, const std::string& unit) {
-  return fmt::format("{:.4g}{}{}", length, unit.empty() ? "" : " ", unit);
+scene::Probe probe_of(const Pick& pick, EpochId epoch, double opacity) {
+  return {epoch, pick.origin_room, pick.direction_room, opacity};
 }
 
 }  // namespace telesplat::viewer

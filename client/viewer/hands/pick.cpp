@@ -103,6 +103,11 @@ Depths depths_of(const volume::VolumeFrame& frame, const volume::Layer& layer, c
   return {std::max(std::min(a, b), 0.0), std::max(a, b)};
 }
 
+void set_ray(Pick& pick, const geometry::Camera& camera, double x_pix, double y_pix) {
+  pick.origin_room = camera.unproject(x_pix, y_pix, camera.near_m);
+  pick.direction_room = glm::normalize(camera.unproject(x_pix, y_pix, 1) - camera.pose.position_room);
+}
+
 }  // namespace
 
 geometry::Camera pick_camera(const geometry::Camera& camera, double x_pix, double y_pix) {
@@ -127,7 +132,8 @@ std::optional<Pick> pick_point(const splat::DrawList& list, const geometry::Came
   out.position_room = camera.unproject(x_pix, y_pix, out.depth_m);
   out.normal_room = best->normal_room;
   out.colour = best->colour;
-  out.error_m = best->radius_m;
+  out.spacing_m = best->radius_m;
+  set_ray(out, camera, x_pix, y_pix);
   return out;
 }
 
@@ -153,7 +159,8 @@ std::optional<Pick> pick_volume(const volume::VolumeFrame& frame, const geometry
     out.depth_m = std::max(depths.near_m + share * (depths.far_m - depths.near_m), camera.near_m);
     out.position_room = camera.unproject(x_pix, y_pix, out.depth_m);
     out.colour = packed(sum);
-    out.error_m = (depths.far_m - depths.near_m) / 2;
+    out.spacing_m = (depths.far_m - depths.near_m) / 2;
+    set_ray(out, camera, x_pix, y_pix);
     return out;
   }
   return std::nullopt;

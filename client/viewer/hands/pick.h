@@ -17,7 +17,8 @@ struct Pick {
   glm::dvec3 normal_room{0.0};  ///< towards the eye, unit length; zero: a volume has none
   uint32_t colour = 0;          ///< 0x00RRGGBB, without light; of a volume, of all in front of the place
   double depth_m = 0;           ///< along the camera's axis
-  double error_m = 0;           ///< how far off the depth may be: the samples' distance, half a layer
+  double spacing_m = 0;         ///< how far samples lie apart there, half a layer: no bound of how exact it is
+  glm::dvec3 origin_room{0.0}, direction_room{0.0, 0.0, -1.0};  ///< of the pixel's ray, from the near plane on
 };
 
 /// The surface at a continuous pixel position, pixel centres at + 0.5. Of the points drawn there the nearest surface

@@ -31,7 +31,7 @@ constexpr HelpLine kHelp[] = {
     {"[1] [2] [3] [4]", "splats: square, disc, ellipse, ewa (not of volumes)"},
     {"[5] [6] [7]", "finish: fill pin-holes, smooth, antialias (not of volumes)"},
     {"[8]", "shading on, off (not of volumes)"},
-    {"[X]", "what lies under the cursor; of the last two picks the distance, of three the angle"},
+    {"[X]", "measure the place under the cursor: value, distance from the one before, angle"},
     {"[B], [N]", "keep a bookmark of this view beside the data set; go to the next bookmark"},
     {"[I]", "show, hide axes, scale, cursor and frame rate"},
     {"[P], F12", "screenshot, into images/ of the run folder or the current folder"},

@@ -223,13 +223,14 @@ Result<TransferFunction> resolve_transfer(const std::string& text, const ValueRa
   return word.find(':') == word.npos ? transfer_preset(word, range) : parse_transfer(word, range);
 }
 
+float extinction(float opacity) { return opacity >= kLeastOpacity ? -std::log1p(-std::min(opacity, kMaxOpacity)) : 0; }
+
 std::vector<LevelColour> level_colours(const TransferFunction& transfer, const Levels& levels) {
   std::vector<LevelColour> out(size_t(levels.count));
   for (int l = 0; l < levels.count; ++l) {
     const auto p = transfer.at(levels.value(l));
     LevelColour& colour = out[size_t(l)];
-    colour = {p.r, p.g, p.b, 0};
-    if (p.opacity >= kLeastOpacity) colour.extinction = -std::log1p(-std::min(p.opacity, kMaxOpacity));
+    colour = {p.r, p.g, p.b, extinction(p.opacity)};
   }
   return out;
 }

@@ -82,6 +82,8 @@ struct LevelColour {
 inline constexpr float kMaxOpacity = 0.9999f;
 inline constexpr float kLeastOpacity =
     1e-4f;  ///< 256 voxels of it behind one another hide 2.5 % of what is behind them
+/// LevelColour::extinction of an opacity.
+float extinction(float opacity);
 std::vector<LevelColour> level_colours(const TransferFunction& transfer, const Levels& levels);
 
 }  // namespace telesplat::volume

@@ -79,6 +79,9 @@ Result<Mesh> elevation_mesh(const ElevationRaster& raster, const ElevationOption
 
   Mesh mesh;
   mesh.format = "raster";
+  mesh.coordinates = raster.coordinates;
+  mesh.coordinates.shown.z = z_scale;
+  if (!raster.georeferenced) mesh.coordinates.lengths.z = z_scale;  // heights and pixels have no common unit
   std::vector<uint32_t> vertex(w * h, ~uint32_t{0});
   const float land = std::max(relief.land_hi - relief.land_lo, 1e-6f);
   for (size_t y = 0; y < h; ++y)

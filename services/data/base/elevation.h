@@ -17,10 +17,11 @@ inline constexpr int64_t kMaxRasterSamples = int64_t{1} << 26;  ///< vertices; l
 struct ElevationRaster {
   int width = 0, height = 0;
   double x0 = 0, y0 = 0, dx = 1, dy = 1;
-  bool georeferenced = false;     ///< dx, dy and heights have one unit
-  int step = 1;                   ///< every step-th sample of the file
-  std::vector<float> heights;     ///< row by row from the north, metres; NaN: no data
-  std::vector<uint32_t> colours;  ///< of a texture, 0x00RRGGBB, one a sample; empty: none
+  bool georeferenced = false;      ///< dx, dy and heights have one unit
+  scene::Coordinates coordinates;  ///< of the file, without z_scale
+  int step = 1;                    ///< every step-th sample of the file
+  std::vector<float> heights;      ///< row by row from the north, metres; NaN: no data
+  std::vector<uint32_t> colours;   ///< of a texture, 0x00RRGGBB, one a sample; empty: none
 };
 
 /// Two triangles a cell whose four corners have data, one where three have. x east, y north, z up. Colours are the

@@ -10,6 +10,7 @@
 #include "common/core/result.h"
 #include "common/geometry/box.h"
 #include "common/scene/arrays.h"
+#include "common/scene/placement.h"
 
 namespace telesplat::data {
 
@@ -33,6 +34,8 @@ struct Mesh {
   /// What is placed in the room instead of the mesh's own box: of a surface, the grid of its volume, so that both stand
   /// at one place and are equally large.
   std::optional<geometry::DBox> frame;
+  /// How positions are made from the file's coordinates, and what these are.
+  scene::Coordinates coordinates;
 };
 
 /// What every reader promises and validate_mesh checks: at least one triangle, no more than kMaxTriangles, every index

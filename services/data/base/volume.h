@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/geometry/box.h"
+#include "common/scene/placement.h"
 
 namespace telesplat::data {
 
@@ -20,6 +21,7 @@ struct Volume {
   std::array<int, 3> size{};
   glm::dmat4 index_to_data{1.0};  ///< spacing, orientation and origin, in the file's own units and axes; affine
   std::string unit;               ///< of these: "mm", "m", ...; empty: the file does not say
+  scene::Space space = scene::Space::kPlain;  ///< of these axes
   VoxelType type = VoxelType::kU8;
   double scale = 1, offset = 0;  ///< value = stored * scale + offset (a CT's rescale, NIfTI's scl_slope)
   /// i fastest, then j, k; native byte order; size[0] * size[1] * size[2] * voxel_bytes(type) bytes.

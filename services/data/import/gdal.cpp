@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 
+#include "common/core/utf8.h"
 #include "services/data/base/elevation.h"
 #include "services/data/import/raster_facts.h"
 
@@ -41,7 +42,8 @@ Result<Dataset> open(const std::string& path, const char* what, const char* cons
 struct Placement {
   double transform[6] = {0, 1, 0, 0, 0, -1};  // corner of pixel (c, r): x = t0 + c t1 + r t2, y = t3 + c t4 + r t5
   bool georeferenced = false, degrees = false;
-  double metres = 1;  // a unit of length
+  bool south_up = false;  // the file's first row is the last one here
+  double metres = 1;      // a unit of length
 };
 
 Placement placement_of(GDALDatasetH dataset) {
@@ -50,6 +52,11 @@ Placement placement_of(GDALDatasetH dataset) {
   for (const double v : out.transform)
     if (!std::isfinite(v)) return {};
   if (out.transform[1] == 0 || out.transform[5] == 0) return {};
+  out.south_up = out.transform[5] > 0;
+  if (out.south_up) {
+    out.transform[3] += out.transform[5] * GDALGetRasterYSize(dataset);
+    out.transform[5] = -out.transform[5];
+  }
   if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
     out.georeferenced = true;
     out.degrees = OSRIsGeographic(reference);
@@ -62,6 +69,37 @@ Placement placement_of(GDALDatasetH dataset) {
         t[0] >= -180.1 && t[0] + w * t[1] <= 180.1 && t[3] <= 90.1 && t[3] + h * t[5] >= -90.1 && std::abs(t[1]) < 0.5;
     out.georeferenced = out.degrees;
   }
+  return out;
+}
+
+std::string line_of(const char* text) { return text ? std::string(text) : std::string(); }
+
+// What the file's coordinates are called, and how long one of each is in metres.
+scene::Coordinates coordinates_of(GDALDatasetH dataset, GDALRasterBandH band, const Placement& at,
+                                  const glm::dvec3& shown) {
+  scene::Coordinates out;
+  if (!at.georeferenced || at.transform[2] != 0 || at.transform[4] != 0) return out;
+  out.space = at.degrees ? scene::Space::kGeographic : scene::Space::kProjected;
+  out.shown = out.lengths = shown;
+  out.unit = at.degrees ? "degrees" : "m";
+  out.height_unit = "m";
+  if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
+    out.reference = line_of(OSRGetName(reference));
+    const std::string authority = line_of(OSRGetAuthorityName(reference, nullptr)),
+                      code = line_of(OSRGetAuthorityCode(reference, nullptr));
+    if (!authority.empty() && !code.empty()) out.reference = authority + ":" + code + " " + out.reference;
+    char* unit = nullptr;
+    OSRGetLinearUnits(reference, &unit);
+    if (!at.degrees && at.metres != 1 && unit) out.unit = unit;
+  }
+  // Heights are shown as they are; feet say so.
+  const std::string unit = line_of(GDALGetRasterUnitType(band));
+  if (!unit.empty() && unit != "metre" && unit != "meter") out.height_unit = unit;
+  for (const char* foot : {"ft", "foot", "feet", "US survey foot"})
+    if (unit == foot) out.lengths.z = 0.3048;
+  out.reference = to_utf8(out.reference.substr(0, scene::kMaxReference));
+  out.unit = to_utf8(out.unit.substr(0, scene::kMaxUnit));
+  out.height_unit = to_utf8(out.height_unit.substr(0, scene::kMaxUnit));
   return out;
 }
 
@@ -86,6 +124,7 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
       return Error{fmt::format("{}: cannot be read: {}", path, CPLGetLastErrorMsg())};
   }
   const Placement of = placement_of(image);
+  const bool upside_down = of.south_up != at.south_up;
   const bool by_place = of.georeferenced && at.georeferenced && of.degrees == at.degrees;
   raster.colours.resize(raster.heights.size());
   for (int y = 0; y < raster.height; ++y)
@@ -97,7 +136,9 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
         fx = (t[0] + column * t[1] - of.transform[0]) / (of.transform[1] * w);
         fy = (t[3] + row * t[5] - of.transform[3]) / (of.transform[5] * h);
       }
-      const auto i = size_t(std::clamp(int(fx * tw), 0, tw - 1)), j = size_t(std::clamp(int(fy * th), 0, th - 1));
+      const auto i = size_t(std::clamp(int(fx * tw), 0, tw - 1));
+      const int down = std::clamp(int(fy * th), 0, th - 1);
+      const auto j = size_t((by_place ? of.south_up : upside_down) ? th - 1 - down : down);
       const uint8_t* texel = &texels[3 * (j * size_t(tw) + i)];
       const bool inside = fx >= 0 && fx < 1 && fy >= 0 && fy < 1;
       raster.colours[size_t(y) * size_t(raster.width) + size_t(x)] =
@@ -143,12 +184,14 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
   out.height = (h + out.step - 1) / out.step;
   out.heights.resize(size_t(out.width) * size_t(out.height));
   std::vector<float> row(size_t(w), 0.0f);
+  const Placement at = placement_of(dataset);
   int has_none = 0, has_scale = 0, has_offset = 0;
   const double none = GDALGetRasterNoDataValue(band, &has_none);
   const double scale = GDALGetRasterScale(band, &has_scale), offset = GDALGetRasterOffset(band, &has_offset);
   for (int y = 0; y < out.height; ++y) {
-    if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
-      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, CPLGetLastErrorMsg())};
+    const int from = at.south_up ? h - 1 - y * out.step : y * out.step;
+    if (GDALRasterIO(band, GF_Read, 0, from, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
+      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, from, h, CPLGetLastErrorMsg())};
     for (int x = 0; x < out.width; ++x) {
       float v = row[size_t(x) * size_t(out.step)];
       // -32768 and -9999 are what void samples usually have, said or not.
@@ -160,7 +203,6 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
     }
   }
 
-  const Placement at = placement_of(dataset);
   const double* t = at.transform;
   double east = at.metres, north = at.metres;  // metres a unit
   if (at.degrees) {
@@ -169,10 +211,12 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
     north = 110'574;
   }
   out.georeferenced = at.georeferenced;
+  // A sample stands in the middle of its pixel.
   out.dx = std::abs(t[1]) * east * out.step;
   out.dy = std::abs(t[5]) * north * out.step;
-  out.x0 = t[0] * east;
-  out.y0 = t[3] * north;
+  out.x0 = (t[0] + t[1] / 2) * east;
+  out.y0 = (t[3] + t[5] / 2) * north;
+  out.coordinates = coordinates_of(dataset, band, at, {east, north, 1});
   if (!texture.empty())
     if (const Status s = drape(texture, at, w, h, out); !s) return s.error();
   return out;

@@ -12,15 +12,18 @@
 namespace telesplat::data {
 namespace {
 
+constexpr size_t kMaxCoordinates = 2000;  // bytes of their text
+
 // At the start of the file; then follow the error's text or the mesh.
 struct Report {
   uint64_t text_bytes = 0;  // of an error; 0: a mesh follows
   uint64_t vertices = 0, triangles = 0, degenerate = 0;
   uint32_t normals = 0, colours = 0;
-  uint64_t scalars = 0;       // as many as there are
-  uint32_t of_faces = 0;      // scalars are one a triangle
-  uint32_t arrays_bytes = 0;  // scene::to_text() of the arrays
-  uint64_t notes_bytes = 0;   // each ends with a line's end
+  uint64_t scalars = 0;            // as many as there are
+  uint32_t of_faces = 0;           // scalars are one a triangle
+  uint32_t arrays_bytes = 0;       // scene::to_text() of the arrays
+  uint64_t notes_bytes = 0;        // each ends with a line's end
+  uint64_t coordinates_bytes = 0;  // scene::to_text() of them
 };
 
 bool write_all(int descriptor, const void* data, size_t bytes) {
@@ -54,6 +57,7 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
   }
   const Mesh& mesh = *result;
   const std::string arrays = mesh.arrays.empty() ? "" : scene::to_text(mesh.arrays);
+  const std::string coordinates = scene::to_text(mesh.coordinates);
   std::string notes;
   for (const auto& note : mesh.notes) notes += note + "\n";
   report = {0,
@@ -65,12 +69,13 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
             mesh.scalars.size(),
             mesh.scalars_of_faces,
             static_cast<uint32_t>(arrays.size()),
-            notes.size()};
+            notes.size(),
+            coordinates.size()};
   const auto put = [&](const auto& array) {
     return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
   };
   return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) &&
-         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(arrays) && put(notes);
+         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(arrays) && put(notes) && put(coordinates);
 }
 
 Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format) {
@@ -104,6 +109,12 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
     mesh.notes.emplace_back(begin, end);
     begin = end == notes.end() ? end : end + 1;
   }
+  std::vector<char> coordinates;
+  if (report.coordinates_bytes > kMaxCoordinates || !take(rest, report.coordinates_bytes, coordinates))
+    return incomplete;
+  auto read = scene::coordinates_from_text({coordinates.data(), coordinates.size()});
+  if (!read) return Error{fmt::format("{}: {}", path, read.error().text)};
+  mesh.coordinates = *std::move(read);
   return mesh;
 }
 

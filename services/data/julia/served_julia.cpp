@@ -2,14 +2,47 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <glm/geometric.hpp>
+
 #include "common/core/clock.h"
+#include "common/julia/distance.h"
 #include "common/options/table.h"
 #include "common/scene/placement.h"
+#include "common/scene/probe.h"
+#include "services/data/base/epochs.h"
 
 namespace telesplat::data {
 namespace {
 
 constexpr double kQuiet_s = 2;  // what takes longer tells how far it is
+
+// A ray's first place of which the orbit does not escape, between two places that are a millionth of the box apart.
+// Steps are half of the distance that is estimated, as estimates near thin parts are too large (distance.h).
+// Nothing: there is none within `most` steps.
+std::optional<scene::Probed> cast(const julia::Parameters& parameters, const julia::Placement& placement,
+                                  const geometry::Clip& clip, const scene::Probe& probe) {
+  constexpr int kMost = 200'000;
+  const auto kept = clip.stretch(probe.origin_room, probe.direction_room);
+  double at = std::max(kept.begin, 0.0), end = kept.end;
+  const glm::dvec3 lo(placement.box_room.lo), hi(placement.box_room.hi);
+  for (int a = 0; a < 3; ++a) {
+    const double on = probe.direction_room[a], near = (lo[a] - probe.origin_room[a]) / on,
+                 far = (hi[a] - probe.origin_room[a]) / on;
+    if (on == 0 && (probe.origin_room[a] < lo[a] || probe.origin_room[a] > hi[a])) return std::nullopt;
+    if (on != 0) at = std::max(at, std::min(near, far)), end = std::min(end, std::max(near, far));
+  }
+  const double least_m = 1e-6 * glm::length(hi - lo);
+  const julia::Slice slice = julia::slice(parameters);
+  for (int n = 0; n < kMost && at <= end; ++n) {
+    const glm::dvec3 room = probe.origin_room + at * probe.direction_room;
+    const double distance =
+        julia::distance_estimate(parameters, slice, room / placement.scale + placement.centre) * placement.scale;
+    if (distance <= 0) return scene::Probed{.room = room, .error_m = least_m};
+    at += std::max(distance / 2, least_m);
+  }
+  return std::nullopt;
+}
 
 class ServedJulia final : public Served {
  public:
@@ -36,6 +69,22 @@ class ServedJulia final : public Served {
     placement.data_to_room[3] = glm::dvec4(-placement_.centre * placement_.scale, 1);
     hello.facts[scene::kPlacementFact] = scene::to_text(placement);
   }
+  Status follow(const wire::Welcome& session) override {
+    epochs_.keep(session);
+    return ok_status();
+  }
+  Result<std::optional<std::string>> carry_out(const wire::Order& order) override {
+    if (order.command != "probe") return Served::carry_out(order);
+    const auto probe = scene::probe_from(order.arguments);
+    if (!probe) return probe.error();
+    const Epochs::Scene* shown = epochs_.find(probe->epoch);
+    if (!shown) return Error{"probe: that epoch is over"};
+    const auto parameters = julia::from_map(shown->parameters);
+    if (!parameters) return parameters.error();
+    const auto found = cast(*parameters, placement_, shown->clip, *probe);
+    if (!found) return Error{"probe: the ray does not meet the set"};
+    return std::optional(scene::to_text(*found));
+  }
   std::string record() const override {
     std::string out = fmt::format("\n[scene]\nkind = \"{}\"\ntitle = {}\nroom_size = {}\n", scene::name_of(kind()),
                                   options::quoted(scene_.title), room_size_m_);
@@ -52,6 +101,7 @@ class ServedJulia final : public Served {
   const julia::Scene scene_;
   const julia::Placement placement_;
   const double room_size_m_;
+  Epochs epochs_;
 };
 
 }  // namespace

@@ -10,8 +10,10 @@
 #include "common/net/dispatch.h"
 #include "common/scene/placement.h"
 #include "common/scene/session.h"
+#include "services/data/base/epochs.h"
 #include "services/data/base/placement_options.h"
 #include "services/data/mesh/array_stores.h"
+#include "services/data/mesh/cast.h"
 
 namespace telesplat::data {
 namespace {
@@ -84,7 +86,7 @@ class ServedMesh final : public Served {
     if (as_begun_) hello.facts[scene::kColouringFact] = scene::to_text(*as_begun_);
     hello.facts[scene::kColourMapFact] = colour::to_text(map_);
     if (const auto rotation = rotation_for_up(info.up); rotation && !info.box_data.empty())
-      hello.facts[scene::kPlacementFact] = scene::to_text(scene::placement_of(*rotation, info.box_data, info.box_room));
+      hello.facts[scene::kPlacementFact] = scene::to_text(placement_of(*rotation));
     hello.box_room = info.box_room;
   }
   Requests requests() const override { return {"chunks", kAnswersWaiting}; }
@@ -92,6 +94,7 @@ class ServedMesh final : public Served {
   // The session may want other colours than it began with: by order of the master, or because another data server that
   // was here before had them.
   Status follow(const wire::Welcome& session) override {
+    epochs_.keep(session);
     const scene::SessionView view(session);
     const std::string order = view.fact(scene::kArrayOrderFact);
     if (std::exchange(master_, session.master) != session.master) order_.clear();  // another one counts from 1 again
@@ -118,6 +121,27 @@ class ServedMesh final : public Served {
       if (store) outlets.requests.send(reply(request, *store), message.peer);
     });
   }
+  Result<std::optional<std::string>> carry_out(const wire::Order& order) override {
+    if (order.command != "probe") return Served::carry_out(order);
+    const auto probe = scene::probe_from(order.arguments);
+    if (!probe) return probe.error();
+    const Epochs::Scene* shown = epochs_.find(probe->epoch);
+    if (!shown) return Error{"probe: that epoch is over"};
+    scene::Colouring colouring;
+    if (!shown->colouring.empty()) {
+      auto read = scene::colouring_from_text(shown->colouring);
+      if (!read) return read.error();
+      colouring = *std::move(read);
+    }
+    const MeshStore* store = stores_.find(colouring.array);
+    if (!store) return Error{fmt::format("probe: the array {} is being read", colouring.array)};
+    const auto choice = scene::choose_array(store->info().arrays, colouring.array);
+    const bool of_cells = !colouring.array.empty() && choice && store->info().arrays[choice->index].of_cells;
+    auto found = cast(*store, *probe, shown->clip, colouring.origin, of_cells);
+    if (!found) return Error{"probe: no triangle lies there"};
+    if (!colouring.array.empty()) found->array = colouring.array, found->array_unit = colouring.unit;
+    return std::optional(scene::to_text(*found));
+  }
   void send_finished(const Outlets&) override {
     const auto opened = stores_.take_opened();
     if (!opened) return;
@@ -140,6 +164,15 @@ class ServedMesh final : public Served {
     const bool exists = request.chunk.value < store.chunks().size();
     return {request.epoch, request.chunk, exists ? store.chunk(request.chunk).bytes : wire::Bytes{}};
   }
+  scene::Placement placement_of(const glm::dmat3& rotation) const {
+    const MeshStoreInfo& info = store_->info();
+    auto out = scene::placement_of(rotation, info.box_data, info.box_room, info.coordinates);
+    const scene::Space space = info.coordinates.space;
+    const bool metres =
+        space == scene::Space::kGeographic || space == scene::Space::kProjected || info.format == "gltf";
+    out.unit = metres ? "m" : info.coordinates.unit;
+    return out;
+  }
   // Of the order "N ARRAY".
   std::string order_number() const { return order_.substr(0, order_.find(' ')); }
   std::string ordered_array() const {
@@ -154,6 +187,7 @@ class ServedMesh final : public Served {
   const std::optional<double> iso_;
   ArrayStores stores_;
   ListLimit lists_;
+  Epochs epochs_;
   InstanceId master_;
   std::string order_, shown_, answer_;
 };

@@ -62,6 +62,7 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.content_hash = source.hash;
   info.arrays = mesh->arrays;
   info.array = source.array;
+  info.coordinates = mesh->coordinates;
   progress(kPlacing, 0.0);
   const auto placed = place_mesh(std::move(*mesh), options.room_size_m, options.up, path);
   if (!placed) return placed.error();

@@ -22,7 +22,8 @@ struct MeshStoreInfo {
   bool had_normals = false, had_colours = false;
   std::vector<scene::ArrayInfo> arrays;  ///< that the file holds
   std::string array;                     ///< of which chunks have the values in place of colours; empty: none
-  geometry::DBox box_data;               ///< in the file's own units
+  geometry::DBox box_data;               ///< as it is shown: the file's coordinates times coordinates.shown
+  scene::Coordinates coordinates;
   geometry::Box box_room;
   std::string up;         ///< the axis chosen
   std::string up_reason;  ///< why, in a few words

@@ -28,6 +28,7 @@ struct StoreHeader {
   float room_lo[3] = {}, room_hi[3] = {};
   char format[16] = {}, up[8] = {}, up_reason[64] = {};
   char array[512] = {};
+  char coordinates[1600] = {};  ///< scene::to_text()
   uint64_t arrays_offset = 0, arrays_bytes = 0;
   uint64_t checksum = 0;  ///< of all the above and the table of contents
 };
@@ -72,6 +73,7 @@ StoreHeader make_header(const MeshStoreInfo& info) {
   std::strncpy(h.up, info.up.c_str(), sizeof h.up - 1);
   std::strncpy(h.up_reason, info.up_reason.c_str(), sizeof h.up_reason - 1);
   std::strncpy(h.array, info.array.c_str(), sizeof h.array - 1);
+  std::strncpy(h.coordinates, scene::to_text(info.coordinates).c_str(), sizeof h.coordinates - 1);
   return h;
 }
 
@@ -163,6 +165,10 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
 
   StoreContent out{*mapped, info_of(header), {}, {}};
   out.info.arrays = *std::move(arrays);
+  auto coordinates =
+      scene::coordinates_from_text({header.coordinates, strnlen(header.coordinates, sizeof header.coordinates)});
+  if (!coordinates) return Error{fmt::format("{}: {}", name, coordinates.error().text)};
+  out.info.coordinates = *std::move(coordinates);
   for (size_t i = 0; i < entries.size(); ++i) {
     const StoreEntry& e = entries[i];
     if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)

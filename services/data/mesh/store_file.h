@@ -22,7 +22,7 @@ namespace telesplat::data {
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// Goes up whenever readers, placement or layout would make another file of the same mesh.
-inline constexpr uint32_t kStoreVersion = 5;
+inline constexpr uint32_t kStoreVersion = 6;
 
 /// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
 /// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages

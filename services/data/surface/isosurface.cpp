@@ -86,6 +86,8 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
   mesh->frame = volume.box();
   // The store keeps what other values a surface may have.
   mesh->arrays = {{.name = "value", .unit = {}, .spans = {{volume.lo, volume.hi}}}};
+  mesh->coordinates.space = volume.space;
+  mesh->coordinates.unit = volume.unit;
   return mesh;
 }
 

@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <glm/vec4.hpp>
 
 #include "common/core/log.h"
+#include "common/scene/clip_order.h"
 #include "common/scene/session.h"
 #include "common/wire/serial.h"
 
@@ -46,7 +44,10 @@ Status VolumeAnswers::follow(const wire::Welcome& welcome) {
   if (!(session->grid == session_.grid) || !(session->levels == session_.levels) || session->steps != session_.steps)
     return Error{"the session shows another volume"};
 
-  Epoch next{welcome.epoch, session->step, {}, volume::to_text(session->transfer)};
+  const auto clip = geometry::clip_from_text(scene::SessionView(welcome).fact(scene::kClipFact));
+  if (!clip) return clip.error();
+
+  Epoch next{welcome.epoch, session->step, {}, volume::to_text(session->transfer), session->transfer, *clip};
   const std::lock_guard lock(mutex_);
   if (welcome.master != master_) epochs_.clear();  // another one counts its own epochs
   master_ = welcome.master;
@@ -90,32 +91,19 @@ Result<std::optional<VolumeAnswers::Reply>> VolumeAnswers::ask(const std::string
 }
 
 Status VolumeAnswers::probe(const wire::Order& order) {
-  glm::dvec3 room;
-  for (const auto& [name, to] : {std::pair{"x", &room.x}, {"y", &room.y}, {"z", &room.z}}) {
-    const std::string text = scene::value_or(order.arguments, name, std::string());
-    const auto read = std::from_chars(text.data(), text.data() + text.size(), *to);
-    if (text.empty() || read.ec != std::errc() || read.ptr != text.data() + text.size() || !std::isfinite(*to))
-      return Error{fmt::format("probe: {} is \"{}\", not a number of metres in the room", name, text.substr(0, 40))};
-  }
-  const glm::dvec3 index(session_.grid.room_to_index() * glm::dvec4(room, 1));
-  const double k = std::floor(index.z + 0.5);
-  if (!(k >= begin_ && k < end_)) return Error{"probe: the place lies in no slice of the volume"};
+  const auto ray = scene::probe_from(order.arguments);
+  if (!ray) return ray.error();
   const std::lock_guard lock(mutex_);
+  const Epoch* const shown = epoch(ray->epoch);
+  if (!shown) return Error{"probe: that epoch is over"};
   if (probes_.size() >= kProbesWaiting) return Error{fmt::format("probe: {} wait already", probes_.size())};
-  probes_.push_back({order.number, epochs_.empty() ? session_.step : epochs_.back().step, index});
+  probes_.push_back({order.number, *ray, shown->step, shown->function, shown->clip});
   return ok_status();
 }
 
 VolumeAnswers::Reply VolumeAnswers::answer(const Probe& probe, InstanceId self) {
-  wire::OrderAnswer out{.instance = self, .number = probe.number};
-  const auto value = store_.value_at(probe.step, probe.index);
-  if (value && *value) {
-    out.ok = true;
-    out.text = fmt::format("{{\"value\":{},\"value_error\":{},\"step\":{},\"index\":[{},{},{}]}}", **value,
-                           session_.levels.step / 2, probe.step, probe.index.x, probe.index.y, probe.index.z);
-  } else {
-    out.text = value ? "probe: the place lies outside of the volume" : value.error().text;
-  }
+  const auto found = store_.cast(probe.step, probe.function, probe.clip, probe.ray);
+  const wire::OrderAnswer out{self, probe.number, found.ok(), found ? scene::to_text(*found) : found.error().text};
   return {{}, wire::OrderAnswer::kName, wire::encode(out)};
 }
 

@@ -42,8 +42,7 @@ class VolumeAnswers {
   /// Error: nonsense.
   Result<std::optional<Reply>> ask(const std::string& peer, const wire::VoxelRequest& request);
 
-  /// Queues the question for the value at a place in the room, of a step. Error: the place is no place, or lies in none
-  /// of this server's slices.
+  /// Queues the question what a ray meets. Error: it is no ray, the epoch is not known, too many wait.
   Status probe(const wire::Order& order);
 
   bool has_work() const;
@@ -57,6 +56,8 @@ class VolumeAnswers {
     int step = 0;
     volume::LevelSet shown;
     std::string transfer;
+    volume::TransferFunction function;
+    geometry::Clip clip;
     bool weights_due = true;
   };
   struct Waiting {
@@ -68,8 +69,10 @@ class VolumeAnswers {
   };
   struct Probe {
     uint64_t number;  // of the order
+    scene::Probe ray;
     int step;
-    glm::dvec3 index;
+    volume::TransferFunction function;
+    geometry::Clip clip;
   };
   Reply answer(const Probe& probe, InstanceId self);
   const Epoch* epoch(EpochId id) const;  // precondition: mutex_ is held

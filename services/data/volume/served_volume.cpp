@@ -97,12 +97,12 @@ class ServedVolume final : public Served {
     worker_->wake();
     return followed;
   }
-  std::optional<std::string> refuse(const wire::Order& order) override {
-    if (order.command != "probe") return Served::refuse(order);
+  Result<std::optional<std::string>> carry_out(const wire::Order& order) override {
+    if (order.command != "probe") return Served::carry_out(order);
     const Status queued = answers_.probe(order);
-    if (!queued) return queued.error().text;
+    if (!queued) return queued.error();
     worker_->wake();
-    return std::nullopt;
+    return std::optional<std::string>();
   }
   void answer(const net::Message& message, const Outlets& outlets) override {
     net::dispatch<wire::VoxelRequest>(outlets.requests, message, [&](const wire::VoxelRequest& request) {

@@ -73,21 +73,10 @@ std::vector<uint32_t> VolumeSlices::weights(const volume::LevelSet& wanted) cons
   return out;
 }
 
-double VolumeSlices::level_at(const glm::dvec3& index) const {
-  double out = 0;
-  const glm::dvec3 floor = glm::floor(index), part = index - floor;
-  for (int corner = 0; corner < 8; ++corner) {
-    double weight = 1;
-    size_t at[3];
-    for (int a = 0; a < 3; ++a) {
-      const int upper = corner >> a & 1, lo = a == 2 ? stored_begin_ : 0, hi = a == 2 ? stored_end_ : size_[size_t(a)];
-      weight *= upper ? part[a] : 1 - part[a];
-      at[a] = size_t(std::clamp(int(floor[a]) + upper, lo, hi - 1) - lo);
-    }
-    const size_t n = (at[2] * size_t(size_[1]) + at[1]) * size_t(size_[0]) + at[0];
-    out += weight * (levels_.narrow.empty() ? double(levels_.wide[n]) : double(levels_.narrow[n]));
-  }
-  return out;
+double VolumeSlices::level(int i, int j, int k) const {
+  const int held = std::clamp(k, stored_begin_, stored_end_ - 1) - stored_begin_;
+  const size_t n = (size_t(held) * size_t(size_[1]) + size_t(j)) * size_t(size_[0]) + size_t(i);
+  return levels_.narrow.empty() ? double(levels_.wide[n]) : double(levels_.narrow[n]);
 }
 
 template <class Level>

@@ -24,9 +24,8 @@ class VolumeSlices {
   /// gradient's direction in room space (towards lower values), by central differences, at the grid's faces by
   /// differences to one side; kNoNormal where the value changes by less than a 512th of all levels over Grid::unit_m().
   volume::Voxels voxels(int k_begin, int k_end, const volume::LevelSet& wanted) const;
-  /// The level between voxels, at index coordinates within half a voxel of this step's own slices: trilinear, beyond
-  /// the outermost centres that of the nearest.
-  double level_at(const glm::dvec3& index) const;
+  /// The level of a voxel of this step's own slices, or of one beside them.
+  double level(int i, int j, int k) const;
   /// How many those are, of each of this step's slices.
   std::vector<uint32_t> weights(const volume::LevelSet& wanted) const;
 

@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 #include <list>
 
+#include "services/data/volume/cast.h"
 #include "services/data/volume/slices.h"
 
 namespace telesplat::data {
@@ -79,6 +80,7 @@ class Store final : public VolumeStore {
     placement_ = {.data_to_room = *index_to_room * glm::inverse(first->index_to_data),
                   .box_data = first->box(),
                   .unit = first->unit};
+    placement_.coordinates.space = first->space;
     if (const Status valid = volume::validate(session_.grid); !valid) return refuse(valid.error());
     const auto part = read_part(options.part, first->size[2]);
     if (!part) return refuse(part.error());
@@ -136,13 +138,14 @@ class Store final : public VolumeStore {
     return (*slices)->voxels(begin, end, wanted);
   }
 
-  Result<std::optional<double>> value_at(int step, const glm::dvec3& index) override {
-    for (int a = 0; a < 3; ++a)
-      if (!(index[a] >= -0.5 && index[a] < session_.grid.size[size_t(a)] - 0.5)) return std::optional<double>();
-    if (const int k = int(std::floor(index.z + 0.5)); k < begin_ || k >= end_) return std::optional<double>();
+  Result<scene::Probed> cast(int step, const volume::TransferFunction& transfer, const geometry::Clip& clip,
+                             const scene::Probe& probe) override {
     const auto slices = step_of(step);
     if (!slices) return slices.error();
-    return std::optional(session_.levels.lo + (*slices)->level_at(index) * session_.levels.step);
+    auto found = data::cast(
+        session_, begin_, end_, [&](int i, int j, int k) { return (*slices)->level(i, j, k); }, transfer, clip, probe);
+    if (found && session_.range.hounsfield) found->array_unit = "HU";
+    return found;
   }
 
   Result<std::vector<uint32_t>> slice_weights(int step, const volume::LevelSet& shown) override {

@@ -7,7 +7,9 @@
 #include <optional>
 #include <string>
 
+#include "common/geometry/clip.h"
 #include "common/scene/placement.h"
+#include "common/scene/probe.h"
 #include "common/volume/histogram.h"
 #include "common/volume/session.h"
 #include "common/volume/voxels.h"
@@ -49,9 +51,9 @@ class VolumeStore {
   /// a step that cannot be read.
   virtual Result<volume::Voxels> voxels(int step, int k_begin, int k_end, const volume::LevelSet& shown,
                                         const volume::LevelSet& have) = 0;
-  /// The value at a place, in the data's units, between voxels interpolated; as exact as levels are (Levels::step).
-  /// Nothing: the place lies outside the volume, or in a slice of another part. Error: as voxels().
-  virtual Result<std::optional<double>> value_at(int step, const glm::dvec3& index) = 0;
+  /// Where a ray meets enough of a step, by its voxels: cast.h. Error: as there, and as voxels().
+  virtual Result<scene::Probed> cast(int step, const volume::TransferFunction& transfer, const geometry::Clip& clip,
+                                     const scene::Probe& probe) = 0;
   /// Visible voxels of every slice of this part, for a set of levels. Error: as voxels().
   virtual Result<std::vector<uint32_t>> slice_weights(int step, const volume::LevelSet& shown) = 0;
 };

@@ -64,6 +64,7 @@ Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadPr
     if (!streamed) return streamed.error();
     streamed->header.format = header->format;
     streamed->header.unit = header->unit;
+    streamed->header.space = header->space;
     // What VTK found must be a grid too; the header of its own format says only part of it.
     if (auto status = check_header(streamed->header, streamed->bytes.size(), path); !status) return status.error();
     return make_volume(streamed->header, std::move(streamed->bytes), path);

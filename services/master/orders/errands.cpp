@@ -71,7 +71,7 @@ std::vector<Errands::Reply> Errands::overdue(double now_s) {
 }
 
 std::string errand_for(const std::string& command) {
-  for (const char* of_viewer : {"pick", "where", "go"})
+  for (const char* of_viewer : {"pick", "where", "go", "measure"})
     if (command == of_viewer) return "viewer";
   if (command == "probe") return "data";
   const auto* setting = scene::setting_of_order(command);

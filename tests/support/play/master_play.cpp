@@ -24,9 +24,9 @@ constexpr size_t kMostMessages = 2000, kMostBytes = 64u << 20;
 const std::array<std::string, kPeers> kPeerIds{"a", "b", "c", "d", "e", "f", "g", "h"};
 const std::array<std::string, 6> kRoles{"data", "sampler", "packer", "viewer", "ctl", "tourist"};
 const std::array<std::string, 3> kKinds{"mesh", "julia", "volume"};
-const std::array<std::string, 20> kCommands{"status",   "stop", "epoch",      "set",   "animate", "tf",      "colour",
-                                            "clip",     "play", "pick",       "where", "go",      "overlay", "probe",
-                                            "coupling", "",     "frobnicate", "set",   "play",    "epoch"};
+const std::array<std::string, 21> kCommands{
+    "status", "stop",    "epoch",   "set",   "animate",  "tf", "colour",     "clip", "play", "pick", "where",
+    "go",     "overlay", "measure", "probe", "coupling", "",   "frobnicate", "set",  "play", "epoch"};
 
 volume::Session volume_session(int part, int parts) {
   volume::Session s;

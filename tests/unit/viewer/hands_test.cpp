@@ -99,7 +99,7 @@ TEST(Picking, FindsTheSurfaceUnderEachPixel) {
       EXPECT_NEAR(found->depth_m, truth->depth, 1.5e-3) << x << "," << y;
       EXPECT_LT(glm::distance(found->position_room, truth->position), 2e-3);
       EXPECT_GT(glm::dot(found->normal_room, truth->normal), 0.98);
-      EXPECT_LT(std::abs(found->depth_m - truth->depth), 3 * found->error_m) << "as exact as it says";
+      EXPECT_LT(std::abs(found->depth_m - truth->depth), 3 * found->spacing_m) << "as exact as it says";
     }
   EXPECT_GT(picked, 500);
   EXPECT_GT(missed, 500);
@@ -190,7 +190,7 @@ TEST(Picking, OfAVolumeGoesToWhereItHidesEnough) {
   ASSERT_TRUE(wall);
   EXPECT_GE(wall->position_room.z, -0.5);
   EXPECT_LE(wall->position_room.z, 7.5);
-  EXPECT_NEAR(wall->error_m, 4, 0.01) << "half of the layer";
+  EXPECT_NEAR(wall->spacing_m, 4, 0.01) << "half of the layer";
   EXPECT_LT(veil->depth_m, wall->depth_m);
 
   const std::vector<volume::SliceImage> thin{plain(0, 0x1a1a0000)};
@@ -223,39 +223,11 @@ TEST(Values, AreFoundByTheirColours) {
 
 SceneTerms millimetres() {
   SceneTerms out;
-  out.placed = true;
   out.placement =
       scene::placement_of(glm::dmat3(1), {{0, 0, 0}, {800, 800, 800}}, {{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}});
   out.placement.unit = "mm";
   return out;
 }
-PickedPlace at(const glm::dvec3& room, const SceneTerms& terms) {
-  Pick pick;
-  pick.position_room = room;
-  return meaning_of(pick, terms);
-}
-
-TEST(Measures, AreInTheDatasUnits) {
-  const SceneTerms terms = millimetres();
-  const PickedPlace places[] = {at({0.3, 0, 0}, terms), at({0, 0, 0}, terms), at({0, 0.1, 0.1}, terms)};
-  EXPECT_NEAR(places[1].data.x, 400, 1e-4);
-  const Measured two = measure(std::span(places, 2), terms);
-  ASSERT_EQ(two.distances.size(), 1u);
-  EXPECT_NEAR(two.distances[0], 300, 1e-3);
-  EXPECT_FALSE(two.angle_deg);
-  const Measured three = measure(places, terms);
-  ASSERT_EQ(three.distances.size(), 2u);
-  EXPECT_NEAR(three.distances[1], 100 * std::sqrt(2.0), 1e-3);
-  ASSERT_TRUE(three.angle_deg);
-  EXPECT_NEAR(*three.angle_deg, 90, 1e-6);
-  EXPECT_EQ(three.unit, "mm");
-  EXPECT_TRUE(measure({}, terms).distances.empty());
-  const PickedPlace twice[] = {places[0], places[0], places[1]};
-  EXPECT_FALSE(measure(twice, terms).angle_deg) << "no angle at a place that is picked twice";
-  EXPECT_EQ(length_text(12.3456, "mm"), "12.35 mm");
-  EXPECT_EQ(length_text(0.5, ""), "0.5");
-}
-
 class Errands : public testing::Test {
  protected:
   Result<std::string> order(const std::string& command, const std::map<std::string, std::string>& arguments) {
@@ -306,11 +278,18 @@ TEST_F(Errands, APickIsToldInTheDatasTerms) {
   EXPECT_EQ(pick["colour"], "#102030");
   EXPECT_EQ(json["epoch"], 3);
   EXPECT_EQ(opacity, kPickOpacity);
+  // It is the viewer's own, so it tells no bound, but the question to the data server.
+  EXPECT_FALSE(pick.contains("error"));
+  EXPECT_TRUE(pick.contains("estimate"));
+  const auto probe = scene::probe_from(pick["probe"].get<std::map<std::string, std::string>>());
+  ASSERT_TRUE(probe) << probe.error().text;
+  EXPECT_EQ(probe->epoch, EpochId{3});
+  EXPECT_TRUE(scene::placement_from_text(json["placement"].dump()));
   // Per cent of the display; two places and their distance.
   const auto two = order("pick", {{"at", "50%,50% 480,240"}, {"opacity", "0.9"}});
   ASSERT_TRUE(two);
   const auto both = nlohmann::json::parse(*two);
-  EXPECT_NEAR(both["distances"][0].get<double>(), 16, 1e-3);
+  EXPECT_NEAR(both["picks"][1]["data"][0].get<double>() - both["picks"][0]["data"][0].get<double>(), 16, 1e-3);
   EXPECT_EQ(opacity, 0.9);
   // Where nothing is.
   EXPECT_TRUE(nlohmann::json::parse(*order("pick", {{"at", "10,10"}}))["picks"][0].is_null());

@@ -9,6 +9,7 @@
 #include <ctime>
 #include <filesystem>
 
+#include "common/core/whole_file.h"
 #include "common/notes/shelf.h"
 #include "common/scene/settings.h"
 #include "tools/common/complain.h"
@@ -65,6 +66,61 @@ int pick(PickOptions o, const options::Given& given) {
     std::printf("%s\n", answer->dump(2, ' ', false, Json::error_handler_t::replace).c_str());
   else
     std::fputs(pick_text(*answer).c_str(), stdout);
+  return 0;
+}
+
+// ---- what a window's person measures ------------------------------------------------------------------------------
+
+struct MeasureOptions {
+  SessionChoice session;
+  std::vector<std::string> words;
+  std::string viewer;
+  std::optional<double> opacity;
+  bool json = false;
+};
+
+options::Table measure_table(MeasureOptions& o) {
+  return joined({{.flag = "words",
+                  .value = &o.words,
+                  .help = "list; add X,Y [X,Y [X,Y]]: a row of places, as ctl pick takes them; remove NUMBER; clear; "
+                          "save FILE.csv"},
+                 {.flag = "--opacity",
+                  .value = &o.opacity,
+                  .help = "of add and of volumes: as ctl pick has it",
+                  .limits = options::Range{0.001, 1},
+                  .default_text = "0.25"},
+                 viewer_row(o.viewer),
+                 json_row(o.json)},
+                session_rows(o.session));
+}
+
+int measure(MeasureOptions o, const options::Given& given) {
+  log::initialise("ctl", "warn");
+  const std::string what = o.words.empty() ? "list" : o.words.front();
+  const std::vector<std::string> more(o.words.begin() + std::min<ptrdiff_t>(1, ptrdiff_t(o.words.size())),
+                                      o.words.end());
+  const bool alone = what == "list" || what == "clear", one = what == "remove" || what == "save";
+  if (!(alone && more.empty()) && !(one && more.size() == 1) && !(what == "add" && !more.empty()))
+    return tools::complain({"ctl measure: needs list, add X,Y ..., remove NUMBER, clear or save FILE.csv"});
+  int exit_code = 0;
+  const auto client = reach(o.session, given, exit_code);
+  if (!client) return exit_code;
+  std::map<std::string, std::string> arguments{{"do", what == "save" ? "csv" : what}};
+  if (what == "add") arguments["at"] = fmt::format("{}", fmt::join(more, " "));
+  if (what == "remove") arguments["number"] = more.front();
+  if (o.opacity) arguments["opacity"] = fmt::format("{}", *o.opacity);
+  if (!o.viewer.empty()) arguments["viewer"] = o.viewer;
+  const auto answer = client->ask("measure", kPatience_s, arguments);
+  if (!answer) return tools::complain(answer.error(), client->unanswered() ? 1 : 2);
+  const Json json = Json::parse(*answer, nullptr, false);
+  if (what == "save") {
+    if (const Status s = write_whole(more.front(), text(json, "csv")); !s) return tools::complain(s.error());
+    std::printf("%s\n", more.front().c_str());
+  } else if (o.json) {
+    std::printf("%s\n", json.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
+  } else {
+    std::fputs(measurements_text(json).c_str(), stdout);
+  }
   return 0;
 }
 
@@ -172,7 +228,7 @@ int print_book(const notes::Shelf& shelf, bool json, bool bookmarks) {
     for (const auto& n : book->notes) {
       std::printf("%llu  %s\n", static_cast<unsigned long long>(n.number), n.text.c_str());
       if (n.place)
-        std::printf("   at %.6g, %.6g, %.6g%s%s\n", n.place->x, n.place->y, n.place->z, n.value.empty() ? "" : "; ",
+        std::printf("   at %.10g, %.10g, %.10g%s%s\n", n.place->x, n.place->y, n.place->z, n.value.empty() ? "" : "; ",
                     n.value.c_str());
     }
   if (bookmarks ? book->bookmarks.empty() : book->notes.empty())
@@ -285,10 +341,12 @@ int keep_notes(KeptOptions o, const options::Given& given) {
 }  // namespace
 
 std::vector<Command> hands_commands() {
-  return {make_command("pick", "what lies at places of a viewer's display, in the data's own coordinates", pick_table,
-                       pick),
-          make_command("bookmark", scene::help_of_order("bookmark"), bookmark_table, bookmark),
-          make_command("notes", scene::help_of_order("notes"), notes_table, keep_notes)};
+  return {
+      make_command("pick", "what lies at places of a viewer's display, in the data's own coordinates", pick_table,
+                   pick),
+      make_command("measure", "places that a window has marked, their distances and angles", measure_table, measure),
+      make_command("bookmark", scene::help_of_order("bookmark"), bookmark_table, bookmark),
+      make_command("notes", scene::help_of_order("notes"), notes_table, keep_notes)};
 }
 
 }  // namespace telesplat::launcher

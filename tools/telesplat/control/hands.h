@@ -1,4 +1,4 @@
-// `telesplat ctl pick|bookmark|notes`: what people point at, and what they keep about it.
+// `telesplat ctl pick|measure|bookmark|notes`: what people point at, and what they keep about it.
 #pragma once
 
 #include <vector>

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
+
+#include "common/scene/told_place.h"
 #include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/control/orders.h"
 
@@ -20,23 +23,34 @@ std::string triple(const Json& json, const char* key) {
   return out;
 }
 
-std::string with_unit(const std::string& text, const std::string& unit) {
-  return unit.empty() ? text : text + " " + unit;
+std::string within_text(const Json& place, const std::string& unit) {
+  if (const auto within = number(place, "error"))
+    return fmt::format("  within       {:.2g}{}{}\n", *within, unit.empty() ? "" : " ", unit);
+  const std::string why = text(place, "estimate");
+  return fmt::format("  within       no bound is known{}\n", why.empty() ? "" : "; an estimate: " + why);
 }
 
-// What the data server has there; nothing where it is no volume's.
-void add_value(ControlClient& client, Json& pick) {
-  const auto room = numbers(pick, "room", 3);
-  if (!room) return;
-  const auto answer = client.order("probe", kPatience_s,
-                                   {{"x", fmt::format("{}", (*room)[0])},
-                                    {"y", fmt::format("{}", (*room)[1])},
-                                    {"z", fmt::format("{}", (*room)[2])}});
-  if (!answer || !answer->ok) return;
-  const Json probed = Json::parse(answer->text, nullptr, false);
-  if (!probed.is_object()) return;
-  for (const char* key : {"value", "value_error", "index", "step"})
-    if (probed.contains(key)) pick[key] = probed[key];
+// What the data server finds there.
+Result<scene::Probed> probe(ControlClient& client, const Json& pick) {
+  std::map<std::string, std::string> arguments;
+  if (const auto* told = field(pick, "probe"); told && told->is_object())
+    for (const auto& [key, value] : told->items())
+      if (value.is_string()) arguments[key] = value.get<std::string>();
+  const auto answer = client.order("probe", kPatience_s, arguments);
+  if (!answer) return answer.error();
+  if (!answer->ok) return Error{answer->text};
+  return scene::probed_from_text(answer->text);
+}
+
+// The place as it is in the data; else why it is an estimate.
+scene::ToldPlace refined(ControlClient& client, Json& pick, scene::ToldPlace place, const scene::Placement& placement) {
+  if (const auto found = probe(client, pick))
+    scene::refine(place, *found, placement);
+  else
+    place.estimate = found.error().text;
+  for (const char* old : {"estimate", "value", "array", "array_unit"}) pick.erase(old);
+  pick.update(scene::to_json(place, placement));
+  return place;
 }
 
 }  // namespace
@@ -48,19 +62,24 @@ Result<nlohmann::ordered_json> ask_pick(ControlClient& client, const PickQuestio
   const auto answer = client.ask("pick", kPatience_s, arguments);
   if (!answer) return answer.error();
   Json out = Json::parse(*answer, nullptr, false);
-  if (!out.is_object() || !out.contains("picks") || !out["picks"].is_array())
-    return Error{"the viewer's answer is no pick"};
+  const auto* told = out.is_object() ? field(out, "placement") : nullptr;
+  const auto placement = scene::placement_from_text(told ? told->dump() : "");
+  if (!placement || !out.contains("picks") || !out["picks"].is_array()) return Error{"the viewer's answer is no pick"};
+  std::vector<scene::ToldPlace> places;
   for (Json& pick : out["picks"])
-    if (pick.is_object() && !pick.contains("value") && !pick.contains("normal")) add_value(client, pick);
+    if (auto place = scene::told_place_from(pick, *placement))
+      places.push_back(refined(client, pick, *std::move(place), *placement));
+  const scene::Measured measured = scene::measure(places, *placement);
+  out["distances"] = measured.distances;
+  if (measured.angles_deg.size() == 1 && std::isfinite(measured.angles_deg[0]))
+    out["angle_deg"] = measured.angles_deg[0];
+  out["unit"] = placement->unit;
   return out;
 }
 
 std::string value_text(const nlohmann::ordered_json& pick) {
-  const auto* value = field(pick, "value");
-  if (!value || !value->is_number()) return {};
-  const std::string array = text(pick, "array"), name = array.empty() ? "value" : array;
-  return with_unit(fmt::format("{} {:.6g} +- {:.2g}", name, value->get<double>(), amount(pick, "value_error")),
-                   text(pick, "array_unit"));
+  const auto place = scene::told_place_from(pick, {});
+  return place ? scene::value_text(*place) : "";
 }
 
 std::string pick_text(const nlohmann::ordered_json& answer) {
@@ -71,18 +90,29 @@ std::string pick_text(const nlohmann::ordered_json& answer) {
       out += "nothing is there\n";
       continue;
     }
-    out += with_unit(triple(pick, "data"), unit) + "\n";
-    out += fmt::format("  in the room  {} m, {:.4g} m before the eye, within {:.2g} m\n", triple(pick, "room"),
-                       amount(pick, "depth_m"), amount(pick, "error_m"));
+    out += text(pick, "place") + "\n" + within_text(pick, unit);
+    out += fmt::format("  in the room  {} m, {:.4g} m before the eye\n", triple(pick, "room"), amount(pick, "depth_m"));
     if (pick.contains("normal")) out += fmt::format("  normal       {}\n", triple(pick, "normal"));
     out += fmt::format("  colour       {}\n", text(pick, "colour"));
     if (const std::string value = value_text(pick); !value.empty()) out += fmt::format("  value        {}\n", value);
   }
   for (const Json& distance : array(answer, "distances"))
-    if (distance.is_number()) out += with_unit(fmt::format("distance {:.6g}", distance.get<double>()), unit) + "\n";
+    if (distance.is_number()) out += "distance " + scene::length_text(distance.get<double>(), unit) + "\n";
   if (const auto* angle = field(answer, "angle_deg"); angle && angle->is_number())
     out += fmt::format("angle {:.4g} degrees\n", angle->get<double>());
   return out;
+}
+
+std::string measurements_text(const nlohmann::ordered_json& answer) {
+  std::string out;
+  for (const Json& place : array(answer, "places")) {
+    out += fmt::format("{}  {}\n", count(place, "number"), text(place, "place"));
+    out += within_text(place, text(answer, "unit"));
+    if (const std::string value = value_text(place); !value.empty()) out += fmt::format("  value        {}\n", value);
+    if (const std::string between = text(place, "between"); !between.empty())
+      out += fmt::format("  between      {}\n", between);
+  }
+  return out.empty() ? "nothing is measured; ctl measure add X,Y or key X of a window measures a place\n" : out;
 }
 
 }  // namespace telesplat::launcher

@@ -15,13 +15,15 @@ struct PickQuestion {
   std::string opacity;              ///< of volumes; empty: the viewer's
 };
 
-/// The viewer's answer (docs/hands.md); of a volume each pick has "value" and "value_error" too, from the data server.
-/// Error: no answer, or a refusal.
+/// The viewer's answer with each place as the data server found it (docs/hands.md), and "distances", "angle_deg" and
+/// "unit". Where the data server does not find it, "estimate" says why. Error: the viewer does not answer, or refuses.
 Result<nlohmann::ordered_json> ask_pick(ControlClient& client, const PickQuestion& question);
 
 /// For people: a paragraph a pick, then distances and the angle.
 std::string pick_text(const nlohmann::ordered_json& answer);
-/// "temperature 21.5 +- 0.2 K"; empty: no value is known there.
+/// The places that a window has marked, a paragraph each.
+std::string measurements_text(const nlohmann::ordered_json& answer);
+/// "temperature 21.50 +- 0.02 K"; empty: no value is known there.
 std::string value_text(const nlohmann::ordered_json& pick);
 
 }  // namespace telesplat::launcher

@@ -204,6 +204,7 @@ Result<DicomSeries> find_dicom_series(const std::string& folder, const std::stri
   h.index_to_data = placement(first.along_row * first.spacing.x, first.along_column * first.spacing.y, *step,
                               first.position.value_or(glm::dvec3(0)));
   h.unit = "mm";
+  h.space = scene::Space::kLps;
   h.ct = first.modality == "CT";
   const bool even = std::all_of(series.slices.begin(), series.slices.end(), [&](const DicomSlice& s) {
     return s.slope == first.slope && s.intercept == first.intercept;

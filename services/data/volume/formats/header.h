@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/scene/placement.h"
 
 namespace telesplat::data {
 
@@ -25,7 +26,8 @@ struct VolumeFileHeader {
   std::string format;  ///< as Volume::format
   std::array<int64_t, 3> size{};
   glm::dmat4 index_to_data{1.0};
-  std::string unit;  ///< of that placement's lengths: "mm", "m", ...; empty: not said
+  std::string unit;                           ///< of that placement's lengths: "mm", "m", ...; empty: not said
+  scene::Space space = scene::Space::kPlain;  ///< of its axes
   StoredType stored = StoredType::kU8;
   double scale = 1, offset = 0;
   bool ct = false;  ///< the file says that it is a CT

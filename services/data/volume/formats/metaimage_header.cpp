@@ -103,6 +103,10 @@ Status read_placement(const Keys& keys, const std::string& path, VolumeFileHeade
   const auto axis = [&](size_t a) {
     return glm::dvec3((*turn)[3 * a], (*turn)[3 * a + 1], (*turn)[3 * a + 2]) * (*spacing)[a];
   };
+  // AnatomicalOrientation tells how the voxels' axes run, not what the placement's are: those are ITK's.
+  if (const auto said = value(keys, {"AnatomicalOrientation"});
+      said.size() == 3 && said.find_first_not_of("RLAPSI") == said.npos)
+    h.space = scene::Space::kLps, h.unit = "mm";
   h.index_to_data = placement(axis(0), axis(1), axis(2), {(*origin)[0], (*origin)[1], (*origin)[2]});
   return ok_status();
 }

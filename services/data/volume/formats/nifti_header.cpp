@@ -160,6 +160,7 @@ Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string
   h.stored = *stored;
   if (v.slope != 0 && std::isfinite(v.slope) && std::isfinite(v.intercept)) h.scale = v.slope, h.offset = v.intercept;
   h.index_to_data = placement_of(v);
+  if (v.sform > 0 || v.qform > 0) h.space = scene::Space::kRas;
   const int units = (two ? f.at<int32_t>(500) : f.at<int8_t>(123)) & 7;  // xyzt_units: lengths in the lowest bits
   h.unit = units == 1 ? "m" : units == 2 ? "mm" : units == 3 ? "um" : "";
   if (!(v.data_at >= 0 && v.data_at <= 1e15))

@@ -105,6 +105,17 @@ bool left_handed(std::string_view space) {
          name == "3d-left-handed" || name == "3d-left-handed-time";
 }
 
+// Mirrored at x, a left-handed space is the right-handed one.
+scene::Space space_named(std::string_view space) {
+  const std::string name = lower(space);
+  for (const char* lps : {"left-posterior-superior", "lps", "left-posterior-superior-time", "lpst"})
+    if (name == lps) return scene::Space::kLps;
+  for (const char* ras : {"right-anterior-superior", "ras", "right-anterior-superior-time", "rast",
+                          "left-anterior-superior", "las", "left-anterior-superior-time", "last"})
+    if (name == ras) return scene::Space::kRas;
+  return scene::Space::kPlain;
+}
+
 // Directions and origin of the three axes that are kept.
 Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>& axes, size_t dimension,
                                 const std::string& path) {
@@ -228,6 +239,7 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   const auto m = placement_of(fields, *axes, sizes->size(), path);
   if (!m) return m.error();
   h.index_to_data = *m;
+  h.space = space_named(field(fields, {"space"}));
   // "mm" "mm" "mm": the first counts, as scanners' axes have one unit.
   if (const auto units = field(fields, {"spaceunits"}); units.starts_with('"'))
     h.unit = units.substr(1, std::min(units.find('"', 1) - 1, size_t{16}));

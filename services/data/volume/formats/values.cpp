@@ -114,6 +114,7 @@ Result<Volume> make_volume(const VolumeFileHeader& h, std::vector<std::byte> byt
   v.size = {int(h.size[0]), int(h.size[1]), int(h.size[2])};
   v.index_to_data = h.index_to_data;
   v.unit = h.unit;
+  v.space = h.space;
   v.scale = h.scale, v.offset = h.offset;
   v.stored = std::move(bytes);
   v.format = h.format;

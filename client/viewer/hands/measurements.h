@@ -1,0 +1,71 @@
+// Places that a person measures: rows of them, with the distances between neighbours and the angles at those in
+// between. They stay until they are taken away. No window, no sockets, no clocks.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/viewer/hands/meaning.h"
+#include "common/geometry/camera.h"
+#include "common/image/file.h"
+
+namespace telesplat::viewer {
+
+class Measurements {
+ public:
+  static constexpr size_t kMost = 200;  ///< places
+
+  using Probe = std::map<std::string, std::string>;  ///< arguments of the order
+  struct Place {
+    uint64_t number = 0;  ///< counts from 1, and is given once
+    scene::ToldPlace told;
+    Probe asked;  ///< the probe whose answer is due; empty: none is
+  };
+  using Row = std::vector<Place>;
+
+  /// Adds a place behind the newest one, or the first of a row. The data server is to be asked: take_probes(). Error:
+  /// there are kMost already.
+  Result<uint64_t> add(const Pick& pick, const SceneTerms& terms, EpochId epoch, double opacity);
+  /// The next place begins a row.
+  void begin_row() { begins_ = true; }
+  /// Error: no place has that number.
+  Status remove(uint64_t number);
+  void clear();
+
+  std::vector<Probe> take_probes() { return std::exchange(probes_, {}); }
+  /// What the data server found, or why there is no answer. A line for the person; empty: no place waits for that.
+  std::string on_answer(const Probe& asked, bool found, const std::string& text);
+
+  const std::vector<Row>& rows() const { return rows_; }
+  const scene::Placement& placement() const { return placement_; }
+  bool empty() const { return rows_.empty(); }
+  /// Another one after each change.
+  uint64_t version() const { return version_; }
+
+  /// A line of what lies between a place and those before it in its row: "12.5 mm from 1, 90.00 degrees at 1".
+  std::string between(const Row& row, size_t index) const;
+  /// JSON: {"places": [as to_json(ToldPlace), "number", "row", "distance", "angle_deg"], "unit"}.
+  std::string list() const;
+  /// The same as a table, a line a place.
+  std::string csv() const;
+
+ private:
+  std::vector<Row> rows_;
+  std::vector<Probe> probes_;
+  scene::Placement placement_;
+  uint64_t last_ = 0, version_ = 0;
+  bool begins_ = true;
+};
+
+/// The part of the camera's picture that marks of the places lie in, with points, lines and labels on nothing
+/// (0xAARRGGBB); x, y: of its upper left pixel. Empty: none is seen. scale: pixels a side of a letter's dot.
+struct MarksPicture {
+  image::View view;
+  int x = 0, y = 0;
+};
+MarksPicture draw_marks(const Measurements& measurements, const geometry::Camera& camera, int scale);
+
+}  // namespace telesplat::viewer
