@@ -11,6 +11,7 @@
 #include "client/viewer/render/fit_view.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/within.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -272,7 +273,7 @@ class Display {
     m.head = turn.head;
     // The display that leads took it after the frame before the last one was presented. Its clock is ours, unless
     // viewers were started by hand.
-    m.posed = {std::clamp(start_s_ + turn.t_s, seen_before_s_, m.begin_s)};
+    m.posed = {within(start_s_ + turn.t_s, seen_before_s_, m.begin_s)};
     m.camera = surface_.camera_of(turn.head);
   }
 
