@@ -230,8 +230,7 @@ geometry::Camera WindowSurface::camera_of(const geometry::Pose& head) const {
 void WindowSurface::run_panel(double now_s, Look& look) {
   panel_.show(interaction_.shows_panel());
   for (const Key key : panel_.take_pressed()) interaction_.press(key);
-  for (const auto& [name, value] : panel_.take_chosen())
-    if (const Status s = set(name, value); !s) panel_.tell(now_s, name + ": " + s.error().text, true);
+  for (const auto& [name, value] : panel_.take_chosen()) choose(now_s, name, value);
   look = interaction_.look();
   if (panel_.shown()) panel_.on_values(values());
   panel_.on_path({.records = interaction_.records_path(),
@@ -381,6 +380,20 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
   return ok_status();
 }
 
+// By the person, who can take it back; what changes the look is a deed by itself.
+void WindowSurface::choose(double now_s, const std::string& name, const std::string& value) {
+  const Look look = interaction_.look();
+  const std::string before = values()[name];
+  if (const Status s = set(name, value); !s) return panel_.tell(now_s, name + ": " + s.error().text, true);
+  if (!(look == interaction_.look())) return;
+  const auto becomes = [this, name](const std::string& text) {
+    return [this, name, text] {
+      if (const Status s = set(name, text); !s) tell(name + ": " + s.error().text);
+    };
+  };
+  interaction_.undo().did(now_s, {name, becomes(before), becomes(value), name});
+}
+
 // How much of the left side it covers.
 double WindowSurface::build_panel(double now_s) {
   const LoggedBuild logged(widget_log_);
@@ -506,12 +519,6 @@ void WindowSurface::build_legend(double now_s, double hidden) {
   if (editable) std::tie(shown.lo, shown.hi) = colours.range();
   const std::function<void(double, double)> change = [&](double lo, double hi) { colours.choose_range(now_s, lo, hi); };
   legend_part_ = viewer::show_legend(shown, legend_view_, hidden, editable ? change : nullptr);
-}
-
-geometry::Rect WindowSurface::legend_box() const {
-  const auto& p = legend_part_;
-  const double w = window_->width(), h = window_->height();
-  return {int(p.left * w), int(p.top * h), int((p.right - p.left) * w), int((p.bottom - p.top) * h)};
 }
 
 // Of a wall the tile in the lower right corner has it; and so does a window that has no Dear ImGui.

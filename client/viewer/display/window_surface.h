@@ -56,8 +56,6 @@ class WindowSurface final : public DisplaySurface {
   /// A path that is being recorded is written.
   ~WindowSurface() override;
 
-  /// What the legend covers, pixels of the window; empty: there is none.
-  geometry::Rect legend_box() const;
   int width() const { return window_->width(); }
   int height() const { return window_->height(); }
 
@@ -116,6 +114,7 @@ class WindowSurface final : public DisplaySurface {
   void show_news(double now_s);
   void keep_path();
   ViewSettings settings() const;
+  void choose(double now_s, const std::string& name, const std::string& value);
   std::map<std::string, std::string> values() const;
   void tell(const std::string& line);
   void run_panel(double now_s, Look& look);
