@@ -75,7 +75,7 @@ FLOORS = {
     ],
     "services/packer": [
         [("services/packer/epoch_hold.h", "services/packer/packing.h")],
-        ["services/packer/points", "services/packer/slices"],
+        ["services/packer/points", "services/packer/slices", "services/packer/pictures"],
         ["services/packer"],
     ],
     "client/viewer": [
@@ -85,7 +85,7 @@ FLOORS = {
         ["client/viewer/display", "client/viewer/xr"],
         [("client/viewer/received.h", "client/viewer/feeds.*")],
         [("client/viewer/points", "client/viewer/record/event_record.*"),
-         ("client/viewer/slices", "client/viewer/record/slice_record.*")],
+         ("client/viewer/slices", "client/viewer/record/slice_record.*"), "client/viewer/pictures"],
         [("client/viewer", "client/viewer/display/display_loop.*", "client/viewer/xr/xr_display.*")],
     ],
     "tools": [
@@ -117,7 +117,7 @@ OUTSIDE_HEADERS = [
     (r"(gdal|ogr|cpl)[_a-z]*\.h", ["services/data/import"]),
     (r"embree.*", ["services/sampler/mesh", "tests/bench"]),
     (r"OpenImageIO/.*", ["common/image", "tests/bench"]),
-    (r"(png\.h|Imf.*\.h)", ["common/image"]),
+    (r"(png\.h|turbojpeg\.h|Imf.*\.h)", ["common/image"]),
     (
         r"epoxy/gl\.h",
         [
