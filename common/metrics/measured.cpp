@@ -16,6 +16,7 @@ constexpr size_t kMostCouplings = 256, kMostOpenSkews = 1024;
 
 std::string coupling_name(double mode, double buffers) {
   if (mode == 0) return "async";
+  if (mode == 3) return "images";
   return mode == 1 ? "sync" : fmt::format("loose({:.0f})", buffers);
 }
 

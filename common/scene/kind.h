@@ -12,8 +12,9 @@ namespace telesplat::scene {
 enum class Kind { kMesh, kJulia, kVolume };
 inline constexpr Kind kKinds[] = {Kind::kMesh, Kind::kJulia, Kind::kVolume};
 
-/// How they travel and are drawn: depth images that become points, or slice images.
-enum class Pipeline { kPoints, kSlices };
+/// How they travel and are drawn: depth images that become points, or slice images; or, in sessions that show what the
+/// servers draw, as pictures. No kind is of pictures by itself: SessionView::pipeline().
+enum class Pipeline { kPoints, kSlices, kPictures };
 
 /// A set of kinds.
 class Kinds {

@@ -15,6 +15,9 @@ V value_or(const std::map<std::string, V>& map, const std::string& key, V fallba
   return found == map.end() ? fallback : found->second;
 }
 
+/// Setting: JPEG quality of the pictures that views come as, 1 to 100; 0, or not there: they come as the kind has it.
+inline constexpr const char* kPictureQuality = "picture.quality";
+
 /// Looks into a welcome; holds a reference to it.
 class SessionView {
  public:
@@ -25,7 +28,9 @@ class SessionView {
   std::optional<Kind> kind() const { return kind_named(fact("kind")); }
   std::optional<Pipeline> pipeline() const {
     const auto k = kind();
-    return k ? std::optional(pipeline_of(*k)) : std::nullopt;
+    if (!k) return std::nullopt;
+    const Pipeline usual = pipeline_of(*k);
+    return usual == Pipeline::kPoints && setting(kPictureQuality, 0) > 0 ? Pipeline::kPictures : usual;
   }
   std::string fact(const std::string& name) const { return value_or(session_.facts, name, std::string()); }
   /// Empty if nobody serves it.

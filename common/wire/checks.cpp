@@ -107,6 +107,13 @@ std::optional<Error> check(const Patch& m) {
   return check_step(m.step);
 }
 
+std::optional<Error> check(const PictureTile& m) { return check(m.lease); }
+
+std::optional<Error> check(const Picture& m) {
+  if (auto bad = check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame)) return bad;
+  return check_pixels(m.rect);
+}
+
 std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.frames); }
 
 std::optional<Error> check(const AccessReport& m) { return check_frames(m.clusters, m.frames); }

@@ -19,6 +19,8 @@ std::optional<Error> check(const PlanRequest& m);
 std::optional<Error> check(const Plan& m);
 std::optional<Error> check(const DepthTile& m);
 std::optional<Error> check(const Patch& m);
+std::optional<Error> check(const PictureTile& m);
+std::optional<Error> check(const Picture& m);
 std::optional<Error> check(const Forget& m);
 std::optional<Error> check(const AccessReport& m);
 std::optional<Error> check(const ViewRequest& m);

@@ -25,6 +25,6 @@ using Messages =
                Shutdown, Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, Refine,
                EpochBegin, StateMark, StateRequest, StateBegin, AccessReport, SliceWeights, SlabAssignment, SlabReady,
                SliceLease, VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady,
-               Swap, Order, OrderAnswer>;
+               Swap, Order, OrderAnswer, PictureTile, Picture>;
 
 }  // namespace telesplat::wire

@@ -1,4 +1,5 @@
-// Messages about tiles of depth images (surfaces, Julia sets): their leases, what samplers fetch for them and send.
+// Messages about tiles of depth images (surfaces, Julia sets), or of pictures: their leases, what samplers fetch for
+// them and send.
 #pragma once
 
 #include <map>
@@ -218,6 +219,42 @@ struct DepthTile {
   Bytes image;  ///< codec stream of lease.rect's size
   template <class F> static void fields(F& f, auto& m) {
     f("sampler", m.sampler); f("lease", m.lease); f("image", m.image, kMaxBulkBytes);
+  }
+};
+
+// ---- pictures, where views come as these: sampler (PUSH) -> packer (PULL), packer (ROUTER) -> viewer (DEALER) -------
+
+/// Sampler -> packer: a tile of a view, drawn and shaded.
+struct PictureTile {
+  static constexpr std::string_view kName = "picture_tile";
+  static constexpr bool kBulk = true;
+  InstanceId sampler;
+  Lease lease;  ///< as leased, with moments as far as the encoded tile
+  Bytes image;  ///< JPEG, of lease.rect's size
+  template <class F> static void fields(F& f, auto& m) {
+    f("sampler", m.sampler); f("lease", m.lease); f("image", m.image, kMaxBulkBytes);
+  }
+};
+
+/// Packer -> the viewer that asked: a tile of its view. Tiles come as they were drawn; with the last one the picture is
+/// complete.
+struct Picture {
+  static constexpr std::string_view kName = "picture";
+  static constexpr bool kBulk = true;
+  InstanceId packer;
+  EpochId epoch;
+  FrameId frame;
+  InstanceId viewer;
+  RequestId request;
+  uint64_t tile = 0, tiles_in_frame = 0;
+  geometry::Camera camera;  ///< of the whole view, as requested
+  geometry::Rect rect;      ///< the tile in it
+  Moments moments;          ///< of the tile, until it was published
+  Bytes image;              ///< JPEG, of rect's size
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer); f("request", m.request);
+    f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("camera", m.camera); f("rect", m.rect);
+    f("moments", m.moments); f("image", m.image, kMaxBulkBytes);
   }
 };
 

@@ -25,6 +25,8 @@ Result<CouplingOrder> read_coupling(const wire::Control& m) {
   if (name == "sync" || name == "loose") {
     out.mode = name == "sync" ? 1 : 2;
     out.buffers = name == "sync" ? 1 : kLooseBuffers;
+  } else if (name == "images") {
+    return Error{"coupling images is of a session from its beginning: telesplat run --coupling images"};
   } else if (name != "async") {
     return Error{fmt::format("coupling is \"{}\", not async, sync or loose", name.substr(0, 40))};
   }

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "common/image/background.h"
+#include "common/image/shading.h"
 #include "common/scene/clip_order.h"
 #include "common/volume/shear.h"
 #include "common/wire/limits.h"
@@ -71,16 +73,14 @@ options::Row setting_by_kind(MasterOptions& o, const std::string& name, const ch
   return row;
 }
 
-// A setting of the session that is one of a few whole numbers.
-options::Row setting_of_few(MasterOptions& o, const char* flag, const std::string& name, double usual,
-                            const options::Names& values, const char* help) {
-  double& value = o.settings.try_emplace(name, usual).first->second;
+// One of a few whole numbers.
+options::Row one_of_few(auto& value, const char* flag, const options::Names& values, const char* help) {
   options::Row row{.flag = flag, .value = {}, .help = help, .limits = values};
   row.value = options::Text{.read =
                                 [&value, values](const std::string& text) {
                                   if (std::find(values.begin(), values.end(), text) == values.end())
                                     return Status(Error{fmt::format("is not one of {}", fmt::join(values, ", "))});
-                                  value = std::stod(text);
+                                  value = std::stoi(text);
                                   return ok_status();
                                 },
                             .write = [&value] { return fmt::format("{}", value); }};
@@ -91,6 +91,9 @@ options::Row setting_of_few(MasterOptions& o, const char* flag, const std::strin
 options::Table steering_table(MasterOptions& o) {
   const auto points = Kinds::of(Pipeline::kPoints);
   const options::Names rays{"1", "4", "16"};
+  const auto setting_value = [&o](const char* name, double usual) -> double& {
+    return o.settings.try_emplace(name, usual).first->second;
+  };
   return {named({.flag = "--steering",
                  .value = {},
                  .help = "on: before a view is sampled, the packer says which of its rays the model lacks, and only "
@@ -107,10 +110,10 @@ options::Table steering_table(MasterOptions& o) {
            .help = "each pixel that the model shows well is sampled again once in so many updates; 0: never",
            .limits = options::Range{0.0, 4096.0},
            .fits = points},
-          setting_of_few(o, "--edge-rays,--sampling.edge_rays", "sampling.edge_rays", 1, rays,
-                         "rays a pixel at edges while the head moves"),
-          setting_of_few(o, "--still-rays,--sampling.still_rays", "sampling.still_rays", 16, rays,
-                         "rays a pixel everywhere while the head stands still, when it has stood long enough")};
+          one_of_few(setting_value("sampling.edge_rays", 1), "--edge-rays,--sampling.edge_rays", rays,
+                     "rays a pixel at edges while the head moves"),
+          one_of_few(setting_value("sampling.still_rays", 16), "--still-rays,--sampling.still_rays", rays,
+                     "rays a pixel everywhere while the head stands still, when it has stood long enough")};
 }
 
 options::Table lease_table(MasterOptions& o) {
@@ -174,22 +177,21 @@ options::Row error_row(MasterOptions& o, const std::string& flag, const std::str
                        const char* help) {
   double& value = o.settings.try_emplace(name, -1).first->second;
   options::Row row{.flag = flag, .value = {}, .help = help, .fits = Kinds::of(Pipeline::kPoints)};
-  row.value =
-      options::Text{.read =
-                        [&value, most, whole](const std::string& text) {
-                          if (text == "auto") return value = -1, ok_status();
-                          if (text == "off") return value = 0, ok_status();
-                          const auto number = number_or_fraction(text);
-                          if (!number || !(*number >= 0 && *number <= most) || (whole && *number != std::floor(*number)))
-                            return Status(Error{fmt::format("is not auto, off or a {}number from 0 to {}{}",
-                                                            whole ? "whole " : "", most, whole ? "" : ", such as 1/32")});
-                          value = *number;
-                          return ok_status();
-                        },
-                    .write =
-                        [&value] {
-                          return value < 0 ? "auto" : value == 0 ? "off" : options::number_text(value);
-                        }};
+  row.value = options::Text{
+      .read =
+          [&value, most, whole](const std::string& text) {
+            if (text == "auto") return value = -1, ok_status();
+            if (text == "off") return value = 0, ok_status();
+            const auto number = number_or_fraction(text);
+            if (!number || !(*number >= 0 && *number <= most) || (whole && *number != std::floor(*number)))
+              return Status(Error{fmt::format("is not auto, off or a {}number from 0 to {}{}", whole ? "whole " : "",
+                                              most, whole ? "" : ", such as 1/32")});
+            value = *number;
+            return ok_status();
+          },
+      .write = [&value] { return value < 0    ? "auto"
+                                 : value == 0 ? "off"
+                                              : options::number_text(value); }};
   return row;
 }
 
@@ -220,6 +222,19 @@ options::Row redundancy_row(MasterOptions& o) {
   return row;
 }
 
+// What pictures are like, where views come as pictures.
+options::Table image_table(MasterOptions& o) {
+  const auto points = Kinds::of(Pipeline::kPoints);
+  return {
+      {.flag = "--image-quality",
+       .value = &o.images.quality,
+       .help = "--coupling images: JPEG quality of pictures while the head moves; from 95 on colours keep all pixels",
+       .limits = options::Range{1, 100},
+       .fits = points},
+      one_of_few(o.images.samples, "--image-samples", {"1", "4", "16"},
+                 "--coupling images: rays a pixel while the head moves")};
+}
+
 options::Row clip_row(MasterOptions& o) {
   return {.flag = "--clip",
           .value = &o.clip,
@@ -247,10 +262,9 @@ options::Table packing_table(MasterOptions& o) {
 }  // namespace
 
 options::Table session_table(MasterServiceOptions& o) {
-  return options::joined(
-      options::joined(options::joined(lease_table(o.master), steering_table(o.master)),
-                      options::joined(packing_table(o.master), error_table(o.master))),
-      {clip_row(o.master)});
+  return options::joined(options::joined(options::joined(lease_table(o.master), steering_table(o.master)),
+                                         options::joined(packing_table(o.master), error_table(o.master))),
+                         options::joined(image_table(o.master), {clip_row(o.master)}));
 }
 
 options::Table limit_table(MasterServiceOptions& o) {
@@ -323,6 +337,21 @@ options::Table table(MasterServiceOptions& o) {
        .value = &o.animate,
        .help = "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "
                "are separated by \";\"",
+       .reach = options::Reach::kHere},
+      {.flag = "--images",
+       .value = &o.master.images.shading,
+       .help = "views are drawn at the samplers and come as pictures, with this shading: lit, head or unlit; telesplat "
+               "run --coupling images asks for it",
+       .limits = options::Names(image::kShadingNames.begin(), image::kShadingNames.end()),
+       .fits = Kinds::of(Pipeline::kPoints),
+       .reach = options::Reach::kHere},
+      {.flag = "--image-background",
+       .value = &o.master.images.background,
+       .help = "--images: colour behind the data, #rrggbb or a name",
+       .limits = options::Check([](const std::string& text) {
+         const auto background = image::parse_background(text);
+         return !background ? background.error().text : background->transparent ? "pictures have no alpha" : "";
+       }),
        .reach = options::Reach::kHere}};
   return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own),
                          options::joined(options::joined(record_table(o), limit_table(o)), session_table(o)));

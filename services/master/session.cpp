@@ -34,6 +34,8 @@ Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data,
   if (!data.box_room.empty())
     if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
   Plan& plan = plan_of(data);
+  if (options_.images.on() && &plan != plans_.at(scene::Pipeline::kPoints).get())
+    return Error{"views of a volume do not come as pictures (--images): they come as slice images"};
   const auto adopted = plan.adopt(data, now_s);
   if (!adopted) return adopted.error();
   if (!adopted->whole) return ok_status();
@@ -231,6 +233,9 @@ void MasterCore::on(const std::string& peer, const wire::OrderAnswer& m, double 
 
 // Of the viewers that are here; those that come later begin with their own.
 Result<std::string> MasterCore::order_coupling(const wire::Control& m, double now_s) {
+  if (options_.images.on())
+    return Error{
+        "coupling: the views of this session come as pictures (--coupling images) from its beginning to its end"};
   const auto order = read_coupling(m);
   if (!order) return order.error();
   std::vector<std::string> here, told;

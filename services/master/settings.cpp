@@ -1,10 +1,25 @@
 #include "services/master/settings.h"
 
+#include <algorithm>
+
+#include "common/image/background.h"
+#include "common/image/shading.h"
+#include "common/scene/session.h"
+
 namespace telesplat::master {
 namespace {
 
 const scene::Policy& policy(std::optional<scene::Kind> kind) {
   return scene::policy_of(kind.value_or(scene::Kind::kMesh));
+}
+
+void add_pictures(const ImageOptions& images, std::map<std::string, double>& out) {
+  const auto& names = image::kShadingNames;
+  const auto background = image::parse_background(images.background);
+  out[scene::kPictureQuality] = images.quality;
+  out["picture.samples"] = images.samples;
+  out["picture.shading"] = double(std::find(names.begin(), names.end(), images.shading) - names.begin());
+  out["picture.background"] = background ? double(background->colour) : 0.0;
 }
 
 }  // namespace
@@ -26,6 +41,7 @@ uint64_t octree_depth(const MasterOptions& options, std::optional<scene::Kind> k
 }
 
 bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  if (options.images.on()) return false;
   return options.progressive == Progressive::kAuto ? policy(kind).progressive : options.progressive == Progressive::kOn;
 }
 
@@ -35,7 +51,8 @@ bool keeps_redundant(const MasterOptions& options, std::optional<scene::Kind> ki
 }
 
 bool steers(const MasterOptions& options, std::optional<scene::Kind> kind) {
-  if (scene::pipeline_of(kind.value_or(scene::Kind::kMesh)) != scene::Pipeline::kPoints) return false;
+  if (options.images.on() || scene::pipeline_of(kind.value_or(scene::Kind::kMesh)) != scene::Pipeline::kPoints)
+    return false;
   return options.steering == Steering::kAuto ? !keeps_redundant(options, kind) : options.steering == Steering::kOn;
 }
 
@@ -47,6 +64,7 @@ std::map<std::string, double> settings(const MasterOptions& options, std::option
   out["sampling.steering"] = steers(options, kind);
   out["sampling.max_pixels"] = double(options.limits.max_sampling_pixels);
   out["viewer.least_sampling"] = policy(kind).least_sampling;
+  if (options.images.on()) add_pictures(options.images, out);
   return out;
 }
 

@@ -39,8 +39,18 @@ const char* name_of(Progressive progressive);
 const char* name_of(Redundancy redundancy);
 const char* name_of(Steering steering);
 
+/// Views are drawn at the servers and come as pictures (docs/coupling.md).
+struct ImageOptions {
+  std::string shading;                 ///< one of image::kShadingNames; empty: views come as the kind of scene has it
+  std::string background = "#141820";  ///< as image::parse_background() takes it
+  int quality = 80;                    ///< of JPEG, 1 to 100
+  int samples = 1;                     ///< rays a pixel: 1, 4 or 16
+  bool on() const { return !shading.empty(); }
+};
+
 struct MasterOptions {
   ScheduleOptions schedule;
+  ImageOptions images;
   Limits limits;
   Progressive progressive = Progressive::kAuto;
   Redundancy redundancy = Redundancy::kAuto;
@@ -61,7 +71,8 @@ bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind);
 bool keeps_redundant(const MasterOptions& options, std::optional<scene::Kind> kind);
 bool steers(const MasterOptions& options, std::optional<scene::Kind> kind);
 /// As everyone is told them (docs/protocol.md): the given ones, packing.keep_redundant, packing.max_points,
-/// packing.max_rate_mbit if one is wished, sampling.steering and viewer.least_sampling.
+/// packing.max_rate_mbit if one is wished, sampling.steering and viewer.least_sampling; picture.quality, .samples,
+/// .shading (its place among image::kShadingNames) and .background (0xRRGGBB) where views come as pictures.
 std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind);
 
 }  // namespace telesplat::master

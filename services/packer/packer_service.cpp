@@ -11,6 +11,7 @@
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
+#include "services/packer/pictures/picture_packing.h"
 #include "services/packer/points/point_packing.h"
 #include "services/packer/ports.h"
 #include "services/packer/slices/slice_packing.h"
@@ -21,7 +22,7 @@ namespace {
 
 constexpr double kSpanFlush_s = 1;
 constexpr double kKeepFreed_s = 10;  // memory that was not needed for that long goes back to the system
-constexpr int kSampledAtOnce = 8;  // then control and viewers get their turn
+constexpr int kSampledAtOnce = 8;    // then control and viewers get their turn
 constexpr int kStateAtOnce = 64;
 constexpr int kStateQueue = 1 << 16;  // messages that wait for a viewer: more than StateAnswers has under way
 
@@ -188,6 +189,7 @@ class PackerService {
                     .master_now = [this] { return link_->to_master_s(monotonic_s()); },
                     .to_master_s = [this](double s) { return link_->to_master_s(s); }};
     if (pipeline == scene::Pipeline::kSlices) return std::make_unique<SlicePacking>(std::move(outlets), spans_);
+    if (pipeline == scene::Pipeline::kPictures) return std::make_unique<PicturePacking>(std::move(outlets), spans_);
     const PointPacking::Options options{.threads = options_.threads,
                                         .max_log_bytes = uint64_t(options_.log_limit_mb * 1e6),
                                         .answers = {.window_bytes = uint64_t(options_.answer_window_mb * 1e6)},

@@ -1,5 +1,5 @@
-// What a packer does with what samplers send, one implementation a pipeline (points, slices). The service around it
-// owns the sockets and follows the master; everything here happens in its thread, and nothing here may wait.
+// What a packer does with what samplers send, one implementation a pipeline (points, slices, pictures). The service
+// around it owns the sockets and follows the master; everything here happens in its thread, and nothing here may wait.
 #pragma once
 
 #include <functional>

@@ -57,6 +57,7 @@ constexpr Row kTable[] = {
     {"voxels", "voxel_request", {kSampler}},
     {"tiles", "depth_tile", {kSampler}},
     {"tiles", "slice_images", {kSampler}},
+    {"tiles", "picture_tile", {kSampler}},
     {"patches", "", kWatchers},  // they subscribe
     {"state", "state_request", kWatchers},
     {"state", "access_report", kWatchers},
@@ -71,11 +72,7 @@ struct Command {
 
 // Those that only tell something. All others are an operator's.
 constexpr Command kCommands[] = {
-    {"status", kEveryone},
-    {"health", kEveryone},
-    {"pick", kWatchers},
-    {"where", kWatchers},
-    {"probe", kWatchers},
+    {"status", kEveryone}, {"health", kEveryone}, {"pick", kWatchers}, {"where", kWatchers}, {"probe", kWatchers},
 };
 
 struct Name {

@@ -54,7 +54,7 @@ constexpr Family kGauges[] = {
      "Age of the newest complete update on display, median of the last seconds."},
     {"viewer_waiting_seconds", "viewer", "waits_s", 1,
      "How long the display has waited for a view update; 0: not for long."},
-    {"viewer_coupling", "viewer", "coupling", 1, "Coupling in force: 0 async, 1 sync, 2 loose."},
+    {"viewer_coupling", "viewer", "coupling", 1, "Coupling in force: 0 async, 1 sync, 2 loose, 3 images."},
     {"viewer_buffers", "viewer", "buffers", 1, "Buffers of the coupling in force."},
     {"viewer_epoch", "viewer", "epoch", 1, "Version of the scene on display."},
     {"sampler_queue", "sampler", "leases_held", 1, "Leases that a sampler holds and has not sampled."},

@@ -43,8 +43,9 @@ void FrameSchedule::begin_whole(const PlannedView& view) {
 
 void FrameSchedule::begin_frame(const PlannedView& view, FrameId id, int step) {
   const geometry::Camera camera = step == 1 ? view.view.camera : geometry::subsample(view.view.camera, step);
-  auto tiles = cut_.rows ? FrameTiles::of_rows(camera.width, camera.height)
-                         : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
+  auto tiles = cut_.rows       ? FrameTiles::of_rows(camera.width, camera.height)
+               : cut_.pictures ? FrameTiles::of_bands(camera.width, camera.height, costs_.samplers())
+                               : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
   const wire::Moments& m = view.view.moments;
   insert({.id = id,
           .epoch = view.epoch,

@@ -39,6 +39,20 @@ FrameTiles FrameTiles::of_squares(int width, int height, int tile_size) {
   return out;
 }
 
+FrameTiles FrameTiles::of_bands(int width, int height, size_t bands) {
+  constexpr int kRows = 16;  // of a JPEG block
+  const auto most = int(wire::kMaxTilePixels / width);
+  const int count = int(std::clamp<size_t>(bands, 1, 1024)), wanted = (height + count - 1) / count;
+  const int rows = std::max(kRows, std::min((wanted + kRows - 1) / kRows, most / kRows) * kRows);
+  FrameTiles out;
+  for (int y = 0; y < height; y += rows) {
+    const geometry::Rect rect{0, y, width, std::min(rows, height - y)};
+    out.tiles_.push_back({.rect = rect, .block = out.blocks_.size(), .rays = pixels(rect)});
+    out.blocks_.push_back(rect);
+  }
+  return out;
+}
+
 FrameTiles FrameTiles::of_rows(int width, int height) {
   FrameTiles out;
   out.blocks_ = cut_blocks(width, height);

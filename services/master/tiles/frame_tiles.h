@@ -28,6 +28,9 @@ class FrameTiles {
  public:
   /// Square tiles, each a block of its own; larger ones where there would be more than 1024.
   static FrameTiles of_squares(int width, int height, int tile_size);
+  /// So many bands of about equal height, of whole rows of JPEG blocks and of no more pixels than a tile may have, each
+  /// a block of its own.
+  static FrameTiles of_bands(int width, int height, size_t bands);
   /// Bands of rows, carved when they are taken.
   static FrameTiles of_rows(int width, int height);
   /// The tiles of a plan, in its order, each a block of its own. Precondition: wire::check(plan).

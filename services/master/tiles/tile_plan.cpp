@@ -22,9 +22,11 @@ Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
   out.changed |= colours_.adopt(data, problem);
   if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
   const auto kind = scene::kind_named(scene_.kind());
-  const Cut cut{.rows = scene_.is_julia(),
+  const bool pictures = options_.images.on();
+  const Cut cut{.rows = scene_.is_julia() && !pictures,
+                .pictures = pictures,
                 .coarse = master::progressive(options_, kind),
-                .coarse_if_slow = options_.progressive == Progressive::kAuto,
+                .coarse_if_slow = options_.progressive == Progressive::kAuto && !pictures,
                 .steered = master::steers(options_, kind)};
   out.changed |= cut != schedule_.cut();
   schedule_.set_cut(cut);

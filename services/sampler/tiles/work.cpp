@@ -46,22 +46,44 @@ Readiness TileWork::look_at_next(double now_s) {
 Delivery TileWork::sample_next() {
   const HeldLease held = std::move(leases_.front());
   leases_.pop_front();
+  if (pictures_.on()) return picture(held);
   const Sampled sampled = source_->sample(held);
   const auto stream = codec::encode(sampled.image, {}, nullptr, geometry::ray_axes(held.lease.camera, held.lease.rect));
-  Delivery out{wire::DepthTile::kName,
-               {},
-               sampled.begin_s,
-               sampled.end_s,
-               monotonic_s(),
-               {double(held.lease.frame.value), double(held.lease.tile), double(held.lease.request.value)}};
-  wire::DepthTile tile{link_.instance(), held.lease};
-  wire::Moments& moments = tile.lease.moments;
-  if (held.waits_since_s > 0) moments.fetch_s = out.begin_s - held.waits_since_s;
-  moments.sample_begin_s = link_.to_master_s(out.begin_s);
-  moments.sample_end_s = link_.to_master_s(out.sampled_s);
-  moments.encode_end_s = link_.to_master_s(out.encoded_s);
-  tile.image = std::as_bytes(std::span(stream));
-  out.body = wire::encode(tile);
+  Delivery out = deliver(wire::DepthTile::kName, held, sampled);
+  out.body = wire::encode(wire::DepthTile{link_.instance(), finished(held, out), std::as_bytes(std::span(stream))});
+  return out;
+}
+
+// What cannot be sampled finer is not.
+Delivery TileWork::picture(const HeldLease& held) {
+  PictureMaker::Rays rays = pictures_.rays(held.lease);
+  HeldLease fine{rays.lease.value_or(held.lease), held.received_s};
+  if (rays.lease && source_->readiness(fine, monotonic_s()).state != Readiness::State::kReady)
+    rays.side = 1, fine.lease = held.lease;
+  const Sampled sampled = source_->sample(fine);
+  const auto jpeg = pictures_.picture(held.lease, rays, sampled.image);
+  Delivery out = deliver(wire::PictureTile::kName, held, sampled);
+  out.body = wire::encode(wire::PictureTile{link_.instance(), finished(held, out), jpeg});
+  return out;
+}
+
+// Of what has just been encoded.
+Delivery TileWork::deliver(std::string_view type, const HeldLease& held, const Sampled& sampled) {
+  const wire::Lease& lease = held.lease;
+  return {type,
+          {},
+          sampled.begin_s,
+          sampled.end_s,
+          monotonic_s(),
+          {double(lease.frame.value), double(lease.tile), double(lease.request.value)}};
+}
+
+wire::Lease TileWork::finished(const HeldLease& held, const Delivery& d) const {
+  wire::Lease out = held.lease;
+  if (held.waits_since_s > 0) out.moments.fetch_s = d.begin_s - held.waits_since_s;
+  out.moments.sample_begin_s = link_.to_master_s(d.begin_s);
+  out.moments.sample_end_s = link_.to_master_s(d.sampled_s);
+  out.moments.encode_end_s = link_.to_master_s(d.encoded_s);
   return out;
 }
 

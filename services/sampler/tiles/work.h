@@ -1,9 +1,11 @@
-// The adapter between leases of tiles and what samples them: it holds the leases and makes depth tiles of the samples.
+// The adapter between leases of tiles and what samples them: it holds the leases and makes depth tiles of the samples,
+// or pictures where the session shows these.
 #pragma once
 
 #include <deque>
 #include <memory>
 
+#include "services/sampler/tiles/picture_maker.h"
 #include "services/sampler/tiles/tile_source.h"
 
 namespace telesplat::sampler {
@@ -14,7 +16,10 @@ class TileWork final : public Work {
   TileWork(std::unique_ptr<TileSource> source, net::MasterLink& link) : source_(std::move(source)), link_(link) {}
 
   const char* name() const override { return source_->name(); }
-  void on_welcome(const wire::Welcome& session) override { source_->on_welcome(session); }
+  void on_welcome(const wire::Welcome& session) override {
+    source_->on_welcome(session);
+    pictures_.follow(session);
+  }
   bool takes_leases() const override { return source_->takes_leases(); }
   /// All pixels of a lease whose mask is none are sampled, with a line: dropped, it would come again when it has run
   /// out, as would the view that waits for it.
@@ -30,10 +35,14 @@ class TileWork final : public Work {
 
  private:
   void hold(const wire::Lease& lease, double arrived_s, double now_s);
+  Delivery picture(const HeldLease& held);
+  static Delivery deliver(std::string_view type, const HeldLease& held, const Sampled& sampled);
+  wire::Lease finished(const HeldLease& held, const Delivery& delivery) const;
 
   std::unique_ptr<TileSource> source_;
   net::MasterLink& link_;
   std::deque<HeldLease> leases_;
+  PictureMaker pictures_;
 };
 
 }  // namespace telesplat::sampler

@@ -19,9 +19,9 @@ namespace {
 using namespace telesplat::test;
 
 // Those that may be larger than kMaxControlBytes.
-constexpr std::string_view kBulkMessages[] = {"metric_rows",  "chunk_list",  "chunk",         "depth_tile",
-                                              "patch",        "forget",      "access_report", "voxel_data",
-                                              "slice_images", "slice_frame", "plan",          "refine"};
+constexpr std::string_view kBulkMessages[] = {
+    "metric_rows", "chunk_list",   "chunk",       "depth_tile", "patch",  "forget",       "access_report",
+    "voxel_data",  "slice_images", "slice_frame", "plan",       "refine", "picture_tile", "picture"};
 
 // Those whose fields may be missing.
 bool is_brief(const MessageSample& sample) { return sample.name == "patch"; }

@@ -53,6 +53,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       {{"voxels", wire::VoxelRequest::kName}, {kSampler}},
       {{"tiles", wire::DepthTile::kName}, {kSampler}},
       {{"tiles", wire::SliceImages::kName}, {kSampler}},
+      {{"tiles", wire::PictureTile::kName}, {kSampler}},
       {{"state", wire::StateRequest::kName}, watchers},
       {{"state", wire::AccessReport::kName}, watchers},
       {{"state", wire::Receipt::kName}, watchers},
@@ -64,7 +65,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       wire::PlanRequest::kName, wire::FrameEnd::kName,   wire::ChunkList::kName,      wire::Chunk::kName,
       wire::VoxelData::kName,   wire::Patch::kName,      wire::Forget::kName,         wire::EpochBegin::kName,
       wire::StateMark::kName,   wire::SliceFrame::kName, wire::SlabAssignment::kName, wire::Swap::kName,
-      wire::Refine::kName,      wire::StateBegin::kName};
+      wire::Refine::kName,      wire::StateBegin::kName, wire::Picture::kName};
   std::set<std::string_view> types{"nonsense"};
   const auto look_at = [&](std::string_view type) {
     types.insert(type);
