@@ -1,5 +1,6 @@
-// What a viewer receives of a session, keeps and draws: points of a model, or frames of slice images. One
-// implementation for each pipeline (points/received_points.h, slices/received_slices.h), each with a cache of its own.
+// What a viewer receives of a session, keeps and draws: points of a model, frames of slice images, or
+// pictures. One implementation for each pipeline (points/received_points.h, slices/received_slices.h,
+// pictures/received_pictures.h), each with a cache of its own.
 // Nobody else asks which it is.
 #pragma once
 

@@ -181,16 +181,18 @@ Table coupling_table(ViewerOptions& o) {
        .value = &o.coupling,
        .help =
            "async: the display never waits for the server; sync: each frame asks for a view update and waits for it; "
-           "loose: each frame waits for the next update, --buffers of them are asked for ahead",
-       .limits = Names{"async", "sync", "loose"}},
+           "loose: each frame waits for the next update, --buffers of them are asked for ahead; images: samplers draw "
+           "the views, which come as JPEG pictures, as with a remote desktop",
+       .limits = Names{"async", "sync", "loose", "images"}},
       {.flag = "--buffers",
        .value = &o.buffers,
        .help = "--coupling loose: view updates that are on their way or complete and not displayed, at most",
        .limits = Range{1, double(wire::kMaxBuffers)}},
       {.flag = "--update-rate",
        .value = &o.update_rate_hz,
-       .help = "--coupling async: view requests a second at most; 0: 20, and 10 for a headset, whose frames must be in "
-               "time",
+       .help =
+           "--coupling async, images: view requests a second at most; 0: 20, 10 for a headset, whose frames must be in "
+           "time, and of images --target-fps",
        .limits = Range{0, 1000}},
       {.flag = "--epoch-patience",
        .value = &o.epoch_patience_s,
@@ -370,9 +372,22 @@ Status settle_shading(ViewerOptions& o) {
   return ok_status();
 }
 
+// Pictures are flat, of one display, and have no alpha.
+Status check_pictures(const ViewerOptions& o) {
+  for (const auto& [given, flag, why] :
+       {std::tuple{o.display.stereo.on(), "--stereo", "each picture is one eye's"},
+        {o.xr, "--xr", "a headset needs frames of its head's pose, and pictures are of an earlier one"},
+        {!o.wall.empty(), "--wall", "pictures of several displays are not kept in step"},
+        {o.background == "transparent", "--background transparent", "JPEG pictures have no alpha"}})
+    if (given) return Error{fmt::format("--coupling images and {}: {}", flag, why)};
+  return ok_status();
+}
+
 Status settle_coupling(ViewerOptions& o) {
   const auto coupling = coupling_named(o.coupling);
-  if (!coupling) return Error{fmt::format("--coupling {}: not async, sync or loose", o.coupling)};
+  if (!coupling) return Error{fmt::format("--coupling {}: not async, sync, loose or images", o.coupling)};
+  if (*coupling == CouplingMode::kImages)
+    if (const Status s = check_pictures(o); !s) return s;
   if (o.buffers < 1 || uint64_t(o.buffers) > wire::kMaxBuffers)
     return Error{fmt::format("--buffers {}: not in 1..{}", o.buffers, wire::kMaxBuffers)};
   o.requests.buffers = uint64_t(buffers_of(*coupling, o.buffers));
@@ -422,6 +437,9 @@ Status settle(ViewerOptions& o) {
   o.requests.max_rate_hz = o.update_rate_hz > 0 ? std::max(o.update_rate_hz, kLeastUpdateRate_hz)
                            : o.xr               ? kHeadsetUpdateRate_hz
                                                 : viewer::RequestOptions{}.max_rate_hz;
+  o.requests.picture_rate_hz = o.update_rate_hz > 0       ? o.requests.max_rate_hz
+                               : o.display.target_fps > 0 ? o.display.target_fps
+                                                          : RequestOptions{}.picture_rate_hz;
   if (const Status s = settle_stereo(o); !s) return s;
   if (const Status s = settle_head_source(o); !s) return s;
   if (const Status s = settle_head(o); !s) return s;

@@ -191,6 +191,9 @@ void ViewerWorker::follow_session() {
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
   requester_.set_min_scale(options_.least_sampling.value_or(told));
   follow_coupling(view);
+  follow_pictures(view);
+  if (std::exchange(session_epoch_, session.epoch) != session.epoch)
+    requester_.on_new_epoch(to_master_s(monotonic_s()));
   requester_.set_steered(view.setting("sampling.steering", 0) != 0);
   if (std::exchange(master_, session.master) != session.master) {
     all_again_ = true;  // it knows nothing of what was asked for
@@ -228,6 +231,30 @@ void ViewerWorker::follow_coupling(const scene::SessionView& session) {
   if (told == wished_) return;
   wished_ = *told != gate_.state() ? told : std::nullopt;
   wished_since_s_ = monotonic_s();
+}
+
+// Views come as pictures or not as long as the session lasts, whatever this viewer was told.
+void ViewerWorker::follow_pictures(const scene::SessionView& session) {
+  const auto pipeline = session.pipeline();
+  const bool pictures = pipeline == scene::Pipeline::kPictures, shows = gate_.state().mode == CouplingMode::kImages;
+  requester_.set_pictures(pictures);
+  if (!pipeline || pictures == shows) return;
+  const CouplingState now = pictures ? coupling_state(CouplingMode::kImages, 0) : CouplingState{};
+  log::warn("coupling: {} instead of {}: so do the views of this session come", coupling_text(now),
+            coupling_text(gate_.state()));
+  requester_.set_buffers(uint64_t(now.buffers));
+  gate_.change(now);
+}
+
+// As many views are under way as keep the servers and the link busy.
+void ViewerWorker::follow_depth(const ViewRequester::Update& update) {
+  CouplingState state = gate_.state();
+  if (state.mode != CouplingMode::kImages) return;
+  depth_.answered(update.complete_s - update.requested_s, int(update.ahead));
+  if (state.buffers == depth_.depth()) return;
+  state.buffers = depth_.depth();
+  requester_.set_buffers(uint64_t(state.buffers));
+  gate_.change(state);
 }
 
 // A display that does not wait yet goes on to show what comes until the update that is on its way is complete: so none
@@ -301,7 +328,8 @@ void ViewerWorker::on_part(const ViewPart& part) {
   stages_table_.complete({*u, part});
   spans_.add("view update", u->requested_s, u->complete_s, metrics::kOverlapping,
              {.frame = double(part.frame.value), .request = double(u->request.value)});
-  const ShownUpdate update{u->request, u->requested_s, part.camera.pose};
+  const ShownUpdate update{u->request, u->requested_s, part.camera.pose, u->posed_s};
+  follow_depth(*u);
   if (!gate_.waits()) may_display(update);
   {
     const std::lock_guard lock(mutex_);

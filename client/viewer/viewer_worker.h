@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "client/viewer/coupling/pipeline_depth.h"
 #include "client/viewer/coupling/stage_table.h"
 #include "client/viewer/display/frame_table.h"
 #include "client/viewer/hands/meaning.h"
@@ -107,6 +108,8 @@ class ViewerWorker {
   void follow_session();
   void follow_record(const wire::Welcome& session);
   void follow_coupling(const scene::SessionView& session);
+  void follow_pictures(const scene::SessionView& session);
+  void follow_depth(const ViewRequester::Update& update);
   void change_coupling(double now_s);
   Status follow(scene::Pipeline pipeline, const wire::Welcome& session);
   void retire();
@@ -143,6 +146,8 @@ class ViewerWorker {
   InstanceId master_;
   bool all_again_ = false;  // what is open is to be asked for again
   double started_s_ = 0, last_report_s_ = 0;
+  PipelineDepth depth_;  // where views come as pictures
+  EpochId session_epoch_;
   std::optional<CouplingState> wished_;  // for the time being another one is in force
   double wished_since_s_ = 0;
 

@@ -5,22 +5,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/viewer/coupling/pipeline_depth.h"
 #include "common/core/check.h"
 #include "common/wire/limits.h"
 
 namespace telesplat::viewer {
 
 std::optional<CouplingMode> coupling_named(std::string_view name) {
-  for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose})
+  for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose, CouplingMode::kImages})
     if (name == coupling_name(mode)) return mode;
   return std::nullopt;
 }
 
 const char* coupling_name(CouplingMode mode) {
-  return mode == CouplingMode::kAsync ? "async" : mode == CouplingMode::kSync ? "sync" : "loose";
+  constexpr const char* kNames[] = {"async", "sync", "loose", "images"};
+  return kNames[size_t(mode)];
 }
 
 int buffers_of(CouplingMode mode, int loose) {
+  if (mode == CouplingMode::kImages) return PipelineDepth::kFirst;
   return mode == CouplingMode::kAsync ? 0 : mode == CouplingMode::kSync ? 1 : loose;
 }
 
@@ -70,7 +73,12 @@ std::vector<RequestId> Coupling::release() {
 
 std::vector<RequestId> Coupling::completed(RequestId request, double now_s) {
   progress(now_s);
-  for (Open& o : open_) o.complete |= o.request == request;
+  const auto found = std::ranges::find(open_, request, &Open::request);
+  if (found != open_.end()) found->complete = true;
+  if (newest_ && found != open_.end()) {
+    open_.erase(open_.begin(), found);
+    ready_.clear();
+  }
   return release();
 }
 

@@ -14,12 +14,13 @@ namespace telesplat::viewer {
 
 /// async: the display shows what is there, requests go out at a rate. sync: ask, wait, display one frame, ask again.
 /// loose: the same with up to `buffers` requests on their way or complete and not displayed, so that server and display
-/// work at the same time.
-enum class CouplingMode { kAsync, kSync, kLoose };
+/// work at the same time. images: the servers draw views; the display waits for the next picture and shows the newest
+/// that is there; as many requests are on their way as PipelineDepth says.
+enum class CouplingMode { kAsync, kSync, kLoose, kImages };
 
 std::optional<CouplingMode> coupling_named(std::string_view name);
 const char* coupling_name(CouplingMode mode);
-/// ViewRequest::buffers: 0, 1, or `loose`.
+/// ViewRequest::buffers: 0, 1, `loose`, or PipelineDepth::kFirst.
 int buffers_of(CouplingMode mode, int loose);
 
 /// A coupling with its buffers, as buffers_of() has them.
@@ -47,15 +48,21 @@ class Coupling {
   static constexpr double kPatience_s = 2;
 
   /// buffers: as buffers_of(); 0: asynchronous, nothing below applies and may_ask() is always true.
-  explicit Coupling(int buffers) : buffers_(buffers) {}
+  /// newest: an update that comes makes those before it void, and holds no credit: it is displayed unless a newer one
+  /// comes before.
+  explicit Coupling(int buffers, bool newest = false) : buffers_(buffers), newest_(newest) {}
   int buffers() const { return buffers_; }
   bool waits() const { return buffers_ > 0; }
   /// From now on there are so many. Credits that are out stay out: with fewer buffers than before nothing may be asked
   /// for until enough updates were displayed. 0: what is open or complete is forgotten, nothing is waited for any more.
   void set_buffers(int buffers);
+  void set_newest(bool newest) { newest_ = newest; }
 
   // ---- requests ----
-  bool may_ask() const { return !waits() || open_.size() + ready_.size() + (displaying_ ? 1 : 0) < size_t(buffers_); }
+  bool may_ask() const {
+    const size_t here = newest_ ? 0 : ready_.size() + (displaying_ ? 1 : 0);
+    return !waits() || open_.size() + here < size_t(buffers_);
+  }
   /// Ids ascend.
   void asked(RequestId request, double now_s);
   bool is_open(RequestId request) const;
@@ -96,6 +103,7 @@ class Coupling {
   std::vector<RequestId> release();
 
   int buffers_;
+  bool newest_ = false;
   std::deque<Open> open_;
   std::deque<RequestId> ready_;
   bool displaying_ = false;

@@ -11,7 +11,8 @@ namespace telesplat::viewer {
 
 class CouplingGate {
  public:
-  explicit CouplingGate(const CouplingState& state) : state_(state), coupling_(state.buffers) {}
+  explicit CouplingGate(const CouplingState& state)
+      : state_(state), coupling_(state.buffers, state.mode == CouplingMode::kImages) {}
   /// What has so many buffers: 0 async, 1 sync, else loose.
   explicit CouplingGate(int buffers)
       : CouplingGate({buffers == 0   ? CouplingMode::kAsync
@@ -33,6 +34,7 @@ class CouplingGate {
     {
       const std::lock_guard lock(mutex_);
       state_ = state;
+      coupling_.set_newest(state.mode == CouplingMode::kImages);
       coupling_.set_buffers(state.buffers);
     }
     changed_.notify_one();
@@ -58,6 +60,7 @@ class CouplingGate {
     CouplingState coupling;            ///< in force when the wait ended
     std::optional<RequestId> request;  ///< the next complete update; none: there was none in time
     double last_sign_s = 0;            ///< Coupling::last_sign_s()
+    bool asked = false;                ///< some request waits for its answer
   };
   /// The next complete update, waited for at most `timeout_s`; not at all where the coupling is asynchronous, also if
   /// that is changed meanwhile.
@@ -65,7 +68,8 @@ class CouplingGate {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::duration<double>(timeout_s),
                       [&] { return coupling_.filled() > 0 || !state_.waits(); });
-    return {state_, coupling_.take(), coupling_.last_sign_s()};
+    const auto next = coupling_.take();
+    return {state_, next, coupling_.last_sign_s(), !coupling_.open().empty()};
   }
   void displayed() {
     const std::lock_guard lock(mutex_);

@@ -24,6 +24,10 @@ struct RequestOptions {
   double horizon_s = 0;       ///< seconds that poses are predicted ahead; 0: the latency of updates, as it is measured
   std::string wall;           ///< wire::ViewRequest
   uint64_t wall_viewers = 0;  ///< likewise
+  /// Views are pictures that the servers draw: they are asked for as the display sees them, of the head as it is, so
+  /// many a second at most and as far as credits go; of a head that rests once more, for a finer one.
+  bool pictures = false;
+  double picture_rate_hz = 60;
   bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 

@@ -10,6 +10,7 @@ struct ShownUpdate {
   RequestId request;
   double requested_s = 0;  ///< master's clock
   geometry::Pose pose;     ///< that was asked for
+  double posed_s = 0;      ///< master's clock: the head was there, unless it was predicted
 };
 
 }  // namespace telesplat::viewer

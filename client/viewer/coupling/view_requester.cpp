@@ -36,6 +36,7 @@ std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height
 void ViewRequester::on_pose(double t_s, const geometry::Camera& display) {
   predictor_.add(t_s, display.pose);
   meter_.actual(t_s, display.pose);
+  if (display_ != display) posed_s_ = t_s;
   display_ = display;
 }
 
@@ -75,6 +76,11 @@ geometry::Camera ViewRequester::wanted(double now_s, bool& still, const geometry
 geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const geometry::Camera* asked) {
   const double horizon_s = this->horizon_s();
   geometry::Camera camera = asked ? *asked : *display_;
+  if (options_.pictures) {
+    if (!options_.adaptive)
+      std::tie(camera.width, camera.height) = sampling_size(options_, display_->width, display_->height);
+    return camera;
+  }
   if (!asked) {
     camera.pose = expected_at(now_s + horizon_s);
     meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
@@ -142,9 +148,22 @@ void ViewRequester::set_buffers(uint64_t buffers) {
   due_s_ = std::min(due_s_, last_sent_s_ + 1.0 / options_.max_rate_hz);  // credits knew no rate
 }
 
+// A head that moves sees its newest view; of one that rests the same view is asked for once more, which samplers draw
+// finer. What is the same view in another epoch is another one.
+bool ViewRequester::picture_due(double now_s) {
+  bool still = false;
+  if (!sent_ || *sent_ != wanted(now_s, still) || epoch_began_s_ > last_sent_s_) {
+    settled_ = false;
+    return true;
+  }
+  if (settled_ || open_.contains(sent_id_) || now_s - last_sent_s_ < kSettles_s) return false;
+  return settled_ = true;
+}
+
 std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const bool paced = options_.buffers == 0;
   if (!display_) return std::nullopt;
+  if (options_.pictures && (now_s < due_s_ || !picture_due(now_s))) return std::nullopt;
   const bool together = paced && now_s - asked_s_ < kAskPatience_s;
   if (together ? !asked_ : paced && (now_s < due_s_ || waits_for_answer(now_s))) return std::nullopt;
   const Ask ask = together ? *std::exchange(asked_, std::nullopt) : Ask{};
@@ -152,12 +171,13 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const geometry::Camera camera = wanted(now_s, still, together ? &ask.camera : nullptr);
   if (paced && !together && quiet(camera) && now_s - last_sent_s_ < kQuietPeriod_s) return std::nullopt;
   last_sent_s_ = now_s;
-  const double period_s = 1.0 / options_.max_rate_hz;
+  const double period_s = 1.0 / (options_.pictures ? options_.picture_rate_hz : options_.max_rate_hz);
   due_s_ = now_s - due_s_ < period_s ? due_s_ + period_s : now_s + period_s;
   const RequestId id = next_;
   next_ = next_.next();
   const uint64_t ahead = paced ? 0 : std::min<uint64_t>(open_.size(), options_.buffers - 1);
-  open_[id] = {.request = id, .ahead = ahead, .requested_s = now_s, .camera = camera, .still = still};
+  open_[id] = {
+      .request = id, .ahead = ahead, .requested_s = now_s, .posed_s = posed_s_, .camera = camera, .still = still};
   while (open_.size() > kMaxOpen) open_.erase(open_.begin());
   sent_ = camera;
   sent_id_ = id;
@@ -267,7 +287,8 @@ std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part
   follow_latency(u, std::max(now_s - u.requested_s, 1e-3));
   const Update done = u;
   // Asynchronous requests before this one were replaced at the master and will never be answered; others may still be.
-  open_.erase(options_.buffers ? it : open_.begin(), std::next(it));
+  // So does a newer picture make the older ones void.
+  open_.erase(options_.buffers && !options_.pictures ? it : open_.begin(), std::next(it));
   return done;
 }
 

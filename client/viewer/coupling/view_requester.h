@@ -46,6 +46,7 @@ class ViewRequester {
   static constexpr double kNearest_m = 0.3;
   static constexpr double kQuietPeriod_s = 1.0;  ///< what has changed without a word is found by asking again
   static constexpr double kPatience_s = 0.5;     ///< with a view on its way
+  static constexpr double kSettles_s = 0.25;     ///< pictures: a head that rests so long is asked for once more
   static constexpr double kAskPatience_s = 0.5;  ///< until views are asked for of the own head again
 
   ViewRequester(const RequestOptions& options, InstanceId viewer)
@@ -69,11 +70,17 @@ class ViewRequester {
   void set_steered(bool steered) { steered_ = steered; }
   /// RequestOptions::buffers from now on. Where that was 0, nothing but the newest request is answered any more.
   void set_buffers(uint64_t buffers);
+  /// RequestOptions::pictures from now on.
+  void set_pictures(bool pictures) { options_.pictures = pictures; }
   /// Whether the newest request waits for its answer.
   bool answer_open() const { return open_.contains(sent_id_); }
   /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full
   /// resolution.
   void on_epoch(double now_s);
+  /// Another epoch began: of pictures, the view of a head that rests is another one.
+  void on_new_epoch(double now_s) {
+    if (options_.pictures) on_epoch(now_s);
+  }
   /// The next request; asynchronously, if one is due. A head that rests asks for exactly the same view again while it
   /// moves by less than kDeadBand_px. Where sampling is steered, it asks only every kQuietPeriod_s while its view is on
   /// its way, and after an update of it that brought no points.
@@ -98,6 +105,7 @@ class ViewRequester {
     uint64_t ahead = 0;  ///< requests that were open when it was sent: it is answered after them
     /// first_s: the first part, of the coarse pass if there is one.
     double requested_s = 0, first_s = 0, complete_s = 0;
+    double posed_s = 0;  ///< the displayed pose was new then
     geometry::Camera camera;
     bool still = false;  ///< asked for at full resolution, while the head rested
     /// The coarse pass included.
@@ -121,6 +129,7 @@ class ViewRequester {
   tracking::PredictionMeter meter_;
   std::optional<tracking::PosePredictor::Sample> expected_;
   std::optional<geometry::Camera> display_;
+  double posed_s_ = 0;  // since when it is that
   RequestId next_{1};
   double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
   double min_scale() const {
@@ -136,6 +145,7 @@ class ViewRequester {
   bool rests_at(const geometry::Pose& there, const geometry::Pose& here) const;
   bool quiet(const geometry::Camera& camera) const;
   bool waits_for_answer(double now_s) const;
+  bool picture_due(double now_s);
   void follow_latency(const Update& update, double latency_s);
   void step_scale(double own_s);
 
@@ -149,6 +159,7 @@ class ViewRequester {
   bool steered_ = false;
   std::optional<geometry::Camera> sent_, quiet_;  // of the last request; of the last update, if it brought no points
   RequestId sent_id_;
+  bool settled_ = false;                         // pictures: of the view that was sent a finer one has been asked for
   uint64_t extra_points_ = 0, extra_bytes_ = 0;  // since the last update
   int slow_ = 0, fast_ = 0;                      // updates in a row that took too long, that left time
   bool changing_ = false;                        // the scene; as of the last request

@@ -198,13 +198,18 @@ class Display {
     }
     const double begin_s = monotonic_s();
     for (;;) {
-      const auto [coupling, request, last_sign_s] = gate_.take(kLookAfterSurface_s);
+      const auto [coupling, request, last_sign_s, asked_for] = gate_.take(look_after_s());
       const double now_s = monotonic_s(), t_s = now_s - start_s_;
       if (request || !coupling.waits()) end_stall();
       if (request && draw_from(*request)) source_->advance(*request);
       if (request || !coupling.waits()) return {monotonic_s() - begin_s, coupling, request.has_value()};
       if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s))
         return {now_s - begin_s, coupling};
+      // A head that rests sees its picture; there is nothing to wait for.
+      if (coupling.mode == CouplingMode::kImages && !asked_for && now_s - begin_s >= kRestPeriod_s) {
+        end_stall();
+        return {now_s - begin_s, coupling};
+      }
       const bool draws = stall_.waiting(now_s, begin_s, last_sign_s, coupling);
       tell_stall(now_s);
       if (draws) return {now_s - begin_s, coupling};
@@ -214,8 +219,15 @@ class Display {
         carry_out_orders(shown_);
       else
         refuse_orders();
-      if (view_intact_ && surface_.visible()) surface_.present(view_, true);
+      if (view_intact_ && surface_.visible()) surface_.present(view_, coupling.mode != CouplingMode::kImages);
     }
+  }
+
+  // Where servers draw, views are asked for of where the head is at each of the display's refreshes, also of those that
+  // bring no new picture.
+  double look_after_s() const {
+    if (gate_.state().mode != CouplingMode::kImages) return kLookAfterSurface_s;
+    return o_.target_fps > 0 ? std::min(1 / o_.target_fps, kLookAfterSurface_s) : kRestPeriod_s / 2;
   }
 
   void end_stall() {
@@ -305,6 +317,7 @@ class Display {
     // The view of now, from what is cached now.
     begin_view(t_s, m);
     const geometry::Camera sampled = asked(m.begin_s, t_s, m.camera, m.head);
+    if (m.coupling.mode == CouplingMode::kImages) worker_.on_pose(m.posed.taken_s, sampled);
     m.look = look_;
     const uint32_t use = use_of_frame(t_s);
     const bool with_depth = use & (kVerify | kExr);
@@ -319,6 +332,7 @@ class Display {
                     .with_coverage = coverage,
                     .intact = intact});
     m.end_s = monotonic_s();
+    if (m.drawn.picture_of) m.posed = {m.drawn.update.posed_s - worker_.to_master_s(0)};
     if (eyes_.on()) m.stereo = {stereo_.mode, eyes_.pair()};
     worker_.on_frame(m.end_s, sampled, m.drawn.epoch, m.drawn.update, waited.for_update);
     // A flat legend would lie in one eye's picture, or be torn by the other's.
@@ -443,8 +457,10 @@ class Display {
     view_intact_ = use == 0;
     if (!use) return;
     if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
-    geometry::Camera camera = m.camera;
+    // A picture is compared with what its server was to draw; how old that is, other columns tell.
+    geometry::Camera camera = m.drawn.picture_of.value_or(m.camera);
     camera.width = view_.width, camera.height = view_.height;
+    if (m.drawn.picture_of) use |= kPictureOnly;
     SpooledFrame frame{m.number, t_s,           use,    camera,
                        {},       m.drawn.epoch, legend, part_of_wall(camera.width, camera.height, o_.wall)};
     if (eyes_.on()) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 
 #include "client/viewer/coupling/shown_update.h"
 #include "client/viewer/display/display_surface.h"
@@ -38,6 +39,8 @@ struct DrawnFrame {
   EpochId epoch;
   bool between_clips = false;  ///< it is cut as the session is now, and its points are of an epoch before that
   ShownUpdate update;          ///< the newest view update that it shows
+  /// Of a picture that a server drew: whose view it is. It has no depth.
+  std::optional<geometry::Camera> picture_of;
 };
 
 /// Used by one thread, the display's.

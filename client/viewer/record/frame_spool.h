@@ -26,7 +26,8 @@ enum FrameUse : uint32_t {
   kPicture = 1,
   kVerify = 2,
   kExr = 4,
-  kTransparent = 8  ///< its pictures have alpha: colours have the coverage in their upper byte
+  kTransparent = 8,  ///< its pictures have alpha: colours have the coverage in their upper byte
+  kPictureOnly = 16  ///< a server drew it: its depth says nothing
 };
 
 struct SpooledFrame {

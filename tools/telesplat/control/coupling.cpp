@@ -21,8 +21,8 @@ options::Table table(CouplingOptions& o) {
   return joined({{.flag = "coupling",
                   .value = &o.coupling,
                   .help = "async: the display never waits; sync: each frame waits for its own view update; loose: for "
-                          "the next of --buffers",
-                  .limits = options::Names{"async", "sync", "loose"},
+                          "the next of --buffers; images: of a session from its beginning alone",
+                  .limits = options::Names{"async", "sync", "loose", "images"},
                   .required = true},
                  {.flag = "--buffers",
                   .value = &o.buffers,

@@ -196,6 +196,16 @@ Status refuse_records_without_folder(const RunOptions& o) {
   return ok_status();
 }
 
+// A viewer that joins is told by its session.
+bool shows_pictures(const RunOptions& o) { return o.viewer.coupling == "images" && o.join_master.empty(); }
+
+// Views of what travels as points alone can come as pictures.
+Status check_pictures(const RunOptions& o, const Scene* scene) {
+  if (!shows_pictures(o) || !scene || scene->pipeline() == scene::Pipeline::kPoints) return ok_status();
+  return Error{fmt::format("--coupling images: {} is {}, which comes as slice images; pictures are of {}", o.data.scene,
+                           scene::described(scene->kind()), "meshes and Julia sets")};
+}
+
 // A movie is made of the record.
 Status check_movie(const RunOptions& o, const options::Given& given) {
   if (o.movie.file.empty()) {
@@ -208,6 +218,8 @@ Status check_movie(const RunOptions& o, const options::Given& given) {
     return Error{
         "--movie needs a session of its own: the record of a joined one is its master's; telesplat movie RUN "
         "FILE makes a movie of it afterwards"};
+  if (shows_pictures(o))
+    return Error{"--movie and --coupling images: a movie is drawn of recorded points, and pictures leave none"};
   if (o.viewer.record_points_mb == 0) return Error{"--movie needs the record that --record-points 0 leaves out"};
   return ok_status();
 }
@@ -278,6 +290,7 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   if (const Status s = settle_wall(o, given); !s) return s.error();
   if (const Status s = settle_links(o); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();
+  if (const Status s = check_pictures(o, out.get()); !s) return s.error();
   if (const Status s = check_movie(o, given); !s) return s.error();
   if (const Status s = check_report(o); !s) return s.error();
   if (const Status s = image::validate_samples(o.verify_samples); !s)
@@ -292,6 +305,8 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
   auto out = arguments(o.master);
   out.insert(out.end(), {"--bind", "tcp://127.0.0.1:*", "--started-by", o.viewer.window ? "view" : "run"});
   if (!o.out.empty()) out.insert(out.end(), {"--out", o.out});
+  if (shows_pictures(o))
+    out.insert(out.end(), {"--images", o.viewer.shading, "--image-background", o.viewer.background});
   return out;
 }
 

@@ -60,6 +60,7 @@ class Verification {
     if (!reference) return reference.error();
     Frame now{*std::move(read), *std::move(reference)};
     scene_.mark_shown(now.frame.view);
+    if (now.frame.use & viewer::kPictureOnly) now.frame.view.depth_m = now.reference.view.depth_m;
     VerifiedView v{
         .frame = now.frame.number, .t_s = now.frame.t_s, .samples = now.reference.samples, .eye = now.frame.eye};
     std::optional<Frame>& before = before_[v.eye];  // of this eye

@@ -169,6 +169,7 @@ std::string coupling_of(const TopProcess& viewer) {
   if (!mode) return {};
   if (*mode == 0) return "async";
   if (*mode == 1) return "sync";
+  if (*mode == 3) return "images";
   return fmt::format("loose({:.0f})", viewer.value("buffers").value_or(0));
 }
 
