@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <set>
 #include <thread>
@@ -157,10 +158,17 @@ class Run {
 
   // What a person at the window wants to see instead. What cannot be is said there and here, and nothing else happens.
   void open(Pipeline& pipeline, const std::string& wish) {
-    const Status opened = try_open(pipeline, wish);
-    if (opened) return;
-    pipeline.tell_viewers("problem " + opened.error().text);
-    progress_.line("telesplat: " + opened.error().text);
+    Status opened = try_open(pipeline, wish);
+    if (opened) opened = open_due();
+    if (!opened) complain(pipeline, opened.error());
+  }
+  Status open_due() {
+    const auto due = std::exchange(due_, nullptr);
+    return due ? due() : ok_status();
+  }
+  void complain(Pipeline& pipeline, const Error& error) {
+    pipeline.tell_viewers("problem " + error.text);
+    progress_.line("telesplat: " + error.text);
   }
 
   // What people ordered of this process, by way of the master (scene::Keeper::kLauncher).
@@ -171,6 +179,8 @@ class Run {
       control.tell("done", {{"number", fmt::format("{}", wish.number)},
                             {"ok", done ? "true" : "false"},
                             {"text", done ? *done : done.error().text}});
+      // The person has the answer; the data server that goes may take some seconds.
+      if (const Status s = open_due(); !s) complain(pipeline, s.error());
     }
   }
 
@@ -203,7 +213,8 @@ class Run {
     const auto scene = scene_of(other.data);
     if (!scene) return scene.error();
     if (const Status s = (*scene)->check(); !s) return s;
-    return pipeline.open(other, true);
+    due_ = [&pipeline, other] { return pipeline.open(other, true); };
+    return ok_status();
   }
 
   Status try_open(Pipeline& pipeline, const std::string& wish) {
@@ -219,7 +230,8 @@ class Run {
     other.data.mesh.use_cache = o_.data.mesh.use_cache;
     if (const Status s = (*scene)->check(); !s) return s;
     keep_recent(wish);
-    return pipeline.open(other);
+    due_ = [&pipeline, other] { return pipeline.open(other); };
+    return ok_status();
   }
 
   // The record of a joined session is its master's; so what its viewers did is asked for, once they have left.
@@ -331,6 +343,7 @@ class Run {
   ProcessorWait busy_;
   std::string master_folder_;                       // where the session's record is; empty: not known, or nowhere
   std::vector<std::string> results_;                // of the viewers of a joined session
+  std::function<Status()> due_;                     // opens what was checked
   std::set<std::pair<uint64_t, uint64_t>> obeyed_;  // orders: master, number
   PassingFolder logs_;
   tools::ProgressLine progress_;
