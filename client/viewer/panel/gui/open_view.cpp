@@ -61,8 +61,10 @@ void show_open(OpenViewState& state, bool can_close, const std::function<void(co
     dialog("Open", can_close ? &state.shown : nullptr);
     ImGui::TextDisabled("a mesh, a volume, a folder of slices, or julia; files can be dropped on the window too");
     ImGui::SetNextItemWidth(-letter * 9);
-    const bool here = ImGui::IsWindowFocused(ImGuiFocusedFlags_RootAndChildWindows);
-    if (ImGui::IsWindowAppearing() || (here && !ImGui::IsAnyItemActive() && !ImGui::IsMouseDown(0)))
+    // Unless the panel has it.
+    const bool has_focus = ImGui::IsWindowFocused(ImGuiFocusedFlags_RootAndChildWindows) ||
+                           !ImGui::IsWindowFocused(ImGuiFocusedFlags_AnyWindow);
+    if (ImGui::IsWindowAppearing() || (has_focus && !ImGui::IsAnyItemActive() && !ImGui::IsMouseDown(0)))
       ImGui::SetKeyboardFocusHere();
     const bool entered = ImGui::InputTextWithHint("##path", "path", &state.path, ImGuiInputTextFlags_EnterReturnsTrue);
     seen("text", "path", ImGui::IsItemEdited() || entered);

@@ -124,15 +124,14 @@ TEST(OpenDialog, LettersGoToThePathAsSoonAsItIsOpen) {
   io.AddInputCharactersUTF8("/data/a");
   for (int i = 0; i < 2; ++i) frame();
   EXPECT_EQ(state.path, "/data/a");
-  io.MousePos = {640, 700};  // the list of files, below its last line
-  for (const bool down : {true, false, false, false}) {
-    io.MouseDown[0] = down;
-    frame();
+  for (const auto& [x, y] : {std::pair{640.0f, 780.0f}, {335.0f, 200.0f}}) {  // outside, and beside its widgets
+    io.MousePos = {x, y};
+    for (const bool down : {true, false, false, false, false}) {
+      io.MouseDown[0] = down;
+      frame();
+    }
+    EXPECT_TRUE(io.WantTextInput);
   }
-  EXPECT_TRUE(io.WantTextInput);
-  io.AddInputCharactersUTF8(".ply");
-  for (int i = 0; i < 2; ++i) frame();
-  EXPECT_EQ(state.path, "/data/a.ply") << "what was typed before is not overwritten";
   ImGui::DestroyContext(context);
 }
 

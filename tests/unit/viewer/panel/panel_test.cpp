@@ -88,7 +88,7 @@ TEST_F(HoleMeterTest, SaysNothingOfThinLines) {
   for (int x = 4; x < 60; x += 6)
     for (int y = 0; y < 32; ++y) at(x, y) = at(x + 1, y) = 0xffa0a0a0;
   EXPECT_TRUE(std::isnan(measure()));
-  object(10, 50);  // a surface behind them
+  object(0, 64);  // a surface behind them
   at(20, 7) = kBackground;
   EXPECT_GT(measure(), 0);
 }
