@@ -77,7 +77,7 @@ TEST_F(Measuring, ATableHasALineAPlace) {
   add({0.3, 0, 0}), add({0, 0, 0});
   const std::string table = all.csv();
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 3);
-  EXPECT_NE(table.find("\n1,1,700"), std::string::npos) << table;
+  EXPECT_NE(table.find("\n1,1,699.99"), std::string::npos) << table;
   EXPECT_NE(table.find("\"mm, as \"\"measured\"\"\""), std::string::npos) << table;
 }
 
