@@ -49,10 +49,10 @@ inline constexpr int kMostRefused = 2, kMostLost = 7;
 /// How the frames of a scene are leased.
 struct Cut {
   bool rows = false;            ///< bands of rows of blocks instead of square tiles
-  bool pictures = false;        ///< a band of all columns a sampler
   bool coarse = false;          ///< a view is two frames: one of step kCoarseStep, then one of step 1
   bool coarse_if_slow = false;  ///< the same where the viewer's link is slow
-  bool steered = false;  ///< the packer is asked first which rays are needed; rows and coarse are for what it leaves
+  bool steered = false;   ///< the packer is asked first which rays are needed; rows and coarse are for what it leaves
+  bool pictures = false;  ///< a band of all columns a sampler
   bool operator==(const Cut&) const = default;
 };
 

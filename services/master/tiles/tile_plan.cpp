@@ -24,10 +24,10 @@ Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
   const auto kind = scene::kind_named(scene_.kind());
   const bool pictures = options_.images.on();
   const Cut cut{.rows = scene_.is_julia() && !pictures,
-                .pictures = pictures,
                 .coarse = master::progressive(options_, kind),
                 .coarse_if_slow = options_.progressive == Progressive::kAuto && !pictures,
-                .steered = master::steers(options_, kind)};
+                .steered = master::steers(options_, kind),
+                .pictures = pictures};
   out.changed |= cut != schedule_.cut();
   schedule_.set_cut(cut);
   return out;
