@@ -52,7 +52,7 @@ def order(chance):
     clips += ["box 0,0,0,1,1,1", "box 1,1,1,0,0,0", "nothing"]
     timelines = ["on", "off", "c.x=-0.5:0.5:2", "c.w=@0s:-0.2@2s:0.1", "nothing", f"c.y={some}:1:3"]
     orders = {
-        "tf": [function(chance), function(chance), function(chance), pick(PRESETS), "is not there.json", "nothing", ""],
+        "tf": [*[f"-- {function(chance)}"] * 3, pick(PRESETS), "is not there.json", "nothing", ""],
         "colour": [pick(arrays), f"map {pick(MAPS)}", f"{pick(arrays)} map {pick(MAPS)}"],
         "coupling": ["async", "sync", "loose", f"loose --buffers {pick('01389')}", "nothing"],
         "set": [f"{pick(NAMES)}={some}"],
@@ -135,8 +135,8 @@ def last(chance):
 def event(seed, index, keys, orders, drops):
     """The event of that number, and how long the monkey waits after it, seconds."""
     chance = random.Random(f"{seed}/{index}")
-    if index == 2:  # an example of docs/volumes.md, which ends within the data
-        return ["ctl", "tf", "20%:#603010:0, 45%:#a07040:0.05, 70%:#40a040:0.4"], 1
+    if index == 2:  # of volumes: it begins far below the data and ends within them, as presets of a CT do
+        return ["ctl", "tf", "--", "-3000:#000000:0, 100:#a07040:0.05, 200:#40a040:0.4"], 1
     return follows(chance, keys, orders, drops), chance.choice([0, 0, 0.02, 0.05, 0.1, 0.2])
 
 
