@@ -140,7 +140,7 @@ TEST(ImagesRefused, AChangeOfCouplingWhileItRuns) {
   for (const auto& [begin, order, words] : {std::tuple{"images", "sync", "from its beginning to its end"},
                                             {"async", "images", "is of a session from its beginning"}}) {
     PipelineRun run({"--coupling", begin, "--size", "160x100", "--duration", "60", "--record-points", "0"});
-    ASSERT_TRUE(run.wait_showing());
+    ASSERT_TRUE(run.wait_status([](const auto& status) { return value(status, "viewer-1", "frames") > 0; }));
     const Said s = said({"ctl", "coupling", order, "--master", run.master()}, run.folder());
     EXPECT_EQ(s.code, 2) << s.out << s.err;
     EXPECT_NE((s.out + s.err).find(words), std::string::npos) << s.out << s.err;
