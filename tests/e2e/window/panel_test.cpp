@@ -257,7 +257,7 @@ TEST_F(PanelTest, TheDialogTakesTheLettersAndEscapeClosesIt) {
   display_->tap("3");
   EXPECT_TRUE(wait_until([&] { return run.program().err().find("splats: ellipse") != std::string::npos; }))
       << run.program().err();
-  for (const char* done : {"bookmark", "screenshot", "once more"})
+  for (const char* done : {"bookmark", "screenshot: ", "once more"})
     EXPECT_EQ(run.program().err().find(done), std::string::npos) << run.program().err();
   display_->tap("q");
   EXPECT_TRUE(wait_until([&] { return run.program().err().find("once more") != std::string::npos; }));
