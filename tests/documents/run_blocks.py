@@ -161,6 +161,8 @@ class Page:
                 return reason
         if words[1:2] == ["view"] and not self._display:
             return "there is no Xvfb"
+        if re.search(r"\.mp4\b", text) and not shutil.which("ffmpeg"):
+            return "there is no ffmpeg"
         return ""
 
     # ---- commands ----
