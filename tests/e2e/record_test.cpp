@@ -119,7 +119,8 @@ TEST(Record, EveryFileIsThereAndTrue) {
     EXPECT_GE(seen[i], still[i] != 0 ? 0 : drawn[i]) << "frame " << i;
     EXPECT_LE(seen[i], still[i] != 0 ? 0 : drawn[i] + presented[i] + 1e-3) << "frame " << i;
   }
-  for (const double ms : run.column("frames.csv", "refresh_ms")) EXPECT_NEAR(ms, 1000.0 / 60, 1e-9);
+  // The runs of these tests have 30 frames a second.
+  for (const double ms : run.column("frames.csv", "refresh_ms")) EXPECT_NEAR(ms, 1000.0 / 30, 1e-9);
 
   const auto& q = s["quality"];
   ASSERT_TRUE(q.is_object());
