@@ -27,9 +27,10 @@ void draw_line(image::View& view, glm::dvec2 a, glm::dvec2 b, double thickness, 
   const double lo_y = std::min(a.y, b.y) - thickness, hi_y = std::max(a.y, b.y) + thickness;
   const double lo_x = std::min(a.x, b.x) - thickness, hi_x = std::max(a.x, b.x) + thickness;
   // In a row, only the pixels near where the line crosses it.
-  const double reach = std::abs(along.y) > 1e-6 * length ? thickness * length / std::abs(along.y) : hi_x - lo_x;
+  const bool level = std::abs(along.y) <= 1e-6 * length;
+  const double reach = level ? hi_x - lo_x : thickness * length / std::abs(along.y);
   for (int y = std::max(int(lo_y), 0); y < std::min(int(hi_y) + 1, view.height); ++y) {
-    const double at = a.x + along.x * ((y + 0.5 - a.y) / (std::abs(along.y) > 1e-9 ? along.y : 1e-9));
+    const double at = level ? a.x : a.x + along.x * ((y + 0.5 - a.y) / along.y);
     const double from = std::max(lo_x, std::min(at - reach, hi_x)), to = std::min(hi_x, std::max(at + reach, lo_x));
     for (int x = std::max(int(from), 0); x < std::min(int(to) + 1, view.width); ++x) {
       const glm::dvec2 p(x + 0.5, y + 0.5);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kStepsAVoxel = 16;
-constexpr double kLongestBracket = 64;  // voxels between the places that bound it
+constexpr double kLongestBracket = 4;  // voxels to the places that bound it; what is wider is no bound
 
 // Extinctions of all values from lo to hi.
 struct Extinctions {
@@ -143,8 +143,10 @@ Result<scene::Probed> cast(const volume::Session& session, int begin, int end, c
   const glm::dvec3 index = from + told.reached * on;
   cells.move_to(index);
   out.value = cells.value(index);
-  if (farthest.reached == kInfinity) return out;
-  out.error_m = std::max(told.reached - nearest.reached, farthest.reached - told.reached) + step_m / 2;
+  out.value_error = cells.deviation();
+  const double bracket_m = std::max(told.reached - nearest.reached, farthest.reached - told.reached);
+  if (bracket_m > kLongestBracket * voxel_m) return out;
+  out.error_m = bracket_m + step_m / 2;
   out.value_error = std::max({hi - *out.value, *out.value - lo, cells.deviation()});
   return out;
 }

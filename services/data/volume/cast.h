@@ -19,8 +19,9 @@ using LevelAt = std::function<double(int i, int j, int k)>;
 ///
 /// Bounds: how values run between voxels is not known; they deviate from the trilinear ones by about an eighth of the
 /// second differences of the voxels around (the error of linear interpolation), and levels are rounded. The place lies
-/// between those at which the largest and the smallest opacity of such values hide enough; where the smallest never do,
-/// there is no bound. The value's bound covers all values between these places.
+/// between those at which the largest and the smallest opacity of such values hide enough; where they lie more than
+/// four voxels off, as at thin things amid noise, there is no bound. The value's bound covers all values between these
+/// places, without them those that may lie at the place.
 ///
 /// begin, end: the slices that are this server's; levels of one more on each side are known, where there are some.
 /// Error: the ray does not meet enough, or meets slices that are not known first.

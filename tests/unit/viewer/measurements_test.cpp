@@ -105,6 +105,14 @@ TEST_F(Measuring, MarksLieOverTheirPlaces) {
     EXPECT_TRUE(marked(marks, glm::dot(x, h) / glm::dot(w, h), glm::dot(y, h) / glm::dot(w, h))) << room.x;
   }
   EXPECT_FALSE(marked(marks, 320, 400));
+  // Both arms of a cross; the line between two places of one height.
+  for (const glm::dvec2 arm : {glm::dvec2(4, 0), glm::dvec2(-4, 0), glm::dvec2(0, 4)})
+    EXPECT_TRUE(marked(marks, 320 + arm.x, 240 + arm.y)) << arm.x << " " << arm.y;
+  all.clear();
+  add({-0.2, 0, 0}), add({0.2, 0, 0});
+  EXPECT_TRUE(marked(draw_marks(all, camera, 1), 320 - 70, 240));
+  all.clear();
+  add({0, 0, 0}), add({0.2, 0.1, 0});
   EXPECT_LT(marks.view.width * marks.view.height, 640 * 480 / 4) << "only the part that has marks";
   // Behind the eye there is nothing to mark, and lines end at the window's edge.
   auto away = camera;
