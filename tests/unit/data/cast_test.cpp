@@ -172,21 +172,6 @@ TEST(CastVolume, PlacesAndValuesAreWithinTheirBoundsOfTheFormulas) {
   EXPECT_GT(hits, 150);
 }
 
-// A sheet that is one voxel thick may hide enough, or may not: the value is told, the place has no bound.
-TEST(CastVolume, WhatMayBeMissedHasNoBound) {
-  const StepReader read = [](size_t, const ReadProgress&) -> Result<Volume> {
-    return make_volume<float>({32, 32, 32}, VoxelType::kF32, [](int, int, int k) { return k == 16 ? 1000.0f : 0.0f; });
-  };
-  const auto store = *VolumeStore::make(read, 1, "sheet", {}, {}, [](const char*, double) {});
-  const auto transfer = *volume::parse_transfer("150:#ffffff:0, 400:#ffffff:0.3", {});
-  const auto found = store->cast(0, transfer, {}, {EpochId{1}, {0, 2, 0.01}, {0, -1, 0}});
-  ASSERT_TRUE(found) << found.error().text;
-  EXPECT_FALSE(found->error_m);
-  ASSERT_TRUE(found->value && found->value_error);
-  EXPECT_GT(*found->value, 150) << "of what is seen";
-  EXPECT_GE(*found->value_error, 100);
-}
-
 TEST(CastVolume, WhatHidesTooLittleIsNoPlace) {
   const auto store = blob_store();
   const auto faint = *volume::parse_transfer("0:#ffffff:0.001", {});
