@@ -59,7 +59,7 @@ class DisplaySurface {
   /// The head whose view begin_frame() returned last, and what it would have returned for another head: viewers of a
   /// wall show what one head sees.
   virtual geometry::Pose head() const = 0;
-  /// Of that head; nothing: a trajectory or a hand moves it, and it was there when the frame began.
+  /// When the pose of head() was taken. Nothing: a trajectory or a hand moves it, so it was taken when the frame began.
   virtual std::optional<PoseMoment> pose_moment() const { return std::nullopt; }
   virtual geometry::Camera camera_of(const geometry::Pose& head) const = 0;
   /// Whether frames without points are worth drawing, because somebody sees them.

@@ -39,7 +39,7 @@ struct DrawnFrame {
   EpochId epoch;
   bool between_clips = false;  ///< it is cut as the session is now, and its points are of an epoch before that
   ShownUpdate update;          ///< the newest view update that it shows
-  /// Of a picture that a server drew: whose view it is. It has no depth.
+  /// The view that a picture of a server shows; such a picture has no depth.
   std::optional<geometry::Camera> picture_of;
 };
 

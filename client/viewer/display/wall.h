@@ -49,8 +49,8 @@ geometry::Camera display_camera(const DisplayOptions& options, const geometry::P
 /// What the whole wall shows, for data to be fitted into.
 geometry::Camera fitting_camera(const DisplayOptions& options);
 
-/// Of the first screen of a wall that stands in the room: what to do where the wall does not show all of the data to a
-/// head there. Nothing: it does, or the data are fitted into the display anyway.
+/// Returns what a person can do where a wall that stands in the room does not show all of the data to the head. Looks
+/// at its first screen. Nothing: the wall shows all, or the data are fitted into the display anyway.
 std::optional<std::string> cut_off_by_wall(const DisplayOptions& options, const geometry::Pose& head,
                                            const geometry::Box& box_room);
 

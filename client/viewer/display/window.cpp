@@ -154,9 +154,9 @@ struct Place {
 
 struct Screen {
   GLFWmonitor* monitor = nullptr;
-  const GLFWvidmode* mode = nullptr;  // null: there is none
+  const GLFWvidmode* mode = nullptr;  // null: no screen
 };
-// On which most of it lies.
+// Returns the screen on which most of the window lies.
 Screen screen_of(const Place& place) {
   int count = 0;
   GLFWmonitor** const monitors = glfwGetMonitors(&count);

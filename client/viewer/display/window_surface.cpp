@@ -521,7 +521,7 @@ void WindowSurface::build_legend(double now_s, double hidden) {
   legend_part_ = viewer::show_legend(shown, legend_view_, hidden, editable ? change : nullptr);
 }
 
-// Of a wall the tile in the lower right corner has it; and so does a window that has no Dear ImGui.
+// Shows the legend over the frame: in a wall's tile at the lower right, and in a window without Dear ImGui.
 void WindowSurface::show_legend() {
   const WallTile& wall = options_.display.wall;
   const int tiles = wall.described ? int(wall.described->screens.size()) : wall.columns * wall.rows;

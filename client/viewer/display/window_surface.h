@@ -97,7 +97,7 @@ class WindowSurface final : public DisplaySurface {
   WindowSurface(const Options& options, std::unique_ptr<Window> window, std::shared_ptr<Lines> lines,
                 std::unique_ptr<ControlDesk> desk);
   geometry::Camera whole(const geometry::Pose& pose) const;
-  // Of the window: its frustum, whose middle lies at a tangent from the view's axis.
+  // The window's frustum; its middle lies at a tangent from the view's axis.
   struct FreePart {
     geometry::Camera frustum;
     double middle_x;

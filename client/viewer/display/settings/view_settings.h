@@ -13,15 +13,15 @@ namespace telesplat::viewer {
 
 struct ViewSettings {
   Look look;
-  bool transparent = false;  ///< the background is nobody's to choose
+  bool transparent = false;  ///< the background cannot be chosen
   SamplingWish sampling;
   StereoOptions stereo;
   bool quad_buffers = false;  ///< the window has a buffer for each eye
   bool legend = true;
 };
 
-/// Gives the setting of this order a value, as its flag takes it. Error: what is wrong, or it is none of these; then
-/// nothing changed.
+/// Gives the setting of this order a value, as its flag takes it. Error: what is wrong, or that no setting has this
+/// order; then nothing changes.
 Status change(ViewSettings& settings, const std::string& order, const std::string& value);
 /// All of them as they are, by their orders.
 std::map<std::string, std::string> values_of(const ViewSettings& settings);

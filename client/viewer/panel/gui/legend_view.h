@@ -22,7 +22,7 @@ struct WindowPart {
 };
 
 /// Builds it, beside `hidden` screen coordinates of the window's left side. Between Dear ImGui's frames. change: the
-/// person wants this range, lo below hi; null: it is nobody's to choose. Returns what it covers.
+/// person wants this range, lo below hi; null: the range cannot be chosen. Returns what it covers.
 WindowPart show_legend(const image::Legend& legend, LegendViewState& state, double hidden,
                        const std::function<void(double lo, double hi)>& change);
 
