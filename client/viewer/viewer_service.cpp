@@ -210,9 +210,9 @@ std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& contex
 struct Served {
   DisplayResult display;
   bool session_ended = false;
-  std::string why;       // it has ended, for people
-  bool refused = false;  // by the master
-  bool failed = false;   // nothing came any more
+  std::string why;      // it has ended, for people
+  int link_code = 0;    // refused by the master, or it was waited for too long
+  bool failed = false;  // nothing came any more
 };
 
 // Shows the session until it, the person or the clock ends it.
@@ -252,7 +252,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const Display& d
         run_display(o.display, *display.surface, make_source, gate, worker, frames, spans, spool, wall.get());
   served.session_ended = worker.shutdown_requested();
   served.why = worker.shutdown_reason();
-  served.refused = worker.refused();
+  served.link_code = worker.link_code();
   served.failed = worker.failed();
   return served;
 }
@@ -283,7 +283,7 @@ Status develop(const std::string& directory, FrameSpool& spool) {
 
 // Ends the session for everyone, if that is this viewer's part. Exit code.
 int farewell(const ViewerOptions& o, const net::Access& asking, const Served& served) {
-  if (served.refused) return 2;
+  if (served.link_code != 0) return served.link_code;
   const int otherwise = served.failed ? 1 : 0;
   if (!o.end_session) return otherwise;
   if (!served.session_ended && !net::stop_requested())

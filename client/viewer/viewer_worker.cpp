@@ -43,7 +43,7 @@ ViewerWorker::ViewerWorker(net::Context& context, const Options& options, Coupli
       frames_(frames),
       spans_(spans),
       updates_table_("updates", update_columns()),
-      link_(context, options.service.master, make_hello(options)),
+      link_(context, options.service.master, make_hello(options), options.service.give_up_after_s),
       feeds_(context, options.service.name),
       requester_(with_buffers(options.requests, gate), link_.instance()),
       started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
@@ -175,7 +175,7 @@ void ViewerWorker::receive() {
 void ViewerWorker::receive_control() {
   link_.receive();
   for (auto& answer : orders_.take_answers()) link_.answer(answer.number, answer.ok, std::move(answer.text));
-  if (link_.refused()) refused_ = true;
+  link_code_ = link_.exit_code();
   if (!link_.shutdown_requested() || shutdown_) return;
   why_ = link_.shutdown_reason();
   shutdown_ = true;

@@ -73,8 +73,8 @@ class ViewerWorker {
   const std::string& shutdown_reason() const { return why_; }
   /// Its thread ended by an exception, which was logged: nothing comes any more.
   bool failed() const { return failed_; }
-  /// The master does not let it in with its keys.
-  bool refused() const { return refused_; }
+  /// MasterLink::exit_code().
+  int link_code() const { return link_code_; }
   InstanceId instance() const { return link_.instance(); }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
@@ -177,7 +177,8 @@ class ViewerWorker {
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
   std::string why_;  // written before shutdown_
-  std::atomic<bool> shutdown_{false}, failed_{false}, refused_{false}, stop_{false};
+  std::atomic<bool> shutdown_{false}, failed_{false}, stop_{false};
+  std::atomic<int> link_code_{0};
   std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
   std::atomic<double> longest_gap_ms_{0};  // between two displayed frames
   metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};

@@ -5,9 +5,18 @@
 #include <unistd.h>
 
 #include "common/core/clock.h"
+#include "common/net/connections/waiting.h"
 #include "common/net/service.h"
 
 namespace telesplat::net {
+namespace {
+
+std::string nothing_there(const Socket& socket, const std::string& endpoint) {
+  const std::string problem = socket.tunnelled() ? std::string() : host_problem(endpoint);
+  return problem.empty() ? "nothing takes connections there" : problem;
+}
+
+}  // namespace
 
 std::string this_person() {
   char text[1024];
@@ -35,9 +44,13 @@ Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& en
     }
     if (std::string refusal = refusal_of_master(socket, endpoint); !refusal.empty()) return Error{std::move(refusal)};
     if (socket.failed_connections() != failed_before)
-      return Error{fmt::format("no master is at {}: nothing takes connections there", endpoint)};
+      return Error{fmt::format("no master is at {}: {}", endpoint, nothing_there(socket, endpoint))};
   }
-  return Error{fmt::format("no answer from a master at {} within {} s", endpoint, timeout_s)};
+  return Error{fmt::format("no answer from a master at {} within {} s{}", endpoint, timeout_s,
+                           socket.in_touch() ? fmt::format(": it is no master, is busy, or speaks another version of "
+                                                           "the protocol than {}",
+                                                           wire::kProtocolVersion)
+                                             : "")};
 }
 
 Result<std::string> ask_master(Socket& socket, const std::string& endpoint, const std::string& command,

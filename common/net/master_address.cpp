@@ -9,6 +9,8 @@
 #include <ctime>
 #include <filesystem>
 
+#include "common/net/local_endpoint.h"
+
 namespace telesplat::net {
 namespace {
 
@@ -25,6 +27,14 @@ bool is_address(const std::string& text) {
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, port);
   return error == std::errc() && stop == end && port >= 1 && port <= 65535;
+}
+
+// Returns the keys that the file of a session of this user names; empty: no such session is at that address.
+std::string keys_at(const std::string& master) {
+  const std::string address = local_address(numeric_host(master));
+  for (const auto& s : running_sessions())
+    if (s.address == address) return s.keys;
+  return {};
 }
 
 // As a person may name it.
@@ -50,7 +60,7 @@ std::string master_from_environment() {
 
 MasterSearch find_master(const std::string& master, const std::string& session) {
   if (!master.empty() && master != kTheOneMaster) {
-    if (is_address(master)) return {.address = master, .problem = {}, .keys = {}};
+    if (is_address(master)) return {.address = master, .problem = {}, .keys = keys_at(master)};
     return {.address = {},
             .problem =
                 fmt::format("{} {}: is no address such as tcp://127.0.0.1:7700",

@@ -24,9 +24,9 @@ struct MasterSearch {
   int exit_code() const { return several ? 2 : 1; }
 };
 
-/// master: an address, which comes back as it is; "auto" or empty: a session that runs on this machine. session: which
-/// one: the master's process number, the scene's or the run folder's name with or without its path; empty: there must
-/// be one alone.
+/// master: an address, which comes back as it is, with the keys of the session of this user that is there; "auto" or
+/// empty: a session that runs on this machine. session: which one: the master's process number, the scene's or the run
+/// folder's name with or without its path; empty: there must be one alone.
 MasterSearch find_master(const std::string& master, const std::string& session = {});
 
 /// A session in one line, for a person who must choose.

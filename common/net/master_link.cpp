@@ -1,12 +1,16 @@
 #include "common/net/master_link.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <utility>
 
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
 #include "common/net/process_facts.h"
+#include "common/scene/session.h"
 
 namespace telesplat::net {
 namespace {
@@ -14,6 +18,7 @@ constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
 // The clock is asked for in quick succession at first: the shortest round trip of some is near the shortest there is.
 constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
 constexpr int kFirstClocks = 8;
+constexpr double kSilence_s = 5;       // of a master that answers once a second
 constexpr double kSignPeriod_s = 1.5;  // of signs of life while no reports come
 }  // namespace
 
@@ -22,12 +27,14 @@ struct MasterLink::Life {
   std::atomic<double> ticked_s{0}, said_s{0};  // when the owner was last here, and a report or a sign was sent
 };
 
-MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
+MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello, double give_up_after_s)
     : hello_(std::move(hello)),
       life_(std::make_shared<Life>()),
       socket_(context, Kind::kDealer, hello_.name + ":master",
               {.max_message_bytes = wire::kMaxControlBytes, .watch_connecting = true, .read_ahead = true}),
-      endpoint_(endpoint) {
+      endpoint_(endpoint),
+      give_up_after_s_(give_up_after_s),
+      host_(endpoint) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -77,6 +84,34 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
   }
   if (welcomed_) ask_clock(now_s);
   look_for_refusal();
+  look_at_waiting(now_s);
+}
+
+// What this process cannot go on without.
+std::string MasterLink::awaited() {
+  if (shutdown_ || warned_) return {};
+  if (welcomed_ && silent_s_ < kSilence_s)
+    return session_ ? lacking_text(scene::value_or(session_->facts, "lacks", std::string())) : std::string();
+  const char* const before = session_ ? "the master of the session is gone: " : "";
+  if (socket_.in_touch())
+    return fmt::format(
+        "{}what takes connections at {} does not answer: it is no master, is busy, or speaks another version of the "
+        "protocol than {}",
+        before, endpoint_, wire::kProtocolVersion);
+  if (!socket_.tunnelled()) host_.begin();
+  const std::string problem = host_.problem();
+  return problem.empty() ? fmt::format("{}no master is at {}", before, endpoint_)
+                         : fmt::format("{}no master is at {}: {}", before, endpoint_, problem);
+}
+
+// Time in which the owner worked, and nothing was read, does not count.
+void MasterLink::look_at_waiting(double now_s) {
+  constexpr double kLongestTurn_s = 0.5;
+  silent_s_ += std::clamp(now_s - std::exchange(ticked_s_, now_s), 0.0, kLongestTurn_s);
+  if (const auto line = waiting_.look(awaited(), now_s)) log::warn("{}", *line);
+  if (give_up_after_s_ <= 0 || shutdown_ || waiting_.waited_s(now_s) < give_up_after_s_) return;
+  log::error("{}; gives up after {} s (--give-up-after)", awaited(), give_up_after_s_);
+  gave_up_ = shutdown_ = true;
 }
 
 // What merely breaks off may be a tunnel whose other end is not there yet.
@@ -108,6 +143,7 @@ void MasterLink::learn_clock(const wire::ClockReply& reply, double arrived_s) {
 }
 
 bool MasterLink::handle(const Message& message) {
+  silent_s_ = 0;
   if (message.type == wire::Welcome::kName) {
     if (auto welcome = socket_.decode<wire::Welcome>(message)) {
       const bool another = !session_ || session_->master != welcome->master;
@@ -133,10 +169,12 @@ bool MasterLink::handle(const Message& message) {
   }
   if (message.type == wire::Shutdown::kName) {
     if (const auto shutdown = socket_.decode<wire::Shutdown>(message)) {
-      if (welcomed_ || session_)
-        shutdown_reason_ = printable(shutdown->reason);
+      shutdown_reason_ = printable(shutdown->reason);
+      refused_ = !welcomed_ && !session_;
+      if (refused_)
+        log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, shutdown_reason_);
       else
-        log::error("the master refuses this process: {}", printable(shutdown->reason));
+        log::info("{}", shutdown_reason_);
       shutdown_ = true;
     }
     return true;

@@ -80,6 +80,7 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .help = "allow addresses other than loopback without encryption",
                  .reach = options::Reach::kHere});
   out.push_back(keys_row(o.keys));
+  if (ends != Ends::kBinds) out.push_back(give_up_row(o.give_up_after_s));
   out.push_back({.flag = "--log-level",
                  .value = &o.log_level,
                  .help = "trace, debug, info, warn, error or off",
@@ -100,12 +101,25 @@ options::Table peer_limit_table(ServiceOptions& o) {
            .not_in_scene = kWhoComes}};
 }
 
+options::Row give_up_row(double& after_s) {
+  return {.flag = "--give-up-after",
+          .value = &after_s,
+          .help =
+              "seconds to wait for a master, or for what its session lacks, before it ends with exit code 1; 0: "
+              "for ever",
+          .limits = options::Range{0.0, 1e9},
+          .reach = options::Reach::kChild};
+}
+
 options::Row keys_row(std::string& folder) {
-  return {.flag = "--keys",
-          .value = &folder,
-          .help = "folder of keys, made by telesplat keys: encrypts, and lets in only those on its allow-list",
-          .reach = options::Reach::kHere,
-          .environment = kKeysVariable};
+  return {
+      .flag = "--keys",
+      .value = &folder,
+      .help =
+          "folder of keys, made by telesplat keys: encrypts, and lets in only those on its allow-list; none: without "
+          "keys",
+      .reach = options::Reach::kHere,
+      .environment = kKeysVariable};
 }
 
 Result<Access> access_of(const ServiceOptions& o, const std::vector<Role>& roles, bool binds) {
@@ -116,14 +130,17 @@ Result<Access> access_of(const ServiceOptions& o, const std::vector<Role>& roles
   return access;
 }
 
-int settle_master(ServiceOptions& o) {
-  MasterSearch search = find_master(o.master);
-  if (search.address.empty()) {
-    std::fprintf(stderr, "telesplat: %s\n", search.problem.c_str());
-    return search.exit_code();
+int settle_master(ServiceOptions& o, bool connects) {
+  if (connects) {
+    MasterSearch search = find_master(o.master);
+    if (search.address.empty()) {
+      std::fprintf(stderr, "telesplat: %s\n", search.problem.c_str());
+      return search.exit_code();
+    }
+    o.master = std::move(search.address);
+    if (o.keys.empty()) o.keys = std::move(search.keys);
   }
-  o.master = std::move(search.address);
-  if (o.keys.empty()) o.keys = std::move(search.keys);
+  if (o.keys == kNoKeys) o.keys.clear();
   return 0;
 }
 

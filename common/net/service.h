@@ -22,6 +22,7 @@ struct ServiceOptions {
   std::vector<std::string> via;  ///< proxies, as Via::parse() takes them
   std::string link;              ///< what the links through them are like, for the record; empty: they are none
   std::string log_level = "info";
+  double give_up_after_s = 0;       ///< what it waits for, its master or others of the session; 0: never
   uint64_t max_connections = 1024;  ///< of each socket that is bound, at a time
   double queue_limit_mb = 256;      ///< that wait for one peer to read them, 10^6 bytes
   double max_messages = 20000;      ///< requests of one peer, a second
@@ -30,7 +31,7 @@ struct ServiceOptions {
 
 /// Adds --name, --log-level, --insecure, --keys; --bind, --max-connections and --queue-limit-mb if the program binds,
 /// --master (or TELESPLAT_MASTER in the environment) if it connects to one, --advertise and --max-messages if it does
-/// both, --via and --link if it only connects.
+/// both, --via and --link if it only connects, --give-up-after if it connects.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 
@@ -38,16 +39,20 @@ options::Table service_table(ServiceOptions& options, Ends ends);
 options::Table peer_limit_table(ServiceOptions& options);
 /// The environment variable that names a folder of keys where --keys is not given.
 inline constexpr const char* kKeysVariable = "TELESPLAT_KEYS";
-/// The row of --keys, of services and of programs that ask a master.
+/// The row of --keys, of services and of programs that ask a master; kNoKeys: without, whatever the environment or the
+/// session's file names.
 options::Row keys_row(std::string& folder);
+
+/// The row of --give-up-after, of services that connect and of who starts them.
+options::Row give_up_row(double& after_s);
 
 /// What options.via and options.keys come to. roles, binds: as read_keys() takes them. Error: names the flag and its
 /// value.
 Result<Access> access_of(const ServiceOptions& options, const std::vector<Role>& roles, bool binds = false);
 
-/// Finds the session that --master auto means, and the keys that it runs with. Returns 0, or the exit code after a line
-/// on stderr that says why there is none.
-int settle_master(ServiceOptions& options);
+/// Finds the session that --master auto means, and the keys that it runs with. connects: the program has a master.
+/// Returns 0, or the exit code after a line on stderr that says why there is none.
+int settle_master(ServiceOptions& options, bool connects);
 
 /// This machine's name; in a container that of the container.
 std::string host_name();

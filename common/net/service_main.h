@@ -19,7 +19,8 @@ int service_main(int argc, char** argv, const char* about, Options options,
     parser.add(table(options));
     parser.version(version());
     parser.parse_or_exit(argv[0], {argv + 1, argv + argc});
-    if (const int code = settle_master(options.service)) return code;
+    const bool connects = telesplat::options::find(table(options), "--master") != nullptr;
+    if (const int code = settle_master(options.service, connects)) return code;
     return run(options);
   });
 }

@@ -176,6 +176,7 @@ struct Socket::Impl {
       ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
   void note_attempt(uint16_t what) {
+    in_touch = what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED;
     if (what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
       broken_off = 0;
     } else if (what & kHandshakeFailed) {
@@ -443,6 +444,7 @@ struct Socket::Impl {
   QueuedBytes queued{options.most_queued_bytes};
   bool guarded = false;                                   // bound with keys
   std::shared_ptr<const std::set<std::string>> may_stay;  // what the doorkeeper said last
+  std::atomic<bool> in_touch{false};                      // of a socket that connects
   size_t failed_unseen = 0;                               // handshakes whose attempt's end was not heard of yet
   std::atomic<uint32_t> broken_off{0}, turned_away{0};    // of a socket that connects: handshakes; event, 0: none
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
@@ -545,6 +547,13 @@ Socket::Refusal Socket::refusal() const {
                                 "many as it takes (--max-connections)",
           .may_pass = !turned_away};
 }
+
+bool Socket::in_touch() const {
+  if (!impl_->ahead) impl_->look_at_attempts();
+  return impl_->in_touch;
+}
+
+bool Socket::tunnelled() const { return impl_->tunnel != nullptr; }
 
 const std::string& Socket::name() const { return impl_->name; }
 

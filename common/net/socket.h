@@ -137,6 +137,10 @@ class Socket {
     bool may_pass = false;
   };
   Refusal refusal() const;
+  /// With SocketOptions::watch_connecting: the last attempt to connect reached somebody who speaks ZeroMQ.
+  bool in_touch() const;
+  /// It connects through a proxy.
+  bool tunnelled() const;
   const std::string& name() const;
 
   struct Impl;

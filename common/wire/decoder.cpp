@@ -65,10 +65,9 @@ bool has_more(Bytes body, size_t max_elements) {
   return counter.too_many;
 }
 
-}  // namespace
-
-std::optional<Error> read_map(Bytes body, size_t max_elements,
-                              const std::function<std::optional<Error>(Decoder&)>& read) {
+// A body that is one msgpack map, of any version.
+std::optional<Error> read_any(Bytes body, size_t max_elements,
+                              const std::function<std::optional<Error>(const msgpack::object&)>& read) {
   try {
     if (has_more(body, max_elements)) return Error{fmt::format("has more than {} elements", max_elements)};
     // Strings and binaries are referenced in place. What lists and maps claim is limited before memory is taken for it.
@@ -80,12 +79,31 @@ std::optional<Error> read_map(Bytes body, size_t max_elements,
     if (offset != body.size()) return Error{fmt::format("{} bytes follow the map", body.size() - offset)};
     const msgpack::object& map = handle.get();
     if (map.type != msgpack::type::MAP) return Error{"is not a map"};
-    if (auto bad = check_version(map)) return bad;
-    Decoder decoder(map);
-    return read(decoder);
+    return read(map);
   } catch (const std::exception& e) {  // msgpack's own errors: truncated, too deep, too large
     return Error{e.what()};
   }
+}
+
+}  // namespace
+
+std::optional<Error> read_map(Bytes body, size_t max_elements,
+                              const std::function<std::optional<Error>(Decoder&)>& read) {
+  return read_any(body, max_elements, [&](const msgpack::object& map) {
+    if (auto bad = check_version(map)) return bad;
+    Decoder decoder(map);
+    return read(decoder);
+  });
+}
+
+std::optional<uint64_t> version_of(Bytes body) {
+  std::optional<uint64_t> out;
+  read_any(body, kMaxElements, [&](const msgpack::object& map) {
+    const msgpack::object* version = find(map, std::string_view("v"));
+    if (version && version->type == msgpack::type::POSITIVE_INTEGER) out = version->via.u64;
+    return std::optional<Error>();
+  });
+  return out;
 }
 
 const msgpack::object* Decoder::enter(const char* name, size_t limit) {

@@ -89,6 +89,9 @@ class Decoder {
   std::optional<Error> error_;
 };
 
+/// The version of a body, if it is a map that has one.
+std::optional<uint64_t> version_of(Bytes body);
+
 /// Reads a body: one msgpack map of this protocol's version, whose fields `read` takes, with at most max_elements
 /// elements in all lists and maps. `read` may return an error of its own. Bulk fields point into `body`.
 std::optional<Error> read_map(Bytes body, size_t max_elements,

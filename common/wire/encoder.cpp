@@ -45,9 +45,9 @@ std::string presentable(std::string_view text) {
 void Encoder::begin_map(uint32_t entries) { Packer(out_).pack_map(entries); }
 void Encoder::begin_array(uint32_t entries) { Packer(out_).pack_array(entries); }
 
-void Encoder::version() {
+void Encoder::put_version(uint64_t version) {
   put_text("v");
-  put(kProtocolVersion);
+  put(version);
 }
 
 void Encoder::numbers(std::span<const double> values) {

@@ -17,14 +17,14 @@ class Encoder {
 
   /// A whole message: "v", then its fields, those of a brief one by their numbers.
   template <Struct M>
-  void versioned_map(const M& m) {
+  void versioned_map(const M& m, uint64_t version = kProtocolVersion) {
     const Blank<M> blank(m);
     brief_ = kIsBrief<M>;
     uint32_t count = 1;
     auto counter = [&](const char*, const auto& value, size_t = 0) { count += !blank(value); };
     M::fields(counter, m);
     begin_map(count);
-    version();
+    put_version(version);
     uint64_t number = 0;
     auto writer = [&](const char* name, const auto& value, size_t = 0) {
       const uint64_t n = number++;
@@ -72,7 +72,7 @@ class Encoder {
   }
   void begin_map(uint32_t entries);
   void begin_array(uint32_t entries);
-  void version();
+  void put_version(uint64_t version);
   void numbers(std::span<const double> values);
   void numbers(std::initializer_list<double> values) { numbers(std::span(values.begin(), values.size())); }
   void put_text(std::string_view text);

@@ -38,6 +38,12 @@ constexpr std::array<Codec, sizeof...(M)> codecs(std::type_identity<std::tuple<M
 }
 constexpr auto kCodecs = codecs(std::type_identity<Messages>{});
 
+std::string encode_as(uint64_t version, const auto& message) {
+  std::string body;
+  Encoder(body).versioned_map(message, version);
+  return body;
+}
+
 }  // namespace
 
 std::string detail::encode(size_t number, const void* message) {
@@ -54,5 +60,17 @@ std::optional<Error> detail::decode(size_t number, Bytes body, void* message) {
   const auto bad = read_map(body, codec.element_limit, [&](Decoder& decoder) { return codec.read(decoder, message); });
   return bad ? std::optional(refused(bad->text)) : std::nullopt;
 }
+
+std::optional<uint64_t> other_version(Bytes body) {
+  const auto version = version_of(body);
+  return version == kProtocolVersion ? std::nullopt : version;
+}
+
+std::string about_versions(uint64_t other) {
+  return fmt::format("it speaks version {} of the protocol, and this master version {}", other, kProtocolVersion);
+}
+
+std::string encode_for(uint64_t version, const Shutdown& message) { return encode_as(version, message); }
+std::string encode_for(uint64_t version, const ControlReply& message) { return encode_as(version, message); }
 
 }  // namespace telesplat::wire

@@ -47,4 +47,12 @@ Result<M> decode(Bytes body) {
   return message;
 }
 
+/// The version of a message's body if it has one, and another than kProtocolVersion.
+std::optional<uint64_t> other_version(Bytes body);
+/// Names both, of a process that says hello to a master.
+std::string about_versions(uint64_t other);
+/// As a process of that version reads it: these two have been the same since the first version, and stay.
+std::string encode_for(uint64_t version, const Shutdown& message);
+std::string encode_for(uint64_t version, const ControlReply& message);
+
 }  // namespace telesplat::wire

@@ -121,7 +121,7 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
   }
   wire::Hello hello = make_hello(served, o.name, *endpoint);
   for (const auto& [fact, value] : recorded.facts) hello.facts[fact] = value;
-  net::MasterLink link(context, o.master, std::move(hello));
+  net::MasterLink link(context, o.master, std::move(hello), o.give_up_after_s);
   BackgroundHash hash(recorded.files);
   served.begin(link.instance());
   link.on_order([&](const wire::Order& order) {
@@ -151,7 +151,7 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
     }
   }
   link.leave(status);
-  return link.refused() ? 2 : 0;
+  return link.exit_code();
 }
 
 int run(const DataServiceOptions& o) {

@@ -1,6 +1,7 @@
 #include "services/master/master_core.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -58,6 +59,7 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
     if (auto& plan = plans_[scene::pipeline_of(kind)]; !plan)
       plan = make_plan(scene::pipeline_of(kind), options_, links);
   plan_ = &plan_of({});
+  told_lacks_ = lacks();
 }
 
 // ---- who takes part -------------------------------------------------------------------------------------------------
@@ -104,6 +106,15 @@ void MasterCore::follow_another_packer(double now_s) {
 bool MasterCore::samplers_here() const {
   return std::any_of(peers_.begin(), peers_.end(),
                      [](const auto& p) { return !p.second.gone && p.second.hello.role == "sampler"; });
+}
+
+std::string MasterCore::lacks() const {
+  std::vector<std::string> out;
+  for (const char* role : {"data", "packer", "sampler"})
+    if (std::none_of(peers_.begin(), peers_.end(),
+                     [&](const auto& p) { return !p.second.gone && !p.second.refused && p.second.hello.role == role; }))
+      out.emplace_back(role);
+  return fmt::format("{}", fmt::join(out, ","));
 }
 
 // Forgets someone who left if there are too many. False: all are here.
@@ -439,7 +450,7 @@ void MasterCore::tick(double now_s) {
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
   forget_departed(now_s);
   follow_another_packer(now_s);
-  if (announce_due_) announce_soon(now_s);
+  if (announce_due_ || told_lacks_ != lacks()) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
   const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);
@@ -476,6 +487,7 @@ void MasterCore::dispatch(double now_s) {
 
 void MasterCore::shut_down(const std::string& reason) {
   stop_ = true;
+  log::info("{}", reason);
   for (const auto& [id, p] : peers_)
     if (!p.gone) outbox_.send(id, wire::Shutdown{reason});
 }

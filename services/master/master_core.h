@@ -45,7 +45,8 @@ class MasterCore {
   void on(const std::string& peer, const wire::TileDone& m, double now_s);
   void on(const std::string& peer, const wire::TileRefused& m, double now_s);
   void on(const std::string& peer, const wire::Goodbye& m, double now_s);
-  void on(const std::string& peer, const wire::Control& m, double now_s);
+  /// key: the name of the sender's key; empty: it has none.
+  void on(const std::string& peer, const wire::Control& m, double now_s, const std::string& key = {});
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
   void on(const std::string& peer, const wire::OrderAnswer& m, double now_s);
   void on(const std::string& peer, const wire::LinkReport& m, double now_s);
@@ -131,6 +132,8 @@ class MasterCore {
   void follow_packer();
   void follow_another_packer(double now_s);
   bool samplers_here() const;
+  /// Returns the roles that the session needs and no process has, such as "data,sampler".
+  std::string lacks() const;
   bool make_room(const std::string& peer);
   void refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s);
   void forget_departed(double now_s);
@@ -200,7 +203,8 @@ class MasterCore {
   double leases_rest_until_s_ = -1e9;
   Pace announcements_{8, 20};
   bool announce_due_ = false;
-  double now_s_ = 0;  // of what came last
+  std::string told_lacks_;  // lacks(), as everyone was told it
+  double now_s_ = 0;        // of what came last
   bool stop_ = false;
   std::string stop_reason_ = "the session was ended";
 };

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include "common/core/version.h"
 #include "common/metrics/run_folder.h"
 #include "common/net/dispatch.h"
+#include "common/net/local_endpoint.h"
 #include "common/net/process_facts.h"
 #include "common/net/session_file.h"
 #include "services/master/gate/senders.h"
@@ -94,7 +96,11 @@ class MasterService {
                   net::announced(*endpoint, {}).c_str());
     else
       log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
-    if (!options_.service.keys.empty()) log::info("keys of {}: others need theirs", options_.service.keys);
+    if (!options_.service.keys.empty())
+      log::info("keys of {}: others need theirs", options_.service.keys);
+    else
+      log::warn("without keys: everybody {} can watch and end this session (--keys DIR lets in whom you want)",
+                net::is_local(*endpoint) ? "on this machine" : "who reaches this machine");
     std::fflush(stdout);
     return ok_status();
   }
@@ -204,16 +210,31 @@ class MasterService {
       return;
     }
     if (!core_.admit(message.peer, now_s)) return control_.reject(message, "its peer sends more than --max-messages");
+    if (message.type == wire::Hello::kName || message.type == wire::Control::kName)
+      if (const auto version = wire::other_version(message.body)) return turn_away(message, *version);
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
                   wire::TileDone, wire::TileRefused, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady,
                   wire::LinkReport, wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
         control_, message, [&](const auto& m) {
           if (const Status s = senders_.admit(message, m); !s) return refuse(message, m, s.error());
-          if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
+          if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
+            core_.on(message.peer, m, now_s, message.user);
+          else if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
             core_.on(message.peer, m, now_s);
           else if (const Status s = core_.on(message.peer, m, now_s); !s)
             control_.reject(message, s.error().text);
         });
+  }
+
+  // Answers a hello or a command of another version as that version has it.
+  void turn_away(const net::Message& message, uint64_t version) {
+    const std::string why = wire::about_versions(version);
+    control_.reject(message, why);
+    if (message.type == wire::Hello::kName)
+      control_.send_frames(message.peer, wire::Shutdown::kName, wire::encode_for(version, wire::Shutdown{why}));
+    else
+      control_.send_frames(message.peer, wire::ControlReply::kName,
+                           wire::encode_for(version, wire::ControlReply{false, why}));
   }
 
   // Whoever gave a command waits for an answer.
@@ -264,6 +285,8 @@ int run(const MasterServiceOptions& o) {
   if (!options) return fail(2, options.error());
   if (o.overwrite && o.goes_on) return refuse({"--continue and --overwrite: the record goes on, or is replaced"});
   std::string run_id;
+  std::error_code error;
+  const bool was_there = std::filesystem::exists(o.out, error);
   const bool goes_on = o.goes_on && metrics::may_go_on(o.out);
   if (!o.out.empty()) {
     if (const Status s = net::refuse_folder_in_use(o.out); !s) return refuse(s.error());
@@ -279,8 +302,10 @@ int run(const MasterServiceOptions& o) {
   if (!record) return refuse(record.error());
   if (goes_on) log::info("{}: its record goes on; this is master {} of it", o.out, (*record)->lives());
   MasterService service(o, *options, *std::move(record), std::move(run_id), *access);
-  if (const Status s = service.open_metrics(); !s) return refuse(s.error());
-  if (const Status s = service.listen(); !s) return fail(2, s.error());
+  Status opened = service.open_metrics();
+  if (opened) opened = service.listen();
+  if (!opened && !o.out.empty() && !goes_on) metrics::remove_record(o.out, !was_there);
+  if (!opened) return refuse(opened.error());
   service.serve();
   service.say_goodbye();
   if (const Status s = service.write_record(); !s) {

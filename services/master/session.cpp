@@ -96,6 +96,7 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   w.epoch = epoch_;
   add_endpoints(w);
   w.facts.erase(metrics::kRecordFact);  // of the master alone
+  if (std::string lacking = lacks(); !lacking.empty()) w.facts["lacks"] = std::move(lacking);
   if (!run_id_.empty()) {
     w.facts["run_folder"] = session_.run_folder;
     w.facts["run_id"] = run_id_;
@@ -117,6 +118,7 @@ void MasterCore::announce_soon(double now_s) {
 void MasterCore::announce(double now_s) {
   announcements_.count(now_s);
   announce_due_ = false;
+  told_lacks_ = lacks();
   const std::string body = wire::encode(welcome({}, now_s));
   if (!outbox_.fits<wire::Welcome>(body)) return;
   // The packer first: it should know an epoch before tiles of it come.
@@ -151,15 +153,17 @@ Status MasterCore::on(const std::string& peer, const wire::SliceWeights& m, doub
   return ok_status();
 }
 
-void MasterCore::on(const std::string& peer, const wire::Control& m, double now_s) {
+void MasterCore::on(const std::string& peer, const wire::Control& m, double now_s, const std::string& key) {
   if (m.command == "status")
     return outbox_.send(peer, wire::ControlReply{true, status_json(now_s, m.arguments.contains("all"))});
   if (m.command == "health") return outbox_.send(peer, health(m, now_s));
   if (m.command == "stop") {
     outbox_.send(peer, wire::ControlReply{true, "stopping"});
     stop_ = true;
+    // What the command says of its sender is its own word; the key is known.
     if (const std::string by = scene::value_or(m.arguments, "by", std::string()); !by.empty())
-      stop_reason_ = "the session was ended by " + to_utf8(by.substr(0, kMostOfEnder));
+      stop_reason_ = "the session was ended by " + printable(by, kMostOfEnder);
+    if (!key.empty()) stop_reason_ += fmt::format(" (key {})", key);
     return;
   }
   if (m.command == "done") return answer_of_launcher(peer, m);

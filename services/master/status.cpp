@@ -172,6 +172,7 @@ std::string MasterCore::status_json(double now_s, bool all) const {
     return number(sum);
   };
   Json out{{"session", told(session_)},
+           {"lacks", lacks()},
            {"messages_rejected", door_.messages_rejected},
            {"keys_refused", door_.keys_refused},
            {"epoch", epoch_.value},
@@ -210,10 +211,8 @@ std::string MasterCore::status_json(double now_s, bool all) const {
       if (p.hello.role == "ctl" || p.gone != gone) continue;
       Json e = process_json(id, p, now_s, all);
       bytes += left_out > 0 ? 0 : dumped(e).size() + 1;
-      if (bytes > kMostBytes)
-        ++left_out;
-      else
-        out["processes"].push_back(std::move(e));
+      left_out += bytes > kMostBytes;
+      if (bytes <= kMostBytes) out["processes"].push_back(std::move(e));
     }
   if (left_out > 0) out["processes_left_out"] = left_out;
   return dumped(out);

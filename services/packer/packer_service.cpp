@@ -77,7 +77,7 @@ class PackerService {
       if (!recorder) return recorder.error();
       plan_recorder_ = std::move(*recorder);
     }
-    link_.emplace(context, options_.service.master, hello);
+    link_.emplace(context, options_.service.master, hello, options_.service.give_up_after_s);
     return ok_status();
   }
 
@@ -99,7 +99,7 @@ class PackerService {
     }
     flush_spans(1e300);
     link_->leave([&] { return status(); });
-    if (link_->refused()) return 2;
+    if (const int code = link_->exit_code()) return code;
     const auto values = status();
     const auto failed = values.find(metrics::kRecordFailed);
     return failed != values.end() && failed->second > 0 ? 1 : 0;

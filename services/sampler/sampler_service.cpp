@@ -33,7 +33,7 @@ class SamplerService {
         context_(context),
         mesh_sampler_(std::move(mesh_sampler)),
         replays_(replay != nullptr),
-        link_(context, o.service.master, make_hello(o, instance)) {
+        link_(context, o.service.master, make_hello(o, instance), o.service.give_up_after_s) {
     if (replays_) set_work(std::make_unique<TileWork>(std::move(replay), link_));
   }
 
@@ -57,8 +57,7 @@ class SamplerService {
     }
     flush_metrics(1e300);
     link_.leave([&] { return status(); });
-    if (link_.refused()) return 2;
-    return failed_ ? 1 : 0;
+    return link_.exit_code() ? link_.exit_code() : int(failed_);
   }
 
  private:

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/net/control.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -89,6 +90,89 @@ TEST_F(ByHand, SoDoesAJuliaSet) {
   EXPECT_TRUE(summary()["data"].is_null()) << "no file";
   expect_understood({"inspect", out()});
   expect_understood({"compare", out(), "--poses", "1", "--kernels", "disc", "--renderers", "cpu"});
+}
+
+TEST_F(ByHand, EveryoneIsToldWhoEndedTheSession) {
+  begin({"julia"});
+  ASSERT_EQ(start_viewer("first", {}).wait(), 0) << service("viewer/first").err();
+  end();
+  const std::string who = "the session was ended by " + net::this_person();
+  for (const char* name : {"master", "data", "packer", "sampler"})
+    EXPECT_NE(service(name).err().find(who), std::string::npos) << name << ": " << service(name).err();
+}
+
+TEST_F(ByHand, WhatIsWaitedForIsSaid) {
+  start("master", {"--bind", "tcp://127.0.0.1:*"});
+  ASSERT_TRUE(wait_until([&] { return service("master").out().find("listening on ") != std::string::npos; }));
+  const std::string said = service("master").out();
+  const size_t at = said.find("tcp://");
+  master_ = said.substr(at, said.find('\n', at) - at);
+  EXPECT_NE(service("master").err().find("everybody on this machine can watch and end this session"), std::string::npos)
+      << service("master").err();
+  write_terrain(folder_ / "hill.ply", 20);
+  start("data", {folder_ / "hill.ply", "--cache", folder_ / "cache"});
+  // A window's viewer and a service say it, each in its own log; who joins with a launcher is told by that.
+  const std::string lacks = "the session has no packer and no sampler";
+  write_terrain(folder_ / "plate.ply", 4);
+  Program joined(
+      "telesplat",
+      {"run", folder_ / "plate.ply", "--master", master_, "--out", folder_ / "joined", "--give-up-after", "6"},
+      folder_ / "joined-run");
+  EXPECT_EQ(joined.wait(), 1) << joined.err();
+  EXPECT_NE(joined.err().find("plate.ply is not opened: the session shows hill"), std::string::npos) << joined.err();
+  EXPECT_NE(joined.err().find(lacks + "; waiting ("), std::string::npos) << joined.err();
+  EXPECT_NE(joined.err().find(lacks + "; gives up after 6 s (--give-up-after)"), std::string::npos) << joined.err();
+  EXPECT_NE(service("data").err().find(lacks), std::string::npos) << service("data").err();
+  Program status("telesplat", {"ctl", "status", "--master", master_}, folder_ / "status");
+  ASSERT_EQ(status.wait(), 0);
+  EXPECT_NE(status.out().find(lacks), std::string::npos) << status.out();
+  end();
+}
+
+TEST_F(ByHand, AServiceWithoutAMasterSaysSoAndGivesUp) {
+  for (const char* role : {"data", "packer", "sampler", "viewer"}) {
+    std::vector<std::string> arguments{"--master", "tcp://127.0.0.1:9", "--give-up-after", "4"};
+    if (role == std::string("data")) arguments.insert(arguments.begin(), "julia");
+    Program service(std::string("telesplat-") + role, arguments, folder_ / role);
+    EXPECT_EQ(service.wait(), 1) << role << ": " << service.err();
+    for (const char* line : {"no master is at tcp://127.0.0.1:9; waiting (3 s so far)",
+                             "no master is at tcp://127.0.0.1:9; gives up after 4 s (--give-up-after)"})
+      EXPECT_NE(service.err().find(line), std::string::npos) << role << ": " << service.err();
+  }
+}
+
+// As an old viewer does, or one that was written from another page.
+TEST_F(ByHand, ProcessesOfAnotherVersionAreToldSo) {
+  begin({"julia"});
+  net::Context context;
+  net::Socket old(context, net::Kind::kDealer, "old", net::kControlSocket);
+  ASSERT_TRUE(old.connect(master_).ok());
+  for (const char* type : {"hello", "control"}) {
+    old.send_frames({}, type, std::string("\x82\xa4role\xa6viewer\xa1v\x0d"));
+    std::optional<net::Message> answer;
+    ASSERT_TRUE(wait_until([&] { return (answer = old.receive()).has_value(); })) << type;
+    EXPECT_EQ(answer->type, type == std::string("hello") ? "shutdown" : "control_reply");
+    const std::string body(reinterpret_cast<const char*>(answer->body.data()), answer->body.size());
+    EXPECT_NE(body.find("\xa1v\x0d"), std::string::npos) << "the answer is of the asker's version";
+    EXPECT_NE(body.find("it speaks version 13 of the protocol, and this master version " +
+                        std::to_string(wire::kProtocolVersion)),
+              std::string::npos)
+        << body;
+  }
+  end();
+}
+
+TEST_F(ByHand, AMasterThatIsRefusedLeavesNothing) {
+  for (const bool exists : {false, true}) {
+    if (exists) fs::create_directories(out());
+    Program master("telesplat-master", {"--bind", "tcp://*:*", "--out", out()}, folder_ / "refused");
+    EXPECT_EQ(master.wait(), 2) << master.err();
+    EXPECT_NE(master.err().find("others need --keys"), std::string::npos) << master.err();
+    EXPECT_EQ(fs::exists(out()), exists);
+    if (exists) {
+      EXPECT_TRUE(fs::is_empty(out()));
+    }
+  }
 }
 
 TEST_F(ByHand, AFolderThatIsNotTheMastersIsLeftAlone) {

@@ -83,7 +83,7 @@ TEST_F(Sessions, CtlFindsWhatRunStarted) {
   ASSERT_TRUE(run.wait_showing());
   EXPECT_TRUE(holds(run.program().err(), "session at " + run.master() + "; telesplat ctl status shows it"))
       << run.program().err();
-  EXPECT_EQ(files(), 1u);
+  EXPECT_EQ(files(), 2u) << "its file, and its keys";
 
   const auto status = ctl({"status"});
   EXPECT_EQ(status.code, 0) << status.err;
@@ -122,7 +122,7 @@ TEST_F(Sessions, CtlFindsWhatRunStarted) {
 
 TEST_F(Sessions, ARunThatJoinsNobodySaysSo) {
   Program run("telesplat", {"run", "--master", "tcp://127.0.0.1:9", "--out", folder_ / "none"}, folder_ / "joining");
-  const std::string told = "telesplat: no master answers at tcp://127.0.0.1:9 yet; waiting for one\n";
+  const std::string told = "telesplat: no master is at tcp://127.0.0.1:9; waiting (3 s so far)\n";
   for (int i = 0; i < 200 && !holds(run.err(), told); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_TRUE(holds(run.err(), told)) << run.err();
   run.signal(SIGINT);
@@ -152,6 +152,14 @@ TEST_F(Sessions, StatusIsForProgramsToo) {
     const auto p = process(s, "all-cores");
     return p.is_object() && std::atoi(p["facts"].value("threads", "0").c_str()) > 0;
   }));
+  // And no more than it may use.
+  Program bound("/usr/bin/taskset",
+                {"-c", "0", TELESPLAT_BIN "/telesplat-sampler", "--master", run.master(), "--name", "one-core"},
+                folder_ / "one-core");
+  EXPECT_TRUE(run.wait_status([](const auto& s) {
+    const auto p = process(s, "one-core");
+    return p.is_object() && p["facts"].value("threads", "0") == "1" && p["facts"].value("cores", "0") == "1";
+  })) << bound.err();
 }
 
 TEST_F(Sessions, OfSeveralOneIsChosen) {
@@ -234,10 +242,14 @@ TEST_F(Sessions, WithoutAFolderForFilesTheSessionRunsAllTheSame) {
   EXPECT_EQ(ctl({"status"}).code, 1);
   EXPECT_EQ(ctl({"stop", "--master", address(*hidden)}).code, 0);
   EXPECT_EQ(hidden->wait(), 0);
+  const auto run = telesplat({"run", "julia", "--out", folder_ / "none"});
+  EXPECT_EQ(run.code, 2);
+  EXPECT_TRUE(holds(run.err, "telesplat: --keys auto: /nonexistent/telesplat: cannot be made")) << run.err;
+  EXPECT_TRUE(holds(run.err, "--keys none runs without keys\n")) << run.err;
 }
 
 TEST_F(Sessions, TheEnvironmentNamesTheMasterOfCtlAndRun) {
-  PipelineRun run({"--duration", "0"});
+  PipelineRun run({"--duration", "0", "--keys", "none"});  // the file that would name them is not found below
   ASSERT_TRUE(run.wait_showing());
   setenv("TELESPLAT_RUNTIME", (folder_ / "another").c_str(), 1);
   EXPECT_EQ(ctl({"status"}).code, 1) << "not to be found";

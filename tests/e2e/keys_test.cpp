@@ -1,5 +1,6 @@
 // Sessions with keys, in processes of their own: everybody who should comes in, nobody else does or can do anything.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -38,7 +39,7 @@ TEST(KeysOfSessions, ThrowAwayKeysGoWithTheRun) {
   const TemporaryFolder runtime;
   setenv("TELESPLAT_RUNTIME", runtime.path().c_str(), 1);
   {
-    PipelineRun run({"--duration", "0", "--keys", "auto"});
+    PipelineRun run({"--duration", "0"});  // --keys auto is the default
     ASSERT_TRUE(wait_until([&] { return run.program().err().find("session at tcp://") != std::string::npos; }));
     // The session's file names them, so that the person who started it needs no flag.
     Program status("telesplat", {"ctl", "status", "--json"}, runtime / "status");
@@ -104,8 +105,9 @@ TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
     return text ? nlohmann::json::parse(*text) : nlohmann::json();
   };
   ASSERT_TRUE(wait_until([&] { return value(status(), "viewer-1", "points") > 0; })) << run.program().err();
-  // Without keys, and with others: an error in time, and no hang.
+  // Without keys, and with others: an error in time, and no hang. The session's file is not theirs.
   const TemporaryFolder folder;
+  setenv("TELESPLAT_RUNTIME", (folder / "strangers").c_str(), 1);
   for (const std::vector<std::string>& flags : {std::vector<std::string>{}, {"--keys", others.path()}}) {
     std::vector<std::string> arguments{"ctl", "stop", "--master", master};
     arguments.insert(arguments.end(), flags.begin(), flags.end());
@@ -149,6 +151,111 @@ TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
   EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
   EXPECT_GE(run.summary()["errors"]["keys_refused"], kStrangers / 2);
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
+}
+
+// What the person who started a run needs no flag for.
+TEST(KeysOfSessions, TheOwnerOfARunNeedsNoKeysFlag) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  const std::string master = run.master();
+  EXPECT_EQ(ask(master, {}, "status").ok(), false) << "it has keys";
+  const TemporaryFolder folder;
+  const std::vector<std::string> at_master{"--master", master};
+  const auto expect_done = [&](const std::string& program, std::vector<std::string> arguments) {
+    for (const auto& where : {std::vector<std::string>{}, at_master}) {
+      auto all = arguments;
+      all.insert(all.end(), where.begin(), where.end());
+      if (where.empty() && program != "telesplat") all.insert(all.end(), {"--master", "auto"});
+      Program p(program, all, folder / "program");
+      EXPECT_EQ(p.wait(60), 0) << program << " " << arguments.front() << ": " << p.err();
+    }
+  };
+  expect_done("telesplat", {"ctl", "status"});
+  expect_done("telesplat", {"ctl", "coupling", "async"});
+  expect_done("telesplat", {"top", "--once"});
+  expect_done("telesplat-health", {"--role", "sampler"});
+  Program joined("telesplat",
+                 {"run", "--master", master, "--size", "160x100", "--frames", "20", "--out", folder / "run"},
+                 folder / "joined");
+  EXPECT_EQ(joined.wait(60), 0) << joined.err();
+  Program sampler("telesplat-sampler", {"--master", master, "--name", "by-hand", "--threads", "1"}, folder / "sampler");
+  EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "by-hand", "tiles_sampled") > 0; }));
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
+}
+
+// Another person on this machine: only root can be one.
+TEST(KeysOfSessions, AnotherUserIsRefusedInASentence) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can run programs as another user";
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  const std::string master = run.master();
+  const TemporaryFolder folder;
+  const auto as_nobody = [&](std::vector<std::string> command) {
+    command.insert(command.begin(), {"--reuid=65534", "--regid=65534", "--clear-groups", "--"});
+    Program p("/usr/bin/setpriv", command, folder / "nobody");
+    EXPECT_EQ(p.wait(30), 1) << p.out() << p.err();
+    return p.err();
+  };
+  const std::string telesplat = TELESPLAT_BIN "/telesplat";
+  for (const char* order : {"status", "stop"})
+    EXPECT_EQ(as_nobody({telesplat, "ctl", order, "--master", master}),
+              "telesplat: the master at " + master + " refuses: it wants a key (--keys DIR)\n");
+  EXPECT_TRUE(as_nobody({telesplat, "ctl", "status"}).starts_with("telesplat: no session of yours runs"));
+  EXPECT_NE(as_nobody({"/bin/cat", run.access().keys()->folder + "/operator.key"}).find("denied"), std::string::npos);
+  // Nor do sockets without a key, of a program of theirs, get anything.
+  const auto before = run.status();
+  net::Context context;
+  std::deque<net::Socket> strangers;
+  for (const auto& [key, kind] : {std::pair{"patches", net::Kind::kSub}, {"state", net::Kind::kDealer}}) {
+    strangers.emplace_back(context, kind, "stranger", net::SocketOptions{.linger_ms = 0});
+    ASSERT_TRUE(strangers.back().connect(process(before, "packer")["endpoints"][key]).ok());
+  }
+  ASSERT_TRUE(run.wait_status([&](const auto& s) {
+    return value(s, "packer", "keys_refused") >= 2 &&
+           value(s, "viewer-1", "updates") > value(before, "viewer-1", "updates") + 3;
+  }));
+  for (net::Socket& s : strangers) EXPECT_FALSE(s.receive());
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
+}
+
+TEST(KeysOfSessions, WithoutKeysARunSaysWhatThatMeans) {
+  PipelineRun run({"--duration", "0", "--keys", "none"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  EXPECT_NE(
+      run.program().err().find("telesplat: --keys none: everybody on this machine can watch and end this session\n"),
+      std::string::npos)
+      << run.program().err();
+  EXPECT_TRUE(ask(run.master(), {}, "stop").ok());
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
+TEST(KeysOfSessions, FilesAreTheirOwnersAloneAndGoWithKilledRuns) {
+  namespace fs = std::filesystem;
+  const TemporaryFolder folder;
+  const std::string runtime = folder / "runtime";
+  setenv("TELESPLAT_RUNTIME", runtime.c_str(), 1);
+  std::string left;
+  {
+    PipelineRun killed({"--duration", "0"});
+    ASSERT_TRUE(killed.wait_showing()) << killed.program().err();
+    left = killed.access().keys()->folder;
+    for (const auto& entry : fs::recursive_directory_iterator(runtime)) {
+      const auto others = entry.status().permissions() & (fs::perms::group_all | fs::perms::others_all);
+      EXPECT_TRUE(others == fs::perms::none || entry.path().extension() == ".pub") << entry.path();
+    }
+    EXPECT_EQ(fs::status(runtime).permissions(), fs::perms::owner_all);
+    killed.program().signal(SIGKILL);
+    killed.program().wait(20);
+    EXPECT_TRUE(killed.all_gone());
+  }
+  ASSERT_TRUE(fs::exists(left));
+  fs::last_write_time(left, fs::file_time_type::clock::now() - std::chrono::minutes(5));
+  PipelineRun next({"--duration", "0"});
+  ASSERT_TRUE(next.wait_showing()) << next.program().err();
+  EXPECT_FALSE(fs::exists(left)) << "the next run removes it";
+  EXPECT_TRUE(fs::exists(next.access().keys()->folder));
+  EXPECT_EQ(next.stop(), 0) << next.program().err();
+  unsetenv("TELESPLAT_RUNTIME");
 }
 
 // A session whose viewer is behind a link, and viewers outside that come through a SOCKS tunnel as `ssh -D` makes it.

@@ -35,6 +35,7 @@ struct FakeMaster {
         w.master = instance;
         w.hello_sent_s = hello->sent_s;
         w.master_s = monotonic_s() + clock_ahead_s;
+        w.facts = facts;
         socket.send(w, m->peer);
       } else if (!known) {
         socket.send(wire::WhoAreYou{instance}, m->peer);
@@ -58,23 +59,24 @@ struct FakeMaster {
   bool known = false;
   int hellos = 0, clock_requests = 0;
   std::string clock = "another";
+  std::map<std::string, std::string> facts;
   double clock_ahead_s = 0;
   std::vector<std::map<std::string, double>> reports;
 };
 
 class Link : public ::testing::Test {
  protected:
-  MasterLink make_link(const std::string& endpoint) {
+  MasterLink make_link(const std::string& endpoint, double give_up_after_s = 0) {
     wire::Hello hello;
     hello.role = "sampler";
     hello.name = "sampler-1";
-    return MasterLink(context, endpoint, hello);
+    return MasterLink(context, endpoint, hello, give_up_after_s);
   }
   // Lets link and master talk until `done`. The link's clock is run fast, so that its second between reports is short.
   template <class Done>
   bool talk(MasterLink& link, FakeMaster* master, Done done) {
     for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
-      link.tick(link_s += 0.02, [] { return MasterLink::Values{{"answer", 42}}; });
+      link.tick(link_s += step_s, [] { return MasterLink::Values{{"answer", 42}}; });
       if (master) master->serve();
       wait_readable({&link.socket()}, 2);
       while (const auto m = link.socket().receive()) EXPECT_TRUE(link.handle(*m));
@@ -83,7 +85,7 @@ class Link : public ::testing::Test {
     return false;
   }
   Context context;
-  double link_s = monotonic_s();
+  double link_s = monotonic_s(), step_s = 0.02;
 };
 
 TEST_F(Link, SaysHelloUntilWelcomedThenReports) {
@@ -113,6 +115,100 @@ TEST_F(Link, SaysHelloAgainToARestartedMaster) {
   EXPECT_GE(second.hellos, 1);
   EXPECT_EQ(link.version(), 2);
   ASSERT_TRUE(talk(link, &second, [&] { return !second.reports.empty(); }));
+}
+
+// What a process says while it waits: the link's clock is run fast, so a minute is short.
+class WaitingLink : public Link {
+ protected:
+  void SetUp() override {
+    log::initialise("link", "info");
+    step_s = 0.4;
+  }
+  // What is logged while link and master talk until `done`.
+  template <class Done>
+  std::string said(MasterLink& link, FakeMaster* master, Done done) {
+    testing::internal::CaptureStderr();
+    EXPECT_TRUE(talk(link, master, done));
+    return testing::internal::GetCapturedStderr();
+  }
+};
+
+TEST_F(WaitingLink, SaysThatNoMasterIsThereAndGivesUpWhereItShould) {
+  MasterLink link = make_link("tcp://127.0.0.1:9", 130);
+  const std::string log = said(link, nullptr, [&] { return link.shutdown_requested(); });
+  const std::string what = "no master is at tcp://127.0.0.1:9";
+  int lines = 0;
+  for (size_t at = 0; (at = log.find(what + "; waiting", at)) != log.npos; ++at) ++lines;
+  EXPECT_EQ(lines, 3) << "at 3, 63 and 123 s: " << log;
+  EXPECT_NE(log.find(what + "; gives up after 130 s (--give-up-after)"), log.npos) << log;
+  EXPECT_EQ(link.exit_code(), 1);
+  EXPECT_FALSE(link.refused());
+}
+
+TEST_F(WaitingLink, SaysThatAHostIsNotFound) {
+  MasterLink link = make_link("tcp://nohost.invalid:7700");
+  const std::string log = said(link, nullptr, [&, until = monotonic_s() + 2, seen = link_s + 70] {
+    return monotonic_s() > until && link_s > seen;
+  });
+  EXPECT_NE(log.find("no master is at tcp://nohost.invalid:7700: no host called nohost.invalid is found: "), log.npos)
+      << log;
+}
+
+TEST_F(WaitingLink, SaysThatTheMasterIsGone) {
+  auto master = std::make_unique<FakeMaster>("tcp://127.0.0.1:*", InstanceId{1});
+  MasterLink link = make_link(master->endpoint);
+  ASSERT_TRUE(talk(link, master.get(), [&] { return !master->reports.empty(); }));
+  const std::string endpoint = master->endpoint;
+  master.reset();
+  const std::string log = said(link, nullptr, [&, until_s = link_s + 200] { return link_s > until_s; });
+  EXPECT_NE(log.find("the master of the session is gone: no master is at " + endpoint), log.npos) << log;
+}
+
+TEST_F(WaitingLink, SaysThatWhatIsThereDoesNotAnswer) {
+  Context others;
+  Socket silent(others, Kind::kRouter, "silent");
+  const auto endpoint = silent.bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(endpoint);
+  MasterLink link = make_link(*endpoint, 100);
+  const std::string log = said(link, nullptr, [&] { return link.shutdown_requested(); });
+  EXPECT_NE(log.find("what takes connections at " + *endpoint +
+                     " does not answer: it is no master, is busy, or speaks "
+                     "another version of the protocol than " +
+                     std::to_string(wire::kProtocolVersion)),
+            log.npos)
+      << log;
+}
+
+TEST_F(WaitingLink, SaysWhatTheSessionLacks) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  master.facts = {{"lacks", "data,packer"}};
+  MasterLink link = make_link(master.endpoint, 70);
+  const std::string log = said(link, &master, [&] { return link.shutdown_requested(); });
+  EXPECT_NE(log.find("the session has no data server and no packer; waiting ("), log.npos) << log;
+  EXPECT_EQ(link.exit_code(), 1);
+}
+
+TEST_F(WaitingLink, TellsTheEndFromARefusal) {
+  for (const bool welcomed : {true, false}) {
+    FakeMaster master("tcp://127.0.0.1:*", {1});
+    MasterLink link = make_link(master.endpoint);
+    if (welcomed) {
+      ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+    } else {
+      ASSERT_TRUE(talk(link, nullptr, [&] {
+        const auto hello = master.socket.receive();
+        if (hello) master.socket.send(wire::Shutdown{"it speaks version 15"}, hello->peer);
+        return hello.has_value();
+      }));
+    }
+    if (welcomed) master.socket.send(wire::Shutdown{"the session was ended by ada"}, master.peer);
+    const std::string log = said(link, nullptr, [&] { return link.shutdown_requested(); });
+    EXPECT_EQ(link.exit_code(), welcomed ? 0 : 2);
+    EXPECT_EQ(link.shutdown_reason(), welcomed ? "the session was ended by ada" : "it speaks version 15");
+    EXPECT_NE(log.find(welcomed ? "info the session was ended by ada" : "refuses sampler-1: it speaks version 15"),
+              log.npos)
+        << log;
+  }
 }
 
 TEST_F(Link, OutlivesADamagedWelcome) {

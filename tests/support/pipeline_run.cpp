@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +19,7 @@
 
 #include "common/core/clock.h"
 #include "common/image/file.h"
+#include "common/net/master_address.h"
 #include "tests/support/patience.h"
 #include "tools/common/csv_table.h"
 #include "tools/telesplat/control/client.h"
@@ -185,12 +187,15 @@ PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::s
   if (command == "view" && std::find(arguments.begin(), arguments.end(), "--panel") == arguments.end())
     a.insert(a.end(), {"--panel", "off"});
   a.insert(a.end(), arguments.begin(), arguments.end());
+  own_runtime_ = setenv("TELESPLAT_RUNTIME", (folder_ / "runtime").c_str(), 0) == 0 &&
+                 std::getenv("TELESPLAT_RUNTIME") == folder_ / "runtime";
   program_ = std::make_unique<Program>("telesplat", a, folder_ / "telesplat");
 }
 
 PipelineRun::~PipelineRun() {
   control_.reset();
   program_.reset();
+  if (own_runtime_) unsetenv("TELESPLAT_RUNTIME");
   for (const pid_t pid : running_with(folder_.path())) ::kill(pid, SIGKILL);
   if (!master_.empty())
     for (const pid_t pid : running_with(master_)) ::kill(pid, SIGKILL);
@@ -213,9 +218,18 @@ void PipelineRun::use_keys(const std::string& keys, net::Access operators) {
   access_ = std::move(operators);
 }
 
+const net::Access& PipelineRun::access() {
+  if (!access_) {
+    auto found = net::Access::open({}, net::find_master(master()).keys, net::asking_roles());
+    EXPECT_TRUE(found.ok()) << (found ? "" : found.error().text);
+    access_ = found ? *std::move(found) : net::Access();
+  }
+  return *access_;
+}
+
 nlohmann::json PipelineRun::status() {
   if (master().empty()) return {};
-  if (!control_) control_ = std::make_unique<launcher::ControlClient>(master(), access_);
+  if (!control_) control_ = std::make_unique<launcher::ControlClient>(master(), access());
   const auto answer = control_->ask("status", 2);
   return answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
 }

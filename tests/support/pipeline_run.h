@@ -80,7 +80,10 @@ class PipelineRun {
   Program& program() { return *program_; }
   const std::string& out() const { return out_; }
   const TemporaryFolder& folder() const { return folder_; }
-  /// The session has keys: status() and stop() take these. keys: their folder.
+  /// By which its master is asked. A run has keys of its own, which its session's file names to this test and to
+  /// programs that it starts.
+  const net::Access& access();
+  /// The session has keys of this folder: status() and stop() take these.
   void use_keys(const std::string& keys, net::Access operators);
   /// The master's address; waits for it.
   const std::string& master();
@@ -102,7 +105,8 @@ class PipelineRun {
  private:
   TemporaryFolder folder_;
   std::string out_, master_, keys_;
-  net::Access access_;
+  bool own_runtime_ = false;  // TELESPLAT_RUNTIME is set by this object
+  std::optional<net::Access> access_;
   std::unique_ptr<Program> program_;
   std::unique_ptr<launcher::ControlClient> control_;
 };

@@ -3,7 +3,7 @@
 namespace telesplat::net {
 
 Result<Access> Access::open(Via via, const std::string& folder, const std::vector<Role>& roles, bool binds) {
-  if (folder.empty()) return Access(std::move(via));
+  if (folder.empty() || folder == kNoKeys) return Access(std::move(via));
   auto keys = read_keys(folder, roles, binds);
   if (!keys) return Error{"--keys " + keys.error().text};
   return Access(std::move(via), *std::move(keys));

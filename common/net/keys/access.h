@@ -11,13 +11,17 @@
 
 namespace telesplat::net {
 
+/// In place of a folder of keys: there shall be none.
+inline constexpr const char* kNoKeys = "none";
+
 class Access {
  public:
   /// Without keys: nothing is encrypted, and nobody asks who it is.
   Access(Via via = {}) : via_(std::move(via)) {}  // NOLINT: implicit on purpose
   Access(Via via, Keys keys) : via_(std::move(via)), keys_(std::make_shared<const Keys>(std::move(keys))) {}
 
-  /// folder: of keys; empty: without keys. roles, binds: as read_keys() takes them. Error: begins with --keys.
+  /// folder: of keys; empty or kNoKeys: without keys. roles, binds: as read_keys() takes them. Error: begins with
+  /// --keys.
   static Result<Access> open(Via via, const std::string& folder, const std::vector<Role>& roles, bool binds = false);
 
   const Via& via() const { return via_; }

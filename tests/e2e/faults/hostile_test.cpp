@@ -55,7 +55,8 @@ void offend(const std::string& endpoint, net::Kind kind, const char* zmtp_type, 
 }
 
 TEST(Hostile, RubbishOnEverySocketIsCountedAndTheRunGoesOn) {
-  PipelineRun run({"--duration", "0", "--samplers", "2"});
+  // Without keys: these strangers shall get in.
+  PipelineRun run({"--duration", "0", "--samplers", "2", "--keys", "none"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   const auto before = run.status();
   std::map<std::string, std::string> endpoints;
@@ -88,7 +89,7 @@ TEST(Hostile, RubbishOnEverySocketIsCountedAndTheRunGoesOn) {
 
 TEST(Hostile, ConnectionsBeyondTheLimitAreRefusedAndTold) {
   constexpr int kMost = 10, kStrangers = 40;
-  PipelineRun run({"--duration", "0", "--max-connections", std::to_string(kMost)});
+  PipelineRun run({"--duration", "0", "--max-connections", std::to_string(kMost), "--keys", "none"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   const auto before = run.status();
   EXPECT_EQ(before["limits"]["max_connections"], kMost);

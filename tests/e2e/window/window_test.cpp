@@ -392,7 +392,7 @@ TEST_F(WindowTest, AGuestIsToldWhoEndedTheSession) {
   ASSERT_NE(live_window(guest), 0u);
   EXPECT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_EQ(guest.wait(60), 0) << guest.err();
-  EXPECT_NE(guest.err().find("the session was ended by " + net::this_person() + "\n"), std::string::npos)
+  EXPECT_NE(guest.err().find("the session was ended by " + net::this_person() + " (key operator)\n"), std::string::npos)
       << guest.err();
 }
 

@@ -495,6 +495,42 @@ TEST_F(Master, AViewerThatEndsWithoutAGoodbyeIsKnownToBeLost) {
   EXPECT_EQ(lost(), 0);
 }
 
+TEST_F(Master, EveryoneIsToldWhatTheSessionLacks) {
+  const auto lacks = [&](const char* peer) {
+    const auto welcomes = sent<wire::Welcome>(peer);
+    if (welcomes.empty()) return std::string("not told");
+    const auto fact = welcomes.back().facts.find("lacks");
+    return fact == welcomes.back().facts.end() ? std::string() : fact->second;
+  };
+  core.on("v", hello("viewer", "viewer-1", 5), 0);
+  EXPECT_EQ(lacks("v"), "data,packer,sampler");
+  join_all();
+  core.tick(1);
+  EXPECT_EQ(lacks("v"), "");
+  EXPECT_EQ(status()["lacks"], "");
+  core.tick(2);
+  EXPECT_EQ(lacks("v"), "not told") << "nothing has changed";
+  core.on("s1", wire::Goodbye{}, 3);
+  core.on("s2", wire::Goodbye{}, 3);
+  core.tick(3);
+  EXPECT_EQ(lacks("v"), "sampler");
+  EXPECT_EQ(status()["lacks"], "sampler");
+}
+
+TEST_F(Master, TheKeyOfWhoEndsTheSessionIsTold) {
+  using Arguments = std::map<std::string, std::string>;
+  for (const auto& [arguments, key, told] :
+       {std::tuple{Arguments{{"by", "ada of lab"}}, "", "the session was ended by ada of lab"},
+        {Arguments{{"by", "ada of lab"}}, "operator", "the session was ended by ada of lab (key operator)"},
+        {Arguments{}, "ben", "the session was ended (key ben)"},
+        {Arguments{{"by", "a\nb"}}, "", "the session was ended by a\uFFFDb"},
+        {Arguments{}, "", "the session was ended"}}) {
+    MasterCore master{MasterOptions{}, {42}, *record};
+    master.on("c", wire::Control{"stop", arguments}, 1, key);
+    EXPECT_EQ(master.stop_reason(), told);
+  }
+}
+
 TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
   join_all();
   wire::MetricRows rows{{5}, "no_such_table", {"a"}, {1}};

@@ -22,6 +22,14 @@ TEST(Control, NobodyIsSaidAtOnce) {
   }
 }
 
+TEST(Control, AHostThatIsNotFoundIsNamed) {
+  const auto answer = ask_master("tcp://nohost.invalid:7700", "status", kLong_s);
+  ASSERT_FALSE(answer.ok());
+  EXPECT_TRUE(answer.error().text.starts_with(
+      "no master is at tcp://nohost.invalid:7700: no host called nohost.invalid is found: "))
+      << answer.error().text;
+}
+
 TEST(Control, MastersAreAskedAtLocalhostAndByIPv6) {
   for (const std::string address : {"tcp://localhost:*", "tcp://[::1]:*"}) {
     Context context;

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/net/master_address.h"
+#include "common/net/service.h"
 
 namespace telesplat::net {
 namespace {
@@ -237,7 +238,29 @@ TEST_F(SessionFiles, TellTheKeysThatASessionRunsWith) {
   EXPECT_EQ(running_sessions(), std::vector{keyed});
   EXPECT_EQ(find_master("auto").keys, "/home/anna/keys");
   EXPECT_EQ(find_master("", "crater.ply").keys, "/home/anna/keys");
-  EXPECT_EQ(find_master(keyed.address).keys, "") << "an address is taken as it is";
+  EXPECT_EQ(find_master(keyed.address).keys, "/home/anna/keys") << "of the session that is there";
+  EXPECT_EQ(find_master("tcp://localhost" + keyed.address.substr(keyed.address.rfind(':'))).keys, "/home/anna/keys");
+  EXPECT_EQ(find_master("tcp://127.0.0.1:4").keys, "");
+  EXPECT_EQ(find_master("tcp://lab.example" + keyed.address.substr(keyed.address.rfind(':'))).keys, "");
+}
+
+TEST_F(SessionFiles, GiveTheirKeysToThoseWhoJoinAndNotToMasters) {
+  RunningSession keyed = session();
+  keyed.keys = "/home/anna/keys";
+  const auto file = SessionFile::publish(keyed);
+  ASSERT_TRUE(file.ok());
+  const auto settled = [&](const std::string& keys, bool connects) {
+    ServiceOptions o;
+    o.master = keyed.address;
+    o.keys = keys;
+    EXPECT_EQ(settle_master(o, connects), 0);
+    return o.keys;
+  };
+  EXPECT_EQ(settled("", true), "/home/anna/keys");
+  EXPECT_EQ(settled("/home/anna/others", true), "/home/anna/others");
+  EXPECT_EQ(settled("none", true), "");
+  EXPECT_EQ(settled("", false), "");
+  EXPECT_EQ(settled("none", false), "");
 }
 
 TEST_F(SessionFiles, OfSeveralSessionsOneMustBeChosen) {

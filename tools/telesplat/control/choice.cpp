@@ -19,7 +19,8 @@ options::Table session_rows(SessionChoice& c) {
           net::keys_row(c.keys)};
 }
 
-std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Given& given, int& exit_code) {
+std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Given& given, int& exit_code,
+                                     const std::vector<net::Role>& roles) {
   const bool is_told = std::find(given.begin(), given.end(), "--master") != given.end();
   const std::string environment = net::master_from_environment();
   if (!c.session.empty() && is_told && c.master != environment) {
@@ -31,7 +32,7 @@ std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Give
     exit_code = tools::complain({search.problem}, search.exit_code());
     return nullptr;
   }
-  const auto access = net::Access::open({}, c.keys.empty() ? search.keys : c.keys, net::asking_roles());
+  const auto access = net::Access::open({}, c.keys.empty() ? search.keys : c.keys, roles);
   if (!access) {
     exit_code = tools::complain(access.error());
     return nullptr;

@@ -18,6 +18,7 @@ struct SessionChoice {
 options::Table session_rows(SessionChoice& choice);
 
 /// A connection to the session's master. Null: it is not known; why was said on stderr, and `exit_code` is set.
-std::unique_ptr<ControlClient> reach(const SessionChoice& choice, const options::Given& given, int& exit_code);
+std::unique_ptr<ControlClient> reach(const SessionChoice& choice, const options::Given& given, int& exit_code,
+                                     const std::vector<net::Role>& roles = net::asking_roles());
 
 }  // namespace telesplat::launcher

@@ -63,7 +63,7 @@ Status print_status(ControlClient& client, const StatusOptions& o) {
 int show_status(StatusOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
   int exit_code = 0;
-  const auto client = reach(o.session, given, exit_code);
+  const auto client = reach(o.session, given, exit_code, net::any_role());  // everybody may ask that
   if (!client) return exit_code;
   if (o.watch) net::install_signal_handlers();
   do {

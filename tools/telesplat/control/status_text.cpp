@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/utf8.h"
+#include "common/net/connections/waiting.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/control/process_tables.h"
@@ -79,6 +80,8 @@ std::string head(const Json& status, double now_s) {
     out += line("record", folder.empty() ? "none" : folder);
     if (const std::string keys = text(*session, "keys"); !keys.empty()) out += line("keys", keys);
   }
+  if (const std::string lacking = net::lacking_text(text(status, "lacks")); !lacking.empty())
+    out += line("waits", lacking);
   if (const uint64_t refused = count(status, "keys_refused"); refused > 0)
     out += line("not let in", fmt::format("{} connections without a key that the master lets in", refused));
   out += line("views", fmt::format("{} complete, {} in flight; epoch {}", count(status, "frames_completed"),

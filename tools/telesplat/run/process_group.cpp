@@ -73,7 +73,9 @@ Status ProcessGroup::start(Member member) {
   fs::create_directories(log_directory_, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
   member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
-  if (!keys_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--keys", keys_});
+  // The environment or a session's file may name other keys.
+  const std::string keys = keys_.empty() ? net::kNoKeys : keys_;
+  if (member.joins) member.arguments.insert(member.arguments.end(), {"--keys", keys});
   if (!endpoint_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
   members_.push_back(std::move(member));
   return restart(members_.back());

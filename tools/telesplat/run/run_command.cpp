@@ -26,6 +26,7 @@
 #include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/after_run.h"
 #include "tools/telesplat/run/children/processor_wait.h"
+#include "tools/telesplat/run/joined/joined_session.h"
 #include "tools/telesplat/run/live_figures.h"
 #include "tools/telesplat/run/overwrite.h"
 #include "tools/telesplat/run/pipeline.h"
@@ -40,7 +41,6 @@ namespace fs = std::filesystem;
 using State = Pipeline::State;
 
 constexpr double kAskEvery_s = 0.5;  // the master for its status
-constexpr double kSilence_s = 3;     // of a master that is joined, before the person is told
 constexpr double kResultPatience_s = 2;
 
 /// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
@@ -122,8 +122,8 @@ class Run {
     ControlClient control(pipeline.master_endpoint(), pipeline.access());
     SessionFigures figures;
     double asked_s = 0;
-    const double begin_s = monotonic_s();
-    bool heard = o_.join_master.empty();  // or told that nothing is
+    std::optional<JoinedSession> joined;
+    if (!o_.join_master.empty()) joined.emplace(o_.join_master, o_.data.scene);
     std::string live;
     auto state = State::kRunning;
     while (state == State::kRunning && !net::stop_requested()) {
@@ -137,15 +137,14 @@ class Run {
         if (const pid_t display = pipeline.display()) busy_.look(display, monotonic_s());
         asked_s = monotonic_s();
       }
-      if (const auto status = control.poll_status()) {
-        heard = true;
+      const auto status = control.poll_status();
+      if (status) {
         if (o_.join_master.empty()) follow_orders(*status, pipeline, control);
         read_status(*status, figures, live);
       }
-      if (!heard && monotonic_s() - begin_s > kSilence_s) {
-        heard = true;
-        progress_.line(fmt::format("telesplat: no master answers at {} yet; waiting for one", o_.join_master));
-      }
+      if (joined)
+        for (const auto& line : joined->look(status ? &*status : nullptr, control.nobody_there(), monotonic_s()))
+          progress_.line("telesplat: " + line);
       if (o_.viewer.window && !o_.viewer.xr && !live.empty())
         progress_.close();  // the window's title has the figures
       else if (!live.empty() || !pipeline.progress().empty())
@@ -356,7 +355,7 @@ int find_session(RunOptions& o) {
   const auto search = net::find_master(o.join_master);
   if (search.address.empty()) return tools::complain({search.problem}, search.exit_code());
   o.join_master = search.address;
-  if (o.keys.empty()) o.keys = search.keys;
+  if (o.keys.empty() || o.keys == kKeysAuto) o.keys = search.keys;
   return 0;
 }
 

@@ -1,22 +1,43 @@
 #include "tools/telesplat/run/run_keys.h"
 
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
+#include <fcntl.h>
+#include <chrono>
 #include <filesystem>
 #include <vector>
 
+#include "common/core/descriptor.h"
 #include "common/net/keys/access.h"
-#include "common/net/keys/key_maker.h"
 #include "common/net/runtime_folder.h"
 #include "common/net/session_file.h"
+#include "tools/common/complain.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kMade = "auto";
+constexpr std::string_view kBegin = "keys-";
+constexpr std::chrono::seconds kYoung{60};  // of a folder that may be about to be locked
+
+// Removes keys of runs that were killed: no process has their folders open.
+void remove_left_behind(const net::RuntimeFolder& runtime) {
+  for (const auto& name : runtime.names()) {
+    const std::string path = runtime.path() + "/" + name;
+    std::error_code error;
+    const auto changed = fs::last_write_time(path, error);
+    if (!name.starts_with(kBegin) || error || fs::file_time_type::clock::now() - changed < kYoung) continue;
+    const Descriptor folder{::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)};
+    if (folder.get() >= 0 && flock(folder.get(), LOCK_EX | LOCK_NB) == 0) fs::remove_all(path, error);
+  }
+}
+
+Error not_made(const Error& why) {
+  return Error{fmt::format("--keys auto: {}; --keys none runs without keys", why.text)};
+}
 
 Status check(const std::string& folder, const std::vector<net::Role>& roles, bool binds) {
   const auto access = net::Access::open({}, folder, roles, binds);
@@ -27,14 +48,15 @@ Status check(const std::string& folder, const std::vector<net::Role>& roles, boo
 
 Result<std::unique_ptr<PassingKeys>> PassingKeys::make() {
   const auto folder = net::RuntimeFolder::make();
-  if (!folder) return Error{"--keys auto: " + folder.error().text};
-  const std::string path = fmt::format("{}/keys-{}", folder->path(), getpid());
+  if (!folder) return not_made(folder.error());
+  remove_left_behind(*folder);
+  const std::string path = fmt::format("{}/{}{}", folder->path(), kBegin, getpid());
   std::error_code error;
   fs::remove_all(path, error);  // of a process of this number that was killed
   auto maker = net::KeyMaker::open(path);
-  if (!maker) return Error{"--keys auto: " + maker.error().text};
-  std::unique_ptr<PassingKeys> out(new PassingKeys(path));
-  if (const auto made = maker->make_missing(); !made) return Error{"--keys auto: " + made.error().text};
+  if (!maker) return not_made(maker.error());
+  std::unique_ptr<PassingKeys> out(new PassingKeys(path, *std::move(maker)));
+  if (const auto made = out->maker_.make_missing(); !made) return not_made(made.error());
   return out;
 }
 
@@ -45,10 +67,13 @@ PassingKeys::~PassingKeys() {
 
 Result<std::unique_ptr<PassingKeys>> settle_keys(RunOptions& o) {
   std::unique_ptr<PassingKeys> out;
-  if (o.keys.empty()) return out;
   const bool joins = !o.join_master.empty();
-  if (o.keys == kMade) {
-    if (joins) return Error{"--keys auto: a session that is joined has its own keys"};
+  if (o.keys == net::kNoKeys) {
+    o.keys.clear();
+    if (!joins) tools::complain({"--keys none: everybody on this machine can watch and end this session"});
+  }
+  if (o.keys.empty()) return out;
+  if (o.keys == kKeysAuto) {
     auto made = PassingKeys::make();
     if (!made) return made;
     out = *std::move(made);

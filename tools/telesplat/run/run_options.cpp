@@ -65,9 +65,16 @@ options::Row metrics_port_row(RunOptions& o) {
   return out;
 }
 
+options::Row give_up_row(RunOptions& o) {
+  options::Row out = net::give_up_row(o.viewer.service.give_up_after_s);
+  out.help += "; of a session that is joined (--master)";
+  out.not_in_scene = "how long a viewer waits";
+  return out;
+}
+
 options::Row keys_row(RunOptions& o) {
   options::Row out = net::keys_row(o.keys);
-  out.help += "; auto: keys that are made for this run and go with it";
+  out.help += "; auto: keys that are made for this run and go with it, or those of your session that is joined";
   out.not_in_scene = "who is let in";
   return out;
 }
@@ -264,7 +271,7 @@ RunOptions view_defaults() {
 
 Table table(RunOptions& o) {
   const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
-  const Table launcher = joined(own, sampler_rows(o));
+  const Table launcher = joined(joined(own, sampler_rows(o)), {give_up_row(o)});
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
   const Table limits = joined(master::limit_table(o.master), net::peer_limit_table(o.master.service));
   const Table of_master = joined(joined(master::record_table(o.master), limits), master::session_table(o.master));
@@ -287,6 +294,8 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
     if (o.join_master.empty())
       if (const Status s = out->check(); !s) return s.error();
   }
+  if (o.join_master.empty() && o.viewer.service.give_up_after_s > 0)
+    return Error{"--give-up-after is given, but no --master: what a session of its own lacks is started again"};
   if (const Status s = settle_wall(o, given); !s) return s.error();
   if (const Status s = settle_links(o); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();

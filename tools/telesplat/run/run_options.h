@@ -24,7 +24,8 @@ struct RunOptions {
   viewer::ViewerOptions viewer;     ///< wall "2x1": the viewers are its tiles; started_s: when the command began
   int samplers = 1, data_servers = 1, viewers = 1;
   std::string join_master;                    ///< --master: join a running session instead of starting one
-  std::string keys;                           ///< folder of keys, of all processes; auto: made for this run
+  std::string keys = "auto";                  ///< folder of keys, of all processes; auto: made for this run, or those
+                                              ///< of the session that is joined; none, empty: without
   MovieOptions movie;                         ///< made of the record after the run; no file: none
   bool report = false;                        ///< made of the record at the end (tools/telesplat/report/report.h)
   std::string out;                            ///< run folder; empty: run makes one, view records nothing

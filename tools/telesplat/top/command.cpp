@@ -148,7 +148,7 @@ int top(TopOptions o, const options::Given& given) {
   std::setlocale(LC_ALL, "");
   std::setlocale(LC_NUMERIC, "C");
   int exit_code = 0;
-  const auto client = reach(o.session, given, exit_code);
+  const auto client = reach(o.session, given, exit_code, net::any_role());
   if (!client) return exit_code;
   net::install_signal_handlers();
   Watch watch(*client);

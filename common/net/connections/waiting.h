@@ -1,0 +1,52 @@
+// What a process waits for, as people are told it: in a line after some seconds, then once a minute.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+namespace telesplat::net {
+
+class Waiting {
+ public:
+  static constexpr double kGrace_s = 3;   ///< of each thing that is waited for, before the first line about it
+  static constexpr double kEvery_s = 60;  ///< between two lines about the same
+
+  /// Looks at what is waited for now: a sentence without its full stop; empty: nothing is. Returns the line that is
+  /// due.
+  std::optional<std::string> look(const std::string& what, double now_s);
+  /// How long it has waited, for one thing or another.
+  double waited_s(double now_s) const { return since_s_ ? now_s - *since_s_ : 0; }
+
+ private:
+  std::string what_;
+  std::set<std::string> told_;
+  std::optional<double> since_s_;
+  double what_since_s_ = 0, told_s_ = -1e9;
+};
+
+/// Returns "the session has no data server and no sampler" for "data,sampler", the roles that a master says its session
+/// lacks; empty for none.
+std::string lacking_text(std::string_view roles);
+
+/// Why the host of tcp://HOST:PORT is not found; empty: it is, or the endpoint names none. It may take seconds.
+std::string host_problem(const std::string& endpoint);
+
+/// The same in a thread of its own.
+class HostSearch {
+ public:
+  explicit HostSearch(std::string endpoint) : endpoint_(std::move(endpoint)) {}
+  /// Begins a search, unless one is under way or began less than half a minute ago.
+  void begin();
+  /// What the last one found.
+  std::string problem() const;
+
+ private:
+  struct Found;
+  std::string endpoint_;
+  std::shared_ptr<Found> found_;
+};
+
+}  // namespace telesplat::net
