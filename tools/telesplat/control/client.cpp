@@ -31,6 +31,10 @@ bool ControlClient::nobody_there() const {
   return nobody_there_ || (line_ && line_->socket.failed_connections() > line_->failed_before);
 }
 
+std::string ControlClient::refusal() const {
+  return line_ ? net::refusal_of_master(line_->socket, endpoint_) : std::string();
+}
+
 Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
                                        const std::map<std::string, std::string>& arguments) {
   auto reply = order(command, timeout_s, arguments);

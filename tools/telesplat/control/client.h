@@ -32,6 +32,8 @@ class ControlClient {
   void tell(const std::string& command, const std::map<std::string, std::string>& arguments);
   /// Nobody takes connections at the master's address any more, since the last answer.
   bool nobody_there() const;
+  /// Why the master does not take this person in, as a sentence; empty: it did not refuse.
+  std::string refusal() const;
   std::optional<nlohmann::json> poll_status();
 
  private:

@@ -143,7 +143,8 @@ class Run {
         read_status(*status, figures, live);
       }
       if (joined)
-        for (const auto& line : joined->look(status ? &*status : nullptr, control.nobody_there(), monotonic_s()))
+        for (const auto& line :
+             joined->look(status ? &*status : nullptr, control.nobody_there(), control.refusal(), monotonic_s()))
           progress_.line("telesplat: " + line);
       if (o_.viewer.window && !o_.viewer.xr && !live.empty())
         progress_.close();  // the window's title has the figures

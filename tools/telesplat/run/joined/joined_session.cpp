@@ -28,15 +28,17 @@ bool is_called(const std::string& shown, const std::string& named) {
 JoinedSession::JoinedSession(std::string master, std::string named)
     : master_(std::move(master)), named_(std::move(named)), host_(master_) {}
 
-std::string JoinedSession::awaited(bool nobody_there, double now_s) {
+std::string JoinedSession::awaited(bool nobody_there, const std::string& refusal, double now_s) {
   if (heard_s_ && now_s - *heard_s_ < kSilence_s) return net::lacking_text(lacks_);
+  if (!refusal.empty()) return refusal;
   if (!nobody_there) return "no master answers at " + master_;
   host_.begin();
   const std::string problem = host_.problem();
   return fmt::format("no master is at {}{}{}", master_, problem.empty() ? "" : ": ", problem);
 }
 
-std::vector<std::string> JoinedSession::look(const nlohmann::json* status, bool nobody_there, double now_s) {
+std::vector<std::string> JoinedSession::look(const nlohmann::json* status, bool nobody_there,
+                                             const std::string& refusal, double now_s) {
   std::vector<std::string> out;
   if (status) {
     heard_s_ = now_s;
@@ -49,7 +51,7 @@ std::vector<std::string> JoinedSession::look(const nlohmann::json* status, bool 
       named_.clear();
     }
   }
-  if (auto line = waiting_.look(awaited(nobody_there, now_s), now_s)) out.push_back(*std::move(line));
+  if (auto line = waiting_.look(awaited(nobody_there, refusal, now_s), now_s)) out.push_back(*std::move(line));
   return out;
 }
 

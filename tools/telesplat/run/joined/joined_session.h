@@ -16,11 +16,12 @@ class JoinedSession {
   JoinedSession(std::string master, std::string named);
 
   /// status: an answer of the master that has just come, or null. nobody_there: nothing takes connections at its
-  /// address. Returns the lines that are due.
-  std::vector<std::string> look(const nlohmann::json* status, bool nobody_there, double now_s);
+  /// address. refusal: why it does not take this person in; empty: it did not refuse. Returns the lines that are due.
+  std::vector<std::string> look(const nlohmann::json* status, bool nobody_there, const std::string& refusal,
+                                double now_s);
 
  private:
-  std::string awaited(bool nobody_there, double now_s);
+  std::string awaited(bool nobody_there, const std::string& refusal, double now_s);
 
   const std::string master_;
   std::string named_;  // until it is compared with what is shown
