@@ -6,6 +6,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <string>
 #include <utility>
 
@@ -35,6 +36,9 @@ class Descriptor {
   bool valid() const { return value_ >= 0; }
   /// how: LOCK_SH or LOCK_EX, and LOCK_NB. False: somebody else holds it, or it cannot be locked.
   bool lock(int how) const { return valid() && flock(value_, how) == 0; }
+  /// Locks it for this process alone, and waits so long for another that holds it. False: that one still does. True
+  /// also where the file system knows no locks.
+  bool lock_within(std::chrono::milliseconds patience) const;
 
  private:
   int value_;

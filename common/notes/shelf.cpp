@@ -2,18 +2,19 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <optional>
 
+#include "common/core/descriptor.h"
 #include "common/core/whole_file.h"
 
 namespace telesplat::notes {
@@ -38,24 +39,7 @@ Result<std::optional<Book>> read_file(const std::string& path) {
   return std::optional(*std::move(book));
 }
 
-// Whoever holds a folder is the only one who changes books in it.
-class FolderLock {
- public:
-  explicit FolderLock(const fs::path& folder) : descriptor_(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    if (descriptor_ >= 0) flock(descriptor_, LOCK_EX);  // where there are no locks two writers at once have bad luck
-  }
-  ~FolderLock() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-  void sync() const {
-    if (descriptor_ >= 0) fsync(descriptor_);
-  }
-
- private:
-  int descriptor_;
-};
+constexpr std::chrono::seconds kLockPatience{5};  // another program holds a folder for as long as it writes a file
 
 // Returns 0, else errno.
 int write_all(int descriptor, const std::string& text) {
@@ -143,7 +127,10 @@ Status change_in(const std::string& to, const Shelf& shelf, const std::function<
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return Error{fmt::format("{}: {}", folder.string(), error.message())};
-  const FolderLock lock(folder);
+  const Descriptor lock{open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (!lock.lock_within(kLockPatience))
+    return Error{fmt::format("{}: another program has locked this folder for {} s; nothing was kept", folder.string(),
+                             kLockPatience.count())};
   auto book = read_book(shelf);
   if (!book) return book.error();
   if (const Status s = change(*book); !s) return s;
@@ -152,7 +139,7 @@ Status change_in(const std::string& to, const Shelf& shelf, const std::function<
     return Error{fmt::format("{}: would have {} bytes, limit {}", to, text.size(), kMaxBytes)};
   failed = replace_file(file, text);
   if (failed != 0) return Error{fmt::format("{}: cannot be written: {}", to, std::strerror(failed))};
-  lock.sync();
+  fsync(lock.get());
   return ok_status();
 }
 

@@ -303,6 +303,12 @@ TEST_F(Hands, BookmarksAndNotesLieBesideTheData) {
   EXPECT_EQ(ctl(run, {"notes", "add", "nothing", "--at", "1,1"}, nullptr, &err), 2);
   EXPECT_EQ(ctl(run, {"notes", "remove", "7"}, nullptr, &err), 2);
 
+  // A book that came with the data changes nothing in the terminal.
+  std::ofstream(book) << "{\"telesplat_notes\": 1, \"notes\": [{\"number\": 1, \"text\": \"red \\u001b[31m\\nnext\"}]}";
+  ASSERT_EQ(ctl(run, {"notes"}, &out, &err), 0) << err;
+  EXPECT_EQ(out.find('\x1b'), std::string::npos) << out;
+  EXPECT_NE(out.find("red "), std::string::npos) << out;
+
   // A broken file is refused and stays.
   std::ofstream(book) << "{\"telesplat_notes\": 1, \"notes\": [";
   const std::string broken = read_text(book);

@@ -2,12 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <utility>
@@ -19,6 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::chrono::seconds kLockPatience{5};  // another program that makes keys takes milliseconds
 constexpr std::string_view kMaster = "master";
 
 std::string file_of(std::string_view name) { return fmt::format("{}{}", name, kSecretEnd); }
@@ -43,13 +44,12 @@ Result<KeyMaker> KeyMaker::open(const std::string& path) {
   auto folder = RuntimeFolder::open(path, true);
   if (!folder) return folder.error();
   struct stat about {};
-  const int lock = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock < 0 || fstat(lock, &about) != 0 || flock(lock, LOCK_EX) != 0) {
-    const Error error{fmt::format("{}: cannot be locked: {}", path, std::strerror(errno))};
-    if (lock >= 0) close(lock);
-    return error;
-  }
-  KeyMaker out(*std::move(folder), lock);
+  Descriptor lock{::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (!lock.valid() || fstat(lock.get(), &about) != 0)
+    return Error{fmt::format("{}: cannot be locked: {}", path, std::strerror(errno))};
+  if (!lock.lock_within(kLockPatience))
+    return Error{fmt::format("{}: another program has locked this folder for {} s", path, kLockPatience.count())};
+  KeyMaker out(*std::move(folder), std::move(lock));
   if (about.st_mode & (S_IRWXG | S_IRWXO))
     return Error{fmt::format("{}: others may look into it (mode {:03o}); chmod 700 keeps it to yourself", path,
                              about.st_mode & 0777)};
@@ -60,13 +60,6 @@ Result<KeyMaker> KeyMaker::open(const std::string& path) {
   out.allowed_ = *std::move(allowed);
   return out;
 }
-
-KeyMaker::~KeyMaker() {
-  if (lock_ >= 0) close(lock_);
-}
-
-KeyMaker::KeyMaker(KeyMaker&& other) noexcept
-    : folder_(std::move(other.folder_)), lock_(std::exchange(other.lock_, -1)), allowed_(std::move(other.allowed_)) {}
 
 // The secret first: a key that is let in without having an owner could not be made again.
 Status KeyMaker::make(const std::string& name, Role role) {

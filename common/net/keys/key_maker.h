@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/descriptor.h"
 #include "common/core/result.h"
 #include "common/net/keys/allow_list.h"
 #include "common/net/runtime_folder.h"
@@ -16,8 +17,7 @@ class KeyMaker {
   /// Makes the folder, for this user alone, if it is not there. Error: it cannot be made, is another's, others may look
   /// into it, it holds something else, or what it holds cannot be read.
   static Result<KeyMaker> open(const std::string& folder);
-  ~KeyMaker();
-  KeyMaker(KeyMaker&& other) noexcept;
+  KeyMaker(KeyMaker&& other) noexcept = default;
   KeyMaker& operator=(KeyMaker&&) = delete;
 
   /// The server's key and one of each role, as far as they are not there. Returns the names of those that were made.
@@ -30,11 +30,11 @@ class KeyMaker {
   const AllowList& allowed() const { return allowed_; }
 
  private:
-  KeyMaker(RuntimeFolder folder, int lock) : folder_(std::move(folder)), lock_(lock) {}
+  KeyMaker(RuntimeFolder folder, Descriptor lock) : folder_(std::move(folder)), lock_(std::move(lock)) {}
   Status make(const std::string& name, Role role);
 
   RuntimeFolder folder_;
-  int lock_;
+  Descriptor lock_;
   AllowList allowed_;
 };
 

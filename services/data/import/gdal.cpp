@@ -29,7 +29,9 @@ using Dataset = std::unique_ptr<void, Close>;
 constexpr const char* kElevationDrivers[] = {"GTiff",   "PNG",  "SRTMHGT", "AAIGrid", "GRASSASCIIGrid",
                                              "USGSDEM", "DTED", "EHdr",    "GSAG",    nullptr};
 
-// drivers: null: all.
+// Formats of textures, none of which names other files.
+constexpr const char* kPictureDrivers[] = {"GTiff", "PNG", "JPEG", "JP2OpenJPEG", "WEBP", "BMP", "GIF", "PNM", nullptr};
+
 Result<Dataset> open(const std::string& path, const char* what, const char* const* drivers) {
   Dataset dataset(GDALOpenEx(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers, nullptr, nullptr));
   if (dataset) return dataset;
@@ -106,7 +108,7 @@ scene::Coordinates coordinates_of(GDALDatasetH dataset, GDALRasterBandH band, co
 // The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the
 // raster.
 Status drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
-  auto opened = open(path, "an image", nullptr);
+  auto opened = open(path, "an image", kPictureDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH image = opened->get();
   const int bands = GDALGetRasterCount(image), w = GDALGetRasterXSize(image), h = GDALGetRasterYSize(image);

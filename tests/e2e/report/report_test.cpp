@@ -227,6 +227,21 @@ TEST(Report, DrawsPlotsWhereMatplotlibIsInstalled) {
     EXPECT_EQ(read_text(folder / fmt::format("run/plots/{}.png", name)).substr(1, 3), "PNG") << name;
 }
 
+TEST(Report, RunsNoCodeOfTheFolderThatItIsMadeIn) {
+  const TemporaryFolder folder;
+  write_run(folder / "run", 20, 1);
+  for (const char* module : {"json", "numpy", "matplotlib", "sitecustomize"})
+    write(folder / fmt::format("run/{}.py", module), fmt::format("open('{}', 'w')\n", folder / "ran"));
+  write(folder / "run/matplotlibrc", "backend: no backend\n");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder / "run");
+  const Outcome made = report(folder, {"."});
+  fs::current_path(before);
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_FALSE(fs::exists(folder / "ran"));
+  EXPECT_EQ(fs::exists(folder / "run/plots"), made.out.find("No plots for papers were drawn: ") == made.out.npos);
+}
+
 TEST(Report, WithoutMatplotlibSaysSoInALineAndIsMade) {
   const TemporaryFolder folder;
   write_run(folder / "run", 20, 1);

@@ -290,6 +290,15 @@ TEST(Rasters, TextureIsDraped) {
   const auto missing = read_mesh(path, nullptr, {.texture = folder / "nothing.png"});
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().text.find("nothing.png"), std::string::npos);
+  // A picture that names another one is followed nowhere.
+  const auto naming = folder.write(
+      "naming.png",
+      "<VRTDataset rasterXSize=\"2\" rasterYSize=\"2\"><VRTRasterBand dataType=\"Byte\" band=\"1\"><SimpleSource>"
+      "<SourceFilename relativeToVRT=\"1\">photo.ppm</SourceFilename><SourceBand>1</SourceBand></SimpleSource>"
+      "</VRTRasterBand></VRTDataset>");
+  const auto followed = read_mesh(path, nullptr, {.texture = naming});
+  ASSERT_FALSE(followed);
+  EXPECT_TRUE(followed.error().text.starts_with(naming + ": cannot be read as an image")) << followed.error().text;
 }
 
 TEST(DetectFormat, ByContentBeforeName) {

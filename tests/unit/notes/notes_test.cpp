@@ -1,4 +1,5 @@
 // Books of notes: what is kept comes back; hostile and broken files are refused and left as they are.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <grp.h>
 #include <gtest/gtest.h>
@@ -13,6 +14,7 @@
 #include <random>
 #include <thread>
 
+#include "common/core/descriptor.h"
 #include "common/notes/shelf.h"
 #include "tests/support/patience.h"
 
@@ -328,6 +330,16 @@ TEST_F(Notes, WhoWritesAtTheSameTimeLosesNothing) {
   const auto book = read_book(shelf);
   ASSERT_TRUE(book) << book.error().text;
   EXPECT_EQ(book->notes.size(), 80u);
+}
+
+TEST_F(Notes, ALockedFolderIsNamedAfterSeconds) {
+  const Descriptor lock{::open(fs::path(shelf.beside).parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  ASSERT_TRUE(lock.lock(LOCK_EX));
+  const Status kept = add_note(shelf, "a note");
+  ASSERT_FALSE(kept);
+  EXPECT_NE(kept.error().text.find("another program has locked this folder for 5 s"), std::string::npos)
+      << kept.error().text;
+  EXPECT_FALSE(fs::exists(shelf.beside));
 }
 
 TEST_F(Notes, AChangeThatIsRefusedWritesNothing) {

@@ -9,6 +9,7 @@
 #include <ctime>
 #include <filesystem>
 
+#include "common/core/utf8.h"
 #include "common/core/whole_file.h"
 #include "common/notes/shelf.h"
 #include "common/scene/settings.h"
@@ -223,13 +224,13 @@ int print_book(const notes::Shelf& shelf, bool json, bool bookmarks) {
   }
   if (bookmarks)
     for (const auto& b : book->bookmarks)
-      std::printf("%s%s%s\n", b.name.c_str(), b.made_at.empty() ? "" : "  ", b.made_at.c_str());
+      std::printf("%s%s%s\n", printable(b.name).c_str(), b.made_at.empty() ? "" : "  ", printable(b.made_at).c_str());
   else
     for (const auto& n : book->notes) {
-      std::printf("%llu  %s\n", static_cast<unsigned long long>(n.number), n.text.c_str());
+      std::printf("%llu  %s\n", static_cast<unsigned long long>(n.number), printable_lines(n.text).c_str());
       if (n.place)
         std::printf("   at %.10g, %.10g, %.10g%s%s\n", n.place->x, n.place->y, n.place->z, n.value.empty() ? "" : "; ",
-                    n.value.c_str());
+                    printable(n.value).c_str());
     }
   if (bookmarks ? book->bookmarks.empty() : book->notes.empty())
     std::printf("there are no %s; ctl %s add makes one\n", bookmarks ? "bookmarks" : "notes",

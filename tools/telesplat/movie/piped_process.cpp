@@ -32,7 +32,8 @@ std::string text_of(int file) {
 }
 
 // In the child. Nothing but system calls.
-[[noreturn]] void become(const std::vector<char*>& argv, int input, int output, int errors, pid_t parent) {
+[[noreturn]] void become(const std::vector<char*>& argv, const char* directory, int input, int output, int errors,
+                         pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);  // it died in between
@@ -40,14 +41,15 @@ std::string text_of(int file) {
   dup2(input, 0);
   dup2(output, 1);
   dup2(errors, 2);
-  execv(argv[0], argv.data());
+  if (!directory || chdir(directory) == 0) execv(argv[0], argv.data());
   dprintf(2, "cannot be started: %s\n", std::strerror(errno));
   _exit(127);
 }
 
 }  // namespace
 
-Result<PipedProcess> PipedProcess::start(const std::string& program, const std::vector<std::string>& arguments) {
+Result<PipedProcess> PipedProcess::start(const std::string& program, const std::vector<std::string>& arguments,
+                                         const char* directory) {
   PipedProcess out;
   out.output_ = memfd_create("output", MFD_CLOEXEC);
   out.errors_ = memfd_create("errors", MFD_CLOEXEC);
@@ -59,7 +61,7 @@ Result<PipedProcess> PipedProcess::start(const std::string& program, const std::
   argv.push_back(nullptr);
   const pid_t parent = getpid();
   const pid_t pid = fork();
-  if (pid == 0) become(argv, input[0], out.output_, out.errors_, parent);
+  if (pid == 0) become(argv, directory, input[0], out.output_, out.errors_, parent);
   ::close(input[0]);
   out.input_ = input[1];
   if (pid < 0) return Error{fmt::format("{}: cannot fork: {}", program, std::strerror(errno))};

@@ -19,7 +19,9 @@ class PipedProcess {
  public:
   /// Starts `program` (a path); no shell sees the arguments. It is in a process group of its own, so that Ctrl-C
   /// reaches this program alone, and is killed should this program die. What it says goes into memory.
-  static Result<PipedProcess> start(const std::string& program, const std::vector<std::string>& arguments);
+  /// directory: its working folder; null: this program's.
+  static Result<PipedProcess> start(const std::string& program, const std::vector<std::string>& arguments,
+                                    const char* directory = nullptr);
   /// Kills it if it still runs.
   ~PipedProcess();
   PipedProcess(PipedProcess&& other) noexcept;

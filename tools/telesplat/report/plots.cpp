@@ -35,10 +35,12 @@ std::vector<std::string> pythons() {
   return out;
 }
 
-// The paths of what it drew of `text`, a page's data.
+// The paths of what it drew of `text`, a page's data. Python takes modules, and matplotlib its settings, from the
+// working folder first, which may be a stranger's run: it works in the root folder.
 Result<std::vector<std::string>> draw(const std::string& python, const std::string& text, const std::string& folder,
                                       const ShouldStop& should_stop) {
-  auto process = PipedProcess::start(python, {"-c", std::string(page_files::plots_py), folder});
+  auto process =
+      PipedProcess::start(python, {"-c", std::string(page_files::plots_py), fs::absolute(folder).string()}, "/");
   if (!process) return process.error();
   process->write(std::as_bytes(std::span(text)), should_stop);
   const int code = process->finish(should_stop);
