@@ -23,6 +23,7 @@
 #include "common/core/utf8.h"
 #include "common/net/connections/broken.h"
 #include "common/net/connections/connections.h"
+#include "common/net/connections/greeting.h"
 #include "common/net/connections/lookout.h"
 #include "common/net/connections/queued_bytes.h"
 #include "common/net/connections/tunnel.h"
@@ -447,6 +448,8 @@ struct Socket::Impl {
   std::atomic<bool> in_touch{false};                      // of a socket that connects
   size_t failed_unseen = 0;                               // handshakes whose attempt's end was not heard of yet
   std::atomic<uint32_t> broken_off{0}, turned_away{0};    // of a socket that connects: handshakes; event, 0: none
+  std::string endpoint;                                   // it connects to
+  bool looked_for_mechanism = false;
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
   std::unique_ptr<ReadAhead> ahead;  // with read_ahead, once something was sent or received; it is the first to go
@@ -498,7 +501,8 @@ Status Socket::connect(const std::string& endpoint) {
     if (!way) return Error{fmt::format("{}: {}", impl_->name, way.error().text)};
     if (!impl_->home.access.keys()) impl_->warn_of_clear(endpoint);
     if (is_ipv6(*way)) impl_->socket.set(zmq::sockopt::ipv6, 1);
-    impl_->socket.connect(numeric_host(*way));
+    impl_->endpoint = numeric_host(*way);
+    impl_->socket.connect(impl_->endpoint);
     return ok_status();
   } catch (const zmq::error_t& e) {
     return Error{fmt::format("{}: cannot connect to {}: {}", impl_->name, endpoint, e.what())};
@@ -537,7 +541,12 @@ Socket::Refusal Socket::refusal() const {
   if (keys && impl_->turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
     return {.text =
                 fmt::format("the key {} of {} is not let in there", keys->own ? keys->own->name : "", keys->folder)};
-  const bool turned_away = impl_->turned_away != 0, broken_off = impl_->broken_off >= kBrokenOff;
+  const bool broken_off = impl_->broken_off >= kBrokenOff;
+  // A server with keys may close a connection before its own greeting is out, so that libzmq cannot tell why.
+  if (!keys && broken_off && !impl_->tunnel && !std::exchange(impl_->looked_for_mechanism, true) &&
+      mechanism_at(impl_->endpoint) == "CURVE")
+    impl_->turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
+  const bool turned_away = impl_->turned_away != 0;
   if (!turned_away && !broken_off) return {};
   if (keys)
     return {.text = fmt::format("it does not take the keys of {}: it has others, or none", keys->folder),

@@ -1,4 +1,5 @@
 // Sockets with keys: who comes in, who does not, and what each may send.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -6,6 +7,7 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "common/core/descriptor.h"
 #include "common/net/control.h"
 #include "common/net/master_link.h"
 #include "tests/integration/receive.h"
@@ -95,6 +97,60 @@ TEST(Keys, WithoutAKeyNobodyComesIn) {
   EXPECT_NE(peer.socket.refusal().text.find("wants a key"), std::string::npos) << peer.socket.refusal().text;
   EXPECT_FALSE(master.socket.receive());
   EXPECT_EQ(master.socket.rejected(), 0u);
+}
+
+// Listens, and closes each connection as soon as the other greeting is whole, before its own has named a mechanism: what
+// a peer sees of a busy server with keys.
+class HastyServer {
+ public:
+  HastyServer() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    auto* const any = reinterpret_cast<sockaddr*>(&address);
+    EXPECT_TRUE(::bind(listener_.get(), any, size) == 0 && ::listen(listener_.get(), 16) == 0 &&
+                ::getsockname(listener_.get(), any, &size) == 0);
+    endpoint = fmt::format("tcp://127.0.0.1:{}", ntohs(address.sin_port));
+    thread_ = std::thread([this] {
+      for (;;) {
+        const Descriptor peer(::accept(listener_.get(), nullptr, nullptr));
+        if (!peer.valid()) return;
+        greet(peer.get());
+      }
+    });
+  }
+  ~HastyServer() {
+    ::shutdown(listener_.get(), SHUT_RDWR);
+    thread_.join();
+  }
+
+  std::string endpoint;
+
+ private:
+  static void greet(int peer) {
+    constexpr size_t kBegin = 11, kWhole = 64;
+    std::string greeting = "\xff" + std::string(8, '\0') + "\x7f" + std::string("\x03\x00", 2) + "CURVE";
+    greeting.resize(kWhole, '\0');
+    const timeval patience{0, 200'000};
+    ::setsockopt(peer, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    ::send(peer, greeting.data(), kBegin, MSG_NOSIGNAL);
+    char theirs[kWhole];
+    if (::recv(peer, theirs, kWhole, MSG_WAITALL) == ssize_t(kWhole)) return;
+    ::send(peer, greeting.data() + kBegin, kWhole - kBegin, MSG_NOSIGNAL);
+  }
+
+  Descriptor listener_{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  std::thread thread_;
+};
+
+TEST(Keys, WhoIsBrokenOffLearnsThatAKeyIsWanted) {
+  HastyServer master;
+  Peer peer({}, master.endpoint);
+  peer.socket.send(kGoodbye);
+  ASSERT_TRUE(receive_until(peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
+  EXPECT_EQ(peer.socket.refusal().text, "it wants a key (--keys DIR)");
+  EXPECT_FALSE(peer.socket.refusal().may_pass);
 }
 
 TEST(Keys, AKeyThatIsNotOnTheListIsRefused) {

@@ -1,0 +1,12 @@
+// What a peer says of itself before anybody is let in.
+#pragma once
+
+#include <string>
+
+namespace telesplat::net {
+
+/// Connects to tcp://HOST:PORT, and reads which security mechanism its greeting names (ZMTP 3, RFC 23): "NULL" or
+/// "CURVE". Empty: no peer that speaks so names one within patience_s.
+std::string mechanism_at(const std::string& endpoint, double patience_s = 0.5);
+
+}  // namespace telesplat::net
