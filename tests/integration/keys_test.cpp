@@ -99,8 +99,8 @@ TEST(Keys, WithoutAKeyNobodyComesIn) {
   EXPECT_EQ(master.socket.rejected(), 0u);
 }
 
-// Listens, and closes each connection as soon as the other greeting is whole, before its own has named a mechanism: what
-// a peer sees of a busy server with keys.
+// Listens, and closes each connection as soon as the other greeting is whole, before its own has named a mechanism:
+// what a peer sees of a busy server with keys.
 class HastyServer {
  public:
   HastyServer() {
