@@ -136,7 +136,7 @@ OUTSIDE_HEADERS = [
     (r"(epoxy/egl\.h|EGL/.*)",
      ["common/gl", "client/viewer/display/window.cpp", "client/viewer/xr", "tools/xr_test_runtime"]),
     (r"openxr/.*", ["client/viewer/xr", "tools/xr_test_runtime"]),
-    (r"GLFW/.*", ["client/viewer/display/window.cpp"]),
+    (r"GLFW/.*", ["client/viewer/display/window.cpp", "client/viewer/panel/gui/gui.cpp"]),
     (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui", "tests/unit/viewer/panel"]),
     (r"GL/.*", []),
     (r"CLI/.*", ["common/options/parser.cpp"]),

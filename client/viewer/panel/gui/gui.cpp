@@ -3,12 +3,14 @@
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
 #include <epoxy/gl.h>
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 #include <imgui.h>
 #include <imgui_internal.h>
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <deque>
 #include <utility>
 
 #include "client/viewer/panel/gui/style.h"
@@ -19,7 +21,6 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kPeriod_s = 0.1;  // of plots and figures while nothing happens
-constexpr int kRelease = 0;        // GLFW_RELEASE
 constexpr size_t kMostWaiting = 4096;
 constexpr int kAfterEvent = 2;  // builds: hovering and layouts settle in the second
 
@@ -34,6 +35,20 @@ uniform sampler2D drawn;
 out vec4 colour;
 void main() { colour = texelFetch(drawn, ivec2(gl_FragCoord.xy), 0); }
 )";
+
+// A key, or a character, which has code alone.
+struct Typed {
+  int code = 0, scancode = 0, action = 0, mods = 0;
+  bool character = false;
+
+  bool releases() const { return !character && action == GLFW_RELEASE; }
+  // Whether the key does something with the letters that were typed before it.
+  bool acts() const {
+    return !character && action == GLFW_PRESS &&
+           ((code >= GLFW_KEY_ESCAPE && code <= GLFW_KEY_END) || code == GLFW_KEY_KP_ENTER ||
+            (mods & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER)));
+  }
+};
 
 // Of the window, screen coordinates.
 struct Area {
@@ -71,9 +86,7 @@ struct Gui::Impl {
   int opaque = 0;           // pixels at the window's left that nothing shines through
   double built_at_s = -1e9;
   int builds_due = kAfterEvent;
-  std::set<int> pressed;             // keys, since the last build
-  std::vector<int> released;         // of these
-  std::vector<unsigned> characters;  // that wait for the text that they are meant for
+  std::deque<Typed> typed;  // that builds have not taken yet, in their order
   bool expects_text = false, popup = false, closes_popup = false;
 
   ~Impl() {
@@ -138,18 +151,17 @@ Result<std::unique_ptr<Gui>> Gui::make(GLFWwindow* window) {
 
 void Gui::stir() { impl_->builds_due = kAfterEvent; }
 
-// A key that is pressed and released before the next build would never have been down: its release waits for that.
 // What happens while nothing is shown would be taken for new when it is: releases alone may not be missed.
 void Gui::on_key(int key, int scancode, int action, int mods) {
   stir();
-  if (action == kRelease && impl_->pressed.contains(key)) return impl_->released.push_back(key);
-  if (!shows() && action != kRelease) return;
-  if (action != kRelease) impl_->pressed.insert(key);
-  ImGui_ImplGlfw_KeyCallback(impl_->window, key, scancode, action, mods);
+  if (action == GLFW_REPEAT) return;  // Dear ImGui repeats keys by itself
+  if (action == GLFW_RELEASE || ((shows() || impl_->expects_text) && impl_->typed.size() < kMostWaiting))
+    impl_->typed.push_back({key, scancode, action, mods, false});
 }
 void Gui::on_character(unsigned code) {
   stir();
-  if ((shows() || impl_->expects_text) && impl_->characters.size() < kMostWaiting) impl_->characters.push_back(code);
+  if ((shows() || impl_->expects_text) && impl_->typed.size() < kMostWaiting)
+    impl_->typed.push_back({int(code), 0, 0, 0, true});
 }
 void Gui::expect_text(bool expected) { impl_->expects_text = expected; }
 bool Gui::close_popup() {
@@ -182,9 +194,33 @@ bool Gui::takes_pointer(double x, double y) const {
   return std::any_of(impl_->areas.begin(), impl_->areas.end(), [&](const Area& a) { return a.has(x, y); });
 }
 bool Gui::shows() const { return !impl_->areas.empty(); }
-bool Gui::takes_text() const { return shows() && ImGui::GetIO().WantTextInput; }
+// As the last build left it: WantTextInput tells of the build before.
+bool Gui::takes_text() const {
+  return shows() && GImGui->WantTextInputNextFrame == 1 && GImGui->ActiveId &&
+         GImGui->ActiveId == GImGui->InputTextState.ID;
+}
 
 bool Gui::due(double now_s) const { return impl_->builds_due > 0 || now_s - impl_->built_at_s >= kPeriod_s; }
+
+// Dear ImGui takes all letters of a build before its keys, and sees keys as they are when a build begins. So a build
+// takes what was typed up to the first key that acts, and none that acts again. Letters wait for the text that they
+// are meant for, and what was typed after them waits with them. Returns whether the next build has more to take.
+bool Gui::take_typed() {
+  Impl& m = *impl_;
+  const bool takes = takes_text();
+  std::vector<int> released;
+  while (!m.typed.empty()) {
+    const Typed t = m.typed.front();
+    if (t.character && !takes && m.expects_text) return false;
+    if (t.acts() && std::find(released.begin(), released.end(), t.code) != released.end()) return true;
+    if (t.releases()) released.push_back(t.code);
+    m.typed.pop_front();
+    if (!t.character) ImGui_ImplGlfw_KeyCallback(m.window, t.code, t.scancode, t.action, t.mods);
+    if (t.character && takes) ImGui_ImplGlfw_CharCallback(m.window, unsigned(t.code));
+    if (t.acts()) break;
+  }
+  return !m.typed.empty();
+}
 
 void Gui::build_texture(const Place& place, const std::function<double()>& build) {
   Impl& m = *impl_;
@@ -195,17 +231,13 @@ void Gui::build_texture(const Place& place, const std::function<double()>& build
     ImGui_ImplOpenGL3_DestroyFontsTexture();
   ImGui_ImplOpenGL3_NewFrame();
   if (ImGui::GetIO().Fonts->TexID == nullptr) ImGui_ImplOpenGL3_CreateFontsTexture();
-  if (takes_text())
-    for (const unsigned code : std::exchange(m.characters, {})) ImGui_ImplGlfw_CharCallback(m.window, code);
-  else if (!m.expects_text)
-    m.characters.clear();
+  const bool more = take_typed();
   ImGui::NewFrame();
   if (std::exchange(m.closes_popup, false) && !GImGui->OpenPopupStack.empty()) ImGui::ClosePopupToLevel(0, true);
   m.opaque = within(int(build() * pixels_a_unit), 0, place.width);
   m.popup = ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopup);
   ImGui::Render();
-  m.pressed.clear();
-  for (const int key : std::exchange(m.released, {})) ImGui_ImplGlfw_KeyCallback(m.window, key, 0, kRelease, 0);
+  if (more) stir();
   const ImDrawData* drawn = ImGui::GetDrawData();
   glBindFramebuffer(GL_FRAMEBUFFER, m.framebuffer);
   glEnable(GL_SCISSOR_TEST);
@@ -230,6 +262,9 @@ int Gui::prepare(const Place& place, double now_s, const std::function<double()>
   if (!build) {
     m.areas.clear();
     m.opaque = 0;
+    if (!m.expects_text)
+      for (const Typed& t : std::exchange(m.typed, {}))
+        if (t.releases()) ImGui_ImplGlfw_KeyCallback(m.window, t.code, t.scancode, t.action, t.mods);
     m.builds_due = kAfterEvent;  // for when it is shown again
     return 0;
   }

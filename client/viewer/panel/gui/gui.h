@@ -58,6 +58,7 @@ class Gui {
   explicit Gui(std::unique_ptr<Impl> impl);
   void stir();
   bool shows() const;
+  bool take_typed();
   void build_texture(const Place& place, const std::function<double()>& build);
 
   std::unique_ptr<Impl> impl_;
