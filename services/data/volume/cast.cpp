@@ -42,14 +42,13 @@ class Cells {
     const std::array<int, 3> cell{int(std::floor(index.x)), int(std::floor(index.y)), int(std::floor(index.z))};
     if (cell == cell_) return;
     cell_ = cell;
-    glm::dvec3 bend(0);
+    bend_ = glm::dvec3(0);
     for (size_t corner = 0; corner < 8; ++corner) {
       std::array<int, 3> at;
       for (size_t a = 0; a < 3; ++a) at[a] = std::clamp(cell[a] + int(corner >> a & 1), lo_[a], hi_[a] - 1);
       values_[corner] = value(at);
-      for (size_t a = 0; a < 3; ++a) bend[int(a)] = std::max(bend[int(a)], second_difference(at, a, values_[corner]));
+      for (size_t a = 0; a < 3; ++a) bend_[int(a)] = std::max(bend_[int(a)], second_difference(at, a, values_[corner]));
     }
-    deviation_ = (bend.x + bend.y + bend.z) / 8 + session_.levels.step / 2;
   }
   double value(const glm::dvec3& index) const {
     const glm::dvec3 part = index - glm::floor(index);
@@ -61,7 +60,11 @@ class Cells {
     }
     return out;
   }
-  double deviation() const { return deviation_; }
+  // The error of linear interpolation is h^2/2 t (1 - t) times the second derivative: none at voxels.
+  double deviation(const glm::dvec3& index) const {
+    const glm::dvec3 part = index - glm::floor(index);
+    return glm::dot(bend_, part * (1.0 - part)) / 2 + session_.levels.step / 2;
+  }
 
  private:
   double value(const std::array<int, 3>& at) const {
@@ -81,7 +84,7 @@ class Cells {
   const LevelAt& level_at_;
   std::array<int, 3> cell_{-2, -2, -2};
   std::array<double, 8> values_{};
-  double deviation_ = 0;
+  glm::dvec3 bend_{0};  // the largest second differences of the eight, along each axis
 };
 
 // Adds up optical depth until there is enough.
@@ -129,7 +132,7 @@ Result<scene::Probed> cast(const volume::Session& session, int begin, int end, c
     }
     if (at - told.reached > kLongestBracket * voxel_m) break;
     cells.move_to(index);
-    const double value = cells.value(index), off = cells.deviation();
+    const double value = cells.value(index), off = cells.deviation(index);
     const Extinctions may = extinctions(transfer, value - off, value + off);
     const double share = length / unit_m;
     nearest.add(may.most * share, at, length, enough);
@@ -143,11 +146,11 @@ Result<scene::Probed> cast(const volume::Session& session, int begin, int end, c
   const glm::dvec3 index = from + told.reached * on;
   cells.move_to(index);
   out.value = cells.value(index);
-  out.value_error = cells.deviation();
+  out.value_error = cells.deviation(index);
   const double bracket_m = std::max(told.reached - nearest.reached, farthest.reached - told.reached);
   if (bracket_m > kLongestBracket * voxel_m) return out;
   out.error_m = bracket_m + step_m / 2;
-  out.value_error = std::max({hi - *out.value, *out.value - lo, cells.deviation()});
+  out.value_error = std::max({hi - *out.value, *out.value - lo, cells.deviation(index)});
   return out;
 }
 

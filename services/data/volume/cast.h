@@ -17,8 +17,9 @@ using LevelAt = std::function<double(int i, int j, int k)>;
 /// one at which what lies before it and the place itself hide probe.opacity. The picture is made of splats, one a
 /// voxel, so it may differ from that by about a voxel.
 ///
-/// Bounds: how values run between voxels is not known; they deviate from the trilinear ones by about an eighth of the
-/// second differences of the voxels around (the error of linear interpolation), and levels are rounded. The place lies
+/// Bounds: how values run between voxels is not known; they deviate from the trilinear ones by about t (1 - t) / 2 of
+/// the second differences of the voxels around, t of the way from one voxel to the next (the error of linear
+/// interpolation), and levels are rounded. The place lies
 /// between those at which the largest and the smallest opacity of such values hide enough; where they lie more than
 /// four voxels off, as at thin things amid noise, there is no bound. The value's bound covers all values between these
 /// places, without them those that may lie at the place.

@@ -1,5 +1,6 @@
 // What a ray meets in the data themselves, against surfaces, fields and opacities whose formulas are known: the place
 // and the value lie within the bounds that are told.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -170,6 +171,48 @@ TEST(CastVolume, PlacesAndValuesAreWithinTheirBoundsOfTheFormulas) {
     }
   }
   EXPECT_GT(hits, 150);
+}
+
+// A sheet of one voxel whose values are 1000 there and 0 beside it. What lies between is one of all fields that bend no
+// more than the voxels do: trilinear, with the error of linear interpolation V t (1 - t) added or taken away, or smooth
+// (Catmull and Rom's spline). A jump of opacity at half of the value begins where 1 - t is half; what is in front of
+// the place and hides a quarter is an eighth of a voxel (log(0.75) / log(0.1)).
+TEST(CastVolume, AOneVoxelSheetIsBoundedByTheFieldsItMayBeOf) {
+  constexpr int kSheet = 32;
+  const auto store = *VolumeStore::make(
+      [](size_t, const ReadProgress&) -> Result<Volume> {
+        return make_volume<float>({kVoxels, kVoxels, kVoxels}, VoxelType::kF32,
+                                  [](int, int, int k) { return k == kSheet ? 1000.0f : 0.0f; });
+      },
+      1, "sheet", {}, {}, [](const char*, double) {});
+  const volume::Session& session = store->session();
+  const glm::dmat4 to_index = session.grid.room_to_index();
+  const double voxel_m = session.grid.unit_m();
+  const std::function<double(double)> fields[] = {
+      [](double t) { return 1 - t; }, [](double t) { return (1 - t) * (1 + t); },
+      [](double t) { return (1 - t) * (1 - t); }, [](double t) { return 1 - 2.5 * t * t + 1.5 * t * t * t; }};
+  for (const double threshold : {0.3, 0.5, 0.8}) {
+    const auto transfer = *volume::parse_transfer(fmt::format("{0}:#ffffff:0, {0}:#ffffff:0.9", 1000 * threshold), {});
+    const auto found = store->cast(0, transfer, {}, {EpochId{1}, {0.01, 0.02, 2}, {0, 0, -1}});
+    ASSERT_TRUE(found && found->value && found->value_error) << threshold;
+    ASSERT_TRUE(found->error_m) << threshold;
+    const glm::dvec3 at(to_index * glm::dvec4(found->room, 1));
+    const double deep = std::log(0.75) / std::log(0.1);
+    EXPECT_NEAR(at.z, kSheet + 1 - threshold - deep, 1.0 / 16);
+    EXPECT_LE(*found->error_m, 0.5 * voxel_m);
+    for (const auto& field : fields) {
+      double t = 1;
+      while (field(t) < threshold) t -= 1e-4;
+      const double place = kSheet + t - deep, value = 1000 * field(std::abs(t - deep));
+      EXPECT_LE(std::abs(place - at.z) * voxel_m, *found->error_m) << threshold;
+      EXPECT_LE(std::abs(value - *found->value), *found->value_error) << threshold;
+    }
+    // It tells no more than these fields need.
+    EXPECT_LE(
+        *found->error_m,
+        voxel_m * (std::max(std::sqrt(1 - threshold) - (1 - threshold), std::sqrt(threshold) - threshold) + 3.0 / 16))
+        << threshold;
+  }
 }
 
 TEST(CastVolume, WhatHidesTooLittleIsNoPlace) {
