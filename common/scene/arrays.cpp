@@ -69,7 +69,9 @@ Json span_json(const ValueSpan& span) { return span.empty() ? Json() : Json::arr
 Json array_json(const ArrayInfo& a) {
   Json spans = Json::array();
   for (const ValueSpan& s : a.spans) spans.push_back(span_json(s));
-  return {{"name", a.name}, {"unit", a.unit}, {"cells", a.of_cells}, {"components", a.components}, {"spans", spans}};
+  Json out{{"name", a.name}, {"unit", a.unit}, {"cells", a.of_cells}, {"components", a.components}, {"spans", spans}};
+  if (!a.histogram.empty()) out["histogram"] = a.histogram;
+  return out;
 }
 
 std::string text_of(const ArrayInfo& a) { return array_json(a).dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -99,6 +101,10 @@ std::optional<ArrayInfo> read_array(const Json& json) {
       spans == json.end() || !spans->is_array() || spans->empty() || spans->size() > size_t{kMaxComponents} + 1)
     return std::nullopt;
   ArrayInfo out{*name, *unit, cells->get<bool>(), components->get<int>(), {}};
+  if (const auto histogram = json.find("histogram"); histogram != json.end()) {
+    if (!histogram->is_string()) return std::nullopt;
+    out.histogram = histogram->get<std::string>();
+  }
   for (const Json& s : *spans) {
     const auto span = read_span(s);
     if (!span) return std::nullopt;

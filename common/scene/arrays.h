@@ -33,6 +33,7 @@ struct ArrayInfo {
   /// [0]: of the values, or of the vectors' lengths. Where there are several components, then one each, at most
   /// kMaxComponents.
   std::vector<ValueSpan> spans;
+  std::string histogram;  ///< volume::to_text() of it; empty: it is not told
   bool operator==(const ArrayInfo&) const = default;
 };
 
@@ -53,8 +54,8 @@ ValueSpan span_of(std::span<const ArrayInfo> arrays, const ArrayChoice& choice);
 /// kMaxArraysText. The others are left out.
 void make_tellable(std::vector<ArrayInfo>& arrays);
 
-/// JSON: [{"name", "unit", "cells", "components", "spans": [[lo, hi] or null, ...]}, ...]. Precondition:
-/// make_tellable().
+/// JSON: [{"name", "unit", "cells", "components", "spans": [[lo, hi] or null, ...], "histogram" if
+/// there is one}, ...]. Precondition: make_tellable().
 std::string to_text(std::span<const ArrayInfo> arrays);
 /// Empty text: none. Error: no such text, a limit.
 Result<std::vector<ArrayInfo>> arrays_from_text(std::string_view text);

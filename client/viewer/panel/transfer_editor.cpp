@@ -13,6 +13,11 @@ namespace {
 bool has_width(const volume::ValueRange& range) { return range.hi / 2 - range.lo / 2 > 0; }
 double room_around(double value) { return std::max(0.5, std::abs(value) / 1000); }
 
+// Halves: a difference of two finite numbers need not be finite.
+double share_of(double value, double lo, double hi) {
+  return within((value / 2 - lo / 2) / (hi / 2 - lo / 2), -1.0, 2.0);
+}
+
 }  // namespace
 
 void TransferEditor::on_session(double now_s, const volume::Session& session,
@@ -33,30 +38,30 @@ void TransferEditor::on_refusal() {
 double TransferEditor::lo() const { return has_width(range_) ? range_.lo : range_.lo - room_around(range_.lo); }
 double TransferEditor::hi() const { return has_width(range_) ? range_.hi : range_.lo + room_around(range_.lo); }
 
-// Halves: a difference of two finite numbers need not be finite.
-double TransferEditor::share(double value) const {
-  return within((value / 2 - lo() / 2) / (hi() / 2 - lo() / 2), -1.0, 2.0);
-}
+double TransferEditor::share(double value) const { return share_of(value, lo(), hi()); }
 double TransferEditor::value_at(double share) const { return std::lerp(lo(), hi(), share); }
 
 // Logarithmic, since backgrounds have thousands of times as many voxels as the rest.
-std::vector<TransferEditor::Bar> TransferEditor::bars(bool logarithmic) const {
-  std::vector<Bar> out;
-  if (!histogram_) return out;
-  const auto& counts = histogram_->counts;
+std::vector<HistogramBar> bars_of(const volume::Histogram& histogram, double lo, double hi, bool logarithmic) {
+  std::vector<HistogramBar> out;
+  const auto& counts = histogram.counts;
   const auto height = [&](uint64_t n) { return logarithmic ? std::log1p(double(n)) : double(n); };
   const auto edge = [&](size_t i) {
-    return share(std::lerp(histogram_->lo, histogram_->hi, double(i) / double(counts.size())));
+    return share_of(std::lerp(histogram.lo, histogram.hi, double(i) / double(counts.size())), lo, hi);
   };
   double most = 0;
   for (size_t i = 0; i < counts.size(); ++i) {
-    const Bar bar{std::max(0.0, edge(i)), std::min(1.0, edge(i + 1)), height(counts[i])};
+    const HistogramBar bar{std::max(0.0, edge(i)), std::min(1.0, edge(i + 1)), height(counts[i])};
     if (bar.height <= 0 || bar.to <= bar.from) continue;
     most = std::max(most, bar.height);
     out.push_back(bar);
   }
-  for (Bar& bar : out) bar.height /= most;
+  for (HistogramBar& bar : out) bar.height /= most;
   return out;
+}
+
+std::vector<HistogramBar> TransferEditor::bars(bool logarithmic) const {
+  return histogram_ ? bars_of(*histogram_, lo(), hi(), logarithmic) : std::vector<HistogramBar>();
 }
 
 std::vector<TransferEditor::Spot> TransferEditor::curve() const {

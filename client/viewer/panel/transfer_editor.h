@@ -11,6 +11,12 @@
 
 namespace telesplat::viewer {
 
+struct HistogramBar {
+  double from = 0, to = 0, height = 0;  ///< shares of the axis and of the highest bar
+};
+/// As far as they lie on an axis from lo to hi.
+std::vector<HistogramBar> bars_of(const volume::Histogram& histogram, double lo, double hi, bool logarithmic);
+
 /// What the session has and what the person wants differ for a moment after each change: what is wanted stays on
 /// display until the session has it or kPatience_s is over. One thread.
 class TransferEditor {
@@ -32,11 +38,7 @@ class TransferEditor {
   /// Where a value lies on the axis: 0 at lo(), 1 at hi(); beyond them -1 to 2 at most.
   double share(double value) const;
   double value_at(double share) const;
-  /// Of the histogram, as far as they lie on the axis.
-  struct Bar {
-    double from = 0, to = 0, height = 0;  ///< shares of the axis and of the highest bar
-  };
-  std::vector<Bar> bars(bool logarithmic) const;
+  std::vector<HistogramBar> bars(bool logarithmic) const;
   /// Opacity over the axis, from end to end.
   struct Spot {
     double share = 0, opacity = 0;

@@ -10,6 +10,7 @@
 #include "common/net/dispatch.h"
 #include "common/scene/placement.h"
 #include "common/scene/session.h"
+#include "common/volume/histogram.h"
 #include "services/data/base/epochs.h"
 #include "services/data/base/placement_options.h"
 #include "services/data/mesh/array_stores.h"
@@ -80,6 +81,8 @@ class ServedMesh final : public Served {
       hello.facts[scene::kIsoFact] = fmt::format("{}", *iso_);
       if (!info.arrays.empty() && !info.arrays[0].spans.empty())
         hello.facts[scene::kIsoFact] += fmt::format(" {} {}", info.arrays[0].spans[0].lo, info.arrays[0].spans[0].hi);
+      if (!info.arrays.empty() && !info.arrays[0].histogram.empty())
+        hello.facts[volume::kHistogramFact] = info.arrays[0].histogram;
     } else if (!info.arrays.empty()) {
       hello.facts[scene::kArraysFact] = scene::to_text(info.arrays);
     }

@@ -11,12 +11,16 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/volume/histogram.h"
 #include "services/data/import/iso.h"
 #include "services/data/import/process.h"
+#include "services/data/volume/statistics.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 namespace {
+
+constexpr int kBins = 128;
 
 bool write_all(int descriptor, const void* data, size_t bytes) {
   const auto* at = static_cast<const std::byte*>(data);
@@ -57,7 +61,7 @@ Result<MeshSource> surface_source(const std::string& path, const std::string& ra
     return isosurface(*volume, iso, source.name);
   };
   const std::string which = raw.empty() && series.empty() ? "" : "-" + hex(raw + series);
-  return MeshSource{hash_files(files_of(*found), progress), fmt::format("-iso{}{}", iso, which), read};
+  return MeshSource{hash_files(files_of(*found), progress), fmt::format("-surface{}{}", iso, which), read};
 }
 
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name) {
@@ -86,6 +90,8 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
   mesh->frame = volume.box();
   // The store keeps what other values a surface may have.
   mesh->arrays = {{.name = "value", .unit = {}, .spans = {{volume.lo, volume.hi}}}};
+  if (const auto levels = choose_levels(volume, volume.lo, volume.hi))
+    mesh->arrays[0].histogram = volume::to_text(volume::histogram_of(count_levels(volume, *levels), *levels, kBins));
   mesh->coordinates.space = volume.space;
   mesh->coordinates.unit = volume.unit;
   return mesh;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <numeric>
+
+#include "common/volume/histogram.h"
 
 namespace telesplat::data {
 namespace {
@@ -47,6 +50,9 @@ void check_ball(const Volume& volume) {
   ASSERT_TRUE(mesh) << mesh.error().text;
   ASSERT_TRUE(validate_mesh(*mesh, "ball"));
   EXPECT_GT(mesh->indices.size(), 3u * 1000);
+  const auto histogram = volume::histogram_from_text(mesh->arrays[0].histogram);
+  ASSERT_TRUE(histogram) << "people choose another value by it";
+  EXPECT_EQ(std::accumulate(histogram->counts.begin(), histogram->counts.end(), uint64_t{0}), 26u * 24 * 22);
   const glm::dmat4 back = glm::inverse(volume.index_to_data);
   for (const auto& p : mesh->positions)
     EXPECT_NEAR(glm::distance(glm::dvec3(back * glm::dvec4(p, 1)), glm::dvec3(12, 11, 10)), 8, 0.35);

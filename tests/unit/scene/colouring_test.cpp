@@ -90,6 +90,7 @@ TEST(Arrays, SpansThatAreFoundLaterHaveRoom) {
   std::vector<ArrayInfo> arrays(kMaxArrays, {std::string(150, 'x'), "", false, 1, {ValueSpan{}}});
   make_tellable(arrays);
   for (ArrayInfo& a : arrays) a.spans[0] = {-1.2345678901234567e-300, 1.2345678901234567e+300};
+  arrays[0].histogram = "0:9:4,0,7";
   const auto read = arrays_from_text(to_text(arrays));
   ASSERT_TRUE(read.ok()) << read.error().text;
   EXPECT_EQ(*read, arrays);
@@ -109,6 +110,7 @@ TEST(Arrays, HostileListsAreRefused) {
         R"([{"name":"a","unit":"","cells":true,"components":0,"spans":[null]}])",
         R"([{"name":"a","unit":"","cells":true,"components":1,"spans":[]}])",
         R"([{"name":"a","unit":"","cells":true,"components":1,"spans":[[2,1]]}])",
+        R"([{"name":"a","unit":"","cells":true,"components":1,"spans":[[0,1]],"histogram":7}])",
         R"([{"name":"a","unit":"","cells":1,"components":1,"spans":[[0,1]]}])"})
     EXPECT_FALSE(arrays_from_text(text).ok()) << text;
   EXPECT_FALSE(arrays_from_text("[" + std::string(100000, ' ') + "]").ok());

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "client/viewer/panel/gui/setting_rows.h"
+#include "client/viewer/panel/gui/transfer_view.h"
 #include "client/viewer/panel/gui/widgets.h"
 #include "common/core/within.h"
 
@@ -115,6 +116,16 @@ void show_cut(CutControls& cut, ColourViewState& state, double now_s) {
     if (const Status s = cut.give(now_s, "off"); !s) state.complaint = s.error().text;
 }
 
+// Below the slider, on its axis.
+void draw_values(const ColourControls& colours) {
+  const auto bars = colours.iso_bars();
+  if (bars.empty()) return;
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
+  const float rim = ImGui::GetStyle().GrabMinSize / 2 + 2, height = ImGui::GetFontSize() * 4;  // the grab's half
+  ImGui::Dummy({0, height});
+  draw_bars({{from.x + rim, to.y}, {to.x - from.x - 2 * rim, height}}, bars);
+}
+
 // A surface is made anew when the person lets go: that takes a moment.
 void show_isosurface(ColourControls& colours, ColourViewState& state) {
   const double now = *colours.iso();
@@ -130,6 +141,7 @@ void show_isosurface(ColourControls& colours, ColourViewState& state) {
     colours.choose_iso(range.empty() ? value : within(value, range.lo, range.hi));
     state.iso.reset();
   }
+  draw_values(colours);
   if (!range.empty()) ImGui::TextDisabled("values of the volume %.5g to %.5g", range.lo, range.hi);
 }
 

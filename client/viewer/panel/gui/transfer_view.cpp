@@ -26,14 +26,6 @@ ImU32 ink(const TransferEditor::Point& p, int alpha) {
   return IM_COL32(int(p.r * 255), int(p.g * 255), int(p.b * 255), alpha);
 }
 
-void draw_histogram(const PlotArea& area, const TransferEditor& editor, bool linear) {
-  auto& list = *ImGui::GetWindowDrawList();
-  for (const auto& bar : editor.bars(!linear)) {
-    const ImVec2 a = at(area, bar.from, bar.height), b = at(area, bar.to, 0);
-    list.AddRectFilled(a, {std::max(b.x, a.x + 1), b.y}, viewer::ink(0x5a6470));
-  }
-}
-
 // The colour of each value below its opacity.
 void draw_function(const PlotArea& area, const TransferEditor& editor) {
   auto& list = *ImGui::GetWindowDrawList();
@@ -132,12 +124,20 @@ void show_window(SceneControls& controls, double now_s) {
 
 }  // namespace
 
+void draw_bars(const PlotArea& area, const std::vector<HistogramBar>& bars) {
+  auto& list = *ImGui::GetWindowDrawList();
+  for (const auto& bar : bars) {
+    const ImVec2 a = at(area, bar.from, bar.height), b = at(area, bar.to, 0);
+    list.AddRectFilled(a, {std::max(b.x, a.x + 1), b.y}, ink(0x5a6470));
+  }
+}
+
 void show_transfer(SceneControls& controls, TransferViewState& state, double now_s, const std::function<void()>& save) {
   const auto& editor = controls.transfer();
   const PlotArea area = plot_area("curve", kEditorHeight);
   edit_points(controls, state, area, now_s);
   ImGui::PushClipRect(area.from, {area.from.x + area.size.x, area.from.y + area.size.y}, true);
-  draw_histogram(area, editor, state.linear);
+  draw_bars(area, editor.bars(!state.linear));
   draw_function(area, editor);
   ImGui::PopClipRect();
   draw_points(area, editor, state.point);

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "client/viewer/panel/gui/widgets.h"
 #include "client/viewer/panel/scene_controls.h"
 
 namespace telesplat::viewer {
@@ -14,6 +15,9 @@ struct TransferViewState {
   bool drags = false;   ///< the pointer holds it
   bool linear = false;  ///< heights of the histogram
 };
+
+/// Draws bars from the lower side of an area.
+void draw_bars(const PlotArea& area, const std::vector<HistogramBar>& bars);
 
 /// Builds it. Between Dear ImGui's frames. save: writes the transfer function to a file of its own choice.
 void show_transfer(SceneControls& controls, TransferViewState& state, double now_s, const std::function<void()>& save);

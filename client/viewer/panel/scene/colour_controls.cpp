@@ -42,9 +42,13 @@ void ColourControls::on_session(double now_s, const wire::Welcome& session) {
   iso_.reset();
   iso_range_ = {};
   double value = 0;
-  if (std::sscanf(view.fact(scene::kIsoFact).c_str(), "%lf %lf %lf", &value, &iso_range_.lo, &iso_range_.hi) >= 1)
+  if (std::sscanf(view.fact(scene::kIsoFact).c_str(), "%lf %lf %lf", &value, &iso_range_.lo, &iso_range_.hi) >= 1 &&
+      std::abs(value) <= scene::kMaxScalar)
     iso_ = value;
-  if (!std::isfinite(iso_range_.lo) || !std::isfinite(iso_range_.hi)) iso_range_ = {};
+  if (!(iso_range_.lo >= -scene::kMaxScalar && iso_range_.hi <= scene::kMaxScalar)) iso_range_ = {};
+  histogram_.reset();
+  if (const std::string text = iso_ ? view.fact(volume::kHistogramFact) : ""; !text.empty())
+    if (auto read = volume::histogram_from_text(text)) histogram_ = *std::move(read);
 }
 
 std::pair<double, double> ColourControls::range() const {
@@ -76,6 +80,11 @@ void ColourControls::reset_range() {
 
 void ColourControls::choose_map(const colour::ColourMap& map) {
   give_({"colour", {{"map", colour::to_text(map)}}, "map"});
+}
+
+std::vector<HistogramBar> ColourControls::iso_bars() const {
+  if (!histogram_ || !(iso_range_.lo < iso_range_.hi)) return {};
+  return bars_of(*histogram_, iso_range_.lo, iso_range_.hi, true);
 }
 
 void ColourControls::choose_iso(double value) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/viewer/panel/order.h"
+#include "client/viewer/panel/transfer_editor.h"
 #include "common/scene/colouring.h"
 #include "common/wire/messages.h"
 
@@ -45,6 +46,8 @@ class ColourControls {
   std::optional<double> iso() const { return iso_; }
   /// Of its volume; empty: not known.
   scene::ValueSpan iso_range() const { return iso_range_; }
+  /// How often they are in it; empty: not known.
+  std::vector<HistogramBar> iso_bars() const;
   void choose_iso(double value);
 
  private:
@@ -59,6 +62,7 @@ class ColourControls {
   std::optional<Wish> wished_;
   std::optional<double> iso_;
   scene::ValueSpan iso_range_;
+  std::optional<volume::Histogram> histogram_;  // of the isosurface's volume
 };
 
 }  // namespace telesplat::viewer

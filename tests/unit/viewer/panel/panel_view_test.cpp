@@ -290,6 +290,20 @@ TEST_P(PanelView, DrawsAnyTransferFunctionOverAnyHistogram) {
   EXPECT_TRUE(orders_.empty());
 }
 
+TEST_P(PanelView, DrawsAnyIsosurface) {
+  if (GetParam() != scene::Kind::kMesh) GTEST_SKIP() << "other data have no isosurface";
+  ImGui::GetIO().DisplaySize = {1280, 6000};
+  for (const char* iso :
+       {"3 0 10", "3 -1.7e308 1.7e308", "1.7e308 0 1", "nan 0 1", "5 5 5", "3 10 0", "3 nan inf", "3"})
+    for (const char* histogram : {"0:10:4,0,9", "-1e30:1e30:1,2,3", "0:10:0,0", "none"}) {
+      welcome_.facts[scene::kIsoFact] = iso;
+      welcome_.facts[volume::kHistogramFact] = histogram;
+      controls_.on_session(now_s_ += 10, welcome_);
+      frame();
+    }
+  EXPECT_TRUE(orders_.empty());
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, PanelView, testing::ValuesIn(scene::kKinds),
                          [](const auto& info) { return std::string(scene::name_of(info.param)); });
 

@@ -79,6 +79,11 @@ TEST_F(Colours, AnIsosurfaceTellsItsValueAndRange) {
   controls.on_session(1, session);
   EXPECT_EQ(controls.iso(), 300);
   EXPECT_EQ(controls.iso_range().lo, -1000);
+  EXPECT_TRUE(controls.iso_bars().empty());
+  session.facts[volume::kHistogramFact] = "-1000:3000:90,0,7,1";
+  controls.on_session(1, session);
+  ASSERT_EQ(controls.iso_bars().size(), 3u) << "as the transfer function's editor has them";
+  EXPECT_EQ(controls.iso_bars()[1].from, 0.5);
   EXPECT_TRUE(controls.arrays().empty());
   controls.choose_iso(450.5);
   ASSERT_EQ(orders.size(), 1u);
@@ -88,6 +93,16 @@ TEST_F(Colours, AnIsosurfaceTellsItsValueAndRange) {
   controls.on_session(2, session);
   EXPECT_EQ(controls.iso(), 300);
   EXPECT_TRUE(controls.iso_range().empty());
+  for (const char* text : {"300 -1.7e308 1.7e308", "300 nan 5", "300 0 inf", "300 9 5"}) {
+    session.facts[scene::kIsoFact] = text;
+    controls.on_session(3, session);
+    EXPECT_EQ(controls.iso(), 300) << text;
+    EXPECT_TRUE(controls.iso_range().empty()) << text;
+    EXPECT_TRUE(controls.iso_bars().empty()) << text;
+  }
+  session.facts[scene::kIsoFact] = "nan 0 1";
+  controls.on_session(4, session);
+  EXPECT_FALSE(controls.iso());
 }
 
 class Cut : public testing::Test {
