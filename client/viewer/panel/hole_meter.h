@@ -8,10 +8,11 @@
 
 namespace telesplat::viewer {
 
-/// A hole is a run of at most kWidest background pixels of a row between runs of the object's that are no narrower.
-/// Narrow gaps of the object itself look the same and count too; quality measures (docs/metrics.md) compare with a
-/// reference instead. Where most gaps lie beside something narrower, it is thin lines, whose gaps say nothing. Each
-/// call looks at every kTurns-th row, so that it costs some tens of microseconds. One thread.
+/// A hole is a run of at most kWidest background pixels of a row between runs of the object's that are no narrower,
+/// with nothing but the object within kWidest pixels around: what is longer is a gap between lines. Small gaps of the
+/// object itself look the same and count too; quality measures (docs/metrics.md) compare with a reference instead.
+/// Where most gaps lie beside something narrower, it is thin lines, whose gaps say nothing. Each call looks at every
+/// kTurns-th row, so that it costs some tens of microseconds. One thread.
 class HoleMeter {
  public:
   static constexpr int kWidest = 8, kTurns = 16;

@@ -77,11 +77,24 @@ TEST_F(HoleMeterTest, SeesNoHolesInABlockNorInNothing) {
 
 TEST_F(HoleMeterTest, CountsNarrowGapsInAnObjectAndNoWideOnes) {
   object(10, 50);
-  for (int y = 0; y < 32; ++y) at(20, y) = at(21, y) = kBackground;
-  EXPECT_DOUBLE_EQ(measure(), 2.0 / 40);
-  for (int y = 0; y < 32; ++y)
+  for (int y = 8; y < 16; ++y) at(20, y) = at(21, y) = kBackground;
+  EXPECT_DOUBLE_EQ(measure(), 16.0 / (40 * 32));
+  for (int y = 8; y < 16; ++y)
     for (int x = 30; x < 31 + HoleMeter::kWidest; ++x) at(x, y) = kBackground;  // one too wide
-  EXPECT_DOUBLE_EQ(measure(), 2.0 / double(40 - HoleMeter::kWidest - 1));
+  EXPECT_DOUBLE_EQ(measure(), 16.0 / double(40 * 32 - 8 * (HoleMeter::kWidest + 1)));
+}
+
+// The table below a patient is two thin lines beside each other, upright, level or slanting.
+TEST_F(HoleMeterTest, AGapBetweenLinesIsNoHole) {
+  for (const auto& [across, down] : {std::pair{1, 0}, {0, 1}, {1, 1}}) {
+    view_.colour.assign(64 * 32, 0xff000000 | kBackground);
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 64; ++x) {
+        const int off = across * (x - 20) - down * (y - 8);
+        if ((off >= 0 && off < 5) || (off >= 8 && off < 13)) at(x, y) = 0xffa0a0a0;  // a gap of three
+      }
+    EXPECT_EQ(measure(), 0) << across << down;
+  }
 }
 
 TEST_F(HoleMeterTest, SaysNothingOfThinLines) {
