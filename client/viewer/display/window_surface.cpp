@@ -348,6 +348,10 @@ std::map<std::string, std::string> WindowSurface::values() const {
   auto out = values_of(settings());
   out.merge(hands_.values());
   out["fullscreen"] = window_->fullscreen() ? "on" : "off";
+  const glm::vec3 room = scene_.box_room.hi - scene_.box_room.lo;
+  if (!scene_.box_room.empty()) out["room-size"] = fmt::format("{:.4g} m", std::max({room.x, room.y, room.z}));
+  if (terms_) out["z-scale"] = fmt::format("{:.4g}", terms_->placement.coordinates.shown.z);
+  if (const auto& volume = scene_controls_.volume()) out["lighting"] = volume->lit ? "on" : "off";
   return out;
 }
 
@@ -380,12 +384,10 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
   return ok_status();
 }
 
-// By the person, who can take it back; what changes the look is a deed by itself.
+// By the person, who can take it back. What comes through set() alone is somebody else's.
 void WindowSurface::choose(double now_s, const std::string& name, const std::string& value) {
-  const Look look = interaction_.look();
   const std::string before = values()[name];
   if (const Status s = set(name, value); !s) return panel_.tell(now_s, name + ": " + s.error().text, true);
-  if (!(look == interaction_.look())) return;
   const auto becomes = [this, name](const std::string& text) {
     return [this, name, text] {
       if (const Status s = set(name, text); !s) tell(name + ": " + s.error().text);

@@ -67,11 +67,13 @@ void Interaction::quit_or_ask() {
   if (!quit_) notes_.push_back("press " + key_names_(Key::kQ) + " once more to quit");
 }
 
-// Its own doing is what a person takes back, not what the display does with it.
-void Interaction::change_look(const Look& look, const char* subject) {
+// A person takes back what keys did, not what others changed since.
+void Interaction::change_look(const Look& look) {
   if (look == look_) return;
-  undo_.did(last_s_.value_or(0),
-            {"look", [this, before = look_] { look_ = before; }, [this, look] { look_ = look; }, subject});
+  const auto become = [this](const Look& from, const Look& to) {
+    return [this, from, to] { look_ = changed(look_, from, to); };
+  };
+  undo_.did(last_s_.value_or(0), {"look", become(look, look_), become(look_, look), ""});
   look_ = look;
 }
 
@@ -167,7 +169,7 @@ bool Interaction::choose_look(Key key) {
     if (const auto kernel = splat::kernel_of_key(char('0' + number))) look.render.kernel = *kernel;
     notes_.push_back("splats: " + std::string(splat::kernel_name(look.render.kernel)));
   }
-  change_look(look, "");
+  change_look(look);
   return true;
 }
 

@@ -62,8 +62,8 @@ class Interaction {
   geometry::Pose advance(double now_s, bool playback);
 
   const Look& look() const { return look_; }
-  /// In place of what keys chose; they go on from it.
-  void set_look(const Look& look) { change_look(look, "look"); }
+  /// In place of what keys chose; they go on from it. It is no deed of the person's.
+  void set_look(const Look& look) { look_ = look; }
   bool wants_to_quit() const { return quit_; }
   /// In flight the mouse turns the head: the pointer should be caught and hidden.
   bool wants_pointer() const { return controls_.flying(); }
@@ -120,7 +120,7 @@ class Interaction {
   void quit_or_ask();
   void play_or_take();
   bool choose_look(Key key);
-  void change_look(const Look& look, const char* subject);
+  void change_look(const Look& look);
   void move_camera(const std::string& what, const std::function<void()>& move);
   bool path_is_over() const;
   void show_help();

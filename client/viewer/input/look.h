@@ -24,6 +24,24 @@ inline bool operator==(const Look& a, const Look& b) {
          a.head_light == b.head_light && a.background == b.background && a.most_detail == b.most_detail;
 }
 
+/// `now` with what differs between two looks as the second one has it.
+inline Look changed(Look now, const Look& from, const Look& to) {
+  const auto take = [](auto& at, const auto& before, const auto& after) {
+    if (before != after) at = after;
+  };
+  auto& finish = now.render.finish;
+  const auto &old = from.render.finish, &next = to.render.finish;
+  take(now.render.kernel, from.render.kernel, to.render.kernel);
+  take(finish.fill, old.fill, next.fill);
+  take(finish.smooth, old.smooth, next.smooth);
+  take(finish.antialias, old.antialias, next.antialias);
+  take(now.lit, from.lit, to.lit);
+  take(now.head_light, from.head_light, to.head_light);
+  take(now.background, from.background, to.background);
+  take(now.most_detail, from.most_detail, to.most_detail);
+  return now;
+}
+
 /// The lights and the background of a look.
 inline void put_into(const Look& look, image::ShadingParameters& shading) {
   const auto lights = image::shading_named(look.head_light ? "head" : "lit");

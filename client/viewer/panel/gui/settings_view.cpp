@@ -98,11 +98,11 @@ void show_data(Panel& panel, SettingsViewState& state, std::optional<scene::Kind
       if (choice("up", axis)) ask(panel, "up", axis);
     ImGui::EndCombo();
   }
-  typed_number(panel, "room-size", "metres", state.room_size);
-  if (kind == scene::Kind::kMesh) typed_number(panel, "z-scale", "of a terrain", state.z_scale);
+  typed_number(panel, "room-size", panel.value("room-size").c_str(), state.room_size);
+  if (kind == scene::Kind::kMesh) typed_number(panel, "z-scale", panel.value("z-scale").c_str(), state.z_scale);
   if (kind == scene::Kind::kVolume) {
     setting_row("lighting");
-    if (begin_list("lighting", "choose ...")) {
+    if (begin_list("lighting", panel.value("lighting").c_str())) {
       for (const char* value : {"on", "off"})
         if (choice("lighting", value)) ask(panel, "lighting", value);
       ImGui::EndCombo();
