@@ -4,14 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <filesystem>
 #include <mutex>
 #include <utility>
 
-#include "client/viewer/hands/errands.h"
+#include "client/viewer/display/window/new_file.h"
 #include "common/core/clock.h"
-#include "common/core/whole_file.h"
 #include "common/core/within.h"
 #include "common/geometry/fit.h"
 #include "common/scene/session.h"
@@ -19,11 +16,10 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kShowAgain_s = 0.1, kPoint_s = 0.1;
+constexpr double kShowAgain_s = 0.1;
 constexpr double kSteps = 32;         // of the window's width
 constexpr double kMostCovered = 0.6;  // of the window's width; else its first view is that of all of it
 constexpr size_t kMostPicture_pixels = 100'000'000;
-constexpr uintmax_t kMostDropped_bytes = 64'000'000;
 
 // What plays from the beginning. An orbit is fitted once it is known around what.
 std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement) {
@@ -35,17 +31,6 @@ std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement)
 int help_scale(const std::vector<std::string>& lines, int width, int height) {
   const image::View smallest = text_panel(lines, 1);
   return within(std::min(width / (smallest.width + 12), height / (2 * smallest.height)), 1, 4);
-}
-
-// A name that no file has.
-std::string dated_path(const std::string& before, const std::string& after) {
-  char date[32];
-  const std::time_t now = std::time(nullptr);
-  std::strftime(date, sizeof date, "%Y%m%d-%H%M%S", std::localtime(&now));
-  std::string out = before + date + after;
-  std::error_code error;
-  for (int n = 2; std::filesystem::exists(out, error); ++n) out = fmt::format("{}{}-{}{}", before, date, n, after);
-  return out;
 }
 
 PanelFigures panel_figures(const LiveFigures& f, double hole_share) {
@@ -108,7 +93,8 @@ WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, s
       bookmarks_([lines](const std::string& line) { lines->add(line); }),
       lines_(std::move(lines)),
       panel_({.transparent = o.display.transparent, .viewer = o.viewer, .shown = o.panel, .opens = bool(o.open)}),
-      launcher_(o.launcher_fd),
+      opening_(o.open, o.launcher_fd, interaction_, panel_, scene_controls_,
+               [this](const std::string& line) { tell(line); }),
       desk_(std::move(desk)),
       screenshots_(o.screenshot_directory, [lines = lines_](const std::string& line) { lines->add(line); }) {
   quad_buffers_ = o.display.stereo.mode == stereo::Mode::kQuadBuffer;
@@ -152,8 +138,8 @@ WindowSurface::FreePart WindowSurface::free_part() const {
   if (o.wall.described || o.wall.tiles() > 1 || o.stereo.on()) return out;
   const double left = double(window_->hidden()) / window_->width();
   // A legend that was dragged to the left is the person's own matter. In steps, as its numbers change.
-  const bool at_right = shows_legend() && legend_part_.left > 0.5;
-  const double right = at_right ? std::ceil((1 - legend_part_.left) * kSteps) / kSteps : 0;
+  const bool at_right = legend_.built() && legend_.part().left > 0.5;
+  const double right = at_right ? std::ceil((1 - legend_.part().left) * kSteps) / kSteps : 0;
   if (!(left + right <= kMostCovered)) return out;
   geometry::Camera& c = out.frustum;
   out.middle_x = (left - right) * (c.right - c.left) / 2;
@@ -198,8 +184,8 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   head_ = interaction_.advance(now_s, playback);
   const geometry::Camera camera = camera_of(head_);
   interaction_.set_height_tangent(camera.top - camera.bottom);
-  take_launcher_lines(now_s);
-  take_dropped();
+  opening_.take_launcher_lines(now_s, has_scene(), !scene_.box_room.empty());
+  opening_.take_dropped(*window_);
   run_panel(now_s, look);
   follow_bookmarks(head_);
   if (interaction_.take_overlay_wish()) hands_.toggle_all();
@@ -209,7 +195,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
     else
       overlays_.hide("hands");
   }
-  show_marks(camera);
+  measuring_.show_marks(camera, options_.display.stereo.mode == stereo::Mode::kOff);  // two eyes would need two
   show_help();
   show_news(now_s);
   keep_path();
@@ -247,10 +233,10 @@ void WindowSurface::run_panel(double now_s, Look& look) {
   if (!desk_) return;
   desk_->watch(panel_.shown() || scene_.box_room.empty() || panel_.figures().waits_s > 0);
   for (auto& order : panel_.take_orders()) give(std::move(order), false);
-  for (auto& probe : measurements_.take_probes()) desk_->give({"probe", std::move(probe), {}});
+  for (auto& probe : measuring_.places().take_probes()) desk_->give({"probe", std::move(probe), {}});
   for (const auto& answer : desk_->take_answers()) {
     if (answer.order.command == "probe") {
-      const std::string line = measurements_.on_answer(answer.order.arguments, answer.obeyed, answer.text);
+      const std::string line = measuring_.places().on_answer(answer.order.arguments, answer.obeyed, answer.text);
       if (!line.empty()) tell(line);
       continue;
     }
@@ -307,9 +293,7 @@ void WindowSurface::keep_path() {
   for (const auto& note : notes) lines_->add(note, std::find(help.begin(), help.end(), note) == help.end());
   const auto path = interaction_.take_path();
   if (path.empty()) return;
-  const std::string name = dated_path(options_.path_directory + "/path-", ".csv");
-  std::error_code error;
-  std::filesystem::create_directories(options_.path_directory, error);
+  const std::string name = new_file(options_.path_directory, "path", ".csv");
   const Status written = geometry::write_trajectory(name, path);
   tell(written
            ? fmt::format("the camera's path of {:.1f} s: {} (T plays it, --trajectory takes it)", path.back().t_s, name)
@@ -319,7 +303,7 @@ void WindowSurface::keep_path() {
 // A window system may want it again at any time, without telling.
 void WindowSurface::present(const image::View& view, bool changed) {
   const Shown now{monotonic_s(), window_->width(), window_->height(), overlays_.version(),
-                  panel_.shown() || open_view_.shown || shows_legend()};
+                  panel_.shown() || opening_.shows_dialog() || legend_.built()};
   const bool same = now.width == shown_.width && now.height == shown_.height && now.overlays == shown_.overlays &&
                     now.panel == shown_.panel && !(now.panel && window_->gui_due(now.at_s));
   if (panel_.shown() && changed && panel_.pipeline() == scene::Pipeline::kPoints) holes_.look_at(view, background_);
@@ -380,7 +364,7 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
     options_.sampling_chosen = true;
     sampling_wish_ = options_.sampling = changed.sampling;
   }
-  if (std::exchange(d.legend, changed.legend) != changed.legend) show_legend();
+  if (std::exchange(d.legend, changed.legend) != changed.legend) legend_.show();
   return ok_status();
 }
 
@@ -403,73 +387,16 @@ double WindowSurface::build_panel(double now_s) {
   if (panel_.shown())
     width = show_panel(panel_, panel_view_, now_s, {[&](Panel&) {
                          show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); });
-                         show_measurements(measurements_, [this] { save_measurements(); });
+                         show_measurements(measuring_.places(), [this] { measuring_.save(options_.path_directory); });
                          const auto book = bookmarks_.book();
-                         notes_wish_ = show_notes(book.get(), notes_view_, !measurements_.empty(), now_s);
+                         notes_wish_ = show_notes(book.get(), notes_view_, !measuring_.places().empty(), now_s);
                        }});
   if (panel_.shown()) follow_notes();
-  legend_part_ = {};
-  if (shows_legend()) build_legend(now_s, width);
+  legend_.not_built();
+  if (legend_.built()) legend_.build(scene_controls_.colours(), now_s, width);
   if (panel_.shown() && interaction_.shows_help()) show_keys(key_lines());
-  show_open(open_view_, has_scene(), [this](const std::string& path) { open(path); });
-  interaction_.show_dialog(open_view_.shown);
+  opening_.build(has_scene());
   return width;
-}
-
-void WindowSurface::take_launcher_lines(double now_s) {
-  for (const std::string& line : launcher_.read()) {
-    if (line == "progress") panel_.on_progress({});
-    if (line.starts_with("progress ")) panel_.on_progress(line.substr(9));
-    if (!line.starts_with("problem ")) continue;
-    panel_.tell(now_s, line.substr(8), true);
-    if (scene_.box_room.empty()) interaction_.show_dialog(true);
-  }
-  interaction_.set_dialog(bool(options_.open), has_scene());
-  if (interaction_.take_open_wish()) open("");
-  if (interaction_.shows_dialog() != open_view_.shown) open_view_ = {.shown = interaction_.shows_dialog()};
-}
-
-void WindowSurface::open(const std::string& path) {
-  if (!options_.open)
-    return tell("this window shows somebody else's session: telesplat view FILE opens a data set in one of its own");
-  tell("opening " + path);
-  options_.open(path);
-}
-
-// What it is, its ending tells: a path of the camera, a transfer function, else a data set.
-void WindowSurface::take_dropped() {
-  const auto dropped = window_->take_dropped();
-  if (dropped.empty()) return;
-  const std::string& path = dropped.front();
-  if (path.ends_with(".csv")) return play_file(path);
-  if (path.ends_with(".json") && scene_controls_.volume()) return use_transfer_file(path);
-  open(path);
-}
-
-// Whole, by the display's thread: what is no file of a sensible size is not opened.
-Status WindowSurface::readable(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return Error{path + ": is no regular file"};
-  const uintmax_t bytes = std::filesystem::file_size(path, error);
-  if (error || bytes > kMostDropped_bytes)
-    return Error{fmt::format("{}: has {:.0f} MB, at most {:.0f} are read here", path, double(bytes) / 1e6,
-                             double(kMostDropped_bytes) / 1e6)};
-  return ok_status();
-}
-
-void WindowSurface::play_file(const std::string& path) {
-  if (const Status s = readable(path); !s) return tell(s.error().text);
-  auto read = geometry::Trajectory::read_csv(path);
-  if (!read) return tell(read.error().text);
-  interaction_.play(std::move(*read));
-  tell("playing " + path + "; T takes the camera");
-}
-
-void WindowSurface::use_transfer_file(const std::string& path) {
-  if (const Status s = readable(path); !s) return tell(s.error().text);
-  auto read = volume::resolve_transfer(path, scene_controls_.volume()->range);
-  if (!read) return tell(read.error().text);
-  panel_.order({"tf", {{"transfer", volume::to_text(*read)}}, {}});
 }
 
 void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& session) {
@@ -483,9 +410,8 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
       facts.fact("scene") + '\n' + facts.fact("data_file") + '\n' + facts.fact(scene::kPlacementFact);
   if (!facts.fact("scene").empty() && name != std::exchange(scene_name_, name) && had_scene_) {
     interaction_.back_to_first_view();
-    measurements_.clear();
+    measuring_.clear();
     notes_view_ = {};
-    hands_.on_pick(std::nullopt);
   }
   had_scene_ = had_scene_ || !facts.fact("scene").empty();
   auto& least = options_.sampling.least_sampling;
@@ -493,50 +419,15 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
 }
 
 void WindowSurface::save_transfer() {
-  const std::string name = dated_path(options_.path_directory + "/transfer-", ".json");
-  std::error_code error;
-  std::filesystem::create_directories(options_.path_directory, error);
+  const std::string name = new_file(options_.path_directory, "transfer", ".json");
   const Status saved = scene_controls_.save_transfer(name);
   tell(saved ? "transfer function: " + name : saved.error().text);
 }
 
-void WindowSurface::on_legend(const std::shared_ptr<const image::Legend>& legend) {
-  if (legend_ == legend && legend_width_ == window_->width() && legend_height_ == window_->height()) return;
-  legend_ = legend;
-  legend_width_ = window_->width();
-  legend_height_ = window_->height();
-  show_legend();
-}
-
-bool WindowSurface::on_wall() const { return options_.display.wall.described || options_.display.wall.tiles() > 1; }
-
-bool WindowSurface::shows_legend() const {
-  return legend_ && options_.display.legend && window_->has_gui() && !on_wall();
-}
-
-void WindowSurface::build_legend(double now_s, double hidden) {
-  auto& colours = scene_controls_.colours();
-  image::Legend shown = *legend_;
-  const bool editable = colours.colouring() && shown.opacity.empty();
-  if (editable) std::tie(shown.lo, shown.hi) = colours.range();
-  const std::function<void(double, double)> change = [&](double lo, double hi) { colours.choose_range(now_s, lo, hi); };
-  legend_part_ = viewer::show_legend(shown, legend_view_, hidden, editable ? change : nullptr);
-}
-
-// Shows the legend over the frame: in a wall's tile at the lower right, and in a window without Dear ImGui.
-void WindowSurface::show_legend() {
-  const WallTile& wall = options_.display.wall;
-  const int tiles = wall.described ? int(wall.described->screens.size()) : wall.columns * wall.rows;
-  if (!legend_ || !options_.display.legend || shows_legend() || wall.tile != tiles - 1) return overlays_.hide("legend");
-  overlays_.show("legend",
-                 {image::legend_picture(*legend_, legend_width_, legend_height_), Overlay::Corner::kLowerRight});
-}
-
 void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
   if (!interaction_.take_screenshot_wish()) return;
-  if (!legend_ || !options_.display.legend) return screenshots_.take(view, alpha);
   image::View copy{view.width, view.height, view.colour, {}};
-  image::draw_legend(copy, *legend_, part_of_wall(view.width, view.height, options_.display.wall));
+  legend_.draw_into(copy, options_.display.wall);
   screenshots_.take(copy, alpha);
 }
 
@@ -563,8 +454,7 @@ std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& ca
 }
 
 void WindowSurface::take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) {
-  if (legend_ && options_.display.legend)
-    image::draw_legend(picture, *legend_, part_of_wall(picture.width, picture.height, {}));
+  legend_.draw_into(picture, {});
   screenshots_.take(picture, alpha, wish.exr);
 }
 
@@ -583,8 +473,8 @@ void WindowSurface::follow_notes() {
   if (wish.look) bookmarks_.look(shelf());
   if (wish.text.empty()) return;
   notes::Note note{.text = wish.text};
-  if (wish.here && !measurements_.empty()) {
-    const scene::ToldPlace& newest = measurements_.rows().back().back().told;
+  if (wish.here && !measuring_.places().empty()) {
+    const scene::ToldPlace& newest = measuring_.places().rows().back().back().told;
     note.place = newest.data;
     note.value = scene::value_text(newest);
   }
@@ -596,49 +486,6 @@ void WindowSurface::follow_bookmarks(const geometry::Pose& pose) {
   if (keeps && terms_) bookmarks_.keep(shelf(), pose);
   if (next && terms_) bookmarks_.next(shelf());
   if (const auto found = bookmarks_.take_found()) interaction_.go_to(found->pose);
-}
-
-// The cursor's overlay follows it a few times a second.
-std::optional<glm::dvec2> WindowSurface::points_at() {
-  tells_pick_ = interaction_.take_pick_wish();
-  centres_ = centres_ || interaction_.take_centre_wish();
-  const double now_s = monotonic_s();
-  const auto pointer = interaction_.pointer();
-  if (!pointer || (!tells_pick_ && !centres_ && (!hands_.shows("cursor") || now_s - pointed_s_ < kPoint_s)))
-    return std::nullopt;
-  pointed_s_ = now_s;
-  const glm::dvec2 at = *pointer * double(window_->height());
-  if (!(at.x >= 0 && at.y >= 0 && at.x < window_->width() && at.y < window_->height())) return std::nullopt;
-  return at / glm::dvec2(window_->width(), window_->height());
-}
-
-void WindowSurface::on_pick(const std::optional<Pick>& pick, EpochId epoch) {
-  hands_.on_pick(pick);
-  if (std::exchange(centres_, false) && pick) interaction_.centre_on(pick->position_room);
-  if (!std::exchange(tells_pick_, false) || !terms_) return;
-  if (!pick) return tell("nothing lies under the cursor");
-  if (const auto added = measurements_.add(*pick, *terms_, epoch, kPickOpacity); !added) tell(added.error().text);
-}
-
-// Only while it looks otherwise than before. Of two eyes each would need its own.
-void WindowSurface::show_marks(const geometry::Camera& camera) {
-  const auto& [p, q] = camera.pose;
-  const bool shown = !measurements_.empty() && options_.display.stereo.mode == stereo::Mode::kOff;
-  const std::string state = !shown ? ""
-                                   : fmt::format("{} {} {} {} {} {} {} {} {} {} {}", measurements_.version(), p.x, p.y,
-                                                 p.z, q.w, q.x, q.y, q.z, camera.left, camera.width, camera.height);
-  if (state == std::exchange(marks_shown_, state)) return;
-  auto marks = shown ? draw_marks(measurements_, camera, within(camera.height / 400, 1, 4)) : MarksPicture{};
-  if (marks.view.width == 0) return overlays_.hide("marks");
-  overlays_.show("marks", {std::move(marks.view), Overlay::Corner::kNone, marks.x, marks.y});
-}
-
-void WindowSurface::save_measurements() {
-  const std::string name = dated_path(options_.path_directory + "/measurements-", ".csv");
-  std::error_code error;
-  std::filesystem::create_directories(options_.path_directory, error);
-  const Status saved = write_whole(name, measurements_.csv());
-  tell(saved ? "measurements: " + name : saved.error().text);
 }
 
 void WindowSurface::report(const LiveFigures& figures) {

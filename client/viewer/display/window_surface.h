@@ -9,19 +9,19 @@
 #include "client/viewer/display/settings/view_settings.h"
 #include "client/viewer/display/title_line.h"
 #include "client/viewer/display/window.h"
+#include "client/viewer/display/window/legend.h"
+#include "client/viewer/display/window/measuring.h"
+#include "client/viewer/display/window/opening.h"
 #include "client/viewer/hands/bookmarks.h"
 #include "client/viewer/hands/hand_overlays.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/input/pose_feed.h"
 #include "client/viewer/panel/control_desk.h"
-#include "client/viewer/panel/gui/legend_view.h"
 #include "client/viewer/panel/gui/measurements_view.h"
 #include "client/viewer/panel/gui/notes_view.h"
-#include "client/viewer/panel/gui/open_view.h"
 #include "client/viewer/panel/gui/panel_view.h"
 #include "client/viewer/panel/gui/scene_view.h"
 #include "client/viewer/panel/hole_meter.h"
-#include "client/viewer/panel/launcher_lines.h"
 #include "client/viewer/panel/order_undo.h"
 #include "client/viewer/panel/panel.h"
 #include "client/viewer/panel/scene_controls.h"
@@ -69,15 +69,17 @@ class WindowSurface final : public DisplaySurface {
   std::optional<PoseMoment> pose_moment() const override { return tracked_ ? options_.poses->moment() : std::nullopt; }
   double refresh_s() override { return window_->refresh_s(); }
   void present(const image::View& view, bool changed) override;
-  void on_legend(const std::shared_ptr<const image::Legend>& legend) override;
+  void on_legend(const std::shared_ptr<const image::Legend>& legend) override { legend_.on_legend(legend); }
   bool wants_picture() const override { return interaction_.wants_screenshot(); }
   void take_picture(const image::View& view, image::Alpha alpha) override;
   std::optional<PictureWish> take_picture_wish(geometry::Camera& camera) override;
   void take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) override;
   void report(const LiveFigures& figures) override;
-  std::optional<glm::dvec2> points_at() override;
-  void on_pick(const std::optional<Pick>& pick, EpochId epoch) override;
-  Measurements* measurements() override { return &measurements_; }
+  std::optional<glm::dvec2> points_at() override { return measuring_.points_at(); }
+  void on_pick(const std::optional<Pick>& pick, EpochId epoch) override {
+    measuring_.on_pick(pick, epoch, terms_.get());
+  }
+  Measurements* measurements() override { return &measuring_.places(); }
   void on_terms(const std::shared_ptr<const SceneTerms>& terms) override {
     terms_ = terms;
     hands_.on_terms(terms);
@@ -107,10 +109,6 @@ class WindowSurface final : public DisplaySurface {
   void look_from(const Side& side);
   void show_help();
   std::vector<std::string> key_lines() const;
-  void show_legend();
-  bool on_wall() const;
-  bool shows_legend() const;  // as Dear ImGui draws it
-  void build_legend(double now_s, double hidden);
   void show_news(double now_s);
   void keep_path();
   ViewSettings settings() const;
@@ -120,20 +118,12 @@ class WindowSurface final : public DisplaySurface {
   void run_panel(double now_s, Look& look);
   double build_panel(double now_s);
   void save_transfer();
-  void take_launcher_lines(double now_s);
-  void take_dropped();
   void give(Order order, bool undoes);
-  void open(const std::string& path);
   // Or is about to have one.
   bool has_scene() const { return !options_.begins_empty || !scene_.box_room.empty(); }
-  static Status readable(const std::string& path);
-  void play_file(const std::string& path);
-  void use_transfer_file(const std::string& path);
   void follow_bookmarks(const geometry::Pose& pose);
   void follow_notes();
   notes::Shelf shelf() const;  // precondition: terms_
-  void show_marks(const geometry::Camera& camera);
-  void save_measurements();
 
   Options options_;  // display and sampling: as the person chose since
   std::optional<SamplingWish> sampling_wish_;
@@ -146,19 +136,14 @@ class WindowSurface final : public DisplaySurface {
   HandOverlays hands_{text_panel};
   std::shared_ptr<const SceneTerms> terms_;
   Bookmarks bookmarks_;
-  Measurements measurements_;
-  std::string marks_shown_;  // the state that the overlay of their marks shows; empty: there is none
-  bool tells_pick_ = false;  // the person asked for it, not the cursor's overlay
-  bool centres_ = false;     // a double click
-  double pointed_s_ = -1e9;
+  Measuring measuring_{*window_, interaction_, hands_, overlays_, [this](const std::string& line) { tell(line); }};
   ShownScene scene_;
   std::string scene_name_;
   bool had_scene_ = false;
   geometry::Pose head_;             // of the frame at hand
   bool tracked_ = false;            // a tracker told it
   std::array<double, 4> fitted_{};  // what the first view suits; zeros: nothing yet
-  std::shared_ptr<const image::Legend> legend_;
-  int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits
+  WindowLegend legend_{*window_, options_.display, overlays_};
   struct Shown {
     double at_s = -1e9;
     int width = 0, height = 0;  // of the window
@@ -174,13 +159,10 @@ class WindowSurface final : public DisplaySurface {
   OrderUndo order_undo_;
   SceneViewState scene_view_;
   PanelViewState panel_view_;
-  OpenViewState open_view_;
-  LegendViewState legend_view_;
-  WindowPart legend_part_;  // what the legend covers
+  Opening opening_;
   NotesViewState notes_view_;
   NotesWish notes_wish_;
   WidgetLog widget_log_ = WidgetLog::from_environment();
-  LauncherLines launcher_;
   std::unique_ptr<ControlDesk> desk_;
   HoleMeter holes_;
   bool quad_buffers_ = false;  // the window has them
