@@ -24,6 +24,7 @@ std::string triple(const Json& json, const char* key) {
 }
 
 std::string within_text(const Json& place, const std::string& unit) {
+  if (place.contains("pending")) return "  within       is being looked up\n";
   if (const auto within = number(place, "error"))
     return fmt::format("  within       {:.2g}{}{}\n", *within, unit.empty() ? "" : " ", unit);
   const std::string why = text(place, "estimate");
