@@ -141,8 +141,8 @@ struct Control {
   /// volume::parse_transfer takes them), "colour" (arguments "array": as scene::parse_colour_by takes it, "map": as
   /// colour::from_text takes it), "clip" (argument "clip": as scene::parse_clip takes it), "play" (arguments "how":
   /// play, pause or step; "steps"), orders that a viewer or a data server answers ("pick", "where", "go", "overlay",
-  /// "probe"; argument "viewer": whose), "coupling" (arguments "coupling": async, sync or loose; "buffers" of loose, 1
-  /// to kMaxBuffers; "viewer": the name of the one that is meant).
+  /// "measure", "probe"; argument "viewer": whose), "coupling" (arguments "coupling": async, sync or loose; "buffers"
+  /// of loose, 1 to kMaxBuffers; "viewer": the name of the one that is meant).
   std::string command;
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {
@@ -161,7 +161,7 @@ struct ControlReply {
 struct Order {
   static constexpr std::string_view kName = "order";
   uint64_t number = 0;  ///< of the master, for the answer
-  std::string command;  ///< viewer: "pick", "where", "go", "overlay"; data: "probe"
+  std::string command;  ///< viewer: "pick", "where", "go", "measure", "overlay"; data: "probe"
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {
     f("number", m.number); f("command", m.command); f("arguments", m.arguments, kMaxFact);
