@@ -3,9 +3,13 @@ import json
 import math
 import os
 import random
+import re
 import struct
 import subprocess
 
+REAL_VOLUMES = ("fuel.nii.gz", "bonsai.nii.gz", "avm-angio.nii.gz", "heart-cine", "alderson-ct-512x512x199.mha",
+                "heptane.nii.gz")
+REAL_SURFACES = ("lucy-100k.ply", "andes-srtm3.tif", "space-exploration.glb")
 PRESETS = ["", "plain", "bone", "skin", "ct-angio", "mr", "fire", "grey"]
 
 
@@ -84,7 +88,7 @@ def make(folder, programs, real):
             volume(at(f"series/ball_{step}.mha"), 24, balls(24, 4 + step))
         volume(at("one value.mha"), 16, b"\7" * 4096)
         large = (((i * 7919) % 4096 - 2048) << 52 for i in range(4096))
-        volume(at("large numbers.mha"), 16, struct.pack("<4096q", *large), "MET_LONG")
+        volume(at("large numbers.mha"), 16, struct.pack("<4096q", *large), "MET_LONG_LONG")
         poses = (f"{i / 10},{math.sin(i / 9)},0.2,{math.cos(i / 9)},1,0,0,0\n" for i in range(30))
         write(at("path.csv"), "t_s,px,py,pz,qw,qx,qy,qz\n" + "".join(poses))
         points, colours = [0, 0, 0.5, 0, 255, 1, 0.5, 0], [0, 0, 0, 0, 255, 1, 1, 1]
@@ -116,15 +120,18 @@ def make(folder, programs, real):
         "one-value": (at("one value.mha"), []),
         "large": (at("large numbers.mha"), []),
     }
-    for name in ("fuel.nii.gz", "bonsai.nii.gz", "avm-angio.nii.gz", "heart-cine", "alderson-ct-512x512x199.mha",
-                 "heptane.nii.gz"):
-        path = os.path.join(real, "volumes", name)
+    real_folder = folder + "-real"
+    os.makedirs(real_folder, exist_ok=True)
+    for name in [f"volumes/{n}" for n in REAL_VOLUMES] + [f"formats/{n}" for n in REAL_SURFACES]:
+        path, link = os.path.join(os.path.abspath(real), name), os.path.join(real_folder, os.path.basename(name))
         if os.path.exists(path):
-            scenes[name.split(".")[0].split("-ct-")[0]] = (path, [])
+            if not os.path.lexists(link):  # notes and bookmarks go beside the link
+                os.symlink(path, link)
+            scenes[re.split(r"[.]|-ct-", os.path.basename(name))[0]] = (link, [])
     drops = {name: at(name) for name in sorted(os.listdir(folder)) if name not in ("complete", "cache")}
     drops |= {"nothing": at("is not there.ply"), "folder": folder}
     return scenes, drops
 
 
 def is_volume(name):
-    return name not in ("arrays", "julia", "terrain", "iso", "empty", "mesh")
+    return name not in ("arrays", "julia", "terrain", "iso", "empty", "mesh", *(n.split(".")[0] for n in REAL_SURFACES))

@@ -90,12 +90,9 @@ class Hands:
         xtest.fake_input(self.x, X.ButtonPress if down else X.ButtonRelease, number)
         self.x.flush()
 
-    def click(self, number, count=1, between=None):
-        """between: what is waited for while the button is down."""
+    def click(self, number, count=1):
         for _ in range(count):
             self.button(number, True)
-            if between:
-                between()
             self.button(number, False)
 
     def key(self, keysym, down):

@@ -72,10 +72,14 @@ def order(chance):
         "up": ["x", "-y", "z", "w"],
         "iso": [some, "100", "x"],
         "room-size": ["1", "0.5", "0", "x"],
+        "open": ["julia", "is not there.ply"],
         "epoch": [""],
         "status": ["", "--json"],
         "list": [""],
     }
+    orders |= {name: ["on", "off", "x"] for name in ("lighting", "panel", "fullscreen", "legend", "swap-eyes")}
+    numbers = ("z-scale", "detail", "least-sampling", "eye-separation", "screen-distance")
+    orders |= {name: [some, "0.5", "1"] for name in numbers}
     whole = {"clip": clips, "animate": timelines}  # with blanks in one argument
     name = pick(["tf", "tf", *orders, *whole])
     return [name, pick(whole[name])] if name in whole else [name, *pick(orders[name]).split()]
@@ -92,16 +96,17 @@ def any_order(chance, orders):
 
 
 def follows(chance, keys, orders, drops):
-    """An event as a list: its kind, then what it needs. keys: those with a meaning, that do not quit."""
+    """An event as a list: its kind, then what it needs. keys: those with a meaning that do not quit, as Control_L+z."""
     share = lambda: round(chance.uniform(-0.02, 1.02), 3)  # noqa: E731
-    kinds = ["widget"] * 40 + ["choice", "key"] * 12 + ["ctl"] * 9 + ["drag"] * 8 + ["click"] * 6 + ["wheel"] * 5
+    kinds = ["widget"] * 50 + ["choice", "key"] * 12 + ["ctl"] * 12 + ["drag"] * 8 + ["click"] * 6 + ["wheel"] * 5
     kinds += ["move", "other-key"] * 4 + ["type", "resize"] * 3 + ["drop", "focus", "close-dialog"] * 2 + ["fly"]
     kind = chance.choice(kinds)
     if kind in ("widget", "choice"):
         places = [round(chance.random(), 3) for _ in range(4)]
         return [kind, chance.getrandbits(32), places, chance.choice(TEXTS), chance.randrange(6)]
     if kind == "key":
-        return ["key", chance.choice(sorted(keys)), list(chance.choice(MODIFIERS))]
+        *modifiers, key = chance.choice(sorted(keys)).split("+")
+        return ["key", key, modifiers if chance.random() < 0.7 else list(chance.choice(MODIFIERS))]
     if kind == "other-key":
         return ["key", chance.choice(OTHER_KEYS), list(chance.choice(MODIFIERS))]
     if kind == "fly":
@@ -122,14 +127,18 @@ def follows(chance, keys, orders, drops):
         return ["drop", chance.choice(sorted(drops))]
     if kind == "resize":
         sizes = [(1, 1), (60, 40), (300, 200), (200, 900), (1200, 160)]
-        return ["resize", *chance.choice(sizes + [(1000, 760)] * 5)]
+        return ["resize", *chance.choice(sizes + [(1000, 760)] * 3 + [(800, 700)] * 3)]
     if kind == "focus":
         return ["focus", chance.random() < 0.5]
     return [kind]
 
 
-def last(chance):
-    return chance.choice([["close"], ["quit"], ["ctl", "stop"]])
+def last(chance, quits):
+    return chance.choice([["close"], ["ctl", "stop"], *(["quit", *keys] for keys in quits)])
+
+
+def is_last(event):
+    return event[0] in ("close", "quit") or event == ["ctl", "stop"]
 
 
 def event(seed, index, keys, orders, drops):

@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 
 import data
@@ -17,7 +18,15 @@ BAD = re.compile(
     r"Assertion|ERROR: (?:Address|Leak|Thread)Sanitizer|runtime error:|terminate called|\bdied \(|CHECK failed"
     r"|Segmentation fault|ended with code (?!2\b)"
 )
+WHOLE = (800, 700)  # pixels of the window
+WHEEL = 80  # pixels that a list moves at a step of the wheel, at most
+ENOUGH = 3  # uses of a widget in earlier runs, after which it is as good as any other
 NEVER = ("messages_rejected", "digests_different", "tiles_refused", "tiles_unsealed", "keys_refused")  # in a status
+
+
+def known_as(name):
+    """A widget's name in the coverage: files are as good as one another."""
+    return re.sub(r"^(Open/(?:file|recent))=.*", r"\1=*", name)
 
 
 class Fault(Exception):
@@ -50,13 +59,16 @@ class Run:
         self.environment["DISPLAY"] = self.hands.name
         path, more = options.scenes[scene]
         self.shows = bool(path)
-        command = [options.program("telesplat"), "view", *([path] if path else []), *more, "--size", "1000x760"]
+        size = f"{WHOLE[0]}x{WHOLE[1]}"
+        command = [options.program("telesplat"), "view", *([path] if path else []), *more, "--size", size]
         if preset and data.is_volume(scene):
             command += ["--tf", preset]
         with open(self.log, "w") as log:
             self.session = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
                                             env=self.environment, cwd=at("work"), start_new_session=True)
         self.orders, self.keys, self.acted = collections.Counter(), collections.Counter(), set()
+        self.tried, self.flying, self.beside = collections.Counter(), False, None
+        self.before, self.openers, self.opens = (None, set()), {}, False
 
     # ---- what became of it ----
     def alive(self):
@@ -77,8 +89,8 @@ class Run:
 
     def check_counters(self):
         """Nobody of the session may have said what another refuses, or hold other points than the packer."""
-        done = self.ask("status", "--json")
-        status = json.loads(done.stdout) if done.returncode == 0 else {}
+        self.ctl(["status", "--json"])
+        status = json.loads(self.told() or "{}")
         for p in status.get("processes", []):
             for name in NEVER:
                 if p["values"].get(name, 0) > 0:
@@ -127,6 +139,7 @@ class Run:
         self.act(event)
         try:
             code = self.session.wait(self.patience_s)
+            self.told()
         except subprocess.TimeoutExpired:
             raise Fault(f"{' '.join(event)} did not end the session in {self.patience_s} s") from None
         if code != 0:
@@ -160,30 +173,41 @@ class Run:
         return {r[0]: (r[1], *(int(v) for v in r[2:])) for r in rows}
 
     def settle(self):
-        """Waits for a build of the panel that knows of what was done."""
+        """Waits for a build of the panel that knows of what was done: the window answers once a frame."""
         self.answer()
-        time.sleep(0.05)
+        self.answer()
 
     def click_on(self, w, x=0.5, y=0.5, button=1, count=1):
         self.hands.move(w[1] + x * (w[3] - w[1]), w[2] + y * (w[4] - w[2]))
-        self.settle()
-        self.hands.click(button, count, self.settle if count == 1 else None)
+        for n in range(count):  # the panel takes one click a frame
+            if n:
+                self.settle()
+            self.hands.click(button)
 
     def scroll_to(self, name):
-        for _ in range(40):
+        top, tries = None, 0
+        while tries < 3:
             w = self.widgets().get(name)
             if not w or not w[5] or w[6]:
                 return w if w and w[6] else None
-            width, height = self.hands.size()
-            self.hands.move(min(60, width / 2), height / 2)
-            self.settle()
-            self.hands.click(4 if w[2] < 0 else 5, 3)
+            tries, top = tries + 1 if w[2] == top else 0, w[2]
+            height = self.hands.size()[1]
+            self.hands.move((w[1] + w[3]) / 2, height / 2)
+            way = (w[2] + w[4] - height) / 2
+            self.hands.click(4 if way < 0 else 5, max(1, min(20, int(abs(way) / WHEEL))))
             self.settle()
         return None
 
     def reach(self, name):
-        """The widget where it can be clicked, after what leads to it: Tab, a closed section, the wheel. Or None."""
+        """The widget where it can be clicked, after what leads to it: a window that is large enough and not in flight,
+        Tab, a closed section, the wheel. Or None."""
         all_here = lambda: {n: w for n, w in self.widgets().items() if w[5]}  # noqa: E731
+        if self.flying:
+            self.hands.tap("Escape")
+            self.flying = False
+        if self.hands.size()[0] < 400 or self.hands.size()[1] < 300:
+            self.hands.resize(*WHOLE)
+            self.settle()
         if self.widgets() and not all_here():
             self.hands.tap("Tab")
             self.settle()
@@ -195,6 +219,11 @@ class Run:
                 self.settle()
         if name not in all_here() and "=" in name and name.split("=")[0] in self.widgets():
             self.open_list(name.split("=")[0])
+        if name not in all_here() and name in self.openers and not self.opens:
+            self.opens = True
+            self.do(self.openers[name])
+            self.settle()
+            self.opens = False
         return self.scroll_to(name)
 
     def use(self, name, w, places, text, how):
@@ -209,12 +238,11 @@ class Run:
             self.enter(text)
         elif kind in ("slider", "drag") or (kind == "plot" and how < 3):
             inside(a, b)
-            self.settle()
             self.hands.button(1, True)
-            self.settle()
             for share in (0.5, 1):
+                self.answer()
                 inside(a + (c - a) * share, b + (d - b) * share)
-                self.settle()
+            self.answer()
             self.hands.button(1, False)
         elif kind == "plot":
             self.click_on(w, a, b, 3 if how == 3 else 1, 2 if how == 4 else 1)
@@ -231,8 +259,7 @@ class Run:
             for x, y in ((w[1] + 30 + a * 150, w[4] + 20 + b * 150), (width * 0.9, height * 0.9)):
                 self.settle()
                 self.hands.move(x, y)
-                self.settle()
-                self.hands.click(1, 1, self.settle)
+                self.hands.click(1)
         self.settle()
 
     def enter(self, text):
@@ -243,24 +270,32 @@ class Run:
 
     # ---- events ----
     def act(self, event):
-        """Does it. Returns it as it can be repeated: with the widget's name."""
+        """Does it. Returns it as it can be repeated: with the widget's name. Learns what opens which widget."""
+        here = {n for n, w in self.widgets().items() if w[5]}
+        opener, were = self.before
+        if opener and opener[0] in ("widget", "choice", "key"):
+            self.openers |= {n: opener for n in here - were if n not in self.openers}
+        done = self.do(event)
+        self.before = done, here
+        return done
+
+    def do(self, event):
         kind, *rest = event
         hands, (width, height) = self.hands, self.hands.size()
         at = lambda x, y: hands.move(x * width, y * height)  # noqa: E731
         if kind in ("widget", "choice"):
             return self.act_on_widget(event)
         if kind == "key":
-            self.keys[rest[0]] += 1
-            hands.tap(*rest)
+            self.press(*rest)
         elif kind == "fly":  # and back again: in flight the panel is out of reach
-            hands.tap("f")
+            self.press("f", [])
             for key in rest[0]:
                 hands.key(key, True)
                 at(*rest[1:])
-                self.settle()
+                self.answer()
                 hands.key(key, False)
-            hands.tap("f")
-            self.keys.update(["f", *rest[0]])
+            self.press("f", [])
+            self.keys.update(rest[0])
         elif kind == "type":
             hands.type(rest[0])
         elif kind == "click":
@@ -298,8 +333,20 @@ class Run:
             hands.close()
         elif kind == "quit":
             hands.focus(True)
-            hands.tap(*self.options.quit_keys[0])
+            for _ in range(2):  # a field's focus or a dialog, then flight
+                self.settle()
+                hands.tap("Escape")
+            field = self.widgets().get("Open/path")  # of an empty window: it takes all letters
+            for name in ["Control_L+q"] if field and field[5] else rest:
+                self.settle()
+                *modifiers, key = name.split("+")
+                self.press(key, modifiers)
         return event
+
+    def press(self, key, modifiers):
+        self.keys["+".join([*modifiers, key])] += 1
+        self.flying = self.flying != (key == "f" and not modifiers)
+        self.hands.tap(key, modifiers)
 
     def act_on_widget(self, event):
         kind, name, places, text, how = event
@@ -311,17 +358,26 @@ class Run:
         return [kind, name, places, text, how] if name else event
 
     def name_of(self, kind, number):
-        """The widget that a number means: one that was ever here; for a choice, one of a list, which is opened."""
+        """The widget that a number means: one that was ever here, three times of four one of those that were tried
+        least; for a choice, one of a list, which is opened."""
         every = self.widgets()
         if kind == "choice":
             here = lambda: [n for n, w in self.widgets().items() if w[5] and w[0] == "choice"]  # noqa: E731
             lists = [n for n, w in every.items() if w[0] == "list"]
             if not here() and lists:
-                self.open_list(events.chosen(lists, number))
+                self.open_list(self.one_of(lists, number))
             if here():
-                return events.chosen(here(), number)
+                return self.one_of(here(), number)
         names = [n for n, w in every.items() if w[0] != "choice"]
-        return events.chosen(names, number) if names else None
+        return self.one_of(names, number) if names else None
+
+    def one_of(self, names, number):
+        if number % 4:
+            tries = {n: self.tried[n] + min(ENOUGH, self.options.uses.get(known_as(n), 0)) for n in names}
+            names = [n for n in names if tries[n] == min(tries.values())]
+        name = events.chosen(names, number)
+        self.tried[name] += 1
+        return name
 
     def open_list(self, name):
         w = self.reach(name)
@@ -329,13 +385,24 @@ class Run:
             self.click_on(w)
             self.settle()
 
-    def ask(self, *arguments):
-        command = [self.options.program("telesplat"), "ctl", *arguments]
-        return subprocess.run(command, env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                              errors="replace", timeout=2 * self.patience_s, cwd=os.path.join(self.folder, "work"))
-
     def ctl(self, arguments):
-        done = self.ask(*arguments)
-        self.orders[arguments[0], done.returncode == 0] += 1
-        if done.returncode not in (0, 1, 2):
-            raise Fault(f"ctl {' '.join(arguments)} ended with code {done.returncode}: {done.stderr.strip()[-300:]}")
+        """Begins an order, which goes on beside the next events, until the next order."""
+        self.told()
+        out = tempfile.TemporaryFile("w+", errors="replace")
+        command = [self.options.program("telesplat"), "ctl", *arguments]
+        order = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=out,
+                                 stderr=subprocess.STDOUT, cwd=os.path.join(self.folder, "work"))
+        self.beside = arguments, order, out
+
+    def told(self):
+        """Waits for the order that goes on. What it printed, if it was obeyed."""
+        if not self.beside:
+            return ""
+        (arguments, order, out), self.beside = self.beside, None
+        code = order.wait(2 * self.patience_s)
+        out.seek(0)
+        text = out.read()
+        self.orders[arguments[0], code == 0] += 1
+        if code not in (0, 1, 2):
+            raise Fault(f"ctl {' '.join(arguments)} ended with code {code}: {text.strip()[-300:]}")
+        return text if code == 0 else ""
