@@ -110,6 +110,10 @@ const TypeCase kTypes[] = {{"u8", "uint8", "MET_UCHAR", "UInt8", 2, VoxelType::k
                            {"i16", "int16", "MET_SHORT", "Int16", 4, VoxelType::kI16},
                            {"u32", "uint32", "MET_UINT", "UInt32", 768, VoxelType::kF32},
                            {"i32", "int32", "MET_INT", "Int32", 8, VoxelType::kF32},
+                           {"u32", "uint32", "MET_ULONG", "UInt32", 768, VoxelType::kF32},
+                           {"i32", "int32", "MET_LONG", "Int32", 8, VoxelType::kF32},
+                           {"u64", "uint64", "MET_ULONG_LONG", "UInt64", 1280, VoxelType::kF32},
+                           {"i64", "int64", "MET_LONG_LONG", "Int64", 1024, VoxelType::kF32},
                            {"f32", "float", "MET_FLOAT", "Float32", 16, VoxelType::kF32},
                            {"f64", "double", "MET_DOUBLE", "Float64", 64, VoxelType::kF32}};
 
@@ -120,6 +124,8 @@ std::string bytes_of(const Pattern& p, const std::string& type) {
          : type == "i16" ? p.bytes<int16_t>()
          : type == "u32" ? p.bytes<uint32_t>()
          : type == "i32" ? p.bytes<int32_t>()
+         : type == "u64" ? p.bytes<uint64_t>()
+         : type == "i64" ? p.bytes<int64_t>()
          : type == "f32" ? p.bytes<float>()
                          : p.bytes<double>();
 }

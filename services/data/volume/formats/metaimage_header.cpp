@@ -14,9 +14,10 @@ namespace {
 
 std::optional<StoredType> type_named(std::string_view name) {
   static const std::map<std::string_view, StoredType> kTypes{
-      {"MET_CHAR", StoredType::kI8},    {"MET_UCHAR", StoredType::kU8},  {"MET_SHORT", StoredType::kI16},
-      {"MET_USHORT", StoredType::kU16}, {"MET_INT", StoredType::kI32},   {"MET_UINT", StoredType::kU32},
-      {"MET_FLOAT", StoredType::kF32},  {"MET_DOUBLE", StoredType::kF64}};
+      {"MET_CHAR", StoredType::kI8},    {"MET_UCHAR", StoredType::kU8},   {"MET_SHORT", StoredType::kI16},
+      {"MET_USHORT", StoredType::kU16}, {"MET_INT", StoredType::kI32},    {"MET_UINT", StoredType::kU32},
+      {"MET_LONG", StoredType::kI32},   {"MET_ULONG", StoredType::kU32},  {"MET_LONG_LONG", StoredType::kI64},
+      {"MET_FLOAT", StoredType::kF32},  {"MET_DOUBLE", StoredType::kF64}, {"MET_ULONG_LONG", StoredType::kU64}};
   const auto found = kTypes.find(name);
   return found == kTypes.end() ? std::nullopt : std::optional(found->second);
 }
