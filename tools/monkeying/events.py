@@ -127,7 +127,7 @@ def follows(chance, keys, orders, drops):
         return ["drop", chance.choice(sorted(drops))]
     if kind == "resize":
         sizes = [(1, 1), (60, 40), (300, 200), (200, 900), (1200, 160)]
-        return ["resize", *chance.choice(sizes + [(1000, 760)] * 3 + [(800, 700)] * 3)]
+        return ["resize", *chance.choice(sizes + [(1000, 760)] + [(640, 560)] * 5)]
     if kind == "focus":
         return ["focus", chance.random() < 0.5]
     return [kind]

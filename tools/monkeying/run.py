@@ -18,7 +18,7 @@ BAD = re.compile(
     r"Assertion|ERROR: (?:Address|Leak|Thread)Sanitizer|runtime error:|terminate called|\bdied \(|CHECK failed"
     r"|Segmentation fault|ended with code (?!2\b)"
 )
-WHOLE = (800, 700)  # pixels of the window
+WHOLE = (640, 560)  # pixels of the window
 WHEEL = 80  # pixels that a list moves at a step of the wheel, at most
 ENOUGH = 3  # uses of a widget in earlier runs, after which it is as good as any other
 NEVER = ("messages_rejected", "digests_different", "tiles_refused", "tiles_unsealed", "keys_refused")  # in a status
