@@ -1,6 +1,7 @@
 """One run of a monkey: a session with a window, what is done to it, and what may not become of it."""
 
 import collections
+import glob
 import json
 import os
 import re
@@ -41,6 +42,7 @@ class Run:
         self.patience_s = 30 * (5 if options.sanitized else 1)
         shutil.rmtree(folder, ignore_errors=True)
         os.makedirs(os.path.join(folder, "work"))
+        os.makedirs(os.path.join(folder, "tmp"))
         at = lambda name: os.path.join(folder, name)  # noqa: E731
         self.log, self.widget_file = at("view.log"), at("widgets")
         reports = f"log_path={at('sanitizer')}"
@@ -48,6 +50,7 @@ class Run:
             "TELESPLAT_RUNTIME": at("runtime"),
             "TELESPLAT_WIDGET_LOG": self.widget_file,
             "TELESPLAT_MONKEY": folder,
+            "TMPDIR": at("tmp"),
             "XDG_CONFIG_HOME": at("config"),
             "XDG_CACHE_HOME": os.path.join(options.out, "cache"),
             "ASAN_OPTIONS": f"{reports}:detect_leaks=0",
@@ -94,7 +97,15 @@ class Run:
         for p in status.get("processes", []):
             for name in NEVER:
                 if p["values"].get(name, 0) > 0:
-                    raise Fault(f"{p['name']} counts {p['values'][name]} {name}")
+                    raise Fault(f"{p['name']} counts {p['values'][name]} {name}{self.dropped()}")
+
+    def dropped(self):
+        """What the processes' logs, which go when the session ends, say of messages."""
+        out = ""
+        for path in glob.glob(os.path.join(self.folder, "tmp", "**", "*.log"), recursive=True):
+            with open(path, errors="replace") as file:
+                out += "".join(f"\n  {os.path.basename(path)}: {line.rstrip()}" for line in file if "dropped" in line)
+        return out
 
     def mine(self):
         """Processes of this run that go on."""
