@@ -247,10 +247,13 @@ void ViewerWorker::follow_pictures(const scene::SessionView& session) {
 }
 
 // As many views are under way as keep the servers and the link busy.
-void ViewerWorker::follow_depth(const ViewRequester::Update& update) {
+void ViewerWorker::follow_depth(const metrics::StagesMs& stages, uint64_t ahead) {
   CouplingState state = gate_.state();
   if (state.mode != CouplingMode::kImages) return;
-  depth_.answered(update.complete_s - update.requested_s, int(update.ahead));
+  depth_.answered({.latency_ms = metrics::sum_ms(stages, ""),
+                   .queued_ms = metrics::sum_ms(stages, "queue_ms"),
+                   .network_ms = metrics::sum_ms(stages, "network_ms"),
+                   .ahead = int(ahead)});
   if (state.buffers == depth_.depth()) return;
   state.buffers = depth_.depth();
   requester_.set_buffers(uint64_t(state.buffers));
@@ -325,11 +328,11 @@ void ViewerWorker::on_part(const ViewPart& part) {
   const auto u = requester_.on_part(part, now_s);
   if (!u) return;
   updates_table_.add(update_row({*u, part}));
-  stages_table_.complete({*u, part});
+  const auto stages = stages_table_.complete({*u, part});
   spans_.add("view update", u->requested_s, u->complete_s, metrics::kOverlapping,
              {.frame = double(part.frame.value), .request = double(u->request.value)});
   const ShownUpdate update{u->request, u->requested_s, part.camera.pose, u->posed_s};
-  follow_depth(*u);
+  if (stages) follow_depth(*stages, u->ahead);
   if (!gate_.waits()) may_display(update);
   {
     const std::lock_guard lock(mutex_);

@@ -109,7 +109,7 @@ class ViewerWorker {
   void follow_record(const wire::Welcome& session);
   void follow_coupling(const scene::SessionView& session);
   void follow_pictures(const scene::SessionView& session);
-  void follow_depth(const ViewRequester::Update& update);
+  void follow_depth(const metrics::StagesMs& stages, uint64_t ahead);
   void change_coupling(double now_s);
   Status follow(scene::Pipeline pipeline, const wire::Welcome& session);
   void retire();

@@ -22,4 +22,11 @@ StagesMs stages_ms(const wire::Moments& part, const UpdateMoments& update) {
   return out;
 }
 
+double sum_ms(const StagesMs& stages, std::string_view ending) {
+  double out = 0;
+  for (const auto& column : kStageColumns)
+    if (std::string_view(column.name).ends_with(ending)) out += column.get(stages);
+  return out;
+}
+
 }  // namespace telesplat::metrics

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string_view>
 
 #include "common/metrics/columns.h"
 #include "common/wire/moments.h"
@@ -48,5 +49,8 @@ struct UpdateMoments {
 /// Their sum is complete_s - requested_s: each begins when the one before it ends. A stage whose end is 0 was not on
 /// the way and took no time.
 StagesMs stages_ms(const wire::Moments& part, const UpdateMoments& update);
+
+/// The stages whose names end so, together: "queue_ms", "network_ms".
+double sum_ms(const StagesMs& stages, std::string_view ending);
 
 }  // namespace telesplat::metrics

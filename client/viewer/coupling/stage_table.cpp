@@ -37,22 +37,25 @@ StageTable::StageTable()
     : table_("stages",
              joined(metrics::names(kBefore), metrics::names(metrics::kStageColumns), metrics::names(kAfter))) {}
 
-void StageTable::complete(const MeasuredUpdate& m) {
+std::optional<metrics::StagesMs> StageTable::complete(const MeasuredUpdate& m) {
   const ViewRequester::Update& u = m.update;
-  if (m.last.moments == wire::Moments{}) return;  // sent again later: nobody knows any more how it came about
+  if (m.last.moments == wire::Moments{})
+    return std::nullopt;  // sent again later: nobody knows any more how it came about
   const metrics::UpdateMoments moments{.requested_s = u.requested_s,
                                        .arrived_s = m.last.arrived_s,
                                        .decode_begin_s = m.last.decode_begin_s,
                                        .decoded_s = m.last.decoded_s,
                                        .complete_s = u.complete_s};
+  const auto stages = metrics::stages_ms(m.last.moments, moments);
   waiting_[u.request] = {.request = u.request,
                          .frame = m.last.frame,
                          .tile = m.last.tile,
                          .patches = u.tiles,
                          .requested_s = u.requested_s,
                          .complete_s = u.complete_s,
-                         .stages = metrics::stages_ms(m.last.moments, moments)};
+                         .stages = stages};
   if (waiting_.size() > kMostWaiting) finish(std::next(waiting_.begin()), kNotShown);
+  return stages;
 }
 
 void StageTable::displayed(RequestId request, double end_s) { finish(waiting_.upper_bound(request), end_s); }

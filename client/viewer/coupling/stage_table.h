@@ -25,8 +25,8 @@ struct UpdateStages {
 class StageTable {
  public:
   StageTable();
-  /// The update is complete. One that a replay of events completed has no row.
-  void complete(const MeasuredUpdate& measured);
+  /// The update is complete; where its time went. One that a replay of events completed has no row.
+  std::optional<metrics::StagesMs> complete(const MeasuredUpdate& measured);
   /// A frame that ended at this moment of the master's clock shows this update, and all before it.
   void displayed(RequestId request, double end_s);
   /// The rows that are finished; `all`: also those whose updates no frame has shown.

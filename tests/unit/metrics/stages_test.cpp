@@ -45,6 +45,9 @@ TEST(Stages, EachEndsWhereTheNextBegins) {
       {"insertion_ms", 3}};
   for (const auto& [name, value] : expected) EXPECT_NEAR(by.at(name), value, 1e-6) << name;
   EXPECT_NEAR(sum(ms), 140, 1e-6);
+  EXPECT_NEAR(sum_ms(ms, "queue_ms"), 16, 1e-6);
+  EXPECT_NEAR(sum_ms(ms, "network_ms"), 32, 1e-6);
+  EXPECT_NEAR(sum_ms(ms, ""), 140, 1e-6);
 }
 
 // A plan that needs no ray: nothing is leased or sampled.
