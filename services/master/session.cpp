@@ -35,7 +35,7 @@ Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data,
     if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
   Plan& plan = plan_of(data);
   if (options_.images.on() && &plan != plans_.at(scene::Pipeline::kPoints).get())
-    return Error{"views of a volume do not come as pictures (--images): they come as slice images"};
+    return Error{"views of a volume do not come as pictures (--coupling images): they come as slice images"};
   const auto adopted = plan.adopt(data, now_s);
   if (!adopted) return adopted.error();
   if (!adopted->whole) return ok_status();

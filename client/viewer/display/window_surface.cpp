@@ -325,7 +325,8 @@ ViewSettings WindowSurface::settings() const {
           .sampling = options_.sampling,
           .stereo = d.stereo,
           .quad_buffers = quad_buffers_,
-          .legend = d.legend};
+          .legend = d.legend,
+          .pictures = panel_.pipeline() == scene::Pipeline::kPictures};
 }
 
 std::map<std::string, std::string> WindowSurface::values() const {

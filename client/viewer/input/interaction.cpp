@@ -154,7 +154,9 @@ bool Interaction::choose_look(Key key) {
     notes_.push_back(std::string(name) + (flag ? " on" : " off"));
   };
   if (pipeline_ != scene::Pipeline::kPoints) {
-    notes_.push_back("key " + std::to_string(number) + " has no meaning for volumes");
+    notes_.push_back("key " + std::to_string(number) +
+                     (pipeline_ == scene::Pipeline::kSlices ? " has no meaning for volumes"
+                                                            : " changes nothing in pictures that servers draw"));
     return true;
   }
   if (key == Key::k5) {

@@ -44,6 +44,7 @@ class Interaction {
   /// Home shows the middle of it at the tangent middle_x.
   void set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home,
                  double middle_x = 0);
+  scene::Pipeline pipeline() const { return pipeline_; }
   /// What T plays from now on, unless the person recorded a path.
   void set_recorded(geometry::Trajectory recorded);
   /// What R does, but whoever has the camera keeps it: to the first view of the scene that is told before the next

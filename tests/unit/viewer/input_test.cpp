@@ -344,6 +344,13 @@ TEST_F(InteractionTest, KeysOfPointsHaveNoMeaningForVolumes) {
   EXPECT_TRUE(i.look().lit);
 }
 
+TEST_F(InteractionTest, KeysOfPointsChangeNothingInPictures) {
+  Interaction i(std::nullopt, look_);
+  i.set_scene(scene::Pipeline::kPictures, box_of(0.4), geometry::default_pose());
+  tap(i, Key::k1);
+  EXPECT_EQ(i.take_notes(), std::vector<std::string>{"key 1 changes nothing in pictures that servers draw"});
+}
+
 TEST_F(InteractionTest, ARecordedPathIsWhatTPlays) {
   Interaction i(std::nullopt, look_);
   wait(i, 0.1);

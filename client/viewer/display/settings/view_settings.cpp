@@ -91,6 +91,7 @@ struct Row {
   const char* order;
   Change change;
   std::string (*text)(const ViewSettings& v);
+  bool of_pictures = false;  ///< pictures that servers drew change with it, or what lies over them
 };
 
 std::string switch_text(bool on) { return on ? "on" : "off"; }
@@ -109,12 +110,13 @@ constexpr Row kRows[] = {
     {"sampling-size", set_sampling_size,
      [](const ViewSettings& v) {
        return v.sampling.adaptive ? "auto" : fmt::format("{}x{}", v.sampling.width, v.sampling.height);
-     }},
+     },
+     true},
     {"least-sampling",
      [](ViewSettings& v, const std::string& s) { return read_number(s, 0.1, 1, v.sampling.least_sampling); },
-     [](const ViewSettings& v) { return fmt::format("{:g}", v.sampling.least_sampling); }},
+     [](const ViewSettings& v) { return fmt::format("{:g}", v.sampling.least_sampling); }, true},
     {"legend", [](ViewSettings& v, const std::string& s) { return into(read_switch(s), v.legend); },
-     [](const ViewSettings& v) { return switch_text(v.legend); }},
+     [](const ViewSettings& v) { return switch_text(v.legend); }, true},
     {"stereo", set_stereo, [](const ViewSettings& v) { return std::string(stereo::name_of(v.stereo.mode)); }},
     {"eye-separation",
      [](ViewSettings& v, const std::string& s) { return read_number(s, 0, 1, v.stereo.eye_separation_m); },
@@ -136,6 +138,8 @@ Result<bool> read_switch(const std::string& value) {
 Status change(ViewSettings& settings, const std::string& order, const std::string& value) {
   for (const Row& row : kRows) {
     if (row.order != order) continue;
+    if (settings.pictures && !row.of_pictures)
+      return Error{"it changes nothing in pictures that the servers draw (--coupling images)"};
     ViewSettings changed = settings;
     if (const Status s = row.change(changed, value); !s) return s;
     settings = std::move(changed);

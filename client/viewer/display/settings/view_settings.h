@@ -18,6 +18,7 @@ struct ViewSettings {
   StereoOptions stereo;
   bool quad_buffers = false;  ///< the window has a buffer for each eye
   bool legend = true;
+  bool pictures = false;  ///< views come as pictures: what changes nothing in these is refused
 };
 
 /// Gives the setting of this order a value, as its flag takes it. Error: what is wrong, or that no setting has this

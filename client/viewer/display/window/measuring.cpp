@@ -32,7 +32,10 @@ void Measuring::on_pick(const std::optional<Pick>& pick, EpochId epoch, const Sc
   hands_.on_pick(pick);
   if (std::exchange(centres_, false) && pick) interaction_.centre_on(pick->position_room);
   if (!std::exchange(tells_pick_, false) || !terms) return;
-  if (!pick) return tell_("nothing lies under the cursor");
+  if (!pick)
+    return tell_(interaction_.pipeline() == scene::Pipeline::kPictures
+                     ? "a picture has no depth: nothing in it can be measured"
+                     : "nothing lies under the cursor");
   if (const auto added = places_.add(*pick, *terms, epoch, kPickOpacity); !added) tell_(added.error().text);
 }
 

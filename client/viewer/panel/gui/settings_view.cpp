@@ -119,7 +119,7 @@ void show_display(Panel& panel) {
     const std::string shown = fmt::format("at most %.2f, now {:.2f}", panel.figures().detail);
     setting_slider(panel, "detail", Look::kLeastDetail, 1, shown.c_str());
   }
-  if (!panel.setup().transparent) show_background(panel);
+  if (!panel.setup().transparent && panel.pipeline() != scene::Pipeline::kPictures) show_background(panel);
 }
 
 void show_sampling(Panel& panel) {

@@ -192,6 +192,16 @@ TEST(ViewSettings, ChangeWhatTheySay) {
   EXPECT_TRUE(v.stereo.swap_eyes);
 }
 
+TEST(ViewSettings, WhatChangesNothingInPicturesIsRefused) {
+  ViewSettings v{.pictures = true};
+  for (const auto& [order, value] : values_of(ViewSettings{})) {
+    const bool counts = order == "sampling-size" || order == "least-sampling" || order == "legend";
+    const Status s = change(v, order, value);
+    EXPECT_EQ(bool(s), counts) << order;
+    if (!s) EXPECT_NE(s.error().text.find("--coupling images"), std::string::npos) << order << ": " << s.error().text;
+  }
+}
+
 TEST(ViewSettings, WhatCannotBeIsRefusedInWordsAndChangesNothing) {
   ViewSettings v;
   const auto before = values_of(v);
