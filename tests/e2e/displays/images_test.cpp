@@ -36,6 +36,8 @@ TEST_P(Images, EachFrameShowsANewerPictureThatLooksAsTheSceneDoes) {
   EXPECT_EQ(s["errors"]["messages_rejected"], 0);
   EXPECT_EQ(s["frames_by_coupling"]["images"], s["frames"]);
   EXPECT_EQ(s["points_cached"], nullptr) << "nobody made points";
+  for (const char* of_points : {"points cached", "redundancy eliminated", "splats"})
+    EXPECT_EQ(run.program().out().find(of_points), std::string::npos) << run.program().out();
   EXPECT_GT(s["bytes_sent"], 0);
   ASSERT_GT(s["quality"]["views"], 0);
   // One ray a pixel on both sides: what differs is what JPEG loses.
@@ -113,6 +115,7 @@ TEST(ImagesSwept, BesideAsyncAndByQuality) {
   EXPECT_EQ(table->text(2, *table->column("flag.coupling")), "images");
   EXPECT_LT(at(2, "quality.ssim.median"), at(3, "quality.ssim.median"));
   EXPECT_LT(at(2, "bytes_sent") / at(2, "frames"), at(3, "bytes_sent") / at(3, "frames"));
+  EXPECT_NE(sweep.out().find("SSIM"), std::string::npos) << "couplings compare where it is equal: " << sweep.out();
 }
 
 TEST(ImagesRefused, WhatPicturesCannotBe) {

@@ -59,6 +59,7 @@ std::string subject_of(const std::string& directory, const json& s) {
 
 // Whether the run was drawn from points, so that there are splats and points cached.
 bool has_points(const json& s) {
+  if (text(s, "coupling") == "images") return false;
   const auto kind = scene::kind_named(text(s, "kind"));
   return !kind || scene::pipeline_of(*kind) == scene::Pipeline::kPoints;
 }

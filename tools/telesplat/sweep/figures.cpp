@@ -44,6 +44,9 @@ constexpr std::array kMeasures{
     Measure{"quality.psnr_db.median", "PSNR, median", "PSNR dB", "dB",
             "How like the pictures are to ones drawn from all data without a network. More is better.", 2, 1, false,
             false},
+    Measure{"quality.ssim.median", "SSIM, median", "SSIM", "",
+            "The same as the eye sees structure; 1 is identical. Where it is equal, other figures compare fairly.", 4,
+            1, false, false},
     Measure{"quality.hole_fraction.mean", "holes, mean", "holes %", "%",
             "Pixels that show no data where there should be some. Less is better.", 3, 100, true, false}};
 
