@@ -410,6 +410,7 @@ class Display {
                   .pick = pick,
                   .go = [&](const geometry::Pose& pose) { return surface_.go_to(pose); },
                   .set = [&](const std::string& name, const std::string& value) { return surface_.set(name, value); },
+                  .pictures = gate_.state().mode == CouplingMode::kImages,
                   .measurements = surface_.measurements()});
       worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});
     }

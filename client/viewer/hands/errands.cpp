@@ -59,6 +59,7 @@ struct Pointed {
 // What lies at the places that an order names.
 Result<std::vector<Pointed>> point(const wire::Order& order, const FrameHands& hands, double& opacity) {
   if (!hands.terms) return Error{"pick: nothing is shown yet"};
+  if (hands.pictures) return Error{"pick: views come as pictures (--coupling images), which have no depth"};
   const std::string at = scene::value_or(order.arguments, "at", std::string());
   const auto wanted = split(at, ' ');
   if (wanted.empty() || wanted.size() > kMostPicks)

@@ -25,6 +25,7 @@ struct FrameHands {
   /// Changes a setting of this viewer (scene::settings()), or shows and hides what lies over the picture ("axes", ...:
   /// on or off). Error: it cannot have this value, or nobody sees it.
   std::function<Status(const std::string& name, const std::string& value)> set;
+  bool pictures = false;  ///< what is displayed are pictures that servers drew: nothing is known of what lies there
   Measurements* measurements = nullptr;  ///< null: there is no window that shows some
 };
 

@@ -307,6 +307,13 @@ TEST_F(Errands, BadOrdersAreRefused) {
   EXPECT_FALSE(order("pick", {{"at", "1,1"}}));
 }
 
+TEST_F(Errands, APictureTellsThatItHasNoDepth) {
+  hands.pictures = true;
+  const auto said = order("pick", {{"at", "200,100"}});
+  ASSERT_FALSE(said);
+  EXPECT_NE(said.error().text.find("no depth"), std::string::npos) << said.error().text;
+}
+
 TEST_F(Errands, WhereAndBackAgain) {
   const auto json = nlohmann::json::parse(*order("where", {}));
   EXPECT_NEAR(json["position"][2].get<double>(), 0.85, 1e-12);
