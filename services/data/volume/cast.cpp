@@ -150,7 +150,13 @@ Result<scene::Probed> cast(const volume::Session& session, int begin, int end, c
   const double bracket_m = std::max(told.reached - nearest.reached, farthest.reached - told.reached);
   if (bracket_m > kLongestBracket * voxel_m) return out;
   out.error_m = bracket_m + step_m / 2;
-  out.value_error = std::max({hi - *out.value, *out.value - lo, cells.deviation(index)});
+  for (const double at : {nearest.reached - step_m / 2, farthest.reached + step_m / 2}) {
+    const glm::dvec3 end = from + at * on;
+    cells.move_to(end);
+    lo = std::min(lo, cells.value(end) - cells.deviation(end));
+    hi = std::max(hi, cells.value(end) + cells.deviation(end));
+  }
+  out.value_error = std::max({*out.value_error, hi - *out.value, *out.value - lo});
   return out;
 }
 
