@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <limits>
@@ -35,11 +36,11 @@ std::optional<glm::dvec3> vector(const Json& json, const char* key) {
   return out;
 }
 
-// With one digit more than the bound's first.
+// With one digit more than the bound's first. The bound has two digits, and no exponent as long as it is short.
 std::string bounded(double value, double error) {
   if (!(error > 0)) return fmt::format("{:.9g}", value);
   const int digits = std::clamp(1 - int(std::floor(std::log10(error))), 0, 12);
-  return fmt::format("{:.{}f} +- {:.2g}", value, digits, error);
+  return fmt::format("{:.{}f} +- {:.9g}", value, digits, std::strtod(fmt::format("{:.2g}", error).c_str(), nullptr));
 }
 
 }  // namespace

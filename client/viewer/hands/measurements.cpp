@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -78,7 +79,8 @@ std::string Measurements::on_answer(const Probe& asked, bool found, const std::s
       ++version_;
       std::string out = fmt::format("{}: {}", place.number, scene::place_text(placement_, place.told.data));
       if (place.told.error)
-        out += " +- " + scene::length_text(std::stod(fmt::format("{:.2g}", *place.told.error)), placement_.unit);
+        out += " +- " + scene::length_text(std::strtod(fmt::format("{:.2g}", *place.told.error).c_str(), nullptr),
+                                           placement_.unit);
       if (!place.told.estimate.empty()) out += ", an estimate: " + place.told.estimate;
       if (const std::string value = scene::value_text(place.told); !value.empty()) out += "; " + value;
       if (const std::string lengths = between(row, i); !lengths.empty()) out += "; " + lengths;

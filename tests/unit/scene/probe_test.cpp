@@ -70,6 +70,11 @@ TEST(ToldPlaces, AnEstimateBecomesAMeasurement) {
   EXPECT_NEAR(*place.error, 2, 1e-4);
   EXPECT_TRUE(place.estimate.empty());
   EXPECT_EQ(value_text(place), "heat 21.500 +- 0.03 K");
+  ToldPlace rough = place;
+  rough.value = 291.4, rough.value_error = 229.95;
+  EXPECT_EQ(value_text(rough), "heat 291 +- 230 K");
+  rough.value_error = 1e-310;
+  EXPECT_EQ(value_text(rough), "heat 291.400000000000 +- 1e-310 K");
   const auto again = told_place_from(to_json(place, p), p);
   ASSERT_TRUE(again);
   EXPECT_EQ(*again, place);

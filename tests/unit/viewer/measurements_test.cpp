@@ -1,6 +1,7 @@
 // What a person measures in a window: rows of places, what is told of them, their marks in the picture.
 #include "client/viewer/hands/measurements.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -43,6 +44,14 @@ TEST_F(Measuring, APlaceIsAnEstimateUntilTheDataServerAnswers) {
   EXPECT_NEAR(place["error"].get<double>(), 1, 1e-6);
   EXPECT_FALSE(place.contains("estimate"));
   EXPECT_FALSE(place.contains("pending"));
+}
+
+TEST_F(Measuring, AnyBoundIsTold) {
+  for (const char* error : {"1e-320", "0", "1e300"}) {
+    add({0, 0, 0});
+    const std::string answer = fmt::format(R"({{"room":[0,0,0],"error_m":{0},"value":7,"value_error":{0}}})", error);
+    EXPECT_NE(all.on_answer(all.take_probes()[0], true, answer).find("+-"), std::string::npos) << error;
+  }
 }
 
 TEST_F(Measuring, WithoutADataServerItIsToldToBeAnEstimate) {

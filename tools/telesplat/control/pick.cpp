@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "common/scene/told_place.h"
 #include "tools/telesplat/control/json_fields.h"
@@ -26,7 +27,8 @@ std::string triple(const Json& json, const char* key) {
 std::string within_text(const Json& place, const std::string& unit) {
   if (place.contains("pending")) return "  within       is being looked up\n";
   if (const auto within = number(place, "error"))
-    return fmt::format("  within       {:.2g}{}{}\n", *within, unit.empty() ? "" : " ", unit);
+    return fmt::format("  within       {}\n",
+                       scene::length_text(std::strtod(fmt::format("{:.2g}", *within).c_str(), nullptr), unit));
   const std::string why = text(place, "estimate");
   return fmt::format("  within       no bound is known{}\n", why.empty() ? "" : "; an estimate: " + why);
 }
