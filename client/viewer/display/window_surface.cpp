@@ -373,6 +373,7 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
 void WindowSurface::choose(double now_s, const std::string& name, const std::string& value) {
   const std::string before = values()[name];
   if (const Status s = set(name, value); !s) return panel_.tell(now_s, name + ": " + s.error().text, true);
+  if (values()[name] == before) return;
   const auto becomes = [this, name](const std::string& text) {
     return [this, name, text] {
       if (const Status s = set(name, text); !s) tell(name + ": " + s.error().text);
