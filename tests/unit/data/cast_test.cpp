@@ -191,12 +191,14 @@ TEST(CastVolume, AOneVoxelSheetIsBoundedByTheFieldsItMayBeOf) {
   const volume::Session& session = store->session();
   const glm::dmat4 to_index = session.grid.room_to_index();
   const double voxel_m = session.grid.unit_m();
+  const glm::dvec3 eye(session.grid.index_to_room * glm::dvec4(33.2, 34.7, 90, 1)),
+      down(session.grid.index_to_room * glm::dvec4(0, 0, -1, 0));
   const std::function<double(double)> fields[] = {
       [](double t) { return 1 - t; }, [](double t) { return (1 - t) * (1 + t); },
       [](double t) { return (1 - t) * (1 - t); }, [](double t) { return 1 - 2.5 * t * t + 1.5 * t * t * t; }};
   for (const double threshold : {0.3, 0.5, 0.8}) {
     const auto transfer = *volume::parse_transfer(fmt::format("{0}:#ffffff:0, {0}:#ffffff:0.9", 1000 * threshold), {});
-    const auto found = store->cast(0, transfer, {}, {EpochId{1}, {0.01, 0.02, 2}, {0, 0, -1}});
+    const auto found = store->cast(0, transfer, {}, {EpochId{1}, eye, glm::normalize(down)});
     ASSERT_TRUE(found && found->value && found->value_error) << threshold;
     ASSERT_TRUE(found->error_m) << threshold;
     const glm::dvec3 at(to_index * glm::dvec4(found->room, 1));
