@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <string_view>
+#include <utility>
 
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
@@ -21,10 +23,21 @@ namespace telesplat::packer {
 namespace {
 
 constexpr double kSpanFlush_s = 1;
-constexpr double kKeepFreed_s = 10;  // memory that was not needed for that long goes back to the system
-constexpr int kSampledAtOnce = 8;    // then control and viewers get their turn
+constexpr double kKeepFreed_s = 10;   // memory that was not needed for that long goes back to the system
+constexpr double kOnTheirWay_s = 30;  // messages of the data set before, after a change
+constexpr int kSampledAtOnce = 8;     // then control and viewers get their turn
 constexpr int kStateAtOnce = 64;
 constexpr int kStateQueue = 1 << 16;  // messages that wait for a viewer: more than StateAnswers has under way
+
+template <class... M>
+bool is_any(std::string_view type) {
+  return ((type == M::kName) || ...);
+}
+bool belongs(std::string_view type, scene::Pipeline pipeline) {
+  if (pipeline == scene::Pipeline::kSlices) return is_any<wire::SliceImages, wire::SliceAck>(type);
+  if (pipeline == scene::Pipeline::kPictures) return is_any<wire::PictureTile, wire::SliceAck>(type);
+  return is_any<wire::DepthTile, wire::StateRequest, wire::AccessReport, wire::Receipt>(type);
+}
 
 class PackerService {
  public:
@@ -173,9 +186,16 @@ class PackerService {
     const auto pipeline = scene::SessionView(session).pipeline();
     if (!pipeline) return;
     packing_ = make_packing(*pipeline);
+    before_ = std::exchange(pipeline_, pipeline), changed_s_ = now_s;
     packing_->follow(session, now_s);
     for (const auto& [early, bytes, since_s] : early_.take())
       ((*packing_).*early.take)(*early.from, early.message, now_s);
+  }
+
+  // Samplers and viewers learn later that another data set is shown.
+  bool is_of_the_kind_before(std::string_view type) const {
+    return before_ && monotonic_s() - changed_s_ < kOnTheirWay_s && belongs(type, *before_) &&
+           !belongs(type, *pipeline_);
   }
 
   std::unique_ptr<Packing> make_packing(scene::Pipeline pipeline) {
@@ -208,6 +228,7 @@ class PackerService {
         continue;
       }
       receive_control();  // what came on another socket at the same time may tell of its epoch
+      if (is_of_the_kind_before(message->type)) continue;
       if (packing_)
         ((*packing_).*take)(from, *message, monotonic_s());
       else
@@ -251,7 +272,9 @@ class PackerService {
   std::optional<PlanRecorder> plan_recorder_;
   metrics::SpanRecorder spans_;
   std::unique_ptr<Packing> packing_;  // none before the session's kind is known
-  EpochHold<Early> early_;            // what came before
+  std::optional<scene::Pipeline> pipeline_, before_;
+  double changed_s_ = 0;
+  EpochHold<Early> early_;  // what came before
   SpareTime spare_;
   bool settled_ = false;  // what the last piece of spare time was for
   int seen_version_ = 0;

@@ -209,6 +209,22 @@ class PackerLimits : public PackerServiceTest {
   }
 };
 
+TEST_F(PackerLimits, WhatIsOnItsWayOfADataSetOfAnotherKindIsNoFault) {
+  master.send(a_volume(), packer_peer);
+  ASSERT_TRUE(ask_for_slices());
+  auto other = mesh();
+  other.epoch = {3};
+  master.send(other, packer_peer);
+  ASSERT_TRUE(ask_for_points());
+  double before = -1;  // requests that came before the packer knew of the change
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(reports("messages_rejected", [&](double n) { return (before = n) >= 0; }));
+  sampler.send(wire::SliceImages{.sampler = {9}});
+  viewer.send(wire::SliceAck{{77}, {0}, 2, false});
+  sampler.send(wire::PictureTile{});  // nothing of this session was ever pictures
+  EXPECT_TRUE(reports("messages_rejected", [&](double n) { return n > before; }));
+  EXPECT_TRUE(reports("messages_rejected", [&](double n) { return n == before + 1; }));
+}
+
 TEST_F(PackerLimits, AFloodOfRequestsIsDroppedAndCountedAndOthersAreAnswered) {
   master.send(mesh(), packer_peer);
   ASSERT_TRUE(ask_for_points());
