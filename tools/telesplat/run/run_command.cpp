@@ -229,6 +229,7 @@ class Run {
     other.data.mesh.cache_dir = o_.data.mesh.cache_dir;
     other.data.mesh.use_cache = o_.data.mesh.use_cache;
     if (const Status s = (*scene)->check(); !s) return s;
+    if (const Status s = check_pictures(other, scene->get()); !s) return s;
     keep_recent(wish);
     due_ = [&pipeline, other] { return pipeline.open(other); };
     return ok_status();

@@ -206,12 +206,15 @@ Status refuse_records_without_folder(const RunOptions& o) {
 // A viewer that joins is told by its session.
 bool shows_pictures(const RunOptions& o) { return o.viewer.coupling == "images" && o.join_master.empty(); }
 
-// Views of what travels as points alone can come as pictures.
+}  // namespace
+
 Status check_pictures(const RunOptions& o, const Scene* scene) {
   if (!shows_pictures(o) || !scene || scene->pipeline() == scene::Pipeline::kPoints) return ok_status();
   return Error{fmt::format("--coupling images: {} is {}, which comes as slice images; pictures are of {}", o.data.scene,
                            scene::described(scene->kind()), "meshes and Julia sets")};
 }
+
+namespace {
 
 // A movie is made of the record.
 Status check_movie(const RunOptions& o, const options::Given& given) {

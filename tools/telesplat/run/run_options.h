@@ -52,6 +52,8 @@ options::Table table(RunOptions& options);
 /// from others (a wall has as many viewers as tiles). given: the flags of the command line. The scene is null where a
 /// session is joined and none is named.
 Result<std::shared_ptr<Scene>> settle(RunOptions& options, const options::Given& given);
+/// Views of what travels as points alone can come as pictures (--coupling images). scene: null: none is shown yet.
+Status check_pictures(const RunOptions& options, const Scene* scene);
 
 /// What each process is told, beside its name, its log level and the master's address. A service's flag that is not as
 /// its program has it anyway is among them; the launcher knows none of them by name.
