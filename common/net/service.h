@@ -51,7 +51,7 @@ options::Row give_up_row(double& after_s);
 Result<Access> access_of(const ServiceOptions& options, const std::vector<Role>& roles, bool binds = false);
 
 /// Finds the session that --master auto means, and the keys that it runs with. connects: the program has a master.
-/// Returns 0, or the exit code after a line on stderr that says why there is none.
+/// Returns 0, or writes to stderr why no master is found and returns the exit code.
 int settle_master(ServiceOptions& options, bool connects);
 
 /// This machine's name; in a container that of the container.

@@ -39,8 +39,7 @@ StageTable::StageTable()
 
 std::optional<metrics::StagesMs> StageTable::complete(const MeasuredUpdate& m) {
   const ViewRequester::Update& u = m.update;
-  if (m.last.moments == wire::Moments{})
-    return std::nullopt;  // sent again later: nobody knows any more how it came about
+  if (m.last.moments == wire::Moments{}) return std::nullopt;  // it was sent again later, and its moments are not known
   const metrics::UpdateMoments moments{.requested_s = u.requested_s,
                                        .arrived_s = m.last.arrived_s,
                                        .decode_begin_s = m.last.decode_begin_s,

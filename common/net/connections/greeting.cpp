@@ -19,7 +19,7 @@ constexpr size_t kMechanismAt = 12, kMechanismEnd = 32;
 
 }  // namespace
 
-std::string mechanism_at(const std::string& endpoint, double patience_s) {
+std::string mechanism_at(const std::string& endpoint) {
   constexpr std::string_view kTcp = "tcp://";
   const size_t colon = endpoint.rfind(':');
   if (!endpoint.starts_with(kTcp) || colon <= kTcp.size()) return {};
@@ -30,7 +30,7 @@ std::string mechanism_at(const std::string& endpoint, double patience_s) {
   if (getaddrinfo(host.c_str(), endpoint.c_str() + colon + 1, &wanted, &found) != 0) return {};
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> all(found, freeaddrinfo);
   const Descriptor fd(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  const timeval patience{0, suseconds_t(patience_s * 1e6)};
+  const timeval patience{0, 500'000};
   setsockopt(fd.get(), SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);  // of connect(), too
   setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   if (::connect(fd.get(), found->ai_addr, found->ai_addrlen) != 0) return {};

@@ -6,7 +6,7 @@
 namespace telesplat::net {
 
 /// Connects to tcp://HOST:PORT, and reads which security mechanism its greeting names (ZMTP 3, RFC 23): "NULL" or
-/// "CURVE". Empty: no peer that speaks so names one within patience_s.
-std::string mechanism_at(const std::string& endpoint, double patience_s = 0.5);
+/// "CURVE". Empty: no peer that speaks so names one within half a second.
+std::string mechanism_at(const std::string& endpoint);
 
 }  // namespace telesplat::net

@@ -29,7 +29,7 @@ using Dataset = std::unique_ptr<void, Close>;
 constexpr const char* kElevationDrivers[] = {"GTiff",   "PNG",  "SRTMHGT", "AAIGrid", "GRASSASCIIGrid",
                                              "USGSDEM", "DTED", "EHdr",    "GSAG",    nullptr};
 
-// Formats of textures, none of which names other files.
+// Formats of textures. A file of theirs names no other file.
 constexpr const char* kPictureDrivers[] = {"GTiff", "PNG", "JPEG", "JP2OpenJPEG", "WEBP", "BMP", "GIF", "PNM", nullptr};
 
 Result<Dataset> open(const std::string& path, const char* what, const char* const* drivers) {

@@ -21,7 +21,7 @@ class WindowLegend {
   void on_legend(const std::shared_ptr<const image::Legend>& legend);
   /// The display's options have changed.
   void show();
-  /// Whether Dear ImGui draws it; else it is an overlay, or there is none.
+  /// Whether Dear ImGui draws it. If not, it is an overlay where one is shown.
   bool built() const;
   /// Between Dear ImGui's frames, if built(). hidden: as show_legend() has it.
   void build(ColourControls& colours, double now_s, double hidden);

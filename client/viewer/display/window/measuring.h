@@ -37,7 +37,7 @@ class Measuring {
   Overlays& overlays_;
   Tell tell_;
   Measurements places_;
-  std::string marks_shown_;  // the state that the overlay of their marks shows; empty: there is none
+  std::string marks_shown_;  // the state that the overlay of their marks shows; empty: no mark
   bool tells_pick_ = false;  // the person asked for it, not the cursor's overlay
   bool centres_ = false;     // a double click
   double pointed_s_ = -1e9;

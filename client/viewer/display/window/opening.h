@@ -16,7 +16,7 @@ namespace telesplat::viewer {
 class Opening {
  public:
   using Tell = std::function<void(const std::string& line)>;
-  /// ask: asks whoever started the session for another data set; null: it is somebody else's session.
+  /// ask: asks the launcher for another data set; null: the session is somebody else's.
   Opening(std::function<void(const std::string& path)> ask, int launcher_fd, Interaction& interaction, Panel& panel,
           SceneControls& scene, Tell tell)
       : ask_(std::move(ask)),
