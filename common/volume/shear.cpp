@@ -106,10 +106,11 @@ void clip(std::vector<glm::dvec3>& vertices, const auto& distance) {
 std::pair<int, int> slices_in_front(const ShearFrame& frame, int slices, double near_slices) {
   const double near = std::max(near_slices, 0.25);
   int begin = 0, end = slices;
+  const double eye = frame.eye[frame.axis];  // of any size
   if (frame.direction > 0)
-    begin = std::max(begin, int(std::ceil(std::max(frame.eye[frame.axis] + near, 0.0))));
+    begin = int(std::ceil(std::clamp(eye + near, 0.0, double(slices))));
   else
-    end = std::min(end, int(std::floor(std::min(frame.eye[frame.axis] - near, slices - 1.0))) + 1);
+    end = int(std::floor(std::clamp(eye - near, -1.0, slices - 1.0))) + 1;
   return {begin, std::max(begin, end)};
 }
 

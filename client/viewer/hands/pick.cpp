@@ -68,9 +68,11 @@ double channel(uint32_t texel, int shift) { return double(texel >> shift & 255);
 // A layer's texel between four, as red, green, blue, alpha in 0 to 255, premultiplied.
 glm::dvec4 look_up(const volume::LayerImage& image, double x, double y) {
   const double left = std::floor(x - 0.5), top = std::floor(y - 0.5);
-  const int x0 = int(left) - image.rect.x, y0 = int(top) - image.rect.y;
+  const double from_left = left - image.rect.x, from_top = top - image.rect.y;
   glm::dvec4 out(0);
-  if (x0 < -1 || y0 < -1 || x0 >= image.rect.width || y0 >= image.rect.height) return out;
+  // Of a ray along the layer they are of any size.
+  if (!(from_left >= -1 && from_top >= -1 && from_left < image.rect.width && from_top < image.rect.height)) return out;
+  const int x0 = int(from_left), y0 = int(from_top);
   for (int n = 0; n < 4; ++n) {
     const int dx = n & 1, dy = n >> 1;
     const double fx = x - 0.5 - left, fy = y - 0.5 - top;

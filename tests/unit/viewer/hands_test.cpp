@@ -195,6 +195,13 @@ TEST(Picking, OfAVolumeGoesToWhereItHidesEnough) {
 
   const std::vector<volume::SliceImage> thin{plain(0, 0x1a1a0000)};
   EXPECT_FALSE(pick_volume(volume::make_volume_frame(grid, shear, thin, {1}, {1}, 0), c, 40, 30, 0.5));
+
+  // Rays that run along the layers meet their planes as far away as numbers go.
+  const double half = std::sqrt(0.5);
+  for (const double lean : {1e-5, 1e-9, 1e-12, 1e-15, -1e-12}) {
+    geometry::Camera along = geometry::make_camera({{-60, 14.5, 9.5}, {half, 0, -half + lean, 0}}, 50, 80, 60);
+    for (double x = 36; x < 44; x += 0.25) (void)pick_volume(frame, along, x, 30, 0.5);
+  }
 }
 
 scene::Colouring temperature() {
