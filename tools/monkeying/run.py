@@ -71,7 +71,7 @@ class Run:
                                             env=self.environment, cwd=at("work"), start_new_session=True)
         self.orders, self.keys, self.acted = collections.Counter(), collections.Counter(), set()
         self.tried, self.flying, self.beside = collections.Counter(), False, None
-        self.before, self.openers, self.opens = (None, set()), {}, False
+        self.before, self.openers, self.opens = (None, set()), options.openers, False
 
     # ---- what became of it ----
     def alive(self):
@@ -370,19 +370,22 @@ class Run:
 
     def name_of(self, kind, number):
         """The widget that a number means: one that was ever here, three times of four one of those that were tried
-        least; for a choice, one of a list, which is opened."""
+        least; for a choice, one of a list, which is opened: one of earlier runs, too, or of a list that was never open."""
         every = self.widgets()
         if kind == "choice":
-            here = lambda: [n for n, w in self.widgets().items() if w[5] and w[0] == "choice"]  # noqa: E731
-            lists = [n for n, w in every.items() if w[0] == "list"]
-            if not here() and lists:
-                self.open_list(self.one_of(lists, number))
-            if here():
-                return self.one_of(here(), number)
-        names = [n for n, w in every.items() if w[0] != "choice"]
-        return self.one_of(names, number) if names else None
+            lists = {n for n, w in every.items() if w[0] == "list"}
+            choices = {n for n in (*every, *self.options.uses) if "=" in n and n.split("=")[0] in lists}
+            name = self.one_of([*choices, *lists - {n.split("=")[0] for n in choices}], number)
+            if name not in lists:
+                return name
+            self.open_list(name)
+            return self.one_of([n for n, w in self.widgets().items() if w[5] and w[0] == "choice"], number)
+        opened = {n for n, opener in self.openers.items() if opener[0] == "widget" and opener[1] in every}
+        return self.one_of([n for n in {*every, *opened} if "=" not in n or n.startswith("Open/")], number)
 
     def one_of(self, names, number):
+        if not names:
+            return None
         if number % 4:
             tries = {n: self.tried[n] + min(ENOUGH, self.options.uses.get(known_as(n), 0)) for n in names}
             names = [n for n in names if tries[n] == min(tries.values())]

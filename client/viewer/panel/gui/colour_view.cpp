@@ -36,7 +36,7 @@ void show_range(ColourControls& colours, double now_s) {
   double ends[2] = {lo, hi};
   const float speed = float(std::max((whole.empty() ? hi - lo : whole.hi - whole.lo) / 300, 1e-30));
   setting_row("range");
-  if (seen("number", "range",
+  if (seen("drag", "range",
            ImGui::DragScalarN("##range", ImGuiDataType_Double, ends, 2, speed, nullptr, nullptr, "%.6g")))
     colours.choose_range(now_s, ends[0], ends[1]);
   hint("drag an end, or double click and type");
