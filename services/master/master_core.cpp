@@ -239,7 +239,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   w.hello_sent_s = m.sent_s;
   outbox_.send(peer, w);
   if (changed && epoch == epoch_ && (!m.endpoints.empty() || m.role == "data")) announce_soon(now_s);
-  if (m.role == "sampler") join(peer);
+  if (m.role == "sampler") join(peer, now_s);
   dispatch(now_s);
 }
 
@@ -362,27 +362,27 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
   dispatch(now_s);
 }
 
-void MasterCore::join(const std::string& sampler) {
-  for (auto& [pipeline, plan] : plans_) plan->join(sampler);
+void MasterCore::join(const std::string& sampler, double now_s) {
+  for (auto& [pipeline, plan] : plans_) plan->join(sampler, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double now_s) {
   const Peer* p = known_sampler(peer, now_s);
   if (!p || !idle_.add(peer, p->leases_at_once)) return;
   plan_->heard_of(peer);
-  join(peer);
+  join(peer, now_s);
   dispatch(now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double now_s) {
   if (!known_sampler(peer, now_s)) return;
-  join(peer);
+  join(peer, now_s);
   plan_->extend(m.lease, peer, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::SlabReady& m, double now_s) {
   if (!known_sampler(peer, now_s)) return;
-  join(peer);
+  join(peer, now_s);
   plan_->slab_ready(peer, m);
   dispatch(now_s);
 }

@@ -167,7 +167,7 @@ class MasterCore {
   void send_swaps();
 
   // Leases.
-  void join(const std::string& sampler);
+  void join(const std::string& sampler, double now_s);
   bool begin_view(double now_s);
   void dispatch(double now_s);
 

@@ -124,7 +124,7 @@ class Schedule {
   virtual Ticked tick(double now_s) = 0;
 
   /// A sampler is here; also for plans that do not lead.
-  virtual void join(const std::string& /*sampler*/) {}
+  virtual void join(const std::string& /*sampler*/, double /*now_s*/) {}
   /// It asks for work: it is through with what it had.
   virtual void heard_of(const std::string& /*sampler*/) {}
   /// It holds its slab of a partition.
@@ -132,6 +132,8 @@ class Schedule {
   /// It is gone; also for plans that do not lead. Returns how many leases it held.
   virtual int release_sampler(const std::string& sampler) = 0;
   virtual size_t leases_of(const std::string& sampler) const = 0;
+  /// Seconds for which it was leased work and delivered nothing; nullopt: it delivers, or has not had the time.
+  virtual std::optional<double> stuck_s(const std::string& /*sampler*/, double /*now_s*/) const { return std::nullopt; }
   virtual Figures figures() const = 0;
 };
 

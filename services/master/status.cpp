@@ -149,6 +149,7 @@ Json MasterCore::process_json(const std::string& id, const Peer& p, double now_s
          {"alive", !p.gone},
          {"silent_s", std::max(0.0, now_s - p.seen_s)}};
   if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
+  if (const auto stuck_s = plan_->stuck_s(id, now_s)) e["delivers_nothing_s"] = *stuck_s;
   for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
   for (const auto& [key, value] : p.hello.facts)
     if (key != metrics::kRecordFact) e["facts"][key] = all ? value : shortened(value);

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "common/net/keys/roles.h"
 
 namespace telesplat::master {
@@ -11,25 +14,33 @@ Status Senders::admit(const net::Message& from, const wire::Hello& m) {
     return Error{fmt::format("the key {} is {}'s: its owner cannot be a {}", from.user, net::described(*from.role),
                              net::as_word(m.role))};
   if (Status s = is_same_user(from, m.instance); !s) return s;
-  const auto [owner, is_new] = owners_.try_emplace(m.instance);
-  if (is_new) order_.push_back(m.instance);
-  // It came back over another connection: the one before speaks for nobody.
-  if (owner->second.peer != from.peer) {
-    instances_.erase(owner->second.peer);
-    owner->second = {from.peer, from.user};
+  if (const auto owner = owners_.find(m.instance); owner == owners_.end()) {
+    auto& instances = of_user_[from.user];
+    owners_[m.instance] = {from.peer, from.user, instances.insert(instances.end(), m.instance)};
+  } else if (owner->second.peer != from.peer) {
+    // It came back over another connection: the one before speaks for nobody.
+    instances_.erase(std::exchange(owner->second.peer, from.peer));
   }
   // Or it is another process from now on.
   const auto before = instances_.find(from.peer);
-  if (before != instances_.end() && before->second != m.instance) owners_.erase(before->second);
+  if (before != instances_.end() && before->second != m.instance) forget(before->second);
   instances_[from.peer] = m.instance;
-  while (order_.size() > kMost) {
-    const auto first = owners_.find(order_.front());
-    order_.pop_front();
-    if (first == owners_.end()) continue;
-    instances_.erase(first->second.peer);
-    owners_.erase(first);
+  if (owners_.size() > kMost) {
+    const auto most = std::max_element(of_user_.begin(), of_user_.end(), [](const auto& a, const auto& b) {
+      return a.second.size() < b.second.size();
+    });
+    forget(most->second.front());
   }
   return ok_status();
+}
+
+void Senders::forget(InstanceId instance) {
+  const auto owner = owners_.find(instance);
+  const auto user = of_user_.find(owner->second.user);
+  user->second.erase(owner->second.place);
+  if (user->second.empty()) of_user_.erase(user);
+  instances_.erase(owner->second.peer);
+  owners_.erase(owner);
 }
 
 // A process whose own connection is busy says it over another.

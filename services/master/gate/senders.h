@@ -2,7 +2,8 @@
 // name it speaks, and which commands it gives.
 #pragma once
 
-#include <deque>
+#include <list>
+#include <map>
 #include <string>
 #include <unordered_map>
 
@@ -14,7 +15,9 @@ namespace telesplat::master {
 
 class Senders {
  public:
-  static constexpr size_t kMost = 8192;  ///< processes that are remembered: of more the first are forgotten
+  /// Processes that are remembered. Of more, the first one of the key that has the most is forgotten, so that no key's
+  /// owner can make this forget another's.
+  static constexpr size_t kMost = 8192;
 
   /// Errors are the sender's fault; the message must not reach the core then. A sender who is not known, and does not
   /// speak for a process of another key, is let pass: the core asks who it is.
@@ -48,10 +51,13 @@ class Senders {
   struct Owner {
     std::string peer;  ///< routing id of the connection that said hello
     std::string user;  ///< the name of its key; empty: there are no keys
+    std::list<InstanceId>::iterator place;  ///< in of_user_
   };
+  void forget(InstanceId instance);
+
   std::unordered_map<InstanceId, Owner> owners_;
   std::unordered_map<std::string, InstanceId> instances_;  // by routing id
-  std::deque<InstanceId> order_;                           // of owners_, the first hello first
+  std::map<std::string, std::list<InstanceId>> of_user_;   // owners_, the first hello first
 };
 
 }  // namespace telesplat::master

@@ -16,6 +16,7 @@ namespace telesplat::master {
 namespace {
 
 constexpr double kWeighPatience_s = 2.0;  // slabs wait no longer for data servers to say what slices weigh
+constexpr double kLeastWait_s = 2.0, kMostWait_s = 60.0;  // of a sampler that let two leases run out, or more
 
 }  // namespace
 
@@ -111,7 +112,17 @@ Result<Obeyed> SlabPlan::set(std::map<std::string, std::string> arguments) {
   return Obeyed{.begins_epoch = true, .answer = {}};
 }
 
+void SlabPlan::join(const std::string& sampler, double now_s) {
+  const auto late = late_.find(sampler);
+  if (late != late_.end() && now_s < late->second.until_s)
+    late->second.asked = true;
+  else
+    partitions_.join(sampler);
+}
+
 void SlabPlan::prepare(double now_s) {
+  for (auto& [sampler, late] : late_)
+    if (now_s >= late.until_s && std::exchange(late.asked, false)) partitions_.join(sampler);
   // Slabs cut without knowing what slices weigh would be fetched in vain.
   if (!whole_ || (!volume_.weighed() && now_s - since_s_ < kWeighPatience_s)) return;
   if (const auto made = partitions_.update(now_s)) assign(*made, now_s);
@@ -176,7 +187,8 @@ void SlabPlan::give_leases(Idle& idle, double now_s) {
   }
 }
 
-bool SlabPlan::done(const wire::TileDone& tile, const std::string& /*sampler*/, double now_s) {
+bool SlabPlan::done(const wire::TileDone& tile, const std::string& sampler, double now_s) {
+  late_.erase(sampler);
   return schedule_.tile_done(tile, now_s);
 }
 
@@ -184,7 +196,11 @@ Ticked SlabPlan::tick(double now_s) {
   const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
     log::warn("a slice lease of sampler {} expired; its slab goes to others until it asks again",
               links_.name_of(sampler));
+    Late late = late_[sampler];
+    late.until_s = now_s + late.wait_s;
+    late.wait_s = std::clamp(2 * late.wait_s, kLeastWait_s, kMostWait_s);
     release_sampler(sampler);
+    late_[sampler] = late;
   });
   return {.expired = expired, .overdue = schedule_.overdue(now_s)};
 }
@@ -195,6 +211,7 @@ void SlabPlan::slab_ready(const std::string& sampler, const wire::SlabReady& sla
 
 int SlabPlan::release_sampler(const std::string& sampler) {
   partitions_.leave(sampler);
+  late_.erase(sampler);
   return schedule_.release_sampler(sampler);
 }
 

@@ -43,7 +43,7 @@ class SlabPlan final : public Plan {
   /// Views of a wall may be about to begin without one that is late.
   bool hurried() const override { return schedule_.walls_here() && schedule_.view_waiting(); }
   Ticked tick(double now_s) override;
-  void join(const std::string& sampler) override { partitions_.join(sampler); }
+  void join(const std::string& sampler, double now_s) override;
   void slab_ready(const std::string& sampler, const wire::SlabReady& slab) override;
   int release_sampler(const std::string& sampler) override;
   size_t leases_of(const std::string& sampler) const override { return schedule_.leases_of(sampler); }
@@ -53,6 +53,11 @@ class SlabPlan final : public Plan {
   void add_counters(std::map<std::string, double>& counters) const override;
 
  private:
+  /// A sampler whose lease ran out and that has delivered nothing since.
+  struct Late {
+    double wait_s = 0, until_s = 0;  ///< that long, until then, it gets no slab: twice as long each time
+    bool asked = false;              ///< it would like to have one again
+  };
   Result<Obeyed> set(std::map<std::string, std::string> arguments);
   void assign(const Partition& partition, double now_s);
 
@@ -60,6 +65,7 @@ class SlabPlan final : public Plan {
   VolumeScene volume_;
   VolumeSchedule schedule_;
   SlabPartitions partitions_;
+  std::map<std::string, Late> late_;
   bool whole_ = false;        // all of the volume is known, and partitions and schedule are of it
   double since_s_ = 0;        // since when
   TokenBucket log_{10, 200};  // lines that hellos bring about: not more often than a person reads

@@ -44,7 +44,7 @@ void FrameSchedule::begin_whole(const PlannedView& view) {
 void FrameSchedule::begin_frame(const PlannedView& view, FrameId id, int step) {
   const geometry::Camera camera = step == 1 ? view.view.camera : geometry::subsample(view.view.camera, step);
   auto tiles = cut_.rows       ? FrameTiles::of_rows(camera.width, camera.height)
-               : cut_.pictures ? FrameTiles::of_bands(camera.width, camera.height, costs_.samplers())
+               : cut_.pictures ? FrameTiles::of_bands(camera.width, camera.height, workers())
                                : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
   const wire::Moments& m = view.view.moments;
   insert({.id = id,
@@ -67,17 +67,35 @@ bool FrameSchedule::tile_open() const {
 }
 
 bool FrameSchedule::backup_due(double now_s) const {
+  const auto trusts = [&](const std::string& sampler) { return this->trusts(sampler, now_s); };
   return std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) {
-    return !f.extra && !f.tiles.open() && f.tiles.overdue(now_s - backup_after_s(f.planned), nullptr);
+    return !f.extra && !f.tiles.open() && f.tiles.overdue(now_s - backup_after_s(f.planned), nullptr, trusts);
   });
 }
 
+bool FrameSchedule::trusted_here(double now_s) const {
+  const auto has = [&](const std::string& sampler) { return trust_.has(sampler); };
+  return trust_.lately(now_s) ||
+         std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) { return f.tiles.any_out(has); });
+}
+
+std::optional<double> FrameSchedule::stuck_s(const std::string& sampler, double now_s) const {
+  const auto waited_s = trust_.waited_s(sampler, now_s);
+  return waited_s && *waited_s > kTold_s ? waited_s : std::nullopt;
+}
+
 double FrameSchedule::target_s() const {
-  return std::max(options().lease_target_s, kTargetPerSampler_s * double(costs_.samplers()));
+  return std::max(options().lease_target_s, kTargetPerSampler_s * double(workers()));
 }
 
 std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, double now_s, bool even_own, bool idle) {
   costs_.join(sampler);
+  const bool trusted_here = this->trusted_here(now_s);
+  if (trusted_here && !trust_.has(sampler)) {
+    if (leases_of(sampler) > 0) return std::nullopt;
+    if (trust_.has_failed(sampler)) return lease_copy(sampler, now_s);
+  }
+  const auto trusts = [&](const std::string& other) { return !trusted_here || trust_.has(other); };
   const double pixel_s = costs_.pixel_s(sampler);
   const auto extras = std::find_if(frames_.rbegin(), frames_.rend(), [](const Frame& f) { return !f.extra; });
   const Frame* newest = extras == frames_.rend() ? nullptr : &*extras;  // of views
@@ -86,17 +104,25 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
     const double row_s = pixel_s * f.camera.width;
     // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would
     // keep all waiting.
-    const bool last = &f == newest && f.tiles.rows_left() > 0 && f.tiles.rows_left() <= int(costs_.samplers());
+    const bool last = &f == newest && f.tiles.rows_left() > 0 && f.tiles.rows_left() <= int(workers());
     if (last && !idle && (row_s == 0 || row_s > kDearRow_s) && leases_of(sampler) > 0) continue;
-    const int rows = band_rows(target_s(), row_s, f.tiles.rows_left(), costs_.samplers());
+    const int rows = band_rows(target_s(), row_s, f.tiles.rows_left(), workers());
     if (const auto tile = f.tiles.take(sampler, rows, even_own)) return lease_tile(f, *tile, sampler, now_s);
     if (f.tiles.open() || f.extra) continue;
     // A frame is finished before the next is fed: what is out too long gets a second sampler.
-    if (const auto tile = f.tiles.overdue(now_s - backup_after_s(f.planned), &sampler)) {
+    if (const auto tile = f.tiles.overdue(now_s - backup_after_s(f.planned), &sampler, trusts)) {
       ++backups_;
       return lease_tile(f, *tile, sampler, now_s);
     }
   }
+  return std::nullopt;
+}
+
+// So that it can show that it delivers, while a frame never waits for it.
+std::optional<wire::Lease> FrameSchedule::lease_copy(const std::string& sampler, double now_s) {
+  const auto trusts = [&](const std::string& other) { return trust_.has(other); };
+  for (Frame& f : frames_)
+    if (const auto tile = f.tiles.to_copy(trusts)) return lease_tile(f, *tile, sampler, now_s);
   return std::nullopt;
 }
 
@@ -156,7 +182,20 @@ void FrameSchedule::end_hopeless() {
   end_closed();
 }
 
+// A tile that another was faster with counts as well: a slow sampler is one that delivers.
+void FrameSchedule::note_delivery(const wire::TileDone& m, const std::string& sampler, double now_s) {
+  const auto held = [&](const Frame& f) {
+    const auto* out = f.tiles.out(m.lease);
+    return out && out->sampler == sampler;
+  };
+  const auto late = overtaken_.find(m.lease);
+  const bool was_late = late != overtaken_.end() && late->second.sampler == sampler;
+  if (was_late) overtaken_.erase(late);
+  if (was_late || std::any_of(frames_.begin(), frames_.end(), held)) trust_.delivered(sampler, now_s);
+}
+
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
+  note_delivery(m, sampler, now_s);
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
   // What a block gives is counted to its last tile: of plans, and of views in squares, a block is a tile.
   const bool known = f != frames_.end() && f->tiles.whole_blocks() && f->step == 1 && m.tile < f->tiles.tiles();
@@ -169,8 +208,10 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   std::optional<double> took_s;
   if (const auto* out = f->tiles.out(m.lease); out && out->tile == m.tile) took_s = now_s - out->leased_s;
   for (const LeaseId id : f->tiles.tile(m.tile).leases)
-    if (const auto* out = f->tiles.out(id); out && id != m.lease)
+    if (const auto* out = f->tiles.out(id); out && id != m.lease) {
       overtaken_[id] = {out->sampler, out->leased_s, out->expires_s};
+      if (now_s - out->leased_s > backup_after_s(f->planned)) trust_.failed(out->sampler, now_s);
+    }
   if (!f->tiles.done(m.tile)) return false;
   if (took_s) (f->planned ? planned_time_s_ : tile_time_s_).add(*took_s);
   // A sampler that cannot read a mask casts all.
@@ -179,7 +220,7 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   costs_.learn(sampler, m.moments.encode_end_s - m.moments.sample_begin_s, double(std::clamp(m.rays, tile.rays, all)));
   if (!f->tiles.complete()) return true;
   if (f->planned && !f->extra && !f->tiles.closed())
-    refining_.learn(now_s - f->begun_s, f->refining, f->put_off, std::max<size_t>(costs_.samplers(), 1));
+    refining_.learn(now_s - f->begun_s, f->refining, f->put_off, std::max<size_t>(workers(), 1));
   end_frame(f);
   return true;
 }
@@ -225,17 +266,22 @@ double FrameSchedule::backup_after_s(bool planned) const {
 }
 
 void FrameSchedule::heard_of(const std::string& sampler) {
-  std::erase_if(overtaken_, [&](const auto& o) { return o.second.sampler == sampler; });
+  for (auto& [id, o] : overtaken_) o.heard |= o.sampler == sampler;
 }
 
 int FrameSchedule::expire(double now_s, const std::function<void(const std::string&)>& lost_sampler) {
   int count = 0;
-  for (Frame& f : frames_) count += f.tiles.expire(now_s, lost_sampler);
-  count += int(std::erase_if(overtaken_, [&](const auto& o) {
+  const auto lost = [&](const std::string& sampler) {
+    ++count;
+    trust_.failed(sampler, now_s);
+    lost_sampler(sampler);
+  };
+  for (Frame& f : frames_) f.tiles.expire(now_s, lost);
+  std::erase_if(overtaken_, [&](const auto& o) {
     if (now_s <= o.second.expires_s) return false;
-    lost_sampler(o.second.sampler);
+    if (!o.second.heard) lost(o.second.sampler);
     return true;
-  }));
+  });
   released_ += uint64_t(count);
   end_hopeless();
   put_back_held(now_s);
@@ -244,6 +290,7 @@ int FrameSchedule::expire(double now_s, const std::function<void(const std::stri
 
 int FrameSchedule::release_sampler(const std::string& sampler) {
   costs_.leave(sampler);
+  trust_.leave(sampler);
   int count = 0;
   for (Frame& f : frames_) count += f.tiles.release(sampler);
   count += int(std::erase_if(overtaken_, [&](const auto& o) { return o.second.sampler == sampler; }));
@@ -255,7 +302,7 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
 size_t FrameSchedule::leases_of(const std::string& sampler) const {
   size_t count = 0;
   for (const Frame& f : frames_) count += f.tiles.leases_of(sampler);
-  for (const auto& [id, o] : overtaken_) count += o.sampler == sampler;
+  for (const auto& [id, o] : overtaken_) count += !o.heard && o.sampler == sampler;
   return count;
 }
 

@@ -2,6 +2,7 @@
 // again; a tile is done only when the packer has it. No sockets, no clocks.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <map>
@@ -14,6 +15,7 @@
 #include "services/master/tiles/plan_questions.h"
 #include "services/master/tiles/refining_rays.h"
 #include "services/master/tiles/sampling_costs.h"
+#include "services/master/tiles/trust.h"
 #include "services/master/views.h"
 
 namespace telesplat::master {
@@ -101,9 +103,10 @@ class FrameSchedule : public Views {
   const LinkGate& links() const { return gate_; }
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been
-  /// out for long in a frame that has none (see backup_after_s()). The newest frame's last rows, one a sampler, go only
-  /// to samplers that hold no other lease, if they take longer than kDearRow_s. even_own: tiles whose lease ran out at
-  /// this very sampler, too. idle: it is known to hold none, though the packer may not have said so yet.
+  /// out for long in a frame that has none (see backup_after_s()). A sampler that failed (see Trust) gets
+  /// copies of what a trusted one has, one at a time. The newest frame's last rows, one a sampler, go only to samplers
+  /// that hold no other lease, if they take longer than kDearRow_s. even_own: tiles whose lease ran out at this very
+  /// sampler, too. idle: it is known to hold none, though the packer may not have said so yet.
   std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true, bool idle = false);
   /// Gives a lease of this sampler its full time again, until longest_fetch_s after it was leased. Others are ignored.
   void extend(LeaseId lease, const std::string& sampler, double now_s);
@@ -129,6 +132,9 @@ class FrameSchedule : public Views {
   bool tile_open() const;
   /// A tile has been out so long that any other sampler than its own could take a backup.
   bool backup_due(double now_s) const;
+  /// See Trust.
+  std::vector<Trust::News> take_news(double now_s) { return trust_.news(now_s); }
+  std::optional<double> stuck_s(const std::string& sampler, double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
   uint64_t tiles_released() const { return released_; }
   uint64_t backups() const { return backups_; }
@@ -161,6 +167,7 @@ class FrameSchedule : public Views {
   struct Overtaken {
     std::string sampler;
     double leased_s, expires_s;
+    bool heard = false;  // it asked for work since
   };
   void begin_frame(const PlannedView& view, FrameId id, int step);
   void begin_whole(const PlannedView& view);
@@ -184,6 +191,13 @@ class FrameSchedule : public Views {
   void end_closed();
   void end_hopeless();
   wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
+  std::optional<wire::Lease> lease_copy(const std::string& sampler, double now_s);
+  /// A trusted sampler works on something, or delivered lately.
+  bool trusted_here(double now_s) const;
+  bool trusts(const std::string& sampler, double now_s) const { return !trusted_here(now_s) || trust_.has(sampler); }
+  /// Samplers that work is cut for.
+  size_t workers() const { return costs_.samplers() - std::min(costs_.samplers(), trust_.stuck()); }
+  void note_delivery(const wire::TileDone& tile, const std::string& sampler, double now_s);
 
   Cut cut_;
   PlanQuestions plans_;
@@ -193,6 +207,7 @@ class FrameSchedule : public Views {
   std::deque<Frame> frames_;  // extra ones last
   std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;
+  Trust trust_;
   LinkGate gate_;
   bool in_turns_ = false;  // an animation plays: who waits for its link would hold up the others
   RefiningRays refining_;

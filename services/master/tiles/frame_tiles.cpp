@@ -95,20 +95,36 @@ std::optional<size_t> FrameTiles::take(const std::string& sampler, int rows, boo
   return std::nullopt;
 }
 
-std::optional<size_t> FrameTiles::overdue(double before_s, const std::string* sampler) const {
+bool FrameTiles::is_late(const Out& out, double before_s, const Trusts& trusts) const {
+  const bool heard = out.heard_s > before_s && out.leased_s > before_s - kHeardFor_s;
+  return out.leased_s <= before_s && !(heard && trusts(out.sampler));
+}
+
+std::optional<size_t> FrameTiles::overdue(double before_s, const std::string* sampler, const Trusts& trusts) const {
   for (const auto& [id, out] : out_) {
     if (out.leased_s > before_s) break;  // the later ones are younger
-    const bool heard = out.heard_s > before_s && out.leased_s > before_s - kHeardFor_s;
-    if (heard || tiles_[out.tile].leases[1].value != 0) continue;
-    if (!sampler || out.sampler != *sampler) return out.tile;
+    const Tile& t = tiles_[out.tile];
+    if (id != t.leases[0] || t.leases.back().value != 0) continue;
+    const bool waits = std::all_of(t.leases.begin(), t.leases.end(), [&](LeaseId lease) {
+      const Out* o = this->out(lease);
+      return !o || (is_late(*o, before_s, trusts) && !(sampler && o->sampler == *sampler));
+    });
+    if (waits) return out.tile;
   }
+  return std::nullopt;
+}
+
+std::optional<size_t> FrameTiles::to_copy(const Trusts& trusts) const {
+  for (auto it = out_.rbegin(); it != out_.rend(); ++it)
+    if (tiles_[it->second.tile].leases[1].value == 0 && trusts(it->second.sampler)) return it->second.tile;
   return std::nullopt;
 }
 
 void FrameTiles::lease(size_t i, LeaseId id, const std::string& sampler, double now_s, double expires_s) {
   Tile& t = tiles_[i];
-  CHECK(t.state != Tile::State::kDone && t.leases[1].value == 0);
-  t.leases[t.leases[0].value ? 1 : 0] = id;
+  const auto free = std::find(t.leases.begin(), t.leases.end(), LeaseId{});
+  CHECK(t.state != Tile::State::kDone && free != t.leases.end());
+  *free = id;
   if (t.state == Tile::State::kOpen) {
     if (i == unleased_)
       ++unleased_;
@@ -164,8 +180,7 @@ bool FrameTiles::hopeless(int most_refused, int most_lost) const {
 
 std::map<LeaseId, FrameTiles::Out>::iterator FrameTiles::take_back(std::map<LeaseId, Out>::iterator lease) {
   Tile& t = tiles_[lease->second.tile];
-  if (t.leases[0] == lease->first) t.leases[0] = t.leases[1];
-  t.leases[1] = {};
+  *std::remove(t.leases.begin(), t.leases.end(), lease->first) = {};
   if (t.leases[0].value == 0) {
     t.state = Tile::State::kOpen;
     reopened_.insert(lease->second.tile);

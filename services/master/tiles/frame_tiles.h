@@ -2,6 +2,7 @@
 // them, except those that happen when a sampler leaves.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <map>
@@ -40,7 +41,7 @@ class FrameTiles {
     geometry::Rect rect;
     size_t block = 0;
     enum class State { kOpen, kLeased, kDone } state = State::kOpen;
-    std::array<LeaseId, 2> leases;          ///< that are out; 0: none. The second is a backup
+    std::array<LeaseId, 3> leases;          ///< that are out, oldest first; 0: none. Later ones are copies
     std::string given_up_by;                ///< whose lease ran out
     int refused = 0;                        ///< so often the packer could not use what came of it
     int lost = 0;                           ///< so often a lease of it ran out, or its sampler left
@@ -56,9 +57,16 @@ class FrameTiles {
     double expires_s;
   };
 
+  /// Whether a sampler delivers what it is leased.
+  using Trusts = std::function<bool(const std::string& sampler)>;
+
   bool open() const { return !closed_ && (!reopened_.empty() || unleased_ < tiles_.size() || rows_.rows_left() > 0); }
   /// Leases are out.
   bool any_out() const { return !out_.empty(); }
+  /// With a sampler that is trusted.
+  bool any_out(const Trusts& trusts) const {
+    return std::any_of(held_.begin(), held_.end(), [&](const auto& held) { return trusts(held.first); });
+  }
   bool complete() const { return closed_ ? out_.empty() : done_ == tiles_.size() && rows_.rows_left() == 0; }
   /// Open tiles are not wanted any more; what is out may still come.
   void close() { closed_ = true; }
@@ -80,12 +88,14 @@ class FrameTiles {
   /// whose lease ran out at this very sampler only if even_own. The tile counts as leased from lease() on, which must
   /// follow.
   std::optional<size_t> take(const std::string& sampler, int rows, bool even_own);
-  /// The tile that has been out longest, if nothing was heard of it since before_s (or it was leased kHeardFor_s before
-  /// that: its sampler only ever says that it needs longer), it has no backup and is not with `sampler` (nullptr: with
-  /// whom does not matter).
-  std::optional<size_t> overdue(double before_s, const std::string* sampler) const;
+  /// The tile that has been out longest, if all of its leases are late, there is room for one more and it is not with
+  /// `sampler` (nullptr: with whom does not matter). Late is a lease of before before_s, unless its sampler is trusted
+  /// and said since that it needs longer, which counts for kHeardFor_s.
+  std::optional<size_t> overdue(double before_s, const std::string* sampler, const Trusts& trusts) const;
+  /// The tile that has been out shortest with one sampler alone, which is trusted.
+  std::optional<size_t> to_copy(const Trusts& trusts) const;
 
-  /// Precondition: the tile came from take() or overdue(). Lease ids rise.
+  /// Precondition: the tile came from take(), overdue() or to_copy(). Lease ids rise.
   void lease(size_t tile, LeaseId id, const std::string& sampler, double now_s, double expires_s);
   /// False: not out with this sampler.
   bool extend(LeaseId id, const std::string& sampler, double now_s, double expires_s);
@@ -106,6 +116,7 @@ class FrameTiles {
   size_t leases_of(const std::string& sampler) const;
 
  private:
+  bool is_late(const Out& out, double before_s, const Trusts& trusts) const;
   std::map<LeaseId, Out>::iterator take_back(std::map<LeaseId, Out>::iterator lease);
   std::map<LeaseId, Out>::iterator end(std::map<LeaseId, Out>::iterator lease);
 

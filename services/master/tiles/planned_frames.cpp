@@ -32,10 +32,10 @@ PlannedView planned(PlannedView view, double now_s) {
 
 PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer, double now_s) const {
   const double ray_s = costs_.pixel_s({});
-  const bool few = costs_.samplers() <= kFewSamplers;
+  const bool few = workers() <= kFewSamplers;
   const int side = few ? kPlannedSideOfFew : kPlannedSide;
   PlanLimits out{.tile_size = side * options().tile_size, .tile_rays = kFirstTileRays, .most_rays = kFirstExtraRays};
-  const size_t samplers = std::max<size_t>(costs_.samplers(), 1);
+  const size_t samplers = std::max<size_t>(workers(), 1);
   out.refining_rays = refining_.most(samplers);
   out.link_rays = viewer ? gate_.update_rays(*viewer) : gate_.least_update_rays(now_s);
   // Tiles are leased at the pace of a link: one is no more than a part of what it carries for an update.

@@ -148,6 +148,12 @@ Ticked TilePlan::tick(double now_s) {
   const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
     log::warn("a lease of sampler {} expired; its tile goes to another", links_.name_of(sampler));
   });
+  for (const auto& [sampler, delivers] : schedule_.take_news(now_s))
+    if (delivers)
+      log::info("sampler {} delivers again", links_.name_of(sampler));
+    else
+      log::warn("sampler {} takes work and has delivered nothing for {:.0f} s: what others wait for goes to others",
+                links_.name_of(sampler), kTold_s);
   return {.expired = expired, .overdue = {}};
 }
 

@@ -51,6 +51,9 @@ class TilePlan final : public Plan {
   void heard_of(const std::string& sampler) override { schedule_.heard_of(sampler); }
   int release_sampler(const std::string& sampler) override { return schedule_.release_sampler(sampler); }
   size_t leases_of(const std::string& sampler) const override { return schedule_.leases_of(sampler); }
+  std::optional<double> stuck_s(const std::string& sampler, double now_s) const override {
+    return schedule_.stuck_s(sampler, now_s);
+  }
   Figures figures() const override;
   void add_status(nlohmann::ordered_json& status) const override;
 

@@ -57,18 +57,23 @@ TEST(HeldLeases, OthersGetATileThatOnlyEverIsExtended) {
   done.frame = first->frame, done.tile = first->tile, done.lease = first->lease;
   ASSERT_TRUE(s.tile_done(done, "fast", 0.01));
   s.request_view(request(1, 2));
-  const auto stuck = next(s, "stuck", 1);
+  const auto before = next(s, "stuck", 3);  // the fast one delivered long ago
+  ASSERT_TRUE(before);
+  done.frame = before->frame, done.tile = before->tile, done.lease = before->lease;
+  ASSERT_TRUE(s.tile_done(done, "stuck", 3.01)) << "it delivers, so it is trusted to extend";
+  s.request_view(request(1, 3));
+  const auto stuck = next(s, "stuck", 3.02);
   ASSERT_TRUE(stuck);
   double given_s = 0;
-  for (double now_s = 1; now_s < 10 && given_s == 0; now_s += 0.1) {
+  for (double now_s = 3.1; now_s < 13 && given_s == 0; now_s += 0.1) {
     s.extend(stuck->lease, "stuck", now_s);
     if (const auto backup = s.lease("fast", now_s)) {
       given_s = now_s;
       EXPECT_EQ(backup->tile, stuck->tile);
     }
   }
-  EXPECT_GT(given_s, 1 + kHeardFor_s);
-  EXPECT_LT(given_s, 1.5 + kHeardFor_s);
+  EXPECT_GT(given_s, 3 + kHeardFor_s);
+  EXPECT_LT(given_s, 3.5 + kHeardFor_s);
 }
 
 TEST(HeldLeases, OnlyWhoHoldsOneExtendsIt) {
@@ -142,6 +147,105 @@ TEST(HeldLeases, ARefusalOfAnotherFrameOrATileThatIsDoneChangesNothing) {
   for (int n = 0; n < 10; ++n) s.refused(other, "a");
   EXPECT_EQ(s.leases_of("a"), 1u);
   EXPECT_EQ(s.frames_in_flight(), 1u);
+}
+
+// A farm on a clock of milliseconds: each view has eight tiles, and there is always a next view.
+struct Farm {
+  enum class Kind { kGood, kSlow, kSilent, kExtends, kBegs };
+  struct Sampler {
+    Kind kind = Kind::kGood;
+    std::optional<wire::Lease> lease;
+    double until_s = 0;
+  };
+  static double needs_s(Kind kind) { return kind == Kind::kGood ? 0.01 : kind == Kind::kSlow ? 0.06 : 1e300; }
+
+  explicit Farm(std::vector<Kind> kinds) {
+    for (const Kind kind : kinds) samplers.push_back({kind});
+  }
+  void step() {
+    now_s += 0.001;
+    if (!schedule.view_waiting()) schedule.request_view(request(1, ++views));
+    for (size_t i = 0; i < samplers.size(); ++i) work(samplers[i], "sampler " + std::to_string(i));
+    schedule.expire(now_s, kNobody);
+    for (const auto& news : schedule.take_news(now_s)) told.push_back(news.sampler);
+  }
+  void work(Sampler& s, const std::string& name) {
+    if (s.lease && now_s >= s.until_s) {
+      wire::TileDone done;
+      done.frame = s.lease->frame, done.tile = s.lease->tile, done.lease = s.lease->lease;
+      schedule.tile_done(done, name, now_s);
+      s.lease.reset();
+      schedule.heard_of(name);
+    }
+    if (s.lease && s.kind == Kind::kExtends) schedule.extend(s.lease->lease, name, now_s);
+    if (s.lease && s.kind != Kind::kBegs) return;
+    if (s.kind == Kind::kBegs) schedule.heard_of(name);
+    if (auto lease = next(schedule, name, now_s)) s.lease = std::move(lease), s.until_s = now_s + needs_s(s.kind);
+  }
+  // Frames a second from now on.
+  double rate(double for_s) {
+    const uint64_t before = schedule.frames_completed();
+    for (const double until_s = now_s + for_s; now_s < until_s;) step();
+    return double(schedule.frames_completed() - before) / for_s;
+  }
+
+  FrameSchedule schedule{{.tile_size = 64, .frames_in_flight = 2, .lease_timeout_s = 2}};
+  std::vector<Sampler> samplers;
+  std::vector<std::string> told;
+  double now_s = 0;
+  uint64_t views = 0;
+};
+
+std::vector<Farm::Kind> one_good(size_t others, Farm::Kind kind) {
+  std::vector<Farm::Kind> out(others + 1, kind);
+  out[others / 2] = Farm::Kind::kGood;
+  return out;
+}
+
+// Of what the good one does alone: a copy of its tile takes nothing of it.
+TEST(HeldLeases, SamplersThatDeliverNothingTakeLittleOfTheRate) {
+  using enum Farm::Kind;
+  const double alone = Farm({kGood}).rate(10);
+  EXPECT_NEAR(alone, 100.0 / 8, 2);
+  for (const Farm::Kind kind : {kSilent, kExtends, kBegs})
+    for (const size_t others : {1, 8}) {
+      Farm farm(one_good(others, kind));
+      EXPECT_GT(farm.rate(10), 0.8 * alone) << others << " of the kind " << int(kind);
+      EXPECT_EQ(farm.told.size(), others) << "each once";
+    }
+}
+
+TEST(HeldLeases, WhoBeginsToDeliverHasItsShareAgain) {
+  using enum Farm::Kind;
+  Farm farm({kGood, kSilent});
+  const double alone = farm.rate(5);
+  EXPECT_TRUE(farm.schedule.stuck_s("sampler 1", farm.now_s));
+  farm.samplers[1].kind = kGood;
+  farm.samplers[1].lease.reset();
+  farm.rate(3);  // its last lease is still out
+  EXPECT_FALSE(farm.schedule.stuck_s("sampler 1", farm.now_s));
+  EXPECT_GT(farm.rate(5), 1.6 * alone);
+  EXPECT_EQ(farm.told, (std::vector<std::string>{"sampler 1", "sampler 1"}));
+}
+
+// What a slow one delivers comes after a backup's: it is not taken for one that delivers nothing.
+TEST(HeldLeases, SlowSamplersAreNotCalledStuck) {
+  using enum Farm::Kind;
+  const double alone = Farm({kGood}).rate(10);
+  Farm farm({kGood, kSlow});
+  EXPECT_GT(farm.rate(10), 0.9 * alone);
+  EXPECT_TRUE(farm.told.empty());
+}
+
+TEST(HeldLeases, SamplersGoOnWhereTheTrustedOneIsDead) {
+  using enum Farm::Kind;
+  Farm farm({kGood, kSilent});
+  farm.rate(3);
+  farm.samplers[0].kind = kSilent;  // it holds a lease, or takes one more
+  farm.samplers[1].kind = kGood;
+  farm.samplers[1].lease.reset();
+  farm.rate(3);
+  EXPECT_NEAR(farm.rate(5), 100.0 / 8, 2);
 }
 
 class HeldSlabs : public testing::Test {

@@ -298,8 +298,8 @@ TEST(Backups, AreNotForTilesThatWereExtended) {
   const auto a = s.lease("a", 10), b = s.lease("b", 10);
   s.extend(a->lease, "a", 10.5);
   EXPECT_EQ(s.lease("c", 10.51)->tile, b->tile);
-  EXPECT_FALSE(s.lease("c", 10.51));
-  EXPECT_EQ(s.lease("c", 10.6)->tile, a->tile);
+  EXPECT_FALSE(s.lease("d", 10.51));
+  EXPECT_EQ(s.lease("d", 10.6)->tile, a->tile);
 }
 
 TEST(Backups, OutliveTheSamplerTheyStandInFor) {

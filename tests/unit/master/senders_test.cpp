@@ -114,6 +114,21 @@ TEST(Senders, CommandsNeedTheirRole) {
   EXPECT_TRUE(senders.admit(from("c"), wire::Control{"stop", {}}).ok());
 }
 
+TEST(Senders, NobodyIsForgottenForWhatAnotherKeySays) {
+  Senders senders;
+  ASSERT_TRUE(senders.admit(from("a", "anna", Role::kViewer), hello("viewer", 1)).ok());
+  const auto takes_anna = [&](const std::string& peer) {
+    return senders.admit(from(peer, "ben", Role::kViewer), hello("viewer", 1)).ok();
+  };
+  for (uint64_t i = 2; i <= 3 * Senders::kMost; ++i)
+    ASSERT_TRUE(senders.admit(from("one", "ben", Role::kViewer), hello("viewer", i)).ok());
+  EXPECT_FALSE(takes_anna("one")) << "many lives over one connection";
+  for (uint64_t i = 2; i <= 3 * Senders::kMost; ++i)
+    ASSERT_TRUE(senders.admit(from("p" + std::to_string(i), "ben", Role::kViewer), hello("viewer", 1'000'000 + i)).ok());
+  EXPECT_FALSE(takes_anna("one")) << "many connections";
+  EXPECT_TRUE(senders.admit(from("a", "anna", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
+}
+
 TEST(Senders, RemembersSoManyAndNoMore) {
   Senders senders;
   for (uint64_t i = 1; i <= Senders::kMost + 10; ++i)

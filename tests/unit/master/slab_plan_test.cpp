@@ -803,6 +803,28 @@ TEST_F(VolumeMaster, ASilentSamplersSlabMovesUntilItAsksAgain) {
   EXPECT_EQ(assigned[2].slabs, 2u) << "it was slow, not dead";
 }
 
+TEST_F(VolumeMaster, ASamplerThatNeverDeliversHasItsSlabMoreAndMoreSeldom) {
+  begin();
+  join_all();
+  int delivered = 0, stood_still = 0;
+  uint64_t views = 0;
+  ask(1);
+  for (; now < 130; now += 0.05) {
+    ready(1);
+    ready(2);
+    view(++views);
+    if (views % 20 == 1) ask(2);
+    (void)sent<wire::SliceLease>("sampler2");
+    core->tick(now);
+    const auto lease = leased(1);
+    if (lease) finish(*lease, 1), ask(1);
+    ++(lease ? delivered : stood_still);
+  }
+  // It lets leases of 2 s run out, after 0, 2, 4, ... 32 s and not again.
+  EXPECT_NEAR(stood_still * 0.05, 7 * 2, 3);
+  EXPECT_GT(delivered, 0);
+}
+
 TEST_F(VolumeMaster, RestartedPeersFindTheirPlace) {
   begin();
   join_all();

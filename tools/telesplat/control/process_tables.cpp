@@ -73,6 +73,8 @@ Field size() {
 std::string heard(const Json& p) {
   const auto silent_s = number(p, "silent_s");
   if (!silent_s) return {};
+  if (const auto stuck_s = number(p, "delivers_nothing_s"); stuck_s && *silent_s <= kSilent_s)
+    return fmt::format("delivers nothing for {:.1f} s", *stuck_s);
   return *silent_s > kSilent_s ? fmt::format("silent for {:.1f} s", *silent_s) : fmt::format("{:.1f} s ago", *silent_s);
 }
 
