@@ -73,7 +73,8 @@ struct ReceivedLinks {
   metrics::SpanRecorder& spans;
   std::function<void(const ViewPart&)>
       on_part;                     ///< part of an update can be drawn, or is held until its update is complete
-  std::function<void()> on_epoch;  ///< a new epoch began
+  std::function<void(RequestId)> on_lost;  ///< its answer cannot be used: it is to be asked for again
+  std::function<void()> on_epoch;          ///< a new epoch began
   std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester
   std::function<double(double)> to_master_s;
 };

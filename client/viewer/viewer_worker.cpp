@@ -314,6 +314,7 @@ ReceivedLinks ViewerWorker::links() {
           .feeds = feeds_,
           .spans = spans_,
           .on_part = [this](const ViewPart& part) { on_part(part); },
+          .on_lost = [this](RequestId r) { lost_.push_back(r); },
           .on_epoch = [this] { requester_.on_epoch(to_master_s(monotonic_s())); },
           .requested_s = [this](RequestId r) { return requester_.requested_s(r); },
           .to_master_s = [this](double s) { return to_master_s(s); }};
@@ -383,6 +384,8 @@ void ViewerWorker::ask_again(double now_s) {
     std::vector<RequestId> released;
     again = c.overdue(now_s, released);
     release(released);
+    for (const RequestId request : std::exchange(lost_, {}))
+      if (c.is_open(request)) again.push_back(request);
     if (std::exchange(all_again_, false)) again = c.open();
   });
   for (const auto& request : requester_.again(again, to_master_s(now_s))) link_.socket().send(request);

@@ -144,7 +144,8 @@ class ViewerWorker {
   int seen_version_ = 0;
   bool told_coarser_ = false;
   InstanceId master_;
-  bool all_again_ = false;  // what is open is to be asked for again
+  bool all_again_ = false;       // what is open is to be asked for again
+  std::vector<RequestId> lost_;  // of these, which may be open
   double started_s_ = 0, last_report_s_ = 0;
   PipelineDepth depth_;  // where views come as pictures
   EpochId session_epoch_;

@@ -190,8 +190,10 @@ struct SliceAck {
   FrameId frame;
   uint64_t buffers = 1;   ///< it has, 1 to kMaxBuffers
   bool in_order = false;  ///< false: of frames that wait for it only the newest is worth sending
+  bool damaged = false;   ///< the frame could not be decoded
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("frame", m.frame); f("buffers", m.buffers); f("in_order", m.in_order);
+    f("damaged", m.damaged);
   }
 };
 

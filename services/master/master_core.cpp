@@ -408,7 +408,7 @@ void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double 
   if (by == instances_.end()) return;
   const auto sampler = peers_.find(by->second);
   if (sampler == peers_.end()) return;
-  plan_->refused(m, sampler->first);
+  plan_->refused(m, sampler->first, now_s);
   if (refused_tiles_.allow(now_s))
     log::warn("{} cannot use what sampler {} made of tile {} of frame {}: {}", p->hello.name,
               sampler->second.hello.name, m.tile, m.frame.value, m.why);

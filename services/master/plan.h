@@ -110,7 +110,7 @@ class Schedule {
   /// Gives a lease of this sampler its full time again, up to ScheduleOptions::longest_fetch_s. Others are ignored.
   virtual void extend(LeaseId lease, const std::string& sampler, double now_s) = 0;
   /// The packer cannot use what this sampler (empty: unknown) made of a tile.
-  virtual void refused(const wire::TileRefused& refused, const std::string& sampler) = 0;
+  virtual void refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) = 0;
   /// The packer has this tile, from `sampler` (empty: unknown). False: it has it twice, or nobody waits for it any
   /// more.
   virtual bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) = 0;

@@ -145,6 +145,18 @@ TEST(VolumeSession, DamagedAndForgottenAnswersAreAskedForAgain) {
   EXPECT_EQ(s.status.at("messages_rejected"), 1) << "the damaged one, counted and dropped";
 }
 
+TEST(VolumeSession, DamagedAnswersAreToldAndHoldUpNothing) {
+  for (const CouplingMode mode : {CouplingMode::kSync, CouplingMode::kLoose}) {
+    const Shown s = show({.damaged = {5, 9}}, mode, 20);
+    expect_complete(s, 20);
+    EXPECT_EQ(s.counts.damaged, 2u);
+    if (mode == CouplingMode::kSync) {
+      EXPECT_EQ(s.counts.repeated, 2u) << "with buffers the next answer may be there before, and is shown";
+    }
+    EXPECT_LT(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0.75e3 * Coupling::kPatience_s);
+  }
+}
+
 TEST(VolumeSession, ShowsEpochsAsTheyCome) {
   const Shown s = show({.epoch_every = 4}, CouplingMode::kLoose, 20);
   expect_complete(s, 20);

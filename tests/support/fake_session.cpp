@@ -134,6 +134,7 @@ void FakeSession::receive_state() {
         continue;
       }
       ++counts_.acknowledged;
+      counts_.damaged += ack->damaged;
       counts_.rising &= ack->frame.value >= last_acknowledged_;  // said again where the buffers change
       last_acknowledged_ = ack->frame.value;
       unacknowledged_.erase(ack->frame.value);

@@ -51,7 +51,7 @@ class FakeSession {
     uint64_t requests = 0, repeated = 0;  ///< view requests, and those whose id was known
     uint64_t most_open = 0;               ///< requests not answered, at most at any time
     uint64_t most_unacknowledged = 0;     ///< volume frames on their way, at most
-    uint64_t introductions = 0, acknowledged = 0;
+    uint64_t introductions = 0, acknowledged = 0, damaged = 0;
     uint64_t began_anew = 0;  ///< state requests for everything
     bool rising = true;       ///< acknowledgements came in the order of frames
     uint64_t buffers = 0;

@@ -20,7 +20,7 @@ ReceivedSlices::ReceivedSlices(const ReceivedOptions& options, const ReceivedLin
                    links_.gate.with([&](Coupling& c) { c.skip_before(part.request); });
                    links_.on_part(part);
                  },
-                 links.on_epoch, links.to_master_s},
+                 links.on_lost, links.on_epoch, links.to_master_s},
                 cache_, links.spans) {}
 
 std::span<const Feed> ReceivedSlices::feeds() const { return kFeeds; }

@@ -98,7 +98,8 @@ void SliceReceiver::on(const wire::SliceFrame& f, double arrived_s, net::Socket&
   if (!frame) {
     ++decode_errors_;
     if (log_limit_.allow(begin_s)) log::warn("volume frame {}: {}: dropped", f.frame.value, frame.error().text);
-    return acknowledge(f.frame, state);
+    acknowledge(f.frame, state, true);
+    return links_.on_lost(f.request);
   }
   packer_ = f.packer;
   newest_ = f.frame;
@@ -130,10 +131,10 @@ void SliceReceiver::on(const wire::SliceFrame& f, double arrived_s, net::Socket&
                   .decoded_s = links_.to_master_s(decoded_s)});
 }
 
-void SliceReceiver::acknowledge(FrameId frame, net::Socket& state) {
+void SliceReceiver::acknowledge(FrameId frame, net::Socket& state, bool damaged) {
   const bool in_order = options_.buffers > 0;
   if (frame.value != 0) acknowledged_ = frame;
-  state.send(wire::SliceAck{options_.viewer, frame, in_order ? options_.buffers : kAsyncBuffers, in_order});
+  state.send(wire::SliceAck{options_.viewer, frame, in_order ? options_.buffers : kAsyncBuffers, in_order, damaged});
 }
 
 // Frames that have left their buffers since the last call.

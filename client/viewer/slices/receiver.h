@@ -32,6 +32,7 @@ class SliceReceiver {
     std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester
     std::function<bool(RequestId)> expected;                      ///< whether it is open; asked where the display waits
     std::function<void(const ViewPart&)> on_part;                 ///< a frame is in the cache
+    std::function<void(RequestId)> on_lost;                       ///< the answer to it cannot be decoded
     std::function<void()> on_epoch;  ///< its epoch is another than that of the frame before
     std::function<double(double)> to_master_s;
   };
@@ -60,7 +61,7 @@ class SliceReceiver {
 
  private:
   void on(const wire::SliceFrame& frame, double arrived_s, net::Socket& state);
-  void acknowledge(FrameId frame, net::Socket& state);
+  void acknowledge(FrameId frame, net::Socket& state, bool damaged = false);
   void acknowledge_left(net::Socket& state);
 
   Options options_;

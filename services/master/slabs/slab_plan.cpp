@@ -16,7 +16,8 @@ namespace telesplat::master {
 namespace {
 
 constexpr double kWeighPatience_s = 2.0;  // slabs wait no longer for data servers to say what slices weigh
-constexpr double kLeastWait_s = 2.0, kMostWait_s = 60.0;  // of a sampler that let two leases run out, or more
+constexpr double kLeastWait_s = 2.0, kMostWait_s = 60.0;  // of a sampler that failed twice, or more often
+constexpr double kForgiven_s = 10.0;                      // after which it failed once
 
 }  // namespace
 
@@ -113,16 +114,32 @@ Result<Obeyed> SlabPlan::set(std::map<std::string, std::string> arguments) {
 }
 
 void SlabPlan::join(const std::string& sampler, double now_s) {
-  const auto late = late_.find(sampler);
-  if (late != late_.end() && now_s < late->second.until_s)
-    late->second.asked = true;
+  const auto failed = failed_.find(sampler);
+  if (failed != failed_.end() && now_s < failed->second.until_s)
+    failed->second.asks = true;
   else
     partitions_.join(sampler);
 }
 
+void SlabPlan::fail(const std::string& sampler, bool asks, double now_s) {
+  Failed f = failed_[sampler];
+  f.since_s = now_s, f.until_s = now_s + f.wait_s, f.asks = asks;
+  f.wait_s = std::clamp(2 * f.wait_s, kLeastWait_s, kMostWait_s);
+  release_sampler(sampler);
+  failed_[sampler] = f;
+}
+
+// Once may be chance: another partition would cost more.
+void SlabPlan::refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) {
+  schedule_.refused(refused, sampler);
+  const auto [failed, first] = failed_.try_emplace(sampler);
+  if (!first) return fail(sampler, true, now_s);
+  failed->second = {.since_s = now_s, .wait_s = kLeastWait_s};
+}
+
 void SlabPlan::prepare(double now_s) {
-  for (auto& [sampler, late] : late_)
-    if (now_s >= late.until_s && std::exchange(late.asked, false)) partitions_.join(sampler);
+  for (auto& [sampler, f] : failed_)
+    if (now_s >= f.until_s && std::exchange(f.asks, false)) partitions_.join(sampler);
   // Slabs cut without knowing what slices weigh would be fetched in vain.
   if (!whole_ || (!volume_.weighed() && now_s - since_s_ < kWeighPatience_s)) return;
   if (const auto made = partitions_.update(now_s)) assign(*made, now_s);
@@ -188,7 +205,8 @@ void SlabPlan::give_leases(Idle& idle, double now_s) {
 }
 
 bool SlabPlan::done(const wire::TileDone& tile, const std::string& sampler, double now_s) {
-  late_.erase(sampler);
+  if (const auto f = failed_.find(sampler); f != failed_.end() && now_s - f->second.since_s > kForgiven_s)
+    failed_.erase(f);
   return schedule_.tile_done(tile, now_s);
 }
 
@@ -196,11 +214,7 @@ Ticked SlabPlan::tick(double now_s) {
   const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
     log::warn("a slice lease of sampler {} expired; its slab goes to others until it asks again",
               links_.name_of(sampler));
-    Late late = late_[sampler];
-    late.until_s = now_s + late.wait_s;
-    late.wait_s = std::clamp(2 * late.wait_s, kLeastWait_s, kMostWait_s);
-    release_sampler(sampler);
-    late_[sampler] = late;
+    fail(sampler, false, now_s);
   });
   return {.expired = expired, .overdue = schedule_.overdue(now_s)};
 }
@@ -211,7 +225,7 @@ void SlabPlan::slab_ready(const std::string& sampler, const wire::SlabReady& sla
 
 int SlabPlan::release_sampler(const std::string& sampler) {
   partitions_.leave(sampler);
-  late_.erase(sampler);
+  failed_.erase(sampler);
   return schedule_.release_sampler(sampler);
 }
 

@@ -36,9 +36,7 @@ class SlabPlan final : public Plan {
   void extend(LeaseId lease, const std::string& sampler, double now_s) override {
     schedule_.extend(lease, sampler, now_s);
   }
-  void refused(const wire::TileRefused& refused, const std::string& sampler) override {
-    schedule_.refused(refused, sampler);
-  }
+  void refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) override;
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override;
   /// Views of a wall may be about to begin without one that is late.
   bool hurried() const override { return schedule_.walls_here() && schedule_.view_waiting(); }
@@ -53,11 +51,13 @@ class SlabPlan final : public Plan {
   void add_counters(std::map<std::string, double>& counters) const override;
 
  private:
-  /// A sampler whose lease ran out and that has delivered nothing since.
-  struct Late {
+  /// A sampler whose lease ran out, or whose slab cannot be used.
+  struct Failed {
+    double since_s = 0;
     double wait_s = 0, until_s = 0;  ///< that long, until then, it gets no slab: twice as long each time
-    bool asked = false;              ///< it would like to have one again
+    bool asks = false;               ///< it would like to have one again
   };
+  void fail(const std::string& sampler, bool asks, double now_s);
   Result<Obeyed> set(std::map<std::string, std::string> arguments);
   void assign(const Partition& partition, double now_s);
 
@@ -65,7 +65,7 @@ class SlabPlan final : public Plan {
   VolumeScene volume_;
   VolumeSchedule schedule_;
   SlabPartitions partitions_;
-  std::map<std::string, Late> late_;
+  std::map<std::string, Failed> failed_;
   bool whole_ = false;        // all of the volume is known, and partitions and schedule are of it
   double since_s_ = 0;        // since when
   TokenBucket log_{10, 200};  // lines that hellos bring about: not more often than a person reads

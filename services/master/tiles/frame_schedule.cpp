@@ -166,7 +166,8 @@ void FrameSchedule::extend(LeaseId lease, const std::string& sampler, double now
     o->second.expires_s = until_s(o->second.leased_s, o->second.expires_s);
 }
 
-void FrameSchedule::refused(const wire::TileRefused& m, const std::string& sampler) {
+void FrameSchedule::refused(const wire::TileRefused& m, const std::string& sampler, double now_s) {
+  trust_.failed(sampler, now_s);
   for (Frame& f : frames_)
     if (f.id == m.frame && f.tiles.refuse(m.tile, sampler) > 0) break;
   end_hopeless();

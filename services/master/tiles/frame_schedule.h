@@ -112,7 +112,7 @@ class FrameSchedule : public Views {
   void extend(LeaseId lease, const std::string& sampler, double now_s);
   /// What this sampler made of a tile cannot be used. The tile goes to another; a frame one of whose tiles is refused
   /// for ever ends without it.
-  void refused(const wire::TileRefused& refused, const std::string& sampler);
+  void refused(const wire::TileRefused& refused, const std::string& sampler, double now_s);
   /// The packer has this tile, which `sampler` (empty: unknown) sampled. Returns true the first time, whichever lease
   /// it came from; false for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
   bool tile_done(const wire::TileDone& tile, const std::string& sampler, double now_s);

@@ -39,8 +39,8 @@ class TilePlan final : public Plan {
   void extend(LeaseId lease, const std::string& sampler, double now_s) override {
     schedule_.extend(lease, sampler, now_s);
   }
-  void refused(const wire::TileRefused& refused, const std::string& sampler) override {
-    schedule_.refused(refused, sampler);
+  void refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) override {
+    schedule_.refused(refused, sampler, now_s);
   }
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override {
     return schedule_.tile_done(tile, sampler, now_s);

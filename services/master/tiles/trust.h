@@ -19,7 +19,7 @@ class Trust {
  public:
   /// What came is of a lease that it held.
   void delivered(const std::string& sampler, double now_s);
-  /// Its lease ran out, or another was faster with what it kept for too long.
+  /// Its lease ran out, another was faster with what it kept for too long, or what it delivered cannot be used.
   void failed(const std::string& sampler, double now_s);
   void leave(const std::string& sampler);
 

@@ -153,7 +153,7 @@ void SliceGatherer::packed(double master_s) {
   if (completed_) completed_->moments.packed_s = master_s;
 }
 
-void SliceGatherer::complete(const std::shared_ptr<const Frame>& frame, double now_s) {
+void SliceGatherer::complete(const std::shared_ptr<Frame>& frame, double now_s) {
   ++statistics_.frames_complete;
   closed_.push_back(frame->lease.frame);
   if (closed_.size() > kMaxClosedFrames) closed_.pop_front();
@@ -203,6 +203,9 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   v.in_order = ack.in_order;
   v.heard_s = now_s;
   if (ack.frame.value != 0) v.sent_again = false;
+  const auto sent = std::find_if(v.unacknowledged.begin(), v.unacknowledged.end(),
+                                 [&](const Waiting& w) { return w.frame->lease.frame == ack.frame; });
+  if (ack.damaged && sent != v.unacknowledged.end()) look_at(*std::shared_ptr(sent->frame), now_s);
   if (!begins && ack.frame.value == 0 && seems_lost(v, now_s)) begins = v.sent_again = true;
   if (begins) {
     // What was under way on a connection that broke is lost.
@@ -222,6 +225,27 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   v.waiting.push_back({newest_, own != views.end() ? *own : wire::SliceView{ack.viewer, {}, views.front().camera, 0},
                        own == views.end()});
   return ok_status();
+}
+
+// Every slab is decoded: the viewer may have said anything.
+void SliceGatherer::look_at(Frame& frame, double now_s) {
+  if (frame.looked_at || !looks_.take(now_s)) return;
+  frame.looked_at = true;
+  const auto& shear = frame.lease.shear;
+  const size_t before = refused_.size();
+  volume::SliceImage image;
+  for (size_t i = 0; i < frame.slabs.size(); ++i)
+    for (const auto& slice : frame.slices[i])
+      if (const Status s = volume::decode_slice_into(image, slice, shear.width, shear.height); !s) {
+        const auto& [sampler, lease, voxels, data] = frame.slabs[i].images;
+        refused_.push_back({lease.frame, lease.slab, lease.lease, sampler, s.error().text});
+        break;
+      }
+  if (refused_.size() == before) return;
+  statistics_.slabs_refused += refused_.size() - before;
+  if (newest_.get() == &frame) newest_ = nullptr;
+  for (auto& [id, v] : viewers_)
+    std::erase_if(v.waiting, [&](const Waiting& w) { return w.frame.get() == &frame; });
 }
 
 // Of a viewer in order, frames may stay in its buffers for as long as it likes.

@@ -6,9 +6,11 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/core/token_bucket.h"
 #include "common/volume/grid.h"
 #include "common/volume/slices/image.h"
 #include "common/wire/messages.h"
@@ -51,7 +53,7 @@ class SliceGatherer {
     uint64_t slabs = 0;            ///< taken
     uint64_t slabs_duplicate = 0;  ///< dropped: was here already
     uint64_t slabs_other_epoch = 0;
-    uint64_t slabs_refused = 0;  ///< dropped: contradict themselves or their frame
+    uint64_t slabs_refused = 0;  ///< dropped: contradict themselves or their frame, or cannot be decoded
     uint64_t frames_complete = 0;
     uint64_t frames_dropped = 0;  ///< never completed
     uint64_t frames_sent = 0;     ///< to viewers, each counted
@@ -78,9 +80,11 @@ class SliceGatherer {
   void packed(double master_s);
   /// A viewer is there (frame 0), or has let a frame go. One that was there before and now speaks over another
   /// connection gets what was under way to it once more; over the same one frame 0 is a sign of life, since nothing is
-  /// lost on it. One that comes late gets the newest complete frame, unless it wants its own in order. Error: a number
-  /// of buffers beyond its limits.
+  /// lost on it. One that comes late gets the newest complete frame, unless it wants its own in order. A frame that it
+  /// could not decode is looked at (take_refused()). Error: a number of buffers beyond its limits.
   Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
+  /// Slabs that cannot be decoded, of frames that viewers say to be damaged: each once.
+  std::vector<wire::TileRefused> take_refused() { return std::exchange(refused_, {}); }
   /// It could not be sent to.
   void unreachable(const std::string& peer);
   /// Forgets viewers that do not answer.
@@ -106,10 +110,11 @@ class SliceGatherer {
     size_t bytes = 0;
     wire::Moments moments;  // of the slab that completed it
     uint64_t voxels = 0;
+    bool looked_at = false;  // whether its slabs can be decoded
   };
   using Frames = std::deque<std::shared_ptr<Frame>>;
   struct Waiting {
-    std::shared_ptr<const Frame> frame;
+    std::shared_ptr<Frame> frame;
     wire::SliceView view;
     bool whole = false;  // the camera is another viewer's: nothing is left out
     double sent_s = 0;   // 0: it waits
@@ -134,7 +139,8 @@ class SliceGatherer {
   std::shared_ptr<Frame> frame_of(const wire::SliceLease& lease, size_t bytes);
   void drop(Frames::iterator frame);
   void make_room(size_t bytes);
-  void complete(const std::shared_ptr<const Frame>& frame, double now_s);
+  void complete(const std::shared_ptr<Frame>& frame, double now_s);
+  void look_at(Frame& frame, double now_s);
   Viewer& viewer(InstanceId id, double now_s);
   static bool seems_lost(const Viewer& viewer, double now_s);
   static bool has_room(const Viewer& viewer);
@@ -148,9 +154,11 @@ class SliceGatherer {
   Frames open_;              // oldest first
   std::deque<FrameId> closed_;
   std::shared_ptr<Frame> completed_;     // the last one
-  std::shared_ptr<const Frame> newest_;  // complete
+  std::shared_ptr<Frame> newest_;  // complete
   std::map<InstanceId, Viewer> viewers_;
   InstanceId turn_;  // the viewer served last
+  TokenBucket looks_{4, 4};
+  std::vector<wire::TileRefused> refused_;
   Statistics statistics_;
 };
 

@@ -112,6 +112,8 @@ void SlicePacking::send_out(double now_s, double* first_s) {
 
 Status SlicePacking::acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s) {
   const Status s = gatherer_.acknowledged(peer, ack, now_s);
+  for (const auto& refused : gatherer_.take_refused())
+    if (outlets_.refuse) outlets_.refuse(refused);
   send_out(now_s);
   return s;
 }

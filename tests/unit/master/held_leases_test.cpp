@@ -89,7 +89,7 @@ TEST(HeldLeases, ATileThatIsRefusedGoesToAnother) {
   FrameSchedule s({.tile_size = 256, .lease_timeout_s = 2});
   s.request_view(request(1, 1));
   const auto bad = next(s, "bad", 0);
-  s.refused(refusal(*bad), "bad");
+  s.refused(refusal(*bad), "bad", 0.1);
   const auto good = s.lease("good", 0.1, false);
   ASSERT_TRUE(good) << "at once: nobody waits until the lease runs out";
   EXPECT_EQ(good->tile, bad->tile);
@@ -111,7 +111,7 @@ TEST(HeldLeases, ATileThatIsRefusedEveryTimeEndsItsFrame) {
   while (s.frames_in_flight() > 0 && refused < 100) {
     const auto bad = s.lease("a", 0.2);
     ASSERT_TRUE(bad);
-    s.refused(refusal(*bad), "a");
+    s.refused(refusal(*bad), "a", 0.2);
     ++refused;
   }
   EXPECT_EQ(refused, kMostRefused + 1);
@@ -141,10 +141,10 @@ TEST(HeldLeases, ARefusalOfAnotherFrameOrATileThatIsDoneChangesNothing) {
   const auto lease = next(s, "a", 0);
   wire::TileRefused other = refusal(*lease);
   other.frame = {99};
-  for (int n = 0; n < 10; ++n) s.refused(other, "a");
+  for (int n = 0; n < 10; ++n) s.refused(other, "a", 0.2);
   other = refusal(*lease);
   other.tile = 77;
-  for (int n = 0; n < 10; ++n) s.refused(other, "a");
+  for (int n = 0; n < 10; ++n) s.refused(other, "a", 0.2);
   EXPECT_EQ(s.leases_of("a"), 1u);
   EXPECT_EQ(s.frames_in_flight(), 1u);
 }

@@ -100,6 +100,64 @@ TEST(SliceGatherer, AFrameGoesOutWhenAllOfItsSlabsAreThere) {
   EXPECT_EQ(g.open_frames(), 0u);
 }
 
+// Its blocks lie where they should, and one cannot be decoded.
+SliceGatherer::Slab damaged(const SliceGatherer::Slab& whole) {
+  const auto& shear = whole.images.lease.shear;
+  for (size_t at = whole.images.data.size(); at-- > 0;) {
+    auto bytes = std::make_shared<std::vector<uint8_t>>(*std::static_pointer_cast<const std::vector<uint8_t>>(whole.owner));
+    (*bytes)[at] ^= 0xff;
+    const auto slices = volume::parse_slices(*bytes, shear.width, shear.height, int(shear.layers.size()));
+    if (!slices || std::all_of(slices->begin(), slices->end(), [&](const auto& slice) {
+          return volume::decode_slice(slice, shear.width, shear.height).ok();
+        }))
+      continue;
+    SliceGatherer::Slab out{whole.images, bytes};
+    out.images.data = std::as_bytes(std::span(*bytes));
+    return out;
+  }
+  ADD_FAILURE() << "every slab can be decoded";
+  return whole;
+}
+
+TEST(SliceGatherer, WhatAViewerCannotDecodeIsRefusedAndSentToNobodyElse) {
+  auto g = gatherer();
+  for (const uint64_t viewer : {7, 8}) ASSERT_TRUE(g.acknowledged("peer " + std::to_string(viewer), ack(viewer, 0), 0));
+  const auto views = {view(7, 5), view(8, 6)};
+  ASSERT_TRUE(g.add(slab(lease(1, 0, 2, views)), 1));
+  const auto added = g.add(damaged(slab(lease(1, 1, 2, views))), 1);
+  ASSERT_TRUE(added.ok()) << added.error().text;
+  const auto out = g.take_outgoing(1);
+  ASSERT_TRUE(out);
+  wire::SliceAck bad = ack(out->frame.viewer.value, 1);
+  bad.damaged = true;
+  ASSERT_TRUE(g.acknowledged(out->peer, bad, 1));
+  const auto refused = g.take_refused();
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_EQ(refused[0].frame, FrameId{1});
+  EXPECT_EQ(refused[0].tile, 1u);
+  EXPECT_EQ(refused[0].lease, LeaseId{101});
+  EXPECT_EQ(refused[0].sampler, InstanceId{2});
+  EXPECT_FALSE(refused[0].why.empty());
+  EXPECT_FALSE(g.take_outgoing(1)) << "the other viewer's";
+  ASSERT_TRUE(g.acknowledged("late", ack(9, 0), 1));
+  EXPECT_FALSE(g.take_outgoing(1)) << "one that comes late";
+  ASSERT_TRUE(g.add(slab(lease(2, 0, 1, views)), 2));
+  EXPECT_TRUE(g.take_outgoing(2)) << "the next frame";
+}
+
+TEST(SliceGatherer, AFrameIsNotDamagedBecauseAViewerSaysSo) {
+  auto g = gatherer();
+  for (const uint64_t viewer : {7, 8}) ASSERT_TRUE(g.acknowledged("peer " + std::to_string(viewer), ack(viewer, 0), 0));
+  ASSERT_TRUE(g.add(slab(lease(1, 0, 1, {view(7, 5), view(8, 6)})), 1));
+  const auto out = g.take_outgoing(1);
+  ASSERT_TRUE(out);
+  wire::SliceAck bad = ack(out->frame.viewer.value, 1);
+  bad.damaged = true;
+  ASSERT_TRUE(g.acknowledged(out->peer, bad, 1));
+  EXPECT_TRUE(g.take_refused().empty());
+  EXPECT_TRUE(g.take_outgoing(1)) << "the other viewer's";
+}
+
 TEST(SliceGatherer, EachViewerGetsWhatItMaySee) {
   auto g = gatherer();
   ASSERT_TRUE(g.acknowledged("wide", ack(1, 0), 0));
