@@ -13,6 +13,7 @@ namespace telesplat::metrics {
 namespace {
 
 constexpr size_t kMostCouplings = 256, kMostOpenSkews = 1024;
+constexpr double kMostLost = 1e6;  // frames in a row: a larger step is no loss but another count
 
 std::string coupling_name(double mode, double buffers) {
   if (mode == 0) return "async";
@@ -81,6 +82,7 @@ Status Measured::add(const std::string& viewer, const wire::MetricRows& more) {
 
 void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
   if (const auto t_s = row.of("t_s")) {
+    add_lost(viewer, row);
     ++frames_shown;
     ++viewer.frames;
     viewer.frames_of_views += row.of("request").value_or(0) > 0;
@@ -99,6 +101,20 @@ void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
   refreshes_missed += row.of("missed").value_or(0);
   add_coupling(viewer, row);
   add_skew(row);
+}
+
+// Viewers number their frames: where numbers are missing the rows were lost on the way. A viewer that was started again
+// begins at a lower one.
+void Measured::add_lost(ViewerFigures& viewer, const Row& row) {
+  const auto frame = row.of("frame");
+  if (!frame) return;
+  const double before = std::exchange(viewer.last_frame, *frame);
+  if (before < 0 || !(*frame > before + 1) || *frame - before > kMostLost) return;
+  const auto lost = uint64_t(*frame - before) - 1;
+  viewer.rows_lost += lost;
+  viewer.frames += lost;
+  frames_shown += lost;
+  frame_rows_lost += lost;
 }
 
 // Of a still frame nothing was drawn: how long it took says nothing.

@@ -29,7 +29,9 @@ struct ViewerFigures {
   double duration_s = 0;
   double still_s = 0;  ///< part of it that ended with these
   Quantiles inter_frame_ms, motion_to_photon_ms, latency_ms;
+  uint64_t rows_lost = 0;  ///< of its frames: they were displayed, and their rows never came
   double last_s = -1e300;  ///< of its frames
+  double last_frame = -1;  ///< its number; below 0: none
   double last_ms = 0;      ///< delay of the last one; 0: it has none, or is still
   std::string coupling;    ///< of the last one
 
@@ -64,7 +66,7 @@ class Measured {
   uint64_t jitters = 0;
   // Of all their frames.
   Quantiles points_drawn, update_age_ms;
-  uint64_t frames_shown = 0, frames_still = 0;
+  uint64_t frames_shown = 0, frames_still = 0, frame_rows_lost = 0;
   bool headset = false;  ///< some frame had a lead
   uint64_t frames_late = 0;
   bool refreshed = false;  ///< some frame had a refresh to be in time for
@@ -89,6 +91,7 @@ class Measured {
  private:
   struct Row;
   void add_frame(ViewerFigures& viewer, const Row& row);
+  void add_lost(ViewerFigures& viewer, const Row& row);
   void add_delay(ViewerFigures& viewer, const Row& row);
   void add_coupling(ViewerFigures& viewer, const Row& row);
   void add_skew(const Row& row);

@@ -33,6 +33,12 @@ ordered_json or_null(const std::string& text) { return text.empty() ? ordered_js
 ordered_json rows_of(const std::map<std::string, uint64_t>& rows) {
   return rows.empty() ? ordered_json() : ordered_json(rows);
 }
+/// Those that no file took, and those of frames that never came.
+std::map<std::string, uint64_t> lost_rows(const Measured& measured, const RecordLosses& losses) {
+  auto out = losses.lost;
+  if (measured.frame_rows_lost > 0) out["frames.csv"] += measured.frame_rows_lost;
+  return out;
+}
 /// A figure that means something only if `measured` is so.
 template <class V>
 ordered_json if_measured(bool measured, V value) {
@@ -361,7 +367,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
         {"leases_expired", whole(counter("leases_expired"))},
         {"viewers_lost", roster.lost("viewer")},
         {"record_failed", about.losses.failed.size() + whole(roster.counted("", kRecordFailed))},
-        {"record_lost", rows_of(about.losses.lost)},
+        {"record_lost", rows_of(lost_rows(measured, about.losses))},
         {"record_cut", rows_of(about.losses.cut)}}}});
   return out;
 }

@@ -7,6 +7,19 @@
 namespace telesplat::metrics {
 namespace {
 
+// A master that stands still loses rows: the frames were displayed all the same.
+TEST_F(Record, RowsThatNeverCameAreCountedByTheNumbersOfFrames) {
+  const std::vector<std::string> columns{"frame", "t_s"};
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 1, 0.1, 2, 0.2, 6, 0.6}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {7, 0.7, 10, 1.0}}));
+  // It was started again.
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 1, 0.1, 3, 0.3}}));
+  const auto s = record->summary({}, {});
+  EXPECT_EQ(s["errors"]["record_lost"]["frames.csv"], 3 + 2 + 1);
+  EXPECT_EQ(s["frames"], 11 + 4);
+  EXPECT_EQ(s["by_viewer"][viewer.name]["frames"], 11 + 4);
+}
+
 TEST_F(Record, TheSummaryIsCompleteAndTrue) {
   ASSERT_TRUE(record->add_rows(viewer, {{5},
                                         "frames",
