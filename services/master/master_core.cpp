@@ -195,6 +195,12 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   return p;
 }
 
+bool MasterCore::serves(const std::string& peer) const {
+  const auto p = peers_.find(peer);
+  const std::string role = p == peers_.end() || p->second.gone ? std::string() : p->second.hello.role;
+  return role == "data" || role == "packer" || role == "sampler";
+}
+
 bool MasterCore::admit(const std::string& peer, double now_s) {
   const auto p = peers_.find(peer);
   const bool packer = p != peers_.end() && !p->second.gone && p->second.hello.role == "packer";

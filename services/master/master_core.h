@@ -37,6 +37,11 @@ class MasterCore {
 
   /// One more message of this peer may be handed to on(): it does not send more than its part. False: it is dropped.
   bool admit(const std::string& peer, double now_s);
+  /// A data server, a packer or a sampler, which the session lives of.
+  bool serves(const std::string& peer) const;
+  /// Of everybody else: net::WorkShares.
+  bool admit_work(const std::string& payer, double now_s) { return gate_.admit_work(payer, now_s); }
+  void worked(const std::string& payer, double seconds, double now_s) { gate_.worked(payer, seconds, now_s); }
   void on(const std::string& peer, const wire::Hello& m, double now_s);
   void on(const std::string& peer, const wire::StatusReport& m, double now_s);
   void on(const std::string& peer, const wire::ViewRequest& m, double now_s);

@@ -210,6 +210,15 @@ class MasterService {
       return;
     }
     if (!core_.admit(message.peer, now_s)) return control_.reject(message, "its peer sends more than --max-messages");
+    const std::string* payer = core_.serves(message.peer) ? nullptr : net::payer(message);
+    if (payer && !core_.admit_work(*payer, now_s))
+      return control_.reject(message, "its sender takes more than its share of the master's time");
+    const double begin_s = thread_cpu_s();
+    handle(message, now_s);
+    if (payer) core_.worked(*payer, thread_cpu_s() - begin_s, now_s);
+  }
+
+  void handle(const net::Message& message, double now_s) {
     if (message.type == wire::Hello::kName || message.type == wire::Control::kName)
       if (const auto version = wire::other_version(message.body)) return turn_away(message, *version);
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,

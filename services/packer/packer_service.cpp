@@ -10,6 +10,7 @@
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
 #include "common/net/connections/peer_rates.h"
+#include "common/net/connections/work_shares.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
@@ -227,12 +228,19 @@ class PackerService {
         from.reject(*message, "its peer sends more than --max-messages");
         continue;
       }
+      const std::string* payer = &from == &state_ ? net::payer(*message) : nullptr;
+      if (payer && !work_.admit(*payer, monotonic_s())) {
+        from.reject(*message, "its sender takes more than its share of the packer's time");
+        continue;
+      }
+      const double begin_s = thread_cpu_s();
       receive_control();  // what came on another socket at the same time may tell of its epoch
       if (is_of_the_kind_before(message->type)) continue;
       if (packing_)
         ((*packing_).*take)(from, *message, monotonic_s());
       else
         early_.add({&from, *message, take}, message->body.size(), monotonic_s());
+      if (payer) work_.worked(*payer, thread_cpu_s() - begin_s, monotonic_s());
     }
   }
 
@@ -245,7 +253,7 @@ class PackerService {
         {"keys_refused", double(tiles_.keys_refused() + patches_.keys_refused() + state_.keys_refused())},
         {"connections_refused",
          double(tiles_.connections_refused() + patches_.connections_refused() + state_.connections_refused())},
-        {"messages_refused", double(rates_.refused())},
+        {"messages_refused", double(rates_.refused() + work_.refused())},
         {"queue_refused", double(patches_.queue_refused() + state_.queue_refused())}};
     if (packing_) packing_->add_status(v);
     return v;
@@ -267,6 +275,7 @@ class PackerService {
   const PackerOptions& options_;
   net::Socket tiles_, patches_, state_;
   net::PeerRates rates_;  // of viewers
+  net::WorkShares work_;  // of viewers
   std::optional<net::MasterLink> link_;
   std::optional<DepthRecorder> recorder_;
   std::optional<PlanRecorder> plan_recorder_;

@@ -8,6 +8,7 @@
 #include "common/core/result.h"
 #include "common/core/token_bucket.h"
 #include "common/net/connections/peer_rates.h"
+#include "common/net/connections/work_shares.h"
 #include "common/wire/session_messages.h"
 #include "common/wire/tile_messages.h"
 
@@ -30,6 +31,8 @@ class Gate {
 
   /// One more message of this peer may be looked at.
   bool admit(const std::string& peer, double now_s) { return rates_.admit(peer, now_s); }
+  bool admit_work(const std::string& payer, double now_s) { return work_.admit(payer, now_s); }
+  void worked(const std::string& payer, double seconds, double now_s) { work_.worked(payer, seconds, now_s); }
   /// The view as it is sampled: where it has more pixels than the limit, every k-th of every k-th row.
   wire::ViewRequest admit(const wire::ViewRequest& view);
   /// Counts a hello that is refused.
@@ -39,7 +42,7 @@ class Gate {
   const Limits& limits() const { return limits_; }
   LimitsHit hit() const {
     LimitsHit out = hit_;
-    out.messages_refused = rates_.refused();
+    out.messages_refused = rates_.refused() + work_.refused();
     return out;
   }
 
@@ -47,6 +50,7 @@ class Gate {
   const Limits limits_;
   LimitsHit hit_;
   net::PeerRates rates_;
+  net::WorkShares work_;
   TokenBucket log_{10, 200};
 };
 

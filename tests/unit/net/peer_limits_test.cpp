@@ -4,6 +4,7 @@
 
 #include "common/net/connections/peer_rates.h"
 #include "common/net/connections/queued_bytes.h"
+#include "common/net/connections/work_shares.h"
 #include "common/net/service.h"
 
 namespace telesplat::net {
@@ -21,6 +22,31 @@ TEST(PeerRates, OneThatFloodsIsNoOthersBusiness) {
   EXPECT_EQ(others, 500);
   EXPECT_EQ(rates.refused(), 100'000u - uint64_t(heard));
   EXPECT_TRUE(rates.admit("flood", 3)) << "later it is heard again";
+}
+
+TEST(WorkShares, LargeMessagesAreNoOthersBusiness) {
+  WorkShares work;
+  double took_s = 0;
+  int others = 0;
+  for (double now_s = 1; now_s < 11; now_s += 0.01) {
+    if (work.admit("flood", now_s)) work.worked("flood", 0.03, now_s), took_s += 0.03;
+    if (work.admit("other", now_s)) work.worked("other", 0.001, now_s), ++others;
+  }
+  EXPECT_NEAR(took_s, WorkShares::kBurst_s + 10 * WorkShares::kShare, 0.05);
+  EXPECT_EQ(others, 1000) << "it takes a tenth of the time";
+  EXPECT_GT(work.refused(), 800u);
+  work.worked("other", 0.001, 20);
+  EXPECT_TRUE(work.admit("flood", 20)) << "later it is heard again";
+}
+
+TEST(WorkShares, GuestsPayByTheirKeysAndOperatorsDoNot) {
+  Message message;
+  message.peer = "connection";
+  EXPECT_EQ(*payer(message), "connection") << "without keys";
+  message.user = "anna", message.role = Role::kViewer;
+  EXPECT_EQ(*payer(message), "anna");
+  message.role = Role::kOperator;
+  EXPECT_EQ(payer(message), nullptr);
 }
 
 TEST(PeerRates, RemembersOnlySoManyPeers) {
