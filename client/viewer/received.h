@@ -72,7 +72,7 @@ struct ReceivedLinks {
   Feeds& feeds;
   metrics::SpanRecorder& spans;
   std::function<void(const ViewPart&)>
-      on_part;                     ///< part of an update can be drawn, or is held until its update is complete
+      on_part;                             ///< part of an update can be drawn, or is held until its update is complete
   std::function<void(RequestId)> on_lost;  ///< its answer cannot be used: it is to be asked for again
   std::function<void()> on_epoch;          ///< a new epoch began
   std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester

@@ -24,7 +24,7 @@ struct Table {
 /// What one viewer did.
 struct ViewerFigures {
   uint64_t frames = 0, updates = 0;
-  uint64_t still = 0;  ///< of its frames: nothing was drawn for them
+  uint64_t still = 0;            ///< of its frames: nothing was drawn for them
   uint64_t frames_of_views = 0;  ///< frames that showed a view that was complete, or what came later
   double duration_s = 0;
   double still_s = 0;  ///< part of it that ended with these

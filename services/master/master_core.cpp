@@ -357,13 +357,14 @@ std::optional<double> MasterCore::due_s() const {
 
 // ---- leases ---------------------------------------------------------------------------------------------------------
 
-void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double now_s) {
+void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double now_s, const std::string& guest) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
   // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
   wire::ViewRequest request = gate_.admit(m);
   if (!geometry::validate(geometry::subsample(request.camera, kCoarseStep))) return;
   request.moments = {.requested_s = m.moments.requested_s, .received_s = now_s};
+  plan_->views().spending().asked(m.viewer, guest, now_s);
   plan_->views().request_view(request);
   dispatch(now_s);
 }

@@ -44,7 +44,8 @@ class MasterCore {
   void worked(const std::string& payer, double seconds, double now_s) { gate_.worked(payer, seconds, now_s); }
   void on(const std::string& peer, const wire::Hello& m, double now_s);
   void on(const std::string& peer, const wire::StatusReport& m, double now_s);
-  void on(const std::string& peer, const wire::ViewRequest& m, double now_s);
+  /// guest: the owner of the viewer's key that let it in; empty: another key, or none.
+  void on(const std::string& peer, const wire::ViewRequest& m, double now_s, const std::string& guest = {});
   void on(const std::string& peer, const wire::LeaseRequest& m, double now_s);
   void on(const std::string& peer, const wire::LeaseExtend& m, double now_s);
   void on(const std::string& peer, const wire::TileDone& m, double now_s);

@@ -228,6 +228,8 @@ class MasterService {
           if (const Status s = senders_.admit(message, m); !s) return refuse(message, m, s.error());
           if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
             core_.on(message.peer, m, now_s, message.user);
+          else if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::ViewRequest>)
+            core_.on(message.peer, m, now_s, message.role == net::Role::kViewer ? message.user : std::string());
           else if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
             core_.on(message.peer, m, now_s);
           else if (const Status s = core_.on(message.peer, m, now_s); !s)

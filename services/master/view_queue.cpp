@@ -54,11 +54,20 @@ bool ViewQueue::turn_waiting() const {
   return std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.turn; });
 }
 
-const wire::ViewRequest* ViewQueue::next(bool turns_only, const std::function<bool(InstanceId)>& served) const {
-  const auto wanted = [&](const auto& v) { return (!turns_only || v.second.turn) && served(v.first); };
-  auto next = std::find_if(viewers_.upper_bound(last_), viewers_.end(), wanted);
-  if (next == viewers_.end()) next = std::find_if(viewers_.begin(), viewers_.end(), wanted);
-  return next == viewers_.end() ? nullptr : &next->second.requests.front();
+const wire::ViewRequest* ViewQueue::next(bool turns_only, const std::function<bool(InstanceId)>& served,
+                                         const std::function<double(InstanceId)>& spent) const {
+  const wire::ViewRequest* out = nullptr;
+  double least = 0;
+  auto v = viewers_.upper_bound(last_);
+  for (size_t n = 0; n < viewers_.size(); ++n, ++v) {
+    if (v == viewers_.end()) v = viewers_.begin();
+    if ((turns_only && !v->second.turn) || !served(v->first)) continue;
+    const double rays = spent(v->first);
+    if (out && rays >= least) continue;
+    out = &v->second.requests.front();
+    least = rays;
+  }
+  return out;
 }
 
 wire::ViewRequest ViewQueue::take(InstanceId viewer) {

@@ -20,6 +20,7 @@ void Views::request_view(const wire::ViewRequest& request) {
 
 void Views::forget_viewer(InstanceId viewer) {
   waiting_.forget(viewer);
+  spending_.forget(viewer);
   for (Begun& f : in_flight_)
     if (std::any_of(f.views.begin(), f.views.end(), [&](const auto& v) { return v.viewer == viewer; }))
       f.left.push_back(viewer);
@@ -28,20 +29,40 @@ void Views::forget_viewer(InstanceId viewer) {
 void Views::take_over(Views& from) {
   CHECK(from.in_flight_.empty());
   waiting_ = std::exchange(from.waiting_, {});
+  spending_ = from.spending_;
   next_frame_ = from.next_frame_, next_lease_ = from.next_lease_;
 }
 
 FrameId Views::next_frame() { return std::exchange(next_frame_, next_frame_.next()); }
 LeaseId Views::next_lease() { return std::exchange(next_lease_, next_lease_.next()); }
 
-std::optional<wire::ViewRequest> Views::take_view(bool turns_only, InFlight allowed,
+bool Views::another_waits() const {
+  return !in_flight_.empty() && view_waits([this](InstanceId viewer) {
+    return std::none_of(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) {
+      return spending_.person(f.views.front().viewer) == spending_.person(viewer);
+    });
+  });
+}
+
+bool Views::leaves_a_place(InstanceId viewer, uint64_t buffers, double now_s) const {
+  if (!spending_.others_ask(viewer, now_s)) return true;
+  const auto own = std::count_if(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) {
+    return spending_.person(f.views.front().viewer) == spending_.person(viewer);
+  });
+  return size_t(own) < std::max<size_t>(1, views_at_once(options_.frames_in_flight, buffers) - 1);
+}
+
+std::optional<wire::ViewRequest> Views::take_view(bool turns_only, double now_s, InFlight allowed,
                                                   const std::function<bool(InstanceId)>& ready) {
-  const wire::ViewRequest* next = waiting_.next(turns_only, [&](InstanceId viewer) {
+  const auto served = [&](InstanceId viewer) {
     if (ready && !ready(viewer)) return false;
+    if (!leaves_a_place(viewer, waiting_.first(viewer)->buffers, now_s)) return false;
     return allowed == InFlight::kAny || std::none_of(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) {
              return std::any_of(f.views.begin(), f.views.end(), [&](const auto& v) { return v.viewer == viewer; });
            });
-  });
+  };
+  const wire::ViewRequest* next =
+      waiting_.next(turns_only, served, [&](InstanceId viewer) { return spending_.spent(viewer, now_s); });
   if (!next || views_in_flight() >= views_at_once(options_.frames_in_flight, next->buffers)) return std::nullopt;
   return waiting_.take(next->viewer);
 }

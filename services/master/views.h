@@ -38,10 +38,14 @@ class Views {
  public:
   /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
   virtual void request_view(const wire::ViewRequest& request);
+  /// Whose request it is, and whose turns they are.
+  Spending& spending() { return spending_; }
   virtual void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
   /// A view of a viewer waits for which this is true.
   bool view_waits(const std::function<bool(InstanceId)>& of) const { return waiting_.next(false, of) != nullptr; }
+  /// A view waits of a person none of whose views is in flight, while those of another are.
+  bool another_waits() const;
   /// Of this viewer, the first; nullptr: none.
   const wire::ViewRequest* waiting_of(InstanceId viewer) const { return waiting_.first(viewer); }
   size_t views_waiting() const { return waiting_.waiting(); }
@@ -67,9 +71,11 @@ class Views {
   enum class InFlight { kAny, kOneAViewer };
   /// The view to begin; viewers take turns. turns_only: only those that have a turn. kOneAViewer: only those that have
   /// no view in flight. nullopt: none waits, or as many are in flight as may be (views_at_once()).
-  /// ready: only viewers for which it is true; null: all.
-  std::optional<wire::ViewRequest> take_view(bool turns_only, InFlight allowed = InFlight::kAny,
+  /// ready: only viewers for which it is true; null: all. Guests take turns by what they spend; one of them leaves a
+  /// place for views of others, where others ask.
+  std::optional<wire::ViewRequest> take_view(bool turns_only, double now_s, InFlight allowed = InFlight::kAny,
                                              const std::function<bool(InstanceId)>& ready = {});
+  const Spending& spending() const { return spending_; }
   /// More views for the same frame, as ViewQueue::take_all().
   std::vector<wire::ViewRequest> take_more(const std::function<bool(const wire::ViewRequest&)>& wanted, size_t most) {
     return waiting_.take_all(wanted, most);
@@ -93,7 +99,10 @@ class Views {
   std::vector<Begun>::iterator find(FrameId frame);
 
   ScheduleOptions options_;
+  bool leaves_a_place(InstanceId viewer, uint64_t buffers, double now_s) const;
+
   ViewQueue waiting_;
+  Spending spending_;
   std::vector<Begun> in_flight_;  // few
   FrameId next_frame_{1};
   LeaseId next_lease_{1};

@@ -370,7 +370,8 @@ class Run:
 
     def name_of(self, kind, number):
         """The widget that a number means: one that was ever here, three times of four one of those that were tried
-        least; for a choice, one of a list, which is opened: one of earlier runs, too, or of a list that was never open."""
+        least; for a choice, one of a list, which is opened: one of earlier runs, too, or of a list that was never
+        open."""
         every = self.widgets()
         if kind == "choice":
             lists = {n for n, w in every.items() if w[0] == "list"}

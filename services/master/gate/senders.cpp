@@ -26,9 +26,8 @@ Status Senders::admit(const net::Message& from, const wire::Hello& m) {
   if (before != instances_.end() && before->second != m.instance) forget(before->second);
   instances_[from.peer] = m.instance;
   if (owners_.size() > kMost) {
-    const auto most = std::max_element(of_user_.begin(), of_user_.end(), [](const auto& a, const auto& b) {
-      return a.second.size() < b.second.size();
-    });
+    const auto most = std::max_element(of_user_.begin(), of_user_.end(),
+                                       [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
     forget(most->second.front());
   }
   return ok_status();

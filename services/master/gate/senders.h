@@ -49,8 +49,8 @@ class Senders {
   Status is_same_user(const net::Message& from, InstanceId instance) const;
 
   struct Owner {
-    std::string peer;  ///< routing id of the connection that said hello
-    std::string user;  ///< the name of its key; empty: there are no keys
+    std::string peer;                       ///< routing id of the connection that said hello
+    std::string user;                       ///< the name of its key; empty: there are no keys
     std::list<InstanceId>::iterator place;  ///< in of_user_
   };
   void forget(InstanceId instance);

@@ -77,7 +77,7 @@ bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition>
   // they might not.
   if (!partition || (!frames_.empty() && frames_.back().partition != partition)) return false;
   const auto first =
-      take_view(turns_only, InFlight::kAny, [&](InstanceId viewer) { return !wait_for_others(viewer, now_s); });
+      take_view(turns_only, now_s, InFlight::kAny, [&](InstanceId viewer) { return !wait_for_others(viewer, now_s); });
   if (!first) return false;
   std::vector<wire::ViewRequest> requests{*first};
   for (auto& r :
@@ -89,6 +89,7 @@ bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition>
   for (wire::ViewRequest& r : requests) r.moments.begun_s = now_s;
   const FrameId id = next_frame();
   begin(id, requests);
+  for (const auto& r : requests) spending().spend(r.viewer, double(r.camera.width) * r.camera.height, now_s);
   frames_.push_back(
       {id, epoch, std::move(partition), std::move(shear), std::move(requests), std::vector<SlabState>(slabs)});
   return true;

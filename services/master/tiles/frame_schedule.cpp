@@ -19,7 +19,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   // The plan of a viewer's next view must know the samples of the one before.
   in_turns_ = turns_only;
   const auto ready = [&](InstanceId viewer) { return open(viewer, now_s); };
-  const auto request = take_view(turns_only, steered ? InFlight::kOneAViewer : InFlight::kAny, ready);
+  const auto request = take_view(turns_only, now_s, steered ? InFlight::kOneAViewer : InFlight::kAny, ready);
   if (!request) return false;
   close_extras(*request, now_s);
   PlannedView view{.epoch = epoch, .view = *request};
@@ -99,7 +99,8 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   const double pixel_s = costs_.pixel_s(sampler);
   const auto extras = std::find_if(frames_.rbegin(), frames_.rend(), [](const Frame& f) { return !f.extra; });
   const Frame* newest = extras == frames_.rend() ? nullptr : &*extras;  // of views
-  for (Frame& f : frames_) {
+  for (Frame* frame : in_turn(now_s)) {
+    Frame& f = *frame;
     if (!may_lease(f, now_s)) continue;
     const double row_s = pixel_s * f.camera.width;
     // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would
@@ -118,6 +119,17 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   return std::nullopt;
 }
 
+// Views of a guest who spends much let those of others go first; of one person's frames the oldest does.
+std::vector<FrameSchedule::Frame*> FrameSchedule::in_turn(double now_s) {
+  std::vector<Frame*> out;
+  for (Frame& f : frames_) out.push_back(&f);
+  const auto spent = [&](const Frame* f) { return spending().spent(f->request.viewer, now_s); };
+  std::stable_sort(out.begin(), out.end(), [&](const Frame* a, const Frame* b) {
+    return a->extra != b->extra ? b->extra : !a->extra && spent(a) < spent(b);
+  });
+  return out;
+}
+
 // So that it can show that it delivers, while a frame never waits for it.
 std::optional<wire::Lease> FrameSchedule::lease_copy(const std::string& sampler, double now_s) {
   const auto trusts = [&](const std::string& other) { return trust_.has(other); };
@@ -131,6 +143,7 @@ wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& 
   // One that has not finished a tile may have to fetch what it samples first, and to arrange it.
   const double time_s = costs_.knows(sampler) ? lease_time_s(f.planned) : options().lease_timeout_s;
   f.tiles.lease(tile, id, sampler, now_s, now_s + time_s);
+  spending().spend(f.request.viewer, double(f.tiles.tile(tile).rays), now_s);
   const auto& t = f.tiles.tile(tile);
   const auto mask = f.tiles.mask(t);
   return {.lease = id,

@@ -90,6 +90,8 @@ class FrameSchedule : public Views {
   /// What came of plans since the last call.
   std::vector<metrics::PlanRow> take_plan_rows() { return std::exchange(plan_rows_, {}); }
   bool steered(double now_s) const { return plans_.on(now_s); }
+  /// Views are to begin though no sampler is idle: the packer is asked first, or one person's would wait for another's.
+  bool begins_early(double now_s) const { return plans_.on(now_s) || another_waits(); }
   /// There is another packer.
   void trust_packer() { plans_.trust(), forget_links(); }
   /// Nothing is under way to any viewer.
@@ -191,6 +193,7 @@ class FrameSchedule : public Views {
   void end_closed();
   void end_hopeless();
   wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
+  std::vector<Frame*> in_turn(double now_s);
   std::optional<wire::Lease> lease_copy(const std::string& sampler, double now_s);
   /// A trusted sampler works on something, or delivered lately.
   bool trusted_here(double now_s) const;

@@ -29,7 +29,7 @@ class TilePlan final : public Plan {
   /// Views whose plans are late are sampled without; views that a newer one overtook end.
   void prepare(double now_s) override;
   bool may_begin(const Idle&) override { return schedule_.view_waiting(); }
-  bool begins_early(double now_s) const override { return schedule_.steered(now_s); }
+  bool begins_early(double now_s) const override { return schedule_.begins_early(now_s); }
   bool begin(EpochId epoch, bool turns_only, double now_s) override;
   void begin_extra(EpochId epoch, double now_s) override;
   Status planned(const wire::Plan& plan, double now_s) override;

@@ -244,8 +244,7 @@ void SliceGatherer::look_at(Frame& frame, double now_s) {
   if (refused_.size() == before) return;
   statistics_.slabs_refused += refused_.size() - before;
   if (newest_.get() == &frame) newest_ = nullptr;
-  for (auto& [id, v] : viewers_)
-    std::erase_if(v.waiting, [&](const Waiting& w) { return w.frame.get() == &frame; });
+  for (auto& [id, v] : viewers_) std::erase_if(v.waiting, [&](const Waiting& w) { return w.frame.get() == &frame; });
 }
 
 // Of a viewer in order, frames may stay in its buffers for as long as it likes.

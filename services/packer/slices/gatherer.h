@@ -153,8 +153,8 @@ class SliceGatherer {
   double most_bytes_s_ = 0;  // wished
   Frames open_;              // oldest first
   std::deque<FrameId> closed_;
-  std::shared_ptr<Frame> completed_;     // the last one
-  std::shared_ptr<Frame> newest_;  // complete
+  std::shared_ptr<Frame> completed_;  // the last one
+  std::shared_ptr<Frame> newest_;     // complete
   std::map<InstanceId, Viewer> viewers_;
   InstanceId turn_;  // the viewer served last
   TokenBucket looks_{4, 4};

@@ -54,10 +54,15 @@ TEST(CutOff, ASamplerFromTheDataServerAlone) {
         << fault.run().status().dump(1);
   }
   EXPECT_EQ(value(fault.run().status(), "cut-off", "tiles_sampled"), 0);
+  EXPECT_TRUE(fault.run().wait_status([](const auto& s) {
+    return process(s, "cut-off").contains("delivers_nothing_s");
+  })) << "it is named: "
+      << fault.run().status().dump(1);
   relay.reset();
   relay = std::make_unique<OwnRelay>(fault, "local", at);
-  EXPECT_TRUE(fault.run().wait_status([](const auto& s) { return value(s, "cut-off", "tiles_sampled") > 0; }))
-      << guest.err();
+  EXPECT_TRUE(fault.run().wait_status([](const auto& s) {
+    return value(s, "cut-off", "tiles_sampled") > 0 && !process(s, "cut-off").contains("delivers_nothing_s");
+  })) << guest.err();
   guest.signal(SIGTERM);
   EXPECT_EQ(guest.wait(20), 0) << guest.err();
   fault.finish();

@@ -124,7 +124,8 @@ TEST(Senders, NobodyIsForgottenForWhatAnotherKeySays) {
     ASSERT_TRUE(senders.admit(from("one", "ben", Role::kViewer), hello("viewer", i)).ok());
   EXPECT_FALSE(takes_anna("one")) << "many lives over one connection";
   for (uint64_t i = 2; i <= 3 * Senders::kMost; ++i)
-    ASSERT_TRUE(senders.admit(from("p" + std::to_string(i), "ben", Role::kViewer), hello("viewer", 1'000'000 + i)).ok());
+    ASSERT_TRUE(
+        senders.admit(from("p" + std::to_string(i), "ben", Role::kViewer), hello("viewer", 1'000'000 + i)).ok());
   EXPECT_FALSE(takes_anna("one")) << "many connections";
   EXPECT_TRUE(senders.admit(from("a", "anna", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
 }

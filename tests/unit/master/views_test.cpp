@@ -146,5 +146,76 @@ TEST(FrameSchedule, BufferedViewsOfTwoPassesAreAnsweredOnce) {
   EXPECT_FALSE(s.view_waiting()) << "its coarse frame and its fine one are the same view";
 }
 
+// What guests ask for costs nobody else more than their share, however much it is.
+// One sampler of 2 million rays a second, on a clock of milliseconds. Each viewer always wants another view.
+struct Session {
+  struct Viewer {
+    InstanceId id;
+    std::string person;
+    int side;
+  };
+  explicit Session(std::vector<Viewer> all) : viewers(std::move(all)) {}
+
+  // Views a second of the first viewer.
+  double rate(double for_s) {
+    const double begin_s = now_s;
+    uint64_t views = 0;
+    for (; now_s < begin_s + for_s; now_s += 0.001) {
+      for (const Viewer& v : viewers) ask(v);
+      if (lease && now_s >= until_s) {
+        wire::TileDone done;
+        done.frame = lease->frame, done.tile = lease->tile, done.lease = lease->lease;
+        const bool first = lease->viewer == viewers[0].id;
+        const uint64_t before = schedule.frames_completed();
+        schedule.tile_done(done, "sampler", now_s);
+        views += first && schedule.frames_completed() > before;
+        lease.reset();
+      }
+      if (!lease) take();
+    }
+    return double(views) / for_s;
+  }
+  void ask(const Viewer& v) {
+    wire::ViewRequest r;
+    r.viewer = v.id;
+    r.request = {++requests};
+    r.camera.width = r.camera.height = v.side;
+    schedule.spending().asked(v.id, v.person, now_s);
+    schedule.request_view(r);
+  }
+  void take() {
+    do
+      if (!lease) lease = schedule.lease("sampler", now_s);
+    while ((!lease || schedule.begins_early(now_s)) && schedule.begin_view({1}, false, now_s));
+    if (lease) until_s = now_s + double(lease->rect.width) * lease->rect.height / 2e6;
+  }
+
+  FrameSchedule schedule{{.tile_size = 256, .frames_in_flight = 2, .lease_timeout_s = 60}};
+  std::vector<Viewer> viewers;
+  std::optional<wire::Lease> lease;
+  double now_s = 0, until_s = 0;
+  uint64_t requests = 0;
+};
+
+TEST(Guests, OneWithLargeViewsHasItsShareAlone) {
+  const Session::Viewer anna{{1}, "anna", 256};
+  const double alone = Session({anna}).rate(20);
+  EXPECT_GT(alone, 20);
+  EXPECT_GE(Session({anna, {{2}, "ben", 4096}}).rate(40), 0.45 * alone);
+  EXPECT_GE(Session({{{1}, "", 256}, {{2}, "ben", 4096}}).rate(40), 0.45 * alone) << "beside the owner";
+}
+
+TEST(Guests, OneWithManyViewersHasItsShareAlone) {
+  const Session::Viewer anna{{1}, "anna", 256};
+  const double alone = Session({anna}).rate(20);
+  std::vector<Session::Viewer> all{anna};
+  for (uint64_t i = 2; i <= 20; ++i) all.push_back({{i}, "ben", 256});
+  EXPECT_GE(Session(all).rate(40), 0.45 * alone);
+}
+
+TEST(Guests, OneAloneHasEverything) {
+  EXPECT_NEAR(Session({{{2}, "ben", 256}}).rate(20), Session({{{2}, "", 256}}).rate(20), 1);
+}
+
 }  // namespace
 }  // namespace telesplat::master

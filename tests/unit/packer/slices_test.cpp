@@ -104,7 +104,8 @@ TEST(SliceGatherer, AFrameGoesOutWhenAllOfItsSlabsAreThere) {
 SliceGatherer::Slab damaged(const SliceGatherer::Slab& whole) {
   const auto& shear = whole.images.lease.shear;
   for (size_t at = whole.images.data.size(); at-- > 0;) {
-    auto bytes = std::make_shared<std::vector<uint8_t>>(*std::static_pointer_cast<const std::vector<uint8_t>>(whole.owner));
+    auto bytes =
+        std::make_shared<std::vector<uint8_t>>(*std::static_pointer_cast<const std::vector<uint8_t>>(whole.owner));
     (*bytes)[at] ^= 0xff;
     const auto slices = volume::parse_slices(*bytes, shear.width, shear.height, int(shear.layers.size()));
     if (!slices || std::all_of(slices->begin(), slices->end(), [&](const auto& slice) {
