@@ -74,7 +74,7 @@ FLOORS = {
         ],
     ],
     "services/packer": [
-        [("services/packer/epoch_hold.h", "services/packer/packing.h")],
+        [("services/packer/epoch_hold.h", "services/packer/packing.h", "services/packer/state_senders.h")],
         ["services/packer/points", "services/packer/slices", "services/packer/pictures"],
         ["services/packer"],
     ],

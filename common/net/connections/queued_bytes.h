@@ -36,7 +36,7 @@ class QueuedBytes {
     uint64_t bytes_ = 0;
   };
 
-  /// most: to a peer, in bytes. Where twice as much waits for all together, a peer may have its part of an eighth of it.
+  /// most: to a peer, in bytes. Where twice as much waits for all together, each may have its part of an eighth of it.
   explicit QueuedBytes(uint64_t most) : most_(most) {}
 
   /// One more message for this peer. A peer for whom nothing waits may have one of any size.

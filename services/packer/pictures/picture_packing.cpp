@@ -30,7 +30,10 @@ void PicturePacking::take_sampled(net::Socket& from, const net::Message& message
 }
 
 void PicturePacking::take_state(net::Socket& from, const net::Message& message, double /*now_s*/) {
-  net::dispatch<wire::SliceAck>(from, message, [&](const wire::SliceAck& m) { meet(message.peer, m.viewer); });
+  net::dispatch<wire::SliceAck>(from, message, [&](const wire::SliceAck& m) {
+    if (!senders_.may_speak(message, m.viewer)) return from.reject(message, kNotItsViewer);
+    meet(message.peer, m.viewer);
+  });
 }
 
 bool PicturePacking::is_first(const wire::Lease& lease) {

@@ -8,6 +8,7 @@
 #include "common/metrics/recorder.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
+#include "services/packer/state_senders.h"
 
 namespace telesplat::packer {
 
@@ -58,6 +59,7 @@ class PicturePacking final : public Packing {
   EpochHold<Ahead> ahead_{{.items = 64, .bytes = 64u << 20}};
   EpochHold<Unmet> unmet_{{.items = 64, .bytes = 64u << 20}};
   std::map<InstanceId, std::string> peers_;  // of viewers
+  StateSenders senders_;
   std::deque<Frame> frames_;                 // the newest last
   uint64_t tiles_ = 0, duplicate_ = 0, other_epoch_ = 0, unsealed_ = 0, bytes_sent_ = 0;
 };

@@ -354,6 +354,7 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
   net::dispatch<wire::StateRequest, wire::AccessReport, wire::Receipt>(from, message, [&](const auto& m) {
     if (!core_) return;
     using M = std::decay_t<decltype(m)>;
+    if (!senders_.may_speak(message, m.viewer)) return from.reject(message, kNotItsViewer);
     if constexpr (std::is_same_v<M, wire::Receipt>)
       on_receipt(m, message.peer, now_s);
     else if constexpr (std::is_same_v<M, wire::AccessReport>)

@@ -19,6 +19,7 @@
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
 #include "services/packer/points/state_answers.h"
+#include "services/packer/state_senders.h"
 
 namespace telesplat::packer {
 
@@ -120,6 +121,7 @@ class PointPacking final : public Packing {
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links
   StateAnswers answers_;
+  StateSenders senders_;
   net::PeerRates beginnings_{kBeginnings_s};  // of answers
   log::RateLimiter told_of_viewers_;
   Completions completions_;

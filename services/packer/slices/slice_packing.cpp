@@ -43,6 +43,7 @@ void SlicePacking::take_sampled(net::Socket& from, const net::Message& message, 
 
 void SlicePacking::take_state(net::Socket& from, const net::Message& message, double now_s) {
   net::dispatch<wire::SliceAck>(from, message, [&](const wire::SliceAck& m) {
+    if (!senders_.may_speak(message, m.viewer)) return from.reject(message, kNotItsViewer);
     if (const Status s = acknowledged(message.peer, m, now_s); !s) from.reject(message, s.error().text);
   });
 }

@@ -7,6 +7,7 @@
 #include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
 #include "services/packer/slices/gatherer.h"
+#include "services/packer/state_senders.h"
 
 namespace telesplat::packer {
 
@@ -41,6 +42,7 @@ class SlicePacking final : public Packing {
   Outlets outlets_;
   metrics::SpanRecorder& spans_;
   SliceGatherer gatherer_;
+  StateSenders senders_;
   EpochHold<Received> ahead_{{.items = 64, .bytes = 256u << 20}};
   InstanceId instance_ = net::make_instance_id(), master_;
   std::optional<volume::Grid> grid_;

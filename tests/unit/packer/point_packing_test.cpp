@@ -732,6 +732,23 @@ TEST_F(PointPackingTest, SessionsOfAnotherPipelineAreNotFollowed) {
   EXPECT_EQ(socket.rejected(), 2u);
 }
 
+TEST_F(PointPackingTest, OneGuestDoesNotSpeakForAnothersViewer) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  const auto says = [&](const char* user, net::Role role, const auto& m) {
+    net::Message out = message(m);
+    out.user = user, out.role = role;
+    packing.take_state(socket, out, 1);
+    return socket.rejected();
+  };
+  const wire::StateRequest asks{{77}, {}, {}};
+  const wire::AccessReport drew{.viewer = {77}, .clusters = {}, .frames = {}};
+  EXPECT_EQ(says("anna", net::Role::kViewer, asks), 0u);
+  EXPECT_EQ(says("ben", net::Role::kViewer, asks), 1u);
+  EXPECT_EQ(says("ben", net::Role::kViewer, drew), 2u);
+  EXPECT_EQ(says("anna", net::Role::kViewer, drew), 2u);
+  EXPECT_EQ(says("owner", net::Role::kOperator, drew), 2u) << "who may end the session";
+}
+
 TEST_F(PointPackingTest, TilesThatMakeNoSenseAreRefused) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   auto bad = tile(1, 0);
