@@ -96,7 +96,7 @@ class Run:
         status = json.loads(self.told() or "{}")
         for p in status.get("processes", []):
             for name in NEVER:
-                if p["values"].get(name, 0) > 0:
+                if p.get("values", {}).get(name, 0) > 0:  # none yet of one that has just come
                     raise Fault(f"{p['name']} counts {p['values'][name]} {name}{self.dropped()}")
 
     def dropped(self):
