@@ -203,8 +203,11 @@ class Run:
                 return w if w and w[6] else None
             tries, top = tries + 1 if w[2] == top else 0, w[2]
             height = self.hands.size()[1]
-            self.hands.move((w[1] + w[3]) / 2, height / 2)
-            way = (w[2] + w[4] - height) / 2
+            part = name.split("=")[0] + "="
+            beside = [o for n, o in self.widgets().items() if n.startswith(part) and o[6]]  # in the open list
+            middle = (beside[0][2] + beside[0][4]) / 2 if beside else height / 2
+            self.hands.move((w[1] + w[3]) / 2, middle)
+            way = (w[2] + w[4]) / 2 - middle
             self.hands.click(4 if way < 0 else 5, max(1, min(20, int(abs(way) / WHEEL))))
             self.settle()
         return None
@@ -230,6 +233,7 @@ class Run:
                 self.settle()
         if name not in all_here() and "=" in name and name.split("=")[0] in self.widgets():
             self.open_list(name.split("=")[0])
+            self.settle()  # it is laid out in its second frame
         if name not in all_here() and name in self.openers and not self.opens:
             self.opens = True
             self.do(self.openers[name])
