@@ -39,7 +39,7 @@ class MasterCore {
   bool admit(const std::string& peer, double now_s);
   /// A data server, a packer or a sampler, which the session lives of.
   bool serves(const std::string& peer) const;
-  /// Of everybody else: net::WorkShares.
+  /// For all others: net::WorkShares.
   bool admit_work(const std::string& payer, double now_s) { return gate_.admit_work(payer, now_s); }
   void worked(const std::string& payer, double seconds, double now_s) { gate_.worked(payer, seconds, now_s); }
   void on(const std::string& peer, const wire::Hello& m, double now_s);

@@ -79,9 +79,11 @@ bool FrameSchedule::trusted_here(double now_s) const {
          std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) { return f.tiles.any_out(has); });
 }
 
-std::optional<double> FrameSchedule::stuck_s(const std::string& sampler, double now_s) const {
-  const auto waited_s = trust_.waited_s(sampler, now_s);
-  return waited_s && *waited_s > kTold_s ? waited_s : std::nullopt;
+std::vector<Trust::News> FrameSchedule::take_news(double now_s) {
+  return trust_.news(now_s, [this](const std::string& sampler) {
+    return leases_of(sampler) > 0 || std::any_of(overtaken_.begin(), overtaken_.end(),
+                                                 [&](const auto& o) { return o.second.sampler == sampler; });
+  });
 }
 
 double FrameSchedule::target_s() const {

@@ -135,8 +135,10 @@ class FrameSchedule : public Views {
   /// A tile has been out so long that any other sampler than its own could take a backup.
   bool backup_due(double now_s) const;
   /// See Trust.
-  std::vector<Trust::News> take_news(double now_s) { return trust_.news(now_s); }
-  std::optional<double> stuck_s(const std::string& sampler, double now_s) const;
+  std::vector<Trust::News> take_news(double now_s);
+  std::optional<double> stuck_s(const std::string& sampler, double now_s) const {
+    return trust_.stuck_s(sampler, now_s);
+  }
   size_t frames_in_flight() const { return frames_.size(); }
   uint64_t tiles_released() const { return released_; }
   uint64_t backups() const { return backups_; }

@@ -33,16 +33,16 @@ bool Trust::has_failed(const std::string& sampler) const {
   return s != samplers_.end() && !s->second.trusted;
 }
 
-std::optional<double> Trust::waited_s(const std::string& sampler, double now_s) const {
+std::optional<double> Trust::stuck_s(const std::string& sampler, double now_s) const {
   const auto s = samplers_.find(sampler);
-  if (s == samplers_.end() || s->second.trusted) return std::nullopt;
+  if (s == samplers_.end() || s->second.trusted || !s->second.told) return std::nullopt;
   return now_s - s->second.since_s;
 }
 
-std::vector<Trust::News> Trust::news(double now_s) {
+std::vector<Trust::News> Trust::news(double now_s, const std::function<bool(const std::string&)>& holds_work) {
   std::vector<News> out;
   for (auto& [name, s] : samplers_) {
-    const bool stuck = !s.trusted && (s.told || now_s - s.since_s > kTold_s);
+    const bool stuck = !s.trusted && (s.told || (now_s - s.since_s > kTold_s && holds_work(name)));
     if (stuck == s.told) continue;
     s.told = stuck;
     stuck ? ++stuck_ : --stuck_;

@@ -1,6 +1,7 @@
 // Which samplers deliver: what others wait for is leased to these alone.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -8,9 +9,9 @@
 
 namespace telesplat::master {
 
-/// Nobody is trusted more than others if the trusted ones have delivered nothing for so long: they may be dead.
+/// All are served alike if the trusted ones have delivered nothing for this long: they may be dead.
 inline constexpr double kTrusted_s = 2.0;
-/// A sampler that delivers nothing for so long is told of.
+/// A sampler that holds work and delivers nothing for this long is told of.
 inline constexpr double kTold_s = 1.0;
 
 /// A sampler has failed that kept others waiting and has delivered nothing since; trusted is who delivered and has not
@@ -27,8 +28,8 @@ class Trust {
   bool has_failed(const std::string& sampler) const;
   /// A trusted one delivered lately.
   bool lately(double now_s) const { return trusted_ > 0 && now_s - delivered_s_ < kTrusted_s; }
-  /// Seconds since it failed; nullopt: it has not.
-  std::optional<double> waited_s(const std::string& sampler, double now_s) const;
+  /// Seconds since it failed, of one that news() told of; else nullopt.
+  std::optional<double> stuck_s(const std::string& sampler, double now_s) const;
 
   /// How many samplers news() told that deliver nothing.
   size_t stuck() const { return stuck_; }
@@ -37,8 +38,8 @@ class Trust {
     std::string sampler;
     bool delivers;  ///< again
   };
-  /// Samplers that have delivered nothing for kTold_s, and those of these that deliver again: each once.
-  std::vector<News> news(double now_s);
+  /// Samplers that hold work and have delivered nothing for kTold_s, and those of these that deliver again: each once.
+  std::vector<News> news(double now_s, const std::function<bool(const std::string&)>& holds_work);
 
  private:
   struct State {

@@ -202,7 +202,7 @@ std::vector<Farm::Kind> one_good(size_t others, Farm::Kind kind) {
   return out;
 }
 
-// Of what the good one does alone: a copy of its tile takes nothing of it.
+// A copy of the good one's tile takes nothing of it, so it goes on as if it were alone.
 TEST(HeldLeases, SamplersThatDeliverNothingTakeLittleOfTheRate) {
   using enum Farm::Kind;
   const double alone = Farm({kGood}).rate(10);

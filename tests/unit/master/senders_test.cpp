@@ -114,7 +114,7 @@ TEST(Senders, CommandsNeedTheirRole) {
   EXPECT_TRUE(senders.admit(from("c"), wire::Control{"stop", {}}).ok());
 }
 
-TEST(Senders, NobodyIsForgottenForWhatAnotherKeySays) {
+TEST(Senders, NoGuestIsForgottenForWhatAnotherKeySays) {
   Senders senders;
   ASSERT_TRUE(senders.admit(from("a", "anna", Role::kViewer), hello("viewer", 1)).ok());
   const auto takes_anna = [&](const std::string& peer) {

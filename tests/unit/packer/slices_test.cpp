@@ -120,7 +120,7 @@ SliceGatherer::Slab damaged(const SliceGatherer::Slab& whole) {
   return whole;
 }
 
-TEST(SliceGatherer, WhatAViewerCannotDecodeIsRefusedAndSentToNobodyElse) {
+TEST(SliceGatherer, WhatAViewerCannotDecodeIsRefusedAndSentToNoOther) {
   auto g = gatherer();
   for (const uint64_t viewer : {7, 8}) ASSERT_TRUE(g.acknowledged("peer " + std::to_string(viewer), ack(viewer, 0), 0));
   const auto views = {view(7, 5), view(8, 6)};
