@@ -18,7 +18,7 @@ Status Senders::admit(const net::Message& from, const wire::Hello& m) {
     auto& instances = of_user_[from.user];
     owners_[m.instance] = {from.peer, from.user, instances.insert(instances.end(), m.instance)};
   } else if (owner->second.peer != from.peer) {
-    // It came back over another connection: the one before speaks for nobody.
+    // It came back over another connection, and the one before speaks for it no more.
     instances_.erase(std::exchange(owner->second.peer, from.peer));
   }
   // Or it is another process from now on.

@@ -200,8 +200,11 @@ class FrameSchedule : public Views {
   /// A trusted sampler works on something, or delivered lately.
   bool trusted_here(double now_s) const;
   bool trusts(const std::string& sampler, double now_s) const { return !trusted_here(now_s) || trust_.has(sampler); }
-  /// Samplers that work is cut for.
-  size_t workers() const { return costs_.samplers() - std::min(costs_.samplers(), trust_.stuck()); }
+  /// Samplers that work is cut for: those that deliver; all where none does.
+  size_t workers() const {
+    const size_t all = costs_.samplers();
+    return trust_.stuck() < all ? all - trust_.stuck() : all;
+  }
   void note_delivery(const wire::TileDone& tile, const std::string& sampler, double now_s);
 
   Cut cut_;

@@ -146,7 +146,7 @@ TEST(FrameSchedule, BufferedViewsOfTwoPassesAreAnsweredOnce) {
   EXPECT_FALSE(s.view_waiting()) << "its coarse frame and its fine one are the same view";
 }
 
-// What guests ask for costs nobody else more than their share, however much it is.
+// A guest takes its share of the sampling, however much it asks for.
 // One sampler of 2 million rays a second, on a clock of milliseconds. Each viewer always wants another view.
 struct Session {
   struct Viewer {
