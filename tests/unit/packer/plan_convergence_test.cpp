@@ -339,7 +339,7 @@ TEST(Plan, TilesThatCameWholeAreThoseOfThePlan) {
   config.validation = 0;
   Session s(config);
   s.view(test::scene_camera({0.6, 0.3, 0.2}, 320, 240));
-  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.25}, 320, 240);
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.22}, 320, 240);
   const wire::PlanRequest r = s.request(camera);
   const wire::Plan plan = s.ask(r);
   ASSERT_FALSE(plan.tiles.empty() || plan.full);

@@ -10,7 +10,8 @@ namespace telesplat::packer {
 namespace {
 
 const geometry::Camera kFirst = test::scene_camera({0.7, 0.4, 0}, 192, 128);
-const geometry::Camera kBeside = test::scene_camera({0.68, 0.42, 0.06}, 240, 160);
+const geometry::Camera kBeside = test::scene_camera({0.69, 0.41, 0.03}, 208, 138);
+const geometry::Camera kFartherBeside = test::scene_camera({0.68, 0.42, 0.06}, 240, 160);
 const geometry::Camera kOther = test::scene_camera({0.6, 0.5, 0.3}, 192, 128);
 
 // Two packers of the same tiles: one knows what was planned.
@@ -119,6 +120,20 @@ TEST_F(PlannedTiles, AViewIsUnderWayUntilItIsCompleteOrOld) {
   EXPECT_FALSE(planner.view_under_way(2)) << "it may have been given up";
   for (const SampledTile& tile : tiles) planner.take(tile, false, 1);
   EXPECT_FALSE(planner.view_under_way(1));
+}
+
+TEST_F(PlannedTiles, AreNoneOfAViewThatNeedsAQuarterOfItsRays) {
+  wire::PlanRequest farther = request({2});
+  farther.camera = kFartherBeside;
+  const wire::Plan whole = planner.plan(with.model(), with.sequence(), farther, 1);
+  double rays = 0;
+  for (const char* c : {"nothing", "edge", "sparse", "stale", "unproven"})
+    rays += whole.figures.at(std::string("rays.") + c);
+  const double pixels = 240.0 * 160;
+  EXPECT_GT(rays, pixels / 4);
+  EXPECT_LT(rays, pixels / 2);
+  EXPECT_TRUE(whole.full) << "rays of masks would cost more";
+  EXPECT_TRUE(whole.tiles.empty());
 }
 
 TEST_F(PlannedTiles, RaysThatOnlyRefineAreLimited) {

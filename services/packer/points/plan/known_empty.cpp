@@ -102,7 +102,7 @@ void KnownEmpty::add(const points::PointModel& model) {
 void KnownEmpty::see(points::ClusterKey key, const points::Mosaic& mosaic) {
   const int shift = kBlockLevel - grid_.depth;  // a leaf is 2^shift blocks long
   const double apart = spacing_m(mosaic, grid_.leaf_size) / (2 * cell_m());
-  const int reach = 1 + static_cast<int>(std::min(apart, kMostReach - 1.0));
+  const int reach = static_cast<int>(std::min<double>(apart + (apart * kFewPixels >= 1), kMostReach));
   const glm::ivec3 leaf = leaf_of(key);
   if (shift <= 0) {
     const glm::ivec3 block{leaf.x >> -shift, leaf.y >> -shift, leaf.z >> -shift};

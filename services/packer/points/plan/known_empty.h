@@ -23,6 +23,10 @@ namespace telesplat::packer {
 class KnownEmpty {
  public:
   static constexpr int kCellLevel = 8, kBlockLevel = kCellLevel - 1;
+  /// Rays that graze a surface pass blocks before it of which others meet it, and views have borders. So blocks around
+  /// what was met and at borders count as seen, but only where they are no longer than this: else what nobody has seen
+  /// would be hidden by what lies beside it, as for a head within the data.
+  static constexpr float kFewPixels = 8;
 
   /// Precondition: points::validate(model).
   explicit KnownEmpty(const points::ModelConfig& model);
@@ -30,7 +34,8 @@ class KnownEmpty {
   /// A new epoch: nothing inside the data set's box was seen.
   void clear();
 
-  /// Points came: the blocks that hold them are seen, and those around, as far as the points lie apart and one more.
+  /// Points came: the blocks that hold them are seen, and those around, as far as the points lie apart and, where a
+  /// block is no longer than kFewPixels points, one more.
   void add(const points::PreparedPatch& patch);
   /// The same of everything in a model.
   void add(const points::PointModel& model);

@@ -130,15 +130,17 @@ class EmptyCarver {
     const PixelRect touched{to_pixel(view.left, clear_.width() - 1), to_pixel(view.top, clear_.height() - 1),
                             to_pixel(view.right, clear_.width() - 1), to_pixel(view.bottom, clear_.height() - 1)};
     const bool whole = view.left >= 0 && view.right <= width && view.top >= 0 && view.bottom <= height;
+    // Of blocks and cells at the image's border the part inside decides, unless they are long: near the eye one is a
+    // hundred pixels, and what of it lies beyond the image was not seen.
+    const bool decides =
+        whole || view.small() || (level >= KnownEmpty::kBlockLevel && view.length() <= KnownEmpty::kFewPixels);
     if (level == KnownEmpty::kCellLevel) {
-      if (passed(view, touched)) see(level, node);
+      if (decides && passed(view, touched)) see(level, node);
       return;
     }
     const Range range = clear_.of(touched);
     if (!(range.hi > view.nearest_m)) return;  // no new ray came as far
-    // Of blocks and cells at the image's border the part inside decides.
-    const bool last = level == KnownEmpty::kBlockLevel || view.small();
-    if ((whole || last) && (range.lo > view.farthest_m || passed(view, touched)))
+    if (decides && (range.lo > view.farthest_m || passed(view, touched)))
       see(level, node);
     else if (!view.small())
       descend(level, node, corner);

@@ -19,7 +19,8 @@ struct NodeView {
   bool crosses_near = false, behind = false;  ///< behind: all of it is before the near plane, so that nobody sees it
 
   /// About half a pixel: its parts are not looked at one by one.
-  bool small() const { return right - left <= 0.6f && bottom - top <= 0.6f; }
+  bool small() const { return length() <= 0.6f; }
+  float length() const { return std::max(right - left, bottom - top); }
 };
 
 /// A cube's corners, in pixels. Two differ in one bit of their number if an edge joins them.

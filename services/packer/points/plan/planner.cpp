@@ -18,6 +18,9 @@ constexpr double kTurn_s = 0.25;
 // Where nothing is known to be, so many times fewer rays look whether something came.
 constexpr int kEmptyShare = 4;
 
+// A ray of a mask takes so many times as long as one of a whole tile: sampled, coded, packed.
+constexpr uint64_t kScattered = 4;
+
 bool never_cast(RayClass c) { return c == RayClass::kGood || c == RayClass::kKnownEmpty; }
 
 uint64_t last_word_mask(int width) { return (width & 63) == 0 ? ~uint64_t{0} : (uint64_t{1} << (width & 63)) - 1; }
@@ -183,7 +186,7 @@ void Planner::Impl::plan_view(Question& q, ViewerView& view) {
   if (q.request.most_rays > 0) put_off(q.request.most_rays, classes);
   q.plan.figures = std::move(classes.figures);
   const auto all = static_cast<uint64_t>(view.camera.width) * static_cast<uint64_t>(view.camera.height);
-  if (classes.needed > all / 2) return plan_full(q, view);
+  if (classes.needed > all / kScattered) return plan_full(q, view);
 
   std::vector<RayTile> tiles = cut_tiles(classes.cast, {0, 0, view.camera.width, view.camera.height}, q.limits());
   sort_by_distance_to_centre(tiles, view.camera.width, view.camera.height);
