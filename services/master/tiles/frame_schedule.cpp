@@ -28,7 +28,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   view.frame = next_frame();
   begin(view.frame, {*request});
   if (steered) {
-    questions_.push_back(plans_.ask(view, limits(request->viewer, now_s), now_s));
+    questions_.push_back(plans_.ask(view, limits(*request, now_s), now_s));
   } else {
     plans_.begin_unplanned(view);
     begin_whole(view);
@@ -36,13 +36,15 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   return true;
 }
 
-void FrameSchedule::begin_whole(const PlannedView& view) {
-  if (view.coarse.value != 0) begin_frame(view, view.coarse, kCoarseStep);
-  begin_frame(view, view.frame, 1);
+void FrameSchedule::begin_whole(const PlannedView& view, int times) {
+  geometry::Camera camera = view.view.camera;
+  camera.width = std::max(camera.width / times, 1), camera.height = std::max(camera.height / times, 1);
+  if (view.coarse.value != 0 && times == 1)
+    begin_frame(view, view.coarse, geometry::subsample(camera, kCoarseStep), kCoarseStep);
+  begin_frame(view, view.frame, camera, 1);
 }
 
-void FrameSchedule::begin_frame(const PlannedView& view, FrameId id, int step) {
-  const geometry::Camera camera = step == 1 ? view.view.camera : geometry::subsample(view.view.camera, step);
+void FrameSchedule::begin_frame(const PlannedView& view, FrameId id, const geometry::Camera& camera, int step) {
   auto tiles = cut_.rows       ? FrameTiles::of_rows(camera.width, camera.height)
                : cut_.pictures ? FrameTiles::of_bands(camera.width, camera.height, workers())
                                : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
@@ -233,7 +235,9 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   // A sampler that cannot read a mask casts all.
   const auto& tile = f->tiles.tile(m.tile);
   const uint64_t all = uint64_t(tile.rect.width) * uint64_t(tile.rect.height);
-  costs_.learn(sampler, m.moments.encode_end_s - m.moments.sample_begin_s, double(std::clamp(m.rays, tile.rays, all)));
+  const double work_s = m.moments.encode_end_s - m.moments.sample_begin_s;
+  costs_.learn(sampler, work_s, double(std::clamp(m.rays, tile.rays, all)));
+  if (!f->planned && work_s > 0) whole_ray_s_.add(work_s / double(all));
   if (!f->tiles.complete()) return true;
   if (f->planned && !f->extra && !f->tiles.closed())
     refining_.learn(now_s - f->begun_s, f->refining, f->put_off, std::max<size_t>(workers(), 1));

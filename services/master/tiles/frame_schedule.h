@@ -45,6 +45,10 @@ inline constexpr double kOvertaken_s = 0.25;
 /// A view that is sampled whole, and of which a link would have to carry so much, arrives coarse first.
 inline constexpr double kCoarseFrom_s = 0.25;
 
+/// Until a view is sampled whole, at most: one of which much is unseen is sampled coarser where it would take longer,
+/// and of others rays are put off (RefiningRays) rather than to sample them whole.
+inline constexpr double kWhole_s = 0.1;
+
 /// A frame ends without a tile that was refused, or whose leases were lost, more often than these.
 inline constexpr int kMostRefused = 2, kMostLost = 7;
 
@@ -173,8 +177,11 @@ class FrameSchedule : public Views {
     double leased_s, expires_s;
     bool heard = false;  // it asked for work since
   };
-  void begin_frame(const PlannedView& view, FrameId id, int step);
-  void begin_whole(const PlannedView& view);
+  void begin_frame(const PlannedView& view, FrameId id, const geometry::Camera& camera, int step);
+  /// times: so many times fewer pixels on each axis, and no coarse frame.
+  void begin_whole(const PlannedView& view, int times = 1);
+  /// Of a view that is to be sampled whole: how many times fewer pixels on each axis keep it within kWhole_s.
+  int coarser(const PlanQuestions::Asked& asked, const wire::Plan& plan) const;
   void take_answer(const wire::Plan& plan, double now_s);
   void begin_planned(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
   /// Views stand before extra frames.
@@ -184,6 +191,11 @@ class FrameSchedule : public Views {
   void note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
   /// viewer: of a view; nullopt: of extra rays, which go to all.
   PlanLimits limits(std::optional<InstanceId> viewer, double now_s) const;
+  PlanLimits limits(const wire::ViewRequest& view, double now_s) const;
+  /// Until all pixels of a view are sampled; 0: not known yet.
+  double whole_s(const geometry::Camera& camera) const {
+    return double(camera.width) * camera.height * whole_ray_s_.value() / double(std::max<size_t>(workers(), 1));
+  }
   bool open(InstanceId viewer, double now_s) const { return in_turns_ || gate_.open(viewer, now_s); }
   bool may_lease(const Frame& frame, double now_s) const;
   bool is_overtaken(const Frame& frame, double now_s) const;
@@ -219,6 +231,7 @@ class FrameSchedule : public Views {
   LinkGate gate_;
   bool in_turns_ = false;  // an animation plays: who waits for its link would hold up the others
   RefiningRays refining_;
+  RunningMean whole_ray_s_{0.2};      // of tiles that are cast whole
   RunningMean tile_time_s_{0.05};     // lease -> done
   RunningMean planned_time_s_{0.05};  // the same of tiles of plans, which have few rays
   uint64_t released_ = 0, backups_ = 0, overtaken_views_ = 0, given_up_ = 0;

@@ -20,7 +20,13 @@ constexpr int kPlannedSide = 2, kPlannedSideOfFew = 8;
 constexpr double kTargetsOfFew = 3;  // of lease_target_s
 constexpr size_t kFewSamplers = 2;
 constexpr uint64_t kUnknownTileRays = 16384;  // of rays beyond views, while nothing is known of any link
+constexpr double kMuchUnseen = 0.25;          // of a view's pixels
 constexpr uint64_t kTilesPerUpdate = 4;       // that a link carries in LinkGate::kUpdate_s
+
+double figure_of(const wire::Plan& plan, const char* name) {
+  const auto found = plan.figures.find(name);
+  return found == plan.figures.end() ? 0.0 : found->second;
+}
 
 // The wait for its plan is over.
 PlannedView planned(PlannedView view, double now_s) {
@@ -51,6 +57,14 @@ PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer, double now_s)
   return out;
 }
 
+// A view that can be sampled whole in time has no need to put rays off.
+PlanLimits FrameSchedule::limits(const wire::ViewRequest& view, double now_s) const {
+  PlanLimits out = limits(view.viewer, now_s);
+  const double whole = whole_s(view.camera);
+  if (out.link_rays == 0 && whole > 0 && whole <= kWhole_s) out.refining_rays = 0;
+  return out;
+}
+
 void FrameSchedule::note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s) {
   plan_rows_.push_back(metrics::row_of(asked.request, asked.asked_s, plan, now_s));
 }
@@ -75,7 +89,7 @@ void FrameSchedule::take_answer(const wire::Plan& plan, double now_s) {
     return;
   }
   if (left(asked->view.frame)) return complete(asked->view.frame, false);
-  if (plan.full) return begin_whole(planned(asked->view, now_s));
+  if (plan.full) return begin_whole(planned(asked->view, now_s), coarser(*asked, plan));
   plans_.known(asked->view);
   if (plan.tiles.empty())
     view_complete(asked->view);
@@ -83,22 +97,30 @@ void FrameSchedule::take_answer(const wire::Plan& plan, double now_s) {
     begin_planned(*asked, plan, now_s);
 }
 
+int FrameSchedule::coarser(const PlanQuestions::Asked& asked, const wire::Plan& plan) const {
+  const geometry::Camera& camera = asked.view.view.camera;
+  double unseen = 0;
+  for (const char* name : {"rays.nothing", "rays.unproven", "rays.stale"}) unseen += figure_of(plan, name);
+  if (asked.request.still || unseen < kMuchUnseen * camera.width * camera.height) return 1;
+  int times = 1;
+  while (times < kCoarseStep && whole_s(camera) > kWhole_s * times * times) times *= 2;
+  return times;
+}
+
 void FrameSchedule::begin_planned(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s) {
-  const auto figure = [&](const char* name) {
-    const auto found = plan.figures.find(name);
-    return found == plan.figures.end() ? 0.0 : found->second;
-  };
   const bool learns = !asked.request.still;
-  insert({.id = plan.frame,
-          .epoch = plan.epoch,
-          .request = planned(asked.view, now_s).view,
-          .camera = plan.camera,
-          .tiles = FrameTiles::of_plan(plan),
-          .planned = true,
-          .extra = asked.request.extra,
-          .begun_s = now_s,
-          .refining = learns ? std::max(figure("rays.sparse"), figure("rays.edge") / RefiningRays::kEdges) : 0,
-          .put_off = learns ? figure("rays.put_off") : 0});
+  insert(
+      {.id = plan.frame,
+       .epoch = plan.epoch,
+       .request = planned(asked.view, now_s).view,
+       .camera = plan.camera,
+       .tiles = FrameTiles::of_plan(plan),
+       .planned = true,
+       .extra = asked.request.extra,
+       .begun_s = now_s,
+       .refining =
+           learns ? std::max(figure_of(plan, "rays.sparse"), figure_of(plan, "rays.edge") / RefiningRays::kEdges) : 0,
+       .put_off = learns ? figure_of(plan, "rays.put_off") : 0});
 }
 
 void FrameSchedule::give_up_plans(double now_s) {

@@ -183,6 +183,48 @@ TEST_F(Steered, RaysThatRefineFollowTheTimeThatViewsTake) {
   EXPECT_LT(view_that_takes(0.2), many / 2) << "rays at edges take time, too";
 }
 
+// 256 x 128 pixels in eight tiles.
+TEST_F(Steered, RaysArePutOffOnlyWhereAWholeViewWouldTakeLong) {
+  auto next_after = [&, id = uint64_t{1}](double tile_s) mutable {
+    wire::Plan full = plan_of(ask(5, id, double(id)), {});
+    full.full = true;
+    EXPECT_TRUE(schedule.take_plan(full, now));
+    for (const auto& lease : leases()) EXPECT_TRUE(done(lease, tile_s));
+    id += 2;
+    return look(5, id - 1, double(id)).most_rays;
+  };
+  EXPECT_EQ(next_after(0.001), 0u) << "8 ms: as many as there are";
+  for (int i = 0; i < 5; ++i) (void)next_after(0.04);
+  EXPECT_GT(next_after(0.04), 0u) << "0.32 s";
+}
+
+TEST_F(Steered, AViewOfWhichMuchIsUnseenIsSampledCoarserWhereItWouldTakeLong) {
+  auto cameras_width = [&, id = uint64_t{1}](double tile_s, double unseen, bool still = false) mutable {
+    if (!still) ++id;
+    wire::Plan full = plan_of(ask(5, 100 + id, double(id)), {});
+    full.full = true;
+    full.figures["rays.nothing"] = unseen / 2, full.figures["rays.unproven"] = unseen / 2;
+    EXPECT_TRUE(schedule.take_plan(full, now));
+    int width = 0;
+    for (const auto& lease : leases()) {
+      width = lease.camera.width;
+      EXPECT_EQ(lease.step, 1u) << "the view is complete with it";
+      EXPECT_EQ(lease.camera.left, request(5, 1).camera.left);
+      EXPECT_EQ(lease.frame, full.frame);
+      EXPECT_TRUE(done(lease, tile_s));
+    }
+    return width;
+  };
+  EXPECT_EQ(cameras_width(0.001, 30000), 256) << "nothing is known of the time";
+  EXPECT_EQ(cameras_width(0.04, 30000), 256) << "8 ms";
+  for (int i = 0; i < 20; ++i) (void)cameras_width(0.04, 0);
+  EXPECT_EQ(cameras_width(0.04, 30000), 128) << "0.32 s: a fourth of the pixels";
+  EXPECT_EQ(cameras_width(0.04, 30000, true), 256) << "a head that rests";
+  EXPECT_EQ(cameras_width(0.04, 8000), 256) << "most is shown: coarser samples would bring nothing";
+  for (int i = 0; i < 20; ++i) (void)cameras_width(2, 0);
+  EXPECT_EQ(cameras_width(2, 30000), 256 / kCoarseStep) << "no coarser than this";
+}
+
 TEST_F(Steered, AViewThatNeedsNothingIsCompleteAtOnce) {
   look(5, 1);
   EXPECT_TRUE(leases().empty());
