@@ -19,7 +19,8 @@ constexpr double kMotionOfRest = 0.002;      // radians, or as much of 0.6 m, un
 // and after some updates that agree.
 constexpr double kScaleStep = 0.70710678118654752;
 constexpr int kSlowUpdates = 3, kFastUpdates = 2;
-constexpr double kSteeredAim = 0.5, kFastEnough = 0.6;  // of the target, of that
+constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;  // of the target, of that
+constexpr double kWholePart = 4;  // more samples than this part of the pixels: the view was sampled whole, about
 
 // Side of a sampled image: a multiple of 8 in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
@@ -86,7 +87,9 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
     meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
   }
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
-  const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
+  // Steered, views of what is known come at once, and what is unseen takes longer than they did.
+  const double ahead_s = steered_ ? std::max(horizon_s, options_.target_latency_s) : horizon_s;
+  const double motion = predictor_.turn_rad_s() * ahead_s + predictor_.speed_m_s() * ahead_s / 0.6;
   const double margin = motion < kMotionOfRest ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
   // The first view is wanted soon rather than sharp, and so is each of an epoch that may not last.
   changing_ = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
@@ -244,7 +247,7 @@ void ViewRequester::follow_latency(const Update& u, double latency_s) {
   if (!options_.adaptive || u.still) return;
   // Requests that were sent before it took their share.
   const double own_s = latency_s / double(1 + u.ahead);
-  if (steered_) return step_scale(own_s);
+  if (steered_) return step_scale(own_s, u);
   // Time goes with the number of pixels, hence the root. On a slow link a few large views would take seconds.
   slow_ = own_s > 2 * options_.target_latency_s ? slow_ + 1 : 0;
   const double least = slow_ >= 2 ? 0.5 : 0.85;
@@ -253,12 +256,16 @@ void ViewRequester::follow_latency(const Update& u, double latency_s) {
 
 // Rays are few however many pixels a view has, and what is cast stays: views that come often show more than fine ones.
 // On a terrain at 2560x1600, aiming at the whole gave the same PSNR and a quarter fewer updates.
-void ViewRequester::step_scale(double own_s) {
+// The time of a view that was sampled whole goes with its pixels: one that took far too long is enough.
+void ViewRequester::step_scale(double own_s, const Update& u) {
   const double aim_s = kSteeredAim * options_.target_latency_s;
-  slow_ = own_s > 1.5 * aim_s ? slow_ + 1 : 0;
+  slow_ = own_s > kTooSlow * aim_s ? slow_ + 1 : 0;
   fast_ = own_s < kFastEnough * aim_s ? fast_ + 1 : 0;
-  if (slow_ < kSlowUpdates && fast_ < kFastUpdates) return;
-  scale_ = std::clamp(slow_ > 0 ? scale_ * kScaleStep : scale_ / kScaleStep, min_scale(), 1.0);
+  const bool whole = double(u.samples) * kWholePart > double(u.camera.width) * u.camera.height;
+  const bool far_off = whole && own_s > kFarOff * aim_s;
+  if (!far_off && slow_ < kSlowUpdates && fast_ < kFastUpdates) return;
+  const double octaves = far_off ? std::ceil(std::log2(own_s / (kTooSlow * aim_s))) : slow_ > 0 ? 1 : -1;
+  scale_ = std::clamp(scale_ * std::pow(kScaleStep, octaves), min_scale(), 1.0);
   slow_ = fast_ = 0;
 }
 

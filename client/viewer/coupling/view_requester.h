@@ -147,7 +147,7 @@ class ViewRequester {
   bool waits_for_answer(double now_s) const;
   bool picture_due(double now_s);
   void follow_latency(const Update& update, double latency_s);
-  void step_scale(double own_s);
+  void step_scale(double own_s, const Update& update);
 
   struct Ask {
     uint64_t number = 0;

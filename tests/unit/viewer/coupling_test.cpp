@@ -308,8 +308,9 @@ class AdaptiveRequester : public testing::Test {
   geometry::Camera display = geometry::make_camera({}, 90, 2560, 1600);
   double now_s = 0;
 
-  // One cycle on a machine that samples so many pixels a second; returns what was asked for.
-  geometry::Camera cycle(double pixels_per_s, bool moving) {
+  // One cycle on a machine that samples so many pixels a second; returns what was asked for. whole: all of them met
+  // something.
+  geometry::Camera cycle(double pixels_per_s, bool moving, bool whole = false) {
     for (int i = 0; i < 12; ++i, now_s += 0.02) {
       if (moving) display.pose = turned(0.4 * now_s, {0, 0, 0});
       requester.on_pose(now_s, display);
@@ -321,6 +322,7 @@ class AdaptiveRequester : public testing::Test {
     last.viewer = kMe;
     last.request = request->request;
     last.frame_complete = true;
+    last.samples = whole ? uint64_t(request->camera.width) * uint64_t(request->camera.height) : 0;
     EXPECT_TRUE(requester.on_part(part_of(last), now_s).has_value());
     return request->camera;
   }
@@ -395,6 +397,29 @@ TEST_F(AdaptiveRequester, SteeredSamplingGoesByOctavesAndOnlyWhereUpdatesAgree) 
   EXPECT_NEAR(density(cycle(1e8, true)), 0.707, 0.01);
   for (int i = 0; i < 20; ++i) cycle(1e6, true);
   EXPECT_NEAR(density(cycle(1e8, true)), 0.5, 0.01) << "no coarser than half of the display";
+}
+
+TEST_F(AdaptiveRequester, OneSteeredViewThatWasSampledWholeAndTookFarTooLongIsEnough) {
+  requester.set_steered(true);
+  for (int i = 0; i < 6; ++i) cycle(1e8, true);
+  EXPECT_NEAR(density(cycle(1e7, true)), 1, 0.01);
+  EXPECT_NEAR(density(cycle(3e7, true, true)), 1, 0.01) << "few rays took long: chance";
+  EXPECT_NEAR(density(cycle(1e7, true, true)), 1, 0.01) << "0.14 s, where 0.1 s are wished";
+  EXPECT_NEAR(density(cycle(1e7, true, true)), 0.5, 0.01) << "0.41 s";
+}
+
+// What comes into sight takes longer than the views of what was known did.
+TEST_F(AdaptiveRequester, ASteeredViewOfATurningHeadIsWideHoweverFastTheLastOnesCame) {
+  for (const bool steered : {false, true}) {
+    requester.set_steered(steered);
+    geometry::Camera c;
+    for (int i = 0; i < 30; ++i) c = cycle(1e9, true);
+    const double margin = c.right / display.right - 1;  // at 0.4 radians a second
+    if (steered)
+      EXPECT_NEAR(margin, 0.02 + 0.6 * 0.4 * 0.2, 0.005) << "as far as it turns in the time wished for an update";
+    else
+      EXPECT_LT(margin, 0.03);
+  }
 }
 
 }  // namespace
