@@ -99,7 +99,8 @@ def follows(chance, keys, orders, drops):
     """An event as a list: its kind, then what it needs. keys: those with a meaning that do not quit, as Control_L+z."""
     share = lambda: round(chance.uniform(-0.02, 1.02), 3)  # noqa: E731
     kinds = ["widget"] * 50 + ["choice", "key"] * 12 + ["ctl"] * 12 + ["drag"] * 8 + ["click"] * 6 + ["wheel"] * 5
-    kinds += ["move", "other-key"] * 4 + ["type", "resize"] * 3 + ["drop", "focus", "close-dialog"] * 2 + ["fly"]
+    kinds += ["move", "other-key"] * 4 + ["type", "resize"] * 3 + ["drop", "focus", "close-dialog"] * 2
+    kinds += ["fly", "measure"]
     kind = chance.choice(kinds)
     if kind in ("widget", "choice"):
         places = [round(chance.random(), 3) for _ in range(4)]
@@ -121,6 +122,8 @@ def follows(chance, keys, orders, drops):
         return ["wheel", chance.choice([4, 5]), chance.randrange(1, 12), share(), share()]
     if kind == "move":
         return ["move", share(), share()]
+    if kind == "measure":  # what is in the middle, most likely
+        return ["measure", round(chance.uniform(0.3, 0.7), 3), round(chance.uniform(0.3, 0.7), 3)]
     if kind == "ctl":
         return ["ctl", *any_order(chance, orders)]
     if kind == "drop":

@@ -26,8 +26,8 @@ NEVER = ("messages_rejected", "digests_different", "tiles_refused", "tiles_unsea
 
 
 def known_as(name):
-    """A widget's name in the coverage: files are as good as one another."""
-    return re.sub(r"^(Open/(?:file|recent))=.*", r"\1=*", name)
+    """A widget's name in the coverage: files are as good as one another, and so are measured places."""
+    return re.sub(r"^(Measurements/remove) \d+$", r"\1 *", re.sub(r"^(Open/(?:file|recent))=.*", r"\1=*", name))
 
 
 class Fault(Exception):
@@ -332,6 +332,9 @@ class Run:
             hands.click(*rest[:2])
         elif kind == "move":
             at(*rest)
+        elif kind == "measure":
+            at(*rest)
+            self.press("x", [])
         elif kind == "ctl":
             self.ctl(rest)
         elif kind == "drop":
