@@ -87,7 +87,7 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
     meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
   }
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
-  // Steered, views of what is known come at once, and what is unseen takes longer than they did.
+  // Steered views of known space come at once; the next one takes longer if something unseen comes into sight.
   const double ahead_s = steered_ ? std::max(horizon_s, options_.target_latency_s) : horizon_s;
   const double motion = predictor_.turn_rad_s() * ahead_s + predictor_.speed_m_s() * ahead_s / 0.6;
   const double margin = motion < kMotionOfRest ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);

@@ -45,8 +45,8 @@ inline constexpr double kOvertaken_s = 0.25;
 /// A view that is sampled whole, and of which a link would have to carry so much, arrives coarse first.
 inline constexpr double kCoarseFrom_s = 0.25;
 
-/// Until a view is sampled whole, at most: one of which much is unseen is sampled coarser where it would take longer,
-/// and of others rays are put off (RefiningRays) rather than to sample them whole.
+/// Seconds that samplers may take for a whole view. A slower one is sampled coarser if much of it is unseen; else its
+/// refining rays are limited (RefiningRays). A quicker one has all of its rays cast.
 inline constexpr double kWhole_s = 0.1;
 
 /// A frame ends without a tile that was refused, or whose leases were lost, more often than these.
