@@ -20,7 +20,7 @@ constexpr double kMotionOfRest = 0.002;      // radians, or as much of 0.6 m, un
 constexpr double kScaleStep = 0.70710678118654752;
 constexpr int kSlowUpdates = 3, kFastUpdates = 2;
 constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;  // of the target, of that
-constexpr double kWholePart = 4;  // more samples than this part of the pixels: the view was sampled whole, about
+constexpr double kWholePart = 4;  // a view with samples in more than 1 of 4 pixels counts as sampled whole
 
 // Side of a sampled image: a multiple of 8 in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }

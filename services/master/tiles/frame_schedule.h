@@ -178,9 +178,9 @@ class FrameSchedule : public Views {
     bool heard = false;  // it asked for work since
   };
   void begin_frame(const PlannedView& view, FrameId id, const geometry::Camera& camera, int step);
-  /// times: so many times fewer pixels on each axis, and no coarse frame.
+  /// Divides the view's width and height by `times`; above 1 there is no coarse frame.
   void begin_whole(const PlannedView& view, int times = 1);
-  /// Of a view that is to be sampled whole: how many times fewer pixels on each axis keep it within kWhole_s.
+  /// Returns the divisor of width and height, 1 to kCoarseStep, that keeps a whole view within kWhole_s.
   int coarser(const PlanQuestions::Asked& asked, const wire::Plan& plan) const;
   void take_answer(const wire::Plan& plan, double now_s);
   void begin_planned(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);

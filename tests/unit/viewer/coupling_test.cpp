@@ -308,8 +308,7 @@ class AdaptiveRequester : public testing::Test {
   geometry::Camera display = geometry::make_camera({}, 90, 2560, 1600);
   double now_s = 0;
 
-  // One cycle on a machine that samples so many pixels a second; returns what was asked for. whole: all of them met
-  // something.
+  // Asks for a view and answers it after pixels / pixels_per_s. whole: each pixel has a sample. Returns the camera.
   geometry::Camera cycle(double pixels_per_s, bool moving, bool whole = false) {
     for (int i = 0; i < 12; ++i, now_s += 0.02) {
       if (moving) display.pose = turned(0.4 * now_s, {0, 0, 0});
@@ -408,7 +407,7 @@ TEST_F(AdaptiveRequester, OneSteeredViewThatWasSampledWholeAndTookFarTooLongIsEn
   EXPECT_NEAR(density(cycle(1e7, true, true)), 0.5, 0.01) << "0.41 s";
 }
 
-// What comes into sight takes longer than the views of what was known did.
+// Unseen surfaces that come into sight take longer than the views of known ones did.
 TEST_F(AdaptiveRequester, ASteeredViewOfATurningHeadIsWideHoweverFastTheLastOnesCame) {
   for (const bool steered : {false, true}) {
     requester.set_steered(steered);

@@ -23,9 +23,9 @@ namespace telesplat::packer {
 class KnownEmpty {
  public:
   static constexpr int kCellLevel = 8, kBlockLevel = kCellLevel - 1;
-  /// Rays that graze a surface pass blocks before it of which others meet it, and views have borders. So blocks around
-  /// what was met and at borders count as seen, but only where they are no longer than this: else what nobody has seen
-  /// would be hidden by what lies beside it, as for a head within the data.
+  /// Blocks around points and cells at an image's border count as seen up to this length in pixels; without them rays
+  /// that graze a surface would be cast again and again. Longer ones, as near a head within the data, stay unseen: they
+  /// may hold surfaces that no ray has met.
   static constexpr float kFewPixels = 8;
 
   /// Precondition: points::validate(model).

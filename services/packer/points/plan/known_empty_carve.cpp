@@ -130,8 +130,8 @@ class EmptyCarver {
     const PixelRect touched{to_pixel(view.left, clear_.width() - 1), to_pixel(view.top, clear_.height() - 1),
                             to_pixel(view.right, clear_.width() - 1), to_pixel(view.bottom, clear_.height() - 1)};
     const bool whole = view.left >= 0 && view.right <= width && view.top >= 0 && view.bottom <= height;
-    // Of blocks and cells at the image's border the part inside decides, unless they are long: near the eye one is a
-    // hundred pixels, and what of it lies beyond the image was not seen.
+    // A short block or cell at the image's border is judged by its part inside. A long one, as near the eye, is not:
+    // its part beyond the image was not seen.
     const bool decides =
         whole || view.small() || (level >= KnownEmpty::kBlockLevel && view.length() <= KnownEmpty::kFewPixels);
     if (level == KnownEmpty::kCellLevel) {

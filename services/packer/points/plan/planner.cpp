@@ -18,7 +18,7 @@ constexpr double kTurn_s = 0.25;
 // Where nothing is known to be, so many times fewer rays look whether something came.
 constexpr int kEmptyShare = 4;
 
-// A ray of a mask takes so many times as long as one of a whole tile: sampled, coded, packed.
+// Sampling, coding and packing a ray of a mask takes about four times as long as one of a whole tile.
 constexpr uint64_t kScattered = 4;
 
 bool never_cast(RayClass c) { return c == RayClass::kGood || c == RayClass::kKnownEmpty; }
