@@ -189,8 +189,7 @@ class PackerService {
     packing_ = make_packing(*pipeline);
     before_ = std::exchange(pipeline_, pipeline), changed_s_ = now_s;
     packing_->follow(session, now_s);
-    for (const auto& [early, bytes, since_s] : early_.take())
-      ((*packing_).*early.take)(*early.from, early.message, now_s);
+    for (const auto& early : early_.take()) ((*packing_).*early.item.take)(*early.item.from, early.item.message, now_s);
   }
 
   // Samplers and viewers learn later that another data set is shown.
@@ -239,7 +238,7 @@ class PackerService {
       if (packing_)
         ((*packing_).*take)(from, *message, monotonic_s());
       else
-        early_.add({&from, *message, take}, message->body.size(), monotonic_s());
+        early_.add({&from, *message, take}, message->body.size(), monotonic_s(), message->user);
       if (payer) work_.worked(*payer, thread_cpu_s() - begin_s, monotonic_s());
     }
   }

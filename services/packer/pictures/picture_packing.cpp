@@ -14,9 +14,9 @@ bool PicturePacking::follow(const wire::Welcome& session, double now_s) {
   master_ = session.master;
   epoch_ = session.epoch;
   lease_key_ = session.lease_key;
-  for (const auto& [early, bytes, since_s] : ahead_.take()) {
+  for (const auto& [early, bytes, since_s, user] : ahead_.take()) {
     if (is_ahead(early.tile.lease))
-      ahead_.add(early, bytes, since_s);
+      ahead_.add(early, bytes, since_s, user);
     else if (const Status s = receive(early.message, early.tile, now_s); !s)
       log::warn("a tile that came early was refused: {}", s.error().text);
   }
@@ -47,7 +47,7 @@ bool PicturePacking::is_first(const wire::Lease& lease) {
 Status PicturePacking::receive(const net::Message& message, const wire::PictureTile& m, double now_s) {
   const wire::Lease& lease = m.lease;
   if (is_ahead(lease)) {
-    ahead_.add({message, m}, message.body.size(), now_s);
+    ahead_.add({message, m}, message.body.size(), now_s, message.user);
     return ok_status();
   }
   if (lease.epoch != epoch_) {
@@ -111,7 +111,7 @@ void PicturePacking::send(InstanceId viewer, std::string body, double now_s) {
 void PicturePacking::meet(const std::string& peer, InstanceId viewer) {
   if (peers_.size() >= kMostViewers && !peers_.contains(viewer)) peers_.erase(peers_.begin());
   peers_[viewer] = peer;
-  for (auto& [unmet, bytes, since_s] : unmet_.take()) send(unmet.viewer, std::move(unmet.body), since_s);
+  for (auto& [unmet, bytes, since_s, user] : unmet_.take()) send(unmet.viewer, std::move(unmet.body), since_s);
 }
 
 void PicturePacking::tick(double now_s) {

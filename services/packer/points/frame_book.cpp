@@ -11,14 +11,16 @@ const FrameBook::Frame* FrameBook::find(FrameId id) const {
   return found == open_.end() ? nullptr : &*found;
 }
 
+bool FrameBook::is_finished(FrameId id) const { return is_finished_.contains(id) || (id <= forgotten_ && !find(id)); }
+
 bool FrameBook::has(FrameId id, uint32_t tile) const {
-  if (is_finished_.count(id)) return true;
+  if (is_finished(id)) return true;
   const Frame* frame = find(id);
   return frame && tile < frame->has_tile.size() && frame->has_tile[tile];
 }
 
 std::optional<FrameBook::Left> FrameBook::left(FrameId id, uint32_t tiles) const {
-  if (is_finished_.count(id)) return std::nullopt;
+  if (is_finished(id)) return std::nullopt;
   const Frame* frame = find(id);
   if (!frame) return Left{.tiles = tiles, .tiles_in_frame = tiles};
   const auto first = std::find(frame->has_tile.begin(), frame->has_tile.end(), false);
@@ -61,6 +63,7 @@ FrameBook::Frame FrameBook::add(const FramePart& tile, const splat::Elimination&
     is_finished_.insert(frame.id);
     if (finished_.size() > kMaxFinishedFrames) {
       is_finished_.erase(finished_.front());
+      forgotten_ = std::max(forgotten_, finished_.front());
       finished_.pop_front();
     }
   }
@@ -71,6 +74,7 @@ void FrameBook::clear() {
   open_.clear();
   finished_.clear();
   is_finished_.clear();
+  forgotten_ = {};
 }
 
 }  // namespace telesplat::packer

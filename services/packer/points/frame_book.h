@@ -14,7 +14,8 @@ namespace telesplat::packer {
 /// Unfinished frames remembered: more than viewers have under way at once. The tiles of an older one are forgotten; if
 /// one of them comes twice then, elimination makes little of it.
 inline constexpr size_t kMaxOpenFrames = 64;
-/// Finished frames remembered, to tell duplicates that come late.
+/// Finished frames remembered, to tell duplicates that come late. Frames that are older than one that was forgotten are
+/// taken for finished: leases of them are not taken again.
 inline constexpr size_t kMaxFinishedFrames = 4096;
 
 class FrameBook {
@@ -49,10 +50,12 @@ class FrameBook {
 
  private:
   const Frame* find(FrameId id) const;
+  bool is_finished(FrameId id) const;
 
   std::deque<Frame> open_;  // oldest first
   std::deque<FrameId> finished_;
   std::unordered_set<FrameId> is_finished_;
+  FrameId forgotten_;  // the newest of the finished ones that are not remembered
 };
 
 }  // namespace telesplat::packer

@@ -137,7 +137,7 @@ bool PointPacking::follow(const wire::Welcome& session, double now_s) {
     return true;
   }
   begin(config, session);
-  for (const auto& [received, bytes, since_s] : ahead_.take()) pack(received, since_s, now_s);
+  for (const auto& early : ahead_.take()) pack(early.item, early.since_s, now_s);
   return true;
 }
 
@@ -199,7 +199,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   // The announcement of its epoch, or of its master, comes on another socket and may be about to. A tile that an
   // earlier master leased waits in vain: what it is of, this one may have numbered the same.
   if (lease.master != master_ || lease.epoch > core_->epoch())
-    return ahead_.add(received, message.body.size(), since_s);
+    return ahead_.add(received, message.body.size(), since_s, message.user);
   if (!wire::is_sealed(lease, m.sampler, lease_key_)) {
     ++unsealed_;
     return from->reject(message, "its lease was not given to who says to have sampled it");

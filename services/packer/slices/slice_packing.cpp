@@ -26,9 +26,9 @@ bool SlicePacking::follow(const wire::Welcome& session, double now_s) {
   lease_key_ = session.lease_key;
   gatherer_.set_scene(read->grid, session.epoch);
   gatherer_.set_most(scene::SessionView(session).setting("packing.max_rate_mbit", 0) * 1e6 / 8);
-  for (const auto& [received, bytes, since_s] : ahead_.take()) {
+  for (const auto& [received, bytes, since_s, user] : ahead_.take()) {
     if (is_ahead(received.images))
-      ahead_.add(received, bytes, since_s);
+      ahead_.add(received, bytes, since_s, user);
     else if (const Status s = receive(received.message, received.images, now_s); !s)
       log::warn("a slab that came early was refused: {}", s.error().text);
   }
@@ -50,7 +50,7 @@ void SlicePacking::take_state(net::Socket& from, const net::Message& message, do
 
 Status SlicePacking::receive(const net::Message& message, const wire::SliceImages& m, double now_s) {
   if (is_ahead(m)) {
-    ahead_.add({message, m}, message.body.size(), now_s);
+    ahead_.add({message, m}, message.body.size(), now_s, message.user);
     return ok_status();
   }
   if (m.lease.epoch != gatherer_.epoch()) {

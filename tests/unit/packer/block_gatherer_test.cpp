@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "services/packer/epoch_hold.h"
+#include "services/packer/points/frame_book.h"
 #include "tests/support/packer_scenes.h"
 
 namespace telesplat::packer {
@@ -176,6 +177,38 @@ TEST(EpochHold, KeepsWhatFitsForAWhile) {
   hold.add(waiting[0].item, waiting[0].bytes, waiting[0].since_s);
   hold.expire(6.5);
   EXPECT_TRUE(hold.empty()) << "who waits on does not begin anew";
+}
+
+TEST(EpochHold, WhoHoldsMostMakesRoom) {
+  EpochHold<int> hold({.items = 3, .bytes = 100, .patience_s = 1});
+  hold.add(1, 10, 0, "anna");
+  for (const int i : {11, 12, 13, 14}) hold.add(i, 10, 0, "eve");
+  hold.add(2, 60, 0, "bert");
+  hold.add(15, 50, 0, "eve");  // too many, and then too much
+  const auto left = hold.take();
+  ASSERT_EQ(left.size(), 2u);
+  EXPECT_EQ(left[0].item, 1);
+  EXPECT_EQ(left[1].item, 15) << "bert held more";
+}
+
+TEST(FrameBook, WhatIsOlderThanTheOldestThatIsRememberedIsNotTakenAgain) {
+  FrameBook book;
+  const auto add = [&](uint64_t frame, uint32_t tiles) {
+    FramePart part;
+    part.frame = {frame}, part.tile = 0, part.tiles_in_frame = tiles;
+    book.add(part, {}, false);
+  };
+  add(1, 1);
+  add(2, 2);
+  for (uint64_t frame = 4; frame < 4 + kMaxFinishedFrames; ++frame) add(frame, 1);
+  EXPECT_TRUE(book.has({1}, 0)) << "it is forgotten, and must not come again";
+  EXPECT_FALSE(book.left({1}, 1));
+  EXPECT_TRUE(book.has({2}, 0));
+  EXPECT_FALSE(book.has({2}, 1)) << "it is still open";
+  EXPECT_TRUE(book.has({4}, 0));
+  EXPECT_FALSE(book.has({4 + kMaxFinishedFrames}, 0)) << "it is new";
+  book.clear();
+  EXPECT_FALSE(book.has({1}, 0)) << "another master counts anew";
 }
 
 }  // namespace

@@ -489,6 +489,28 @@ TEST_F(PointPackingTest, OnlyWhatWasLeasedIsTaken) {
   made_up.lease.master = {1};
   deliver(made_up, 1);
   EXPECT_EQ(socket.rejected(), 1u) << "without a seal";
+// Until their master is known their seals say nothing.
+TEST_F(PointPackingTest, OneKeysEarlyTilesDoNotPushOutAnothers) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  const auto deliver_by = [&](const std::string& user, wire::DepthTile m, std::span<const uint8_t> stream) {
+    m.image = std::as_bytes(stream);
+    net::Message sampled = message(m);
+    sampled.user = user;
+    packing.take_sampled(socket, sampled, 1);
+  };
+  for (const int half : {0, 1}) {
+    wire::DepthTile m = tile(1, half);
+    test::seal_lease(m.lease, m.sampler, {2});
+    deliver_by("anna", m, codec::encode(test::sample_scene(m.lease.camera, m.lease.rect)));
+  }
+  wire::DepthTile made_up = tile(2, 0);
+  made_up.lease.master = {2};
+  for (int n = 0; n < 1000; ++n) deliver_by("eve", made_up, {});
+  ASSERT_TRUE(packing.follow(welcome(test::kEpoch, {2}), 1.2));
+  EXPECT_EQ(told.size(), 2u);
+  EXPECT_GT(status("tiles_unsealed"), 0);
+}
+
   wire::seal(made_up.lease, {8}, test::lease_key());
   deliver(made_up, 1);
   EXPECT_EQ(socket.rejected(), 2u) << "of a lease that another sampler was given";
