@@ -60,7 +60,11 @@ void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, do
     known = viewers_.emplace(viewer, Viewer{.window_from_s = now_s}).first;
     known->second.last = receipt;
     known->second.moved_s = now_s;
-    if (const auto replay = replays_.extract(viewer)) known->second.replayed_until = replay.mapped();
+    const auto replay = std::ranges::find(replays_, viewer, [](const auto& r) { return r.first; });
+    if (replay != replays_.end()) {
+      known->second.replayed_until = replay->second;
+      replays_.erase(replay);
+    }
     if (newest >= known->second.replayed_until) learn_rtt(known->second, rtt_s, now_s);
     return;
   }
@@ -83,10 +87,13 @@ void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, do
 void LinkMeter::replayed(InstanceId viewer) {
   if (published_.empty()) return;
   const Sequence until = published_.back().sequence;
-  if (const auto known = viewers_.find(viewer); known != viewers_.end())
+  if (const auto known = viewers_.find(viewer); known != viewers_.end()) {
     known->second.replayed_until = until;
-  else if (replays_.size() < kMostViewers)
-    replays_[viewer] = until;
+    return;
+  }
+  std::erase_if(replays_, [&](const auto& r) { return r.first == viewer; });
+  if (replays_.size() >= kMostViewers) replays_.pop_front();  // most likely it never tells what it has
+  replays_.emplace_back(viewer, until);
 }
 
 void LinkMeter::expire(double now_s) {

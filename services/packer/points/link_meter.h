@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "common/core/ids.h"
 
@@ -78,7 +79,7 @@ class LinkMeter {
   std::deque<Published> published_;
   uint64_t bytes_ = 0, forgotten_bytes_ = 0;  // published in all; of events that are not remembered
   std::map<InstanceId, Viewer> viewers_;
-  std::map<InstanceId, Sequence> replays_;  // of viewers that have given no receipt yet
+  std::deque<std::pair<InstanceId, Sequence>> replays_;  // of viewers that have given no receipt yet, newest last
 };
 
 }  // namespace telesplat::packer

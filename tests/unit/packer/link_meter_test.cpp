@@ -115,6 +115,7 @@ TEST(LinkMeter, AViewerThatDoesNotReadShowsByTheAgeOfWhatWaits) {
 TEST(LinkMeter, LearnsNothingFromAReplay) {
   LinkMeter meter;
   for (uint64_t i = 1; i <= 100; ++i) meter.published(Sequence{i}, 1'000'000, double(i));
+  for (uint64_t v = 100; v < 100 + 2 * LinkMeter::kMostViewers; ++v) meter.replayed({v});  // of whom no receipt comes
   meter.replayed(kViewer);
   meter.received(kViewer, {}, 0, 100.00);
   meter.received(kViewer, Sequence{60}, 0.03, 100.03);
