@@ -545,6 +545,7 @@ Socket::Refusal Socket::refusal() const {
   // A server with keys may close a connection before its own greeting is out, so that libzmq cannot tell why.
   if (!keys && broken_off && !impl_->tunnel && !std::exchange(impl_->looked_for_mechanism, true) &&
       mechanism_at(impl_->endpoint) == "CURVE")
+uint64_t Socket::queued_bytes(std::string_view peer) const { return impl_->queued.of(peer); }
     impl_->turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
   const bool turned_away = impl_->turned_away != 0;
   if (!turned_away && !broken_off) return {};

@@ -134,6 +134,8 @@ class Socket {
   /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.
   struct Refusal {
     std::string text;
+  /// Of a ROUTER: bytes of bodies that wait to be sent to this peer.
+  uint64_t queued_bytes(std::string_view peer) const;
     bool may_pass = false;
   };
   Refusal refusal() const;

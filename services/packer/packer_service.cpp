@@ -205,6 +205,7 @@ class PackerService {
                                          std::string body) { patches_.send_frames({}, type, std::move(body)); },
                     .to_viewer = [this](std::string_view peer, std::string_view type,
                                         std::string body) { return state_.send_frames(peer, type, std::move(body)); },
+                    .waiting = [this](const std::string& peer) { return state_.queued_bytes(peer); },
                     .tell_link = [this](const wire::LinkReport& m) { link_->socket().send(m); },
                     .master_now = [this] { return link_->to_master_s(monotonic_s()); },
                     .to_master_s = [this](double s) { return link_->to_master_s(s); }};

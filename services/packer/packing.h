@@ -19,9 +19,10 @@ struct Outlets {
   std::function<void(std::string_view type, std::string body)> to_viewers;  ///< to all of them
   /// To one viewer. False: dropped, because its queue is full or it is gone.
   std::function<bool(std::string_view peer, std::string_view type, std::string body)> to_viewer;
-  std::function<void(const wire::LinkReport&)> tell_link;  ///< the master
-  std::function<double()> master_now;                      ///< seconds on the master's clock
-  std::function<double(double local_s)> to_master_s;       ///< monotonic_s() of this machine on the master's clock
+  std::function<uint64_t(const std::string& peer)> waiting;  ///< bytes that wait for this viewer; null: none do
+  std::function<void(const wire::LinkReport&)> tell_link;    ///< the master
+  std::function<double()> master_now;                        ///< seconds on the master's clock
+  std::function<double(double local_s)> to_master_s;         ///< monotonic_s() of this machine on the master's clock
 
   template <class M>
   void publish(const M& message) const {

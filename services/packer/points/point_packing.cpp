@@ -5,6 +5,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/net/connections/work_shares.h"
 #include "common/net/dispatch.h"
 #include "common/wire/lease_seal.h"
 #include "services/packer/points/plan/blue_noise.h"
@@ -360,16 +361,18 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
     else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
     else
-      answer(m, message.peer, now_s);
+      answer(m, message, now_s);
   });
 }
 
-void PointPacking::answer(const wire::StateRequest& request, const std::string& peer, double now_s) {
+void PointPacking::answer(const wire::StateRequest& request, const net::Message& message, double now_s) {
+  const std::string& peer = message.peer;
   const Sequence after = request.packer == instance_ ? request.after : Sequence{};
   const bool known = after <= core_->sequence() && core_->remembers(after);
   const bool follows = request.packer == instance_ || request.packer.value == 0;
   if (known && answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
   if (!beginnings_.admit(peer, now_s)) return;  // it takes a look at all events; whoever it is asks again
+  if (answers_.is_full(peer)) return;           // likewise
   if (!known) {
     // A mark of a packer that the viewer does not know: it then asks for everything.
     answers_.drop(peer);
@@ -378,7 +381,11 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
     return;
   }
   if (!outlets_.send(wire::StateBegin{instance_, after}, peer)) return;
-  StateAnswers::Answer answer{.viewer = request.viewer, .left = core_->replay(after), .mark = mark(true)};
+  const std::string* payer = net::payer(message);
+  StateAnswers::Answer answer{.viewer = request.viewer,
+                              .payer = payer ? *payer : message.user,
+                              .left = core_->replay(after),
+                              .mark = mark(true)};
   completions_.fill(answer.left.others, request.viewer, after);
   answers_.begin(peer, after, std::move(answer));
   meter_.replayed(request.viewer);
@@ -400,7 +407,7 @@ void PointPacking::send_answers() {
                     log::info("a viewer caught up: {} events up to {}", answer.events, answer.mark.sequence.value);
                   return true;
                 },
-                size_on_wire);
+                size_on_wire, [&](const std::string& peer) { return outlets_.waiting ? outlets_.waiting(peer) : 0; });
 }
 
 void PointPacking::on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s) {

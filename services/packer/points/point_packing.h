@@ -91,7 +91,7 @@ class PointPacking final : public Packing {
   /// To the master: taken in, but not published with this tile.
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
-  void answer(const wire::StateRequest& request, const std::string& peer, double now_s);
+  void answer(const wire::StateRequest& request, const net::Message& message, double now_s);
   void send_answers();
   void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});

@@ -7,6 +7,8 @@
 #include <deque>
 #include <map>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "common/wire/point_messages.h"
 #include "services/packer/points/event_log.h"
@@ -18,12 +20,13 @@ class StateAnswers {
  public:
   struct Limits {
     uint64_t window_bytes = 8u << 20;   ///< sent to a viewer and not received, about
-    uint64_t bytes_in_all = 64u << 20;  ///< the same of all viewers: where they are many each has its part
+    uint64_t bytes_in_all = 64u << 20;  ///< the same of all: each person has a part of it, and of that each connection
     uint64_t bytes_at_once = 1u << 20;  ///< to all, in one turn
     size_t viewers = 256;               ///< beyond, the one that was begun first is dropped: it asks again
   };
   struct Answer {
     InstanceId viewer;
+    std::string payer;  ///< net::payer(), who asks
     EventLog::Replay left;
     wire::StateMark mark;  ///< at the end
     uint64_t events = 0;   ///< sent
@@ -35,41 +38,53 @@ class StateAnswers {
   /// A viewer asks over this connection for what follows `after`. follows: it has what was sent so far, if it has
   /// received it; false: it begins anew. True: it is being answered already; what it lacks is under way or will be.
   bool goes_on(const std::string& peer, InstanceId viewer, Sequence after, bool follows) {
-    std::erase_if(answers_, [&](const auto& a) { return a.second.answer.viewer == viewer && a.first != peer; });
-    const auto found = answers_.find(peer);
-    if (found == answers_.end()) return false;
-    if (follows && found->second.answer.viewer == viewer && after >= found->second.received) {
+    for (auto& [other, entry] : answers_)
+      if (entry.answer.viewer == viewer && other != peer) entry.stop();
+    Entry* const found = find(peer);
+    if (!found) return false;
+    if (follows && found->answer.viewer == viewer && after >= found->received) {
       received(peer, after);
-      return answers_.contains(peer);
+      return find(peer) != nullptr;
     }
-    answers_.erase(found);
+    found->stop();
     return false;
   }
+  /// As much waits for this connection as may: another answer to it is not begun.
+  bool is_full(const std::string& peer) const {
+    const auto found = answers_.find(peer);
+    return found != answers_.end() && found->second.waiting > 0 && found->second.waiting >= found->second.window;
+  }
   void begin(const std::string& peer, Sequence after, Answer answer) {
-    if (answers_.size() >= limits_.viewers)
-      answers_.erase(std::min_element(answers_.begin(), answers_.end(),
-                                      [](const auto& a, const auto& b) { return a.second.number < b.second.number; }));
-    answers_[peer] = {.answer = std::move(answer), .received = after, .number = ++begun_};
+    if (size() >= limits_.viewers)
+      std::ranges::min_element(answers_, {}, [](const auto& a) {
+        return std::pair(a.second.stopped, a.second.number);
+      })->second.stop();
+    Entry& entry = answers_[peer];
+    entry = {.answer = std::move(answer), .received = after, .number = ++begun_, .waiting = entry.waiting};
   }
   /// Whoever is at this connection has applied everything up to `newest`.
   void received(const std::string& peer, Sequence newest) {
-    const auto found = answers_.find(peer);
-    if (found == answers_.end()) return;
-    Entry& a = found->second;
-    a.received = std::max(a.received, newest);
-    for (; !a.under_way.empty() && a.under_way.front().first <= newest; a.under_way.pop_front())
-      a.bytes -= a.under_way.front().second;
-    if (a.all_sent && a.under_way.empty()) answers_.erase(found);
+    Entry* const a = find(peer);
+    if (!a) return;
+    a->received = std::max(a->received, newest);
+    for (; !a->under_way.empty() && a->under_way.front().first <= newest; a->under_way.pop_front())
+      a->bytes -= a->under_way.front().second;
+    if (a->all_sent && a->under_way.empty()) a->stop();
   }
   /// What was left for this connection is not sent.
-  void drop(const std::string& peer) { answers_.erase(peer); }
-  void clear() { answers_.clear(); }
+  void drop(const std::string& peer) {
+    if (Entry* const a = find(peer)) a->stop();
+  }
+  void clear() {
+    for (auto& [peer, a] : answers_) a.stop();
+  }
 
   /// Sends some of what is left, in turn. next(Replay&): its next event, if there is one. send(peer, Event) and
   /// end(peer, Answer), after the last event: false if it could not be sent; who could not be sent to asks again.
-  /// bytes_of(Event): on the wire.
-  template <class Next, class Send, class End, class BytesOf>
-  void pump(const Next& next, const Send& send, const End& end, const BytesOf& bytes_of) {
+  /// bytes_of(Event): on the wire. waiting(peer): bytes that wait to be sent to it, also of answers that were stopped.
+  template <class Next, class Send, class End, class BytesOf, class Waiting>
+  void pump(const Next& next, const Send& send, const End& end, const BytesOf& bytes_of, const Waiting& waiting) {
+    share_out(waiting);
     for (uint64_t sent = 0; sent < limits_.bytes_at_once;) {
       const auto turn = next_turn();
       if (turn == answers_.end()) return;
@@ -80,14 +95,14 @@ class StateAnswers {
       if (event) {
         const uint64_t bytes = bytes_of(*event) + kMessageBytes;
         a.under_way.emplace_back(event->sequence, bytes);
-        a.bytes += bytes, sent += bytes, ++a.answer.events;
+        a.bytes += bytes, a.waiting += bytes, sent += bytes, ++a.answer.events;
         there = send(turn->first, *event);
       } else {
         a.all_sent = true;
         sent += kMessageBytes;
         there = end(turn->first, a.answer);
       }
-      if (!there || (a.all_sent && a.under_way.empty())) answers_.erase(turn);
+      if (!there || (a.all_sent && a.under_way.empty())) a.stop();
     }
   }
   /// pump() would send something.
@@ -95,11 +110,13 @@ class StateAnswers {
     return std::any_of(answers_.begin(), answers_.end(), [this](const auto& a) { return may_send(a.second); });
   }
 
-  size_t size() const { return answers_.size(); }
+  size_t size() const {
+    return size_t(std::ranges::count_if(answers_, [](const auto& a) { return !a.second.stopped; }));
+  }
   /// Of all viewers.
   uint64_t bytes_under_way() const {
     uint64_t out = 0;
-    for (const auto& [peer, a] : answers_) out += a.bytes;
+    for (const auto& [peer, a] : answers_) out += a.held();
     return out;
   }
 
@@ -112,12 +129,39 @@ class StateAnswers {
     std::deque<std::pair<Sequence, uint64_t>> under_way{};
     uint64_t bytes = 0;  // of these
     bool all_sent = false;
-    uint64_t number = 0;  // in the order in which they were begun
+    uint64_t number = 0;   // in the order in which they were begun
+    uint64_t waiting = 0;  // bytes for this connection, as the last pump() left it, whatever its receipts say
+    uint64_t window = 0;   // for `held`; as of the last pump()
+    bool stopped = false;  // nothing is left of it but what waits
+
+    uint64_t held() const { return std::max(bytes, waiting); }
+    void stop() {
+      answer.viewer = {}, answer.left = {}, under_way.clear();
+      bytes = 0, stopped = true;
+    }
   };
-  bool may_send(const Entry& a) const {
-    const uint64_t part = limits_.bytes_in_all / std::max<uint64_t>(answers_.size(), 1);
-    return !a.all_sent && a.bytes < std::min(limits_.window_bytes, part);
+  Entry* find(const std::string& peer) {
+    const auto found = answers_.find(peer);
+    return found == answers_.end() || found->second.stopped ? nullptr : &found->second;
   }
+  // A person's many connections, and what waits for those that read nothing, leave the others their parts.
+  template <class Waiting>
+  void share_out(const Waiting& waiting) {
+    std::map<std::string_view, uint64_t> connections;  // of each payer
+    for (auto at = answers_.begin(); at != answers_.end();) {
+      Entry& a = at->second;
+      a.waiting = waiting(at->first);
+      if (a.stopped && a.waiting == 0) {
+        at = answers_.erase(at);
+        continue;
+      }
+      ++connections[a.answer.payer], ++at;
+    }
+    for (auto& [peer, a] : answers_)
+      a.window =
+          std::min(limits_.window_bytes, limits_.bytes_in_all / connections.size() / connections[a.answer.payer]);
+  }
+  bool may_send(const Entry& a) const { return !a.stopped && !a.all_sent && a.held() < a.window; }
   // The next one after that which was served last.
   std::map<std::string, Entry>::iterator next_turn() {
     auto at = answers_.upper_bound(turn_);

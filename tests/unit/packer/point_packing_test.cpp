@@ -93,6 +93,12 @@ class PointPackingTest : public testing::Test {
                   sent.push_back({std::string(peer), std::string(type), std::move(body)});
                   return true;
                 },
+            .waiting =
+                [this](const std::string& peer) {
+                  uint64_t bytes = 0;
+                  for (const Sent& s : sent) bytes += s.peer == peer ? s.body.size() : 0;
+                  return bytes;
+                },
             .master_now = [] { return 99.0; },
             .to_master_s = [](double s) { return s + 50; }};
   }
@@ -483,12 +489,6 @@ TEST_F(PointPackingTest, TilesOfAMasterThatIsNotKnownYetWaitForIt) {
   EXPECT_EQ(told.size(), 2u);
 }
 
-TEST_F(PointPackingTest, OnlyWhatWasLeasedIsTaken) {
-  ASSERT_TRUE(packing.follow(welcome(), 0));
-  wire::DepthTile made_up = tile(1, 0);
-  made_up.lease.master = {1};
-  deliver(made_up, 1);
-  EXPECT_EQ(socket.rejected(), 1u) << "without a seal";
 // Until their master is known their seals say nothing.
 TEST_F(PointPackingTest, OneKeysEarlyTilesDoNotPushOutAnothers) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
@@ -511,6 +511,12 @@ TEST_F(PointPackingTest, OneKeysEarlyTilesDoNotPushOutAnothers) {
   EXPECT_GT(status("tiles_unsealed"), 0);
 }
 
+TEST_F(PointPackingTest, OnlyWhatWasLeasedIsTaken) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  wire::DepthTile made_up = tile(1, 0);
+  made_up.lease.master = {1};
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 1u) << "without a seal";
   wire::seal(made_up.lease, {8}, test::lease_key());
   deliver(made_up, 1);
   EXPECT_EQ(socket.rejected(), 2u) << "of a lease that another sampler was given";
@@ -545,8 +551,9 @@ TEST_F(PointPackingTest, ARefusedTileIsToldTheMaster) {
 // Answers of some events at a time, to viewers that join.
 class StateAnswersTest : public PointPackingTest {
  protected:
-  static constexpr uint64_t kWindow = 56000;
-  StateAnswersTest() : PointPackingTest({.answers = {.window_bytes = kWindow, .bytes_at_once = kWindow / 2}}) {
+  static constexpr uint64_t kWindow = 56000, kAll = 16 * kWindow;
+  StateAnswersTest()
+      : PointPackingTest({.answers = {.window_bytes = kWindow, .bytes_in_all = kAll, .bytes_at_once = kWindow / 2}}) {
     wire::Welcome session = welcome();
     session.settings["packing.keep_redundant"] = 1;
     EXPECT_TRUE(packing.follow(session, 0));
@@ -677,6 +684,37 @@ TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
     }
   }
   for (int n = 0; n < 8; ++n) EXPECT_GT(newest["peer" + std::to_string(n)], 10u) << "each has its turn";
+}
+
+// They ask anew, say that they have received all, or ask in the name of other viewers: what waits for them is counted.
+TEST_F(StateAnswersTest, WhoReadsNothingIsSentNoMoreThanItsPart) {
+  constexpr int kConnections = 40;
+  const auto ask_as = [&](const std::string& user, const std::string& peer, uint64_t viewer, double now_s) {
+    net::Message m = message(wire::StateRequest{{viewer}, packer, {}, true}, peer);
+    m.user = user, m.role = net::Role::kViewer;
+    packing.take_state(socket, m, now_s);
+  };
+  double now_s = 2;
+  for (int round = 0; round < 30; ++round) {
+    for (int n = 0; n < kConnections; ++n) {
+      const std::string peer = "eve" + std::to_string(n);
+      ask_as("eve", peer, uint64_t(1000 + kConnections * (round % 3) + n), now_s);
+      receipt({kFrames}, packer, now_s, peer);
+    }
+    for (int turn = 0; turn < 20; ++turn) packing.tick(now_s += 0.02);
+  }
+  uint64_t waiting = 0, largest = 0;
+  for (const Sent& s : sent) {
+    waiting += s.peer.empty() ? 0 : s.body.size();
+    largest = std::max<uint64_t>(largest, s.body.size());
+  }
+  EXPECT_LE(waiting, kAll + kConnections * (largest + 4096));
+  // Another person has a part of their own.
+  ask_as("anna", "anna", 99, now_s);
+  for (int turn = 0; turn < 20; ++turn) packing.tick(now_s += 0.02);
+  to("anna");
+  EXPECT_GT(bytes, kWindow / 2);
+  EXPECT_LE(bytes, kWindow + largest);
 }
 
 TEST_F(StateAnswersTest, AnAnswerThatCannotBeSentHasNoMark) {
