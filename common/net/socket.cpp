@@ -295,9 +295,10 @@ struct Socket::Impl {
     return sent + (sent > 255 ? 9 : 2);
   }
 
-  bool send(std::string_view peer, std::string_view type, std::string& body) {
+  // make(): the body, once the peer's queue takes it.
+  template <class Make>
+  bool send(std::string_view peer, std::string_view type, size_t bytes, const Make& make) {
     if (kind == Kind::kPub) drain_subscriptions();
-    const size_t bytes = body.size();
     if (counts_queued() && !make_room(peer, type, bytes)) return false;
     try {
       using zmq::send_flags;
@@ -313,8 +314,10 @@ struct Socket::Impl {
         std::string body;
         QueuedBytes::Ticket ticket;
       };
+      std::string body = make();
+      const size_t made = body.size();
       auto* owned =
-          counts_queued() ? new Owned{std::move(body), queued.add(peer, bytes)} : new Owned{std::move(body), {}};
+          counts_queued() ? new Owned{std::move(body), queued.add(peer, made)} : new Owned{std::move(body), {}};
       const auto free = [](void* memory, void* hint) {
         was_handed_over(memory);
         delete static_cast<Owned*>(hint);
@@ -325,6 +328,10 @@ struct Socket::Impl {
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
     }
+  }
+
+  bool send(std::string_view peer, std::string_view type, std::string& body) {
+    return send(peer, type, body.size(), [&] { return std::move(body); });
   }
 
   std::optional<Message> receive() {
@@ -514,6 +521,12 @@ bool Socket::send_frames(std::string_view peer, std::string_view type, std::stri
   return impl_->send(peer, type, body);
 }
 
+bool Socket::send_made(std::string_view peer, std::string_view type, uint64_t bytes,
+                       const std::function<std::string()>& encoded) {
+  CHECK(!impl_->options.read_ahead);
+  return impl_->send(peer, type, bytes, encoded);
+}
+
 void Socket::set_due(Due due) {
   CHECK(impl_->options.read_ahead && !impl_->ahead);
   impl_->due = std::move(due);
@@ -532,6 +545,7 @@ uint64_t Socket::failed_connections() const {
   return impl_->failed_connections;
 }
 uint64_t Socket::keys_refused() const { return impl_->counts().keys_refused; }
+uint64_t Socket::queued_bytes(std::string_view peer) const { return impl_->queued.of(peer); }
 uint64_t Socket::queue_refused() const { return impl_->queue_refused; }
 uint64_t Socket::connections_refused() const { return impl_->counts().refused; }
 
@@ -545,7 +559,6 @@ Socket::Refusal Socket::refusal() const {
   // A server with keys may close a connection before its own greeting is out, so that libzmq cannot tell why.
   if (!keys && broken_off && !impl_->tunnel && !std::exchange(impl_->looked_for_mechanism, true) &&
       mechanism_at(impl_->endpoint) == "CURVE")
-uint64_t Socket::queued_bytes(std::string_view peer) const { return impl_->queued.of(peer); }
     impl_->turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
   const bool turned_away = impl_->turned_away != 0;
   if (!turned_away && !broken_off) return {};

@@ -95,6 +95,12 @@ class Socket {
   /// Sends an already encoded message, shared by several receivers.
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
 
+  /// Makes a message only if the peer's queue takes it; `bytes`: about as many as it will have. Not with read_ahead.
+  template <class M>
+  bool send_made(std::string_view peer, uint64_t bytes, const std::function<M()>& make) {
+    return send_made(peer, M::kName, bytes, [&] { return wire::encode(make()); });
+  }
+
   /// With read_ahead: what the thread that reads is to say by itself, a message's type and body. It is asked at least
   /// every 100 ms, however busy the owner is. To be set before anything is sent or received.
   using Due = std::function<std::optional<std::pair<std::string, std::string>>()>;
@@ -128,14 +134,14 @@ class Socket {
   /// Of a socket that binds: connections that were hung up on because there were SocketOptions::most_connections, or
   /// more bytes of one than SocketOptions::most_unread_bytes, or because a subscriber wanted anything but all.
   uint64_t connections_refused() const;
+  /// Of a ROUTER: bytes of bodies that wait to be sent to this peer.
+  uint64_t queued_bytes(std::string_view peer) const;
   /// Messages dropped and subscribers hung up on because of SocketOptions::most_queued_bytes.
   uint64_t queue_refused() const;
   /// With SocketOptions::watch_connecting: why it was not let in where it connects to, as far as it was told; empty: it
   /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.
   struct Refusal {
     std::string text;
-  /// Of a ROUTER: bytes of bodies that wait to be sent to this peer.
-  uint64_t queued_bytes(std::string_view peer) const;
     bool may_pass = false;
   };
   Refusal refusal() const;
@@ -149,6 +155,8 @@ class Socket {
   Impl& impl() const { return *impl_; }
 
  private:
+  bool send_made(std::string_view peer, std::string_view type, uint64_t bytes,
+                 const std::function<std::string()>& encoded);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -118,10 +118,13 @@ class ServedMesh final : public Served {
   // Who asks for an array that is not there yet asks again, and so does whose answer found the queue full.
   void answer(const net::Message& message, const Outlets& outlets) override {
     net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(outlets.requests, message, [&](const auto& request) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkListRequest>)
-        if (!lists_.allow(message.peer, monotonic_s())) return;
+      constexpr bool kAsksForAll = std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkListRequest>;
+      if (kAsksForAll && !lists_.allow(message.peer, monotonic_s())) return;
       const MeshStore* store = stores_.find(request.array);
-      if (store) outlets.requests.send(reply(request, *store), message.peer);
+      using Reply = decltype(reply(request, *store));
+      if (store)
+        outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store),
+                                          [&] { return reply(request, *store); });
     });
   }
   Result<std::optional<std::string>> carry_out(const wire::Order& order) override {
@@ -166,6 +169,12 @@ class ServedMesh final : public Served {
   static wire::Chunk reply(const wire::ChunkRequest& request, const MeshStore& store) {
     const bool exists = request.chunk.value < store.chunks().size();
     return {request.epoch, request.chunk, exists ? store.chunk(request.chunk).bytes : wire::Bytes{}};
+  }
+  static uint64_t bytes_of(const wire::ChunkListRequest&, const MeshStore& store) {
+    return store.chunks().size() * sizeof(geometry::ChunkInfo);
+  }
+  static uint64_t bytes_of(const wire::ChunkRequest& request, const MeshStore& store) {
+    return request.chunk.value < store.chunks().size() ? store.chunks()[request.chunk.value].bytes : 0;
   }
   scene::Placement placement_of(const glm::dmat3& rotation) const {
     const MeshStoreInfo& info = store_->info();

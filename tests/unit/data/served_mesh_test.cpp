@@ -57,6 +57,45 @@ TEST_F(ServedMeshTest, AnotherMastersOrderOfTheSameWordsIsAnsweredToo) {
   EXPECT_EQ(answer(2, "1 heat"), "1");
 }
 
+class CountsChunks final : public MeshStore {
+ public:
+  const MeshStoreInfo& info() const override { return info_; }
+  const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
+  geometry::ChunkBytes chunk(ChunkId) const override {
+    ++looked_at;
+    return {bytes_, nullptr};
+  }
+  mutable int looked_at = 0;
+
+ private:
+  MeshStoreInfo info_;
+  std::vector<std::byte> bytes_ = std::vector<std::byte>(1000);
+  std::vector<geometry::ChunkInfo> chunks_{{.id = {0}, .box_room = {}, .triangles = 1, .bytes = 1000}};
+};
+
+TEST(ServedMesh, AChunkIsReadOnlyForAPeerWhoseQueueTakesIt) {
+  const auto store = std::make_shared<CountsChunks>();
+  const auto served = serve_mesh(store, "hill.ply", {.as_begun = std::nullopt, .map = {}, .open = {}});
+  net::Context context;
+  net::Socket requests(context, net::Kind::kRouter, "requests", {.high_water_mark = 4});
+  net::Socket master(context, net::Kind::kRouter, "master", {}),
+      asker(context, net::Kind::kDealer, "asker", {.high_water_mark = 100});
+  ASSERT_TRUE(requests.bind("inproc://chunks"));
+  ASSERT_TRUE(asker.connect("inproc://chunks"));
+  constexpr int kAsked = 1000;
+  for (int asked = 0; asked < kAsked; ++asked) {
+    net::wait_readable({&asker}, 0);  // it hears what was read of its requests
+    ASSERT_TRUE(asker.send(wire::ChunkRequest{EpochId{1}, ChunkId{0}, ""}));
+    ASSERT_TRUE(net::wait_readable({&requests}, 20000));
+    served->answer(*requests.receive(), {requests, master});
+  }
+  int got = 0;
+  while (net::wait_readable({&asker}, 200)) got += asker.receive().has_value();
+  EXPECT_GT(got, 0);
+  EXPECT_LT(got, kAsked) << "it read nothing meanwhile";
+  EXPECT_EQ(store->looked_at, got);
+}
+
 // Lists are large, and quickly asked for.
 TEST_F(ServedMeshTest, APeerGetsAFewListsAtOnce) {
   net::Context context;
