@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/core/clock.h"
+#include "common/net/connections/connections.h"
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
 #include "tests/integration/receive.h"
@@ -105,6 +106,55 @@ TEST(HostilePeers, WhoeverFillsAQueueWithLargeMessagesIsHungUpOn) {
   std::vector<Message> got;
   EXPECT_TRUE(bound.receive_until([&] { return got.size() >= 8; }, &got)) << "what was whole is not lost";
   EXPECT_TRUE(bound.serves_a_friend(Kind::kPush));
+}
+
+// A connection's number is used again, also by one that came after one that said nothing.
+TEST(Connections, TheFirstMessageOfAReusedDescriptorIsOfTheOneThatIsThere) {
+  constexpr uint64_t kMessage = 4 * kMiB;
+  zmq::context_t context;
+  zmq::socket_t router(context, zmq::socket_type::router);
+  Connections connections(context, router, {.name = "router", .most_unread = kMessage + kMiB});
+  router.bind("tcp://127.0.0.1:*");
+  const std::string endpoint = router.get(zmq::sockopt::last_endpoint);
+  const auto wait_open = [&](size_t most) {
+    for (const double until = monotonic_s() + kDeadline_s; connections.counts().open != most;) {
+      if (monotonic_s() > until) return false;
+      zmq::pollitem_t item{nullptr, connections.descriptor(), ZMQ_POLLIN, 0};
+      zmq::poll(&item, 1, std::chrono::milliseconds(10));
+    }
+    return true;
+  };
+  const auto wait_message = [&] {
+    zmq::pollitem_t item{router.handle(), 0, ZMQ_POLLIN, 0};
+    return zmq::poll(&item, 1, std::chrono::milliseconds(int(kDeadline_s * 1e3))) == 1;
+  };
+  // Of which connection the next message was.
+  const auto receive = [&] {
+    zmq::message_t peer, body;
+    if (!wait_message() || !router.recv(peer) || !router.recv(body)) return -1;
+    const int fd = zmq_msg_get(body.handle(), ZMQ_SRCFD);
+    connections.spoke(fd, body.size());
+    return fd;
+  };
+  int first = -1;
+  {
+    RawPeer speaks(endpoint);
+    ASSERT_TRUE(speaks.shake_hands("DEALER") && speaks.send(zmtp_frame("hello", false)));
+    first = receive();
+  }
+  ASSERT_TRUE(wait_open(0));
+  {
+    const RawPeer says_nothing(endpoint);
+    ASSERT_TRUE(wait_open(1));
+  }
+  ASSERT_TRUE(wait_open(0));
+  RawPeer speaks(endpoint);
+  const std::string message = zmtp_frame(std::string(kMessage, 'x'), false);
+  ASSERT_TRUE(speaks.shake_hands("DEALER") && speaks.send(message));
+  ASSERT_EQ(receive(), first) << "the number is used again";
+  ASSERT_TRUE(speaks.send(message) && wait_message());
+  connections.hang_up_on_unread();
+  EXPECT_EQ(connections.counts().refused, 0u) << "of two messages one was read";
 }
 
 // Twenty thousand messages of all lengths: what they have on their way is known to the byte, or it would add up.

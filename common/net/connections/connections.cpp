@@ -208,18 +208,21 @@ size_t Connections::hang_up_on_late(uint64_t bytes) {
 void Connections::spoke(int fd, uint64_t bytes, std::string_view user) {
   const std::lock_guard lock(mutex_);
   drain();  // its acceptance was told before its message came
+  const auto it = open_.find(fd);
   for (auto* gone : {&to_judge_, &ended_}) {
     const auto found =
         std::find_if(gone->begin(), gone->end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
     if (found == gone->end()) continue;
     found->has_spoken = true;
-    return;
+    // It is of the one that came since by this number, if so much has come of that one.
+    if (it == open_.end() || passed(fd).came < it->second.read + bytes) return;
+    break;
   }
-  if (const auto it = open_.find(fd); it != open_.end()) {
+  if (it != open_.end()) {
     Connection& c = it->second;
     c.read += bytes;
+    c.user = user;
     if (!std::exchange(c.has_spoken, true)) {
-      c.user = user;
       c.published = published_;
       if (options_.publishes) c.taken = passed(fd).taken;
     }
