@@ -53,15 +53,13 @@ void PointReceiver::on_published_mark(const wire::StateMark& mark) {
       mark.sequence != sequencer_.applied())
     return;
   const uint64_t ours = cache_.digest();
-  if (!check_.compare(mark.digest, ours, monotonic_s())) {
-    if (mark.digest != ours)
-      log::warn("after event {} the points are not the packer's: {:016x}, it has {:016x}", mark.sequence.value, ours,
-                mark.digest);
-    return;
-  }
-  log::error("after event {} the points are not the packer's: {:016x}, it has {:016x}; they are asked for anew",
-             mark.sequence.value, ours, mark.digest);
-  sequencer_.start_anew();
+  const auto verdict = check_.compare(mark.packer, mark.digest, ours, monotonic_s());
+  if (verdict == ReplicaCheck::Verdict::kGoOn) return;
+  const bool anew = verdict == ReplicaCheck::Verdict::kAskAnew;
+  log::error("after event {} the points are not those of the packer {:x}: {:016x}, it has {:016x}; {}",
+             mark.sequence.value, mark.packer.value, ours, mark.digest,
+             anew ? "they are asked for anew" : "they came anew and are shown as they are: the packer may be broken");
+  if (anew) sequencer_.start_anew();
 }
 
 void PointReceiver::receive_answers(net::Socket& state, int most) {
@@ -158,7 +156,9 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
   if (const Status decoded = codec::decode_into(tile_, bytes, patch.rect.width, patch.rect.height); !decoded) {
     ++decode_errors_;
-    log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
+    if (told_of_patches_.allow(begin))
+      log::warn("patch {} of the packer {:x} cannot be decoded: {}", patch.sequence.value, patch.packer.value,
+                decoded.error().text);
     return false;
   }
   if (patch.viewer == options_.viewer && !patch.extra) rays_.follow(patch.camera);

@@ -12,6 +12,7 @@
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/record/event_record.h"
 #include "client/viewer/render/fine_rays.h"
+#include "common/core/log.h"
 #include "common/image/depth_image.h"
 #include "common/metrics/recorder.h"
 #include "common/net/socket.h"
@@ -84,6 +85,7 @@ class PointReceiver {
   EpochId epoch_;
   image::DepthImage tile_;  // memory that decoding reuses
   refinement::BoundedPatches bounded_;
+  log::RateLimiter told_of_patches_;  // that cannot be decoded
   double asked_s_ = 0;
   uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0, patches_refined_ = 0;
 };

@@ -3,27 +3,32 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
+
+#include "common/core/ids.h"
 
 namespace telesplat::viewer {
 
 class ReplicaCheck {
  public:
-  /// After a difference the replica is made anew at once, then, if that did not help, after this time, twice this time,
-  /// and so on: what never comes out equal shall not cost a link all it has.
-  static constexpr double kPatience_s = 20, kLongest_s = 640;
+  /// After a difference the replica is made anew at once, and again after this time, twice this time, up to kMostAnew
+  /// times in a row of one packer: what never comes out equal shall not cost a link all it has.
+  static constexpr double kPatience_s = 20;
+  static constexpr int kMostAnew = 3;
 
-  /// Both digests are of the same event. True: the replica is to be made anew from everything.
-  bool compare(uint64_t packers, uint64_t ours, double now_s) {
-    if (packers == ours) {
-      ++equal_;
-      patience_s_ = kPatience_s;
-      return false;
-    }
+  enum class Verdict {
+    kGoOn,
+    kAskAnew,  ///< the replica is to be made anew from everything
+    kGiveUp,   ///< told once: it was, kMostAnew times, and is not asked for any more until digests are equal
+  };
+  /// Both digests are of the same event.
+  Verdict compare(InstanceId packer, uint64_t packers, uint64_t ours, double now_s) {
+    if (std::exchange(packer_, packer) != packer || packers == ours) anew_ = 0, again_s_ = -1e300;
+    if (packers == ours) return ++equal_, Verdict::kGoOn;
     ++different_;
-    if (now_s < again_s_) return false;
-    again_s_ = now_s + patience_s_;
-    patience_s_ = patience_s_ * 2 < kLongest_s ? patience_s_ * 2 : kLongest_s;
-    return true;
+    if (now_s < again_s_ || anew_ > kMostAnew) return Verdict::kGoOn;
+    again_s_ = now_s + kPatience_s * double(1 << anew_);
+    return ++anew_ > kMostAnew ? Verdict::kGiveUp : Verdict::kAskAnew;
   }
 
   uint64_t equal() const { return equal_; }
@@ -31,7 +36,9 @@ class ReplicaCheck {
 
  private:
   uint64_t equal_ = 0, different_ = 0;
-  double patience_s_ = kPatience_s, again_s_ = -1e300;
+  InstanceId packer_;
+  int anew_ = 0;  // times in a row, and one more once it is given up
+  double again_s_ = -1e300;
 };
 
 }  // namespace telesplat::viewer

@@ -3,29 +3,40 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace telesplat::viewer {
 namespace {
 
+using Verdict = ReplicaCheck::Verdict;
+constexpr InstanceId kPacker{5};
+
 TEST(ReplicaCheck, EqualOnesAreCounted) {
   ReplicaCheck check;
-  EXPECT_FALSE(check.compare(7, 7, 1));
-  EXPECT_FALSE(check.compare(8, 8, 2));
+  EXPECT_EQ(check.compare(kPacker, 7, 7, 1), Verdict::kGoOn);
+  EXPECT_EQ(check.compare(kPacker, 8, 8, 2), Verdict::kGoOn);
   EXPECT_EQ(check.equal(), 2u);
   EXPECT_EQ(check.different(), 0u);
 }
 
-TEST(ReplicaCheck, ADifferentOneIsMadeAnewAtOnceThenLessAndLessOften) {
+TEST(ReplicaCheck, ADifferentOneIsMadeAnewAtOnceThenLessOftenAndThenNoMore) {
   ReplicaCheck check;
-  int anew = 0;
-  for (double now_s = 0; now_s < 3600; now_s += 2) anew += check.compare(1, 2, now_s);
-  EXPECT_GE(anew, 6);
-  EXPECT_LE(anew, 12) << "what never comes out equal costs little";
-  EXPECT_EQ(check.different(), 1800u);
+  std::vector<double> anew_s, given_up_s;
+  for (double now_s = 0; now_s < 36000; now_s += 2) {
+    const Verdict verdict = check.compare(kPacker, 1, 2, now_s);
+    if (verdict == Verdict::kAskAnew) anew_s.push_back(now_s);
+    if (verdict == Verdict::kGiveUp) given_up_s.push_back(now_s);
+  }
+  EXPECT_EQ(anew_s, (std::vector<double>{0, 20, 60}));
+  EXPECT_EQ(given_up_s, std::vector<double>{140}) << "told once";
+  EXPECT_EQ(check.different(), 18000u);
   // Once it was equal, the next difference is another one.
-  EXPECT_FALSE(check.compare(3, 3, 1e6));
-  EXPECT_TRUE(check.compare(3, 4, 2e6));
-  EXPECT_FALSE(check.compare(3, 4, 2e6 + ReplicaCheck::kPatience_s / 2));
-  EXPECT_TRUE(check.compare(3, 4, 2e6 + 2 * ReplicaCheck::kPatience_s));
+  EXPECT_EQ(check.compare(kPacker, 3, 3, 1e6), Verdict::kGoOn);
+  EXPECT_EQ(check.compare(kPacker, 3, 4, 1e6 + 2), Verdict::kAskAnew);
+  EXPECT_EQ(check.compare(kPacker, 3, 4, 1e6 + 2 + ReplicaCheck::kPatience_s / 2), Verdict::kGoOn);
+  EXPECT_EQ(check.compare(kPacker, 3, 4, 1e6 + 2 + ReplicaCheck::kPatience_s), Verdict::kAskAnew);
+  // So it is with another packer.
+  EXPECT_EQ(check.compare({6}, 3, 4, 1e6 + 24), Verdict::kAskAnew);
 }
 
 }  // namespace
