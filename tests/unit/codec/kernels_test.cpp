@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <string>
 #include <vector>
@@ -31,6 +32,15 @@ void on_every_set(Check check) {
       for (int round = 0; round < 20; ++round) ASSERT_NO_FATAL_FAILURE(check(kernels(), width, random));
     }
   }
+}
+
+// In sanitized builds as well: they are what decodes the streams of others.
+TEST(Kernels, EveryInstructionSetOfThisMachineIsTested) {
+  const std::vector<int64_t> all = kernel_targets();
+  for (const int64_t target : {int64_t{HWY_AVX2}, int64_t{HWY_AVX3}, int64_t{HWY_AVX3_DL}})
+    if (hwy::SupportedTargets() & target) {
+      EXPECT_EQ(std::count(all.begin(), all.end(), target), 1) << hwy::TargetName(target);
+    }
 }
 
 // Three rows of a plane and what is around them.
