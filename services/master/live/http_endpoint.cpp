@@ -11,6 +11,7 @@
 #include <chrono>
 #include <mutex>
 #include <optional>
+#include <string_view>
 #include <thread>
 
 #include "common/core/clock.h"
@@ -28,7 +29,20 @@ using asio::ip::tcp;
 constexpr auto kAfterFailure = std::chrono::milliseconds(200);  // of accepting: no descriptors are left
 constexpr int kBacklog = 16;
 
+// Programs of this machine call it by these names. A page in a browser here, whose own name was made to point to this
+// address, does not.
+bool is_loopback_name(std::string_view host) {
+  if (const size_t colon = host.rfind(':'); colon != host.npos && host.find(']', colon) == host.npos)
+    host = host.substr(0, colon);
+  if (beast::iequals({host.data(), host.size()}, "localhost")) return true;
+  beast::error_code error;
+  if (host.starts_with('[') && host.ends_with(']'))
+    return asio::ip::make_address_v6(std::string(host.substr(1, host.size() - 2)), error).is_loopback() && !error;
+  return asio::ip::make_address_v4(std::string(host), error).is_loopback() && !error;
+}
+
 struct Shared {
+  bool local = true;  // bound to loopback
   std::mutex mutex;
   std::shared_ptr<const std::string> text = std::make_shared<const std::string>();
   size_t connections = 0;  // the thread's alone
@@ -78,7 +92,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void look_up(const http::request<http::empty_body>& request) {
     const std::string target(request.target());
     const std::string path = target.substr(0, target.find('?'));
-    if (request.method() != http::verb::get && request.method() != http::verb::head)
+    if (shared_.local && !is_asked_locally(request))
+      fill(http::status::forbidden, "the name of the host is not this machine's own, such as localhost\n");
+    else if (request.method() != http::verb::get && request.method() != http::verb::head)
       fill(http::status::method_not_allowed, "GET is understood here\n");
     else if (path == "/metrics")
       fill(http::status::ok, *shared_.now());
@@ -86,6 +102,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
       fill(http::status::ok, "A session of Telesplat. /metrics has its figures, in Prometheus' text format.\n");
     else
       fill(http::status::not_found, "nothing is here; /metrics has the figures\n");
+  }
+
+  static bool is_asked_locally(const http::request<http::empty_body>& request) {
+    const auto hosts = request.count(http::field::host);
+    if (hosts == 0) return request.version() < 11;
+    return hosts == 1 && is_loopback_name(std::string(request[http::field::host]));
   }
 
   void fill(http::status status, std::string text) {
@@ -167,6 +189,7 @@ Result<std::unique_ptr<HttpEndpoint>> HttpEndpoint::open(const Options& o) {
                     "that needs --insecure",
                     o.address)};
   auto impl = std::make_unique<Impl>();
+  impl->shared.local = address.is_loopback();
   const tcp::endpoint endpoint(address, uint16_t(o.port));
   impl->acceptor.open(endpoint.protocol(), error);
   if (!error) impl->acceptor.set_option(tcp::acceptor::reuse_address(true), error);

@@ -21,7 +21,8 @@ class HttpEndpoint {
     int port = 0;
     bool insecure = false;  ///< the address need not be loopback
   };
-  /// Binds and begins to serve. Error: names the flag, the address and what is wrong.
+  /// Binds and begins to serve; on loopback those alone who call it by a name of loopback. Error: names the flag, the
+  /// address and what is wrong.
   static Result<std::unique_ptr<HttpEndpoint>> open(const Options& options);
   ~HttpEndpoint();
   HttpEndpoint(const HttpEndpoint&) = delete;

@@ -80,7 +80,7 @@ class Endpoint : public testing::Test {
     c.say(request);
     return c.hear();
   }
-  std::string get(const std::string& path) { return ask("GET " + path + " HTTP/1.1\r\nHost: x\r\n\r\n"); }
+  std::string get(const std::string& path) { return ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n"); }
 
   const int port = free_port();
   std::unique_ptr<HttpEndpoint> endpoint;
@@ -100,14 +100,30 @@ TEST_F(Endpoint, ServesTheNewestText) {
 TEST_F(Endpoint, RefusesWhatIsNotForIt) {
   EXPECT_TRUE(get("/other").starts_with("HTTP/1.1 404 "));
   EXPECT_TRUE(get("/metrics/../etc").starts_with("HTTP/1.1 404 "));
-  EXPECT_TRUE(ask("POST /metrics HTTP/1.1\r\n\r\n").starts_with("HTTP/1.1 405 "));
-  EXPECT_TRUE(ask("POST /metrics HTTP/1.1\r\nContent-Length: 999999999\r\n\r\n").starts_with("HTTP/1.1 400 "))
+  EXPECT_TRUE(ask("POST /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n").starts_with("HTTP/1.1 405 "));
+  EXPECT_TRUE(ask("POST /metrics HTTP/1.1\r\nHost: localhost\r\nContent-Length: 999999999\r\n\r\n")
+                  .starts_with("HTTP/1.1 400 "))
       << "nobody waits for a body";
   EXPECT_TRUE(ask("no request at all\r\n\r\n").starts_with("HTTP/1.1 400 "));
-  const std::string head = ask("HEAD /metrics HTTP/1.1\r\n\r\n");
+  const std::string head = ask("HEAD /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_TRUE(head.starts_with("HTTP/1.1 200 "));
   EXPECT_TRUE(head.ends_with("\r\n\r\n")) << head;
   EXPECT_TRUE(get("/metrics").ends_with("telesplat_up 1\n")) << "and goes on";
+}
+
+// A page in a browser of this machine may reach it by a name of its own, which points here.
+TEST_F(Endpoint, ThoseWhoCallItByAnotherNameAreRefused) {
+  const auto code = [&](const std::string& head) {
+    return ask("GET /metrics " + head + "\r\n\r\n").substr(0, sizeof "HTTP/1.1 200" - 1);
+  };
+  for (const char* host : {"localhost", "LocalHost:9464", "127.0.0.1", "127.3.2.1:80", "[::1]", "[::1]:9464"})
+    EXPECT_EQ(code(std::string("HTTP/1.1\r\nHost: ") + host), "HTTP/1.1 200") << host;
+  for (const char* host : {"evil.example", "evil.example:9464", "127.0.0.1.evil.example", "localhost.evil.example",
+                           "192.168.1.5", "[fe80::1]:80", "::1", "[::1", "127.0.0.1@evil.example", "", ":80"})
+    EXPECT_EQ(code(std::string("HTTP/1.1\r\nHost: ") + host), "HTTP/1.1 403") << host;
+  EXPECT_EQ(code("HTTP/1.1\r\nHost: localhost\r\nHost: evil.example"), "HTTP/1.1 403");
+  EXPECT_EQ(code("HTTP/1.1"), "HTTP/1.1 403");
+  EXPECT_EQ(code("HTTP/1.0"), "HTTP/1.1 200") << "which knows no names";
 }
 
 TEST_F(Endpoint, RequestsWithoutAnEndAreNotKept) {
@@ -126,7 +142,7 @@ TEST_F(Endpoint, TheSlowAreClosedAndTheOthersServed) {
   bool served = false;
   while (!served && monotonic_s() - begin_s < 4 * HttpEndpoint::kPatience_s) {
     Client c(port);
-    c.say("GET /metrics HTTP/1.1\r\n\r\n");
+    c.say("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
     for (Client& s : slow) s.say("t");
     served = c.hear(1).ends_with("telesplat_up 1\n");
   }
@@ -142,6 +158,15 @@ TEST_F(Endpoint, APortInUseIsSaid) {
   ASSERT_FALSE(second.ok());
   EXPECT_EQ(second.error().text,
             "--metrics-port " + std::to_string(port) + ": 127.0.0.1 cannot be bound: Address already in use");
+}
+
+TEST(EndpointAddress, WhereOthersMayReachItAnyNameWill) {
+  const int port = free_port();
+  const auto opened = HttpEndpoint::open({.address = "0.0.0.0", .port = port, .insecure = true});
+  ASSERT_TRUE(opened.ok());
+  Client c(port);
+  c.say("GET / HTTP/1.1\r\nHost: master\r\n\r\n");
+  EXPECT_TRUE(c.hear().starts_with("HTTP/1.1 200 "));
 }
 
 TEST(EndpointAddress, IsLoopbackUnlessToldOtherwise) {
