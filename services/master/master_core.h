@@ -163,7 +163,7 @@ class MasterCore {
   Result<std::string> obey(const wire::Control& m, double now_s);
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
   void answer_of_launcher(const std::string& peer, const wire::Control& m);
-  Status pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s);
+  Status pass_on(const Errands::Asker& asker, const wire::Control& m, const std::string& role, double now_s);
   /// all: facts are told whole.
   nlohmann::ordered_json process_json(const std::string& routing_id, const Peer& peer, double now_s, bool all) const;
   std::string status_json(double now_s, bool all) const;

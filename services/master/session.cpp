@@ -168,7 +168,7 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   }
   if (m.command == "done") return answer_of_launcher(peer, m);
   if (const std::string role = errand_for(m.command); !role.empty()) {
-    if (const Status s = pass_on(peer, m, role, now_s); !s)
+    if (const Status s = pass_on({peer, key.empty() ? peer : key}, m, role, now_s); !s)
       outbox_.send(peer, wire::ControlReply{false, s.error().text});
     return;
   }
@@ -195,9 +195,9 @@ wire::ControlReply MasterCore::health(const wire::Control& m, double now_s) cons
 // To the viewer that is named, else of a setting to all that are here, and of what is asked to the first one; to all
 // data servers of the scene, of which each knows its part. Of viewers that have one name the one that was heard last is
 // meant: it may be another's new life.
-Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s) {
+Status MasterCore::pass_on(const Errands::Asker& asker, const wire::Control& m, const std::string& role, double now_s) {
   if (role == Errands::kLauncher) {
-    const auto number = errands_.ask_launcher(peer, m, session_.started_by, now_s);
+    const auto number = errands_.ask_launcher(asker, m, session_.started_by, now_s);
     return number ? ok_status() : Status(number.error());
   }
   const std::string wanted = role == "viewer" ? scene::value_or(m.arguments, "viewer", std::string()) : std::string();
@@ -224,7 +224,7 @@ Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, cons
   if (role == "viewer" && (!wanted.empty() || !scene::setting_of_order(m.command))) here.resize(1);
   std::set<std::string> asked;
   for (const Here& h : here) asked.insert(h.id);
-  const auto number = errands_.begin(peer, asked, now_s);
+  const auto number = errands_.begin(asker, asked, now_s);
   if (!number) return number.error();
   for (const auto& id : asked) outbox_.send(id, wire::Order{*number, m.command, m.arguments});
   return ok_status();

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <utility>
 
@@ -10,18 +11,22 @@
 
 namespace telesplat::master {
 
-Result<uint64_t> Errands::begin(const std::string& peer, std::set<std::string> asked, double now_s) {
+Result<uint64_t> Errands::begin(const Asker& asker, std::set<std::string> asked, double now_s) {
+  const auto own = std::count_if(errands_.begin(), errands_.end(),
+                                 [&](const auto& errand) { return errand.second.asker.person == asker.person; });
+  if (size_t(own) >= kMostOfOne)
+    return Error{fmt::format("{} orders of yours wait for their answers, limit {}", own, kMostOfOne)};
   if (errands_.size() >= kMost) return Error{fmt::format("{} orders wait for their answers, limit {}", kMost, kMost)};
-  errands_[++last_] = {peer, std::move(asked), {}, now_s + kPatience_s, {}};
+  errands_[++last_] = {asker, std::move(asked), {}, now_s + kPatience_s, {}};
   return last_;
 }
 
-Result<uint64_t> Errands::ask_launcher(const std::string& peer, const wire::Control& order,
-                                       const std::string& started_by, double now_s) {
+Result<uint64_t> Errands::ask_launcher(const Asker& asker, const wire::Control& order, const std::string& started_by,
+                                       double now_s) {
   if (started_by.empty() || started_by == "hand")
     return Error{fmt::format("{}: this session was started by hand: whoever started its processes starts and ends them",
                              order.command)};
-  auto number = begin(peer, {kLauncher}, now_s);
+  auto number = begin(asker, {kLauncher}, now_s);
   if (number) errands_[*number].wish = order;
   return number;
 }
@@ -40,7 +45,7 @@ std::optional<Errands::Reply> Errands::answered(const std::string& from, const w
     errand->second.refusal = answer.text;
     return std::nullopt;
   }
-  Reply out{std::move(errand->second.peer), {answer.ok, answer.text}};
+  Reply out{std::move(errand->second.asker.peer), {answer.ok, answer.text}};
   errands_.erase(errand);
   return out;
 }
@@ -54,7 +59,7 @@ std::vector<Errands::Reply> Errands::lost(const std::string& asked) {
       continue;
     }
     if (e.refusal.empty()) e.refusal = "who was asked is gone, and has not answered";
-    out.push_back({std::move(e.peer), {false, std::move(e.refusal)}});
+    out.push_back({std::move(e.asker.peer), {false, std::move(e.refusal)}});
     at = errands_.erase(at);
   }
   return out;
@@ -64,7 +69,7 @@ std::vector<Errands::Reply> Errands::overdue(double now_s) {
   std::vector<Reply> out;
   std::erase_if(errands_, [&](auto& errand) {
     if (now_s < errand.second.until_s) return false;
-    out.push_back({std::move(errand.second.peer), {false, fmt::format("no answer within {} s", kPatience_s)}});
+    out.push_back({std::move(errand.second.asker.peer), {false, fmt::format("no answer within {} s", kPatience_s)}});
     return true;
   });
   return out;

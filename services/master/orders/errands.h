@@ -17,18 +17,23 @@ class Errands {
  public:
   static constexpr double kPatience_s = 3;  ///< for an answer
   static constexpr size_t kMost = 256;      ///< under way; more are refused
+  static constexpr size_t kMostOfOne = 16;  ///< of these, one person's: a quarter of what a viewer keeps waiting
 
+  struct Asker {
+    std::string peer;    ///< who asked
+    std::string person;  ///< the name of the key; where there are no keys the connection
+  };
   struct Reply {
     std::string peer;  ///< who asked
     wire::ControlReply reply;
   };
 
   /// An order that these processes (routing ids) have been sent, under this number; the first answer that is good
-  /// counts, and if none is the last one. Error: too many are under way.
-  Result<uint64_t> begin(const std::string& peer, std::set<std::string> asked, double now_s);
+  /// counts, and if none is the last one. Error: too many are under way, of all or of this person.
+  Result<uint64_t> begin(const Asker& asker, std::set<std::string> asked, double now_s);
   /// Likewise an order to the launcher, which is no process of the session: it finds the order among wishes(), and
   /// answers as kLauncher. Only sessions that a launcher started have one.
-  Result<uint64_t> ask_launcher(const std::string& peer, const wire::Control& order, const std::string& started_by,
+  Result<uint64_t> ask_launcher(const Asker& asker, const wire::Control& order, const std::string& started_by,
                                 double now_s);
   static constexpr const char* kLauncher = "launcher";
   /// Orders to the launcher that have no answer yet, by their numbers.
@@ -43,7 +48,7 @@ class Errands {
 
  private:
   struct Errand {
-    std::string peer;
+    Asker asker;
     std::set<std::string> open;  // who has not answered yet
     std::string refusal;         // what the last one said that could not; empty: none did yet
     double until_s = 0;

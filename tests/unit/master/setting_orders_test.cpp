@@ -26,6 +26,12 @@ class SettingOrders : public testing::Test {
     core.on("ctl", wire::Control{command, arguments}, now_s);
     take();
   }
+  // Whether a pick that comes over this connection with this key is passed on to a viewer.
+  bool picks(const std::string& peer, const std::string& key) {
+    core.on(peer, wire::Control{"pick", {{"at", "1,1"}}}, 1, key);
+    take();
+    return !asked.empty();
+  }
   void take() {
     replies.clear();
     asked.clear();
@@ -103,6 +109,22 @@ TEST_F(SettingOrders, AnAnswerThatIsNoneIsRefusedAndALauncherThatIsSilentIsTold)
   ASSERT_EQ(replies.size(), 1u);
   EXPECT_FALSE(replies[0].second.ok);
   EXPECT_EQ(replies[0].second.text, "no answer within 3 s");
+}
+
+// A viewer keeps 64 orders and drops the oldest: a person alone must not be able to fill its list.
+TEST_F(SettingOrders, NobodyFillsTheListOfOrdersAlone) {
+  size_t passed_on = 0;
+  for (size_t i = 0; i < Errands::kMost; ++i) passed_on += picks("eve's " + std::to_string(i), "eve");
+  ASSERT_EQ(replies.size(), 1u);
+  EXPECT_EQ(replies[0].second.text, "16 orders of yours wait for their answers, limit 16");
+  EXPECT_EQ(passed_on, 16u);
+  EXPECT_TRUE(picks("anna's", "anna"));
+  for (size_t i = 0; i < Errands::kMost; ++i) picks("without keys", "");
+  EXPECT_FALSE(picks("without keys", ""));
+  EXPECT_TRUE(picks("another without keys", ""));
+  core.tick(1 + Errands::kPatience_s + 0.1);
+  take();
+  EXPECT_TRUE(picks("eve's", "eve")) << "those that nobody answered count no more";
 }
 
 TEST_F(SettingOrders, AnUnknownOrderIsToldAllThereAre) {
