@@ -196,15 +196,16 @@ std::string wall_name(const ViewerOptions& o) { return fmt::format("{} x{}", o.w
 std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& context, const ViewerWorker& worker) {
   if (!in_step(o)) return nullptr;
   const auto& d = o.display;
-  return std::make_unique<WallPace>(context,
-                                    WallPace::Options{.master = o.service.master,
-                                                      .name = o.service.name,
-                                                      .wall = wall_name(o),
-                                                      .number = uint64_t(d.wall.tile),
-                                                      .viewers = uint64_t(d.wall.tiles()),
-                                                      .period_s = d.target_fps > 0 ? 1 / d.target_fps : 0,
-                                                      .asks_hz = o.requests.max_rate_hz},
-                                    worker.instance(), [&worker](double s) { return worker.to_master_s(s); });
+  return std::make_unique<WallPace>(
+      context,
+      WallPace::Options{.master = o.service.master,
+                        .name = o.service.name,
+                        .wall = wall_name(o),
+                        .number = uint64_t(d.wall.tile),
+                        .viewers = uint64_t(d.wall.tiles()),
+                        .period_s = d.target_fps > 0 ? 1 / d.target_fps : 0,
+                        .asks_hz = o.requests.max_rate_hz},
+      [&worker] { return worker.instance(); }, [&worker](double s) { return worker.to_master_s(s); });
 }
 
 struct Served {

@@ -47,6 +47,7 @@ ViewerWorker::ViewerWorker(net::Context& context, const Options& options, Coupli
       feeds_(context, options.service.name),
       requester_(with_buffers(options.requests, gate), link_.instance()),
       started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
+      instance_(link_.instance()),
       thread_([this] { loop(); }) {}
 
 ViewerWorker::~ViewerWorker() {
@@ -139,6 +140,7 @@ std::shared_ptr<const SceneTerms> ViewerWorker::terms() const {
 void ViewerWorker::loop() {
   net::lower_thread_priority(5);  // the display comes first
   link_.on_order([this](const wire::Order& order) { orders_.put(order); });
+  link_.on_renewed([this](InstanceId instance) { renew(instance); });
   try {
     while (!stop_) {
       const double poll_s = gate_.waits() ? kCoupledPoll_s : options_.requests.wall.empty() ? kPoll_s : kWallPoll_s;
@@ -179,6 +181,13 @@ void ViewerWorker::receive_control() {
   if (!link_.shutdown_requested() || shutdown_) return;
   why_ = link_.shutdown_reason();
   shutdown_ = true;
+}
+
+// What was received speaks for the instance before: with the next welcome it begins anew.
+void ViewerWorker::renew(InstanceId instance) {
+  instance_ = instance;
+  requester_.set_viewer(instance);
+  pipeline_.reset();
 }
 
 void ViewerWorker::follow_session() {

@@ -75,7 +75,8 @@ class ViewerWorker {
   bool failed() const { return failed_; }
   /// MasterLink::exit_code().
   int link_code() const { return link_code_; }
-  InstanceId instance() const { return link_.instance(); }
+  /// It may become another one.
+  InstanceId instance() const { return instance_; }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
   /// For people who watch.
@@ -105,6 +106,7 @@ class ViewerWorker {
 
   void loop();
   void receive();
+  void renew(InstanceId instance);
   void follow_session();
   void follow_record(const wire::Welcome& session);
   void follow_coupling(const scene::SessionView& session);
@@ -180,6 +182,7 @@ class ViewerWorker {
   std::string why_;  // written before shutdown_
   std::atomic<bool> shutdown_{false}, failed_{false}, stop_{false};
   std::atomic<int> link_code_{0};
+  std::atomic<InstanceId> instance_;
   std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
   std::atomic<double> longest_gap_ms_{0};  // between two displayed frames
   metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};

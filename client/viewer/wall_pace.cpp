@@ -22,10 +22,10 @@ void sleep_until(double t_s) {
 
 }  // namespace
 
-WallPace::WallPace(net::Context& context, const Options& options, InstanceId viewer,
+WallPace::WallPace(net::Context& context, const Options& options, std::function<InstanceId()> viewer,
                    std::function<double(double)> to_master_s)
     : options_(options),
-      viewer_(viewer),
+      viewer_(std::move(viewer)),
       to_master_s_(std::move(to_master_s)),
       socket_(context, net::Kind::kDealer, options.name + ":wall", {.linger_ms = 0}) {
   if (const Status s = socket_.connect(options.master); !s) log::error("{}", s.error().text);
@@ -82,7 +82,7 @@ WallPace::Swapped WallPace::drawn(const Wish& next, const std::function<bool()>&
   const double begin_s = monotonic_s();
   late_s_ = begun_ ? late_s_ : 0;
   predictor_.add(begin_s, next.head);
-  const wire::SwapReady ready{.viewer = viewer_,
+  const wire::SwapReady ready{.viewer = viewer_(),
                               .wall = options_.wall,
                               .number = options_.number,
                               .viewers = options_.viewers,

@@ -47,8 +47,9 @@ class WallPace {
     geometry::Pose ask_head;
   };
 
-  /// Connects. to_master_s: this machine's monotonic time on the master's clock.
-  WallPace(net::Context& context, const Options& options, InstanceId viewer, std::function<double(double)> to_master_s);
+  /// Connects. viewer: as the viewer says hello. to_master_s: this machine's monotonic time on the master's clock.
+  WallPace(net::Context& context, const Options& options, std::function<InstanceId()> viewer,
+           std::function<double(double)> to_master_s);
 
   /// The frame at hand is drawn (frame 0: there is none yet). Returns when it is to be presented; turn() is the next
   /// one then. stopped: asked ten times a second; true: it returns at once.
@@ -64,7 +65,7 @@ class WallPace {
   std::optional<wire::Swap> wait(const wire::SwapReady& ready, double patience_s, const std::function<bool()>& stopped);
 
   Options options_;
-  InstanceId viewer_;
+  std::function<InstanceId()> viewer_;
   std::function<double(double)> to_master_s_;
   net::Socket socket_;
   Turn turn_;

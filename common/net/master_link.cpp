@@ -20,10 +20,12 @@ constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
 constexpr int kFirstClocks = 8;
 constexpr double kSilence_s = 5;       // of a master that answers once a second
 constexpr double kSignPeriod_s = 1.5;  // of signs of life while no reports come
+constexpr int kMostRenewals = 3;
 }  // namespace
 
 struct MasterLink::Life {
   std::atomic<bool> welcomed{false};
+  std::atomic<InstanceId> self;
   std::atomic<double> ticked_s{0}, said_s{0};  // when the owner was last here, and a report or a sign was sent
 };
 
@@ -41,13 +43,14 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
   hello_.name = to_utf8(hello_.name);
   for (auto& [fact, value] : hello_.facts) value = to_utf8(value);
   hello_.pid = static_cast<uint64_t>(getpid());
+  life_->self = hello_.instance;
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);
-  socket_.set_due([life = life_, self = hello_.instance]() -> std::optional<std::pair<std::string, std::string>> {
+  socket_.set_due([life = life_]() -> std::optional<std::pair<std::string, std::string>> {
     const double now_s = monotonic_s();
     if (!life->welcomed || now_s - life->said_s < kSignPeriod_s || now_s - life->ticked_s > kLongestWork_s)
       return std::nullopt;
     life->said_s = now_s;
-    return std::pair(std::string(wire::StatusReport::kName), wire::encode(wire::StatusReport{self, {}}));
+    return std::pair(std::string(wire::StatusReport::kName), wire::encode(wire::StatusReport{life->self, {}}));
   });
 }
 
@@ -55,6 +58,26 @@ void MasterLink::follow_welcomed(bool welcomed) {
   welcomed_ = welcomed;
   life_->said_s = monotonic_s();
   life_->welcomed = welcomed;
+  if (welcomed) hellos_ = renewals_ = 0;
+}
+
+void MasterLink::say_hello(double sent_s) {
+  hello_.sent_s = sent_s;
+  socket_.send(hello_);
+  ++hellos_;
+}
+
+// Each hello that was said as the instance before is answered.
+bool MasterLink::renew() {
+  if (!renewed_) return false;
+  if (hellos_before_ > 0) return --hellos_before_, true;
+  if (++renewals_ > kMostRenewals) return false;
+  hellos_before_ = std::max(0, std::exchange(hellos_, 0) - 1);
+  life_->self = hello_.instance = make_instance_id();
+  log::warn("the master knows {} as a process of another key: it joins again as a new one", hello_.name);
+  follow_welcomed(false);
+  renewed_(hello_.instance);
+  return true;
 }
 
 void MasterLink::report(const std::function<Values()>& status, double now_s) {
@@ -74,8 +97,7 @@ void MasterLink::report(const std::function<Values()>& status, double now_s) {
 void MasterLink::tick(double now_s, const std::function<Values()>& status) {
   life_->ticked_s = monotonic_s();
   if (!welcomed_ && now_s - last_hello_s_ >= kHelloPeriod_s) {
-    hello_.sent_s = monotonic_s();
-    socket_.send(hello_);
+    say_hello(monotonic_s());
     last_hello_s_ = now_s;
   }
   if (welcomed_ && now_s - last_status_s_ >= kStatusPeriod_s) {
@@ -169,6 +191,7 @@ bool MasterLink::handle(const Message& message) {
   }
   if (message.type == wire::Shutdown::kName) {
     if (const auto shutdown = socket_.decode<wire::Shutdown>(message)) {
+      if (shutdown->reason.starts_with(wire::kInstanceTaken) && renew()) return true;
       shutdown_reason_ = printable(shutdown->reason);
       refused_ = !welcomed_ && !session_;
       if (refused_)
@@ -202,8 +225,7 @@ void MasterLink::receive() {
 void MasterLink::tell(const std::string& fact, const std::string& value) {
   hello_.facts[fact] = to_utf8(value);
   if (!welcomed_) return;  // the hello that is due anyway tells it
-  hello_.sent_s = 0;       // no exchange to take the time from
-  socket_.send(hello_);
+  say_hello(0);            // no exchange to take the time from
 }
 
 void MasterLink::leave(const std::function<Values()>& status) {

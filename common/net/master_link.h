@@ -46,6 +46,11 @@ class MasterLink {
   /// The answer to an order of this master's.
   void answer(uint64_t number, bool ok, std::string text);
 
+  /// Called when this process becomes another instance, because the master knows the one before as another's. Without
+  /// it, and after some in a row, the process is refused.
+  using Renewed = std::function<void(InstanceId)>;
+  void on_renewed(Renewed renewed) { renewed_ = std::move(renewed); }
+
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
@@ -69,6 +74,8 @@ class MasterLink {
 
  private:
   void report(const std::function<Values()>& status, double now_s);
+  void say_hello(double sent_s);
+  bool renew();
   void ask_clock(double now_s);
   void look_for_refusal();
   std::string awaited();
@@ -85,6 +92,10 @@ class MasterLink {
   bool shutdown_ = false, welcomed_ = false, refused_ = false, warned_ = false, gave_up_ = false;
   std::string shutdown_reason_;
   Obey obey_;
+  Renewed renewed_;
+  int hellos_ = 0;         // of this instance, since it was welcomed
+  int hellos_before_ = 0;  // of the instance before: they will be refused, too
+  int renewals_ = 0;       // since it was welcomed
   ClockEstimate clock_;
   int clock_asked_ = 0;  // since the master is known
   const std::string endpoint_;

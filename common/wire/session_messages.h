@@ -178,6 +178,9 @@ struct OrderAnswer {
   }
 };
 
+/// Begins the reason of a shutdown that answers a hello: the process may say hello again as another instance.
+inline constexpr std::string_view kInstanceTaken = "its instance is another's";
+
 /// Master -> everyone: finish, flush metrics, say goodbye, exit 0. A process that leaves by itself sends Goodbye too.
 struct Shutdown {
   static constexpr std::string_view kName = "shutdown";

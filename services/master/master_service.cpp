@@ -248,7 +248,7 @@ class MasterService {
                            wire::encode_for(version, wire::ControlReply{false, why}));
   }
 
-  // Whoever gave a command waits for an answer.
+  // Whoever gave a command or said hello waits for an answer.
   void refuse(const net::Message& message, const auto& m, const Error& why) {
     control_.reject(message, why.text);
     if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
@@ -259,6 +259,8 @@ class MasterService {
   net::Context context_;
   net::Socket control_{context_,
                        net::Kind::kRouter,
+    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Hello>)
+      control_.send(wire::Shutdown{why.text}, message.peer);
                        "master",
                        {.high_water_mark = 10000,
                         .max_message_bytes = 16u << 20,

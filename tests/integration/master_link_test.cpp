@@ -30,6 +30,11 @@ struct FakeMaster {
         const auto hello = socket.decode<wire::Hello>(*m);
         ASSERT_TRUE(hello);
         ++hellos;
+        if (instances.empty() || instances.back() != hello->instance) instances.push_back(hello->instance);
+        if (int(instances.size()) <= refused) {
+          socket.send(wire::Shutdown{std::string(wire::kInstanceTaken) + ": eve has it"}, m->peer);
+          continue;
+        }
         known = true;
         wire::Welcome w;
         w.master = instance;
@@ -58,6 +63,8 @@ struct FakeMaster {
   std::string endpoint, peer;
   bool known = false;
   int hellos = 0, clock_requests = 0;
+  int refused = 0;  // so many instances are another's
+  std::vector<InstanceId> instances;
   std::string clock = "another";
   std::map<std::string, std::string> facts;
   double clock_ahead_s = 0;
@@ -209,6 +216,48 @@ TEST_F(WaitingLink, TellsTheEndFromARefusal) {
               log.npos)
         << log;
   }
+}
+
+TEST_F(Link, BecomesAnotherInstanceWhereItsOwnIsTaken) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  master.refused = 2;
+  MasterLink link = make_link(master.endpoint);
+  std::vector<InstanceId> instances{link.instance()};
+  link.on_renewed([&](InstanceId instance) { instances.push_back(instance); });
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value() || link.shutdown_requested(); }));
+  EXPECT_FALSE(link.shutdown_requested());
+  EXPECT_EQ(instances.size(), 3u);
+  EXPECT_EQ(instances, master.instances) << "each was said hello as";
+  EXPECT_EQ(link.instance(), instances.back());
+}
+
+// Hellos that were on their way when the first of them was refused are refused, too.
+TEST_F(Link, BecomesAnotherInstanceOnceForAllItsHellos) {
+  auto master = std::make_unique<FakeMaster>("tcp://127.0.0.1:*", InstanceId{1});
+  MasterLink link = make_link(master->endpoint);
+  int renewed = 0;
+  link.on_renewed([&](InstanceId) { ++renewed; });
+  std::vector<Message> hellos;
+  ASSERT_TRUE(talk(link, nullptr, [&] {
+    while (auto m = master->socket.receive()) hellos.push_back(std::move(*m));
+    return hellos.size() >= 3;
+  }));
+  for (const Message& hello : hellos)
+    master->socket.send(wire::Shutdown{std::string(wire::kInstanceTaken)}, hello.peer);
+  ASSERT_TRUE(talk(link, master.get(), [&] { return link.session().has_value() || link.shutdown_requested(); }));
+  EXPECT_FALSE(link.shutdown_requested());
+  EXPECT_EQ(renewed, 1);
+}
+
+TEST_F(Link, IsRefusedWhereEveryInstanceIsTaken) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  master.refused = 100;
+  MasterLink link = make_link(master.endpoint);
+  int renewed = 0;
+  link.on_renewed([&](InstanceId) { ++renewed; });
+  ASSERT_TRUE(talk(link, &master, [&] { return link.shutdown_requested(); }));
+  EXPECT_EQ(renewed, 3);
+  EXPECT_EQ(link.exit_code(), 2);
 }
 
 TEST_F(Link, OutlivesADamagedWelcome) {

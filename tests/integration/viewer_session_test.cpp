@@ -59,7 +59,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
     };
     out.result = run_display(display, surface, make, gate, worker, table, spans, nullptr);
   }
-  if (session_options.change_every == 0) {
+  if (session_options.change_every == 0 && !session_options.taken) {
     EXPECT_EQ(out.sources, std::vector<std::string>{session_options.volume ? "samples" : "points"});
   }
   // The worker's last rows and its last report are on their way.
@@ -212,6 +212,18 @@ TEST(VolumeSession, GoesOnWithAnotherMaster) {
 // Mesh, volume, mesh: the viewer follows, and what was on display stays there until the next scene has a picture.
 TEST(ChangingSession, FramesThatWaitShowEachUpdateFromTheSceneItIsOf) {
   for (const auto mode : {CouplingMode::kSync, CouplingMode::kLoose}) {
+// Who knows a viewer's instance may be quicker to say hello to another master.
+TEST(ChangingSession, GoesOnAsAnotherInstanceWhereItsOwnIsTaken) {
+  for (const bool volume : {true, false})
+    for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync}) {
+      const Shown s = show({.volume = volume, .restart_after = 6, .taken = true}, mode, 60, 100);
+      expect_complete(s, 60);
+      EXPECT_GT(s.updates.size(), 8u) << "updates come after the other master's hello, too";
+      EXPECT_GT(*std::max_element(s.request.begin(), s.request.end()), 8);
+      EXPECT_EQ(s.sources.size(), 2u);
+    }
+}
+
     const Shown s = show({.volume = false, .change_every = 15, .changes = 2}, mode, 50);
     expect_complete(s, 50);
     expect_one_update_a_frame(s);

@@ -79,14 +79,15 @@ struct Presented {
 void show(const std::string& master, int number, double draw_s, double stops_s, double resumes_s, double ends_s,
           Presented& presented, std::atomic<int>& alone) {
   net::Context context;
-  WallPace pace(context,
-                {.master = master,
-                 .name = "viewer-" + std::to_string(number + 1),
-                 .wall = "lab",
-                 .number = uint64_t(number),
-                 .viewers = kViewers,
-                 .period_s = kPeriod_s},
-                {100 + uint64_t(number)}, [](double s) { return s; });
+  WallPace pace(
+      context,
+      {.master = master,
+       .name = "viewer-" + std::to_string(number + 1),
+       .wall = "lab",
+       .number = uint64_t(number),
+       .viewers = kViewers,
+       .period_s = kPeriod_s},
+      [number] { return InstanceId{100 + uint64_t(number)}; }, [](double s) { return s; });
   const auto stopped = [&] { return monotonic_s() > ends_s; };
   const auto wish = [&] {
     WallPace::Wish out;
@@ -183,8 +184,9 @@ TEST(WallPace, AnotherMastersNumbersMayBeLower) {
       }
     }
   });
-  WallPace pace(context, {.master = *bound, .name = "viewer-1", .wall = "lab", .period_s = kPeriod_s}, {100},
-                [](double s) { return s; });
+  WallPace pace(
+      context, {.master = *bound, .name = "viewer-1", .wall = "lab", .period_s = kPeriod_s},
+      [] { return InstanceId{100}; }, [](double s) { return s; });
   for (const Word& word : words) {
     const auto swapped = pace.drawn({}, [] { return false; });
     EXPECT_FALSE(swapped.alone) << word.frame;

@@ -91,13 +91,18 @@ void FakeSession::receive_master() {
   while (const auto m = master_.receive()) {
     const std::lock_guard lock(mutex_);
     if (const auto hello = m->type == wire::Hello::kName ? master_.decode<wire::Hello>(*m) : std::nullopt) {
+      if (hello->instance == taken_id_) {
+        master_.send(wire::Shutdown{std::string(wire::kInstanceTaken) + ": eve has it"}, m->peer);
+        continue;
+      }
       wire::Welcome w = welcome();
       w.hello_sent_s = hello->sent_s;
       viewer_ = m->peer;
+      viewer_id_ = hello->instance;
       master_.send(w, m->peer);
     } else if (m->type == wire::ViewRequest::kName) {
       const auto request = master_.decode<wire::ViewRequest>(*m);
-      if (!request) continue;
+      if (!request || request->viewer == taken_id_) continue;
       ++counts_.requests;
       const bool known = !seen_.insert(request->request.value).second;
       counts_.repeated += known;
@@ -126,7 +131,7 @@ void FakeSession::receive_state() {
     viewer_state_ = m->peer;
     if (m->type == wire::SliceAck::kName) {
       const auto ack = state_.decode<wire::SliceAck>(*m);
-      if (!ack) continue;
+      if (!ack || ack->viewer == taken_id_) continue;
       counts_.in_order = ack->in_order;
       buffers_ = ack->buffers;
       if (ack->frame.value == 0) {
@@ -158,6 +163,12 @@ bool FakeSession::disturb() {
     unacknowledged_.clear();
     open_.clear();
     options_.restart_after = 0;
+    if (options_.taken) {
+      taken_id_ = viewer_id_;
+      former_state_ = std::exchange(viewer_state_, {});
+      master_.send(wire::WhoAreYou{master_id_}, viewer_);
+      return true;
+    }
   } else if (options_.change_every && options_.changes > 0 &&
              answers_ % options_.change_every == options_.change_every - 1) {
     --options_.changes;

@@ -26,6 +26,7 @@ class FakeSession {
     uint64_t epoch_every = 0;  ///< a new epoch after N answers; 0: never
     /// Another master after N answers: requests are lost, frames numbered anew; 0: never.
     uint64_t restart_after = 0;
+    bool taken = false;  ///< the other master knows the viewer's instance as another's
     /// The scene becomes one of the other kind after every N answers, `changes` times; 0: never. Another packer packs
     /// it, at the same endpoints; requests are lost.
     uint64_t change_every = 0, changes = 2;
@@ -80,7 +81,7 @@ class FakeSession {
   std::set<uint64_t> seen_, unacknowledged_;
   uint64_t frame_ = 0, sequence_ = 0, answers_ = 0, last_acknowledged_ = 0, buffers_ = 1;
   EpochId epoch_{1};
-  InstanceId master_id_{11}, packer_{12};
+  InstanceId master_id_{11}, packer_{12}, viewer_id_, taken_id_;
   bool strange_ = false;
   double silent_until_s_ = 0;
   std::vector<std::pair<std::string, std::string>> log_;  // published events: type, body

@@ -52,6 +52,9 @@ class ViewRequester {
   ViewRequester(const RequestOptions& options, InstanceId viewer)
       : options_(options), viewer_(viewer), predictor_(options.prediction) {}
 
+  /// The viewer is another instance from now on.
+  void set_viewer(InstanceId viewer) { viewer_ = viewer; }
+
   /// A displayed pose; display: the camera it was shown with.
   void on_pose(double t_s, const geometry::Camera& display);
   /// Poses from now on are told in another space, or of another head: how it moved before means nothing.

@@ -13,7 +13,8 @@ Status Senders::admit(const net::Message& from, const wire::Hello& m) {
   if (from.role && !net::may_be(*from.role, m.role))
     return Error{fmt::format("the key {} is {}'s: its owner cannot be a {}", from.user, net::described(*from.role),
                              net::as_word(m.role))};
-  if (Status s = is_same_user(from, m.instance); !s) return s;
+  if (Status s = is_same_user(from, m.instance); !s)
+    return Error{fmt::format("{}: {}", wire::kInstanceTaken, s.error().text)};
   if (const auto owner = owners_.find(m.instance); owner == owners_.end()) {
     auto& instances = of_user_[from.user];
     owners_[m.instance] = {from.peer, from.user, instances.insert(instances.end(), m.instance)};

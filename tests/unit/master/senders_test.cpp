@@ -95,7 +95,7 @@ TEST(Senders, NobodyTakesAProcessOfAnotherKey) {
   ASSERT_TRUE(senders.admit(from("a", "anna", Role::kViewer), hello("viewer", 1)).ok());
   const Status refused = senders.admit(from("b", "ben", Role::kViewer), hello("viewer", 1));
   ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().text, "the key ben speaks in the name of a process of anna");
+  EXPECT_EQ(refused.error().text, "its instance is another's: the key ben speaks in the name of a process of anna");
   EXPECT_FALSE(senders.admit(from("c", "ben", Role::kViewer), wire::Goodbye{{1}}).ok());
   EXPECT_FALSE(senders.admit(from("c", "ben", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
   EXPECT_TRUE(senders.admit(from("d", "anna", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
