@@ -492,6 +492,8 @@ net::MasterLink::Values ViewerWorker::status() const {
                                  {"bytes_received", double(bytes_received_)},
                                  {"gaps_resynced", 0},
                                  {"updates", double(updates_)},
+                                 {metrics::kUpdateRows, double(updates_table_.gone())},
+                                 {metrics::kStageRows, double(stages_table_.gone())},
                                  {"frames", double(frames_shown_)},
                                  {"first_points_s", first_points_s_},
                                  {"epochs_shown", double(epochs_shown_)},

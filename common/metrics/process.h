@@ -10,6 +10,9 @@ namespace telesplat::metrics {
 /// Status value by which a process tells how many files of the record it could not write to their end.
 inline constexpr const char* kRecordFailed = "record_failed";
 
+/// Status values by which a viewer tells how many rows of updates.csv and stages.csv it has sent.
+inline constexpr const char *kUpdateRows = "update_rows", *kStageRows = "stage_rows";
+
 struct Process {
   std::string role, name;
   uint64_t pid = 0;

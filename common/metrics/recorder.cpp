@@ -12,12 +12,16 @@ constexpr size_t kMaxBuffered = 1u << 20;  // values kept if the master is away;
 void TableRecorder::add(std::span<const double> row) {
   CHECK(row.size() == columns_.size());
   const std::lock_guard lock(mutex_);
-  if (values_.size() < kMaxBuffered) values_.insert(values_.end(), row.begin(), row.end());
+  if (values_.size() < kMaxBuffered)
+    values_.insert(values_.end(), row.begin(), row.end());
+  else
+    ++gone_;
 }
 
 std::optional<wire::MetricRows> TableRecorder::flush(InstanceId instance) {
   const std::lock_guard lock(mutex_);
   if (values_.empty()) return std::nullopt;
+  gone_ += values_.size() / columns_.size();
   wire::MetricRows out{instance, table_, columns_, std::move(values_)};
   values_.clear();
   return out;

@@ -1,6 +1,7 @@
 // What a process measures before it is sent to the master: rows of a table, and spans for the trace. Thread-safe.
 #pragma once
 
+#include <atomic>
 #include <initializer_list>
 #include <mutex>
 #include <optional>
@@ -22,12 +23,15 @@ class TableRecorder {
   void add(std::initializer_list<double> row) { add(std::span(row.begin(), row.size())); }
   /// The rows since the last call, if any.
   std::optional<wire::MetricRows> flush(InstanceId instance);
+  /// Rows that flush() has returned so far, or for which there was no room.
+  uint64_t gone() const { return gone_; }
 
  private:
   std::string table_;
   std::vector<std::string> columns_;
   std::mutex mutex_;
   std::vector<double> values_;
+  std::atomic<uint64_t> gone_{0};
 };
 
 /// Values of a row of "spans".

@@ -208,6 +208,7 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
   const Table* table = measured_.table(rows.table);
   if (!table) return Error{fmt::format("metrics table '{}' is unknown", to_utf8(rows.table.substr(0, 32)))};
   const bool first = table->columns.empty();
+  row_losses_.came(process, rows.table, rows.values.size() / rows.columns.size());
   if (Status added = measured_.add(process.name, rows); !added) return added;
   TextFile& out = file(rows.table == "frames" ? Csv::kFrames : rows.table == "stages" ? Csv::kStages : Csv::kUpdates);
   if (!out.is_open()) return ok_status();
@@ -232,6 +233,12 @@ void RunRecord::flush() {
   for (TextFile& file : files_) file.flush();
   trace_.file().flush();
 }
+void RunRecord::add_status(const Process& process) {
+  for (const auto& [value, table] : {std::pair{kUpdateRows, "updates"}, {kStageRows, "stages"}})
+    if (const auto sent = process.values.find(value); sent != process.values.end())
+      row_losses_.told(process, table, sent->second);
+}
+
 
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& tile) {
   measured_.tiles().add(sampler, tile);
@@ -302,6 +309,7 @@ RecordLosses RunRecord::losses() const {
     if (file.rows_lost() > 0) out.lost[name] = file.rows_lost();
     if (file.rows_cut() > 0) out.cut[name] = file.rows_cut();
   };
+  for (const auto& [table, rows] : row_losses_.lost()) out.lost[table + ".csv"] += rows;
   for (const TextFile& file : files_) look(file);
   look(lives_file_);
   look(trace_.file());

@@ -17,6 +17,7 @@
 #include "common/metrics/lives/lives.h"
 #include "common/metrics/measured.h"
 #include "common/metrics/process.h"
+#include "common/metrics/sums/row_losses.h"
 #include "common/metrics/text_file.h"
 #include "common/metrics/trace/trace_file.h"
 
@@ -49,6 +50,8 @@ class RunRecord {
   /// fit. Columns whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from
   /// its own.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
+  /// What this process says of itself: rows that it has sent and that did not come are lost.
+  void add_status(const Process& process);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
   /// The scene's parameters and texts (quoted in the file) from t_s on. epochs.csv has the names of the first epoch.
   void add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
@@ -91,6 +94,7 @@ class RunRecord {
   Beginning begin_;
   std::vector<Life> lives_;
   Measured measured_;
+  RowLosses row_losses_;
   std::vector<std::string> epoch_columns_;
   std::array<TextFile, kCsvs> files_;  // plans.csv and assignment.csv are opened when there is something to write
   TextFile lives_file_;

@@ -261,6 +261,7 @@ void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double
   Peer* p = known(peer, now_s);
   if (!p || m.values.empty()) return;  // without values it is a sign of life, of a process that works
   p->process.values = m.values;
+  if (p->hello.role == "viewer") record_.add_status(p->process);
   p->reports.push_back(m.values);
   if (p->reports.size() > kReports) p->reports.pop_front();
 }

@@ -31,6 +31,7 @@ class StageTable {
   void displayed(RequestId request, double end_s);
   /// The rows that are finished; `all`: also those whose updates no frame has shown.
   std::optional<wire::MetricRows> flush(InstanceId instance, bool all);
+  uint64_t gone() const { return table_.gone(); }
 
  private:
   void finish(std::map<RequestId, UpdateStages>::iterator end, double shown_s);

@@ -531,6 +531,21 @@ TEST_F(Master, TheKeyOfWhoEndsTheSessionIsTold) {
   }
 }
 
+TEST_F(Master, RowsThatWereUnderWayWhenALinkBrokeAreCounted) {
+  join_all();
+  const auto tells = [&](const std::string& peer, double rows, double now_s) {
+    core.on(peer, wire::StatusReport{{5}, {{metrics::kUpdateRows, rows}}}, now_s);
+  };
+  const auto lost = [&] { return record->summary({}, {})["errors"]["record_lost"]; };
+  tells("v", 0, 1);
+  EXPECT_TRUE(core.on("v", rows_of("updates", {5}), 1));
+  tells("v", 1, 2);
+  EXPECT_TRUE(lost().is_null());
+  core.on("v over another", hello("viewer", "viewer-1", 5), 20);
+  tells("v over another", 4, 20);
+  EXPECT_EQ(lost()["updates.csv"], 3);
+}
+
 TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
   join_all();
   wire::MetricRows rows{{5}, "no_such_table", {"a"}, {1}};

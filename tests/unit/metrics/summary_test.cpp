@@ -20,6 +20,35 @@ TEST_F(Record, RowsThatNeverCameAreCountedByTheNumbersOfFrames) {
   EXPECT_EQ(s["by_viewer"][viewer.name]["frames"], 11 + 4);
 }
 
+// Updates have no numbers without holes: viewers tell how many rows they have sent.
+TEST_F(Record, RowsOfUpdatesThatNeverCameAreCountedByWhatViewersTell) {
+  const auto tells = [&](double updates, double stages) {
+    viewer.values = {{kUpdateRows, updates}, {kStageRows, stages}};
+    record->add_status(viewer);
+  };
+  const auto came = [&](const char* table, size_t rows) {
+    ASSERT_TRUE(record->add_rows(viewer, {{5}, table, {"latency_ms"}, std::vector<double>(rows, 9)}));
+  };
+  const auto lost = [&] { return record->summary({}, {})["errors"]["record_lost"]; };
+  tells(100, 90);  // for the record before
+  came("updates", 4), came("stages", 4);
+  tells(104, 94);
+  EXPECT_TRUE(lost().is_null());
+  came("updates", 1);
+  tells(111, 94);
+  tells(111, 94);
+  EXPECT_EQ(lost(), nlohmann::json({{"updates.csv", 6}}));
+  came("updates", 2), came("stages", 1);
+  tells(114, 99);
+  EXPECT_EQ(lost(), nlohmann::json({{"stages.csv", 4}, {"updates.csv", 7}}));
+  viewer.pid = 6;  // it was started again
+  tells(0, 0);
+  came("updates", 2);
+  tells(3, 0);
+  tells(1e300, -1);
+  EXPECT_EQ(lost(), nlohmann::json({{"stages.csv", 4}, {"updates.csv", 8}}));
+}
+
 TEST_F(Record, TheSummaryIsCompleteAndTrue) {
   ASSERT_TRUE(record->add_rows(viewer, {{5},
                                         "frames",
