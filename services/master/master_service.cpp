@@ -57,6 +57,11 @@ net::RunningSession introduction(const MasterServiceOptions& o, const std::strin
           .keys = net::absolute_path(o.service.keys)};
 }
 
+// What ctl must be told where it finds no file of the session.
+std::string flags_of_ctl(const net::ServiceOptions& o, const std::string& endpoint) {
+  return " --master " + net::local_address(endpoint) + (o.keys.empty() ? "" : " --keys " + o.keys);
+}
+
 /// The control socket, and the core that answers what comes over it.
 class MasterService {
  public:
@@ -92,7 +97,8 @@ class MasterService {
     told_ = core_.session();
     std::printf("listening on %s\n", endpoint->c_str());
     if (options_.started_by == "hand")
-      std::printf("telesplat ctl status asks this session; others join it with --master %s\n",
+      std::printf("telesplat ctl status%s asks this session; others join it with --master %s\n",
+                  file_ ? "" : flags_of_ctl(options_.service, *endpoint).c_str(),
                   net::announced(*endpoint, {}).c_str());
     else
       log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
@@ -253,14 +259,14 @@ class MasterService {
     control_.reject(message, why.text);
     if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
       control_.send(wire::ControlReply{false, why.text}, message.peer);
+    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Hello>)
+      control_.send(wire::Shutdown{why.text}, message.peer);
   }
 
   const MasterServiceOptions& options_;
   net::Context context_;
   net::Socket control_{context_,
                        net::Kind::kRouter,
-    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Hello>)
-      control_.send(wire::Shutdown{why.text}, message.peer);
                        "master",
                        {.high_water_mark = 10000,
                         .max_message_bytes = 16u << 20,

@@ -239,13 +239,28 @@ TEST_F(Sessions, WithoutAFolderForFilesTheSessionRunsAllTheSame) {
   const auto hidden = master("hidden");
   EXPECT_TRUE(holds(hidden->err(), "telesplat ctl will not find this session: /nonexistent/telesplat"))
       << hidden->err();
+  EXPECT_TRUE(holds(hidden->out(), "telesplat ctl status --master " + address(*hidden) + " asks this session"))
+      << hidden->out();
   EXPECT_EQ(ctl({"status"}).code, 1);
+  EXPECT_EQ(ctl({"status", "--master", address(*hidden)}).code, 0);
   EXPECT_EQ(ctl({"stop", "--master", address(*hidden)}).code, 0);
   EXPECT_EQ(hidden->wait(), 0);
   const auto run = telesplat({"run", "julia", "--out", folder_ / "none"});
   EXPECT_EQ(run.code, 2);
   EXPECT_TRUE(holds(run.err, "telesplat: --keys auto: /nonexistent/telesplat: cannot be made")) << run.err;
   EXPECT_TRUE(holds(run.err, "--keys none runs without keys\n")) << run.err;
+}
+
+// A folder that others may write into is refused: the line of a run says how the session is asked all the same.
+TEST_F(Sessions, ARunThatIsNotFoundSaysHowItIsAsked) {
+  fs::permissions(runtime_, fs::perms(0777));
+  PipelineRun run({"--duration", "0", "--keys", "none"});
+  ASSERT_TRUE(run.wait_showing());
+  EXPECT_TRUE(holds(run.program().err(),
+                    "session at " + run.master() + "; telesplat ctl status --master " + run.master() + " shows it"))
+      << run.program().err();
+  EXPECT_EQ(ctl({"status"}).code, 1);
+  EXPECT_EQ(ctl({"status", "--master", run.master()}).code, 0);
 }
 
 TEST_F(Sessions, TheEnvironmentNamesTheMasterOfCtlAndRun) {

@@ -18,6 +18,7 @@
 #include "common/core/machine.h"
 #include "common/metrics/run_folder.h"
 #include "common/net/master_address.h"
+#include "common/net/session_file.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
@@ -42,6 +43,13 @@ using State = Pipeline::State;
 
 constexpr double kAskEvery_s = 0.5;  // the master for its status
 constexpr double kResultPatience_s = 2;
+
+// What ctl must be told where the session's file is not there, by which it finds others: the master's log tells why.
+std::string flags_of_ctl(const std::string& master, const std::string& keys) {
+  for (const auto& session : net::running_sessions())
+    if (session.address == net::local_address(master)) return "";
+  return " --master " + master + (keys.empty() ? "" : " --keys " + keys);
+}
 
 /// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
 class PassingFolder {
@@ -82,7 +90,8 @@ class Run {
     auto pipeline = Pipeline::start(o_);
     if (!pipeline) return not_started(pipeline.error());
     if (o_.join_master.empty())
-      progress_.line(fmt::format("session at {}; telesplat ctl status shows it", pipeline->master_endpoint()));
+      progress_.line(fmt::format("session at {}; telesplat ctl status{} shows it", pipeline->master_endpoint(),
+                                 flags_of_ctl(pipeline->master_endpoint(), o_.keys)));
     const State state = watch(*pipeline);
     // From here on a signal is another one: what is at hand is left out.
     const bool stopped = state == State::kRunning;
