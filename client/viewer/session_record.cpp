@@ -1,6 +1,7 @@
 #include "client/viewer/session_record.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "common/core/log.h"
+#include "common/core/whole_file.h"
 #include "common/metrics/run_folder.h"
 #include "common/scene/session.h"
 
@@ -20,10 +22,7 @@ namespace fs = std::filesystem;
 constexpr int kMostViewers = 100;  // of one name in a folder
 
 // Whether this process made it: of several only one did.
-bool made(const std::string& folder) {
-  std::error_code error;
-  return fs::create_directory(folder, error) && !error;
-}
+bool made(const std::string& folder) { return mkdir(folder.c_str(), 0700) == 0; }
 
 // The folder's name came over the network: what stands there must not lead elsewhere.
 Status refuse_links(const std::string& folder) {
@@ -65,9 +64,8 @@ Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const Options& option
 
 // A folder with images/ is taken: whoever joins the session later makes one of its own.
 Status SessionRecord::open_in(const std::string& directory) {
-  std::error_code error;
-  fs::create_directories(directory + "/images", error);
-  if (error) return Error{fmt::format("{}/images: cannot be made: {}", directory, error.message())};
+  if (const auto error = make_private_folder(directory + "/images"))
+    return Error{fmt::format("{}/images: cannot be made: {}", directory, error.message())};
   lock_ = Descriptor::open_file(directory + "/images", O_RDONLY | O_DIRECTORY);
   if (!lock_.lock(LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK)  // some file systems know no locks
     return Error{fmt::format("{}: another viewer records there; give another --out", directory)};

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <utility>
 
 #include "common/core/descriptor.h"
@@ -36,11 +37,11 @@ Status check(const std::string& path, const struct stat& about, uint64_t most_by
 }
 
 // A new file beside `path`, of a name that nobody has.
-int make_part(const std::string& path, std::string& part) {
+int make_part(const std::string& path, std::string& part, unsigned mode = 0666) {
   static std::atomic<unsigned> made{0};
   for (int tries = 0; tries < kTries; ++tries) {
     part = fmt::format("{}.{}-{}.part", path, getpid(), ++made);
-    const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode);
     if (fd >= 0 || errno != EEXIST) return fd;
   }
   return -1;
@@ -91,15 +92,28 @@ Result<std::string> new_part(const std::string& path) {
   return part;
 }
 
-Status write_whole(const std::string& path, std::string_view text) {
+Status write_whole(const std::string& path, std::string_view text, unsigned mode) {
   std::string part;
-  Descriptor file(make_part(path, part));
+  Descriptor file(make_part(path, part, mode));
   if (file.get() < 0) return failed(path, "cannot be written");
   const bool written = write_all(file.get(), text) && file.close() && rename(part.c_str(), path.c_str()) == 0;
   if (written) return ok_status();
   const Error error = failed(path, "cannot be written");
   unlink(part.c_str());
   return error;
+}
+
+std::error_code make_private_folder(const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return {};
+  const std::filesystem::path folder = std::filesystem::absolute(path, error).lexically_normal();
+  std::filesystem::path made;
+  for (const auto& part : folder) {
+    made /= part;
+    if (mkdir(made.c_str(), 0700) == 0 || std::filesystem::is_directory(made, error)) continue;
+    return {errno, std::generic_category()};
+  }
+  return {};
 }
 
 }  // namespace telesplat

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "common/core/result.h"
 
@@ -29,8 +30,13 @@ Status check_readable(const std::string& path, uint64_t most_bytes);
 Result<std::string> new_part(const std::string& path);
 
 /// Writes a file as a whole: whoever looks sees the one before, or all of it. What is written goes into a new file
-/// beside it, which takes its place: never through a symbolic link, nor into a file that lay there. Error: it cannot be
-/// written.
-Status write_whole(const std::string& path, std::string_view text);
+/// beside it, which takes its place: never through a symbolic link, nor into a file that lay there. mode: of the new
+/// file, without what the process' mask takes away. Error: it cannot be written.
+Status write_whole(const std::string& path, std::string_view text, unsigned mode = 0666);
+
+/// Mode of files that are for their user alone.
+inline constexpr unsigned kPrivate = 0600;
+/// Makes a folder, and those above it that are not there, for the user alone. One that is there stays as it is.
+std::error_code make_private_folder(const std::string& path);
 
 }  // namespace telesplat

@@ -138,7 +138,7 @@ Status move_record(const std::string& from, const std::string& to, const Found& 
   for (const auto& file : files) {
     const fs::path source = fs::path(from) / file, target = fs::path(to) / file;
     if (!fs::exists(fs::symlink_status(source, error))) continue;  // records of earlier versions have no id
-    fs::create_directories(target.parent_path(), error);
+    error = make_private_folder(target.parent_path());
     if (!error) fs::rename(source, target, error);
     if (error) return Error{fmt::format("{}: cannot be moved to {}: {}", source.string(), to, error.message())};
   }
@@ -216,8 +216,7 @@ Status refuse_strangers(const std::string& directory, Logs logs) {
 }
 
 Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs) {
-  std::error_code error;
-  fs::create_directories(directory, error);
+  std::error_code error = make_private_folder(directory);
   if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
   if (const Status s = refuse_links(directory, logs); !s) return s.error();
   const Found found = look_into(directory, logs);

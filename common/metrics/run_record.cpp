@@ -133,9 +133,8 @@ Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory,
   out->begin_ = begin;
   out->lives_.push_back({begin, clock_id()});
   if (directory.empty()) return out;
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
+  if (const auto error = make_private_folder(directory))
+    return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
   if (const Status opened = options.goes_on ? out->go_on() : out->open_files(); !opened) return opened.error();
   out->keep_room();
   return out;
@@ -147,7 +146,7 @@ RunRecord::~RunRecord() {
 
 // A disk that is full has room for the summary all the same.
 void RunRecord::keep_room() {
-  const int fd = ::open(path_of(kRoom).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  const int fd = ::open(path_of(kRoom).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, kPrivate);
   if (fd < 0) return;
   if (posix_fallocate(fd, 0, kRoomBytes) != 0) log::warn("{}: little room is left on its disk", directory_);
   close(fd);
@@ -208,8 +207,8 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
   const Table* table = measured_.table(rows.table);
   if (!table) return Error{fmt::format("metrics table '{}' is unknown", to_utf8(rows.table.substr(0, 32)))};
   const bool first = table->columns.empty();
-  row_losses_.came(process, rows.table, rows.values.size() / rows.columns.size());
   if (Status added = measured_.add(process.name, rows); !added) return added;
+  row_losses_.came(process, rows.table, rows.values.size() / rows.columns.size());
   TextFile& out = file(rows.table == "frames" ? Csv::kFrames : rows.table == "stages" ? Csv::kStages : Csv::kUpdates);
   if (!out.is_open()) return ok_status();
   if (first) {
@@ -233,12 +232,12 @@ void RunRecord::flush() {
   for (TextFile& file : files_) file.flush();
   trace_.file().flush();
 }
+
 void RunRecord::add_status(const Process& process) {
   for (const auto& [value, table] : {std::pair{kUpdateRows, "updates"}, {kStageRows, "stages"}})
     if (const auto sent = process.values.find(value); sent != process.values.end())
       row_losses_.told(process, table, sent->second);
 }
-
 
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& tile) {
   measured_.tiles().add(sampler, tile);
@@ -309,8 +308,8 @@ RecordLosses RunRecord::losses() const {
     if (file.rows_lost() > 0) out.lost[name] = file.rows_lost();
     if (file.rows_cut() > 0) out.cut[name] = file.rows_cut();
   };
-  for (const auto& [table, rows] : row_losses_.lost()) out.lost[table + ".csv"] += rows;
   for (const TextFile& file : files_) look(file);
+  for (const auto& [table, rows] : row_losses_.lost()) out.lost[table + ".csv"] += rows;
   look(lives_file_);
   look(trace_.file());
   return out;
@@ -327,7 +326,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
 Status RunRecord::write_file(const std::string& name, const std::string& text) {
   if (directory_.empty()) return ok_status();
   unlink(path_of(kRoom).c_str());
-  Status written = write_whole(path_of(name), text);
+  Status written = write_whole(path_of(name), text, kPrivate);
   if (!written) unwritten_.push_back(name), why_ = reason_of(written.error());
   return written;
 }

@@ -11,6 +11,7 @@
 
 #include "common/core/log.h"
 #include "common/core/utf8.h"
+#include "common/core/whole_file.h"
 
 namespace telesplat::metrics {
 namespace {
@@ -54,7 +55,7 @@ bool TextFile::open_behind(const std::string& path, uint64_t keep_bytes, uint64_
   limit_bytes_ = limit_bytes;
   bytes_ = keep_bytes;
   // Some of what is written to need not be a file of this disk, and cannot be cut off.
-  fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | (keep_bytes ? 0 : O_TRUNC), 0666);
+  fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | (keep_bytes ? 0 : O_TRUNC), kPrivate);
   if (fd_ < 0 || keep_bytes == 0) return is_open();
   if (ftruncate(fd_, off_t(keep_bytes)) == 0 && lseek(fd_, 0, SEEK_END) == off_t(keep_bytes)) return true;
   const int error = errno;

@@ -73,6 +73,9 @@ class Files(unittest.TestCase):
     def test_everything_has_limits(self):
         for file, _, service in self.each():
             self.assertIn("nofile", service["ulimits"])
+            for volume in service.get("volumes", []):
+                if volume["type"] == "tmpfs":
+                    self.assertGreater(volume["tmpfs"]["size"], 0)
             self.assertIn("max-size", service["logging"]["options"])
             if file == "compose.yaml":
                 self.assertLessEqual(service["pids_limit"], 1024)

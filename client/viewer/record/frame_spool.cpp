@@ -11,6 +11,7 @@
 
 #include "common/core/guarded.h"
 #include "common/core/log.h"
+#include "common/core/whole_file.h"
 #include "common/net/service.h"
 
 namespace telesplat::viewer {
@@ -88,9 +89,8 @@ Status read_legend(FILE* in, const FileHeader& h, SpooledFrame& f) {
 }  // namespace
 
 Result<std::unique_ptr<FrameSpool>> FrameSpool::open(const std::string& directory, size_t max_waiting) {
-  std::error_code error;
-  fs::create_directories(directory, error);
-  if (error) return Error{fmt::format("{}: cannot be made a folder for frames: {}", directory, error.message())};
+  if (const auto error = make_private_folder(directory))
+    return Error{fmt::format("{}: cannot be made a folder for frames: {}", directory, error.message())};
   std::unique_ptr<FrameSpool> out(new FrameSpool);
   out->directory_ = directory;
   out->max_waiting_ = max_waiting;
@@ -204,8 +204,7 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
 
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
                       const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on) {
-  std::error_code error;
-  fs::create_directories(picture_directory, error);
+  std::error_code error = make_private_folder(picture_directory);
   const auto paths = spooled_frames(spool_directory);
   for (size_t i = 0; i < paths.size(); ++i) {
     if (go_on && !go_on()) break;

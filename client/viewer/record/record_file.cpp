@@ -10,6 +10,7 @@
 
 #include "common/core/check.h"
 #include "common/core/log.h"
+#include "common/core/whole_file.h"
 #include "common/wire/limits.h"
 
 namespace telesplat::viewer {
@@ -25,7 +26,7 @@ Result<RecordWriter> RecordWriter::open(const std::string& path, std::string_vie
                                         const char* what) {
   CHECK(magic.size() == kMagicBytes);
   RecordWriter out;
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, kPrivate);
   if (fd >= 0) out.file_.reset(fdopen(fd, "wb"));
   if (!out.file_ || std::fwrite(magic.data(), 1, magic.size(), out.file_.get()) != magic.size())
     return Error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};

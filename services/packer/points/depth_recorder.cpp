@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "common/codec/depth_codec.h"
+#include "common/core/whole_file.h"
 
 namespace telesplat::packer {
 namespace {
@@ -25,9 +26,8 @@ std::string row_of(FrameId id, const geometry::Camera& c) {
 }  // namespace
 
 Result<DepthRecorder> DepthRecorder::open(const std::string& directory, int max_frames) {
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error) return Error{fmt::format("{}: cannot be made a folder for depth images: {}", directory, error.message())};
+  if (const auto error = make_private_folder(directory))
+    return Error{fmt::format("{}: cannot be made a folder for depth images: {}", directory, error.message())};
   const std::string cameras = directory + "/cameras.csv";
   if (!(std::ofstream(cameras) << kCameraColumns << '\n')) return Error{fmt::format("{}: cannot be written", cameras)};
   DepthRecorder out;

@@ -49,6 +49,7 @@ TEST_F(Child, LinesAndExitCodesComeBack) {
   EXPECT_EQ(all_lines(child), (std::vector<std::string>{"one", "two"}));
   EXPECT_EQ(child.exit_code(), 3);
   EXPECT_EQ(log(), "trouble\n");
+  EXPECT_EQ(std::filesystem::status(folder + "/log").permissions(), std::filesystem::perms(0600));
   EXPECT_EQ(child.name(), "child");
 }
 

@@ -82,6 +82,47 @@ TEST(ReportRun, WithoutASummaryIsToldFromItsTables) {
     EXPECT_NE(notes.find(told), notes.npos) << told;
 }
 
+// A stranger's run folder may have links to whatever lies on the reader's disk, and pages are passed on.
+TEST(ReportRun, NothingIsReadThroughLinks) {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run", mine = folder / "mine";
+  write(mine + "/frames.csv", kFrames);
+  write(mine + "/summary.json", R"({"scene": "secret-scene"})");
+  write(mine + "/session.toml", "secret = true\n");
+  write(mine + "/logs/master.log", "12:00:00.000 master error secret\n");
+  image::View view{2, 1, {0xff0000, 0x00ff00}, {}};
+  fs::create_directories(mine + "/images");
+  ASSERT_TRUE(image::write_png(mine + "/images/frame-000000.png", view));
+  const auto empty = [](const nlohmann::ordered_json& page) {
+    EXPECT_TRUE(page.at("config").is_null());
+    EXPECT_TRUE(page.at("logs").empty());
+    EXPECT_EQ(page.at("pictures").at("of"), 0);
+    EXPECT_FALSE(page.at("finished").get<bool>());
+    EXPECT_EQ(page.dump().find("secret"), std::string::npos);
+    EXPECT_NE(page.at("notes").dump().find("frames.csv is a symbolic link and not looked into"), std::string::npos)
+        << page.at("notes");
+  };
+  EXPECT_FALSE(run_json(mine, "r", 1).at("config").is_null());
+  fs::create_directory(run);
+  for (const char* name : {"frames.csv", "summary.json", "session.toml", "logs", "images"})
+    fs::create_symlink(mine + "/" + name, run + "/" + name);
+  auto page = run_json(run, "r", 1);
+  empty(page);
+  EXPECT_NE(page.at("notes").dump().find("5 symbolic links are not looked into, such as frames.csv"), std::string::npos)
+      << page.at("notes");
+  for (const char* name : {"logs/master.log", "images/frame-000000.png"}) {
+    fs::remove(fs::path(run + "/" + name).parent_path());
+    fs::create_directory(fs::path(run + "/" + name).parent_path());
+    fs::create_symlink(mine + "/" + name, run + "/" + name);
+  }
+  empty(run_json(run, "r", 1));
+  // A link to the folder itself, such as runs/latest, is as good as its name.
+  fs::create_directory_symlink(mine, folder / "latest");
+  page = run_json(folder / "latest", "r", 1);
+  EXPECT_FALSE(page.at("config").is_null());
+  EXPECT_EQ(page.at("pictures").at("of"), 1);
+}
+
 TEST(ReportRun, FramesOfAPictureThatStandsAreNoDelays) {
   const TemporaryFolder folder;
   write(folder / "frames.csv",

@@ -1,6 +1,8 @@
 // Whose files a run folder holds: those of the record in it may be removed, those of others may not.
 #include "common/metrics/run_folder.h"
 
+#include <sys/stat.h>
+
 #include "tests/unit/metrics/record_fixture.h"
 
 namespace telesplat::metrics {
@@ -38,6 +40,27 @@ TEST_F(RunFolder, ARecordWithinItIsAnotherRuns) {
   remove_record(folder, true);
   for (const char* other : {"second", "viewer-third"})
     EXPECT_TRUE(has(other + std::string("/frames.csv")) && has(other + std::string("/run.id"))) << other;
+}
+
+// Command lines, paths and hosts stand in it.
+TEST_F(RunFolder, ARecordIsForItsUserAlone) {
+  const auto mode = [&](const std::string& name) { return fs::status(folder + "/" + name).permissions(); };
+  const auto before = umask(0);
+  fs::create_directory(folder + "/mine");
+  fs::permissions(folder + "/mine", fs::perms(0755));
+  for (const char* run : {"runs/new", "mine"}) {
+    ASSERT_TRUE(begin_folder(folder + "/" + run, false, Logs::kOurs).ok());
+    const auto record = RunRecord::open(folder + "/" + run);
+    ASSERT_TRUE(record.ok());
+    ASSERT_TRUE((*record)->write_file("session.toml", "a = 1\n").ok());
+    ASSERT_TRUE((*record)->finish({}, {}).ok());
+  }
+  umask(before);
+  EXPECT_EQ(mode("runs/new"), fs::perms::owner_all);
+  EXPECT_EQ(mode("mine"), fs::perms(0755)) << "as its owner made it";
+  for (const char* run : {"runs/new/", "mine/"})
+    for (const char* file : {"frames.csv", "trace.json", "session.toml", "summary.json"})
+      EXPECT_EQ(mode(run + std::string(file)), fs::perms(0600)) << run << file;
 }
 
 TEST_F(RunFolder, LogsAndEmptyFoldersAreNoStrangers) {

@@ -40,6 +40,15 @@ TEST_F(JoinedRecord, TheFirstViewerTakesTheFolderOthersOneInIt) {
   EXPECT_EQ(joined(), "viewer-guest");
 }
 
+TEST_F(JoinedRecord, ItIsForItsUserAlone) {
+  const auto before = umask(0);
+  EXPECT_EQ(joined(), ".");
+  EXPECT_EQ(joined(), "viewer-guest");
+  umask(before);
+  for (const char* name : {"/run/images", "/run/spool", "/run/viewer-guest", "/run/viewer-guest/images"})
+    EXPECT_EQ(fs::status(folder_ + name).permissions(), fs::perms::owner_all) << name;
+}
+
 // Else it would write into the files of the first, make pictures of its frames, and take its spool away.
 TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
   const auto first = SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "first", .received_mb = 1});

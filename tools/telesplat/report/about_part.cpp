@@ -167,6 +167,7 @@ void add_counted(const ordered_json& spreads, const RunTables& t, ordered_json& 
 }  // namespace
 
 ordered_json read_summary(const std::string& directory) {
+  if (!lies_within(directory, "summary.json")) return {};
   auto out = tools::read_json_file(directory + "/summary.json");
   return out.is_object() ? out : ordered_json();
 }

@@ -8,6 +8,7 @@
 #include "common/core/utf8.h"
 #include "tools/common/line_reader.h"
 #include "tools/telesplat/report/about_part.h"
+#include "tools/telesplat/report/reading/run_tables.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -61,7 +62,8 @@ ordered_json logs_json(const std::string& directory) {
   std::vector<fs::path> paths;
   std::error_code error;
   for (fs::directory_iterator entry(directory + "/logs", error), end; !error && entry != end; entry.increment(error))
-    if (std::error_code unknown; entry->path().extension() == ".log" && entry->is_regular_file(unknown))
+    if (std::error_code unknown; entry->path().extension() == ".log" && entry->is_regular_file(unknown) &&
+                                 lies_within(directory, "logs/" + entry->path().filename().string()))
       paths.push_back(entry->path());
   std::sort(paths.begin(), paths.end());
   if (paths.size() > kMostLogs) paths.resize(kMostLogs);

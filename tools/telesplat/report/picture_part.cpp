@@ -43,7 +43,9 @@ std::vector<Picture> pictures_in(const std::string& directory, bool compared) {
   std::vector<Picture> out;
   std::error_code error;
   for (fs::directory_iterator entry(directory + "/images", error), end; !error && entry != end; entry.increment(error))
-    if (auto p = picture_of(entry->path()); p && p->name.empty() != compared) out.push_back(*p);
+    if (auto p = picture_of(entry->path());
+        p && p->name.empty() != compared && lies_within(directory, "images/" + entry->path().filename().string()))
+      out.push_back(*p);
   std::sort(out.begin(), out.end(), [](const Picture& a, const Picture& b) { return a.frame < b.frame; });
   return out;
 }

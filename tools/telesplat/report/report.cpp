@@ -67,8 +67,23 @@ std::vector<std::string> names_of(const ReportOptions& o) {
 }
 
 ordered_json config_of(const std::string& directory, const PageLimits& limits) {
+  if (!lies_within(directory, "session.toml")) return {};
   const auto text = read_whole(directory + "/session.toml", kMostSessionBytes);
   return text ? ordered_json(to_utf8(text->substr(0, limits.text_bytes))) : ordered_json();
+}
+
+// What readers pass over.
+std::vector<std::string> links_in(const std::string& directory) {
+  std::vector<std::string> out;
+  std::error_code error;
+  for (const char* folder : {"", "images", "logs"}) {
+    if (*folder && !lies_within(directory, folder)) continue;
+    for (fs::directory_iterator entry(fs::path(directory) / folder, error), end; !error && entry != end;
+         entry.increment(error))
+      if (fs::is_symlink(entry->symlink_status(error))) out.push_back(to_utf8(entry->path().filename().string()));
+  }
+  std::sort(out.begin(), out.end());
+  return out;
 }
 
 std::string kind_of(const ordered_json& summary) {
@@ -119,6 +134,9 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
     tables.notes.emplace_back(
         "summary.json is not there or cannot be read: the run has not ended in order; what is told here comes from its "
         "tables");
+  if (const auto links = links_in(directory); !links.empty())
+    tables.notes.push_back(fmt::format("{} symbolic link{} not looked into, such as {}", links.size(),
+                                       links.size() == 1 ? " is" : "s are", links.front()));
   ordered_json out{{"name", name}, {"directory", to_utf8(directory)}, {"facts", facts_json(summary)}};
   out["finished"] = summary.is_object();
   out["origin_s"] = tables.origin_s;

@@ -80,6 +80,7 @@ ordered_json trace_json(const Trace& trace, double origin_s, double begin_s, dou
 
 ordered_json trace_part(const std::string& directory, const RunTables& tables, size_t share, size_t windows) {
   const std::string path = directory + "/trace.json";
+  if (!lies_within(directory, "trace.json")) return {{"why", "trace.json is a symbolic link"}};
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return {{"why", "trace.json is not there"}};
   std::ifstream in(path, std::ios::binary);

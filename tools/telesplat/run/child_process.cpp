@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/whole_file.h"
 #include "common/net/service.h"
 
 namespace telesplat::launcher {
@@ -24,7 +25,7 @@ Result<ChildProcess> ChildProcess::start(const std::string& name, const std::str
                                          const std::vector<std::string>& arguments, const std::string& log_path,
                                          int nice_value, bool told) {
   int out[2];
-  const int log = ::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  const int log = ::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, kPrivate);
   if (log < 0) return Error{fmt::format("{}: {}", log_path, std::strerror(errno))};
   if (pipe2(out, O_CLOEXEC) != 0) {
     ::close(log);

@@ -12,6 +12,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
+#include "common/core/whole_file.h"
 #include "common/net/control.h"
 #include "common/net/service.h"
 #include "tools/telesplat/control/client.h"
@@ -69,9 +70,8 @@ Result<std::string> ProcessGroup::start_listener(Member member, double patience_
 }
 
 Status ProcessGroup::start(Member member) {
-  std::error_code error;
-  fs::create_directories(log_directory_, error);
-  if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
+  if (const auto error = make_private_folder(log_directory_))
+    return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
   member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
   // The environment or a session's file may name other keys.
   const std::string keys = keys_.empty() ? net::kNoKeys : keys_;

@@ -44,7 +44,8 @@ Status write_summary(const std::string& directory, const std::vector<VerifiedVie
   auto summary = tools::read_json_object(path);
   if (!summary) return summary.error();
   (*summary)["quality"] = quality_json(views);
-  return write_whole(path, summary->dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  return write_whole(path, summary->dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n",
+                     kPrivate);
 }
 
 class Verification {

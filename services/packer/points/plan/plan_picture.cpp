@@ -7,6 +7,7 @@
 #include <bit>
 #include <filesystem>
 
+#include "common/core/whole_file.h"
 #include "common/image/canvas.h"
 
 namespace telesplat::packer {
@@ -72,9 +73,8 @@ image::View drawn(const PlanPicture& picture) {
 }
 
 Result<PlanRecorder> PlanRecorder::open(const std::string& directory, int most) {
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error) return Error{fmt::format("{}: cannot be made a folder for plans: {}", directory, error.message())};
+  if (const auto error = make_private_folder(directory))
+    return Error{fmt::format("{}: cannot be made a folder for plans: {}", directory, error.message())};
   PlanRecorder out;
   out.directory_ = directory;
   out.left_ = most;

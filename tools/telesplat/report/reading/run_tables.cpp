@@ -45,6 +45,10 @@ std::optional<LooseTable> read(const std::string& directory, const char* name, c
                                const Names& texts, std::vector<std::string>& notes) {
   std::error_code error;
   const std::string path = directory + "/" + name;
+  if (!lies_within(directory, name)) {
+    notes.push_back(fmt::format("{} is a symbolic link and not looked into: {}", name, lacks));
+    return {};
+  }
   if (!fs::exists(path, error)) {
     notes.push_back(fmt::format("{} is not there: {}", name, lacks));
     return {};
@@ -115,6 +119,12 @@ std::vector<double> RunTables::of_drawn(const std::string& column) const {
   for (size_t row = 0; row < drawn.size(); ++row)
     if (!drawn[row] || (column == "inter_frame_ms" && !(out[row] > 0))) out[row] = NAN;  // a first frame has no delay
   return out;
+}
+
+bool lies_within(const std::string& directory, const std::string& name) {
+  std::error_code error;
+  const fs::path real = fs::canonical(fs::path(directory) / name, error);
+  return error || real == (fs::canonical(directory, error) / name);
 }
 
 RunTables read_run_tables(const std::string& directory, const std::string& kind, double skip_s) {

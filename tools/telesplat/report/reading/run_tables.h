@@ -39,6 +39,10 @@ struct PageLimits {
   size_t text_bytes = 200'000;     ///< of a configuration
 };
 
+/// Whether a file or folder of a run is reached without a symbolic link: the run may be a stranger's, and a link may
+/// lead to any file of the reader's.
+bool lies_within(const std::string& directory, const std::string& name);
+
 /// kind: of the scene, "mesh", "julia", "volume" or empty.
 /// skip_s: what began sooner after the first displayed frame is left out.
 RunTables read_run_tables(const std::string& directory, const std::string& kind, double skip_s = 0);
