@@ -258,10 +258,10 @@ class FinerPoints {
   uint32_t enough_;
 };
 
-// Whether a mosaic is merged with others: those of one class. Samples an octave coarser, among finer ones of which
-// there are few yet, would be drawn by the mean as splats with gaps between them.
-bool may_merge(const Mosaic& m, int fresh_class) {
-  return !m.provisional() && density_class(m.pixel_range()) == fresh_class;
+// Whether a mosaic is merged with another one: those of one group and class. Samples an octave coarser, among finer
+// ones of which there are few yet, would be drawn by the mean as splats with gaps between them.
+bool may_merge(const Mosaic& m, const Mosaic& fresh) {
+  return m.group() == fresh.group() && density_class(m.pixel_range()) == density_class(fresh.pixel_range());
 }
 
 bool contains(const std::vector<uint32_t>& list, uint32_t i) {
@@ -271,12 +271,11 @@ bool contains(const std::vector<uint32_t>& list, uint32_t i) {
 // The mosaics that `fresh` is merged with, ascending: smallest first, as long as they are of a size with what there is.
 std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic& fresh) {
   std::vector<uint32_t> out;
-  const int fresh_class = density_class(fresh.pixel_range());
   uint32_t total = fresh.count(0);
   while (true) {
     const Mosaic* smallest = nullptr;
     for (const Mosaic& m : mosaics)
-      if (may_merge(m, fresh_class) && !contains(out, static_cast<uint32_t>(&m - mosaics.data())) &&
+      if (may_merge(m, fresh) && !contains(out, static_cast<uint32_t>(&m - mosaics.data())) &&
           (!smallest || m.count(0) < smallest->count(0)))
         smallest = &m;
     if (!smallest) break;
@@ -296,8 +295,8 @@ uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<u
   FinerPoints finer(coarse, merged_class);
   const auto for_finer = [&](const auto& visit) {
     for (uint32_t j = 0; j < mosaics.size(); ++j)
-      if (density_class(mosaics[j].pixel_range()) > density_class(coarse.pixel_range()) && !mosaics[j].provisional() &&
-          !contains(replaced, j))
+      if (density_class(mosaics[j].pixel_range()) > density_class(coarse.pixel_range()) &&
+          mosaics[j].group() == coarse.group() && !contains(replaced, j))
         visit(mosaics[j].level(0));
   };
   size_t most = own;
@@ -378,7 +377,7 @@ Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float p
 }
 
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
-  if (fresh.provisional()) {
+  if ((fresh.frame_tag() & kProvisionalTag) != 0) {
     Merge alone;
     alone.added.push_back(std::move(fresh));
     return alone;
@@ -394,7 +393,8 @@ Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
   const int merged_class = density_class(range);
   for (uint32_t i = 0; own >= kSmallMosaic && i < mosaics.size(); ++i) {
     const Mosaic& coarse = mosaics[i];
-    if (density_class(coarse.pixel_range()) >= merged_class || coarse.provisional() || contains(out.replaced, i))
+    if (density_class(coarse.pixel_range()) >= merged_class || coarse.group() != fresh.group() ||
+        contains(out.replaced, i))
       continue;
     const uint32_t surrounded = find_surrounded(mosaics, out.replaced, coarse, merged_class, p, own);
     if (surrounded == 0 || surrounded * kLeastTaken < coarse.count(0)) continue;

@@ -41,7 +41,7 @@ struct Merge {
 /// what is merged so far. If the result is not small, it also takes in the points of coarser mosaics that finer points
 /// surround: such a point is as exact as they are, so it needs no larger splat than they do. What of a coarser mosaic
 /// is not surrounded stays a mosaic.
-///   Provisional mosaics stay as they came.
+///   Mosaics of a coarse pass stay as they came. Those of a head at rest are merged among themselves.
 ///   A merged mosaic has the mean pixel range of its parts, by their points, their mean direction if they are alike,
 ///   and fresh's sequence and frame.
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh);

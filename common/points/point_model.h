@@ -27,14 +27,20 @@ namespace telesplat::points {
 inline constexpr int kLevels = 3;           ///< level 0 = every sample, 1 = one of 2x2 pixels, 2 = one of 4x4
 inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 
-/// A frame tag is what of a frame's number these bits hold.
+/// A frame tag has so many bits: tagged().
 inline constexpr uint32_t kFrameTagMask = (1u << 24) - 1;
 /// The bit of a frame tag that coarse passes have.
 inline constexpr uint32_t kProvisionalTag = 1u << 23;
-/// What prepare_patch() is told of a frame: its number without that bit, or, of a coarse pass (step > 1), with it.
-constexpr FrameId tagged(FrameId frame, uint64_t step) {
-  return {(frame.value & (kProvisionalTag - 1)) | (step > 1 ? kProvisionalTag : 0)};
+/// The bit of a frame tag that points of a head at rest have; what follows it is the number of that rest.
+inline constexpr uint32_t kRestTag = 1u << 22;
+/// What prepare_patch() is told of a frame: its number, or that of a head's rest (not 0), with the bits for a coarse
+/// pass (step > 1) and a rest.
+constexpr FrameId tagged(FrameId frame, uint64_t step, uint64_t rest = 0) {
+  if (rest != 0) return {(rest & (kRestTag - 1)) | kRestTag};
+  return {(frame.value & (kRestTag - 1)) | (step > 1 ? kProvisionalTag : 0)};
 }
+/// The tag, if its points are provisional; else 0.
+constexpr uint32_t group_of(uint32_t tag) { return (tag & (kProvisionalTag | kRestTag)) != 0 ? tag : 0; }
 
 /// Where a cluster's leaf lies: its integer coordinates, `depth` bits each, in the octree's cube; x in the low bits
 /// (x | y << 10 | z << 20).
@@ -83,9 +89,12 @@ class Mosaic {
   /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch
   /// (T4.3.2).
   uint32_t frame_tag() const { return static_cast<uint32_t>(sequence_and_frame_ >> kSequenceBits); }
-  /// Of a coarse pass: its points stand in for the complete frame that is on its way. They are merged with none, show
-  /// nothing to redundancy elimination, and are forgotten by their tag when that frame is there.
-  bool provisional() const { return (frame_tag() & kProvisionalTag) != 0; }
+  /// Its points are forgotten by their tag, and show nothing to redundancy elimination: those of a coarse pass when the
+  /// complete frame is there, those of a head at rest when it has moved on.
+  bool provisional() const { return group() != 0; }
+  /// The tag, if provisional; else 0. Mosaics of one group are merged, but not those of a coarse pass.
+  uint32_t group() const { return group_of(frame_tag()); }
+  bool of_rest() const { return (frame_tag() & kRestTag) != 0; }
   /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
   /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l. Of merged mosaics the mean.
   float pixel_range() const { return pixel_range_; }

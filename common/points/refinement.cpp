@@ -19,7 +19,8 @@ struct UnprojectedRow {
   void set(const RowRays& rays, const image::DepthImage& image, int row) {
     const auto n = static_cast<size_t>(image.width);
     keys.resize(n), x.resize(n), y.resize(n), z.resize(n);
-    unproject_row(rays, image.depth.data() + static_cast<size_t>(row) * n, n, keys.data(), x.data(), y.data(), z.data());
+    unproject_row(rays, image.depth.data() + static_cast<size_t>(row) * n, n, keys.data(), x.data(), y.data(),
+                  z.data());
   }
 };
 
@@ -69,7 +70,7 @@ uint64_t PreparedRefinement::points() const {
 
 PreparedRefinement prepare_refinement(const ModelConfig& config, Sequence sequence, Sequence of,
                                       const geometry::Camera& camera, const geometry::Rect& tile,
-                                      const image::DepthImage& bounded, const image::DepthImage& exact) {
+                                      const image::DepthImage& bounded, const image::DepthImage& exact, FrameId frame) {
   CHECK(tile.width == bounded.width && tile.height == bounded.height);
   CHECK(tile.width == exact.width && tile.height == exact.height);
   const OctreeGrid grid = octree_grid(config);
@@ -93,7 +94,7 @@ PreparedRefinement prepare_refinement(const ModelConfig& config, Sequence sequen
       part.bounded.push_back(was), part.exact.push_back(is);
     }
   }
-  PreparedRefinement out{sequence, of, {}};
+  PreparedRefinement out{sequence, of, group_of(static_cast<uint32_t>(frame.value)), {}};
   out.parts.reserve(parts.size());
   for (auto& [key, part] : parts) {
     part.key = key;
@@ -113,7 +114,7 @@ Insertion plan_refinement(const PointModel& model, const PreparedRefinement& ref
     for (uint32_t m = 0; m < cluster->mosaics.size(); ++m) {
       const Mosaic& mosaic = cluster->mosaics[m];
       // What was merged has the newest sequence of its parts, so an older mosaic has no point of that patch.
-      if (mosaic.sequence() < refinement.of || mosaic.provisional()) continue;
+      if (mosaic.sequence() < refinement.of || mosaic.group() != refinement.group) continue;
       const Mosaic::Level l = mosaic.level(0);
       found.clear();
       for (uint32_t i = 0; i < l.count; ++i)

@@ -23,16 +23,18 @@ struct PreparedRefinement {
   };
   Sequence sequence;        ///< of the event that brings it
   Sequence of;              ///< of the patch that it refines
+  uint32_t group = 0;       ///< of that patch: Mosaic::group()
   std::vector<Part> parts;  ///< ascending keys
   uint64_t points() const;
 };
 
-/// camera, tile: of the patch, as prepare_patch() takes them. bounded, exact: the patch's image as it was published,
-/// and as it was sampled; pixels that only one of them covers are left out.
+/// camera, tile, frame: of the patch, as prepare_patch() takes them. bounded, exact: the patch's image as it was
+/// published, and as it was sampled; pixels that only one of them covers are left out.
 /// Preconditions: as prepare_patch(); both images of the tile's size.
 PreparedRefinement prepare_refinement(const ModelConfig& config, Sequence sequence, Sequence of,
                                       const geometry::Camera& camera, const geometry::Rect& tile,
-                                      const image::DepthImage& bounded, const image::DepthImage& exact);
+                                      const image::DepthImage& bounded, const image::DepthImage& exact,
+                                      FrameId frame = {});
 
 /// What it does to the model (PointModel::commit): mosaics with such points are made anew in their places, with the
 /// sequence and the frame that they had. Clusters and points that are not there are passed over. Of points that are

@@ -71,6 +71,7 @@ struct BoundedPatch {
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the patch in it
   std::vector<uint8_t> stream;
+  FrameId tag;  ///< points::tagged()
 };
 
 /// Book of those who follow the packer.
@@ -78,8 +79,8 @@ class BoundedPatches {
  public:
   /// Precondition: the stream was decoded, so it is good.
   void add(Sequence sequence, const geometry::Camera& camera, const geometry::Rect& rect,
-           std::span<const uint8_t> stream) {
-    book_.add(sequence, stream.size(), {camera, rect, {stream.begin(), stream.end()}});
+           std::span<const uint8_t> stream, FrameId tag = {}) {
+    book_.add(sequence, stream.size(), {camera, rect, {stream.begin(), stream.end()}, tag});
   }
   /// What event `sequence` with that stream makes of patch `of`. Nothing: that patch is not here; then all of its
   /// points were forgotten. Error: the stream does not fit it.

@@ -41,13 +41,15 @@ struct Patch {
   geometry::Rect missed_rect{0, 0, 1, 1};
   Moments moments;                        ///< of the last tile, if it completes an update; none when sent again
   bool refinable = false;                 ///< what its image leaves out may follow: Refine
+  /// Not 0: its points go when the head has moved on, by the tag that this number gives (points::tagged).
+  uint64_t rest = 0;
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
     f("extra", m.extra); f("frame_complete", m.frame_complete); f("left_out", m.left_out); f("samples", m.samples); f("kept", m.kept);
     f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
     f("missed", m.missed, kMaxMaskWords); f("missed_rect", m.missed_rect); f("moments", m.moments);
-    f("refinable", m.refinable);
+    f("refinable", m.refinable); f("rest", m.rest);
   }
 };
 struct Forget {

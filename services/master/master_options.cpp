@@ -110,8 +110,6 @@ options::Table steering_table(MasterOptions& o) {
            .help = "each pixel that the model shows well is sampled again once in so many updates; 0: never",
            .limits = options::Range{0.0, 4096.0},
            .fits = points},
-          one_of_few(setting_value("sampling.edge_rays", 1), "--edge-rays,--sampling.edge_rays", rays,
-                     "rays a pixel at edges while the head moves"),
           one_of_few(setting_value("sampling.still_rays", 16), "--still-rays,--sampling.still_rays", rays,
                      "rays a pixel everywhere while the head stands still, when it has stood long enough")};
 }

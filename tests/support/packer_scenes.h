@@ -59,9 +59,9 @@ class Replica {
     if (event.kind == packer::Event::Kind::kPatch) {
       const auto image = codec::decode(*event.blob, event.rect.width, event.rect.height);
       CHECK(image.ok());
-      if (event.refinable) bounded_.add(event.sequence, event.camera, event.rect, *event.blob);
-      model_.insert(points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image,
-                                          points::tagged(event.frame, event.step)));
+      if (event.refinable) bounded_.add(event.sequence, event.camera, event.rect, *event.blob, event.tag());
+      model_.insert(
+          points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image, event.tag()));
     }
   }
   /// Closes a gap.

@@ -172,9 +172,8 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   }
   const double decoded = monotonic_s();
   epoch_ = patch.epoch;
-  if (patch.refinable) bounded_.add(patch.sequence, patch.camera, patch.rect, bytes);
-  auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_,
-                                        points::tagged(patch.frame, patch.step));
+  if (patch.refinable) bounded_.add(patch.sequence, patch.camera, patch.rect, bytes, tag_of(patch));
+  auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_, tag_of(patch));
   if (options_.hold)
     batches_.add(UpdateBatches::Insert{std::move(prepared), patch.epoch}, cache_, sequencer_.packer());
   else

@@ -81,7 +81,7 @@ bool PointSource::stands_still(const FrameInput& input) {
   if (!still_shading_) {
     still_shading_.emplace(options_.shading, input.camera);
     still_.begin(input.camera);
-    changes_.any = true;
+    changes_.any = base_stale_ = true;
   } else {
     still_.on_changes(changes_);
     still_.on_changes(ray_changes_);
@@ -140,12 +140,15 @@ void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnF
 
 void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFrame& out) {
   out.chosen_s = input.begin_s;
-  base_stale_ |= changes_.any;
+  if (changes_.any) {
+    select(input, 1, out);
+    base_stale_ |= splat::names_of(list_) != base_;  // finer points are no part of it
+  }
   const bool base = input.with_depth || (!still_.covers_all() && (base_stale_ || !input.intact));
-  if (base || changes_.any) select(input, 1, out);
+  if (base && !changes_.any) select(input, 1, out);
   if (base) {
     draw_list(input, *still_shading_, view, out);
-    base_stale_ = false;
+    base_stale_ = false, base_ = splat::names_of(list_);
   }
   out.changed = base || !input.intact;
   out.still = !base;

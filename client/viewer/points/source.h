@@ -63,6 +63,7 @@ class PointSource final : public ViewSource {
   StillPicture still_;
   Supersampler supersampler_;
   std::optional<image::Shading> still_shading_;  // none: no still picture has begun
+  uint64_t base_ = 0;                            // what it shows: splat::names_of()
   bool base_stale_ = true;  // the picture without sub-pixels, wherever the view shows it, is not of the model as it is
   double tile_s_ = 0, saved_s_ = 0, seen_s_ = 0;
   bool pair_sharp_ = false;  // the pair on display was drawn with all detail

@@ -106,9 +106,8 @@ struct EventReplay::Impl {
     const std::span bytes(reinterpret_cast<const uint8_t*>(p.image.data()), p.image.size());
     if (const Status s = codec::decode_into(tile, bytes, p.rect.width, p.rect.height); !s) return wrong(s.error().text);
     if (const Status s = add_rays(p, tile, rays); !s) return wrong(s.error().text);
-    if (p.refinable) bounded.add(p.sequence, p.camera, p.rect, bytes);
-    model->insert(
-        points::prepare_patch(model->config(), p.sequence, p.camera, p.rect, tile, points::tagged(p.frame, p.step)));
+    if (p.refinable) bounded.add(p.sequence, p.camera, p.rect, bytes, tag_of(p));
+    model->insert(points::prepare_patch(model->config(), p.sequence, p.camera, p.rect, tile, tag_of(p)));
     return ok_status();
   }
   Status apply(const wire::Forget& f) {

@@ -83,7 +83,7 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
   const geometry::Camera fine = finer(camera, side_);
   const geometry::Rect sub = scaled(grown(rect, 1), side_);
   splat::SelectionOptions selection = scene.selection;
-  selection.detail = 1;
+  selection.detail = 1, selection.rests = true;
   // Finer samples cover parts of a cluster only, as often as not edges that were sampled twice: coarser splats beside
   // them must not shrink. Over them the nearest centre wins a sub-pixel anyway.
   selection.hide_ratio = std::numeric_limits<float>::infinity();
@@ -108,7 +108,7 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
 void Supersampler::render_coarse(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect) {
   const geometry::Rect around = grown(rect, 2);
   splat::SelectionOptions selection = scene.selection;
-  selection.detail = 1;
+  selection.detail = 1, selection.rests = true;
   scene.select(crop(camera, grown(around, kOverhang)), selection, coarse_list_);
   render(scene, coarse_list_, crop(camera, around), coarse_);
 }

@@ -49,14 +49,15 @@ struct Workspace {
 // Every mosaic that may be seen, whole, with splats of its own samples' distance.
 class Chooser {
  public:
-  explicit Chooser(const geometry::Camera& camera) : camera_(camera), eye_(camera.pose.position_room) {}
+  Chooser(const geometry::Camera& camera, bool rests)
+      : camera_(camera), eye_(camera.pose.position_room), rests_(rests) {}
 
   void add(const points::Cluster& cluster, std::vector<DrawItem>& items, uint64_t& points) const {
     const LeafView view = leaf_view(cluster.leaf_room, eye_);
     const double leaf_m = double{cluster.leaf_room.hi.x} - double{cluster.leaf_room.lo.x};
     const float range = points::pixel_range(camera_, cluster.leaf_room.centre(), leaf_m);
     for (const points::Mosaic& mosaic : cluster.mosaics) {
-      if (mosaic.provisional()) continue;  // its points will be gone
+      if (mosaic.provisional() && !(rests_ && mosaic.of_rest())) continue;  // its points will be gone
       const Facing facing = facing_of(mosaic, view);
       if (facing == Facing::kAway) continue;
       const float px = std::min(kClosedScale * range / mosaic.pixel_range(), static_cast<float>(kMaxSplatSide));
@@ -71,6 +72,7 @@ class Chooser {
  private:
   const geometry::Camera& camera_;
   const glm::vec3 eye_;
+  const bool rests_;
 };
 
 }  // namespace
@@ -84,7 +86,7 @@ struct ViewKeys::Impl {
       : arena(threads > 0 ? threads : tbb::task_arena::automatic),
         workspaces(static_cast<size_t>(arena.max_concurrency())) {}
 
-  void choose(const points::PointModel& model, const geometry::Camera& camera);
+  void choose(const points::PointModel& model, const geometry::Camera& camera, bool rests);
   void bin(const geometry::Camera& camera);
   void draw_tile(int index, Workspace& workspace, const std::function<void(const Tile&)>& visit);
 
@@ -104,11 +106,11 @@ struct ViewKeys::Impl {
   uint64_t points = 0;
 };
 
-void ViewKeys::Impl::choose(const points::PointModel& model, const geometry::Camera& camera) {
+void ViewKeys::Impl::choose(const points::PointModel& model, const geometry::Camera& camera, bool rests) {
   items.clear();
   points = 0;
   const geometry::Frustum frustum(camera);
-  const Chooser chooser(camera);
+  const Chooser chooser(camera, rests);
   for (const SeenBrick& seen : seen_bricks(model, frustum, glm::vec3(camera.pose.position_room)))
     for_seen_clusters(seen, frustum, [&](const points::Cluster& cluster) { chooser.add(cluster, items, points); });
   FrameFigures figures(traits_of(kKernel), camera, kClosedScale);
@@ -162,11 +164,12 @@ void ViewKeys::Impl::draw_tile(int index, Workspace& w, const std::function<void
 ViewKeys::ViewKeys(int threads) : impl_(std::make_unique<Impl>(threads)) {}
 ViewKeys::~ViewKeys() = default;
 
-void ViewKeys::begin(const points::PointModel& model, const geometry::Camera& camera, int tile_width, int tile_height) {
+void ViewKeys::begin(const points::PointModel& model, const geometry::Camera& camera, int tile_width, int tile_height,
+                     bool rests) {
   Impl& m = *impl_;
   m.grid = {camera.width, camera.height, tile_width, tile_height};
   m.near_m = static_cast<float>(camera.near_m);
-  m.choose(model, camera);
+  m.choose(model, camera, rests);
   m.bin(camera);
   for (Workspace& w : m.workspaces) w.resize(tile_width, tile_height);
 }

@@ -42,7 +42,9 @@ class ViewKeys {
 
   /// Chooses and bins the points of a view. The model must not change until the last draw().
   /// tile_width, tile_height: multiples of 64 keep the bits of two tiles' pixels in different words.
-  void begin(const points::PointModel& model, const geometry::Camera& camera, int tile_width, int tile_height);
+  /// rests: points of heads at rest count, too.
+  void begin(const points::PointModel& model, const geometry::Camera& camera, int tile_width, int tile_height,
+             bool rests = false);
   const TileGrid& grid() const;
   /// Of the keys' depth codes: unbiased_depth_code().
   const RimBias& rim() const;

@@ -1,5 +1,7 @@
 #include "common/splat/select/view_selection.h"
 
+#include <xxhash.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -167,7 +169,7 @@ class Selector {
     visible_.clear();
     for (size_t i = 0; i < views_.size(); ++i) views_[i] = leaf_view(cluster.leaf_room, eyes_[i]);
     for (const points::Mosaic& m : cluster.mosaics) {
-      if (after.value != 0 && m.sequence() <= after) continue;
+      if ((after.value != 0 && m.sequence() <= after) || (m.of_rest() && !options_.rests)) continue;
       const Facing facing = this->facing(m);
       if (facing != Facing::kAway) visible_.push_back({&m, facing == Facing::kMixed});
     }
@@ -220,6 +222,19 @@ class Selector {
 
 bool faces_away(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const glm::vec3& eye_room) {
   return facing_of(mosaic, leaf_view(leaf_room, eye_room)) == Facing::kAway;
+}
+
+uint64_t names_of(const DrawList& list) {
+  uint64_t hash = list.replica;
+  for (const DrawItem& item : list.items) {
+    const struct {
+      uint64_t sequence;
+      uint32_t key, first, count;
+      float splat_px;
+    } name{item.sequence.value, item.cluster->key, item.first, item.level.count, item.splat_px};
+    hash = XXH3_64bits_withSeed(&name, sizeof name, hash);
+  }
+  return hash;
 }
 
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,

@@ -20,6 +20,7 @@ struct SelectionOptions {
   float detail = 1.0f;
   bool transitions = true;  ///< between neighbouring levels as many points as wanted; false: the closest level whole
   bool cone_culling = true;
+  bool rests = false;  ///< points of heads at rest are chosen, too: they are finer than pixels
   /// Packing kept redundant patches: the best ones of each cluster are drawn (patch_choice.h).
   bool best_patch_only = false;
   /// The list is to serve both: what either eye sees is chosen, for splats of the size that the camera asks for, which
@@ -83,6 +84,9 @@ struct DrawList {
 ///   options.best_patch_only.
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
                  DrawList& out, const points::Summaries* summaries = nullptr);
+
+/// Hash of which points a list has and how large their splats are: lists of one replica that show the same are alike.
+uint64_t names_of(const DrawList& list);
 
 /// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use
 /// this one test, so that a mosaic that viewers cull does not count as seen.

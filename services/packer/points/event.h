@@ -33,6 +33,7 @@ struct Event : FramePart {
   /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else none.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
+  uint32_t rest = 0;  ///< not 0: its points go when the head has moved on; those of one rest of one head share it
   /// Covered pixels of this tile, before and after elimination.
   uint64_t samples = 0, kept = 0;
   uint64_t untold_samples = 0;  ///< of its frame's tiles that nobody was told of, since the last one that was told
@@ -45,6 +46,9 @@ struct Event : FramePart {
 
   // kRefine
   Sequence refines;  ///< the patch that becomes exact
+
+  /// What prepare_patch() is told of a patch's frame.
+  FrameId tag() const { return points::tagged(frame, step, rest); }
 };
 
 }  // namespace telesplat::packer

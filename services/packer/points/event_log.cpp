@@ -31,9 +31,8 @@ Event bare(const Event& event) {
 
 uint64_t EventLog::Patch::bytes() const {
   return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() +
-         (refinement ? refinement->capacity() : 0) +
-         event.missed.capacity() * sizeof event.missed[0] + forgotten.capacity() * sizeof forgotten[0] +
-         patch_forgotten.capacity() * sizeof patch_forgotten[0];
+         (refinement ? refinement->capacity() : 0) + event.missed.capacity() * sizeof event.missed[0] +
+         forgotten.capacity() * sizeof forgotten[0] + patch_forgotten.capacity() * sizeof patch_forgotten[0];
 }
 
 uint64_t EventLog::bytes() const {
@@ -78,10 +77,12 @@ void EventLog::add_patch_forget(const Event& event, std::span<const points::Clus
   for (const points::Cluster& cluster : dropped) {
     const auto found = patches_of_.find(cluster.key);
     CHECK(found != patches_of_.end());
-    for (const points::Mosaic& mosaic : cluster.mosaics) {
-      drop_part(mosaic.sequence(), cluster.key, event.sequence, true);
-      std::erase(found->second, mosaic.sequence());
-    }
+    const uint32_t tag = cluster.mosaics.front().frame_tag();
+    std::erase_if(found->second, [&](Sequence patch) {
+      if (patches_.at(patch).event.tag().value != tag) return false;
+      drop_part(patch, cluster.key, event.sequence, true);
+      return true;
+    });
     if (found->second.empty()) patches_of_.erase(found);
   }
   patch_forgets_.push_back(event);
@@ -201,8 +202,7 @@ std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) co
   std::vector<std::tuple<Sequence, points::ClusterKey, uint32_t>> keys;
   for (const auto& [sequence, patch] : patches_)
     for (const auto& [forgotten, key] : patch.patch_forgotten)
-      keys.emplace_back(forgotten, key,
-                        static_cast<uint32_t>(points::tagged(patch.event.frame, patch.event.step).value));
+      keys.emplace_back(forgotten, key, static_cast<uint32_t>(patch.event.tag().value));
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   for (const auto& [sequence, key, frame] : keys) {

@@ -42,7 +42,6 @@ PlanConfig plan_config_of(const wire::Welcome& session, const Config& packing) {
   c.nearest_sample = packing.nearest_sample;
   c.view_cell_m = std::clamp(view.setting("sampling.view_cell_m", c.view_cell_m), 0.0, 1e3);
   c.validation = whole("sampling.validation", c.validation, BlueNoise::kMaxShare);
-  c.edge_rays = whole("sampling.edge_rays", c.edge_rays, 16);
   c.still_rays = whole("sampling.still_rays", c.still_rays, 16);
   c.max_points = packing.max_points;
   c.threads = packing.threads;
@@ -117,7 +116,8 @@ void with_message(InstanceId packer, const Event& e, const wire::Moments& moment
                               .missed = e.missed,
                               .missed_rect = e.missed_rect,
                               .moments = moments,
-                              .refinable = e.refinable});
+                              .refinable = e.refinable,
+                              .rest = e.rest});
     case Event::Kind::kRefine:
       return send(wire::Refine{packer, e.sequence, e.epoch, e.refines, std::as_bytes(std::span(*e.blob))});
     case Event::Kind::kForget:

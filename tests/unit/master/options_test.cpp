@@ -27,7 +27,6 @@ TEST(MasterFlags, SettingsHaveTheirUsualValues) {
                                                               {"packing.obsolete_after_s", 0},
                                                               {"packing.patches_per_cluster", 6},
                                                               {"packing.rate_weight", 4},
-                                                              {"sampling.edge_rays", 1},
                                                               {"sampling.still_rays", 16},
                                                               {"sampling.validation", 32},
                                                               {"sampling.view_cell_m", 0.2},
@@ -77,11 +76,9 @@ TEST(MasterFlags, AreReadUnderBothTheirNames) {
   EXPECT_EQ(o.master.steering, Steering::kOff);
   EXPECT_TRUE(give(o, "--view-cell", "0"));
   EXPECT_TRUE(give(o, "--validation", "64"));
-  EXPECT_TRUE(give(o, "--edge-rays", "16"));
   EXPECT_TRUE(give(o, "--sampling.still_rays", "1"));
   EXPECT_EQ(o.master.settings.at("sampling.view_cell_m"), 0);
   EXPECT_EQ(o.master.settings.at("sampling.validation"), 64);
-  EXPECT_EQ(o.master.settings.at("sampling.edge_rays"), 16);
   EXPECT_EQ(o.master.settings.at("sampling.still_rays"), 1);
   EXPECT_TRUE(give(o, "--tile-size", "64"));
   EXPECT_EQ(o.master.schedule.tile_size, 64);
@@ -106,7 +103,6 @@ TEST(MasterFlags, HaveLimits) {
                                                                                    {"--view-cell", "-0.1"},
                                                                                    {"--view-cell", "11"},
                                                                                    {"--validation", "4097"},
-                                                                                   {"--edge-rays", "2"},
                                                                                    {"--still-rays", "0"},
                                                                                    {"--still-rays", "1e9"},
                                                                                    {"--packing.redundancy", "2"}}) {

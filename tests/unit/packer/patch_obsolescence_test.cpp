@@ -197,6 +197,58 @@ TEST(EliminateMode, ACoarsePassLeavesNoTraceBehindItsCompleteFrame) {
   EXPECT_EQ(late.model().digest(), core.model().digest());
 }
 
+TEST(EliminateMode, WhatARestingHeadWasShownGoesWhenItHasMovedOn) {
+  Config config = test::packer_config();
+  config.model.compact = true;
+  PackerCore core(config, test::kEpoch), plain(config, test::kEpoch);
+  test::Replica replica(config.model);
+  const auto apply = [&](const std::vector<Event>& events) {
+    for (const Event& e : events) replica.apply(e);
+  };
+  const auto fine = [&](uint64_t id, geometry::Camera view) {
+    view.width *= 2, view.height *= 2;
+    auto tiles = test::sampled_frame({id}, view, 48);
+    for (auto& t : tiles) t.extra = true, t.missed.reset(t.rect.width, t.rect.height);
+    return tiles;
+  };
+  for (PackerCore* c : {&core, &plain}) {
+    const auto events = submit_all(*c, test::sampled_frame({1}, camera(0), 48), 0);
+    if (c == &core) apply(events);
+  }
+  const uint64_t of_view = core.model().points();
+  for (uint64_t id = 2; id < 5; ++id) {
+    const auto events = submit_all(core, fine(id, camera(0)), 0);
+    for (const Event& e : events) EXPECT_EQ(e.rest, 1u);
+    apply(events);
+    apply(submit_all(core, test::sampled_frame({id + 10}, camera(0), 48), 0));
+    EXPECT_TRUE(core.forget_superseded().empty()) << "it rests";
+  }
+  EXPECT_GT(core.model().points(), 3 * of_view);
+  EXPECT_EQ(replica.model().digest(), core.model().digest());
+
+  // The first view from elsewhere, and what of it is there already, are the same with and without a rest before.
+  std::vector<Event> moved = submit_all(core, test::sampled_frame({20}, camera(0.02), 48), 1);
+  const std::vector<Event> expected = submit_all(plain, test::sampled_frame({20}, camera(0.02), 48), 1);
+  ASSERT_EQ(moved.size(), expected.size());
+  for (size_t i = 0; i < moved.size(); ++i) EXPECT_EQ(moved[i].kept, expected[i].kept);
+  apply(moved);
+  const auto forgets = core.forget_superseded();
+  ASSERT_EQ(forgets.size(), 1u);
+  EXPECT_EQ(forgets[0].frames.size(), forgets[0].clusters.size());
+  apply(forgets);
+  EXPECT_EQ(core.model().points(), plain.model().points());
+  EXPECT_EQ(replica.model().digest(), core.model().digest());
+  test::Replica late(config.model);
+  late.catch_up(core);
+  EXPECT_EQ(late.model().digest(), core.model().digest());
+  EXPECT_EQ(core.log_bytes() < 2 * plain.log_bytes(), true) << "and its patches go with them";
+
+  // Another rest has another number; a head that rests elsewhere at once leaves the old one behind, too.
+  for (const Event& e : submit_all(core, fine(30, camera(0.02)), 2)) EXPECT_EQ(e.rest, 2u);
+  for (const Event& e : submit_all(core, fine(31, camera(0.04)), 2)) EXPECT_EQ(e.rest, 3u);
+  EXPECT_EQ(core.forget_superseded().size(), 1u);
+}
+
 TEST(KeepMode, ACompleteFrameSupersedesItsCoarsePass) {
   PackerCore core(keep_config(), test::kEpoch);
   test::Replica replica(keep_config().model);

@@ -82,6 +82,33 @@ TEST(Compaction, ProvisionalMosaicsStayAsTheyCame) {
   EXPECT_EQ(model.digest(), without.digest()) << "as if they had never been there";
 }
 
+TEST(Compaction, PointsOfARestAreMergedAmongThemselves) {
+  PointModel model(compact_config()), without(compact_config()), alone(compact_config());
+  for (uint64_t s = 1; s <= 60; ++s) {
+    const uint64_t rest = s % 3;  // none, and two of them
+    model.insert(view(s, 0.4, 320, 1, tagged({s}, 1, rest)));
+    if (rest == 0) without.insert(view(s, 0.4, 320, 1, tagged({s}, 1)));
+    if (rest == 1) alone.insert(view(s, 0.4, 320, 1, tagged({s}, 1, rest)));
+  }
+  std::vector<ClusterKey> keys;
+  std::vector<uint32_t> frames;
+  size_t mosaics = 0, of_rest_1 = 0;
+  for (const auto& [key, cluster] : model.clusters()) {
+    for (const uint64_t rest : {1, 2}) {
+      keys.push_back(key);
+      frames.push_back(static_cast<uint32_t>(tagged({}, 1, rest).value));
+    }
+    for (const Mosaic& m : cluster->mosaics) mosaics += m.of_rest(), of_rest_1 += m.group() == frames.end()[-2];
+  }
+  EXPECT_GT(of_rest_1, 0u);
+  EXPECT_LT(mosaics, 8 * model.clusters().size()) << "40 patches of two rests";
+  model.forget(keys, frames);
+  EXPECT_EQ(model.digest(), without.digest()) << "as if they had never been there";
+  EXPECT_GT(alone.points(), 0u);
+  for (const auto& [key, cluster] : alone.clusters())
+    for (const Mosaic& m : cluster->mosaics) EXPECT_EQ(m.frame_tag(), kRestTag | 1);
+}
+
 TEST(Compaction, MosaicsGrowWithTheLogarithmOfPoints) {
   PointModel model(compact_config());
   uint64_t parts = 0;

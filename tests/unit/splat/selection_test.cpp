@@ -299,6 +299,23 @@ TEST(ViewSelection, PointsThatFaceAwayAreNotDrawn) {
 }
 
 // One list for both eyes: each sees what it would see of a list of its own, also where a mosaic faces it alone.
+TEST(Selection, PointsOfARestAreChosenOnlyWhereTheyAreAskedFor) {
+  points::PointModel model = sphere_model();
+  const geometry::Camera camera = view(0.3, 0.8);
+  DrawList before, moving, refined;
+  splat::select_view(model, camera, {}, before);
+  geometry::Camera fine = camera;
+  fine.width *= 2, fine.height *= 2;
+  model.insert(points::prepare_patch(model.config(), Sequence{10}, fine, {0, 0, fine.width, fine.height},
+                                     sphere_image(fine, 0, 1), points::tagged({10}, 1, 1)));
+  splat::select_view(model, camera, {}, moving);
+  EXPECT_EQ(moving.points, before.points);
+  EXPECT_EQ(splat::names_of(moving), splat::names_of(before)) << "its picture need not be drawn again";
+  splat::select_view(model, camera, {.rests = true}, refined);
+  EXPECT_GT(refined.points, moving.points + 1000);
+  EXPECT_NE(splat::names_of(refined), splat::names_of(before));
+}
+
 TEST(Selection, OneListShowsEachEyeWhatItsOwnWould) {
   const points::PointModel model = sphere_model();
   for (const auto& [angle, distance] : {std::pair{0.3, 0.45}, {1.7, 0.7}, {4.0, 1.4}}) {

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kMostFull = 0.85;  // of the points that the model may hold
 constexpr unsigned kDirections = 8;
-// Rays beyond a view while the head moves, as shares of its pixels: the next view has edges of its own.
-constexpr double kMovingCells = 0.05, kMovingFine = 0.04;
+// Rays from beside a view while the head moves, as a share of its pixels: the next view has edges of its own.
+constexpr double kMovingCells = 0.05;
 // Tiles that have not come for so long were given up.
 constexpr double kLost_s = 0.5;
 // Of a view from beside: as much more on each side, and what is so near to a sample is good enough.
@@ -122,21 +122,12 @@ void Planner::Impl::plan_extra(Question& q, ViewerView& view) {
       static_cast<double>(q.model.points()) > kMostFull * static_cast<double>(config.max_points))
     return;
   view.still = view.still || q.request.still;
+  if (q.request.most_rays > 0) q.most_rays = q.request.most_rays;
   if (plan_lost(q, view)) return;
   const bool cells_first = q.request.round % 2 == 0;
   if (cells_first && plan_cells(q, view)) return;
   if (plan_fine(q, view)) return;
   if (!cells_first) plan_cells(q, view);
-}
-
-// False: there were enough such rays for this view.
-bool Planner::Impl::limit(Question& q, const ViewerView& view, uint64_t cast, double share) const {
-  q.most_rays = q.request.most_rays > 0 ? q.request.most_rays : ~uint64_t{0};
-  if (view.still) return true;
-  const auto most = static_cast<uint64_t>(share * view.camera.width * view.camera.height);
-  if (cast >= most) return false;
-  q.most_rays = std::min(q.most_rays, most - cast);
-  return true;
 }
 
 // Tiles of extra frames that were given up for the view's are asked for again: each was planned once and is not found
@@ -165,7 +156,12 @@ bool Planner::Impl::plan_lost(Question& q, ViewerView& view) {
 }
 
 bool Planner::Impl::plan_cells(Question& q, ViewerView& view) {
-  if (!(config.view_cell_m > 0) || !limit(q, view, view.cell_rays, kMovingCells)) return false;
+  if (!(config.view_cell_m > 0)) return false;
+  if (!view.still) {
+    const auto most = static_cast<uint64_t>(kMovingCells * view.camera.width * view.camera.height);
+    if (view.cell_rays >= most) return false;
+    q.most_rays = std::min(q.most_rays, most - view.cell_rays);
+  }
   // A moving head has moved on before all directions had their turn.
   const unsigned tries = view.still ? kDirections : 1;
   for (unsigned i = 0; i < tries; ++i) {
@@ -230,40 +226,45 @@ bool Planner::Impl::plan_cell(Question& q, ViewerView& view, unsigned turn) {
 }
 
 bool Planner::Impl::plan_fine(Question& q, ViewerView& view) {
-  if (!view.still && config.edge_rays <= 1) return false;
-  if (!limit(q, view, view.fine_rays, kMovingFine)) return false;
+  if (!view.still) return false;
   if (q.breaks_off()) return true;
   if (!view.fine_map) look_closer(q, view);
   if (plan_stages(q, view)) return true;
-  if (!view.still || view.fine_changes == changes || view.looks >= kMostLooks) return false;
+  if (view.fine_changes == changes || view.looks >= kMostLooks) return false;
   if (q.breaks_off()) return true;
   look_closer(q, view);
   return plan_stages(q, view);
 }
 
+// First at the view, then at what finer rays have added to it.
 void Planner::Impl::look_closer(Question& q, ViewerView& view) {
-  if (view.still || !view.map) map_view(q, view);
-  view.fine_map = view.map;
-  view.fine_changes = view.map_changes;
-  ++view.looks;
+  if (view.looks++ == 0) {
+    map_view(q, view);
+    view.fine_map = view.map;
+  } else {
+    view.fine_map = nullptr;
+    const std::shared_ptr<ViewMap> map = new_map();
+    render_view_map(q.model, view.camera, test, true, keys, *map, true);
+    view.fine_map = map;
+  }
+  view.fine_changes = changes;
 }
 
 bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
   const std::shared_ptr<const ViewMap> map = view.fine_map;
-  const int while_still = view.still ? config.still_rays : 1;
+  const int most = config.still_rays;
   // What differs little gets all of its rays at once: what waits for them shows little of it, and each pass more is
   // another patch of each cluster for packer and viewers to merge.
-  const int weak = while_still >= 16 ? 2 : 1;
+  const int weak = most >= 16 ? 2 : 1;
   // Of pixels at edges all of the finest rays are cast, also where the model has samples: where a ray passes beside a
   // sample, none tells.
-  const int at_edges = std::max(config.edge_rays, while_still);
-  const FineStage stages[] = {{0, map->edge, 1, at_edges, at_edges < 16},
-                              {1, map->edge, 2, at_edges, true},
-                              {2, map->strong, 1, while_still, false},
-                              {3, map->strong, 2, while_still, false},
-                              {4, map->weak, weak, while_still, false}};
+  const FineStage stages[] = {{0, map->edge, 1, most < 16},
+                              {1, map->edge, 2, true},
+                              {2, map->strong, 1, false},
+                              {3, map->strong, 2, false},
+                              {4, map->weak, weak, false}};
   for (const FineStage& stage : stages)
-    if (stage.most >= 1 << 2 * stage.finer && plan_fine(q, view, stage)) return true;
+    if (most >= 1 << 2 * stage.finer && plan_fine(q, view, stage)) return true;
   return false;
 }
 
@@ -336,7 +337,7 @@ void Planner::Impl::look_into(Question& q, const geometry::Rect& region, FineSea
   const int times = search.camera.width / search.open.width();
   const std::vector<Part> parts = parts_of(search.open, region, times);
   const geometry::Camera camera = geometry::crop(search.camera, region);
-  keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight);
+  keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight, true);
   const PixelJudge judge(camera, test, keys.rim());
   image::PixelMask cast(region.width, region.height);
   std::mutex mutex;
@@ -383,7 +384,6 @@ bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const FineStage& st
   }
   if (q.unfinished && !q.enough(search.rays)) return true;
   sort_by_distance_to_centre(search.tiles, search.camera.width, search.camera.height);
-  view.fine_rays += search.rays;
   q.plan.figures["rays.refinement"] = static_cast<double>(search.rays);
   return issue(q, std::exchange(search.tiles, {}),
                {.kind = PlannedFrame::Kind::kFine, .camera = search.camera, .base = view.camera}) > 0 ||

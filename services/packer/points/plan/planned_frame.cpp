@@ -60,6 +60,7 @@ void note_inserted(const points::PreparedPatch& patch, const points::ModelConfig
   constexpr int kMostFollowed = 4;  // more than viewers most often have under way
   if (patch.mosaics.empty()) return;
   const uint32_t tag = patch.mosaics.front().second.frame_tag();
+  if (points::group_of(tag) != 0) return;  // its points will be gone
   int followed = 0;
   for (auto frame = shelf.frames().rbegin(); frame != shelf.frames().rend(); ++frame) {
     if (!frame->map || !frame->nearest_known || frame->complete()) continue;

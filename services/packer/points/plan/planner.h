@@ -23,7 +23,6 @@ struct PlanConfig {
   float nearest_sample = 0.6f;      ///< Config::nearest_sample
   double view_cell_m = 0.2;         ///< a head movement this long shall uncover nothing unknown; 0: no such rays
   int validation = 32;              ///< every good pixel is cast once in so many plans of a view; 0: never
-  int edge_rays = 1;                ///< rays a pixel at edges while the head moves: 1, 4 or 16
   int still_rays = 16;              ///< rays a pixel everywhere while it stands still: 1, 4 or 16
   uint64_t max_points = 0;          ///< of the model: near it no extra rays are planned; 0: no limit
   int threads = 1;                  ///< 0: all cores

@@ -48,7 +48,6 @@ struct Planner::Impl {
 
   // extra_rays.cpp: rays beyond a view.
   void plan_extra(Question& q, ViewerView& view);
-  bool limit(Question& q, const ViewerView& view, uint64_t cast, double share) const;
   bool plan_lost(Question& q, ViewerView& view);
   double step_aside_m(const ViewerView& view) const;
   bool plan_cell(Question& q, ViewerView& view, unsigned direction);
@@ -61,7 +60,6 @@ struct Planner::Impl {
     size_t number;
     const image::PixelMask& wanted;
     int finer;
-    int most;  ///< rays that such a pixel may have
     bool all;
   };
   bool plan_fine(Question& q, ViewerView& view, const FineStage& stage);

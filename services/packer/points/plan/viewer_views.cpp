@@ -29,7 +29,7 @@ void forget_casts(ViewerView& view) {
   view.fine_map = nullptr;
   view.looks = 0;
   view.lost.clear();
-  view.cell_rays = view.fine_rays = 0;
+  view.cell_rays = 0;
 }
 
 void follow(const geometry::Camera& camera, ViewerView& view) {

@@ -42,7 +42,7 @@ struct ViewerView {
   uint64_t fine_changes = 0;                ///< of the model that it shows
   int looks = 0;                            ///< how many such maps there were for this camera
   std::deque<LostTiles> lost;
-  uint64_t cell_rays = 0, fine_rays = 0;  ///< planned so far
+  uint64_t cell_rays = 0;  ///< planned so far, from beside
 };
 
 /// The view moves to another camera, or stays.

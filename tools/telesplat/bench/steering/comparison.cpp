@@ -33,7 +33,7 @@ SteeredSessionConfig config_of(const SteeringBenchOptions& o, const std::string&
   out.plan.model = {box, points::ModelConfig{}.depth, true};
   out.plan.view_cell_m = mode == "no-cell" ? 0 : o.view_cell_m;
   out.plan.validation = o.validation;
-  out.plan.edge_rays = o.edge_rays, out.plan.still_rays = o.still_rays;
+  out.plan.still_rays = o.still_rays;
   out.plan.threads = o.threads;
   out.render.kernel = *splat::kernel_named(o.splat);
   return out;

@@ -25,7 +25,7 @@ struct SteeringBenchOptions {
   double fov_deg = 90;
   double view_cell_m = 0.2;
   int validation = 32;
-  int edge_rays = 1, still_rays = 16;
+  int still_rays = 16;
   std::string modes = "off,on,no-cell";
   std::string splat = "disc";
   bool audit = false;  ///< count the rays that a plan misses or casts in vain

@@ -195,10 +195,10 @@ double SteeredSession::settle() {
   return timed(ms, [&] { return planner_.settle(); }) ? std::max(ms, 1e-3) : 0;
 }
 
-// What is disproved.
+// What is disproved, and what a head left behind.
 void SteeredSession::forget() {
-  for (const packer::Event& event : packer_.forget(planner_.disproved()))
-    cache_.forget(event.sequence, event.clusters, event.frames);
+  for (const auto& events : {packer_.forget(planner_.disproved()), packer_.forget_superseded()})
+    for (const packer::Event& event : events) cache_.forget(event.sequence, event.clusters, event.frames);
 }
 
 void SteeredSession::note_cast(const geometry::Rect& rect, const image::PixelMask* mask) {
@@ -220,7 +220,7 @@ Status SteeredSession::insert(const packer::Event& event, ViewCost& cost) {
       fine_rays_.add({kEpoch, event.camera, event.missed_rect, &*missed, event.rect, &*decoded});
     }
     cache_.insert(
-        points::prepare_patch(cache_.config(), event.sequence, event.camera, event.rect, *decoded, event.frame),
+        points::prepare_patch(cache_.config(), event.sequence, event.camera, event.rect, *decoded, event.tag()),
         kEpoch);
     return ok_status();
   });

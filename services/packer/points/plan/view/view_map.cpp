@@ -147,13 +147,13 @@ void reset_masks(int width, int height, ViewMap& map) {
 }
 
 void render_view_map(const points::PointModel& model, const geometry::Camera& camera, const PixelTest& test,
-                     bool with_planes, splat::ViewKeys& keys, ViewMap& map) {
+                     bool with_planes, splat::ViewKeys& keys, ViewMap& map, bool rests) {
   map.camera = camera;
   reset_masks(camera.width, camera.height, map);
   const size_t pixels = with_planes ? static_cast<size_t>(camera.width) * camera.height : 0;
   map.depth_m.resize(pixels), map.colour.resize(pixels), map.normal.resize(pixels);
   map.nearest_m.resize(pixels);
-  keys.begin(model, camera, kPlanTileWidth, kPlanTileHeight);
+  keys.begin(model, camera, kPlanTileWidth, kPlanTileHeight, rests);
   const PixelJudge judge(camera, test, keys.rim());
   keys.draw_all([&](const splat::ViewKeys::Tile& tile) { judge.judge(tile, tile.rect.x, tile.rect.y, map); });
 }

@@ -43,9 +43,9 @@ struct ViewMap {
 
 /// Renders the model and judges its pixels. with_planes: depth_m, colour, normal and nearest_m are filled; else they
 /// are empty.
-///   threads: those of `keys`.
+///   threads: those of `keys`. rests: ViewKeys::begin().
 void render_view_map(const points::PointModel& model, const geometry::Camera& camera, const PixelTest& test,
-                     bool with_planes, splat::ViewKeys& keys, ViewMap& map);
+                     bool with_planes, splat::ViewKeys& keys, ViewMap& map, bool rests = false);
 
 /// The same tile by tile, for views that are looked at in parts.
 class PixelJudge {
