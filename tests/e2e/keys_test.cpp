@@ -83,6 +83,9 @@ TEST(KeysOfSessions, AViewersKeyCanLookAndNothingElse) {
   peer.send(wire::LeaseRequest{{4711}});
   peer.send(wire::Shutdown{"now"});
   std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  const auto answer = peer.receive();
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->type, wire::Shutdown::kName) << "why it is refused";
   EXPECT_FALSE(peer.receive()) << "neither welcome nor lease";
   const auto now = nlohmann::json::parse(*ask(master, anna, "status"));
   EXPECT_GE(now["messages_rejected"], 12);

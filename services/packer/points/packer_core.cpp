@@ -30,6 +30,8 @@ constexpr uint32_t kMostRestNumber = points::kRestTag - 1;
 // Viewers whose rests are kept: those of one person and a few guests.
 constexpr size_t kMaxRests = 16;
 
+uint32_t rest_tag(uint32_t rest) { return static_cast<uint32_t>(points::tagged({}, 1, rest).value); }
+
 // Defence in depth: what came over the network was checked there, too.
 Status check_tile(const SampledTile& t) {
   if (const Status part = check(t, "tile"); !part) return part;
@@ -110,6 +112,7 @@ struct PackerCore::Impl {
   struct Rest {
     uint32_t number = 0;  // of 1 and more
     geometry::Pose pose;
+    RequestId request;                      // the newest of its views
     std::set<points::ClusterKey> clusters;  // that have its points
   };
   struct Refinable {
@@ -186,10 +189,13 @@ struct PackerCore::Impl {
   uint32_t rest_of(const SampledTile& tile) {
     const auto [at, is_new] = rests.try_emplace(tile.viewer);
     Rest& rest = at->second;
-    if (!is_new && rest.pose == tile.camera.pose) return rest.number;
+    if (!is_new && rest.pose == tile.camera.pose) {
+      rest.request = std::max(rest.request, tile.request);
+      return rest.number;
+    }
     end_rest(rest);
     newest_rest = newest_rest % kMostRestNumber + 1;
-    rest = {newest_rest, tile.camera.pose, {}};
+    rest = {newest_rest, tile.camera.pose, tile.request, {}};
     if (rests.size() <= kMaxRests) return newest_rest;
     // Viewers leave without a word.
     const auto oldest = std::min_element(rests.begin(), rests.end(), [&](const auto& a, const auto& b) {
@@ -200,9 +206,14 @@ struct PackerCore::Impl {
     return newest_rest;
   }
 
+  // Its head rests elsewhere by now.
+  bool comes_too_late(const SampledTile& tile) const {
+    const auto at = rests.find(tile.viewer);
+    return at != rests.end() && tile.request < at->second.request && !(at->second.pose == tile.camera.pose);
+  }
+
   void end_rest(const Rest& rest) {
-    const auto tag = static_cast<uint32_t>(points::tagged({}, 1, rest.number).value);
-    for (const points::ClusterKey key : rest.clusters) superseded.push_back({key, tag});
+    for (const points::ClusterKey key : rest.clusters) superseded.push_back({key, rest_tag(rest.number)});
   }
 
   // The view from elsewhere is complete.
@@ -278,14 +289,15 @@ struct PackerCore::Impl {
 
   Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish,
              const std::optional<KnownReference>& known) {
+    if (tile.missed.width() > 0 && comes_too_late(tile)) {
+      tile.image = image::DepthImage(tile.rect.width, tile.rect.height);
+      tile.missed = {};
+    }
     splat::Elimination elimination = eliminate(tile, known);
-    const bool is_fine = tile.missed.width() > 0;
-    const uint32_t rest = is_fine ? rest_of(tile) : 0;
+    const uint32_t rest = tile.missed.width() > 0 ? rest_of(tile) : 0;
     if (!keeps() && elimination.kept > 0 && tile.step == 1)
-      elimination.kept -= drop_known_points(
-          model, kNearestKnown,
-          points::group_of(static_cast<uint32_t>(points::tagged(tile.frame, tile.step, rest).value)), tile);
-    const FrameBook::Frame frame = frames.add(tile, elimination, is_fine);
+      elimination.kept -= drop_known_points(model, kNearestKnown, rest != 0 ? rest_tag(rest) : 0, tile);
+    const FrameBook::Frame frame = frames.add(tile, elimination, rest != 0);
     if (!tile.extra && tile.step == 1 && frame.tiles_left == 0) move_on(tile);
     if (frame.nothing_new) {
       Event event = untold(tile, elimination, frame);
@@ -293,7 +305,7 @@ struct PackerCore::Impl {
       return event;
     }
     Event event = next_event(Event::Kind::kPatch);
-    if (is_fine) event.missed = codec::encode_mask(tile.missed), event.missed_rect = tile.rect, event.rest = rest;
+    if (rest != 0) event.missed = codec::encode_mask(tile.missed), event.missed_rect = tile.rect, event.rest = rest;
     if (!keeps()) crop_to_kept(tile);
     static_cast<FramePart&>(event) = tile;
     event.frame_complete = frame.tiles_left == 0;

@@ -247,6 +247,14 @@ TEST(EliminateMode, WhatARestingHeadWasShownGoesWhenItHasMovedOn) {
   for (const Event& e : submit_all(core, fine(30, camera(0.02)), 2)) EXPECT_EQ(e.rest, 2u);
   for (const Event& e : submit_all(core, fine(31, camera(0.04)), 2)) EXPECT_EQ(e.rest, 3u);
   EXPECT_EQ(core.forget_superseded().size(), 1u);
+  // Tiles of the old one that come only now do not end the new one.
+  const uint64_t before = core.model().points();
+  auto tiles = fine(32, camera(0.02));
+  for (auto& t : tiles) t.request = {1030};
+  submit_all(core, std::move(tiles), 2);
+  EXPECT_EQ(core.model().points(), before);
+  for (const Event& e : submit_all(core, fine(33, camera(0.04)), 2)) EXPECT_EQ(e.rest, 3u);
+  EXPECT_TRUE(core.forget_superseded().empty());
 }
 
 TEST(KeepMode, ACompleteFrameSupersedesItsCoarsePass) {
