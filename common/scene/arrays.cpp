@@ -22,7 +22,7 @@ constexpr size_t kMostSpanText = 52;  // bytes: two numbers of all digits
 std::string names_of(std::span<const ArrayInfo> arrays) {
   std::string out;
   for (size_t i = 0; i < std::min(arrays.size(), kNamesTold); ++i)
-    out += fmt::format("{}{}", i ? ", " : "", arrays[i].name);
+    out += fmt::format("{}{}{}", i ? ", " : "", arrays[i].name, arrays[i].components > 1 ? " (.x, .y ...)" : "");
   if (arrays.size() > kNamesTold) out += fmt::format(" and {} more", arrays.size() - kNamesTold);
   return out;
 }

@@ -135,7 +135,7 @@ TEST_F(ColouredRun, ColoursChangeWhileItRuns) {
   EXPECT_TRUE(shows_epoch(run, 6));
 
   EXPECT_EQ(ctl(run, {"colour", "pressure"}, &out, &err), 2);
-  EXPECT_NE(err.find("temperature, wind, part"), std::string::npos) << err;
+  EXPECT_NE(err.find("temperature, wind (.x, .y ...), part"), std::string::npos) << err;
   for (const std::vector<std::string>& wrong : {std::vector<std::string>{"colour"},
                                                 {"colour", "temperature:9:1"},
                                                 {"colour", "map", "nonesuch"},
@@ -168,7 +168,7 @@ TEST_F(ColouredRun, WhatIsWrongEndsWithCode2) {
     std::vector<std::string> words;
     std::string says;
   };
-  for (const Wrong& wrong : {Wrong{{mesh(), "--colour-by", "pressure"}, "temperature, wind, part"},
+  for (const Wrong& wrong : {Wrong{{mesh(), "--colour-by", "pressure"}, "temperature, wind (.x, .y ...), part"},
                              Wrong{{mesh(), "--colour-by", "temperature:5:1"}, "--colour-by"},
                              Wrong{{mesh(), "--colour-by", "temperature", "--colour-map", "nonesuch"}, "--colour-map"},
                              Wrong{{folder_ / "t.off", "--colour-by", "temperature"}, "has no arrays"},

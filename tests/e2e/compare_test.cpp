@@ -84,6 +84,9 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
   const std::string out = run.out() + "/compare";
   {
+    Program other("telesplat", {"compare", run.out(), "--iso", "40", "--no-cache"}, run.folder() / "other");
+    EXPECT_EQ(other.wait(60), 2);
+    EXPECT_NE(other.err().find("--iso: " + run.out() + " is a run folder"), std::string::npos) << other.err();
     Program compare("telesplat", {"compare", run.out(), "--poses", "2", "--repeat", "2"}, run.folder() / "compare");
     ASSERT_EQ(compare.wait(120), 0) << compare.err();
     EXPECT_NE(compare.out().find("ellipse"), std::string::npos) << compare.out();

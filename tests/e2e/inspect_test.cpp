@@ -72,6 +72,9 @@ TEST_F(Inspect, ARasterThatRunTakesIsNoPicture) {
     EXPECT_TRUE(tells(part)) << part << " is not in\n" << out_;
   ASSERT_EQ(inspect({folder_ / "photo.png"}), 0) << err_;
   EXPECT_TRUE(tells("photo.png: a picture") && tells("8-bit grey: a picture, not elevation")) << out_;
+  std::ofstream(folder_ / "my.toml") << "scene = \"dem.png\"\n";
+  EXPECT_EQ(inspect({folder_ / "my.toml"}), 2);
+  EXPECT_NE(err_.find("my.toml: is a scene file, not data: telesplat run"), std::string::npos) << err_;
   ASSERT_EQ(inspect({folder_ / "dem.png", "--no-cache", "--json", "--z-scale", "2", "--up", "-y"}), 0) << err_;
   const auto json = nlohmann::json::parse(out_, nullptr, false);
   ASSERT_TRUE(json.is_object()) << out_;

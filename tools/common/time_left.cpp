@@ -19,7 +19,7 @@ std::string TimeLeft::text(const std::string& stage, double fraction, double now
   const auto [begin, is_new] = begins_.try_emplace(stage, Begin{now_s, fraction, fraction});
   if (fraction < begin->second.last) begin->second = {now_s, fraction, fraction};  // it began again
   begin->second.last = fraction;
-  std::string out = fmt::format("{} {:.0f} %", stage, std::floor(100 * fraction));
+  std::string out = fraction > 0 ? fmt::format("{} {:.0f} %", stage, std::floor(100 * fraction)) : stage;
   const double seen_s = now_s - begin->second.at_s, seen = fraction - begin->second.fraction;
   if (seen_s < kLeastSeen_s || seen < kLeastSeen) return out;
   const double left_s = seen_s * (1 - fraction) / seen;

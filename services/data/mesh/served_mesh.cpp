@@ -66,7 +66,13 @@ class ServedMesh final : public Served {
                info.from_cache ? " (from the chunk store)" : "") +
            (as_begun_ ? ", coloured by " + as_begun_->array : "");
   }
-  std::vector<std::string> notes() const override { return store_->info().notes; }
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> out = store_->info().notes;
+    if (!as_begun_ && map_.name != "viridis")
+      out.push_back("--colour-map " + map_.name +
+                    " shows nothing until an array is chosen: --colour-by, or ctl colour");
+    return out;
+  }
   void describe(wire::Hello& hello) const override {
     const MeshStoreInfo& info = store_->info();
     hello.facts.insert({{"format", info.format},

@@ -130,7 +130,7 @@ TEST(VtpArrays, OfPointsAndCellsAndComponents) {
   EXPECT_EQ(cells.scalars, (std::vector<float>{5, 6}));
   const auto unknown = read_mesh(path, nullptr, {}, "pressure");
   ASSERT_FALSE(unknown.ok());
-  EXPECT_NE(unknown.error().text.find("there is no array \"pressure\"; there are: t, v, c, t (cell)"),
+  EXPECT_NE(unknown.error().text.find("there is no array \"pressure\"; there are: t, v (.x, .y ...), c, t (cell)"),
             std::string::npos)
       << unknown.error().text;
 }

@@ -141,8 +141,9 @@ TEST(ViewerResults, AreOfTheNamedViewersThoughTheyLeft) {
     {"role": "viewer", "name": "viewer-1-a-5", "alive": false, "rates": {"frames": 58.71}, "values": {"frames": 285,
      "updates": 34, "points": 90000, "bytes_received": 1234567}}]})");
   EXPECT_EQ(viewer_results(status, {"viewer-1-a-5", "viewer-2-a-6"}),
-            std::vector<std::string>{"viewer-1-a-5: 285 frames, 58.7 fps, 34 view updates, 0.09 M points at the end, "
-                                     "1.2 MB received"});
+            std::vector<std::string>{
+                "viewer-1-a-5: 285 frames, 58.7 fps at the end, 34 view updates, 0.09 M points at the end, "
+                "1.2 MB received"});
   EXPECT_TRUE(viewer_results(nlohmann::json::object(), {"viewer-1"}).empty());
 }
 

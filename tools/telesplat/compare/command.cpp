@@ -218,13 +218,26 @@ class Comparison {
   std::vector<PoseStrip> strips_;
 };
 
-int compare(CompareOptions o, const options::Given&) {
+// What is drawn of a run is what it has recorded.
+Status refuse_data_flags(const CompareOptions& o, const options::Given& given) {
+  std::error_code error;
+  if (!fs::is_directory(o.path, error)) return ok_status();
+  data::DataOptions any;
+  const options::Table flags = data::scene_table(any);
+  for (const std::string& flag : given)
+    if (options::find(flags, flag) && flag != "--cache" && flag != "--no-cache")
+      return Error{fmt::format("{}: {} is a run folder, whose data are drawn as they were recorded", flag, o.path)};
+  return ok_status();
+}
+
+int compare(CompareOptions o, const options::Given& given) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
   if (const Status s = image::validate_samples(o.samples); !s) return tools::complain({"--samples: " + s.error().text});
   const auto finish = splat::finish_named(o.finish);
   if (!finish)
     return tools::complain({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
+  if (const Status s = refuse_data_flags(o, given); !s) return tools::complain(s.error());
   auto subject = find_subject(o);
   if (!subject) return tools::complain(subject.error());
   const auto renderers = choose_renderers(o);

@@ -69,7 +69,7 @@ std::vector<std::string> viewer_results(const nlohmann::json& status, const std:
     if (std::find(names.begin(), names.end(), name) == names.end() || !p.contains("values")) continue;
     const auto values = p["values"], rates = p.value("rates", empty);
     std::string line = fmt::format("{}: {:.0f} frames", name, values.value("frames", 0.0));
-    if (rates.contains("frames")) line += fmt::format(", {:.1f} fps", rates.value("frames", 0.0));
+    if (rates.contains("frames")) line += fmt::format(", {:.1f} fps at the end", rates.value("frames", 0.0));
     line += fmt::format(", {:.0f} view updates", values.value("updates", 0.0));
     if (const double points = values.value("points", 0.0); points > 0)
       line += fmt::format(", {:.2f} M points at the end", points / 1e6);

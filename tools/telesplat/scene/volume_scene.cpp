@@ -123,8 +123,9 @@ Result<std::unique_ptr<DirectScene>> VolumeScene::open_direct(int threads, const
 }
 
 std::string VolumeScene::summary(uint64_t primitives) const {
-  constexpr size_t kShort = 40;  // a transfer function of many points is long
-  std::string transfer = options_.volume.transfer.empty() ? "that fits" : options_.volume.transfer;
+  constexpr size_t kShort = 60;  // a transfer function of many points is long
+  std::string transfer = options_.volume.transfer.empty() ? "of the preset that fits (telesplat inspect names it)"
+                                                          : options_.volume.transfer;
   if (transfer.size() > kShort) transfer = transfer.substr(0, kShort) + "...";
   std::set<int> steps;
   for (const auto& [id, epoch] : epochs_.by_id) steps.insert(epoch.step);
