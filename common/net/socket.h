@@ -134,7 +134,7 @@ class Socket {
   /// Of a socket that binds: connections that were hung up on because there were SocketOptions::most_connections, or
   /// more bytes of one than SocketOptions::most_unread_bytes, or because a subscriber wanted anything but all.
   uint64_t connections_refused() const;
-  /// Of a ROUTER: bytes of bodies that wait to be sent to this peer.
+  /// Bytes of bodies that a ROUTER has yet to send to this peer.
   uint64_t queued_bytes(std::string_view peer) const;
   /// Messages dropped and subscribers hung up on because of SocketOptions::most_queued_bytes.
   uint64_t queue_refused() const;

@@ -258,8 +258,8 @@ class FinerPoints {
   uint32_t enough_;
 };
 
-// Whether a mosaic is merged with another one: those of one group and class. Samples an octave coarser, among finer
-// ones of which there are few yet, would be drawn by the mean as splats with gaps between them.
+// Whether a mosaic is merged with another one: those of one group and class. The mean of a class is the size of its
+// splats, so samples an octave coarser would have gaps between them.
 bool may_merge(const Mosaic& m, const Mosaic& fresh) {
   return m.group() == fresh.group() && density_class(m.pixel_range()) == density_class(fresh.pixel_range());
 }

@@ -27,7 +27,7 @@ namespace telesplat::points {
 inline constexpr int kLevels = 3;           ///< level 0 = every sample, 1 = one of 2x2 pixels, 2 = one of 4x4
 inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 
-/// A frame tag has so many bits: tagged().
+/// The 24 bits of a frame tag, which tagged() makes.
 inline constexpr uint32_t kFrameTagMask = (1u << 24) - 1;
 /// The bit of a frame tag that coarse passes have.
 inline constexpr uint32_t kProvisionalTag = 1u << 23;

@@ -1,5 +1,5 @@
 // Any bytes through the depth-image decoder: an error, or a canonical image that survives another round trip, and one
-// within the same bounds, whose refinement makes it exact. On every instruction set, all of which must agree.
+// within the same bounds, whose refinement makes it exact. Every instruction set decodes it, and all must agree.
 #include <cstdlib>
 #include <optional>
 #include <span>

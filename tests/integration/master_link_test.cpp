@@ -63,7 +63,7 @@ struct FakeMaster {
   std::string endpoint, peer;
   bool known = false;
   int hellos = 0, clock_requests = 0;
-  int refused = 0;  // so many instances are another's
+  int refused = 0;  // the first instances that are refused: another key has them
   std::vector<InstanceId> instances;
   std::string clock = "another";
   std::map<std::string, std::string> facts;

@@ -128,7 +128,7 @@ TEST(Connections, TheFirstMessageOfAReusedDescriptorIsOfTheOneThatIsThere) {
     zmq::pollitem_t item{router.handle(), 0, ZMQ_POLLIN, 0};
     return zmq::poll(&item, 1, std::chrono::milliseconds(int(kDeadline_s * 1e3))) == 1;
   };
-  // Of which connection the next message was.
+  // Tells which connection the next message came from.
   const auto receive = [&] {
     zmq::message_t peer, body;
     if (!wait_message() || !router.recv(peer) || !router.recv(body)) return -1;

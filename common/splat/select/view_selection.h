@@ -85,7 +85,7 @@ struct DrawList {
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
                  DrawList& out, const points::Summaries* summaries = nullptr);
 
-/// Hash of which points a list has and how large their splats are: lists of one replica that show the same are alike.
+/// Hashes which points a list has and how large their splats are. Two lists of one replica with one hash show the same.
 uint64_t names_of(const DrawList& list);
 
 /// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use
