@@ -70,6 +70,7 @@ TEST(HitPacket, SimdEqualsScalarOnEveryTarget) {
         ASSERT_LT(normal[k], 65536u);
         const glm::vec3 n = image::decode_normal16(static_cast<uint16_t>(normal[k]));
         EXPECT_GT(glm::dot(n, expected.normal), std::cos(0.018f)) << "triangle " << first + k;  // one degree
+        EXPECT_LT(glm::dot(n, glm::normalize(d[k])), 0.018f) << "faces away";
       }
     }
   });

@@ -14,7 +14,6 @@
 #include "common/codec/room_axes.h"
 #include "common/geometry/ray_axes.h"
 #include "common/refinement/bounded_patches.h"
-#include "services/packer/points/elimination/known_points.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/frame_book.h"
 #include "services/packer/points/obsolescence.h"
@@ -23,9 +22,6 @@
 namespace telesplat::packer {
 namespace {
 
-// Pixels: Config::nearest_sample for what a view cannot show. With 0.6 the bones have a fifth fewer points, and a tenth
-// more holes, since a point beside an edge may be needed though another one is near.
-constexpr float kNearestKnown = 0.4f;
 constexpr uint32_t kMostRestNumber = points::kRestTag - 1;
 // Viewers whose rests are kept: those of one person and a few guests.
 constexpr size_t kMaxRests = 16;
@@ -293,10 +289,8 @@ struct PackerCore::Impl {
       tile.image = image::DepthImage(tile.rect.width, tile.rect.height);
       tile.missed = {};
     }
-    splat::Elimination elimination = eliminate(tile, known);
+    const splat::Elimination elimination = eliminate(tile, known);
     const uint32_t rest = tile.missed.width() > 0 ? rest_of(tile) : 0;
-    if (!keeps() && elimination.kept > 0 && tile.step == 1)
-      elimination.kept -= drop_known_points(model, kNearestKnown, rest != 0 ? rest_tag(rest) : 0, tile);
     const FrameBook::Frame frame = frames.add(tile, elimination, rest != 0);
     if (!tile.extra && tile.step == 1 && frame.tiles_left == 0) move_on(tile);
     if (frame.nothing_new) {

@@ -100,6 +100,9 @@ void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* H
                hn::Load(f, hits.direction[2] + lane)};
     const VF sign = hn::And(hn::Xor(hn::Xor(dot(n, g), dot(d, g)), hn::Set(f, -0.0f)), hn::Set(f, -0.0f));
     n = {hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
+    const VF away =
+        hn::Div(hn::Mul(hn::Max(dot(n, d), hn::Zero(f)), hn::Set(f, kTurn)), hn::Max(dot(d, d), hn::Set(f, 1e-30f)));
+    n = {hn::NegMulAdd(away, d.x, n.x), hn::NegMulAdd(away, d.y, n.y), hn::NegMulAdd(away, d.z, n.z)};
     hn::Store(encode16(n), un, normal + lane);
 
     // Colour: looked up for a scalar, or per channel, rounded.
@@ -153,6 +156,7 @@ SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triang
   out.colour = chunk.scalars ? rgb(colours.at(scalar)) : glm::clamp(out.colour, 0.0f, 255.0f);
   if (glm::dot(out.normal, out.normal) < 1e-6f) out.normal = g;
   if (glm::dot(out.normal, g) * glm::dot(direction, g) > 0) out.normal = -out.normal;
+  out.normal -= kTurn * std::max(glm::dot(out.normal, direction), 0.0f) / glm::dot(direction, direction) * direction;
   out.normal = glm::normalize(out.normal);
   return out;
 }

@@ -3,6 +3,8 @@
 //   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel; of scalars: the colour of the one interpolated
 //   n is negated where it points away from the side of the triangle that the ray sees: sign(n . g) == sign(d . g)
 // with g either normal of the triangle's plane and d the ray's direction, whatever the winding.
+//   n is turned across the ray where it faces away all the same, as over an edge or a coarse mesh, because viewers leave
+//   out points that face away: n - kTurn (n . d) d / (d . d)
 #pragma once
 
 #include <cstdint>
@@ -14,6 +16,8 @@
 namespace telesplat::sampler {
 
 inline constexpr int kPacket = 8;
+/// Above 1, so that a normal along the ray turns round. raster_shaders.h has it, too.
+inline constexpr float kTurn = 1.02f;
 
 /// What is known of up to eight hits. Lanes without a hit may hold anything finite.
 struct HitPacket {

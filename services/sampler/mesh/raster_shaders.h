@@ -92,7 +92,8 @@ void main() {
            weight.y * decode_normal32(words[16u + 3u * vertices + corner.y]) +
            weight.z * decode_normal32(words[16u + 3u * vertices + corner.z]);
   if (dot(n, n) < 1e-6) n = g;
-  normal = encode_normal16(dot(n, g) * sign(total) > 0 ? -n : n);  // towards the side that is seen
+  if (dot(n, g) * sign(total) > 0) n = -n;  // towards the side that is seen
+  normal = encode_normal16(n - 1.02 * max(dot(n, d), 0) / dot(d, d) * d);  // hit_packet.h: kTurn
   if (scalars) {
     colour = scalar_colour(corner, weight);
     return;
