@@ -2,7 +2,6 @@
 
 #include <hwy/aligned_allocator.h>
 #include <hwy/cache_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -13,7 +12,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
-#include "common/parallel/in_parallel.h"
+#include "common/parallel/crew.h"
 #include "common/splat/item_figures.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/tile_work.h"
@@ -22,6 +21,7 @@ namespace telesplat::splat {
 namespace {
 
 constexpr int kMargin = kMaxSplatSide;
+constexpr size_t kRunsAtOnce = 512;
 constexpr size_t kBoxesAhead = 8;
 
 // Keys of a tile of full size, its reach, and the margin that splats hang over into.
@@ -87,8 +87,7 @@ struct Sight {
 
 struct CpuSplatter::Impl {
   explicit Impl(int threads)
-      : arena(threads > 0 ? threads : tbb::task_arena::automatic),
-        workspaces(static_cast<size_t>(arena.max_concurrency())) {}
+      : crew(threads), workspaces(static_cast<size_t>(crew.threads())) {}
 
   void prepare(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                const image::Shading& shading);
@@ -101,7 +100,7 @@ struct CpuSplatter::Impl {
   SplatStats render(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                     const image::Shading& shading, std::span<const FrameTarget> targets);
 
-  tbb::task_arena arena;
+  Crew crew;
   std::vector<Workspace> workspaces;
 
   // The frame.
@@ -168,15 +167,15 @@ void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera
   sight.binning.begin(grid, runs.runs.size(), sight.resolve.near_m, static_cast<float>(layout.reach) + sight.overhang);
   const auto room_to_pixel = camera.room_to_pixel();
   const glm::vec3 eye(camera.pose.position_room);
-  arena.execute([&] {
-    in_parallel(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
-      for (size_t i = r.begin(); i < r.end(); ++i) {
-        // Clusters lie scattered in memory.
-        if (i + kBoxesAhead < r.end()) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
-        runs.transform(i, list.items, room_to_pixel, eye);
-        sight.binning.place(i, runs.transforms[i], reach_of(list, runs.runs[i], sight), static_cast<float>(kMargin));
-      }
-    });
+  const size_t count = runs.runs.size();
+  crew.run((count + kRunsAtOnce - 1) / kRunsAtOnce, [&](size_t part, int) {
+    const size_t last = std::min((part + 1) * kRunsAtOnce, count);
+    for (size_t i = part * kRunsAtOnce; i < last; ++i) {
+      // Clusters lie scattered in memory.
+      if (i + kBoxesAhead < last) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
+      runs.transform(i, list.items, room_to_pixel, eye);
+      sight.binning.place(i, runs.transforms[i], reach_of(list, runs.runs[i], sight), static_cast<float>(kMargin));
+    }
   });
   sight.binning.list();
 }
@@ -288,18 +287,11 @@ SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geome
     }
     w.stats = {};
   }
-  const int count = grid.count();
-  arena.execute([&] {
-    in_parallel(
-        tbb::blocked_range<int>(0, count * static_cast<int>(cameras.size()), 1),
-        [&](const tbb::blocked_range<int>& tiles) {
-          Workspace& workspace = workspaces[static_cast<size_t>(thread_in_loop())];
-          for (int i = tiles.begin(); i < tiles.end(); ++i) {
-            const auto view = static_cast<size_t>(i / count);
-            draw_tile(i % count, list, sights[view], targets[view], workspace);
-          }
-        },
-        tbb::simple_partitioner());
+  const auto count = static_cast<size_t>(grid.count());
+  crew.run(count * cameras.size(), [&](size_t tile, int thread) {
+    const size_t view = tile / count;
+    draw_tile(static_cast<int>(tile % count), list, sights[view], targets[view],
+              workspaces[static_cast<size_t>(thread)]);
   });
   SplatStats sum;
   sum.prepare_ms = prepare_ms;
