@@ -120,7 +120,7 @@ Table drawing_table(ViewerOptions& o) {
   return {
       {.flag = "--detail-budget",
        .value = &d.detail_budget,
-       .help = "on: lower detail where a view takes longer to construct than --target-fps leaves time for",
+       .help = "on: lower detail, then draw at half the size, where frames take longer than --target-fps allows",
        .fits = kPoints,
        .on_off = true},
       {.flag = "--least-detail",

@@ -87,6 +87,15 @@ Camera crop(const Camera& c, const Rect& r) {
   return out;
 }
 
+Camera half_size(const Camera& c) {
+  Camera out = c;
+  out.width = (c.width + 1) / 2;
+  out.height = (c.height + 1) / 2;
+  out.right = c.left + 2.0 * out.width / c.width * (c.right - c.left);
+  out.bottom = c.top - 2.0 * out.height / c.height * (c.top - c.bottom);
+  return out;
+}
+
 Camera subsample(const Camera& c, int step) {
   Camera out = c;
   const double du = (c.right - c.left) / c.width, dv = (c.top - c.bottom) / c.height;

@@ -93,4 +93,8 @@ Camera crop(const Camera& camera, const Rect& rect);
 /// >= 1.
 Camera subsample(const Camera& camera, int step);
 
+/// The camera whose pixel (i, j) covers the pixels (2 i, 2 j) to (2 i + 1, 2 j + 1) of `camera`: half its size, rounded
+/// up, so the last ones may lie partly outside camera's image.
+Camera half_size(const Camera& camera);
+
 }  // namespace telesplat::geometry

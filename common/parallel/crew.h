@@ -23,7 +23,7 @@ class Crew {
 
   int threads() const { return static_cast<int>(helpers_.size()) + 1; }
 
-  /// turn(n, thread) for each n below `count`, in about this order; thread: which of threads() runs it, the caller is 0.
+  /// turn(n, thread) for each n below `count`, in about this order; thread: which of threads() runs it, 0 the caller.
   /// Returns when all are done. Precondition: one call at a time; turns throw nothing and do not call run().
   void run(size_t count, const std::function<void(size_t, int)>& turn);
 

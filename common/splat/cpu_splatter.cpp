@@ -13,6 +13,7 @@
 #include "common/core/check.h"
 #include "common/core/clock.h"
 #include "common/parallel/crew.h"
+#include "common/splat/doubling.h"
 #include "common/splat/item_figures.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/tile_work.h"
@@ -22,6 +23,7 @@ namespace {
 
 constexpr int kMargin = kMaxSplatSide;
 constexpr size_t kRunsAtOnce = 512;
+constexpr int kRowsAtOnce = 32;  // that are doubled
 constexpr size_t kBoxesAhead = 8;
 
 // Keys of a tile of full size, its reach, and the margin that splats hang over into.
@@ -86,8 +88,7 @@ struct Sight {
 }  // namespace
 
 struct CpuSplatter::Impl {
-  explicit Impl(int threads)
-      : crew(threads), workspaces(static_cast<size_t>(crew.threads())) {}
+  explicit Impl(int threads) : crew(threads), workspaces(static_cast<size_t>(crew.threads())) {}
 
   void prepare(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                const image::Shading& shading);
@@ -99,6 +100,8 @@ struct CpuSplatter::Impl {
   void finish_tile(const ResolvedTile& tile, Workspace& workspace);
   SplatStats render(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                     const image::Shading& shading, std::span<const FrameTarget> targets);
+  SplatStats render_halved(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
+                           const image::Shading& shading, const FrameTarget& target);
 
   Crew crew;
   std::vector<Workspace> workspaces;
@@ -111,6 +114,8 @@ struct CpuSplatter::Impl {
   TileGrid grid;
   std::array<Sight, 2> sights;
   std::vector<uint8_t> intensity = std::vector<uint8_t>(65536 + 3);
+  std::vector<uint32_t> half_colour;  // of a halved frame, before it is doubled
+  std::vector<float> half_depth_m;
 };
 
 void CpuSplatter::Impl::prepare(const DrawList& list, std::span<const geometry::Camera> cameras,
@@ -307,8 +312,26 @@ SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geome
   return sum;
 }
 
+SplatStats CpuSplatter::Impl::render_halved(const DrawList& list, const geometry::Camera& camera,
+                                            const RenderOptions& options, const image::Shading& shading,
+                                            const FrameTarget& target) {
+  const geometry::Camera small = geometry::half_size(camera);
+  half_colour.resize(static_cast<size_t>(small.width) * static_cast<size_t>(small.height));
+  if (target.depth_m) half_depth_m.resize(half_colour.size());
+  const FrameTarget half{small.width, small.height, half_colour.data(), target.depth_m ? half_depth_m.data() : nullptr};
+  SplatStats stats = render(list, {&small, 1}, options, shading, {&half, 1});
+  const double start = monotonic_s();
+  crew.run(static_cast<size_t>((target.height + kRowsAtOnce - 1) / kRowsAtOnce), [&](size_t part, int) {
+    const int first = static_cast<int>(part) * kRowsAtOnce;
+    double_rows(half, target, first, std::min(first + kRowsAtOnce, target.height));
+  });
+  stats.resolve_ms += (monotonic_s() - start) * 1e3 * crew.threads();
+  return stats;
+}
+
 SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                const image::Shading& shading, const FrameTarget& target) {
+  if (options.halved) return impl_->render_halved(list, camera, options, shading, target);
   return impl_->render(list, {&camera, 1}, options, shading, {&target, 1});
 }
 

@@ -35,6 +35,7 @@ class CpuSplatter {
 
   /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish
   /// has on (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
+  /// options.halved: colours between the pixels drawn are interpolated (doubling.h); depths are the nearest pixel's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
   /// Two views of one list, as fast as can be: what they have in common is prepared once, and threads draw both at a

@@ -28,6 +28,9 @@ std::optional<Finish> finish_of_bits(uint64_t bits);
 struct RenderOptions {
   Kernel kernel = Kernel::kDisc;
   Finish finish;
+  /// CpuSplatter::render draws half as many pixels a side and doubles them. What is drawn is to be selected for
+  /// geometry::half_size(camera).
+  bool halved = false;
 };
 
 }  // namespace telesplat::splat

@@ -18,7 +18,7 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/normal.h"
 #include "common/splat/cpu_splatter.h"
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 #include "common/splat/select/view_selection.h"
 
 namespace telesplat {

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "common/image/file.h"
+#include "common/splat/doubling.h"
 #include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/movie/movie_target.h"
@@ -54,6 +55,41 @@ TEST(Movie, OfAMeshShowsWhatWasDisplayedToTheLastBit) {
   EXPECT_GT(expect_as_displayed(run, 25), 20u);
   const auto made = run.column("frames.csv", "summaries");
   EXPECT_GT(made.back(), 0) << "nothing was drawn from summaries: the test shows less than it should";
+}
+
+// Sets the last column of all rows of frames.csv, which is `halved`.
+void set_halved(const PipelineRun& run, char value) {
+  const std::string path = run.out() + "/frames.csv";
+  std::ifstream in(path);
+  std::string line, all;
+  std::getline(in, line);
+  ASSERT_TRUE(line.ends_with(",halved")) << line;
+  for (all = line + "\n"; std::getline(in, line); all += line + "\n") line.back() = value;
+  std::ofstream(path) << all;
+}
+
+// Which frames are drawn at half their size depends on the machine; so the record is made to say it.
+TEST(Movie, OfFramesOfHalfTheirSizeShowsThemDoubled) {
+  PipelineRun run({"--duration", "1", "--size", "160x120", "--still-samples", "1"});
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const std::string whole = run.folder() / "whole", half = run.folder() / "half";
+  set_halved(run, '1');
+  ASSERT_EQ(movie(run, whole + "/", {"--fps", "5"}).code, 0);
+  set_halved(run, '0');
+  ASSERT_EQ(movie(run, half + "/", {"--fps", "5", "--size", "80x60"}).code, 0);
+  int compared = 0;
+  for (; fs::exists(fmt::format("{}/{:06}.png", half, compared)); ++compared) {
+    auto small = image::read_view(fmt::format("{}/{:06}.png", half, compared));
+    const auto large = image::read_view(fmt::format("{}/{:06}.png", whole, compared));
+    ASSERT_TRUE(small.ok() && large.ok());
+    std::vector<uint32_t> doubled(160 * 120);
+    splat::double_rows({80, 60, small->colour.data(), nullptr}, {160, 120, doubled.data(), nullptr}, 0, 120);
+    ASSERT_EQ(large->colour.size(), doubled.size());
+    size_t different = 0;
+    for (size_t i = 0; i < doubled.size(); ++i) different += ((large->colour[i] ^ doubled[i]) & 0xffffff) != 0;
+    EXPECT_EQ(different, 0u) << "frame " << compared;
+  }
+  EXPECT_GE(compared, 5);
 }
 
 TEST(Movie, OfAMeshDrawnByOpenGlShowsWhatWasDisplayedToTheLastBit) {

@@ -5,7 +5,7 @@
 
 #include "common/geometry/trajectory.h"
 #include "common/splat/facing.h"
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 #include "common/splat/select/view_selection.h"
 #include "common/splat/splat_kernels.h"
 #include "tests/support/splat_scene.h"

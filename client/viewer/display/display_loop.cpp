@@ -27,6 +27,11 @@ void sleep_until(double t_s) {
   if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
 }
 
+// Samples that are finer than what is drawn would come late and show nothing.
+geometry::Camera drawn_size(const geometry::Camera& camera, const DrawnFrame& drawn) {
+  return drawn.halved ? geometry::half_size(camera) : camera;
+}
+
 LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
                          const ViewerWorker& worker) {
   const auto network = worker.figures();
@@ -334,7 +339,7 @@ class Display {
     m.end_s = monotonic_s();
     if (m.drawn.picture_of) m.posed = {m.drawn.update.posed_s - worker_.to_master_s(0)};
     if (eyes_.on()) m.stereo = {stereo_.mode, eyes_.pair()};
-    worker_.on_frame(m.end_s, sampled, m.drawn.epoch, m.drawn.update, waited.for_update);
+    worker_.on_frame(m.end_s, drawn_size(sampled, m.drawn), m.drawn.epoch, m.drawn.update, waited.for_update);
     // A flat legend would lie in one eye's picture, or be torn by the other's.
     const auto legend = eyes_.on() ? nullptr : worker_.legend_at(m.drawn.epoch);
     surface_.on_legend(legend);

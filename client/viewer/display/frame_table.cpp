@@ -87,6 +87,7 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"predicted_ms", [](F f) { return f.posed.ahead_s * 1e3; }},
     {"refresh_ms", [](F f) { return f.refresh_s * 1e3; }},
     {"still", [](F f) { return f.drawn.still ? 1.0 : 0.0; }},
+    {"halved", [](F f) { return f.drawn.halved ? 1.0 : 0.0; }},
 };
 
 }  // namespace

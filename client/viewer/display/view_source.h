@@ -34,6 +34,7 @@ struct DrawnFrame {
   uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
   uint64_t summaries = 0;  ///< of bricks, that had been made by then
   double detail = 1, budget_ms = 0;
+  bool halved = false;  ///< drawn at half its size (splat::RenderOptions)
   double refined = 0, refine_ms = 0;  ///< of a still picture: share of pixels drawn with sub-pixels; time for that
   int sub_pixels = 1;                 ///< of such a pixel, on each axis
   EpochId epoch;

@@ -39,6 +39,7 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
       received_(received),
       budget_(options.detail_budget && options.target_fps > 0 ? kBudgetShare * 1e3 / options.target_fps : 0,
               options.least_detail),
+      half_size_(renderer_->halves() ? budget_.budget_ms() : 0),
       supersampler_(*renderer_, still_side(options)) {}
 
 // Splats that soften their edges let the background through; which is known from drawing the same over another one.
@@ -91,7 +92,7 @@ bool PointSource::stands_still(const FrameInput& input) {
 
 void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out) {
   options_.selection.detail = float(std::min(detail, input.look.most_detail));
-  received_.cache().select(input.camera, options_.selection, list_);
+  received_.cache().select(out.halved ? geometry::half_size(input.camera) : input.camera, options_.selection, list_);
   clip_list(*cut_.clip, list_);
   out.chosen_s = seen_s_ = monotonic_s();
   if (!input.resting) received_.on_seen(list_.clusters_seen, list_.frames_seen);
@@ -99,8 +100,10 @@ void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out
 
 void PointSource::draw_list(const FrameInput& input, const image::Shading& shading, image::View& view,
                             DrawnFrame& out) {
+  splat::RenderOptions render = input.look.render;
+  render.halved = out.halved;
   note_stats(renderer_->render(
-                 list_, input.camera, input.look.render, shading,
+                 list_, input.camera, render, shading,
                  {view.width, view.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr}),
              out);
 }
@@ -127,12 +130,14 @@ void PointSource::measure(const FrameInput& input, double detail, const DrawnFra
   const double threads_ms =
       out.project_cpu_ms + out.resolve_cpu_ms + out.fill_cpu_ms + out.smooth_cpu_ms + out.antialias_cpu_ms;
   const double work_ms = out.prepare_ms + threads_ms / std::max(options_.threads, 1);
-  budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, std::min((end_s - out.chosen_s) * 1e3, work_ms),
-                     double(list_.points), detail);
+  const double draw_ms = std::min((end_s - out.chosen_s) * 1e3, work_ms);
+  budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, draw_ms, double(list_.points), detail);
+  if (out.halved == half_size_.on()) half_size_.frame_done(draw_ms, budget_.detail() <= options_.least_detail);
 }
 
 void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out) {
   const double detail = wanted_detail(input);
+  out.halved = half_size_.on() && !input.resting && !input.with_coverage;
   select(input, input.resting ? 1.0 : detail, out);
   if (list_.points > 0 || input.even_empty) draw_list(input, image::Shading(options_.shading, input.camera), view, out);
   if (!input.resting) measure(input, detail, out);

@@ -48,6 +48,7 @@ class PointSource final : public ViewSource {
   ReceivedPoints& received_;
   image::View over_white_;
   splat::FrameBudget budget_;
+  splat::HalfSize half_size_;
   splat::SpeedDetail speed_;
   splat::DrawList list_;
   uint64_t drawn_ = 0;  // points of it

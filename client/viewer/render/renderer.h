@@ -20,6 +20,8 @@ class Renderer {
     static const std::string none;
     return none;
   }
+  /// Whether it draws halved frames faster (splat::RenderOptions::halved); else it takes no notice of it.
+  virtual bool halves() const { return false; }
   /// Draws one frame into target (host memory). Called from one thread, the one that made the renderer.
   virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                                    const splat::RenderOptions& options, const image::Shading& shading,

@@ -68,7 +68,8 @@ const Names kFrames{"frame",
                     "motion_to_photon_ms",
                     "predicted_ms",
                     "refresh_ms",
-                    "still"};
+                    "still",
+                    "halved"};
 
 const Names kUpdates{"request",        "frame",           "requested_s", "first_s",      "complete_s",  "latency_ms",
                      "start_up_ms",    "tiles",           "samples",     "points",       "bytes",       "eliminated",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 namespace telesplat::splat {
 namespace {
@@ -10,7 +11,9 @@ namespace {
 constexpr double kIdle = 0.82, kLeastShare = 0.4;
 constexpr double kSmallStep = 0.02, kLargeStep = 0.06;
 constexpr double kRise = 0.35, kFall = 0.2;  // the smoothed load takes over this share of what was measured
-constexpr double kFollow_s = 0.07;           // time constant of SpeedDetail: after 0.3 s 1.4 % of a change is left
+constexpr double kHalfFrom = 1.15, kHalfUntil = 0.7, kHalfSmooth = 0.1;  // HalfSize
+constexpr int kHalfLearns = 20, kHalfLeast = 60;                         // frames
+constexpr double kFollow_s = 0.07;  // time constant of SpeedDetail: after 0.3 s 1.4 % of a change is left
 
 double median(double a, double b, double c) { return std::max(std::min(a, b), std::min(std::max(a, b), c)); }
 
@@ -37,6 +40,19 @@ void FrameBudget::frame_done(double select_ms, double draw_ms, double points, do
     step = std::min(kSmallStep, 0.1 * 0.5 * std::log(kIdle / std::max(load_, 0.05)) + 0.001);
   }
   detail_ = std::clamp(detail_ * std::exp(step), least_, 1.0);
+}
+
+void HalfSize::frame_done(double draw_ms, bool least) {
+  if (!(budget_ms_ > 0) || !std::isfinite(draw_ms) || draw_ms < 0) return;
+  const double now = std::min(draw_ms / budget_ms_, 3.0);
+  load_ += (median(now, last_[0], last_[1]) - load_) * std::max(kHalfSmooth, 1.0 / ++frames_);
+  last_[1] = std::exchange(last_[0], now);
+  if (frames_ < kHalfLearns) return;
+  if (on_ && frames_ == kHalfLearns) saved_ = std::clamp(load_before_ / std::max(load_, 0.05), 1.2, 4.0);
+  if (on_ ? frames_ < kHalfLeast || load_ * saved_ > kHalfUntil : !least || load_ < kHalfFrom) return;
+  load_before_ = load_;
+  load_ = last_[0] = last_[1] = 0, frames_ = 0;
+  on_ = !on_;
 }
 
 double screen_movement(const geometry::Pose& from, const geometry::Pose& to, double depth_m, double focal_px) {

@@ -37,6 +37,31 @@ class FrameBudget {
   double load_ = 0;          // smoothed
 };
 
+/// Whether frames are drawn at half their size (RenderOptions::halved): where the least detail still takes longer than
+/// the budget. Splats are some pixels wide then, so that pixels cost more than they show, and the samplers of a small
+/// machine lack what they cost.
+class HalfSize {
+ public:
+  /// budget_ms <= 0: never.
+  explicit HalfSize(double budget_ms) : budget_ms_(budget_ms) {}
+
+  /// To be called after each frame that was drawn as on() said. draw_ms: time to draw it. least: FrameBudget allows no
+  /// less detail. Begins after some frames above 115 % of the budget. Ends a second later at the earliest, once frames
+  /// of full size would take less than 70 % of it, by what halving saved when it began. Figures that are not finite are
+  /// ignored.
+  void frame_done(double draw_ms, bool least);
+  bool on() const { return on_; }
+
+ private:
+  double budget_ms_;
+  bool on_ = false;
+  int frames_ = 0;           // since it changed
+  double last_[2] = {0, 0};  // times to draw over the budget, of the frames before
+  double load_ = 0;          // smoothed, since it changed
+  double load_before_ = 0;   // when it changed
+  double saved_ = 1;         // a frame of full size takes this many times as long
+};
+
 /// The thesis divides the desired pixel range by the head's velocity. We divide it by the speed of typical content on
 /// the screen, in units of kFreePixels each 60th of a second; slower movements cost nothing. Detail follows within
 /// about 0.3 s.

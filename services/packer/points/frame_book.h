@@ -6,7 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 #include "services/packer/points/frame_part.h"
 
 namespace telesplat::packer {

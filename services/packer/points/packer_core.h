@@ -10,7 +10,7 @@
 
 #include "common/core/result.h"
 #include "common/points/point_model.h"
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 #include "services/packer/points/errors/allowed_errors.h"
 #include "services/packer/points/event.h"
 #include "services/packer/points/event_log.h"

@@ -2,9 +2,9 @@
 //
 //   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel; of scalars: the colour of the one interpolated
 //   n is negated where it points away from the side of the triangle that the ray sees: sign(n . g) == sign(d . g)
+//   n is turned across the ray where it faces away all the same, as over an edge or a coarse mesh, because viewers
+//     leave out points that face away: n - kTurn (n . d) d / (d . d)
 // with g either normal of the triangle's plane and d the ray's direction, whatever the winding.
-//   n is turned across the ray where it faces away all the same, as over an edge or a coarse mesh, because viewers leave
-//   out points that face away: n - kTurn (n . d) d / (d . d)
 #pragma once
 
 #include <cstdint>

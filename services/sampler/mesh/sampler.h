@@ -40,7 +40,8 @@ class Sampler {
 
   /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
   /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped
-  /// to the side on which the camera sees the triangle, and facing the eye (hit_packet.h). Returns a canonical image of tile.width x tile.height.
+  /// to the side on which the camera sees the triangle, and turned to the eye (hit_packet.h). Returns a canonical image
+  /// of tile.width x tile.height.
   /// mask, of the tile's size: only its pixels are sampled, and are what they are without a mask (where two triangles
   /// are equally near, the other one may be seen); the others are empty. null: all.
   /// Precondition: tile lies in the camera's image.

@@ -112,5 +112,17 @@ TEST(Subsample, LooksWhereTheFullCameraDoes) {
   }
 }
 
+TEST(Camera, HalfSizeCoversTwoByTwoPixelsWithEach) {
+  for (const auto& [width, height] : {std::pair{102, 60}, {103, 61}, {1, 1}}) {
+    const Camera full = make_camera({{0.1, 0.2, 0.9}, {0.6, 0, 0.8, 0}}, 70, width, height), half = half_size(full);
+    EXPECT_EQ(half.width, (width + 1) / 2);
+    EXPECT_EQ(half.height, (height + 1) / 2);
+    for (const auto& [i, j] : {std::pair{0, 0}, {3, 2}, {half.width, half.height}}) {  // corners of pixels
+      const glm::dvec3 a = half.unproject(i, j, 0.7), b = full.unproject(2 * i, 2 * j, 0.7);
+      EXPECT_LT(glm::distance(a, b), 1e-12) << width << " " << i << " " << j;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace telesplat::geometry

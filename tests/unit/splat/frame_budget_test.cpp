@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "common/geometry/trajectory.h"
 #include "common/splat/select/frame_budget.h"
@@ -96,6 +97,68 @@ TEST(FrameBudget, NoiseIsNotSeen) {
     EXPECT_LT(run.late_swing(600), load < 1 ? 1.0001 : 1.06) << load;
     EXPECT_LT(run.late_share_above(1.15, 600), 0.03 + 1.0 / 60) << load;
   }
+}
+
+// What a machine does whose frames of full size take `load` budgets, and `saved` times less at half their size.
+std::vector<bool> halves(HalfSize& size, int frames, const std::function<double(int frame)>& load, double saved,
+                         bool least = true) {
+  std::vector<bool> out;
+  for (int i = 0; i < frames; ++i) {
+    out.push_back(size.on());
+    size.frame_done(load(i) * kBudget_ms / (size.on() ? saved : 1), least);
+  }
+  return out;
+}
+size_t changes(const std::vector<bool>& on) {
+  size_t out = 0;
+  for (size_t i = 1; i < on.size(); ++i) out += on[i] != on[i - 1];
+  return out;
+}
+
+TEST(HalfSize, BeginsWithinASecondWhereFramesTakeTooLongAndStays) {
+  for (const double load : {1.3, 2.0, 6.0})
+    for (const double saved : {1.5, 2.5, 4.0}) {
+      HalfSize size(kBudget_ms);
+      const auto on = halves(
+          size, 600, [&](int) { return load; }, saved);
+      EXPECT_EQ(changes(on), 1u) << load << " " << saved;
+      EXPECT_TRUE(on[60]) << load << " " << saved;
+    }
+}
+
+TEST(HalfSize, EndsWhenFramesOfFullSizeHaveTime) {
+  for (const double saved : {1.5, 2.5, 4.0}) {
+    HalfSize size(kBudget_ms);
+    const auto on = halves(
+        size, 900, [](int i) { return i < 300 ? 1.6 : 0.5; }, saved);
+    EXPECT_EQ(changes(on), 2u) << saved;
+    EXPECT_TRUE(on[299]);
+    EXPECT_FALSE(on[400]) << saved;
+  }
+}
+
+TEST(HalfSize, IsNothingForFramesInTimeNorForSingleOnesNorWhileDetailFalls) {
+  std::mt19937 rng(7);
+  std::lognormal_distribution<double> noise(0, 0.1);
+  for (const double load : {0.5, 0.95}) {
+    HalfSize size(kBudget_ms);
+    EXPECT_EQ(changes(halves(
+                  size, 2000, [&](int i) { return load * noise(rng) * (i % 60 == 59 ? 8 : 1); }, 2)),
+              0u)
+        << load;
+  }
+  HalfSize size(kBudget_ms), without(0);
+  EXPECT_EQ(changes(halves(
+                size, 300, [](int) { return 2.0; }, 2, false)),
+            0u)
+      << "less detail may be enough";
+  EXPECT_EQ(changes(halves(
+                without, 300, [](int) { return 2.0; }, 2)),
+            0u)
+      << "frames are not paced";
+  size.frame_done(std::numeric_limits<double>::quiet_NaN(), true);
+  size.frame_done(-1, true);
+  EXPECT_FALSE(size.on());
 }
 
 TEST(FrameBudget, FollowsTheLoad) {

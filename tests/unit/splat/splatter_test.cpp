@@ -1,6 +1,8 @@
 // What single points look like: where, how large, which wins.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "common/splat/flat/splat_table.h"
@@ -309,6 +311,45 @@ TEST(SplatTable, SizesRoundAsStated) {
   EXPECT_EQ(splat::square_side(2.0f), 2);
   EXPECT_EQ(splat::disc_diameter(2.1f), 2.25f);
   EXPECT_EQ(splat::disc_diameter(0.1f), 1.0f);
+}
+
+// Bilinear between the centres of the pixels drawn, for odd sizes and parts of pictures, too.
+TEST(CpuSplatter, HalvedFramesAreInterpolated) {
+  for (const auto& [width, height] : {std::pair{600, 400}, {601, 399}}) {
+    const geometry::Camera camera = testing::front_camera(width, height), small = geometry::half_size(camera);
+    const image::Shading shading({}, camera);
+    auto made = testing::random_items(5, 60, 900);
+    std::vector<splat::DrawItem> items;
+    for (auto& m : made) items.push_back(m.item(1.5f));
+    const splat::DrawList list = testing::draw_list(std::move(items));
+    splat::CpuSplatter splatter(2);
+    Frame drawn(small.width, small.height);
+    splatter.render(list, small, {Kernel::kDisc, {}}, shading, drawn.target());
+    const size_t pitch = size_t(width) + 9;
+    std::vector<uint32_t> colour(pitch * size_t(height), 7);
+    std::vector<float> depth_m(colour.size(), 7);
+    splatter.render(list, camera, {Kernel::kDisc, {}, true}, shading,
+                    {width, height, colour.data(), depth_m.data(), pitch});
+    int varied = 0;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const size_t at = size_t(y) * pitch + size_t(x);
+        ASSERT_EQ(depth_m[at], drawn.depth_m[size_t(y / 2) * size_t(small.width) + size_t(x / 2)]) << x << ", " << y;
+        const double u = std::clamp((x + 0.5) / 2 - 0.5, 0.0, small.width - 1.0),
+                     v = std::clamp((y + 0.5) / 2 - 0.5, 0.0, small.height - 1.0);
+        const int i = std::min(int(u), small.width - 2), j = std::min(int(v), small.height - 2);
+        for (const int shift : {0, 8, 16, 24}) {
+          const auto channel = [&](int dx, int dy) { return drawn.at(i + dx, j + dy) >> shift & 255; };
+          const double a = u - i, b = v - j;
+          const double expected = (1 - b) * ((1 - a) * channel(0, 0) + a * channel(1, 0)) +
+                                  b * ((1 - a) * channel(0, 1) + a * channel(1, 1));
+          ASSERT_NEAR(colour[at] >> shift & 255, expected, 2) << x << ", " << y << ", bit " << shift;
+          varied += channel(0, 0) != channel(1, 0);
+        }
+      }
+    EXPECT_GT(varied, 10000);
+    EXPECT_EQ(colour[size_t(width)], 7u) << "beside the picture";
+  }
 }
 
 }  // namespace

@@ -69,7 +69,8 @@ class PointReplay final : public FrameReplay {
     selection.detail = float(frame.detail);
     selection.best_patch_only = run_.keeps_redundant;
     selection.eyes = eyes;
-    splat::select_view(*models_->model(), camera, selection, list_, &models_->summaries());
+    splat::select_view(*models_->model(), frame.look.render.halved ? geometry::half_size(camera) : camera, selection,
+                       list_, &models_->summaries());
     list_.applied = models_->applied();
     list_.replica = models_->replica() + 1;
     list_.epoch = frame.epoch;

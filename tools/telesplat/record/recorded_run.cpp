@@ -160,9 +160,9 @@ Status read_display(const std::string& path, const toml::table& session, const t
 struct FrameColumns {
   size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1, 0, 0.
+  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1, 0, 0, 0.
   std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, head_light, background, refined,
-      sub_pixels, swap_wait_ms, screen_m;
+      sub_pixels, swap_wait_ms, screen_m, halved;
   std::array<std::optional<size_t>, 6> eyes;  // left_x left_y left_z right_x right_y right_z
 };
 
@@ -196,6 +196,7 @@ Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   out.background = table.find("background");
   out.refined = table.find("refined");
   out.sub_pixels = table.find("sub_pixels");
+  out.halved = table.find("halved");
   out.swap_wait_ms = table.find("swap_wait_ms");
   out.screen_m = table.find("screen_m");
   const char* const eyes[] = {"left_x", "left_y", "left_z", "right_x", "right_y", "right_z"};
@@ -215,9 +216,10 @@ Status read_look(const tools::CsvTable& table, size_t row, const FrameColumns& a
   const auto lit = optional_count(table, row, at.lit, f.look.lit, 2);
   const auto head = optional_count(table, row, at.head_light, f.look.head_light, 2);
   const auto background = optional_count(table, row, at.background, f.look.background, 0x1000000);
-  for (const auto* value : {&splat, &finish, &lit, &head, &background})
+  const auto halved = optional_count(table, row, at.halved, 0, 2);
+  for (const auto* value : {&splat, &finish, &lit, &head, &background, &halved})
     if (!*value) return value->error();
-  f.look = {.render = {splat::kKernels[*splat], *splat::finish_of_bits(*finish)},
+  f.look = {.render = {splat::kKernels[*splat], *splat::finish_of_bits(*finish), *halved == 1},
             .lit = *lit == 1,
             .head_light = *head == 1,
             .background = uint32_t(*background)};

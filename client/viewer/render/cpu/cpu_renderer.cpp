@@ -11,6 +11,7 @@ class CpuRenderer final : public Renderer {
  public:
   explicit CpuRenderer(int threads) : splatter_(threads) {}
   const char* name() const override { return "cpu"; }
+  bool halves() const override { return true; }
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                            const splat::RenderOptions& options, const image::Shading& shading,
                            const splat::FrameTarget& target) override {

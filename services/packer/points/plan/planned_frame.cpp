@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 
 namespace telesplat::packer {
 

@@ -10,7 +10,7 @@
 #include "common/codec/depth_codec.h"
 #include "common/codec/mask_stream.h"
 #include "common/core/clock.h"
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 
 namespace telesplat::launcher {
 namespace {

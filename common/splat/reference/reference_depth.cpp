@@ -1,4 +1,4 @@
-#include "common/splat/reference_depth.h"
+#include "common/splat/reference/reference_depth.h"
 
 #include <tbb/task_arena.h>
 
