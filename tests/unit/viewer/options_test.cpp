@@ -169,6 +169,7 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   f.drawn.refined = 0.5;
   f.drawn.refine_ms = 6;
   f.drawn.sub_pixels = 4;
+  f.drawn.halved = true;
   f.coupling = {CouplingMode::kLoose, 5};
   f.lead_s = 0.25;
   f.missed = 3;
@@ -181,19 +182,19 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 30, row.end() - 14)),
+  EXPECT_EQ((std::vector<double>(row.end() - 31, row.end() - 15)),
             (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5, 1, 0xffeedd, 0, 0, -1}));
-  EXPECT_EQ((std::vector<double>(row.end() - 14, row.end())),
-            (std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0, 250, 3, 1750, 500, 62.5, 0}));
+  EXPECT_EQ((std::vector<double>(row.end() - 15, row.end())),
+            (std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0, 250, 3, 1750, 500, 62.5, 0, 1}));
   f.stereo = {stereo::Mode::kRows, {.screen_m = 0.75}};
   f.stereo.pair.eyes[0].pose.position_room = {1, 2, 3};
   f.stereo.pair.eyes[1].pose.position_room = {4, 5, 6};
   const auto seen_by_two = frame_row(f);
-  EXPECT_EQ((std::vector<double>(seen_by_two.end() - 14, seen_by_two.end() - 6)),
+  EXPECT_EQ((std::vector<double>(seen_by_two.end() - 15, seen_by_two.end() - 7)),
             (std::vector<double>{double(stereo::Mode::kRows), 0.75, 1, 2, 3, 4, 5, 6}));
   f.drawn.still = true;
   const auto stands = frame_row(f);
-  EXPECT_EQ((std::vector<double>(stands.end() - 4, stands.end())), (std::vector<double>{-1, 500, 62.5, 1}))
+  EXPECT_EQ((std::vector<double>(stands.end() - 5, stands.end() - 1)), (std::vector<double>{-1, 500, 62.5, 1}))
       << "a picture that stands shows no motion";
 }
 
