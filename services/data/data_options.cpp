@@ -70,6 +70,12 @@ Table placement_table(PlacementOptions& o) {
 
 Table mesh_table(MeshOptions& o) {
   return {
+      {.flag = "--crease-angle",
+       .value = &o.crease_deg,
+       .help = "meshes without normals: edges are sharp from this angle on, degrees; 180: none",
+       .limits = Range{0, 180},
+       .fits = kMeshes,
+       .reach = Reach::kRecorded},
       {.flag = "--z-scale",
        .value = &o.elevation.z_scale,
        .help = "elevation rasters: heights times this; 0: 1 where the file says where it lies, else so that the relief "

@@ -12,7 +12,7 @@ namespace telesplat::data {
 
 inline int use(Result<Mesh> mesh) {
   if (!mesh.ok() || !validate_mesh(*mesh, "fuzz").ok()) return 0;
-  const auto placed = place_mesh(std::move(*mesh), 0.8, "auto", "fuzz");
+  const auto placed = place_mesh(std::move(*mesh), {}, "fuzz");
   if (!placed.ok()) return 0;
   const ChunkPlan plan = plan_chunks(*placed, 64);
   for (size_t c = 0; c < plan.chunks(); ++c) {

@@ -39,7 +39,7 @@ TEST(Chunks, HoldEveryTriangleOnceForRandomMeshes) {
   int opened = 0;
   for (int round = 0; round < 200; ++round) {
     const Mesh mesh = random_mesh(random);
-    const auto placed = place_mesh(Mesh(mesh), 0.8, "y", "random");
+    const auto placed = place_mesh(Mesh(mesh), {.up = "y", .crease_deg = 180}, "random");
     if (!placed) {  // all degenerate, or of no extent: said so
       EXPECT_TRUE(placed.error().text.starts_with("random: ")) << placed.error().text;
       continue;
@@ -103,7 +103,7 @@ TEST(Chunks, HoldEveryTriangleOnceForRandomMeshes) {
 // On an even grid a chunk's box is about as large as its share of the area: far from the strips or scatter of a bad
 // order.
 TEST(Chunks, AreCompact) {
-  const auto placed = place_mesh(wavy_grid(256, 0.0), 1.0, "z", "grid");
+  const auto placed = place_mesh(wavy_grid(256, 0.0), {.room_size_m = 1, .up = "z"}, "grid");
   ASSERT_TRUE(placed.ok());
   const ChunkPlan plan = plan_chunks(*placed, 2048);
   ASSERT_EQ(plan.chunks(), 64u);
@@ -119,7 +119,7 @@ TEST(Chunks, AreCompact) {
 TEST(Chunks, DoNotDependOnThreads) {
   std::mt19937 random(7);
   const Mesh mesh = random_mesh(random);
-  const auto a = place_mesh(Mesh(mesh), 0.8, "y", "a"), b = place_mesh(Mesh(mesh), 0.8, "y", "b");
+  const auto a = place_mesh(Mesh(mesh), {.up = "y"}, "a"), b = place_mesh(Mesh(mesh), {.up = "y"}, "b");
   EXPECT_EQ(plan_chunks(*a, 100).order, plan_chunks(*b, 100).order);
   const auto plan = plan_chunks(*a, 100);
   const auto first = std::span(plan.order).first(plan.begin[1]);

@@ -78,7 +78,7 @@ Result<Mesh> elevation_mesh(const ElevationRaster& raster, const ElevationOption
   }
 
   Mesh mesh;
-  mesh.format = "raster";
+  mesh.format = "raster", mesh.smooth = true;
   mesh.coordinates = raster.coordinates;
   mesh.coordinates.shown.z = z_scale;
   if (!raster.georeferenced) mesh.coordinates.lengths.z = z_scale;  // heights and pixels have no common unit

@@ -28,6 +28,7 @@ struct Mesh {
   /// the file's minus scene::scalar_origin() of its span; NaN where that is not finite. Empty: it was asked for none.
   std::vector<float> scalars;
   bool scalars_of_faces = false;
+  bool smooth = false;  ///< sampled from a field: it has no creases, only coarse places
   std::vector<scene::ArrayInfo> arrays;  ///< all that the file holds, asked for or not; make_tellable() was called
   uint64_t degenerate_dropped = 0;       ///< faces with fewer than three corners
   std::vector<std::string> notes;        ///< what people should know of how it was read: lines that name the file

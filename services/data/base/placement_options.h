@@ -12,6 +12,9 @@ struct PlacementOptions {
   double room_size_m = 0.8;  ///< the largest extent of the data set's box in room space
   /// x, y, z, -x, -y, -z: the data axis that points up; auto: z for terrains, volumes and other medical data, else y.
   std::string up = "auto";
+  /// Meshes without normals: edges under this angle or more between two triangles are sharp; 180: vertices have one
+  /// normal each.
+  double crease_deg = 40;
 };
 
 /// The rotation (determinant +1) that turns data axis `up` to +y. Error unless `up` is x, y, z, -x, -y or -z.

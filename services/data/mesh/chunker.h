@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "services/data/mesh/placement.h"
+#include "services/data/mesh/placing/placement.h"
 
 namespace telesplat::data {
 

@@ -16,7 +16,7 @@
 #include "common/core/descriptor.h"
 #include "common/core/log.h"
 #include "services/data/mesh/cache.h"
-#include "services/data/mesh/placement.h"
+#include "services/data/mesh/placing/placement.h"
 #include "services/data/mesh/store_file.h"
 
 namespace telesplat::data {
@@ -64,7 +64,7 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.array = source.array;
   info.coordinates = mesh->coordinates;
   progress(kPlacing, 0.0);
-  const auto placed = place_mesh(std::move(*mesh), options.room_size_m, options.up, path);
+  const auto placed = place_mesh(std::move(*mesh), options, path);
   if (!placed) return placed.error();
   progress(kPlacing, 1.0);
   info.triangles = placed->indices.size() / 3;
@@ -171,6 +171,8 @@ Descriptor lock_making(const std::string& stem, const Progress& progress) {
 Status validate(const StoreOptions& options) {
   if (!(options.room_size_m >= 1e-3 && options.room_size_m <= 1e4))
     return Error{fmt::format("room size {} m is outside [0.001, 10000]", options.room_size_m)};
+  if (!(options.crease_deg >= 0 && options.crease_deg <= 180))
+    return Error{fmt::format("crease angle {} is outside [0, 180] degrees", options.crease_deg)};
   if (options.up != "auto")
     if (const auto rotation = rotation_for_up(options.up); !rotation) return rotation.error();
   return ok_status();
@@ -180,8 +182,9 @@ Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, cons
                                                    const StoreOptions& options, const Progress& progress) {
   if (!options.use_cache) return open_unnamed(path, options, source, progress);
   const fs::path folder = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
-  const std::string stem =
-      (folder / fmt::format("{:016x}-{}-{}{}", source.hash, options.up, options.room_size_m, source.variant)).string();
+  const std::string stem = (folder / fmt::format("{:016x}-{}-{}-{}{}", source.hash, options.up, options.room_size_m,
+                                                 options.crease_deg, source.variant))
+                               .string();
   std::error_code error;
   fs::create_directories(folder, error);
   if (const std::string problem = problem_of_shared_place(folder.string()); !problem.empty()) {

@@ -6,6 +6,7 @@
 #include <hwy/highway.h>
 
 #include <bit>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "common/image/normal.h"
@@ -83,23 +84,26 @@ void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* H
     const VF w0 = hn::Sub(hn::Sub(hn::Set(f, 1.0f), w1), w2);
     const auto blend = [&](VF a, VF b, VF c) { return hn::MulAdd(w2, c, hn::MulAdd(w1, b, hn::Mul(w0, a))); };
 
-    // Normal: decode three corners, interpolate.
-    const V3 n0 = decode32(hn::Load(un, hits.corner_normal[0] + lane));
-    const V3 n1 = decode32(hn::Load(un, hits.corner_normal[1] + lane));
-    const V3 n2 = decode32(hn::Load(un, hits.corner_normal[2] + lane));
-    V3 n{blend(n0.x, n1.x, n2.x), blend(n0.y, n1.y, n2.y), blend(n0.z, n1.z, n2.z)};
-
-    // Opposite corner normals may cancel: then the triangle's own normal stands in.
+    // Normal: decode three corners, turn each to the viewer's side of the triangle, interpolate.
     const V3 g{hn::Load(f, hits.geometric_normal[0] + lane), hn::Load(f, hits.geometric_normal[1] + lane),
                hn::Load(f, hits.geometric_normal[2] + lane)};
-    const auto cancelled = hn::Lt(dot(n, n), hn::Set(f, 1e-6f));
-    n = {hn::IfThenElse(cancelled, g.x, n.x), hn::IfThenElse(cancelled, g.y, n.y), hn::IfThenElse(cancelled, g.z, n.z)};
-
-    // Flip: the signs of n . g and d . g are equal where n points away from the viewer's side.
     const V3 d{hn::Load(f, hits.direction[0] + lane), hn::Load(f, hits.direction[1] + lane),
                hn::Load(f, hits.direction[2] + lane)};
-    const VF sign = hn::And(hn::Xor(hn::Xor(dot(n, g), dot(d, g)), hn::Set(f, -0.0f)), hn::Set(f, -0.0f));
-    n = {hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
+    const VF behind = dot(d, g), minus = hn::Set(f, -0.0f);
+    const auto seen = [&](const V3& n) HWY_ATTR {  // the signs of n . g and d . g are equal where n points away
+      const VF sign = hn::And(hn::Xor(hn::Xor(dot(n, g), behind), minus), minus);
+      return V3{hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
+    };
+    const V3 n0 = seen(decode32(hn::Load(un, hits.corner_normal[0] + lane)));
+    const V3 n1 = seen(decode32(hn::Load(un, hits.corner_normal[1] + lane)));
+    const V3 n2 = seen(decode32(hn::Load(un, hits.corner_normal[2] + lane)));
+    V3 n{blend(n0.x, n1.x, n2.x), blend(n0.y, n1.y, n2.y), blend(n0.z, n1.z, n2.z)};
+
+    // Corner normals along the triangle may cancel: then the triangle's own normal stands in.
+    const auto cancelled = hn::Lt(dot(n, n), hn::Set(f, 1e-6f));
+    const V3 own = seen(g);
+    n = {hn::IfThenElse(cancelled, own.x, n.x), hn::IfThenElse(cancelled, own.y, n.y),
+         hn::IfThenElse(cancelled, own.z, n.z)};
     const VF away =
         hn::Div(hn::Mul(hn::Max(dot(n, d), hn::Zero(f)), hn::Set(f, kTurn)), hn::Max(dot(d, d), hn::Set(f, 1e-30f)));
     n = {hn::NegMulAdd(away, d.x, n.x), hn::NegMulAdd(away, d.y, n.y), hn::NegMulAdd(away, d.z, n.z)};
@@ -147,15 +151,16 @@ SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triang
   const float weight[3] = {1 - u - v, u, v};
   SurfacePoint out{glm::vec3(0), glm::vec3(0)};
   float scalar = 0;
+  const float behind = glm::dot(direction, g);
+  const auto seen = [&](const glm::vec3& n) { return std::signbit(glm::dot(n, g)) == std::signbit(behind) ? -n : n; };
   for (int corner = 0; corner < 3; ++corner) {
     const uint32_t vertex = chunk.indices[3 * size_t{triangle} + corner], c = chunk.colours[vertex];
     out.colour += weight[corner] * rgb(c);
     if (chunk.scalars) scalar += weight[corner] * std::bit_cast<float>(c);
-    out.normal += weight[corner] * image::decode_normal32(chunk.normals[vertex]);
+    out.normal += weight[corner] * seen(image::decode_normal32(chunk.normals[vertex]));
   }
   out.colour = chunk.scalars ? rgb(colours.at(scalar)) : glm::clamp(out.colour, 0.0f, 255.0f);
-  if (glm::dot(out.normal, out.normal) < 1e-6f) out.normal = g;
-  if (glm::dot(out.normal, g) * glm::dot(direction, g) > 0) out.normal = -out.normal;
+  if (glm::dot(out.normal, out.normal) < 1e-6f) out.normal = seen(g);
   out.normal -= kTurn * std::max(glm::dot(out.normal, direction), 0.0f) / glm::dot(direction, direction) * direction;
   out.normal = glm::normalize(out.normal);
   return out;

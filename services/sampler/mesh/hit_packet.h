@@ -1,7 +1,8 @@
 // From ray hits to what a depth image stores, eight at a time: colours and normals interpolated over the triangle.
 //
 //   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel; of scalars: the colour of the one interpolated
-//   n is negated where it points away from the side of the triangle that the ray sees: sign(n . g) == sign(d . g)
+//   each nk is negated first where it points away from the side of the triangle that the ray sees:
+//     sign(nk . g) == sign(d . g); so triangles that are wound the other way are as good as their neighbours
 //   n is turned across the ray where it faces away all the same, as over an edge or a coarse mesh, because viewers
 //     leave out points that face away: n - kTurn (n . d) d / (d . d)
 // with g either normal of the triangle's plane and d the ray's direction, whatever the winding.

@@ -49,6 +49,7 @@ vec3 decode_normal32(uint code) {
   float z = 1 - abs(p.x) - abs(p.y), fold = max(-z, 0.0);
   return normalize(vec3(p.x + (p.x >= 0 ? -fold : fold), p.y + (p.y >= 0 ? -fold : fold), z));
 }
+vec3 seen(vec3 n, vec3 side) { return dot(n, side) < 0 ? -n : n; }
 uint encode_normal16(vec3 n) {
   vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
   if (n.z < 0) p = vec2((1 - abs(p.y)) * (p.x >= 0 ? 1 : -1), (1 - abs(p.x)) * (p.y >= 0 ? 1 : -1));
@@ -88,11 +89,11 @@ void main() {
 
   vec3 p = weight.x * a + weight.y * b + weight.z * c;
   depth_m = -(to_camera * p).z;
-  vec3 n = weight.x * decode_normal32(words[16u + 3u * vertices + corner.x]) +
-           weight.y * decode_normal32(words[16u + 3u * vertices + corner.y]) +
-           weight.z * decode_normal32(words[16u + 3u * vertices + corner.z]);
-  if (dot(n, n) < 1e-6) n = g;
-  if (dot(n, g) * sign(total) > 0) n = -n;  // towards the side that is seen
+  vec3 side = total > 0 ? -g : g;  // that is seen
+  vec3 n = weight.x * seen(decode_normal32(words[16u + 3u * vertices + corner.x]), side) +
+           weight.y * seen(decode_normal32(words[16u + 3u * vertices + corner.y]), side) +
+           weight.z * seen(decode_normal32(words[16u + 3u * vertices + corner.z]), side);
+  if (dot(n, n) < 1e-6) n = side;
   normal = encode_normal16(n - 1.02 * max(dot(n, d), 0) / dot(d, d) * d);  // hit_packet.h: kTurn
   if (scalars) {
     colour = scalar_colour(corner, weight);

@@ -2,14 +2,14 @@
 #include <glm/gtc/matrix_access.hpp>
 #include <glm/matrix.hpp>
 
-#include "services/data/mesh/placement.h"
+#include "services/data/mesh/placing/placement.h"
 #include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {
 
-Result<PlacedMesh> place(Mesh mesh, const std::string& up = "y", double room_size_m = 0.8) {
-  return place_mesh(std::move(mesh), room_size_m, up, "test");
+Result<PlacedMesh> place(Mesh mesh, const std::string& up = "y", double room_size_m = 0.8, double crease_deg = 40) {
+  return place_mesh(std::move(mesh), {.room_size_m = room_size_m, .up = up, .crease_deg = crease_deg}, "test");
 }
 
 TEST(RotationForUp, TurnsThatAxisToYWithoutMirroring) {
@@ -68,7 +68,7 @@ TEST(PlaceMesh, NormalsAreMeansOverTrianglesWeightedByArea) {
       mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 4, 0}, {0, 0, -1}};
   mesh.indices = {0, 1, 2, 0, 1, 3};
-  const auto placed = place(mesh);
+  const auto placed = place(mesh, "y", 0.8, 180);
   ASSERT_TRUE(placed.ok());
   const glm::vec3 expected = glm::normalize(glm::vec3(0, 1, 4));
   EXPECT_LT(glm::distance(image::decode_normal32(placed->normals[0]), expected), 1e-3f);

@@ -6,6 +6,7 @@
 
 #include "common/geometry/box.h"
 #include "services/data/base/mesh.h"
+#include "services/data/base/placement_options.h"
 
 namespace telesplat::data {
 
@@ -41,10 +42,10 @@ UpGuess guess_up(const Mesh& mesh);
 
 /// Centres the mesh's frame, or if it has none the box of the used vertices, at the origin, turns `up` ("auto":
 /// guess_up) to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision,
-/// rounded to float at the end. Drops degenerate
-/// triangles and counts them; computes normals (area-weighted mean over a vertex's triangles) where the file has none,
-/// or where one of them has no direction. Takes the mesh apart as it goes to save memory. Errors start with `name`: the
-/// box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh passed.
-Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string& up, const std::string& name);
+/// rounded to float at the end. Drops degenerate triangles and counts them. Where the file has no normals it makes
+/// them, and copies of vertices that lie on sharp edges (creases.h); where one of the file's has no direction it makes
+/// that one. Takes the mesh apart as it goes to save memory. Errors start with `name`: the box has no extent, or one
+/// beyond 1e30; no triangle is left. Precondition: validate_mesh passed.
+Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name);
 
 }  // namespace telesplat::data

@@ -1,7 +1,8 @@
-#include "services/data/mesh/placement.h"
+#include "services/data/mesh/placing/placement.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -9,11 +10,13 @@
 #include "common/image/normal.h"
 #include "common/parallel/in_parallel.h"
 #include "services/data/base/placement_options.h"
+#include "services/data/mesh/placing/creases.h"
 
 namespace telesplat::data {
 namespace {
 
 constexpr size_t kGrain = 1 << 16;
+constexpr double kNoCrease_deg = 180;
 
 template <class Body>
 void parallel(size_t count, const Body& body) {
@@ -52,16 +55,6 @@ void drop_degenerate(PlacedMesh& mesh) {
   if (!mesh.face_colours.empty()) mesh.face_colours.resize(kept);
 }
 
-// Area-weighted vertex normals, not normalised. Scaled up so that small triangles do not vanish in float.
-std::vector<glm::vec3> vertex_normals(const PlacedMesh& mesh) {
-  std::vector<glm::vec3> normals(mesh.positions_room.size(), glm::vec3(0));
-  for (size_t t = 0; t < mesh.indices.size() / 3; ++t) {
-    const glm::vec3 n(area_vector(mesh, t) * 1e12);
-    for (int k = 0; k < 3; ++k) normals[mesh.indices[3 * t + k]] += n;
-  }
-  return normals;
-}
-
 bool has_direction(const glm::vec3& n) {
   return std::isfinite(n.x) && std::isfinite(n.y) && std::isfinite(n.z) &&
          std::abs(n.x) + std::abs(n.y) + std::abs(n.z) > 1e-20f;
@@ -75,14 +68,25 @@ uint32_t encode(const glm::vec3& n) {
 
 void set_normals(PlacedMesh& placed, const std::vector<glm::vec3>& from_file, const glm::mat3& rotation) {
   placed.normals.resize(placed.positions_room.size());
-  bool complete = !from_file.empty();
-  if (complete)
-    for (const glm::vec3& n : from_file) complete &= has_direction(n);
-  const std::vector<glm::vec3> computed = complete ? std::vector<glm::vec3>() : vertex_normals(placed);
+  std::vector<glm::vec3> computed;
+  if (!std::all_of(from_file.begin(), from_file.end(), has_direction)) {
+    std::vector<uint32_t> indices = placed.indices;
+    computed = smooth_normals(placed.positions_room, kNoCrease_deg, indices).normals;
+  }
   parallel(placed.normals.size(), [&](size_t i) {
-    const bool use_file = !from_file.empty() && has_direction(from_file[i]);
-    placed.normals[i] = encode(use_file ? rotation * from_file[i] : computed[i]);
+    placed.normals[i] = encode(has_direction(from_file[i]) ? rotation * from_file[i] : computed[i]);
   });
+}
+
+// Where the file has no normals: vertices are split at creases.
+void make_normals(PlacedMesh& placed, double crease_deg) {
+  const SmoothNormals smooth = smooth_normals(placed.positions_room, crease_deg, placed.indices);
+  for (const uint32_t vertex : smooth.copies) {
+    placed.positions_room.push_back(glm::vec3(placed.positions_room[vertex]));
+    if (!placed.colours.empty()) placed.colours.push_back(uint32_t(placed.colours[vertex]));
+  }
+  placed.normals.resize(smooth.normals.size());
+  parallel(placed.normals.size(), [&](size_t i) { placed.normals[i] = encode(smooth.normals[i]); });
 }
 
 // The array that colours the mesh, if any.
@@ -96,9 +100,9 @@ void take_scalars(Mesh& mesh, PlacedMesh& placed) {
 
 }  // namespace
 
-Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string& up, const std::string& name) {
+Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name) {
   PlacedMesh placed;
-  const UpGuess guess = up == "auto" ? guess_up(mesh) : UpGuess{up, "--up"};
+  const UpGuess guess = options.up == "auto" ? guess_up(mesh) : UpGuess{options.up, "--up"};
   placed.up = guess.axis, placed.up_reason = guess.reason;
   const auto rotation = rotation_for_up(placed.up);
   if (!rotation) return rotation.error();
@@ -110,7 +114,7 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string
   if (!(largest >= 1e-30 && largest <= 1e30))
     return Error{fmt::format("{}: its largest extent is {}, outside [1e-30, 1e30]", name, largest)};
   const glm::dvec3 centre = frame.lo + size * 0.5;
-  const double scale = room_size_m / largest;
+  const double scale = options.room_size_m / largest;
 
   // Vertices that no triangle uses may lie anywhere; they are not kept, so they need not be placed well.
   placed.positions_room.resize(mesh.positions.size());
@@ -125,8 +129,11 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string
     return Error{fmt::format("{}: all its {} triangles are degenerate (no area)", name, placed.degenerate_dropped)};
   for (uint32_t i : placed.indices) placed.box_room.extend(placed.positions_room[i]);
 
-  set_normals(placed, mesh.normals, glm::mat3(*rotation));
   if (!placed.scalars) placed.colours = std::move(mesh.colours);
+  if (mesh.normals.empty())
+    make_normals(placed, mesh.smooth ? kNoCrease_deg : options.crease_deg);
+  else
+    set_normals(placed, mesh.normals, glm::mat3(*rotation));
   if (placed.colours.empty() && placed.face_colours.empty())
     placed.colours.assign(placed.positions_room.size(), kNeutralAlbedo);
   return placed;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "services/data/mesh/placement.h"
+#include "services/data/mesh/placing/placement.h"
 
 namespace telesplat::data {
 namespace {
