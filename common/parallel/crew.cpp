@@ -1,7 +1,8 @@
 #include "common/parallel/crew.h"
 
-#include <algorithm>
 #include <atomic>
+
+#include "common/core/machine.h"
 
 namespace telesplat {
 
@@ -16,7 +17,7 @@ struct Crew::Loop {
 };
 
 Crew::Crew(int threads) {
-  if (threads <= 0) threads = static_cast<int>(std::max(std::thread::hardware_concurrency(), 1u));
+  if (threads <= 0) threads = usable_processors();
   for (int i = 1; i < threads; ++i) helpers_.emplace_back([this, i] { help(i); });
 }
 
@@ -37,7 +38,10 @@ void Crew::run(size_t count, const std::function<void(size_t, int)>& turn) {
     loop_ = &loop;
     ++loops_;
   }
-  if (count > 1) wake_.notify_all();
+  if (count > helpers_.size())
+    wake_.notify_all();
+  else
+    for (size_t n = 1; n < count; ++n) wake_.notify_one();
   loop.work(0);
   std::unique_lock lock(mutex_);
   loop_ = nullptr;

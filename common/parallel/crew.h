@@ -15,7 +15,7 @@ namespace telesplat {
 
 class Crew {
  public:
-  /// threads: with the caller of run(); 0: one a core.
+  /// threads: with the caller of run(); 0: usable_processors().
   explicit Crew(int threads);
   ~Crew();
   Crew(const Crew&) = delete;
