@@ -2,8 +2,6 @@
 
 #include <atomic>
 
-#include "common/core/machine.h"
-
 namespace telesplat {
 
 struct Crew::Loop {
@@ -17,7 +15,6 @@ struct Crew::Loop {
 };
 
 Crew::Crew(int threads) {
-  if (threads <= 0) threads = usable_processors();
   for (int i = 1; i < threads; ++i) helpers_.emplace_back([this, i] { help(i); });
 }
 

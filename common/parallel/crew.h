@@ -15,7 +15,7 @@ namespace telesplat {
 
 class Crew {
  public:
-  /// threads: with the caller of run(); 0: usable_processors().
+  /// threads: with the caller of run(), at least 1.
   explicit Crew(int threads);
   ~Crew();
   Crew(const Crew&) = delete;

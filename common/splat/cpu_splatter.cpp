@@ -12,6 +12,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/core/machine.h"
 #include "common/parallel/crew.h"
 #include "common/splat/doubling.h"
 #include "common/splat/item_figures.h"
@@ -88,7 +89,8 @@ struct Sight {
 }  // namespace
 
 struct CpuSplatter::Impl {
-  explicit Impl(int threads) : crew(threads), workspaces(static_cast<size_t>(crew.threads())) {}
+  explicit Impl(int threads)
+      : crew(threads > 0 ? threads : usable_processors()), workspaces(static_cast<size_t>(crew.threads())) {}
 
   void prepare(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                const image::Shading& shading);

@@ -29,7 +29,7 @@ struct SplatStats {
 
 class CpuSplatter {
  public:
-  /// threads: 0 = all cores.
+  /// threads: 0 = usable_processors().
   explicit CpuSplatter(int threads = 0);
   ~CpuSplatter();
 

@@ -72,7 +72,7 @@ Table mesh_table(MeshOptions& o) {
   return {
       {.flag = "--crease-angle",
        .value = &o.crease_deg,
-       .help = "meshes without normals: edges are sharp from this angle on, degrees; 180: none",
+       .help = "meshes without normals, but terrains and scans: edges are sharp from this angle on, degrees; 180: none",
        .limits = Range{0, 180},
        .fits = kMeshes,
        .reach = Reach::kRecorded},

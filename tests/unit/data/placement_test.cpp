@@ -133,6 +133,7 @@ TEST(GuessUp, TerrainsAndMedicalDataStandOnZ) {
   EXPECT_EQ(guess_up(wavy_grid(30)).axis, "z");
   ASSERT_GT(isosurface(60).positions.size(), 2000u);
   EXPECT_EQ(guess_up(isosurface(60)).axis, "z");
+  EXPECT_EQ(place(isosurface(60))->positions_room.size(), isosurface(60).positions.size()) << "it is split nowhere";
   Mesh vtk = sphere(20);
   vtk.format = "vtp";
   EXPECT_EQ(guess_up(vtk).axis, "z");

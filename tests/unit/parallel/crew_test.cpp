@@ -29,8 +29,6 @@ TEST(Crew, EachTurnComesOnceAndThreadsHaveNumbersOfTheirOwn) {
   }
 }
 
-TEST(Crew, AThreadPerCoreUnlessTold) { EXPECT_GE(Crew(0).threads(), 1); }
-
 // What a loop's turns read is gone when it is over.
 TEST(Crew, ThousandsOfShortLoopsLeaveNoThreadBehind) {
   Crew crew(4);

@@ -107,6 +107,7 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, cons
   const auto rotation = rotation_for_up(placed.up);
   if (!rotation) return rotation.error();
 
+  const bool smooth = mesh.smooth || (mesh.normals.empty() && is_isosurface(mesh));
   placed.box_data = box_of_used(mesh);
   const geometry::DBox frame = mesh.frame.value_or(placed.box_data);
   const glm::dvec3 size = frame.size();
@@ -131,7 +132,7 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, cons
 
   if (!placed.scalars) placed.colours = std::move(mesh.colours);
   if (mesh.normals.empty())
-    make_normals(placed, mesh.smooth ? kNoCrease_deg : options.crease_deg);
+    make_normals(placed, smooth ? kNoCrease_deg : options.crease_deg);
   else
     set_normals(placed, mesh.normals, glm::mat3(*rotation));
   if (placed.colours.empty() && placed.face_colours.empty())

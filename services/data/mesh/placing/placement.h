@@ -40,12 +40,16 @@ struct UpGuess {
 };
 UpGuess guess_up(const Mesh& mesh);
 
+/// Whether it is the surface of a scan: most vertices have two coordinates, and only two, in common with many others,
+/// because marching cubes puts them on the edges of a voxel grid. Precondition: validate_mesh passed.
+bool is_isosurface(const Mesh& mesh);
+
 /// Centres the mesh's frame, or if it has none the box of the used vertices, at the origin, turns `up` ("auto":
 /// guess_up) to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision,
 /// rounded to float at the end. Drops degenerate triangles and counts them. Where the file has no normals it makes
-/// them, and copies of vertices that lie on sharp edges (creases.h); where one of the file's has no direction it makes
-/// that one. Takes the mesh apart as it goes to save memory. Errors start with `name`: the box has no extent, or one
-/// beyond 1e30; no triangle is left. Precondition: validate_mesh passed.
+/// them, and copies of vertices that lie on sharp edges (creases.h), unless the mesh is smooth or an isosurface; where
+/// one of the file's has no direction it makes that one. Takes the mesh apart as it goes to save memory. Errors start
+/// with `name`: the box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh passed.
 Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name);
 
 }  // namespace telesplat::data

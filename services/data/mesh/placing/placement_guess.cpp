@@ -37,6 +37,8 @@ std::vector<bool> repeated(const std::vector<double>& values) {
   return out;
 }
 
+}  // namespace
+
 // Marching cubes puts its vertices on the edges of the voxel grid: two coordinates are those of grid planes and so
 // shared with many other vertices, the third lies in between and is shared with few. Scans share none, CAD models
 // mostly all three.
@@ -56,8 +58,6 @@ bool is_isosurface(const Mesh& mesh) {
   }
   return 10 * two_or_more >= 9 * values[0].size() && 2 * exactly_two >= values[0].size();
 }
-
-}  // namespace
 
 UpGuess guess_up(const Mesh& mesh) {
   if (mesh.format == "raster") return {"z", "an elevation raster"};
