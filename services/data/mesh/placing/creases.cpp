@@ -109,13 +109,17 @@ class Creases {
     std::sort(edges_.begin(), edges_.end(), [](const Edge& a, const Edge& b) {
       return std::pair(a.other, a.triangle) < std::pair(b.other, b.triangle);
     });
-    for (size_t e = 1; e < edges_.size(); ++e) {
-      const Edge &a = edges_[e - 1], &b = edges_[e];
-      if (a.other != b.other) continue;
-      const bool turned = a.leaves == b.leaves;
-      const double cosine = glm::dot(units_[a.triangle], units_[b.triangle]);
-      if ((turned ? -cosine : cosine) >= cos_crease_) unite(a.triangle, b.triangle, turned);
+    for (size_t first = 0, last = 0; first < edges_.size(); first = last) {
+      while (last < edges_.size() && edges_[last].other == edges_[first].other) ++last;
+      for (size_t e = first + 1; e < last; ++e) unite_if_smooth(edges_[e - 1], edges_[e], last - first == 2);
     }
+  }
+
+  // Where more than two triangles share an edge, two that run through it the same way are those of two sheets.
+  void unite_if_smooth(const Edge& a, const Edge& b, bool alone) {
+    const bool turned = a.leaves == b.leaves;
+    const double cosine = glm::dot(units_[a.triangle], units_[b.triangle]);
+    if ((alone || !turned) && (turned ? -cosine : cosine) >= cos_crease_) unite(a.triangle, b.triangle, turned);
   }
 
   void split(size_t n) {
@@ -129,12 +133,21 @@ class Creases {
       parent_[i] = uint32_t(i);
     }
     unite_across_edges(corners, count);
+    sums_.assign(count, glm::dvec3(0)), as_wound_.assign(count, glm::dvec3(0));
+    for (size_t i = 0; i < count; ++i) {
+      const auto [group, turned] = group_of(uint32_t(i));
+      sums_[group] += turned ? -areas_[i] : areas_[i];
+      as_wound_[group] += areas_[i];
+    }
     numbers_.assign(count, kNone);
     out_.normals[vertex] = glm::vec3(0);
     for (size_t i = 0; i < count; ++i) {
-      const auto [group, turned] = group_of(uint32_t(i));
-      if (numbers_[group] == kNone) numbers_[group] = group == 0 || !splits_ ? vertex : copy(vertex);
-      out_.normals[numbers_[group]] += glm::vec3(areas_[i] * (turned ? -kScale : kScale));
+      const uint32_t group = group_of(uint32_t(i)).first;
+      if (numbers_[group] == kNone) {
+        numbers_[group] = group == 0 || !splits_ ? vertex : copy(vertex);
+        const double sign = glm::dot(as_wound_[group], sums_[group]) < 0 ? -kScale : kScale;
+        out_.normals[numbers_[group]] += glm::vec3(sums_[group] * sign);
+      }
       if (numbers_[group] != vertex) new_indices_.push_back({corners[i], numbers_[group]});
     }
   }
@@ -155,7 +168,7 @@ class Creases {
   std::vector<size_t> first_, corners_;  // of each vertex that is looked at; corners: places in indices
   std::vector<std::pair<size_t, uint32_t>> new_indices_;  // of corners; edges are told by the old ones
   // Of the vertex at hand.
-  std::vector<glm::dvec3> areas_, units_;
+  std::vector<glm::dvec3> areas_, units_, sums_, as_wound_;  // the last two: of groups
   std::vector<uint32_t> parent_, numbers_;
   std::vector<bool> turned_;
   std::vector<Edge> edges_;
