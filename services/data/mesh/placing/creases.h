@@ -16,7 +16,7 @@ struct SmoothNormals {
 /// less than crease_deg have one normal there; those that are parted by sharper edges, or meet in the vertex alone,
 /// have one each, and `indices` refers to copies of the vertex for them. 180: each vertex has one normal.
 ///   The angle is that between the surfaces, however the triangles are wound; normals of turned ones are turned before
-///   they are added. A group's normal has the sign that most of its area has, so neighbours agree unless most are turned.
+///   they are added. A group has the sign of most of its area, so neighbours agree unless most triangles are turned.
 /// The split by edges is that of VTK's vtkPolyDataNormals.
 /// positions: of every vertex. indices: three a triangle; each triangle has an area.
 SmoothNormals smooth_normals(const std::vector<glm::vec3>& positions, double crease_deg,
