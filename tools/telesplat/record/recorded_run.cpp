@@ -160,7 +160,7 @@ Status read_display(const std::string& path, const toml::table& session, const t
 struct FrameColumns {
   size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1, 0, 0, 0.
+  // Where a file lacks them they count as 0, 1, 0, all, as the run began, 0, 1, 0, 0, 0.
   std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, head_light, background, refined,
       sub_pixels, swap_wait_ms, screen_m, halved;
   std::array<std::optional<size_t>, 6> eyes;  // left_x left_y left_z right_x right_y right_z

@@ -29,19 +29,13 @@ class Creases {
   }
 
  private:
-  // Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses
-  // it.
-  glm::dvec3 area_vector(size_t triangle) const {
-    const uint32_t* t = &indices_[3 * triangle];
-    const glm::dvec3 a(positions_[t[0]]), b(positions_[t[1]]), c(positions_[t[2]]);
-    return glm::cross(b - a, c - a);
-  }
+  glm::dvec3 area_of(size_t triangle) const { return area_vector(positions_, &indices_[3 * triangle]); }
 
   // Scaled up so that small triangles do not vanish in float.
   void add_normals() {
     out_.normals.assign(positions_.size(), glm::vec3(0));
     for (size_t t = 0; t < indices_.size() / 3; ++t) {
-      const glm::vec3 n(area_vector(t) * kScale);
+      const glm::vec3 n(area_of(t) * kScale);
       for (int k = 0; k < 3; ++k) out_.normals[indices_[3 * t + k]] += n;
     }
   }
@@ -52,7 +46,7 @@ class Creases {
     std::vector<uint32_t> number(positions_.size(), kNone);
     uint32_t count = 0;
     for (size_t t = 0; t < indices_.size() / 3; ++t) {
-      const glm::dvec3 n = glm::normalize(area_vector(t));
+      const glm::dvec3 n = glm::normalize(area_of(t));
       for (int k = 0; k < 3; ++k) {
         const uint32_t vertex = indices_[3 * t + k];
         const glm::dvec3 mean(out_.normals[vertex]);
@@ -128,7 +122,7 @@ class Creases {
     const uint32_t vertex = indices_[corners[0]];
     areas_.resize(count), units_.resize(count), parent_.resize(count), turned_.assign(count, false);
     for (size_t i = 0; i < count; ++i) {
-      areas_[i] = area_vector(corners[i] / 3);
+      areas_[i] = area_of(corners[i] / 3);
       units_[i] = glm::normalize(areas_[i]);
       parent_[i] = uint32_t(i);
     }
@@ -167,7 +161,7 @@ class Creases {
   SmoothNormals out_;
   std::vector<size_t> first_, corners_;  // of each vertex that is looked at; corners: places in indices
   std::vector<std::pair<size_t, uint32_t>> new_indices_;  // of corners; edges are told by the old ones
-  // Of the vertex at hand.
+  // split() uses these for one vertex.
   std::vector<glm::dvec3> areas_, units_, sums_, as_wound_;  // the last two: of groups
   std::vector<uint32_t> parent_, numbers_;
   std::vector<bool> turned_;
@@ -175,6 +169,11 @@ class Creases {
 };
 
 }  // namespace
+
+glm::dvec3 area_vector(const std::vector<glm::vec3>& positions, const uint32_t* triangle) {
+  const glm::dvec3 a(positions[triangle[0]]), b(positions[triangle[1]]), c(positions[triangle[2]]);
+  return glm::cross(b - a, c - a);
+}
 
 SmoothNormals smooth_normals(const std::vector<glm::vec3>& positions, double crease_deg,
                              std::vector<uint32_t>& indices) {

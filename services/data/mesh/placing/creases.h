@@ -9,8 +9,12 @@ namespace telesplat::data {
 
 struct SmoothNormals {
   std::vector<glm::vec3> normals;  ///< one a vertex, then one for each copy; of any length
-  std::vector<uint32_t> copies;    ///< of which vertices copies are needed, which come after all vertices
+  std::vector<uint32_t> copies;    ///< vertices to be copied; the copies come after all vertices, in this order
 };
+
+/// Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses
+/// it. triangle: its three indices.
+glm::dvec3 area_vector(const std::vector<glm::vec3>& positions, const uint32_t* triangle);
 
 /// Each vertex's mean of its triangles' normals, weighted by area. Triangles around a vertex that meet at an edge under
 /// less than crease_deg have one normal there; those that are parted by sharper edges, or meet in the vertex alone,

@@ -31,21 +31,13 @@ geometry::DBox box_of_used(const Mesh& mesh) {
   return box;
 }
 
-// Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses
-// it.
-glm::dvec3 area_vector(const PlacedMesh& mesh, size_t triangle) {
-  const uint32_t* t = &mesh.indices[3 * triangle];
-  const glm::dvec3 a(mesh.positions_room[t[0]]), b(mesh.positions_room[t[1]]), c(mesh.positions_room[t[2]]);
-  return glm::cross(b - a, c - a);
-}
-
 // Removes triangles without area, keeping the order of the others.
 void drop_degenerate(PlacedMesh& mesh) {
   size_t kept = 0;
   const size_t triangles = mesh.indices.size() / 3;
   for (size_t t = 0; t < triangles; ++t) {
     const uint32_t a = mesh.indices[3 * t], b = mesh.indices[3 * t + 1], c = mesh.indices[3 * t + 2];
-    if (area_vector(mesh, t) == glm::dvec3(0)) continue;
+    if (area_vector(mesh.positions_room, &mesh.indices[3 * t]) == glm::dvec3(0)) continue;
     if (!mesh.face_colours.empty()) mesh.face_colours[kept] = mesh.face_colours[t];
     mesh.indices[3 * kept] = a, mesh.indices[3 * kept + 1] = b, mesh.indices[3 * kept + 2] = c;
     ++kept;
