@@ -70,7 +70,8 @@ void describe_raster(const RasterFacts& r, const geometry::DBox& box, Descriptio
                     r.unit == "metres" ? "" : fmt::format(", {:.4g} x {:.4g} m as shown", r.sample_x_m, r.sample_y_m)));
   const double scale = r.hi > r.lo ? (box.hi.z - box.lo.z) / (r.hi - r.lo) : 1;
   out.row("heights",
-          fmt::format("{:.6g} .. {:.6g}{}, shown times {:.4g} (--z-scale){}", r.lo, r.hi, r.unit.empty() ? "" : " m",
+          fmt::format("{:.6g} .. {:.6g}{}{}, shown times {:.4g} (--z-scale){}", r.lo, r.hi, r.unit.empty() ? "" : " m",
+                      r.height_m == 1 ? "" : fmt::format(", in the file {} of {:.6g} m", r.height_unit, r.height_m),
                       scale, r.without_data > 0 ? fmt::format("; {} samples have no data", r.without_data) : ""));
   out.json["raster"] = {{"samples", {r.width, r.height}},
                         {"type", r.type},
@@ -84,6 +85,8 @@ void describe_raster(const RasterFacts& r, const geometry::DBox& box, Descriptio
                         {"sample", {r.sample_x, r.sample_y}},
                         {"sample_m", {r.sample_x_m, r.sample_y_m}},
                         {"heights", {r.lo, r.hi}},
+                        {"height_unit", r.height_unit},
+                        {"height_unit_m", r.height_m},
                         {"z_scale", scale},
                         {"samples_without_data", r.without_data}};
 }
@@ -147,7 +150,11 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   facts.iso = options.iso;
   facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {
-    auto raster = inspect_raster(path);
+    const auto file = MappedFile::open(path);
+    if (!file) return file.error();
+    std::vector<std::string> files = companion_files((*file)->text(), "raster", path);
+    files.insert(files.begin(), path);
+    auto raster = inspect_raster(files);
     if (!raster) return raster.error();
     facts.raster = std::move(*raster);
     facts.texture = options.elevation.texture;

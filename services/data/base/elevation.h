@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <string>
 #include <vector>
 
@@ -12,16 +13,17 @@ namespace telesplat::data {
 
 inline constexpr int64_t kMaxRasterSamples = int64_t{1} << 26;  ///< vertices; larger rasters are read coarser
 
-/// A regular grid of heights. Sample (column, row) stands at east = x0 + column * dx, north = y0 - row * dy, metres (or
-/// pixels, if the file does not say where it lies).
+/// A regular grid of heights. Sample (column, row) stands at first + column * along_row + row * along_column: east and
+/// north, metres (or pixels, if the file does not say where it lies).
 struct ElevationRaster {
   int width = 0, height = 0;
-  double x0 = 0, y0 = 0, dx = 1, dy = 1;
-  bool georeferenced = false;      ///< dx, dy and heights have one unit
+  glm::dvec2 first{0}, along_row{1, 0}, along_column{0, -1};
+  bool georeferenced = false;      ///< plan and heights have one unit
   scene::Coordinates coordinates;  ///< of the file, without z_scale
   int step = 1;                    ///< every step-th sample of the file
-  std::vector<float> heights;      ///< row by row from the north, metres; NaN: no data
+  std::vector<float> heights;      ///< row by row, metres; NaN: no data
   std::vector<uint32_t> colours;   ///< of a texture, 0x00RRGGBB, one a sample; empty: none
+  std::vector<std::string> notes;  ///< as Mesh::notes
 };
 
 /// Two triangles a cell whose four corners have data, one where three have. x east, y north, z up. Colours are the
@@ -29,9 +31,5 @@ struct ElevationRaster {
 /// the 2nd to 98th percentile of the rest. Error, starting with `name`: fewer than 2 x 2 samples, no cell with data, a
 /// z_scale that is not finite.
 Result<Mesh> elevation_mesh(const ElevationRaster& raster, const ElevationOptions& options, const std::string& name);
-
-/// Reads with GDAL. It may throw or crash on hostile files: called in the program telesplat-import only. Errors name
-/// the file: no raster, several bands (a picture), more samples than memory.
-Result<ElevationRaster> read_elevation(const std::string& path, const std::string& texture);
 
 }  // namespace telesplat::data

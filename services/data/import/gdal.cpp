@@ -1,16 +1,21 @@
 // Elevation rasters, read by GDAL: heights, where they lie on earth, and a texture draped over them.
 #include <cpl_error.h>
+#include <cpl_vsi.h>
 #include <fmt/format.h>
 #include <gdal.h>
 #include <ogr_srs_api.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "common/core/utf8.h"
-#include "services/data/base/elevation.h"
+#include "common/core/within.h"
+#include "services/data/import/gdal.h"
 #include "services/data/import/raster_facts.h"
 
 namespace telesplat::data {
@@ -25,80 +30,168 @@ struct Close {
 using Dataset = std::unique_ptr<void, Close>;
 
 // Formats of elevation. GDAL knows many more, and tells them by what a file holds, whatever its name is: some name
-// other files, on this machine or on others.
-constexpr const char* kElevationDrivers[] = {"GTiff",   "PNG",  "SRTMHGT", "AAIGrid", "GRASSASCIIGrid",
-                                             "USGSDEM", "DTED", "EHdr",    "GSAG",    nullptr};
+// other files, on this machine or on others. A VRT's are those that we were given.
+constexpr const char* kElevationDrivers[] = {"GTiff", "PNG",  "SRTMHGT", "AAIGrid", "GRASSASCIIGrid", "USGSDEM", "DTED",
+                                             "EHdr",  "GSAG", "VRT",     "XYZ",     nullptr};
 
 // Formats of textures. A file of theirs names no other file.
 constexpr const char* kPictureDrivers[] = {"GTiff", "PNG", "JPEG", "JP2OpenJPEG", "WEBP", "BMP", "GIF", "PNM", nullptr};
 
-Result<Dataset> open(const std::string& path, const char* what, const char* const* drivers) {
-  Dataset dataset(GDALOpenEx(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers, nullptr, nullptr));
-  if (dataset) return dataset;
-  std::string why = CPLGetLastErrorMsg();
-  why = why.substr(0, std::min(why.find('\n'), size_t{200}));
-  return Error{fmt::format("{}: cannot be read as {}: {}", path, what, why.empty() ? "GDAL does not know it" : why)};
+// Where GDAL finds a file that was sent: in its memory files, which are the sent ones themselves.
+std::string place_of(const std::string& path) {
+  return "/vsimem/" + std::filesystem::absolute(path).lexically_normal().relative_path().string();
 }
 
-// Where pixels lie. In degrees, or in some unit of length.
+// Drivers but those above go, so that no file of a VRT is read by one of them.
+Status prepare(ImportFiles& files) {
+  CPLSetErrorHandler(CPLQuietErrorHandler);
+  GDALAllRegister();
+  const auto listed = [](const char* name, const char* const* drivers) {
+    for (; *drivers; ++drivers)
+      if (std::string_view(name) == *drivers) return true;
+    return false;
+  };
+  for (int i = GDALGetDriverCount() - 1; i >= 0; --i) {
+    const GDALDriverH driver = GDALGetDriver(i);
+    const char* const name = GDALGetDriverShortName(driver);
+    if (!listed(name, kElevationDrivers) && !listed(name, kPictureDrivers)) GDALDeregisterDriver(driver);
+  }
+  for (const ImportFile& file : files.all()) {
+    const auto content = files.read(file.path());
+    if (!content) continue;  // empty, for one
+    // GDAL reads them alone: they are open for nothing else.
+    auto* const bytes = reinterpret_cast<GByte*>(const_cast<char*>(content->data()));
+    if (VSILFILE* memory = VSIFileFromMemBuffer(place_of(file.path()).c_str(), bytes, content->size(), FALSE))
+      VSIFCloseL(memory);
+  }
+  return files.all().empty() ? Status(Error{"no file arrived"}) : ok_status();
+}
+
+// What GDAL complained of last, in one line that names files as they are.
+std::string complaint() {
+  std::string why = CPLGetLastErrorMsg();
+  for (size_t at; (at = why.find("/vsimem/")) != why.npos;) why.erase(at, 7);
+  why = why.substr(0, std::min(why.find('\n'), size_t{200}));
+  return why.empty() ? "GDAL does not know it" : why;
+}
+
+Result<Dataset> open(const std::string& path, const char* what, const char* const* drivers) {
+  Dataset dataset(GDALOpenEx(place_of(path).c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers, nullptr, nullptr));
+  if (dataset) return dataset;
+  return Error{fmt::format("{}: cannot be read as {}: {}", path, what, complaint())};
+}
+
+// Where pixels lie: in degrees, or in some unit of length.
 struct Placement {
   double transform[6] = {0, 1, 0, 0, 0, -1};  // corner of pixel (c, r): x = t0 + c t1 + r t2, y = t3 + c t4 + r t5
   bool georeferenced = false, degrees = false;
-  bool south_up = false;  // the file's first row is the last one here
-  double metres = 1;      // a unit of length
+  bool reference = false;  // the file says in what system
+  double metres = 1;       // a unit of length
+  std::string unit;        // its name; empty: not said
+
+  glm::dvec2 at(double column, double row) const {
+    const double* t = transform;
+    return {t[0] + column * t[1] + row * t[2], t[3] + column * t[4] + row * t[5]};
+  }
 };
 
 Placement placement_of(GDALDatasetH dataset) {
   Placement out;
   if (GDALGetGeoTransform(dataset, out.transform) != CE_None) return {};
-  for (const double v : out.transform)
-    if (!std::isfinite(v)) return {};
-  if (out.transform[1] == 0 || out.transform[5] == 0) return {};
-  out.south_up = out.transform[5] > 0;
-  if (out.south_up) {
-    out.transform[3] += out.transform[5] * GDALGetRasterYSize(dataset);
-    out.transform[5] = -out.transform[5];
-  }
+  const double* t = out.transform;
+  for (int i = 0; i < 6; ++i)
+    if (!std::isfinite(t[i])) return {};
+  if (t[1] * t[5] - t[2] * t[4] == 0) return {};
+  out.georeferenced = true;
   if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
-    out.georeferenced = true;
+    out.reference = true;
     out.degrees = OSRIsGeographic(reference);
-    if (!out.degrees) out.metres = OSRGetLinearUnits(reference, nullptr);
+    char* unit = nullptr;
+    if (!out.degrees) out.metres = OSRGetLinearUnits(reference, &unit);
     if (!(out.metres > 0) || !std::isfinite(out.metres)) out.metres = 1;
+    out.unit = out.degrees ? "degrees" : out.metres == 1 || !unit ? "metres" : unit;
   } else {
     // Without a reference system, but with coordinates that can only be degrees.
-    const double *t = out.transform, w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
-    out.degrees =
-        t[0] >= -180.1 && t[0] + w * t[1] <= 180.1 && t[3] <= 90.1 && t[3] + h * t[5] >= -90.1 && std::abs(t[1]) < 0.5;
-    out.georeferenced = out.degrees;
+    const double w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
+    const glm::dvec2 a = out.at(0, 0), b = out.at(w, h);
+    out.degrees = std::max(std::abs(a.x), std::abs(b.x)) <= 180.1 && std::max(std::abs(a.y), std::abs(b.y)) <= 90.1 &&
+                  std::abs(t[1]) < 0.5;
+    if (out.degrees) out.unit = "degrees";
   }
   return out;
 }
 
 std::string line_of(const char* text) { return text ? std::string(text) : std::string(); }
 
+// What a unit of the file's heights is called, and how many metres it has.
+struct HeightUnit {
+  std::string name = "m";
+  double metres = 1;
+  std::string from;  // what says so
+};
+
+std::optional<double> metres_of(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937;
+  constexpr std::pair<const char*, double> kUnits[] = {{"m", 1},
+                                                       {"metre", 1},
+                                                       {"metres", 1},
+                                                       {"meter", 1},
+                                                       {"meters", 1},
+                                                       {"ft", kFoot},
+                                                       {"foot", kFoot},
+                                                       {"feet", kFoot},
+                                                       {"international foot", kFoot},
+                                                       {"cm", 0.01},
+                                                       {"us survey foot", kSurveyFoot},
+                                                       {"us_survey_foot", kSurveyFoot},
+                                                       {"mm", 0.001},
+                                                       {"us-ft", kSurveyFoot},
+                                                       {"ftus", kSurveyFoot},
+                                                       {"km", 1000},
+                                                       {"foot_us", kSurveyFoot},
+                                                       {"decimetre", 0.1},
+                                                       {"dm", 0.1},
+                                                       {"centimetre", 0.01},
+                                                       {"kilometre", 1000}};
+  for (const auto& [unit, metres] : kUnits)
+    if (name == unit) return metres;
+  return std::nullopt;
+}
+
+// The band's own unit first, then that of a vertical reference system, then the plan's: surveys in feet have heights in
+// feet.
+HeightUnit height_unit(GDALDatasetH dataset, GDALRasterBandH band, const Placement& at) {
+  if (const std::string unit = line_of(GDALGetRasterUnitType(band)); !unit.empty()) {
+    const auto metres = metres_of(unit);
+    return {unit, metres.value_or(1), metres ? "the band" : "the band, a unit that is not known: taken for metres"};
+  }
+  const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset);
+  if (reference && OSRIsCompound(reference)) {
+    char* unit = nullptr;
+    const double metres = OSRGetTargetLinearUnits(reference, "COMPD_CS|VERT_CS", &unit);
+    if (metres > 0 && std::isfinite(metres) && unit) return {unit, metres, "its vertical reference system"};
+  }
+  if (!at.degrees && at.metres != 1)
+    return {at.unit, at.metres, "its plan: the file does not say, so heights are taken to be as the plan"};
+  return {};
+}
+
 // What the file's coordinates are called, and how long one of each is in metres.
-scene::Coordinates coordinates_of(GDALDatasetH dataset, GDALRasterBandH band, const Placement& at,
-                                  const glm::dvec3& shown) {
+scene::Coordinates coordinates_of(GDALDatasetH dataset, const HeightUnit& heights, const Placement& at,
+                                  const glm::dvec2& shown) {
   scene::Coordinates out;
-  if (!at.georeferenced || at.transform[2] != 0 || at.transform[4] != 0) return out;
+  if (!at.georeferenced) return out;
   out.space = at.degrees ? scene::Space::kGeographic : scene::Space::kProjected;
-  out.shown = out.lengths = shown;
-  out.unit = at.degrees ? "degrees" : "m";
-  out.height_unit = "m";
+  out.shown = out.lengths = {shown, heights.metres};
+  out.unit = at.unit == "metres" || at.unit.empty() ? "m" : at.unit;
+  out.height_unit = heights.metres == 1 ? "m" : heights.name;
   if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
     out.reference = line_of(OSRGetName(reference));
     const std::string authority = line_of(OSRGetAuthorityName(reference, nullptr)),
                       code = line_of(OSRGetAuthorityCode(reference, nullptr));
     if (!authority.empty() && !code.empty()) out.reference = authority + ":" + code + " " + out.reference;
-    char* unit = nullptr;
-    OSRGetLinearUnits(reference, &unit);
-    if (!at.degrees && at.metres != 1 && unit) out.unit = unit;
   }
-  // Heights are shown as they are; feet say so.
-  const std::string unit = line_of(GDALGetRasterUnitType(band));
-  if (!unit.empty() && unit != "metre" && unit != "meter") out.height_unit = unit;
-  for (const char* foot : {"ft", "foot", "feet", "US survey foot"})
-    if (unit == foot) out.lengths.z = 0.3048;
   out.reference = to_utf8(out.reference.substr(0, scene::kMaxReference));
   out.unit = to_utf8(out.unit.substr(0, scene::kMaxUnit));
   out.height_unit = to_utf8(out.height_unit.substr(0, scene::kMaxUnit));
@@ -123,24 +216,26 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
       return Error{fmt::format("{}: has {} channels, only 8-bit ones can be draped", path,
                                GDALGetDataTypeName(GDALGetRasterDataType(band)))};
     if (GDALRasterIO(band, GF_Read, 0, 0, w, h, texels.data() + c, tw, th, GDT_Byte, 3, 3 * tw) != CE_None)
-      return Error{fmt::format("{}: cannot be read: {}", path, CPLGetLastErrorMsg())};
+      return Error{fmt::format("{}: cannot be read: {}", path, complaint())};
   }
   const Placement of = placement_of(image);
-  const bool upside_down = of.south_up != at.south_up;
   const bool by_place = of.georeferenced && at.georeferenced && of.degrees == at.degrees;
+  const bool upside_down = (of.transform[5] > 0) != (at.transform[5] > 0);
+  double inverse[6];
+  if (by_place && !GDALInvGeoTransform(const_cast<double*>(of.transform), inverse))
+    return Error{fmt::format("{}: its place has no inverse", path)};
   raster.colours.resize(raster.heights.size());
   for (int y = 0; y < raster.height; ++y)
     for (int x = 0; x < raster.width; ++x) {
       const double column = x * raster.step + 0.5, row = y * raster.step + 0.5;
       double fx = column / full_width, fy = row / full_height;
+      if (upside_down) fy = 1 - fy;
       if (by_place) {
-        const double* t = at.transform;
-        fx = (t[0] + column * t[1] - of.transform[0]) / (of.transform[1] * w);
-        fy = (t[3] + row * t[5] - of.transform[3]) / (of.transform[5] * h);
+        const glm::dvec2 p = at.at(column, row) * (at.metres / of.metres);
+        fx = (inverse[0] + p.x * inverse[1] + p.y * inverse[2]) / w;
+        fy = (inverse[3] + p.x * inverse[4] + p.y * inverse[5]) / h;
       }
-      const auto i = size_t(std::clamp(int(fx * tw), 0, tw - 1));
-      const int down = std::clamp(int(fy * th), 0, th - 1);
-      const auto j = size_t((by_place ? of.south_up : upside_down) ? th - 1 - down : down);
+      const auto i = size_t(within(int(fx * tw), 0, tw - 1)), j = size_t(within(int(fy * th), 0, th - 1));
       const uint8_t* texel = &texels[3 * (j * size_t(tw) + i)];
       const bool inside = fx >= 0 && fx < 1 && fy >= 0 && fy < 1;
       raster.colours[size_t(y) * size_t(raster.width) + size_t(x)] =
@@ -166,11 +261,34 @@ Status refuse_picture(GDALDatasetH dataset, const std::string& path) {
                   path)};
 }
 
+// Every step-th sample of every step-th row, in metres.
+Status read_heights(GDALRasterBandH band, const std::string& path, double metres, ElevationRaster& out) {
+  const int w = GDALGetRasterBandXSize(band), h = GDALGetRasterBandYSize(band);
+  int has_none = 0, has_scale = 0, has_offset = 0;
+  const double none = GDALGetRasterNoDataValue(band, &has_none);
+  const double scale = GDALGetRasterScale(band, &has_scale), offset = GDALGetRasterOffset(band, &has_offset);
+  std::vector<float> row(size_t(w), 0.0f);
+  out.heights.reserve(size_t(out.width) * size_t(out.height));
+  for (int y = 0; y < out.height; ++y) {
+    if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
+      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, complaint())};
+    for (int x = 0; x < out.width; ++x) {
+      double v = row[size_t(x) * size_t(out.step)];
+      // -32768 and -9999 are what void samples usually have, said or not.
+      const bool no_data =
+          !std::isfinite(v) || (has_none && v == float(none)) || v == -32768 || v == -9999 || std::abs(v) > 1e9;
+      if (has_scale) v *= scale;
+      if (has_offset) v += offset;
+      out.heights.push_back(no_data ? std::numeric_limits<float>::quiet_NaN() : float(v * metres));
+    }
+  }
+  return ok_status();
+}
+
 }  // namespace
 
-Result<ElevationRaster> read_elevation(const std::string& path, const std::string& texture) {
-  CPLSetErrorHandler(CPLQuietErrorHandler);
-  GDALAllRegister();
+Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture) {
+  if (const Status s = prepare(files); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
   auto opened = open(path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH dataset = opened->get();
@@ -179,53 +297,39 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
   if (w < 2 || h < 2 || w > kMaxSide || h > kMaxSide)
     return Error{fmt::format("{}: a raster of {} x {} samples, limits 2 and {}", path, w, h, kMaxSide)};
   const GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
+  const Placement at = placement_of(dataset);
+  const HeightUnit unit = height_unit(dataset, band, at);
 
   ElevationRaster out;
   while (int64_t{(w + out.step - 1) / out.step} * ((h + out.step - 1) / out.step) > kMaxRasterSamples) ++out.step;
   out.width = (w + out.step - 1) / out.step;
   out.height = (h + out.step - 1) / out.step;
-  out.heights.resize(size_t(out.width) * size_t(out.height));
-  std::vector<float> row(size_t(w), 0.0f);
-  const Placement at = placement_of(dataset);
-  int has_none = 0, has_scale = 0, has_offset = 0;
-  const double none = GDALGetRasterNoDataValue(band, &has_none);
-  const double scale = GDALGetRasterScale(band, &has_scale), offset = GDALGetRasterOffset(band, &has_offset);
-  for (int y = 0; y < out.height; ++y) {
-    const int from = at.south_up ? h - 1 - y * out.step : y * out.step;
-    if (GDALRasterIO(band, GF_Read, 0, from, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
-      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, from, h, CPLGetLastErrorMsg())};
-    for (int x = 0; x < out.width; ++x) {
-      float v = row[size_t(x) * size_t(out.step)];
-      // -32768 and -9999 are what void samples usually have, said or not.
-      const bool no_data =
-          !std::isfinite(v) || (has_none && v == float(none)) || v == -32768.0f || v == -9999.0f || std::abs(v) > 1e9f;
-      if (!no_data && has_scale) v *= float(scale);
-      if (!no_data && has_offset) v += float(offset);
-      out.heights[size_t(y) * size_t(out.width) + size_t(x)] = no_data ? std::numeric_limits<float>::quiet_NaN() : v;
-    }
-  }
-
-  const double* t = at.transform;
-  double east = at.metres, north = at.metres;  // metres a unit
+  if (const Status s = read_heights(band, path, unit.metres, out); !s) return s.error();
+  glm::dvec2 metres(at.metres);  // a unit of x and y
   if (at.degrees) {
-    const double latitude = (t[3] + t[5] * h / 2) * kPi / 180;
-    east = 111'320 * std::max(std::cos(latitude), 0.01);
-    north = 110'574;
+    const double latitude = at.at(w / 2.0, h / 2.0).y * kPi / 180;
+    metres = {111'320 * std::max(std::cos(latitude), 0.01), 110'574};
   }
   out.georeferenced = at.georeferenced;
   // A sample stands in the middle of its pixel.
-  out.dx = std::abs(t[1]) * east * out.step;
-  out.dy = std::abs(t[5]) * north * out.step;
-  out.x0 = (t[0] + t[1] / 2) * east;
-  out.y0 = (t[3] + t[5] / 2) * north;
-  out.coordinates = coordinates_of(dataset, band, at, {east, north, 1});
+  out.first = at.at(0.5, 0.5) * metres;
+  out.along_row = (at.at(1, 0) - at.at(0, 0)) * metres * double(out.step);
+  out.along_column = (at.at(0, 1) - at.at(0, 0)) * metres * double(out.step);
+  out.coordinates = coordinates_of(dataset, unit, at, metres);
+  if (at.georeferenced && !at.degrees && !at.reference)
+    out.notes.push_back(path +
+                        ": does not say in what system its coordinates are; they and the heights are taken for "
+                        "metres");
+  if (!unit.from.empty() && unit.name != "m")
+    out.notes.push_back(
+        fmt::format("{}: heights are in {} ({}), {:.6g} m each", path, unit.name, unit.from, unit.metres));
   if (!texture.empty())
     if (const Status s = drape(texture, at, w, h, out); !s) return s.error();
   return out;
 }
 
-Result<RasterFacts> read_raster_facts(const std::string& path) {
-  const auto raster = read_elevation(path, "");
+Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& path) {
+  const auto raster = read_elevation(files, path, "");
   if (!raster) return raster.error();
   auto opened = open(path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
@@ -236,20 +340,19 @@ Result<RasterFacts> read_raster_facts(const std::string& path) {
   out.width = GDALGetRasterXSize(dataset), out.height = GDALGetRasterYSize(dataset);
   out.step = raster->step;
   const Placement at = placement_of(dataset);
-  const double* t = at.transform;
-  if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
-    if (const char* name = OSRGetName(reference)) out.reference = name;
-    char* unit = nullptr;
-    OSRGetLinearUnits(reference, &unit);
-    out.unit = at.degrees ? "degrees" : at.metres == 1 || !unit ? "metres" : unit;
-  } else if (at.degrees) {
-    out.unit = "degrees";
+  out.reference = raster->coordinates.reference;
+  out.unit = at.unit.empty() && at.georeferenced ? "units" : at.unit;
+  out.height_unit = raster->coordinates.height_unit;
+  out.height_m = raster->coordinates.lengths.z;
+  glm::dvec2 lo(HUGE_VAL), hi(-HUGE_VAL);
+  for (const int corner : {0, 1, 2, 3}) {
+    const glm::dvec2 p = at.at(corner % 2 * out.width, corner / 2 * out.height);
+    lo = glm::min(lo, p), hi = glm::max(hi, p);
   }
-  const double x1 = t[0] + t[1] * out.width, y1 = t[3] + t[5] * out.height;
-  out.west = std::min(t[0], x1), out.east = std::max(t[0], x1);
-  out.south = std::min(t[3], y1), out.north = std::max(t[3], y1);
-  out.sample_x = std::abs(t[1]), out.sample_y = std::abs(t[5]);
-  out.sample_x_m = raster->dx / raster->step, out.sample_y_m = raster->dy / raster->step;
+  out.west = lo.x, out.south = lo.y, out.east = hi.x, out.north = hi.y;
+  out.sample_x = glm::length(at.at(1, 0) - at.at(0, 0)), out.sample_y = glm::length(at.at(0, 1) - at.at(0, 0));
+  out.sample_x_m = glm::length(raster->along_row) / raster->step;
+  out.sample_y_m = glm::length(raster->along_column) / raster->step;
   out.lo = HUGE_VAL, out.hi = -HUGE_VAL;
   for (const float z : raster->heights)
     if (std::isfinite(z))

@@ -3,8 +3,6 @@
 // a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
 #include <fmt/format.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -14,7 +12,9 @@
 #include <new>
 
 #include "services/data/base/cut_off.h"
-#include "services/data/base/elevation.h"
+#include "services/data/import/confine.h"
+#include "services/data/import/files.h"
+#include "services/data/import/gdal.h"
 #include "services/data/import/iso.h"
 #include "services/data/import/process.h"
 #include "services/data/import/raster_facts.h"
@@ -28,23 +28,16 @@ namespace {
 // A hostile file must not keep us busy without end.
 void limit_time(uint64_t bytes) { alarm(static_cast<unsigned>(60 + bytes / 1'000'000)); }
 
-// A reader may take what this process has mapped already, a gigabyte, and `more`. Sanitizers map terabytes of shadow,
-// so there the limit is left out.
-void limit_memory(uint64_t more) {
-#ifndef TELESPLAT_SANITIZED
+// A reader may take what this process has mapped already, a gigabyte, and `more`.
+uint64_t memory_with(uint64_t more) {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
-  const rlim_t bytes = pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + more;
-  const rlimit limit{bytes, bytes};
-  setrlimit(RLIMIT_AS, &limit);
-#else
-  static_cast<void>(more);
-#endif
+  return pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + more;
 }
 
-telesplat::Result<telesplat::data::Mesh> import_elevation(const std::string& path, double z_scale,
-                                                          const std::string& texture) {
-  const auto raster = telesplat::data::read_elevation(path, texture);
+telesplat::Result<telesplat::data::Mesh> import_elevation(telesplat::data::ImportFiles& files, const std::string& path,
+                                                          double z_scale, const std::string& texture) {
+  const auto raster = telesplat::data::read_elevation(files, path, texture);
   if (!raster) return raster.error();
   return telesplat::data::elevation_mesh(*raster, {z_scale, texture}, path);
 }
@@ -56,7 +49,6 @@ bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
   // The voxels, of any type, twice more while they are unpacked or turned; the packed file.
   const uint64_t bytes = header->voxels() * 8;
   limit_time(file_bytes + bytes / 10);
-  limit_memory(3 * bytes + 2 * file_bytes);
   try {
     const auto volume =
         data::read_vtk_volume(*header, path, [&](double fraction) { data::send_progress(out, fraction); });
@@ -83,34 +75,29 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string format = argv[1], path = argv[2];
-  struct stat status {};
-  if (format == "iso")
-    fstat(STDIN_FILENO, &status);
-  else
-    stat(path.c_str(), &status);
-  const auto file_bytes = static_cast<uint64_t>(status.st_size);
-  const rlimit no_core{0, 0};
-  setrlimit(RLIMIT_CORE, &no_core);
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
   // The libraries of this program take a second to load and more; the parent may have died meanwhile.
   if (const char* parent = std::getenv(telesplat::data::kParentVariable); parent && std::atoi(parent) != getppid())
     return 1;
   telesplat::data::end_at_cut_off_files(telesplat::data::kCutOffExit);
+  telesplat::data::ImportFiles files(STDIN_FILENO);
+  const uint64_t file_bytes = files.bytes();
   const int out = dup(STDOUT_FILENO);
-  dup2(STDERR_FILENO, STDOUT_FILENO);  // what VTK prints must not get between
+  dup2(STDERR_FILENO, STDOUT_FILENO);  // what libraries print must not get between
   try {
     if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
     limit_time(file_bytes);
     const bool gltf = format == "gltf" && argc == 4;
     const uint64_t texture_detail = gltf ? std::strtoull(argv[3], nullptr, 10) : 0;
     // Pictures hold many texels a byte; baked triangles are divided into a copy.
-    limit_memory(100 * file_bytes + (gltf ? (uint64_t{3} << 30) + 300 * texture_detail : 0));
+    const uint64_t memory = memory_with(100 * file_bytes + (gltf ? (uint64_t{3} << 30) + 300 * texture_detail : 0));
+    if (format.starts_with("raster")) telesplat::data::confine(memory);
     if (format == "raster-facts") {
-      const auto facts = telesplat::data::read_raster_facts(path);
+      const auto facts = telesplat::data::read_raster_facts(files, path);
       return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
     }
-    const auto mesh = argc == 5         ? import_elevation(path, std::atof(argv[3]), argv[4])
-                      : format == "iso" ? telesplat::data::flying_edges(STDIN_FILENO, path)
+    const auto mesh = argc == 5         ? import_elevation(files, path, std::atof(argv[3]), argv[4])
+                      : format == "iso" ? telesplat::data::flying_edges(files.all().at(0).descriptor(), path)
                                         : telesplat::data::import_with_vtk(
                                               path, format, argc == 4 && !gltf ? argv[3] : "", texture_detail);
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +13,9 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/core/log.h"
+#include "services/data/import/confine.h"
+#include "services/data/import/files.h"
 #include "services/data/import/report.h"
 
 extern char** environ;
@@ -26,30 +30,46 @@ std::string import_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : kImportProgram;
 }
 
+// The program's environment: nothing of ours but what sanitizers take.
+std::vector<std::string> surroundings() {
+  std::vector<std::string> out{fmt::format("{}={}", kParentVariable, getpid())};
+  for (char** variable = environ; *variable; ++variable)
+    for (const char* known : {"ASAN_OPTIONS=", "LSAN_OPTIONS=", "TSAN_OPTIONS=", "UBSAN_OPTIONS="})
+      if (std::string_view(*variable).starts_with(known)) out.emplace_back(*variable);
+  return out;
+}
+
 }  // namespace
 
-Result<pid_t> start_import(int input, int output, std::vector<std::string> words) {
+Result<pid_t> start_import(std::vector<std::string> words, const std::vector<std::string>& files, int output) {
   const std::string format = words[0], path = words[1];
+  static const bool told = [] {
+    if (const std::string missing = not_confined(); !missing.empty())
+      log::warn("files are read with less protection: this kernel does not offer {}", missing);
+    return true;
+  }();
+  static_cast<void>(told);
+  int ends[2];
+  if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
+    return Error{fmt::format("{}: no socket for reading it: {}", path, std::strerror(errno))};
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  if (input >= 0)
-    posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
-  else
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   words.insert(words.begin(), import_program());
   const std::string& program = words[0];
-  std::string parent = fmt::format("{}={}", kParentVariable, getpid());
-  std::vector<char*> surroundings{parent.data()};
-  for (char** variable = environ; *variable; ++variable) surroundings.push_back(*variable);
-  surroundings.push_back(nullptr);
-  std::vector<char*> arguments;
+  std::vector<std::string> variables = surroundings();
+  std::vector<char*> arguments, environment;
   for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
+  for (std::string& variable : variables) environment.push_back(variable.data());
+  arguments.push_back(nullptr), environment.push_back(nullptr);
   pid_t child = -1;
-  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), surroundings.data());
+  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  if (!failed) send_files(ends[0], files);
+  close(ends[0]);
   if (failed)
     return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program,
                              std::strerror(failed))};
@@ -70,12 +90,12 @@ Status end_import(pid_t child, const std::string& reader, const std::string& for
   return ok_status();
 }
 
-Result<Mesh> import(const std::string& reader, std::vector<std::string> words, int input) {
+Result<Mesh> import(const std::string& reader, std::vector<std::string> words, const std::vector<std::string>& files) {
   const std::string format = words[0], path = words[1];
   const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
   if (output < 0) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
   auto result = [&]() -> Result<Mesh> {
-    const auto child = start_import(input, output, std::move(words));
+    const auto child = start_import(std::move(words), files, output);
     if (!child) return child.error();
     if (auto status = end_import(*child, reader, format, path); !status) return status.error();
     return read_import_report(output, path, format);

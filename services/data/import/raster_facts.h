@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/core/result.h"
 
@@ -18,15 +19,17 @@ struct RasterFacts {
   /// Edges and a sample's size, in that unit; without one in samples.
   double west = 0, south = 0, east = 0, north = 0, sample_x = 1, sample_y = 1;
   double sample_x_m = 1, sample_y_m = 1;  ///< in metres, as it is shown; without a unit 1
-  double lo = 0, hi = 0;                  ///< heights, of the samples that are read
+  double lo = 0, hi = 0;                  ///< heights in metres, of the samples that are read
+  std::string height_unit;                ///< of the file's heights; empty: nothing says where it lies
+  double height_m = 1;                    ///< of that unit
   uint64_t without_data = 0;              ///< of the samples that are read
 };
 
-/// Reads it with GDAL, in the program telesplat-import. Errors name the file.
-Result<RasterFacts> inspect_raster(const std::string& path);
+/// Reads it with GDAL, in the program telesplat-import. files: the raster, then what lies beside it. Errors name the
+/// file.
+Result<RasterFacts> inspect_raster(const std::vector<std::string>& files);
 
 /// That program's part.
-Result<RasterFacts> read_raster_facts(const std::string& path);
 bool write_raster_facts(int descriptor, const Result<RasterFacts>& facts);
 
 }  // namespace telesplat::data

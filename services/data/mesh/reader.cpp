@@ -14,7 +14,7 @@ namespace {
 constexpr const char* kSupported =
     "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTU, VTK (polygons and unstructured grids), glTF and GLB, "
     "and elevation rasters "
-    "(GeoTIFF, HGT, 16-bit PNG, ASCII grid)";
+    "(GeoTIFF, HGT, 16-bit PNG, ASCII and XYZ grids, VRT)";
 
 std::string extension_of(const std::string& path) {
   std::string out = std::filesystem::path(path).extension().string();
@@ -59,7 +59,8 @@ bool looks_like_raster(std::string_view content, const std::string& extension) {
   if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv) || content.starts_with("II+\0"sv)) return true;
   // As in other_kind().
   if (content.starts_with("\x89PNG"sv)) return content.size() > 26 && content[24] == 16 && content[25] == 0;
-  return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2"});
+  if (content.substr(0, 1000).find("<VRTDataset") != content.npos) return true;
+  return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2", ".xyz", ".vrt"});
 }
 
 // Ascii STL starts with "solid", and so do some binary ones: their size gives them away.
@@ -151,7 +152,7 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
                 : detected.format == "stl" ? read_stl(content, path, progress)
                 : detected.format == "obj" ? read_obj(content, path, progress, texture_detail)
                 : detected.format == "raster"
-                    ? read_with_gdal(path, elevation, progress)
+                    ? read_with_gdal(content, path, elevation, progress)
                     : read_with_vtk(content, detected.format, path, progress, array, texture_detail);
     if (!mesh) return mesh;
     if (auto status = validate_mesh(*mesh, path); !status) return status.error();

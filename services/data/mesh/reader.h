@@ -61,10 +61,13 @@ Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, 
 
 /// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
 /// elevation.h.
-Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress);
+Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
+                            const ReadProgress& progress);
 
-/// Other files that `path` pulls in (material libraries of an OBJ and their textures, buffers and images of a glTF), as
-/// paths; existing or not.
+/// Other files that `path` pulls in (material libraries of an OBJ and their textures, buffers and images of a glTF,
+/// files of a VRT, what says beside a raster where it lies), as paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);
+/// Of a VRT: the files that it is made of, as it names them.
+std::vector<std::string> vrt_sources(std::string_view content);
 
 }  // namespace telesplat::data

@@ -84,7 +84,7 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
     if (input >= 0) close(input);
     return Error{fmt::format("{}: no memory file for its voxels: {}", name, std::strerror(reason))};
   }
-  auto mesh = import("VTK's surface", {"iso", name}, input);
+  auto mesh = import("VTK's surface", {"iso", name}, {fmt::format("/proc/self/fd/{}", input)});
   close(input);
   if (!mesh) return mesh;
   mesh->frame = volume.box();

@@ -18,7 +18,7 @@ Result<StreamedVolume> read_volume_with_vtk(const VolumeFileHeader& header, cons
   if (pipe2(ends, O_CLOEXEC) != 0)
     return Error{fmt::format("{}: no pipe for reading it: {}", path, std::strerror(errno))};
   fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);  // fewer turns between the two processes; smaller ones do as well
-  const auto child = start_import(-1, ends[1], {header.format, path});
+  const auto child = start_import({header.format, path}, {path}, ends[1]);
   close(ends[1]);
   if (!child) {
     close(ends[0]);

@@ -12,7 +12,7 @@ namespace {
 constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
 ElevationRaster raster(int width, int height, auto z) {
-  ElevationRaster r{width, height, 100, 2000, 30, 30, true};
+  ElevationRaster r{width, height, {100, 2000}, {30, 0}, {0, -30}, true};
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) r.heights.push_back(z(x, y));
   return r;
@@ -33,6 +33,23 @@ TEST(Elevation, StandsEastNorthAndUp) {
   EXPECT_TRUE(validate_mesh(*mesh, "a"));
 }
 
+TEST(Elevation, StandsAsItsGridIsTurnedAndMirrored) {
+  auto turned = raster(4, 3, [](int x, int y) { return float(10 * x + y); });
+  for (const auto& [row, column] :
+       {std::pair{glm::dvec2(24, 18), glm::dvec2(18, -24)},    // by 37 degrees
+        std::pair{glm::dvec2(30, 0), glm::dvec2(0, 30)},       // its first row in the south
+        std::pair{glm::dvec2(-30, 0), glm::dvec2(0, -30)}}) {  // its first column in the east
+    turned.along_row = row, turned.along_column = column;
+    const auto mesh = elevation_mesh(turned, {}, "a");
+    ASSERT_TRUE(mesh);
+    EXPECT_EQ(mesh->positions[7], glm::dvec3(glm::dvec2(100, 2000) + 3.0 * row + column, 31));
+    for (size_t i = 0; i < mesh->indices.size(); i += 3) {
+      const auto p = [&](size_t k) { return mesh->positions[mesh->indices[i + k]]; };
+      EXPECT_GT(glm::cross(p(1) - p(0), p(2) - p(0)).z, 0);
+    }
+  }
+}
+
 TEST(Elevation, IsScaledUpwards) {
   const auto flat = raster(8, 8, [](int x, int) { return float(x); });
   const auto three = elevation_mesh(flat, {.z_scale = 3}, "a");
@@ -41,7 +58,7 @@ TEST(Elevation, IsScaledUpwards) {
   // Without a place on earth nobody knows what a pixel is: the relief becomes a seventh of the longer side.
   auto unplaced = flat;
   unplaced.georeferenced = false;
-  unplaced.dx = unplaced.dy = 1;
+  unplaced.along_row = {1, 0}, unplaced.along_column = {0, -1};
   const auto automatic = elevation_mesh(unplaced, {}, "a");
   ASSERT_TRUE(automatic);
   EXPECT_NEAR(automatic->positions[7].z - automatic->positions[0].z, 8.0 / 7, 1e-6);

@@ -248,7 +248,7 @@ TEST(VtkReader, GltfNodesAndMaterials) {
   EXPECT_NE(missing.error().text.find("ab.bin"), std::string::npos) << missing.error().text;
 }
 
-TEST(Rasters, AsciiGridWithAVoidCorner) {
+TEST(AsciiGrids, HaveAVoidCorner) {
   const TempFolder folder;
   const auto path =
       folder.write("grid.asc",
@@ -264,22 +264,7 @@ TEST(Rasters, AsciiGridWithAVoidCorner) {
   EXPECT_EQ(mesh->colours.size(), 5u);
 }
 
-// GDAL would read this by what it holds, and with it whatever it names.
-TEST(Rasters, NameNoOtherFile) {
-  const TempFolder folder;
-  folder.write("real.asc", "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n");
-  ASSERT_TRUE(read_mesh(folder / "real.asc", nullptr));
-  const auto path = folder.write(
-      "named.asc",
-      "<VRTDataset rasterXSize=\"3\" rasterYSize=\"2\"><VRTRasterBand dataType=\"Float32\" band=\"1\"><SimpleSource>"
-      "<SourceFilename relativeToVRT=\"1\">real.asc</SourceFilename><SourceBand>1</SourceBand></SimpleSource>"
-      "</VRTRasterBand></VRTDataset>");
-  const auto mesh = read_mesh(path, nullptr);
-  ASSERT_FALSE(mesh);
-  EXPECT_TRUE(mesh.error().text.starts_with(path + ": cannot be read as an elevation raster")) << mesh.error().text;
-}
-
-TEST(Rasters, TextureIsDraped) {
+TEST(AsciiGrids, ATextureIsDraped) {
   const TempFolder folder;
   const auto path = folder.write("grid.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n4 5\n");
   const auto image =

@@ -49,15 +49,15 @@ TEST(Inspect, ARastersUnitsAndColoursAreTrue) {
   EXPECT_NEAR(double(told.json["room"]["hi"][2]), 0.4, 1e-6);
 }
 
-TEST(Inspect, AGridWithoutAPlaceSaysSo) {
+TEST(Inspect, AGridWithoutASystemSaysSo) {
   const TempFolder folder;
   const std::string path = folder.write(
       "grid.asc", "ncols 4\nnrows 3\nxllcorner 900\nyllcorner 900\ncellsize 1\n1 2 3 4\n1 2 3 4\n1 2 3 5\n");
   EXPECT_TRUE(is_mesh_file(path));
   const auto facts = inspect_mesh(path, no_cache(), nullptr);
   ASSERT_TRUE(facts.ok()) << facts.error().text;
-  // A seventh of the side, 4 samples, for 4 of height.
-  expect_rows(describe(*facts), {"the file does not say", "1 .. 5, shown times 0.1429 (--z-scale)"});
+  expect_rows(describe(*facts), {"units: west 900, east 904", "does not say in what system its coordinates are",
+                                 "1 .. 5 m, shown times 1 (--z-scale)"});
 }
 
 TEST(Inspect, APictureIsNoElevationAndTheLineSaysWhatIs) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/import/process.h"
@@ -76,12 +77,20 @@ Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, 
                            const ReadProgress& progress, const std::string& array, uint64_t texture_detail) {
   if (auto status = check_before(content, format, path); !status) return status.error();
   if (progress) progress(0.0);
-  return import("VTK's " + format, {format, path, format == "gltf" ? std::to_string(texture_detail) : array});
+  return import("VTK's " + format, {format, path, format == "gltf" ? std::to_string(texture_detail) : array}, {path});
 }
 
-Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress) {
+Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
+                            const ReadProgress& progress) {
   if (progress) progress(0.0);
-  return import("GDAL's raster", {"raster", path, fmt::format("{}", options.z_scale), options.texture});
+  std::error_code error;
+  for (const std::string& name : vrt_sources(content))
+    if (!std::filesystem::exists(std::filesystem::path(path).parent_path() / name, error))
+      return Error{fmt::format("{}: is made of {}, which is missing", path, name)};
+  std::vector<std::string> files = companion_files(content, "raster", path);
+  files.insert(files.begin(), path);
+  if (!options.texture.empty()) files.push_back(options.texture);
+  return import("GDAL's raster", {"raster", path, fmt::format("{}", options.z_scale), options.texture}, files);
 }
 
 }  // namespace telesplat::data

@@ -1,0 +1,54 @@
+// How telesplat-import gets the files that it reads: as descriptors, from the process that asked. It opens none itself.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "services/data/base/companions.h"
+#include "services/data/base/mapped_file.h"
+
+namespace telesplat::data {
+
+/// Sends descriptors of those of `paths` that are regular files and can be opened, each with its path, through a socket
+/// of packets. Stops where the other end is gone.
+void send_files(int socket, const std::vector<std::string>& paths);
+
+/// A file that was received.
+class ImportFile {
+ public:
+  ImportFile(std::string path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+
+  /// As the sender named it.
+  const std::string& path() const { return path_; }
+  uint64_t size() const;
+  int descriptor() const { return descriptor_; }
+  /// Maps it. Error: it is empty or cannot be mapped.
+  Result<std::shared_ptr<const MappedFile>> map() const { return MappedFile::map(descriptor_, path_); }
+
+ private:
+  std::string path_;
+  int descriptor_;  // open as long as the process lives
+};
+
+/// All that a sender sent: the file to be read first, then its companions.
+class ImportFiles : public Companions {
+ public:
+  /// Receives until the sender closes its end.
+  explicit ImportFiles(int socket);
+
+  const std::vector<ImportFile>& all() const { return files_; }
+  uint64_t bytes() const;  ///< of all files together
+  /// The content of the first one. Error: it did not come; it is empty.
+  Result<std::string_view> content();
+  /// named: relative to the folder of the first one.
+  Result<std::string_view> read(const std::string& named) override;
+
+ private:
+  Result<std::string_view> mapped(const ImportFile& file);
+
+  std::vector<ImportFile> files_;
+  std::vector<std::shared_ptr<const MappedFile>> mapped_;
+};
+
+}  // namespace telesplat::data
