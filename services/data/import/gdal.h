@@ -9,8 +9,8 @@
 
 namespace telesplat::data {
 
-/// Reads the raster `path` and the picture `texture` (empty: none), both among `files`. Errors name the file: no raster,
-/// several bands (a picture), more samples than memory.
+/// Reads the raster `path` and the picture `texture` (empty: none), both among `files`. Errors name the file: no
+/// raster, several bands (a picture), more samples than memory.
 Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture);
 
 /// What it says of itself, and the heights that it holds.
