@@ -41,6 +41,8 @@ Status check_volume(const DataOptions& o) {
     const auto header = read_volume_header(step, o.volume.raw);
     if (!header || header->data_path.empty() || header->data_path == step) continue;
     if (const Status s = check_named(step, header->data_path); !s) return s;
+    for (const std::string& part : header->more_paths)
+      if (const Status s = check_named(step, part); !s) return s;
   }
   return ok_status();
 }

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+
+#include "common/core/within.h"
 
 namespace telesplat::data {
 namespace {
@@ -34,6 +37,14 @@ std::string bytes_text(uint64_t bytes) {
   if (bytes < 100'000) return fmt::format("{} bytes", bytes);
   return bytes < 1'000'000'000 ? fmt::format("{:.1f} MB", double(bytes) / 1e6)
                                : fmt::format("{:.2f} GB", double(bytes) / 1e9);
+}
+
+std::string range_text(double lo, double hi) {
+  constexpr int kDigits = 6, kMostDigits = 17;
+  const double largest = std::max(std::abs(lo), std::abs(hi));
+  const double more = hi > lo ? std::ceil(std::log10(largest / (hi - lo))) - 1 : 0;
+  const int digits = kDigits + int(within(more, 0.0, double(kMostDigits - kDigits)));
+  return fmt::format("{:.{}g} .. {:.{}g}", lo, digits, hi, digits);
 }
 
 std::string vector_text(const glm::dvec3& v) {

@@ -30,6 +30,8 @@ class Description {
 };
 
 std::string bytes_text(uint64_t bytes);        ///< "812 bytes", "1.3 MB"
+/// "0 .. 240": both ends with as many digits as tell them apart.
+std::string range_text(double lo, double hi);
 std::string vector_text(const glm::dvec3& v);  ///< "(1, 2.5, -3)"
 std::string extent_text(const glm::dvec3& v);  ///< "1 x 2.5 x 3"
 nlohmann::ordered_json vector_json(const glm::dvec3& v);

@@ -70,7 +70,7 @@ void describe_raster(const RasterFacts& r, const geometry::DBox& box, Descriptio
                     r.unit == "metres" ? "" : fmt::format(", {:.4g} x {:.4g} m as shown", r.sample_x_m, r.sample_y_m)));
   const double scale = r.hi > r.lo ? (box.hi.z - box.lo.z) / (r.hi - r.lo) : 1;
   out.row("heights",
-          fmt::format("{:.6g} .. {:.6g}{}{}, shown times {:.4g} (--z-scale){}", r.lo, r.hi, r.unit.empty() ? "" : " m",
+          fmt::format("{}{}{}, shown times {:.4g} (--z-scale){}", range_text(r.lo, r.hi), r.unit.empty() ? "" : " m",
                       r.height_m == 1 ? "" : fmt::format(", in the file {} of {:.6g} m", r.height_unit, r.height_m),
                       scale, r.without_data > 0 ? fmt::format("; {} samples have no data", r.without_data) : ""));
   out.json["raster"] = {{"samples", {r.width, r.height}},
@@ -108,7 +108,7 @@ void describe_shape(const MeshFileFacts& facts, Description& out) {
 }
 
 std::string span_text(const scene::ValueSpan& span) {
-  return span.empty() ? "no finite values" : fmt::format("{:.6g} .. {:.6g}", span.lo, span.hi);
+  return span.empty() ? "no finite values" : range_text(span.lo, span.hi);
 }
 
 nlohmann::ordered_json span_json(const scene::ValueSpan& span) {

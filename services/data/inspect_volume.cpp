@@ -85,11 +85,11 @@ void describe_values(const VolumeFileFacts& facts, Description& out) {
   if (steps > 1 && facts.steps_read < steps)
     of = fmt::format(", of the first step alone: the {} steps together are more than is kept in memory", steps);
   out.row("values",
-          fmt::format("{:.6g} .. {:.6g}{}{}{}", range.lo, range.hi, range.hounsfield ? ", Hounsfield units (a CT)" : "",
+          fmt::format("{}{}{}{}", range_text(range.lo, range.hi), range.hounsfield ? ", Hounsfield units (a CT)" : "",
                       of, v.not_finite > 0 ? fmt::format("; {} voxels are not finite", v.not_finite) : ""));
-  out.row("", fmt::format("mostly {:.6g} .. {:.6g} where it is not background", range.typical_lo, range.typical_hi));
+  out.row("", fmt::format("mostly {} where it is not background", range_text(range.typical_lo, range.typical_hi)));
   out.row("histogram", fmt::format("|{}| (log{})", bars(facts.histogram),
-                                   steps > 1 ? fmt::format("; first step, {:.6g} .. {:.6g}", v.lo, v.hi) : ""));
+                                   steps > 1 ? "; first step, " + range_text(v.lo, v.hi) : ""));
   out.json["values"] = {{"lo", range.lo},
                         {"hi", range.hi},
                         {"typical_lo", range.typical_lo},

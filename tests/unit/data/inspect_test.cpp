@@ -27,6 +27,14 @@ std::string write_tile(const TempFolder& folder) {
   return folder.write("N42W123.hgt", heights);
 }
 
+TEST(Inspect, RangesHaveAsManyDigitsAsTellTheirEndsApart) {
+  EXPECT_EQ(range_text(0, 240), "0 .. 240");
+  EXPECT_EQ(range_text(-0.123456789, 1), "-0.123457 .. 1");
+  EXPECT_EQ(range_text(1e9, 1e9 + 240), "1000000000 .. 1000000240");
+  EXPECT_EQ(range_text(101325, 101325.25), "101325 .. 101325.25");
+  EXPECT_EQ(range_text(7, 7), "7 .. 7");
+}
+
 TEST(Inspect, ARastersUnitsAndColoursAreTrue) {
   const TempFolder folder;
   const auto facts = inspect_mesh(write_tile(folder), no_cache(), nullptr);

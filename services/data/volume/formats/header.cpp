@@ -88,10 +88,10 @@ Status check_header(const VolumeFileHeader& h, uint64_t data_bytes, const std::s
     return Error{fmt::format("{}: claims {} from byte {} on, but {} has {} bytes", path, claim_of(h), h.data_at, where,
                              data_bytes)};
   const uint64_t there = data_bytes - (h.data_at_end ? 0 : h.data_at);
-  const uint64_t needed = h.voxel_bytes() + h.skip_unpacked;
+  const uint64_t needed = h.voxel_bytes() / h.parts() + h.skip_unpacked;
   const bool fits = h.encoding == Encoding::kRaw    ? needed <= there
                     : h.encoding == Encoding::kGzip ? needed / kBestPacking <= there
-                                                    : 2 * h.voxels() - 1 <= there;
+                                                    : 2 * (h.voxels() / h.parts()) - 1 <= there;
   if (!fits)
     return Error{fmt::format("{}: claims {}, but {} has {} bytes{}", path, claim_of(h), where, there,
                              h.encoding == Encoding::kGzip   ? " of compressed ones"
@@ -193,13 +193,16 @@ Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::
   }();
   if (!header) return header;
   VolumeFileHeader h = *header;
-  uint64_t data_bytes = start->file_bytes;
-  if (h.data_path != path) {
+  const bool detached = h.data_path != path;
+  uint64_t data_bytes = detached ? ~uint64_t{0} : start->file_bytes;  // of the smallest file
+  for (size_t i = 0; detached && i < h.parts(); ++i) {
+    const std::string& part = i == 0 ? h.data_path : h.more_paths[i - 1];
     std::error_code error;
-    if (!std::filesystem::is_regular_file(h.data_path, error))
-      return Error{fmt::format("{}: its data file is missing: {}", path, h.data_path)};
-    data_bytes = std::filesystem::file_size(h.data_path, error);
-    if (error) return Error{fmt::format("{}: {}: {}", path, h.data_path, error.message())};
+    if (!std::filesystem::is_regular_file(part, error))
+      return Error{fmt::format("{}: its data file is missing: {}", path, part)};
+    const uint64_t bytes = std::filesystem::file_size(part, error);
+    if (error) return Error{fmt::format("{}: {}: {}", path, part, error.message())};
+    data_bytes = std::min(data_bytes, bytes);
   }
   if (h.format == "nifti" && (start->packed || lower(h.data_path).ends_with(".gz"))) {
     h.encoding = Encoding::kGzip;  // all of the file is packed, header included

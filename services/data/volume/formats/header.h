@@ -32,7 +32,10 @@ struct VolumeFileHeader {
   double scale = 1, offset = 0;
   bool ct = false;  ///< the file says that it is a CT
   // Where the voxels are. kGzip: a gzip or zlib stream from data_at on.
-  std::string data_path;       ///< a file; often the header's own
+  std::string data_path;  ///< a file; often the header's own
+  /// Further files, where the voxels lie in several: each has as many of them, and begins as the first.
+  std::vector<std::string> more_paths;
+  uint32_t line_skip = 0;      ///< lines to leave out at a file's beginning, before data_at counts
   uint64_t data_at = 0;        ///< byte in that file
   bool data_at_end = false;    ///< instead: as many bytes as the voxels take, at the file's end
   uint64_t skip_unpacked = 0;  ///< bytes to leave out behind the decompression
@@ -41,6 +44,7 @@ struct VolumeFileHeader {
 
   uint64_t voxels() const { return uint64_t(size[0]) * uint64_t(size[1]) * uint64_t(size[2]); }
   uint64_t voxel_bytes() const { return voxels() * stored_bytes(stored); }
+  size_t parts() const { return 1 + more_paths.size(); }
 };
 
 // Parsers of one format. `content`: the header's file from its beginning, at least its first kHeaderBytes or all of it.
@@ -52,10 +56,11 @@ inline constexpr const char* kSupportedTypes =
     "supported are 8 to 64-bit integers and 32 and 64-bit floating point numbers, one a voxel";
 
 /// NRRD 1..5, attached and detached: encodings raw, gzip, text; spacings or space directions; spaces with left-handed
-/// axes are mirrored at x, so that what is shown is not. Error: list files, other encodings, more axes than three that
-/// are longer than one. Source: teem.sourceforge.net/nrrd/format.html.
+/// axes are mirrored at x, so that what is shown is not; lists and patterns of files; axis mins and maxs. Error: other
+/// encodings, more axes than three that are longer than one. Source: teem.sourceforge.net/nrrd/format.html.
 Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path);
-/// MetaImage (.mha, .mhd): TransformMatrix, ElementSpacing, Offset; zlib. Error: LIST files, several channels.
+/// MetaImage (.mha, .mhd): TransformMatrix, ElementSpacing, Offset; zlib; lists and patterns of files. Error: several
+/// channels.
 Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::string& path);
 /// NIfTI 1 and 2, single files and .hdr/.img pairs, in either byte order. `content` is unpacked. The sform if there is
 /// one, else the qform, else the spacing. Error: time steps, colours, Analyze files. Source:
@@ -68,7 +73,7 @@ Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& 
 /// For help texts and errors.
 inline constexpr const char* kRawTypes =
     "u8, i8, u16, i16, u32, i32, u64, i64, f32, f64, little-endian, or big-endian with be behind them (u16be)";
-/// What --raw says, for the file at `path`: "WxHxD:TYPE[:SX,SY,SZ]", TYPE one of kRawTypes.
+/// What --raw says, for the file at `path`: "WxHxD:TYPE[:SX,SY,SZ][:skip=BYTES]", TYPE one of kRawTypes.
 Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path);
 /// What --raw could say of a file of so many bytes, likeliest first, at most three: what its name says
 /// (tooth_103x94x161_uint16.raw), else cubes and stacks of square slices that are nearly cubes. Each has exactly that

@@ -66,4 +66,35 @@ glm::dmat4 placement(const glm::dvec3& i, const glm::dvec3& j, const glm::dvec3&
   return {glm::dvec4(i, 0), glm::dvec4(j, 0), glm::dvec4(k, 0), glm::dvec4(origin, 1)};
 }
 
+Result<std::vector<std::string>> files_of_pattern(std::string_view text) {
+  const size_t blank = std::min(text.find_first_of(" \t"), text.size()), percent = text.find('%');
+  const std::string_view name = text.substr(0, blank);
+  const auto range = numbers(text.substr(blank));
+  const auto bad = [&] { return Error{in_quotes(text) + " is no pattern of files: NAME%03d FIRST LAST STEP"}; };
+  const size_t end = percent < blank ? name.find_first_not_of("0123456789", percent + 1) : name.npos;
+  if (end == name.npos || name[end] != 'd' || !range || range->size() < 2 || name.find('%', end) != name.npos)
+    return bad();
+  const bool padded = name[percent + 1] == '0';
+  const auto width = size_t(number(name.substr(percent + 1, end - percent - 1)).value_or(0));
+  const double first = (*range)[0], last = (*range)[1], step = range->size() > 2 ? (*range)[2] : 1;
+  if (!(std::abs(first) < 1e9) || !(std::abs(last) < 1e9) || !(std::abs(step) >= 1) || width > 20 ||
+      (last - first) / step < 0 || (last - first) / step >= double(kMostFiles))
+    return bad();
+  std::vector<std::string> out;
+  for (double n = first; step > 0 ? n <= last : n >= last; n += step)
+    out.push_back(
+        fmt::format("{}{}{}", name.substr(0, percent),
+                    padded ? fmt::format("{:0{}}", int64_t(n), width) : fmt::format("{:{}}", int64_t(n), width),
+                    name.substr(end + 1)));
+  return out;
+}
+
+Status take_files(const std::vector<std::string>& names, const std::string& path, VolumeFileHeader& h) {
+  if (names.empty() || names.size() > h.voxels() || h.voxels() % names.size() != 0)
+    return Error{fmt::format("{}: its {} voxels lie in {} files, not as many in each", path, h.voxels(), names.size())};
+  h.data_path = beside(path, names[0]);
+  for (size_t i = 1; i < names.size(); ++i) h.more_paths.push_back(beside(path, names[i]));
+  return ok_status();
+}
+
 }  // namespace telesplat::data

@@ -46,6 +46,7 @@ Result<std::vector<double>> per_axis(const Keys& keys, std::initializer_list<std
 // The lines up to ElementDataFile, behind which local data begin.
 struct Lines {
   Keys keys;
+  std::vector<std::string> files;  // behind "ElementDataFile = LIST"
   size_t data_at = 0;
 };
 Result<Lines> read_lines(std::string_view content, const std::string& path) {
@@ -62,7 +63,14 @@ Result<Lines> read_lines(std::string_view content, const std::string& path) {
     const std::string_view key = trim(line.substr(0, equals));
     lines.keys.emplace(key, trim(line.substr(equals + 1)));
     lines.data_at = begin;
-    if (key == "ElementDataFile") return lines;
+    if (key != "ElementDataFile") continue;
+    for (std::string_view rest = content.substr(std::min(begin, content.size()));
+         lines.keys[key].starts_with("LIST") && !rest.empty() && lines.files.size() < kMostFiles;) {
+      const std::string_view name = rest.substr(0, rest.find('\n'));
+      rest.remove_prefix(std::min(name.size() + 1, rest.size()));
+      if (!trim(name).empty()) lines.files.emplace_back(trim(name));
+    }
+    return lines;
   }
   return Error{path + ": its header has no ElementDataFile, so that it has no end"};
 }
@@ -120,11 +128,16 @@ Status find_data(const Lines& lines, const std::string& path, VolumeFileHeader& 
   const bool packed = is_true(value(keys, {"CompressedData"}));
   h.encoding = packed ? Encoding::kGzip : binary ? Encoding::kRaw : Encoding::kText;
   const std::string_view data = value(keys, {"ElementDataFile"});
-  if (data.empty() || data == "LIST" || data.starts_with("LIST ") || data.find('%') != data.npos)
-    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
-  const bool local = data == "LOCAL" || data == "Local" || data == "local";
-  h.data_path = local ? path : beside(path, data);
-  h.data_at = local ? lines.data_at : 0;
+  if (data.empty()) return Error{path + ": its ElementDataFile is empty"};
+  const bool local = data == "LOCAL" || data == "Local" || data == "local", listed = data.starts_with("LIST");
+  if (listed || data.find('%') != data.npos) {
+    const auto files = listed ? Result(lines.files) : files_of_pattern(data);
+    if (!files) return Error{fmt::format("{}: {}", path, files.error().text)};
+    if (const Status s = take_files(*files, path, h); !s) return s;
+  } else {
+    h.data_path = local ? path : beside(path, data);
+    h.data_at = local ? lines.data_at : 0;
+  }
   const auto text = value(keys, {"HeaderSize"});
   if (text.empty() || local) return ok_status();
   const auto bytes = number(text);

@@ -39,6 +39,7 @@ std::optional<StoredType> type_named(const std::string& name) {
 // The fields, by lower-case names without blanks, and where the data begins: behind the first empty line.
 struct Lines {
   Fields fields;
+  std::vector<std::string> files;  // behind "data file: LIST"
   bool ct = false;
   bool ended = false;  // by an empty line
   size_t data_at = 0;
@@ -46,6 +47,7 @@ struct Lines {
 
 Lines split(std::string_view content) {
   Lines out;
+  bool listed = false;
   size_t at = content.find('\n');
   while (at != content.npos && at + 1 < content.size()) {
     const size_t begin = at + 1;
@@ -58,6 +60,10 @@ Lines split(std::string_view content) {
     }
     if (line.front() == '#') continue;
     const size_t colon = line.find(':');
+    if (listed) {
+      if (out.files.size() < kMostFiles) out.files.emplace_back(line);
+      continue;
+    }
     if (colon == line.npos) continue;
     if (line.substr(colon).starts_with(":=")) {  // key/value pairs
       out.ct |=
@@ -66,6 +72,7 @@ Lines split(std::string_view content) {
     }
     std::string name = lower(line.substr(0, colon));
     std::erase(name, ' ');
+    listed = name == "datafile" && trim(line.substr(colon + 1)).starts_with("LIST");
     out.fields.emplace(std::move(name), trim(line.substr(colon + 1)));
   }
   return out;
@@ -116,11 +123,19 @@ scene::Space space_named(std::string_view space) {
   return scene::Space::kPlain;
 }
 
+// Whether the samples of an axis stand at nodes: "cell node ???", a word an axis.
+bool at_nodes(std::string_view centers, size_t axis) {
+  for (; axis > 0; --axis) centers = trim(centers.substr(std::min(centers.find(' '), centers.size())));
+  return centers.starts_with("node");
+}
+
 // Directions and origin of the three axes that are kept.
-Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>& axes, size_t dimension,
-                                const std::string& path) {
+Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>& axes,
+                                const std::vector<int64_t>& sizes, const std::string& path) {
+  const size_t dimension = sizes.size();
   std::array<glm::dvec3, 3> step{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
   glm::dvec3 origin(0);
+  bool placed = false;
   if (const auto text = field(fields, {"spacedirections"}); !text.empty()) {
     const auto all = vectors(text);
     if (!all || all->size() != dimension)
@@ -128,13 +143,25 @@ Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>&
                                dimension)};
     for (size_t a = 0; a < 3; ++a)
       if (!(*all)[axes[a]].empty()) step[a] = to_vec((*all)[axes[a]]);
+    placed = true;
   } else if (const auto spacings = field(fields, {"spacings"}); !spacings.empty()) {
     const auto all = numbers(spacings);
     if (!all || all->size() != dimension)
       return Error{fmt::format("{}: its spacings are {}, not {} numbers", path, in_quotes(spacings), dimension)};
     for (size_t a = 0; a < 3; ++a)
       if (const double s = (*all)[axes[a]]; !std::isnan(s)) step[a] *= s;
+    placed = true;
   }
+  const auto mins = numbers(field(fields, {"axismins"})), maxs = numbers(field(fields, {"axismaxs"}));
+  if (!placed && mins && maxs && mins->size() == dimension && maxs->size() == dimension)
+    for (size_t a = 0; a < 3; ++a) {
+      // From the first sample's edge to the last one's; of samples at nodes from the first to the last.
+      const double lo = (*mins)[axes[a]], span = (*maxs)[axes[a]] - lo, n = double(sizes[axes[a]]);
+      if (!std::isfinite(lo) || !(std::abs(span) > 0)) continue;
+      const bool nodes = at_nodes(field(fields, {"centers", "centerings"}), axes[a]) && n > 1;
+      step[a] *= span / (nodes ? n - 1 : n);
+      origin[int(a)] = lo + (nodes ? 0 : span / n / 2);
+    }
   if (const auto text = field(fields, {"spaceorigin"}); !text.empty()) {
     const auto all = vectors(text);
     if (!all || all->size() != 1 || all->front().empty())
@@ -187,19 +214,28 @@ Status find_data(const Lines& lines, const std::string& path, VolumeFileHeader& 
   const std::string_view data = field(fields, {"datafile"});
   if (data.empty() && !lines.ended)
     return Error{fmt::format("{}: its header does not end (no empty line) and names no data file", path)};
-  if (data.starts_with("LIST") || data.find('%') != data.npos)
-    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
+  if (data.starts_with("LIST") || data.find('%') != data.npos) {
+    // "LIST [DIM]" and names, or "PATTERN FIRST LAST STEP [DIM]"; DIM adds nothing: all have as many voxels.
+    const auto files = data.starts_with("LIST") ? Result(lines.files) : files_of_pattern(data);
+    if (!files) return Error{fmt::format("{}: {}", path, files.error().text)};
+    return take_files(*files, path, h);
+  }
   h.data_path = data.empty() ? path : beside(path, data);
   h.data_at = data.empty() ? lines.data_at : 0;
+  return ok_status();
+}
 
+// What is left out at their beginning.
+Status read_skips(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
   const auto skipped = [&](std::initializer_list<const char*> names) {
     const auto text = field(fields, names);
     return text.empty() ? std::optional(0.0) : number(text);
   };
   const auto line_skip = skipped({"lineskip"}), byte_skip = skipped({"byteskip"});
-  if (!line_skip || *line_skip != 0)
+  if (!line_skip || !(*line_skip >= 0 && *line_skip <= 1e6) || *line_skip != std::floor(*line_skip))
     return Error{
-        fmt::format("{}: skips {} lines of its data; supported is none", path, in_quotes(field(fields, {"lineskip"})))};
+        fmt::format("{}: skips {} lines of its data, limit 1e6", path, in_quotes(field(fields, {"lineskip"})))};
+  h.line_skip = uint32_t(*line_skip);
   if (!byte_skip || *byte_skip < -1 || *byte_skip > 1e15 || *byte_skip != std::floor(*byte_skip) ||
       (*byte_skip < 0 && h.encoding != Encoding::kRaw))
     return Error{fmt::format("{}: skips {} bytes of its data", path, in_quotes(field(fields, {"byteskip"})))};
@@ -236,7 +272,7 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   const auto axes = choose_axes(*sizes, path);
   if (!axes) return axes.error();
   for (size_t a = 0; a < 3; ++a) h.size[a] = (*sizes)[(*axes)[a]];
-  const auto m = placement_of(fields, *axes, sizes->size(), path);
+  const auto m = placement_of(fields, *axes, *sizes, path);
   if (!m) return m.error();
   h.index_to_data = *m;
   h.space = space_named(field(fields, {"space"}));
@@ -246,6 +282,7 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
 
   if (const Status s = read_encoding(fields, path, h); !s) return s.error();
   if (const Status s = find_data(lines, path, h); !s) return s.error();
+  if (const Status s = read_skips(fields, path, h); !s) return s.error();
   return h;
 }
 

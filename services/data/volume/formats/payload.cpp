@@ -23,7 +23,8 @@ constexpr size_t kBlock = 256 << 10;  // stays in the second cache between being
 // A file read from front to back.
 class Source {
  public:
-  static Result<std::unique_ptr<Source>> open(const std::string& path, uint64_t at, bool at_end, uint64_t bytes) {
+  static Result<std::unique_ptr<Source>> open(const std::string& path, uint32_t lines, uint64_t at, bool at_end,
+                                              uint64_t bytes) {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (descriptor < 0) return Error{fmt::format("{}: cannot be opened: {}", path, std::strerror(errno))};
     auto source = std::unique_ptr<Source>(new Source(descriptor, path));
@@ -33,6 +34,7 @@ class Source {
     const auto size = static_cast<uint64_t>(status.st_size);
     if (at_end && bytes > size) return Error{fmt::format("{}: has {} bytes of {}", path, size, bytes)};
     source->at_ = at_end ? size - bytes : at;
+    if (const Status s = source->skip_lines(lines); !s) return s.error();
     posix_fadvise(descriptor, static_cast<off_t>(source->at_), 0, POSIX_FADV_SEQUENTIAL);
     return source;
   }
@@ -52,6 +54,23 @@ class Source {
   }
 
  private:
+  // From at_ on, which moves behind them.
+  Status skip_lines(uint32_t lines) {
+    const uint64_t behind = at_;
+    at_ = 0;
+    std::string block(lines > 0 ? 4096 : 0, '\0');
+    for (uint64_t begin = 0; lines > 0; begin = at_) {
+      const auto n = read(block.data(), block.size());
+      if (!n) return n.error();
+      if (*n == 0) return Error{fmt::format("{}: ends within the lines to be left out", path_)};
+      size_t i = 0;
+      while (i < *n && lines > 0) lines -= block[i++] == '\n';
+      if (lines == 0) at_ = begin + i;
+    }
+    at_ += behind;
+    return ok_status();
+  }
+
   Source(int descriptor, std::string path) : descriptor_(descriptor), path_(std::move(path)) {}
   int descriptor_;
   std::string path_;
@@ -63,15 +82,13 @@ Error too_short(const VolumeFileHeader& h, const std::string& path, uint64_t got
                            h.voxel_bytes(), h.size[0], h.size[1], h.size[2], name_of(h.stored))};
 }
 
-// Fills `out` to `bytes`, block by block; `next(to, n)` gives up to n bytes, 0 at the end.
+// Fills `out` by another file's share, block by block; `next(to, n)` gives up to n bytes, 0 at the end.
 template <class Next>
-Result<std::vector<std::byte>> fill(const VolumeFileHeader& h, const std::string& path, const ReadProgress& progress,
-                                    Next&& next) {
-  const uint64_t bytes = h.voxel_bytes();
-  std::vector<std::byte> out;
-  out.reserve(bytes);  // address space; pages come with what is read
-  for (uint64_t steps = 0; out.size() < bytes; ++steps) {
-    const size_t begin = out.size(), want = std::min<uint64_t>(kBlock, bytes - begin);
+Status fill(const VolumeFileHeader& h, const std::string& path, const ReadProgress& progress,
+            std::vector<std::byte>& out, Next&& next) {
+  const uint64_t bytes = h.voxel_bytes(), until = out.size() + bytes / h.parts();
+  for (uint64_t steps = 0; out.size() < until; ++steps) {
+    const size_t begin = out.size(), want = std::min<uint64_t>(kBlock, until - begin);
     out.resize(begin + want);
     size_t have = 0;
     while (have < want) {
@@ -82,7 +99,7 @@ Result<std::vector<std::byte>> fill(const VolumeFileHeader& h, const std::string
     }
     if (progress && steps % 16 == 0) progress(double(out.size()) / double(bytes));
   }
-  return out;
+  return ok_status();
 }
 
 class Inflater {
@@ -164,13 +181,13 @@ bool parse_stored(StoredType type, std::string_view word, std::byte* to) {
   return false;
 }
 
-Result<std::vector<std::byte>> read_text(const VolumeFileHeader& h, Source& source, const std::string& path,
-                                         const ReadProgress& progress) {
+Status read_text(const VolumeFileHeader& h, Source& source, const std::string& path, const ReadProgress& progress,
+                 std::vector<std::byte>& out) {
   std::string window;  // what is read and not parsed yet
   size_t at = 0;
   bool ended = false;
   const size_t size = stored_bytes(h.stored);
-  return fill(h, path, progress, [&](std::byte* to, size_t bytes) -> Result<size_t> {
+  return fill(h, path, progress, out, [&](std::byte* to, size_t bytes) -> Result<size_t> {
     size_t have = 0;
     while (have + size <= bytes) {
       const auto blank = [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == ','; };
@@ -198,6 +215,29 @@ Result<std::vector<std::byte>> read_text(const VolumeFileHeader& h, Source& sour
   });
 }
 
+Status read_part(const VolumeFileHeader& h, const std::string& file, const std::string& path,
+                 const ReadProgress& progress, std::vector<std::byte>& out) {
+  auto source = Source::open(file, h.line_skip, h.data_at, h.data_at_end, h.voxel_bytes() / h.parts());
+  if (!source) return source.error();
+  if (h.encoding == Encoding::kText) return read_text(h, **source, path, progress, out);
+  if (h.encoding == Encoding::kRaw)
+    return fill(h, path, progress, out, [&](std::byte* to, size_t bytes) { return (*source)->read(to, bytes); });
+  Inflater inflater(**source, path);
+  std::vector<std::byte> left_out(std::min<uint64_t>(h.skip_unpacked, kBlock));
+  for (uint64_t left = h.skip_unpacked; left > 0;) {
+    const auto n = inflater.read(left_out.data(), std::min<uint64_t>(left, left_out.size()));
+    if (!n) return n.error();
+    if (*n == 0) return too_short(h, path, 0);
+    left -= *n;
+  }
+  const Status filled =
+      fill(h, path, progress, out, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
+  // Reading on brings the stream's checksum, if the voxels were all of it.
+  std::byte more;
+  if (const auto n = inflater.read(&more, 1); filled && !n) return n.error();
+  return filled;
+}
+
 }  // namespace
 
 Status check_memory(uint64_t bytes, const std::string& path) {
@@ -211,24 +251,12 @@ Status check_memory(uint64_t bytes, const std::string& path) {
 
 Result<std::vector<std::byte>> read_payload(const VolumeFileHeader& h, const std::string& path,
                                             const ReadProgress& progress) {
-  auto source = Source::open(h.data_path, h.data_at, h.data_at_end, h.voxel_bytes());
-  if (!source) return source.error();
-  if (h.encoding == Encoding::kText) return read_text(h, **source, path, progress);
-  if (h.encoding == Encoding::kRaw)
-    return fill(h, path, progress, [&](std::byte* to, size_t bytes) { return (*source)->read(to, bytes); });
-  Inflater inflater(**source, path);
-  std::vector<std::byte> left_out(std::min<uint64_t>(h.skip_unpacked, kBlock));
-  for (uint64_t left = h.skip_unpacked; left > 0;) {
-    const auto n = inflater.read(left_out.data(), std::min<uint64_t>(left, left_out.size()));
-    if (!n) return n.error();
-    if (*n == 0) return too_short(h, path, 0);
-    left -= *n;
-  }
-  auto voxels = fill(h, path, progress, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
-  // Reading on brings the stream's checksum, if the voxels were all of it.
-  std::byte more;
-  if (const auto n = inflater.read(&more, 1); voxels && !n) return n.error();
-  return voxels;
+  std::vector<std::byte> out;
+  out.reserve(h.voxel_bytes());  // address space; pages come with what is read
+  for (size_t i = 0; i < h.parts(); ++i)
+    if (const Status s = read_part(h, i == 0 ? h.data_path : h.more_paths[i - 1], path, progress, out); !s)
+      return s.error();
+  return out;
 }
 
 }  // namespace telesplat::data

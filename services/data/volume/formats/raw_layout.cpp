@@ -86,7 +86,7 @@ Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string
     return Error{fmt::format("{}: --raw {}: {}, as in 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2", path,
                              in_quotes(spec), what)};
   };
-  constexpr const char* kShape = "SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING] is needed";
+  constexpr const char* kShape = "SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING][:skip=BYTES] is needed";
   std::string_view rest = spec;
   const auto size = spec.size() <= 200 ? take_size(rest) : std::nullopt;
   if (!size || !rest.starts_with(':')) return bad(kShape);
@@ -99,11 +99,21 @@ Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string
   const auto stored = type_named(type);
   if (!stored) return bad(fmt::format("{} is no type; types are {}", in_quotes(whole), kRawTypes));
   h.stored = *stored;
-  if (colon == rest.size()) return h;
-  const auto s = numbers(rest.substr(colon + 1), true);
-  if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0))
-    return bad(fmt::format("{} is not three spacings above 0", in_quotes(rest.substr(colon + 1))));
-  h.index_to_data = placement({(*s)[0], 0, 0}, {0, (*s)[1], 0}, {0, 0, (*s)[2]}, glm::dvec3(0));
+  if (colon + 1 == rest.size()) return bad(kShape);
+  for (std::string_view parts = rest.substr(std::min(colon + 1, rest.size())); !parts.empty();) {
+    const std::string_view part = parts.substr(0, parts.find(':'));
+    parts.remove_prefix(std::min(part.size() + 1, parts.size()));
+    if (part.starts_with("skip=")) {
+      const auto skip = whole_numbers(part.substr(5));
+      if (!skip || skip->size() != 1) return bad(fmt::format("{} is no number of bytes from 0 on", in_quotes(part)));
+      h.data_at = uint64_t((*skip)[0]);
+      continue;
+    }
+    const auto s = numbers(part, true);
+    if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0))
+      return bad(fmt::format("{} is not three spacings above 0", in_quotes(part)));
+    h.index_to_data = placement({(*s)[0], 0, 0}, {0, (*s)[1], 0}, {0, 0, (*s)[2]}, glm::dvec3(0));
+  }
   return h;
 }
 

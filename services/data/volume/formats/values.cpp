@@ -56,22 +56,28 @@ void swap_bytes(std::vector<std::byte>& bytes) {
     std::reverse(bytes.begin() + ptrdiff_t(at), bytes.begin() + ptrdiff_t(at + sizeof(T)));
 }
 
-// In place: what is written never overtakes what is read.
+// In place: what is written never overtakes what is read. Values whose range has less than 4096 of the steps that f32
+// has there, or that f32 does not reach, become fractions of half that range around its middle: scale and offset.
 template <class T>
-Status narrow(std::vector<std::byte>& bytes, StoredType type, const std::string& path) {
+Status narrow(std::vector<std::byte>& bytes, StoredType type, const std::string& path, double& scale, double& offset) {
   const size_t count = bytes.size() / sizeof(T);
   const Range range = range_of<T>(bytes.data(), count);
   const double largest = std::max(std::abs(range.lo), std::abs(range.hi));
-  const double steps = (range.hi - range.lo) / (largest * 0x1p-24);  // that f32 has over the range
-  if (largest > double(std::numeric_limits<float>::max()) || (range.hi > range.lo && steps < 4096))
-    return Error{fmt::format("{}: its values of type {} from {} to {} cannot be held as 32-bit floating point numbers",
-                             path, name_of(type), range.lo, range.hi)};
+  const double steps = (range.hi - range.lo) / (largest * 0x1p-24);
+  const bool fraction = largest > double(std::numeric_limits<float>::max()) || (range.hi > range.lo && steps < 4096);
+  const double half = (range.hi - range.lo) / 2, middle = range.lo + half;
+  if (!std::isfinite(half))
+    return Error{fmt::format("{}: its values of type {} go from {} to {}, more than a number can tell", path,
+                             name_of(type), range.lo, range.hi)};
   for (size_t i = 0; i < count; ++i) {
     T wide;
     std::memcpy(&wide, bytes.data() + i * sizeof(T), sizeof wide);
-    const float value = static_cast<float>(wide);
+    const auto value = fraction && half > 0 ? static_cast<float>((double(wide) - middle) / half)
+                       : fraction           ? 0.0f
+                                            : static_cast<float>(wide);
     std::memcpy(bytes.data() + i * sizeof value, &value, sizeof value);
   }
+  if (fraction) offset += middle * scale, scale *= half > 0 ? half : 1;
   bytes.resize(count * sizeof(float));
   if (sizeof(T) > sizeof(float)) bytes.shrink_to_fit();
   return ok_status();
@@ -88,6 +94,7 @@ Result<Volume> make_volume(const VolumeFileHeader& h, std::vector<std::byte> byt
     if (stored_bytes(h.stored) == 8) swap_bytes<uint64_t>(bytes);
   }
   Volume v;
+  v.scale = h.scale, v.offset = h.offset;
   auto status = ok_status();
   switch (h.stored) {
     case StoredType::kU8:
@@ -105,17 +112,16 @@ Result<Volume> make_volume(const VolumeFileHeader& h, std::vector<std::byte> byt
     default:
       v.type = VoxelType::kF32;
   }
-  if (h.stored == StoredType::kU32) status = narrow<uint32_t>(bytes, h.stored, path);
-  if (h.stored == StoredType::kI32) status = narrow<int32_t>(bytes, h.stored, path);
-  if (h.stored == StoredType::kU64) status = narrow<uint64_t>(bytes, h.stored, path);
-  if (h.stored == StoredType::kI64) status = narrow<int64_t>(bytes, h.stored, path);
-  if (h.stored == StoredType::kF64) status = narrow<double>(bytes, h.stored, path);
+  if (h.stored == StoredType::kU32) status = narrow<uint32_t>(bytes, h.stored, path, v.scale, v.offset);
+  if (h.stored == StoredType::kI32) status = narrow<int32_t>(bytes, h.stored, path, v.scale, v.offset);
+  if (h.stored == StoredType::kU64) status = narrow<uint64_t>(bytes, h.stored, path, v.scale, v.offset);
+  if (h.stored == StoredType::kI64) status = narrow<int64_t>(bytes, h.stored, path, v.scale, v.offset);
+  if (h.stored == StoredType::kF64) status = narrow<double>(bytes, h.stored, path, v.scale, v.offset);
   if (!status) return status.error();
   v.size = {int(h.size[0]), int(h.size[1]), int(h.size[2])};
   v.index_to_data = h.index_to_data;
   v.unit = h.unit;
   v.space = h.space;
-  v.scale = h.scale, v.offset = h.offset;
   v.stored = std::move(bytes);
   v.format = h.format;
   const Range range = range_of(v.type, v.stored.data(), h.voxels());
