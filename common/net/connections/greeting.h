@@ -3,10 +3,16 @@
 
 #include <string>
 
+#include "common/core/result.h"
+
 namespace telesplat::net {
 
 /// Connects to tcp://HOST:PORT, and reads which security mechanism its greeting names (ZMTP 3, RFC 23): "NULL" or
 /// "CURVE". Empty: no peer that speaks so names one within half a second.
 std::string mechanism_at(const std::string& endpoint);
+
+/// Whether something listens at tcp://HOST:PORT, as far as half a second tells; endpoints of other kinds count as
+/// reachable. Error: why not, in the system's words.
+Status check_reachable(const std::string& endpoint);
 
 }  // namespace telesplat::net

@@ -40,21 +40,25 @@ class Store : public MeshStore {
   Descriptor use_;
 };
 
+// news: for the person, of this opening alone.
 std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& path, bool from_cache,
-                                      Descriptor use = Descriptor()) {
+                                      const std::vector<std::string>& news, Descriptor use = Descriptor()) {
   content.info.source = path;
+  for (std::string& note : content.info.notes) note = path + ": " + note;
+  content.info.notes.insert(content.info.notes.end(), news.begin(), news.end());
   content.info.from_cache = from_cache;
   return std::make_shared<Store>(std::move(content), std::move(use));
 }
 
 // Reads the mesh file and writes its store into the descriptor. unwritten: set if that is what failed.
 Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
-                   const Progress& progress, std::vector<std::string>& notes, bool* unwritten = nullptr) {
+                   const Progress& progress, bool* unwritten = nullptr) {
   auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
   if (!mesh) return mesh.error();
   progress(kReading, 1.0);
-  notes = mesh->notes;
   MeshStoreInfo info;
+  for (const std::string& note : mesh->notes)
+    info.notes.push_back(note.starts_with(path + ": ") ? note.substr(path.size() + 2) : note);
   info.format = mesh->format;
   info.vertices = mesh->positions.size();
   info.had_normals = !mesh->normals.empty();
@@ -87,17 +91,15 @@ Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const S
   if (!file.valid())
     return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
   unlink(name.c_str());
-  std::vector<std::string> notes;
-  if (auto status = build_store(file.get(), path, options, source, progress, notes); !status) return status.error();
+  if (auto status = build_store(file.get(), path, options, source, progress); !status) return status.error();
   auto content = read_store(file.get(), name);
   if (!content) return content.error();
-  content->info.notes = std::move(notes);
-  return make_store(std::move(*content), path, false);
+  return make_store(std::move(*content), path, false, {});
 }
 
 // The store of a stem, which is locked as in use; null: there is none. news: for the person.
 Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const std::string& path, bool from_cache,
-                                                 std::vector<std::string> news = {}) {
+                                                 const std::vector<std::string>& news = {}) {
   const std::string name = stem + ".mesh";
   auto file = Descriptor::open_file(name, O_RDONLY);
   if (!file.valid() && errno == ENOENT) return std::shared_ptr<MeshStore>();
@@ -106,8 +108,7 @@ Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const 
   auto content = read_store(file.get(), name);
   if (!content) return content.error();
   note_use(stem, path, fmt::format("{}, {} triangles", content->info.format, content->info.triangles));
-  content->info.notes = std::move(news);
-  return make_store(std::move(*content), path, from_cache, std::move(file));
+  return make_store(std::move(*content), path, from_cache, news, std::move(file));
 }
 
 // Makes a store in the cache. It gets its name once it is whole. Where the cache has a limit, others make room: this
@@ -116,7 +117,6 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
                                                const StoreOptions& options, const MeshSource& source,
                                                const Progress& progress) {
   const std::string name = stem + ".mesh", part = stem + ".part";
-  std::vector<std::string> notes;
   bool unwritten = false;
   {
     const auto out = Descriptor::open_file(part, O_RDWR | O_CREAT | O_TRUNC);
@@ -124,7 +124,7 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
       log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
       return open_unnamed(path, options, source, progress);
     }
-    const Status built = build_store(out.get(), path, options, source, progress, notes, &unwritten);
+    const Status built = build_store(out.get(), path, options, source, progress, &unwritten);
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
       const std::string reason =
           built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
@@ -135,9 +135,10 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
     }
   }
   if (unwritten) return open_unnamed(path, options, source, progress);  // elsewhere, there may be room
+  std::vector<std::string> news;
   if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
-    notes.push_back(std::move(told));
-  auto store = open_existing(stem, path, false, std::move(notes));
+    news.push_back(std::move(told));
+  auto store = open_existing(stem, path, false, news);
   if (!store.ok() || *store) return store;
   return Error{fmt::format("{}: was removed as soon as it was made", name)};
 }

@@ -29,7 +29,7 @@ struct MeshStoreInfo {
   std::string up_reason;  ///< why, in a few words
   bool from_cache = false;
   uint64_t content_hash = 0;
-  std::vector<std::string> notes;  ///< Mesh::notes, where it was made just now
+  std::vector<std::string> notes;  ///< Mesh::notes; what else people should know of the store
 };
 
 /// An open chunk store: immutable, safe to read from any thread.

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <sstream>
 
 #include "common/parallel/in_parallel.h"
 
@@ -30,7 +31,8 @@ struct StoreHeader {
   char array[512] = {};
   char coordinates[1600] = {};  ///< scene::to_text()
   uint64_t arrays_offset = 0, arrays_bytes = 0;
-  uint64_t checksum = 0;  ///< of all the above and the table of contents
+  uint64_t notes_bytes = 0;  ///< behind the arrays: lines
+  uint64_t checksum = 0;     ///< of all the above and the table of contents
 };
 static_assert(sizeof(StoreHeader) <= kPage);
 
@@ -39,9 +41,9 @@ struct StoreEntry {
   float lo[3] = {}, hi[3] = {};
 };
 
-uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries, std::string_view arrays) {
+uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries, std::string_view texts) {
   const uint64_t seed = XXH3_64bits(&header, offsetof(StoreHeader, checksum));
-  return XXH3_64bits_withSeed(arrays.data(), arrays.size(),
+  return XXH3_64bits_withSeed(texts.data(), texts.size(),
                               XXH3_64bits_withSeed(entries.data(), entries.size_bytes(), seed));
 }
 
@@ -124,13 +126,15 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
 
   StoreHeader header = make_header(info);
   header.chunks = static_cast<uint32_t>(entries.size());
-  const std::string arrays = scene::to_text(info.arrays);
-  header.arrays_offset = end, header.arrays_bytes = arrays.size();
-  header.file_bytes = end + round_up(arrays.size());
-  header.checksum = checksum_of(header, entries, arrays);
+  std::string texts = scene::to_text(info.arrays);
+  header.arrays_offset = end, header.arrays_bytes = texts.size();
+  for (const std::string& note : info.notes) texts += note + "\n";
+  header.notes_bytes = texts.size() - header.arrays_bytes;
+  header.file_bytes = end + round_up(texts.size());
+  header.checksum = checksum_of(header, entries, texts);
   if (failure == 0 && ftruncate(descriptor, static_cast<off_t>(header.file_bytes)) != 0) failure = errno;
   if (failure == 0) failure = write_at(descriptor, entries.data(), entries.size() * sizeof(StoreEntry), kPage);
-  if (failure == 0) failure = write_at(descriptor, arrays.data(), arrays.size(), header.arrays_offset);
+  if (failure == 0) failure = write_at(descriptor, texts.data(), texts.size(), header.arrays_offset);
   if (failure == 0) failure = write_at(descriptor, &header, sizeof header, 0);
   if (failure != 0)
     return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes,
@@ -155,16 +159,19 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
       kPage + header.chunks * sizeof(StoreEntry) > bytes.size())
     return Error{fmt::format("{}: chunk store claims {} chunks in {} bytes", name, header.chunks, bytes.size())};
   const std::span entries(reinterpret_cast<const StoreEntry*>(bytes.data() + kPage), header.chunks);
-  const bool inside =
-      header.arrays_offset <= bytes.size() && header.arrays_bytes <= bytes.size() - header.arrays_offset;
-  const std::string_view text = inside ? (*mapped)->text().substr(header.arrays_offset, header.arrays_bytes) : "";
-  if (!inside || checksum_of(header, entries, text) != header.checksum)
+  const uint64_t behind = header.arrays_offset <= bytes.size() ? bytes.size() - header.arrays_offset : 0;
+  const bool inside = header.arrays_bytes <= behind && header.notes_bytes <= behind - header.arrays_bytes;
+  const std::string_view texts =
+      inside ? (*mapped)->text().substr(header.arrays_offset, header.arrays_bytes + header.notes_bytes) : "";
+  if (!inside || checksum_of(header, entries, texts) != header.checksum)
     return Error{fmt::format("{}: chunk store's table of contents is damaged", name)};
-  auto arrays = scene::arrays_from_text(text);
+  auto arrays = scene::arrays_from_text(texts.substr(0, header.arrays_bytes));
   if (!arrays) return Error{fmt::format("{}: {}", name, arrays.error().text)};
 
   StoreContent out{*mapped, info_of(header), {}, {}};
   out.info.arrays = *std::move(arrays);
+  std::istringstream notes{std::string(texts.substr(header.arrays_bytes))};
+  for (std::string note; std::getline(notes, note);) out.info.notes.push_back(note);
   auto coordinates =
       scene::coordinates_from_text({header.coordinates, strnlen(header.coordinates, sizeof header.coordinates)});
   if (!coordinates) return Error{fmt::format("{}: {}", name, coordinates.error().text)};

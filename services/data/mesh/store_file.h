@@ -3,7 +3,7 @@
 //   offset 0      StoreHeader, padded to 4096
 //   4096          StoreEntry[chunks], padded to a multiple of 4096
 //   then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order they were made
-//   then          what the file's arrays are: scene::to_text()
+//   then          what the file's arrays are: scene::to_text(); remarks on the file, lines without its name
 //
 // Native byte order: the file is a cache and never travels.
 #pragma once
@@ -22,7 +22,7 @@ namespace telesplat::data {
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// Goes up whenever readers, placement or layout would make another file of the same mesh.
-inline constexpr uint32_t kStoreVersion = 6;
+inline constexpr uint32_t kStoreVersion = 7;
 
 /// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
 /// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages
@@ -32,7 +32,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
 
 struct StoreContent {
   std::shared_ptr<const MappedFile> file;
-  MeshStoreInfo info;  ///< without source and from_cache
+  MeshStoreInfo info;  ///< without source and from_cache; notes without the file's name
   std::vector<geometry::ChunkInfo> chunks;
   std::vector<size_t> offsets;  ///< of each chunk in the file
 };

@@ -118,6 +118,38 @@ TEST(FullDisk, UnderTheRecordIsToldAndTheRunGoesOn) {
   EXPECT_LT(count_of(logs, "No space left"), 12u) << "once a file, not once a frame";
 }
 
+TEST(FullDisk, FromTheBeginningIsTheReasonThatIsTold) {
+  TemporaryFolder folder;
+  const std::string mesh = folder / "mesh.ply";
+  write_terrain(mesh, 8);
+  SmallDisk disk(1);
+  if (!disk.mounted()) GTEST_SKIP() << "a disk of its own cannot be mounted: " << disk.why();
+  TemporaryFolder on_disk;
+  ::unsetenv("TMPDIR");  // the rest lies elsewhere
+  std::ofstream(on_disk / "ballast", std::ios::binary) << std::string(700 << 10, 'x');
+  Program run("telesplat",
+              {"run", mesh, "--no-cache", "--out", on_disk / "run", "--size", "320x240", "--duration", "3"},
+              folder / "run");
+  EXPECT_EQ(run.wait(), 1) << run.err();
+  EXPECT_NE(run.err().find(on_disk / "run"), std::string::npos) << run.err();
+  EXPECT_GE(count_of(run.err(), "No space left on device"), 1u) << run.err();
+}
+
+TEST(NoLoopback, IsSaidInSeconds) {
+  TemporaryFolder folder;
+  const std::string mesh = folder / "mesh.ply";
+  write_terrain(mesh, 8);
+  Program possible("/usr/bin/unshare", {"-n", "true"}, folder / "possible");
+  if (possible.wait() != 0) GTEST_SKIP() << "no network of its own: " << possible.err();
+  Program run("/usr/bin/unshare",
+              {"-n", std::string(TELESPLAT_BIN) + "/telesplat", "run", mesh, "--no-cache", "--out", folder / "out"},
+              folder / "run");
+  EXPECT_EQ(run.wait(20), 1) << run.err();
+  EXPECT_NE(run.err().find("cannot be reached at tcp://127.0.0.1:"), std::string::npos) << run.err();
+  EXPECT_NE(run.err().find("loopback"), std::string::npos) << run.err();
+  EXPECT_FALSE(fs::exists(folder / "out")) << "a run folder was left";
+}
+
 TEST(FullDisk, UnderTheChunkStoreIsNoReasonNotToShowTheMesh) {
   SmallDisk disk(8);
   if (!disk.mounted()) GTEST_SKIP() << "a disk of its own cannot be mounted: " << disk.why();

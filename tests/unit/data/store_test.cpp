@@ -79,6 +79,19 @@ TEST_F(StoreTest, SecondOpenIsFromTheCacheAndTheSame) {
   }
 }
 
+TEST_F(StoreTest, RemarksOnTheFileAreToldEachTimeItIsOpened) {
+  const std::string grid = "ncols 3\nnrows 2\nxllcorner 900\nyllcorner 900\ncellsize 1\n1 2 3\n4 5 6\n";
+  const auto made = open_or_fail(folder_.write("a.asc", grid), options_);
+  const auto found = open_or_fail(folder_.write("b.asc", grid), options_);
+  ASSERT_TRUE(made && found);
+  ASSERT_TRUE(found->info().from_cache);
+  ASSERT_EQ(made->info().notes.size(), 1u);
+  ASSERT_EQ(found->info().notes.size(), 1u);
+  const std::string remark = ": does not say in what system its coordinates are";
+  EXPECT_TRUE(made->info().notes[0].starts_with((folder_ / "a.asc") + remark)) << made->info().notes[0];
+  EXPECT_TRUE(found->info().notes[0].starts_with((folder_ / "b.asc") + remark)) << found->info().notes[0];
+}
+
 TEST_F(StoreTest, KnowsFilesByContentAndOptions) {
   open_or_fail(path_, options_);
   fs::copy(path_, folder_ / "copy.ply");

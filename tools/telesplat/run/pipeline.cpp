@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "common/core/clock.h"
+#include "common/net/connections/greeting.h"
 #include "common/net/service.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -39,6 +40,12 @@ Status Pipeline::start_servers() {
   const RunOptions& o = options_;
   const int nice = o.background_servers ? 10 : 0;
   if (const Status s = group_.start_master(master_arguments(o), kMasterPatience_s); !s) return s;
+  // The others would ask for ever where there is no loopback device.
+  if (const Status s = net::check_reachable(group_.endpoint()); !s)
+    return Error{
+        fmt::format("the session's master was started, but cannot be reached at {}: {}; is the loopback "
+                    "device up (ip link set lo up)?",
+                    group_.endpoint(), s.error().text)};
   if (const Status s = start_data(); !s) return s;
   // A headset's frames come first; else views are worth more than that they are drawn a little later.
   Member packer{
