@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "common/metrics/roster.h"
 #include "common/scene/session.h"
@@ -64,12 +65,20 @@ ordered_json commands(const std::vector<Process>& processes) {
   return by_hand.empty() ? ordered_json() : by_hand;
 }
 
+ordered_json lines_of(const std::string& text) {
+  auto out = ordered_json::array();
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) out.push_back(line);
+  return out;
+}
+
 ordered_json data_of(const Roster& roster) {
   const std::string file = roster.fact("data", "data_file");
   if (file.empty()) return {};
   return {{"file", file},
           {"bytes", number_or_null(roster.fact("data", "data_bytes"))},
-          {"hash", text_or_null(roster.fact("data", "data_hash"))}};
+          {"hash", text_or_null(roster.fact("data", "data_hash"))},
+          {"remarks", lines_of(roster.fact("data", "remarks"))}};
 }
 
 ordered_json trajectory_of(const Roster& roster) {

@@ -21,7 +21,8 @@ namespace {
 
 // How long the loop waits for messages. While something is worked on, its end ends no wait.
 constexpr int kQuiet_ms = 50, kBusy_ms = 2;
-constexpr int kRequestsATurn = 64;  // so that the master is not kept waiting
+constexpr size_t kMostRemarks = 4000;  // bytes that the session is told of them
+constexpr int kRequestsATurn = 64;     // so that the master is not kept waiting
 
 // Progress goes to the launcher's pipe, or to the log every two seconds. scene: the file.
 Progress make_progress(bool to_stdout, const std::string& scene) {
@@ -108,6 +109,10 @@ wire::Hello make_hello(const Served& served, const std::string& name, const std:
   hello.facts = {{"kind", std::string(scene::name_of(served.kind()))}, {"scene", to_utf8(served.title())}};
   if (!endpoint.empty()) hello.endpoints = {{std::string(served.requests().endpoint), endpoint}};
   served.describe(hello);
+  std::string remarks;
+  for (const std::string& note : served.notes())
+    if (remarks.size() + note.size() < kMostRemarks) remarks += note + "\n";
+  if (!remarks.empty()) hello.facts["remarks"] = to_utf8(remarks);
   return hello;
 }
 

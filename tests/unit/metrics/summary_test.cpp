@@ -463,7 +463,11 @@ TEST_F(Record, TheSummarySaysWhatWasDone) {
   const Process data{"data",
                      "data",
                      2,
-                     {{"host", "north"}, {"data_file", "/x/a b.ply"}, {"data_bytes", "123"}, {"data_hash", "xxh3:0f"}},
+                     {{"host", "north"},
+                      {"data_file", "/x/a b.ply"},
+                      {"data_bytes", "123"},
+                      {"data_hash", "xxh3:0f"},
+                      {"remarks", "one\ntwo\n"}},
                      {}};
   const Process sampler{
       "sampler", "sampler-1", 3, {{"host", "south"}, {"gpu", "Some GPU"}, {"command", "s 'x y'"}}, {}};
@@ -491,6 +495,7 @@ TEST_F(Record, TheSummarySaysWhatWasDone) {
   EXPECT_EQ(s["data"]["file"], "/x/a b.ply");
   EXPECT_EQ(s["data"]["bytes"], 123);
   EXPECT_EQ(s["data"]["hash"], "xxh3:0f");
+  EXPECT_EQ(s["data"]["remarks"], nlohmann::ordered_json({"one", "two"}));
   EXPECT_EQ(s["trajectory"]["hash"], "xxh3:1");
   EXPECT_EQ(s["asked"]["duration_s"], 2.5);
   EXPECT_EQ(s["asked"]["verify_every"], 30);

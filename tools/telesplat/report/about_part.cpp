@@ -194,6 +194,8 @@ ordered_json facts_json(const ordered_json& s) {
   add("began", text(s, "begin").substr(0, 19));
   add("machines", machines(s));
   add("data", text(s, "data.file"));
+  for (const ordered_json& remark : at(s, "data.remarks"))
+    if (remark.is_string()) add("remark", remark.get<std::string>());
   const auto command = at(s, "command");
   add("command", command.is_string() ? command.get<std::string>() : std::string());
   return out;
