@@ -12,6 +12,7 @@
 #include <new>
 
 #include "services/data/base/cut_off.h"
+#include "services/data/gltf/reader.h"
 #include "services/data/import/confine.h"
 #include "services/data/import/files.h"
 #include "services/data/import/gdal.h"
@@ -40,6 +41,13 @@ telesplat::Result<telesplat::data::Mesh> import_elevation(telesplat::data::Impor
   const auto raster = telesplat::data::read_elevation(files, path, texture);
   if (!raster) return raster.error();
   return telesplat::data::elevation_mesh(*raster, {z_scale, texture}, path);
+}
+
+telesplat::Result<telesplat::data::Mesh> import_gltf(telesplat::data::ImportFiles& files, const std::string& path,
+                                                     uint64_t texture_detail) {
+  const auto content = files.content();
+  if (!content) return telesplat::Error{fmt::format("{}: {}", path, content.error().text)};
+  return telesplat::data::read_gltf(*content, path, files, texture_detail);
 }
 
 bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
@@ -91,15 +99,15 @@ int main(int argc, char** argv) {
     const uint64_t texture_detail = gltf ? std::strtoull(argv[3], nullptr, 10) : 0;
     // Pictures hold many texels a byte; baked triangles are divided into a copy.
     const uint64_t memory = memory_with(100 * file_bytes + (gltf ? (uint64_t{3} << 30) + 300 * texture_detail : 0));
-    if (format.starts_with("raster")) telesplat::data::confine(memory);
+    if (gltf || format.starts_with("raster")) telesplat::data::confine(memory);
     if (format == "raster-facts") {
       const auto facts = telesplat::data::read_raster_facts(files, path);
       return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
     }
     const auto mesh = argc == 5         ? import_elevation(files, path, std::atof(argv[3]), argv[4])
                       : format == "iso" ? telesplat::data::flying_edges(files.all().at(0).descriptor(), path)
-                                        : telesplat::data::import_with_vtk(
-                                              path, format, argc == 4 && !gltf ? argv[3] : "", texture_detail);
+                      : gltf            ? import_gltf(files, path, texture_detail)
+                                        : telesplat::data::import_with_vtk(path, format, argc == 4 ? argv[3] : "");
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{

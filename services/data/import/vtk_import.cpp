@@ -3,16 +3,10 @@
 #include <fmt/format.h>
 #include <vtkCellArray.h>
 #include <vtkCellArrayIterator.h>
-#include <vtkCompositeDataIterator.h>
 #include <vtkDataArray.h>
 #include <vtkDataReader.h>
-#include <vtkFieldData.h>
-#include <vtkGLTFDocumentLoader.h>
-#include <vtkGLTFReader.h>
 #include <vtkGeometryFilter.h>
-#include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
-#include <vtkObjectFactory.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataReader.h>
@@ -28,11 +22,8 @@
 #include <array>
 #include <cmath>
 
-#include "services/data/base/mapped_file.h"
 #include "services/data/import/vtk_arrays.h"
 #include "services/data/import/vtk_complaint.h"
-#include "services/data/texture/bake.h"
-#include "services/data/texture/gltf_textures.h"
 
 namespace telesplat::data {
 namespace {
@@ -73,23 +64,6 @@ double channel_scale(vtkDataArray* colours) {
   }
 }
 
-// The glTF material of a block, from the field data that vtkGLTFReader leaves.
-struct Material {
-  Linear factor{1, 1, 1};
-  uint32_t texture = kNoTexture;
-
-  Material(vtkPolyData* block, const GltfTextures& textures) {
-    vtkFieldData* fields = block->GetFieldData();
-    if (vtkDataArray* a = fields->GetArray("BaseColorMultiplier");
-        a && a->GetNumberOfComponents() >= 3 && a->GetNumberOfTuples() > 0)
-      for (int k = 0; k < 3; ++k) factor[k] = a->GetComponent(0, k);
-    vtkDataArray* index = fields->GetArray("BaseColorTextureIndex");
-    if (!index || index->GetNumberOfTuples() == 0) return;
-    const double i = index->GetTuple1(0);
-    if (i >= 0 && i < double(textures.all.size()) && textures.all[size_t(i)]) texture = uint32_t(i);
-  }
-};
-
 class Collector {
  public:
   /// array: what the mesh is coloured by; empty: nothing.
@@ -97,12 +71,12 @@ class Collector {
 
   /// Of a format that holds one block: with its arrays. Error: array is not one of them.
   Status add_alone(vtkPolyData* block, const std::string& path) {
-    add(block, nullptr);
+    add(block);
     if (mesh_.positions.empty()) return ok_status();
     return take_arrays(*block, array_, cells_, path, mesh_);
   }
 
-  void add(vtkPolyData* block, const Material* material) {
+  void add(vtkPolyData* block) {
     const auto base = static_cast<uint32_t>(mesh_.positions.size());
     const vtkIdType points = block->GetNumberOfPoints();
     if (points <= 0 || static_cast<uint64_t>(points) + base > kMaxVertices) return;
@@ -113,23 +87,10 @@ class Collector {
       mesh_.positions.emplace_back(p[0], p[1], p[2]);
     }
     add_normals(block->GetPointData()->GetNormals(), points);
-    add_colours(block, material);
+    add_colours(block);
     const vtkIdType before_polys = block->GetNumberOfVerts() + block->GetNumberOfLines();
     add_cells(block->GetPolys(), base, points, false, before_polys);
     add_cells(block->GetStrips(), base, points, true, before_polys + block->GetNumberOfPolys());
-  }
-
-  /// Of all blocks added so far, which have these textures.
-  void bake(GltfTextures textures, uint64_t most_triangles, const std::string& path) {
-    mesh_.notes = std::move(textures.notes);
-    use_.textures = std::move(textures.all);
-    const bool any = std::any_of(use_.texture.begin(), use_.texture.end(), [](uint32_t t) { return t != kNoTexture; });
-    const bool sound =
-        std::all_of(mesh_.indices.begin(), mesh_.indices.end(), [&](uint32_t i) { return i < mesh_.positions.size(); });
-    if (!any || !sound) return;
-    any_normals_ = true;
-    if (std::string note = bake_textures(mesh_, std::move(use_), most_triangles); !note.empty())
-      mesh_.notes.push_back(path + ": " + note);
   }
 
   Mesh finish() {
@@ -149,32 +110,16 @@ class Collector {
     }
   }
 
-  void add_colours(vtkPolyData* block, const Material* material) {
+  void add_colours(vtkPolyData* block) {
     const vtkIdType points = block->GetNumberOfPoints();
     vtkDataArray* colours = find_colours(block->GetPointData());
     if (colours && colours->GetNumberOfTuples() != points) colours = nullptr;
-    vtkDataArray* uv = block->GetPointData()->GetTCoords();
-    if (uv && (uv->GetNumberOfTuples() != points || uv->GetNumberOfComponents() < 2)) uv = nullptr;
-    const uint32_t texture = material && uv ? material->texture : kNoTexture;
-    const bool tinted = material && (texture != kNoTexture || material->factor != Linear{1, 1, 1});
-    any_colours_ |= colours || tinted;
+    any_colours_ |= colours != nullptr;
     const double scale = colours ? channel_scale(colours) : 0;
     for (vtkIdType i = 0; i < points; ++i) {
-      use_.texture.push_back(texture);
-      use_.uv.push_back(texture == kNoTexture ? glm::vec2(0)
-                                              : glm::vec2(uv->GetComponent(i, 0), uv->GetComponent(i, 1)));
-      if (!colours && !tinted) {
-        mesh_.colours.push_back(kNeutralAlbedo);
-        continue;
-      }
-      Linear c{1, 1, 1};
-      // glTF says that its vertex colours are linear; everyone else's are what the screen shall show.
-      if (colours)
-        for (int k = 0; k < 3; ++k)
-          c[k] = colours->GetComponent(i, k) * scale, c[k] = material ? c[k] : to_linear(c[k]);
-      if (material)
-        for (int k = 0; k < 3; ++k) c[k] *= material->factor[k];
-      mesh_.colours.push_back(to_rgb(c));
+      Linear c{};
+      for (int k = 0; colours && k < 3; ++k) c[k] = to_linear(colours->GetComponent(i, k) * scale);
+      mesh_.colours.push_back(colours ? to_rgb(c) : kNeutralAlbedo);
     }
   }
 
@@ -203,7 +148,6 @@ class Collector {
   }
 
   Mesh mesh_;
-  TextureUse use_;
   const std::string array_;
   std::vector<uint32_t> cells_;  // of each triangle, where array_ may be of cells
   bool any_normals_ = false, any_colours_ = false;
@@ -248,58 +192,13 @@ Status read_vtk(const std::string& path, const std::string& format, Collector& c
   return read_poly_data<vtkPolyDataReader>(path, collector);
 }
 
-// Reads the geometry alone. Pictures are read elsewhere: with their samplers, and without an end if one is missing.
-class GltfReader : public vtkGLTFReader {
- public:
-  static GltfReader* New() { VTK_STANDARD_NEW_BODY(GltfReader); }
-
-  void read() {
-    UpdateInformation();
-    if (const auto model = Loader ? Loader->GetInternalModel() : nullptr)
-      for (auto& image : model->Images) {
-        image.BufferView = -1;
-        image.MimeType = "image/png";
-        image.Uri =  // one grey pixel
-            "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGM4"
-            "AQAAygDJmcpdfgAAAABJRU5ErkJggg==";
-      }
-    Update();
-  }
-};
-
-Status read_gltf(const std::string& path, uint64_t texture_detail, Collector& collector) {
-  const auto file = MappedFile::open(path);
-  if (!file) return file.error();
-  auto textures = read_gltf_textures((*file)->text(), path);
-  if (!textures) return textures.error();
-  vtkNew<GltfReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->ApplyDeformationsToGeometryOn();
-  reader->read();
-  auto* blocks = vtkMultiBlockDataSet::SafeDownCast(reader->GetOutputDataObject(0));
-  if (!blocks) return ok_status();
-  const auto iterator = vtk::TakeSmartPointer(blocks->NewIterator());
-  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem())
-    if (auto* block = vtkPolyData::SafeDownCast(iterator->GetCurrentDataObject())) {
-      const Material material(block, *textures);
-      collector.add(block, &material);
-    }
-  collector.bake(std::move(*textures), texture_detail, path);
-  return ok_status();
-}
-
 }  // namespace
 
-Result<Mesh> import_with_vtk(const std::string& path, const std::string& format, const std::string& array,
-                             uint64_t texture_detail) {
+Result<Mesh> import_with_vtk(const std::string& path, const std::string& format, const std::string& array) {
   vtkNew<vtkStringOutputWindow> output;
   vtkOutputWindow::SetInstance(output);
   Collector collector(format, array);
-  Status read = ok_status();
-  if (format == "gltf")
-    read = read_gltf(path, texture_detail, collector);
-  else
-    read = read_vtk(path, format, collector);
+  const Status read = read_vtk(path, format, collector);
   const std::string complaint = first_complaint(output->GetOutput());
   if (!complaint.empty()) return Error{fmt::format("{}: {}", path, complaint)};
   if (!read) return read.error();

@@ -1,36 +1,16 @@
 // Which other files a mesh file pulls in.
 #include <algorithm>
-#include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <pugixml.hpp>
 
+#include "services/data/gltf/container.h"
 #include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/reader.h"
-#include "services/data/texture/gltf_textures.h"
 
 namespace telesplat::data {
 namespace {
 
 constexpr size_t kMaxCompanions = 1024;
-
-// The uris of buffers and images, as VTK looks for them: without undoing %20 and its like.
-std::vector<std::string> gltf_uris(std::string_view content) {
-  std::vector<std::string> names;
-  if (!gltf_json_fits(content)) return names;  // check_gltf() refuses it
-  const nlohmann::json document = nlohmann::json::parse(gltf_json(content), nullptr, false);
-  if (!document.is_object()) return names;
-  for (const char* kind : {"buffers", "images"}) {
-    const auto list = document.find(kind);
-    if (list == document.end() || !list->is_array()) continue;
-    for (const auto& item : *list) {
-      const auto uri = item.is_object() ? item.find("uri") : item.end();
-      if (!item.is_object() || uri == item.end() || !uri->is_string() || names.size() == kMaxCompanions) continue;
-      if (const auto& text = uri->get_ref<const std::string&>(); !text.starts_with("data:")) names.push_back(text);
-    }
-  }
-  return names;
-}
 
 // What may say beside a raster where it lies: world files, reference systems, headers, GDAL's notes.
 std::vector<std::string> raster_sides(const std::string& path) {
@@ -76,7 +56,7 @@ std::vector<std::string> companion_files(std::string_view content, const std::st
         files.push_back(material.texture);
     return files;
   }
-  if (format == "gltf") names = gltf_uris(content);
+  if (format == "gltf") names = gltf_files(content);
   if (format == "raster") {
     names = vrt_sources(content);
     for (std::string& side : raster_sides(path)) names.push_back(std::move(side));

@@ -7,6 +7,7 @@
 #include <new>
 
 #include "services/data/base/mapped_file.h"
+#include "services/data/gltf/container.h"
 
 namespace telesplat::data {
 namespace {
@@ -92,7 +93,7 @@ bool looks_like_obj(std::string_view content) {
 DetectedFormat detect_format(std::string_view content, const std::string& path) {
   const std::string extension = extension_of(path);
   if (content.starts_with("ply\n") || content.starts_with("ply\r")) return {"ply", ""};
-  if (content.starts_with("glTF")) return {"gltf", ""};
+  if (looks_like_gltf(content)) return {"gltf", ""};
   if (content.starts_with("# vtk DataFile")) return {"vtk", ""};
   if (const std::string_view start = content.substr(0, 1000); start.find("<VTKFile") != start.npos) {
     if (start.find("type=\"PolyData\"") != start.npos) return {"vtp", ""};
@@ -110,8 +111,6 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   // By name, where the content says nothing (or is broken, which the reader will say better).
   if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtu", ".vtk"})) return {extension.substr(1), ""};
   if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};
-  const std::string_view start = content.substr(0, 4096);
-  if (start.starts_with("{") && start.find("\"asset\"") != start.npos) return {"gltf", ""};
   if (looks_like_obj(content)) return {"obj", ""};
   return {"", fmt::format("is of no known format; {}; raw voxels need --raw", kSupported)};
 }
@@ -147,13 +146,13 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
   if (const Status s = check_array(array, detected.format, path); !s) return s.error();
   try {
-    auto mesh = detected.format == "ply"   ? read_ply(content, path, progress, array)
-                : detected.format == "off" ? read_off(content, path, progress)
-                : detected.format == "stl" ? read_stl(content, path, progress)
-                : detected.format == "obj" ? read_obj(content, path, progress, texture_detail)
-                : detected.format == "raster"
-                    ? read_with_gdal(content, path, elevation, progress)
-                    : read_with_vtk(content, detected.format, path, progress, array, texture_detail);
+    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress, array)
+                : detected.format == "off"    ? read_off(content, path, progress)
+                : detected.format == "stl"    ? read_stl(content, path, progress)
+                : detected.format == "obj"    ? read_obj(content, path, progress, texture_detail)
+                : detected.format == "raster" ? read_with_gdal(content, path, elevation, progress)
+                : detected.format == "gltf"   ? read_imported_gltf(content, path, progress, texture_detail)
+                                              : read_with_vtk(content, detected.format, path, progress, array);
     if (!mesh) return mesh;
     if (auto status = validate_mesh(*mesh, path); !status) return status.error();
     return mesh;

@@ -52,12 +52,14 @@ Result<Mesh> read_stl(std::string_view content, const std::string& name, const R
 /// one that is missing the mesh has a note.
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
                       uint64_t texture_detail = kDefaultTextureDetail);
-/// VTP, VTU, legacy VTK and glTF, through VTK (of grids the surface), in the program telesplat-import, which must lie
+/// VTP, VTU and legacy VTK, through VTK (of grids the surface), in the program telesplat-import, which must lie
 /// beside this process's own program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us.
 /// Claimed counts are checked here before VTK sees the file.
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress, const std::string& array = {},
-                           uint64_t texture_detail = kDefaultTextureDetail);
+                           const ReadProgress& progress, const std::string& array = {});
+/// glTF, as read_gltf() (gltf/reader.h), in the program telesplat-import like the above.
+Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
+                                uint64_t texture_detail);
 
 /// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
 /// elevation.h.

@@ -13,7 +13,6 @@
 #include "services/data/mesh/file_source.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/texture/bake.h"
-#include "services/data/texture/gltf_textures.h"
 #include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {

@@ -5,11 +5,8 @@
 #include <charconv>
 #include <filesystem>
 
-#include "services/data/base/mapped_file.h"
 #include "services/data/import/process.h"
-#include "services/data/mesh/formats/gltf_header.h"
 #include "services/data/mesh/reader.h"
-#include "services/data/texture/gltf_textures.h"
 
 namespace telesplat::data {
 namespace {
@@ -39,17 +36,6 @@ Status check_counts(std::string_view content, const std::string& name, std::init
 }
 
 Status check_before(std::string_view content, const std::string& format, const std::string& path) {
-  if (format == "gltf") {
-    uint64_t bytes = content.size();
-    const auto pictures = gltf_picture_files(content, path);
-    for (const std::string& companion : companion_files(content, format, path)) {
-      const auto file = MappedFile::open(companion);
-      if (!file && std::find(pictures.begin(), pictures.end(), companion) != pictures.end()) continue;  // goes without
-      if (!file) return Error{fmt::format("{}: needs a file that is missing: {}", path, file.error().text)};
-      bytes += (*file)->bytes().size();
-    }
-    return check_gltf(content, bytes, path);
-  }
   if (format == "vtp" || format == "vtu") {
     // zlib packs at most 1032 to 1.
     return check_counts(content, path,
@@ -74,10 +60,18 @@ Status check_before(std::string_view content, const std::string& format, const s
 }  // namespace
 
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress, const std::string& array, uint64_t texture_detail) {
+                           const ReadProgress& progress, const std::string& array) {
   if (auto status = check_before(content, format, path); !status) return status.error();
   if (progress) progress(0.0);
-  return import("VTK's " + format, {format, path, format == "gltf" ? std::to_string(texture_detail) : array}, {path});
+  return import("VTK's " + format, {format, path, array}, {path});
+}
+
+Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
+                                uint64_t texture_detail) {
+  if (progress) progress(0.0);
+  std::vector<std::string> files = companion_files(content, "gltf", path);
+  files.insert(files.begin(), path);
+  return import("the glTF", {"gltf", path, std::to_string(texture_detail)}, files);
 }
 
 Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,

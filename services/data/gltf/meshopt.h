@@ -1,0 +1,21 @@
+// Inside services/data/gltf: buffer views that meshoptimizer has packed. Source: Khronos, "EXT_meshopt_compression" and
+// "KHR_meshopt_compression", appendices A and B.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace telesplat::data::gltf {
+
+struct MeshoptView {
+  size_t count, stride;      ///< stride: bytes an element
+  std::string mode, filter;  ///< as the extension names them; filter: "" or "NONE": none
+};
+
+/// The bytes, count times stride, that were packed: all modes, filters and versions of both extensions. Throws Refusal:
+/// it is damaged, or claims more than so many bytes can hold.
+std::vector<std::byte> decode_meshopt(std::span<const std::byte> packed, const MeshoptView& view);
+
+}  // namespace telesplat::data::gltf
