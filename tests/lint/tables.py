@@ -39,6 +39,7 @@ FLOORS = {
     "services/data": [
         ["services/data/base"],
         ["services/data/texture"],
+        ["services/data/gltf"],
         ["services/data/volume/formats"],
         ["services/data/import"],
         ["services/data/served.h"],
@@ -114,6 +115,7 @@ OUTSIDE_HEADERS = [
     (r"zmq.*", ["common/net"]),
     (r"sodium\.h", ["common/net/keys", "common/wire/lease_seal.cpp"]),
     (r"vtk.*", ["services/data/import"]),
+    (r"(draco/.*|meshoptimizer\.h)", ["services/data/gltf", "tests/unit/data/gltf"]),
     (r"(gdal|ogr|cpl)[_a-z]*\.h", ["services/data/import"]),
     (r"embree.*", ["services/sampler/mesh", "tests/bench"]),
     (r"OpenImageIO/.*", ["common/image", "tests/bench"]),

@@ -20,9 +20,7 @@ std::vector<size_t> node_list(const Json& of, const char* key, size_t nodes) {
 }
 
 glm::dmat4 transform(glm::dvec3 move, glm::dquat turn, glm::dvec3 scale) {
-  const double length = glm::length(turn);
-  const glm::dmat4 turned = length > 0 ? glm::mat4_cast(turn / length) : glm::dmat4(1);
-  return glm::scale(glm::translate(glm::dmat4(1), move) * turned, scale);
+  return glm::scale(glm::translate(glm::dmat4(1), move) * glm::mat4_cast(turn), scale);
 }
 
 glm::dmat4 local_transform(const Json& node) {

@@ -20,7 +20,8 @@ struct Placement {
 };
 
 /// Where each mesh stands in the file's default scene, else its first, else under all its roots; without nodes each
-/// mesh once. Skins stand as their joints do. Throws Refusal: a node is not there, has two parents or lies below itself.
+/// mesh once. Skins stand as their joints do. Throws Refusal: a node is not there, has two parents or lies below
+/// itself.
 std::map<size_t, std::vector<Placement>> place_meshes(Document& document);
 
 /// The weights that a node or mesh gives to morph targets.
