@@ -11,6 +11,7 @@ namespace telesplat::data::gltf {
 namespace {
 
 const Json kNothing;
+constexpr const char* kMeshopt[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
 
 enum Component : size_t { kByte = 5120, kUbyte, kShort, kUshort, kUint = 5125, kFloat };
 
@@ -183,7 +184,7 @@ Bytes Document::view(size_t i) {
       refuse("buffer view {} claims {} bytes from {} on, buffer {} has {}", i, length, offset, number, data.size());
     return data.subspan(offset, length);
   };
-  for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
+  for (const char* name : kMeshopt)
     if (const Json& packed = extension(view, name); packed.is_object()) try {
         return unpacked_[i] = decode_meshopt(
                    slice(packed), {index(packed, "count").value_or(0), index(packed, "byteStride").value_or(0),
@@ -198,7 +199,10 @@ template <class To>
 void Document::copy(size_t view_index, const Json& of, size_t type, int width, bool normalised, std::span<To> out) {
   const Bytes data = view(view_index);
   const size_t offset = index(of, "byteOffset").value_or(0), element = size_of(type) * size_t(width);
-  size_t stride = index(at("bufferViews", view_index), "byteStride").value_or(0);
+  const Json& layout = at("bufferViews", view_index);
+  size_t stride = index(layout, "byteStride").value_or(0);
+  for (const char* name : kMeshopt)
+    if (stride == 0) stride = index(extension(layout, name), "byteStride").value_or(0);
   if (stride == 0) stride = element;
   const size_t count = out.size() / size_t(width);
   if (count == 0) return;

@@ -36,12 +36,18 @@ const Material& Materials::at(std::optional<size_t> number_of) {
   out.cut = text(json, "alphaMode") == "MASK";
   out.blend = text(json, "alphaMode") == "BLEND";
   out.cutoff = number(json, "alphaCutoff", 0.5);
-  const Json& info = member(own ? metal : gloss, own ? "baseColorTexture" : "diffuseTexture");
-  if (const auto texture = index(info, "index")) {
+  const Json* info = &member(own ? metal : gloss, own ? "baseColorTexture" : "diffuseTexture");
+  // What is black but for its own light is shown in the colour of that.
+  const auto light = numbers<3>(json, "emissiveFactor", {0, 0, 0});
+  if (glm::dvec3(out.factor) == glm::dvec3(0) && light != std::array<double, 3>{0, 0, 0}) {
+    out.factor = {light[0], light[1], light[2], factor[3]};
+    info = &member(json, "emissiveTexture");
+  }
+  if (const auto texture = index(*info, "index")) {
     out.texture = load(*texture);
-    const Json& transform = extension(info, "KHR_texture_transform");
+    const Json& transform = extension(*info, "KHR_texture_transform");
     out.uv = uv_transform(transform);
-    out.uv_set = index(transform, "texCoord").value_or(index(info, "texCoord").value_or(0));
+    out.uv_set = index(transform, "texCoord").value_or(index(*info, "texCoord").value_or(0));
   }
   return out;
 }

@@ -12,6 +12,7 @@ namespace telesplat::data::gltf {
 /// Triangles with what their vertices have; `positions` tells how many these are. Others have as many, or none.
 struct Primitive {
   Values positions, normals, uv, colours;
+  double colour_scale = 1;                         ///< of colours: what makes them 0..1
   std::vector<std::pair<Values, Values>> joints;   ///< numbers of joints and weights: four a vertex each
   std::vector<std::pair<Values, Values>> targets;  ///< of morphs: what moves positions and normals
   std::vector<uint32_t> corners;                   ///< three a triangle, all in range

@@ -6,6 +6,7 @@
 #include <glm/mat3x3.hpp>
 #include <unordered_map>
 
+#include "common/image/srgb.h"
 #include "services/data/gltf/materials.h"
 #include "services/data/gltf/primitive.h"
 #include "services/data/gltf/scene.h"
@@ -36,12 +37,6 @@ void check_extensions(const Document& document) {
   }
 }
 
-uint32_t to_srgb8(double linear) {
-  const double c = std::clamp(linear, 0.0, 1.0);  // NaN becomes 0 below
-  const double v = c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
-  return v > 0 ? static_cast<uint32_t>(v * 255 + 0.5) : 0;
-}
-
 class Reader {
  public:
   Reader(std::string_view content, const std::string& name, Companions& companions)
@@ -62,8 +57,7 @@ class Reader {
         }
     }
     if (mesh_.indices.empty() && thin_ + hidden_ > 0)
-      refuse("holds no triangles that can be seen, but {} parts of points or lines and {} transparent triangles", thin_,
-             hidden_);
+      refuse("holds no visible triangles, {} parts of points or lines, {} transparent triangles", thin_, hidden_);
     return finish(texture_detail);
   }
 
@@ -97,7 +91,8 @@ class Reader {
   }
 
   static double opacity(const Material& material, const Primitive& primitive, uint32_t vertex) {
-    return material.factor.a * (primitive.colours.width == 4 ? double(primitive.colours[vertex][3]) : 1.0);
+    return material.factor.a *
+           (primitive.colours.width == 4 ? primitive.colour_scale * primitive.colours[vertex][3] : 1.0);
   }
   static bool opacity_below(double limit, const Material& material, const Primitive& primitive) {
     return std::any_of(primitive.corners.begin(), primitive.corners.end(),
@@ -203,8 +198,9 @@ class Reader {
       use_.uv.push_back(texture == kNoTexture ? glm::vec2(0)
                                               : glm::vec2(material.uv * glm::dvec3(uv[v][0], uv[v][1], 1)));
       glm::dvec3 c = material.factor;  // linear light, as the colours of glTF's vertices
-      if (colours.width) c *= glm::dvec3(glm::make_vec3(colours[v]));
-      mesh_.colours.push_back(coloured ? pack_rgb(to_srgb8(c.r), to_srgb8(c.g), to_srgb8(c.b)) : kNeutralAlbedo);
+      if (colours.width) c *= primitive.colour_scale * glm::dvec3(glm::make_vec3(colours[v]));
+      const auto code = [](double linear) { return image::srgb_of_linear(float(linear)); };
+      mesh_.colours.push_back(coloured ? pack_rgb(code(c.r), code(c.g), code(c.b)) : kNeutralAlbedo);
     }
   }
 
@@ -213,12 +209,12 @@ class Reader {
       if (count > 0) mesh_.notes.push_back(fmt::format("{}: {}", name_, text));
     };
     mesh_.notes = std::move(materials_.notes);
-    note(thin_, fmt::format("{} parts of points or lines are left out", thin_));
-    note(hidden_, fmt::format("{} triangles that are fully transparent are left out", hidden_));
-    note(translucent_, fmt::format("{} translucent parts are shown opaque", translucent_));
-    note(cut_by_texture_, fmt::format("{} parts are shown without what their texture cuts out", cut_by_texture_));
+    note(thin_, fmt::format("parts of points or lines are left out: {}", thin_));
+    note(hidden_, fmt::format("triangles that are fully transparent are left out: {}", hidden_));
+    note(translucent_, fmt::format("translucent parts are shown opaque: {}", translucent_));
+    note(cut_by_texture_, fmt::format("parts are shown without the holes of their textures: {}", cut_by_texture_));
     const size_t animations = document_.list("animations").size();
-    note(animations, fmt::format("its animations ({}) are not played: it is shown at rest", animations));
+    note(animations, fmt::format("animations are not played: {}", animations));
     if (any_textures_) {
       any_normals_ = true;
       use_.textures = std::move(materials_.textures);

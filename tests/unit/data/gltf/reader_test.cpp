@@ -87,7 +87,7 @@ TEST(Gltf, StripsFansAndListsWithoutIndicesTurnAlike) {
     const auto at = [&](size_t k) { return mesh.positions[mesh.indices[i + k]]; };
     EXPECT_GT(glm::cross(at(1) - at(0), at(2) - at(0)).z, 0.5) << i / 3;
   }
-  EXPECT_EQ(mesh.notes, std::vector<std::string>{"a.glb: 1 parts of points or lines are left out"});
+  EXPECT_EQ(mesh.notes, std::vector<std::string>{"a.glb: parts of points or lines are left out: 1"});
 }
 
 // A strip's corner that stands twice joins two strips.
@@ -120,6 +120,11 @@ TEST(Gltf, ColoursOfAllTypesAreLinear) {
   const Json gloss = {{"extensions", {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseFactor", {0.5, 0, 1, 1}}}}}}};
   EXPECT_EQ(read(coloured(floats, 4, half).glb()).colours[0], 0xbc0000u);
   EXPECT_EQ(read(coloured(floats, 4, gloss).glb()).colours[0], 0xbc0000u);
+  Json lamp = {{"emissiveFactor", {0.5, 0, 0}}, {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}}}};
+  EXPECT_EQ(read(coloured(floats, 4, lamp).glb()).colours[0], 0xbc0000u) << "what shines is not black";
+  MadeGltf silent = coloured(bytes, 4);
+  silent.json["accessors"][0].erase("normalized");
+  EXPECT_EQ(read(silent.glb()).colours, right);
 }
 
 TEST(Gltf, WhatIsTransparentIsLeftOutOrTold) {
@@ -133,11 +138,11 @@ TEST(Gltf, WhatIsTransparentIsLeftOutOrTold) {
   EXPECT_TRUE(with({{"alphaMode", "OPAQUE"}}).notes.empty());
   const Mesh cut = with({{"alphaMode", "MASK"}});
   EXPECT_EQ(cut.indices.size(), 12u);
-  EXPECT_EQ(cut.notes, std::vector<std::string>{"a.glb: 1 triangles that are fully transparent are left out"});
+  EXPECT_EQ(cut.notes, std::vector<std::string>{"a.glb: triangles that are fully transparent are left out: 1"});
   EXPECT_EQ(with({{"alphaMode", "MASK"}, {"alphaCutoff", 0.1}}).indices.size(), 15u);
   const Mesh blend = with({{"alphaMode", "BLEND"}});
   EXPECT_EQ(blend.indices.size(), 15u);
-  EXPECT_EQ(blend.notes, std::vector<std::string>{"a.glb: 1 translucent parts are shown opaque"});
+  EXPECT_EQ(blend.notes, std::vector<std::string>{"a.glb: translucent parts are shown opaque: 1"});
   const Json gone = {{"alphaMode", "BLEND"}, {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0}}}}};
   EXPECT_EQ(with(gone).indices.size(), 12u);
 }
