@@ -13,22 +13,18 @@ namespace {
 const Json kNothing;
 constexpr const char* kMeshopt[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
 
-enum Component : size_t { kByte = 5120, kUbyte, kShort, kUshort, kUint = 5125, kFloat };
+// By component type from 5120 on: bytes, and the largest value of integers.
+struct Component {
+  size_t bytes;
+  double largest;
+};
+constexpr size_t kByte = 5120, kUbyte = 5121, kShort = 5122, kUshort = 5123, kUint = 5125, kFloat = 5126;
+constexpr Component kComponents[] = {{1, 127}, {1, 255}, {2, 32767}, {2, 65535}, {}, {4, 4294967295}, {4, 1}};
 
-size_t size_of(size_t component) {
-  switch (component) {
-    case kByte:
-    case kUbyte:
-      return 1;
-    case kShort:
-    case kUshort:
-      return 2;
-    case kUint:
-    case kFloat:
-      return 4;
-    default:
-      refuse("component type {} is not one of glTF's", component);
-  }
+const Component& component(size_t type) {
+  const size_t i = type - kByte;
+  if (i >= std::size(kComponents) || kComponents[i].bytes == 0) refuse("component type {} is not one of glTF's", type);
+  return kComponents[i];
 }
 
 int width_of(const std::string& type) {
@@ -108,20 +104,7 @@ double number(const Json& of, const char* key, double otherwise) {
   return value.is_number() ? value.get<double>() : otherwise;
 }
 
-double normalising_scale(size_t component_type) {
-  switch (component_type) {
-    case kByte:
-      return 1 / 127.0;
-    case kUbyte:
-      return 1 / 255.0;
-    case kShort:
-      return 1 / 32767.0;
-    case kUshort:
-      return 1 / 65535.0;
-    default:
-      return component_type == kUint ? 1 / 4294967295.0 : 1.0;
-  }
-}
+double normalising_scale(size_t component_type) { return 1 / component(component_type).largest; }
 
 Document::Document(std::string_view content, Companions& companions) : content_(content), companions_(companions) {
   check_glb(content);
@@ -198,7 +181,7 @@ Bytes Document::view(size_t i) {
 template <class To>
 void Document::copy(size_t view_index, const Json& of, size_t type, int width, bool normalised, std::span<To> out) {
   const Bytes data = view(view_index);
-  const size_t offset = index(of, "byteOffset").value_or(0), element = size_of(type) * size_t(width);
+  const size_t offset = index(of, "byteOffset").value_or(0), element = component(type).bytes * size_t(width);
   const Json& layout = at("bufferViews", view_index);
   size_t stride = index(layout, "byteStride").value_or(0);
   for (const char* name : kMeshopt)

@@ -56,7 +56,7 @@ struct Values {
   const float* operator[](size_t i) const { return numbers->data() + i * size_t(width); }
 };
 
-/// What makes a stored integer of this component type a number of 0..1 or -1..1; 1 for floats.
+/// What makes a stored integer of this component type a number of 0..1 or -1..1; 1 for floats. Refuses other types.
 double normalising_scale(size_t component_type);
 
 class Document {

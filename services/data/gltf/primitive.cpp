@@ -92,7 +92,7 @@ Primitive read_primitive(Document& document, const Json& json, std::optional<siz
   if (out.colours.width && out.colours.width < 3) refuse("its colours have {} components", out.colours.width);
   // Colours are always normalised, though some programs forget to say so.
   const Json& colours = document.at("accessors", index(member(json, "attributes"), "COLOR_0").value_or(~size_t{0}));
-  if (member(colours, "normalized") != true)
+  if (out.colours.width && member(colours, "normalized") != true)
     out.colour_scale = normalising_scale(index(colours, "componentType").value_or(0));
   if (uv_set) out.uv = one_each(read(fmt::format("TEXCOORD_{}", *uv_set), 2));
   for (int set = 0; deformed; ++set) {
