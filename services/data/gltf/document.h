@@ -75,6 +75,8 @@ class Document {
   Values values(size_t accessor, int width);
   /// The same of whole numbers.
   std::vector<uint32_t> indices(size_t accessor);
+  /// Of the file and the buffers that are there.
+  uint64_t bytes_of_files();
   /// What a URI stands for: text within it, or a file. It stays valid as long as this object. Error: text within that
   /// is no base64, or Companions::read().
   Result<std::string_view> resource(const std::string& uri);
@@ -85,7 +87,6 @@ class Document {
   int read(size_t accessor, int width, std::vector<To>& out);
   template <class To>
   void copy(size_t view, const Json& of, size_t type, int width, bool normalised, std::span<To> out);
-  uint64_t bytes_of_files();
 
   const std::string_view content_;
   Companions& companions_;

@@ -15,7 +15,7 @@ namespace telesplat::data {
 namespace gltf {
 namespace {
 
-constexpr size_t kMostVertices = size_t{1} << 28;  // instances counted
+constexpr size_t kMostVertices = size_t{1} << 25;  // instances counted; one more for two bytes of the files
 constexpr double kInvisible = 1 / 512.0;           // opacity below half of an 8-bit step
 
 // Extensions that files may require: those that are read, and those that change nothing of shapes and base colours.
@@ -72,9 +72,9 @@ class Reader {
         read_primitive(document_, json, textured ? std::optional(material.uv_set) : std::nullopt, deformed);
     drop_invisible(material, primitive);
     const auto used = keep_used(primitive);
-    if (used.size() * placements.size() > kMostVertices - std::min(kMostVertices, mesh_.positions.size()))
+    if (used.size() * placements.size() > most_vertices_ - mesh_.positions.size())
       refuse("{} vertices in {} places; with the {} before, the limit is {}", used.size(), placements.size(),
-             mesh_.positions.size(), kMostVertices);
+             mesh_.positions.size(), most_vertices_);
     translucent_ += material.blend && (textured || opacity_below(1 - kInvisible, material, primitive));
     cut_by_texture_ += material.cut && textured;
     for (const Placement& placement : placements) {
@@ -214,6 +214,8 @@ class Reader {
     note(translucent_, fmt::format("translucent parts are shown opaque: {}", translucent_));
     note(cut_by_texture_, fmt::format("parts are shown without the holes of their textures: {}", cut_by_texture_));
     const size_t animations = document_.list("animations").size();
+    const size_t scenes = document_.list("scenes").size();
+    note(scenes > 1, fmt::format("scenes that are not shown: {}", scenes - 1));
     note(animations, fmt::format("animations are not played: {}", animations));
     if (any_textures_) {
       any_normals_ = true;
@@ -231,6 +233,7 @@ class Reader {
   Materials materials_;
   Mesh mesh_;
   TextureUse use_;
+  const size_t most_vertices_ = kMostVertices + document_.bytes_of_files() / 2;
   bool any_normals_ = false, any_colours_ = false, any_textures_ = false;
   size_t thin_ = 0, translucent_ = 0, cut_by_texture_ = 0;  // primitives
   size_t hidden_ = 0;                                       // triangles

@@ -17,6 +17,7 @@ TEST(GltfScene, TheDefaultIsShownElseTheFirstElseAllRoots) {
   expect_box(read(made.glb()), 4, {20, 0, 0}, {21, 1, 1});
   made.json["scene"] = 1;
   expect_box(read(made.glb()), 8, {0, 0, 0}, {11, 1, 1});
+  EXPECT_EQ(read(made.glb()).notes, std::vector<std::string>{"a.glb: scenes that are not shown: 1"});
   made.json.erase("scenes");
   made.json["nodes"][0]["children"] = {1, 2};
   made.json["nodes"][0]["scale"] = {2, 2, 2};
@@ -104,6 +105,14 @@ TEST(GltfScene, ChainsOfNodesMayBeLong) {
   for (size_t i = 1; i < kNodes; ++i) made.add("nodes", {{"children", {i - 1}}, {"translation", {1, 0, 0}}});
   made.json["scenes"] = {{{"nodes", {kNodes - 1}}}};
   expect_box(read(made.glb()), 4, {kNodes - 1, 0, 0}, {kNodes, 1, 1});
+}
+
+TEST(GltfScene, InstancesHaveALimit) {
+  MadeGltf made;
+  const size_t p = made.accessor(std::vector<float>(3 * 9000), 3), t = made.accessor(std::vector<float>(3 * 9000), 3);
+  made.show({{"attributes", {{"POSITION", p}}}},
+            {{"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", t}}}}}}}});
+  EXPECT_NE(refusal(made.glb()).find("9000 vertices in 9000 places"), std::string::npos);
 }
 
 TEST(GltfScene, ClaimsAreRefusedBeforeTheyCost) {
