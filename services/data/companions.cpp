@@ -35,9 +35,8 @@ Status check_named(const std::string& path, const std::string& named) {
 Status check_volume(const DataOptions& o) {
   const auto source = find_volume(o.scene, o.volume.raw, o.volume.series);
   if (!source) return ok_status();
+  if (source->dicom) return ok_status();  // slices name nothing
   for (const std::string& step : source->steps) {
-    std::error_code error;
-    if (fs::is_directory(step, error)) continue;  // DICOM slices name nothing
     const auto header = read_volume_header(step, o.volume.raw);
     if (!header || header->data_path.empty() || header->data_path == step) continue;
     if (const Status s = check_named(step, header->data_path); !s) return s;

@@ -36,8 +36,7 @@ const char* unit_of(const MeshFileFacts& facts) {
 std::string unit_of_volume(const std::string& path, const MeshOptions& options) {
   const auto source = find_volume(path, options.raw, options.series);
   if (!source) return "";
-  std::error_code error;
-  if (std::filesystem::is_directory(source->steps[0], error)) return "mm";  // DICOM's
+  if (source->dicom) return "mm";
   const auto header = read_volume_header(source->steps[0], options.raw);
   return header ? header->unit : "";
 }

@@ -15,15 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-uint64_t bytes_of(const std::string& path) {
-  std::error_code error;
-  if (!fs::is_directory(path, error)) return fs::file_size(path, error);
-  uint64_t bytes = 0;
-  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
-    if (entry->is_regular_file(error)) bytes += entry->file_size(error);
-  return bytes;
-}
-
 std::string bars(const std::array<uint64_t, 64>& counts) {
   constexpr const char* kBars[] = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
   const double most = std::log1p(double(*std::max_element(counts.begin(), counts.end())));
@@ -141,7 +132,8 @@ Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOpti
       VolumeStore::make(read, source->steps.size(), path, options, placement, progress ? progress : silent);
   if (!store) return store.error();
   facts.session = (*store)->session();
-  for (const std::string& step : source->steps) facts.file_bytes += bytes_of(step);
+  std::error_code error;
+  for (const std::string& file : source->files()) facts.file_bytes += fs::file_size(file, error);
   facts.up = up_of_volume(placement);
   facts.up_reason = placement.up == "auto" ? "volumes stand on z" : "--up";
   facts.transfer =
@@ -149,9 +141,8 @@ Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOpti
   facts.transfer_reason = !options.transfer.empty()        ? "--tf"
                           : facts.session.range.hounsfield ? "fits Hounsfield units"
                                                            : "fits values of no known unit";
-  if (facts.volume.format == "dicom")
-    if (const auto series = find_dicom_series(source->steps[0], options.series))
-      for (size_t i = 0; i < series->all.size(); ++i) facts.series.push_back(text_of(series->all[i], i));
+  for (size_t i = 0; source->dicom && i < source->dicom->all.size(); ++i)
+    facts.series.push_back(text_of(source->dicom->all[i], i));
   return facts;
 }
 

@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "common/volume/grid.h"
-#include "services/data/volume/formats/dicom_header.h"
+#include "services/data/volume/formats/dicom_order.h"
 #include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
@@ -32,8 +32,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   use(parse_nifti(content, "fuzz"), size);
   use(parse_vti(content, "fuzz"), size);
   use(parse_raw_spec(content, "fuzz"), size);
-  const auto slice = parse_dicom(content, "fuzz");
-  if (slice.ok() && (slice->data_at > size || slice->data_bytes > size - slice->data_at)) std::abort();
+  const auto slices = parse_dicom(content, "fuzz");
+  if (slices.ok() && slices->empty()) std::abort();
+  for (size_t i = 0; slices.ok() && i < slices->size(); ++i) {
+    const DicomSlice& s = (*slices)[i];
+    if (!s.deflated && (s.data_at > size || s.data_bytes > size - s.data_at)) std::abort();
+  }
+  if (slices.ok()) order_slices(*slices, [](auto& a, auto& b) { return a.frame == b.frame; });
   volume_format({std::string(content), false, size}, "fuzz.nii");
   return 0;
 }

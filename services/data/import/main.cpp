@@ -1,5 +1,5 @@
-// telesplat-import FORMAT FILE: reads a mesh, raster or volume file with VTK or GDAL and leaves it on standard output
-// for the process that asked (process.cpp; volumes: volume/vtk_reader.cpp). A program of its own so that neither
+// telesplat-import FORMAT FILE: reads a mesh, raster or volume file with VTK, GDAL or GDCM and leaves it on standard
+// output for the process that asked (process.cpp; volumes: volume/vtk_reader.cpp). A program of its own so that neither
 // a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
 #include <fmt/format.h>
 #include <sys/prctl.h>
@@ -10,10 +10,12 @@
 #include <cstdlib>
 #include <fstream>
 #include <new>
+#include <vector>
 
 #include "services/data/base/cut_off.h"
 #include "services/data/gltf/reader.h"
 #include "services/data/import/confine.h"
+#include "services/data/import/dicom.h"
 #include "services/data/import/files.h"
 #include "services/data/import/gdal.h"
 #include "services/data/import/iso.h"
@@ -68,6 +70,31 @@ bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
   }
 }
 
+// All frames of all files, one after the other, as one volume. bytes: of their pixels.
+bool import_dicom(int out, const telesplat::data::ImportFiles& files, uint64_t bytes) {
+  namespace data = telesplat::data;
+  limit_time(bytes / 4);
+  data::confine(memory_with(3 * bytes + 16 * files.bytes()));
+  data::VolumeFileHeader header;
+  std::vector<char> pixels;
+  for (const data::ImportFile& file : files.all()) {
+    const auto mapped = file.map();
+    if (!mapped) return data::send_error(out, mapped.error().text);
+    const auto frames = data::decode_dicom((*mapped)->text(), file.path());
+    if (!frames) return data::send_error(out, frames.error().text);
+    const auto stored = frames->bytes == 1   ? data::StoredType::kU8
+                        : frames->bytes == 2 ? data::StoredType::kU16
+                                             : data::StoredType::kU32;
+    const bool first = header.size[2] == 0;
+    if (!first && (frames->columns != header.size[0] || frames->rows != header.size[1] || stored != header.stored))
+      return data::send_error(out, file.path() + ": GDCM finds pixels of another size than in the files before");
+    header.size = {frames->columns, frames->rows, header.size[2] + frames->frames};
+    header.stored = stored;
+    pixels.insert(pixels.end(), frames->pixels.begin(), frames->pixels.end());
+  }
+  return pixels.size() == header.voxel_bytes() && data::send_volume(out, header, pixels.data());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -76,6 +103,7 @@ int main(int argc, char** argv) {
         "usage: telesplat-import vtp|vtu|vtk FILE [ARRAY]   (standard output: the mesh, for telesplat-data)\n"
         "       telesplat-import gltf FILE TEXTURE_DETAIL\n"
         "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
+        "       telesplat-import dicom NAME BYTES    (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
         "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n"
         "       telesplat-import iso NAME            (standard input: iso.h)\n",
@@ -95,6 +123,7 @@ int main(int argc, char** argv) {
   try {
     if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
     limit_time(file_bytes);
+    if (format == "dicom" && argc == 4) return import_dicom(out, files, std::strtoull(argv[3], nullptr, 10)) ? 0 : 1;
     const bool gltf = format == "gltf" && argc == 4;
     const uint64_t texture_detail = gltf ? std::strtoull(argv[3], nullptr, 10) : 0;
     // Pictures hold many texels a byte; baked triangles are divided into a copy.

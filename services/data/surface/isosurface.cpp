@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 
 #include "common/volume/histogram.h"
 #include "services/data/import/iso.h"
@@ -33,19 +32,6 @@ bool write_all(int descriptor, const void* data, size_t bytes) {
   return true;
 }
 
-// What the volume's first step is read from: one file, or all files of a folder of slices.
-std::vector<std::string> files_of(const VolumeSource& volume) {
-  namespace fs = std::filesystem;
-  const std::string& first = volume.steps.front();
-  std::error_code error;
-  if (!fs::is_directory(first, error)) return {first};
-  std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(first, error))
-    if (entry.is_regular_file(error)) files.push_back(entry.path().string());
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 // Text as hexadecimal digits of its hash: for file names.
 std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
 
@@ -61,7 +47,9 @@ Result<MeshSource> surface_source(const std::string& path, const std::string& ra
     return isosurface(*volume, iso, source.name);
   };
   const std::string which = raw.empty() && series.empty() ? "" : "-" + hex(raw + series);
-  return MeshSource{hash_files(files_of(*found), progress), fmt::format("-surface{}{}", iso, which), read};
+  // What the volume's first step is read from: one file, or all slices of a series.
+  const auto files = found->dicom ? found->files() : std::vector{found->steps.front()};
+  return MeshSource{hash_files(files, progress), fmt::format("-surface{}{}", iso, which), read};
 }
 
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 
+#include "services/data/volume/formats/dicom_series.h"
 #include "services/data/volume/formats/header.h"
 #include "services/data/volume/formats/header_text.h"
 #include "services/data/volume/volume.h"
@@ -83,22 +84,36 @@ Result<std::vector<std::string>> series_of(const std::vector<std::string>& paths
   return steps;
 }
 
+// A series, whatever it is read from: a step each for its time steps.
+Result<VolumeSource> take_dicom(VolumeSource source, const std::string& path) {
+  auto series = find_dicom_series(path, source.series);
+  if (!series) return series.error();
+  source.dicom = std::move(*series);
+  source.steps.assign(source.dicom->order.steps.size(), path);
+  return source;
+}
+
 }  // namespace
 
 bool looks_like_volume(const std::string& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) return !format_of(path).empty();
   const auto files = files_in(path);
-  return files && std::any_of(files->begin(), files->end(), [](auto& file) { return !format_of(file).empty(); });
+  return files && (std::any_of(files->begin(), files->end(), [](auto& file) { return !format_of(file).empty(); }) ||
+                   holds_dicom(path));
 }
+
+std::vector<std::string> VolumeSource::files() const { return dicom ? dicom->files() : steps; }
 
 Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series) {
   std::error_code error;
-  VolumeSource source{{}, raw, file_name(fs::path(path).lexically_normal().string()), series};
+  VolumeSource source{{}, raw, file_name(fs::path(path).lexically_normal().string()), series, nullptr};
   const Error no_folder{fmt::format("--series: {} is no folder of DICOM slices", path)};
   if (source.name.empty()) source.name = file_name(fs::path(path).lexically_normal().parent_path().string());
   if (!fs::exists(path, error)) return Error{path + ": no such file or folder"};
   if (!fs::is_directory(path, error)) {
+    if (raw.empty() && format_of(path) == "dicom" && (series.empty() || file_name(path) == "DICOMDIR"))
+      return take_dicom(std::move(source), path);
     if (!series.empty()) return no_folder;
     // Reading its header says best what is wrong with it.
     const auto header = read_volume_header(path, raw);
@@ -115,10 +130,7 @@ Result<VolumeSource> find_volume(const std::string& path, const std::string& raw
     slices += format == "dicom";
     if (!format.empty() && format != "dicom") volumes.push_back(file);
   }
-  if (volumes.empty() && slices > 0) {
-    source.steps = {path};
-    return source;
-  }
+  if (volumes.empty() && raw.empty() && (slices > 0 || holds_dicom(path))) return take_dicom(std::move(source), path);
   if (volumes.empty())
     return Error{fmt::format("{}: holds neither volume files nor DICOM slices ({} files)", path, files->size())};
   if (slices > 0)

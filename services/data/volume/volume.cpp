@@ -2,10 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <new>
 
-#include "services/data/volume/formats/dicom_series.h"
+#include "services/data/volume/dicom_reader.h"
 #include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/formats/payload.h"
 
@@ -13,20 +12,14 @@ namespace telesplat::data {
 
 namespace {
 
-// The checked header of a step, a DICOM folder's included; its size is that of the first step.
+// The checked header of a step, a DICOM series' included; its size is that of the first step.
 Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t step) {
   if (step >= source.steps.size())
     return Error{fmt::format("{}: has no step {}, it has {}", source.name, step, source.steps.size())};
-  const auto header_of = [&](const std::string& path) -> Result<VolumeFileHeader> {
-    std::error_code error;
-    if (!std::filesystem::is_directory(path, error)) return read_volume_header(path, source.raw);
-    auto series = find_dicom_series(path, source.series);
-    if (!series) return series.error();
-    return series->header;
-  };
-  auto header = header_of(source.steps[step]);
+  if (source.dicom) return source.dicom->header;
+  auto header = read_volume_header(source.steps[step], source.raw);
   if (!header || step == 0) return header;
-  const auto first = header_of(source.steps[0]);
+  const auto first = read_volume_header(source.steps[0], source.raw);
   if (first && first->size != header->size)
     return Error{fmt::format("{}: has {} x {} x {} voxels, the first of its series, {}, has {} x {} x {}",
                              source.steps[step], header->size[0], header->size[1], header->size[2], source.steps[0],
@@ -38,7 +31,7 @@ Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t ste
 Result<Volume> read_step_here(const VolumeFileHeader& header, const VolumeSource& source, size_t step,
                               const ReadProgress& progress) {
   const std::string& path = source.steps[step];
-  if (header.format == "dicom") return read_dicom(path, source.series, progress);
+  if (source.dicom) return read_dicom(*source.dicom, step, path, progress);
   auto bytes = read_payload(header, path, progress);
   if (!bytes) return bytes.error();
   return make_volume(header, std::move(*bytes), path);

@@ -1,6 +1,7 @@
 // Finding and reading the files of a volume.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,19 +11,26 @@
 
 namespace telesplat::data {
 
+struct DicomSeries;
+
 /// Files of one data set: what --raw and a path say. One file a time step.
 struct VolumeSource {
-  std::vector<std::string> steps;  ///< a file each, or one DICOM folder
-  std::string raw;                 ///< --raw: "256x256x256:u8[:sx,sy,sz]"; empty: files tell themselves
-  std::string name;                ///< for people
-  std::string series;              ///< --series: which of a DICOM folder's; empty: the one of most slices
+  std::vector<std::string> steps;            ///< a file each, or a DICOM folder as often as its series has steps
+  std::string raw;                           ///< --raw: "256x256x256:u8[:sx,sy,sz]"; empty: files tell themselves
+  std::string name;                          ///< for people
+  std::string series;                        ///< --series: which of a DICOM folder's; empty: the one of most slices
+  std::shared_ptr<const DicomSeries> dicom;  ///< of a DICOM folder, file or disc
+
+  /// All files that its voxels come from.
+  std::vector<std::string> files() const;
 };
 
-/// Whether a path is (by content, then by name) a volume: a volume file, a folder of DICOM slices, or a folder of
+/// Whether a path is (by content, then by name) a volume: a volume file, a DICOM file or folder, or a folder of
 /// numbered volume files.
 bool looks_like_volume(const std::string& path);
-/// A volume file, a DICOM folder, or a folder with a numbered series of volume files (phase00.nrrd, phase02.nrrd, ...),
-/// in order of their numbers. With `raw`, a raw file or a folder of numbered ones. series: of a DICOM folder alone.
+/// A volume file, a DICOM folder or file (dicom_series.h), or a folder with a numbered series of volume files
+/// (phase00.nrrd, phase02.nrrd, ...), in order of their numbers. With `raw`, a raw file or a folder of numbered ones.
+/// series: of a DICOM folder alone.
 /// Error: nothing of the kind; names path and what it is instead.
 Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series = "");
 /// Reads one step. Formats that VTK reads are read in the program telesplat-import (vtk_reader.cpp), so that neither

@@ -7,6 +7,7 @@
 #include <array>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <optional>
 
 #include "services/data/volume/volume.h"
 #include "tests/support/files/data_files.h"
@@ -140,7 +141,9 @@ class DicomWriter {
   explicit DicomWriter(Syntax syntax, const std::string& syntax_uid = "") : syntax_(Syntax::kExplicit) {
     constexpr const char* kUids[] = {"1.2.840.10008.1.2.1", "1.2.840.10008.1.2", "1.2.840.10008.1.2.2"};
     out_ = std::string(128, '\0') + "DICM";
-    put(0x00020010, "UI", syntax_uid.empty() ? kUids[int(syntax)] : syntax_uid);
+    const std::string uid = syntax_uid.empty() ? kUids[int(syntax)] : syntax_uid;
+    put(0x00020000, "UL", raw(uint32_t(8 + (uid.size() + 1) / 2 * 2)));
+    put(0x00020010, "UI", uid);
     syntax_ = syntax;
   }
   void put(uint32_t tag, const char* type, std::string value) {
@@ -156,6 +159,23 @@ class DicomWriter {
     put16(0x00280010, 1);
     put(0x7fe00010, "OW", "\x7f\x7f");
     out_ += tag(0xfffee00d) + raw(uint32_t(0), big()) + tag(0xfffee0dd) + raw(uint32_t(0), big());
+  }
+  /// A sequence of items that have their lengths said, or not, as `undefined` is.
+  void put_sequence(uint32_t t, const std::vector<std::string>& items, bool undefined = true) {
+    std::string all;
+    for (const std::string& item : items) {
+      all += tag(0xfffee000) + raw(undefined ? 0xffffffff : uint32_t(item.size()), big()) + item;
+      if (undefined) all += tag(0xfffee00d) + raw(uint32_t(0), big());
+    }
+    if (undefined) all += tag(0xfffee0dd) + raw(uint32_t(0), big());
+    tag_and_length(t, "SQ", undefined ? 0xffffffff : uint32_t(all.size()));
+    out_ += all;
+  }
+  /// The elements alone, for an item of a sequence.
+  static DicomWriter item(Syntax syntax) {
+    DicomWriter out(syntax);
+    out.out_.clear();
+    return out;
   }
   const std::string& content() const { return out_; }
 
@@ -181,28 +201,41 @@ struct Dicom {
   std::string modality = "MR", series = "1.2.3", slope = "1", intercept = "0", syntax_uid;
   bool positions = true;
   uint16_t bits_stored = 16, representation = 1, components = 1;
+  std::string uid, image_type = "ORIGINAL\\PRIMARY\\AXIAL", photometric = "MONOCHROME2";
+  bool preamble = true, icon = true;
+  int temporal_position = 0;  ///< 0: not said
+  std::optional<int> padding = {};
+  std::optional<glm::dvec3> position = {};  ///< instead of the pattern's
 };
 
 inline std::string dicom_slice(const Pattern& p, int k, const Dicom& d) {
   const glm::dmat4& m = p.index_to_data;
   const auto s = spacing_of(m);
   DicomWriter w(d.syntax, d.syntax_uid);
+  if (!d.image_type.empty()) w.put(0x00080008, "CS", d.image_type);
+  w.put(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1." + std::string(d.modality == "CT" ? "2" : "4"));
+  if (!d.uid.empty()) w.put(0x00080018, "UI", d.uid);
   w.put(0x00080060, "CS", d.modality);
   w.put(0x00180050, "DS", fmt::format("{:.12g}", s[2]));
   w.put(0x0020000e, "UI", d.series);
   w.put(0x00200013, "IS", std::to_string(k + 1));
-  if (d.positions) w.put(0x00200032, "DS", three(m * glm::dvec4(0, 0, k, 1), "\\"));
+  const glm::dvec4 at = d.position ? glm::dvec4(*d.position, 1) : m * glm::dvec4(0, 0, k, 1);
+  if (d.positions) w.put(0x00200032, "DS", three(at, "\\"));
   w.put(0x00200037, "DS", three(m[0] / s[0], "\\") + "\\" + three(m[1] / s[1], "\\"));
+  if (d.temporal_position > 0) w.put(0x00200100, "IS", std::to_string(d.temporal_position));
   w.put16(0x00280002, d.components);
+  w.put(0x00280004, "CS", d.photometric);
   w.put16(0x00280010, uint16_t(p.size[1]));
   w.put16(0x00280011, uint16_t(p.size[0]));
   w.put(0x00280030, "DS", fmt::format("{:.12g}\\{:.12g}", s[1], s[0]));  // between rows, between columns
   w.put16(0x00280100, 16);
   w.put16(0x00280101, d.bits_stored);
+  w.put16(0x00280102, uint16_t(d.bits_stored - 1));
   w.put16(0x00280103, d.representation);
+  if (d.padding) w.put16(0x00280120, uint16_t(*d.padding));
   w.put(0x00281052, "DS", d.intercept);
   w.put(0x00281053, "DS", d.slope);
-  w.put_icon();
+  if (d.icon) w.put_icon();
   std::string pixels;
   const uint16_t mask = uint16_t((1u << d.bits_stored) - 1);  // what lies above are another's bits
   for (int j = 0; j < p.size[1]; ++j)
@@ -210,7 +243,7 @@ inline std::string dicom_slice(const Pattern& p, int k, const Dicom& d) {
       pixels += raw(uint16_t((uint16_t(int16_t(p.value(i, j, k))) & mask) | (0xa5a5 & ~mask)),
                     d.syntax == DicomWriter::Syntax::kBigEndian);
   w.put(0x7fe00010, "OW", pixels);
-  return w.content();
+  return d.preamble ? w.content() : w.content().substr(w.content().find("\x08", 132, 1));
 }
 
 /// Reads what lies at `path`, or fails the test.

@@ -1,10 +1,14 @@
 #include "services/data/volume/formats/dicom_header.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <glm/geometric.hpp>
+#include <iterator>
 
 #include "services/data/volume/formats/header_text.h"
 
@@ -13,58 +17,91 @@ namespace {
 
 constexpr uint32_t kUndefined = 0xffffffff;
 constexpr int kMostNesting = 16;
+constexpr size_t kMostFrames = 65536;
+constexpr size_t kMostInflated = size_t{2} << 30;
 
 constexpr uint32_t kItem = 0xfffee000, kItemEnd = 0xfffee00d, kSequenceEnd = 0xfffee0dd;
-constexpr uint32_t kPixels = 0x7fe00010;
+constexpr uint32_t kPixels = 0x7fe00010, kFloatPixels = 0x7fe00008, kDoublePixels = 0x7fe00009;
+constexpr uint32_t kPerFrame = 0x52009230;
+constexpr std::string_view kDeflated = "1.2.840.10008.1.2.1.99";
+
+// Sequences whose values are those of a frame, or of all frames: functional groups (PS3.3 C.7.6.16) and detectors.
+constexpr uint32_t kGroups[] = {0x52009229, kPerFrame,  0x00189114, 0x00189117, 0x00189118, 0x00189226, 0x00189329,
+                                0x00209111, 0x00209113, 0x00209116, 0x00289110, 0x00289145, 0x00540022};
+
+bool is_type(std::string_view vr) {
+  constexpr std::string_view kAll =
+      "AE AS AT CS DA DS DT FD FL IS LO LT OB OD OF OL OV OW PN SH SL SQ SS ST SV TM UC UI UL UN UR US UT UV ";
+  return vr.find(' ') == vr.npos && kAll.find(std::string(vr) + ' ') != kAll.npos;
+}
+
+uint16_t little16(std::string_view content, size_t at) {
+  return uint16_t(static_cast<unsigned char>(content[at]) | static_cast<unsigned char>(content[at + 1]) << 8);
+}
+
+bool has_preamble(std::string_view content) { return content.size() >= 132 && content.substr(128, 4) == "DICM"; }
 
 struct Element {
   uint32_t tag = 0;
   std::array<char, 2> vr{};
   uint32_t length = 0;
-  bool sequence() const { return vr == std::array{'S', 'Q'}; }
 };
 
 class Parser {
  public:
-  Parser(std::string_view content, const std::string& path) : content_(content), path_(path) { out_.path = path; }
+  Parser(std::string_view content, const std::string& path) : content_(content), path_(path) { base_.path = path; }
 
-  Result<DicomSlice> run() {
-    if (content_.size() < 132 || content_.substr(128, 4) != "DICM")
-      return Error{path_ + ": is no DICOM file: no DICM at byte 128"};
-    at_ = 132;
+  Result<std::vector<DicomSlice>> run() {
+    if (!is_dicom(content_)) return Error{path_ + ": is no DICOM file: no DICM at byte 128, and no elements before"};
+    at_ = has_preamble(content_) ? 132 : 0;
     // The file's meta group is always explicit and little-endian; its end is where another group begins.
     while (at_ + 2 <= content_.size() && u16(at_) == 2)
-      if (auto status = element(0); !status) return status.error();
-    if (auto status = choose_syntax(); !status) return status.error();
+      if (auto status = element(0, false); !status) return status.error();
+    if (base_.syntax == kDeflated) {
+      auto inflated = inflate_dicom(content_, path_);
+      if (!inflated) return inflated.error();
+      inflated_ = std::move(*inflated);
+      content_ = inflated_, at_ = 0, base_.deflated = true;
+    }
+    choose_syntax();
     while (!done_ && at_ + 8 <= content_.size())
-      if (auto status = element(0); !status) return status.error();
-    return out_;
+      if (auto status = element(0, false); !status) return status.error();
+    return slices();
+  }
+
+  /// Where the elements behind the meta group begin.
+  Result<size_t> end_of_meta() {
+    at_ = has_preamble(content_) ? 132 : 0;
+    while (at_ + 2 <= content_.size() && u16(at_) == 2)
+      if (auto status = element(0, false); !status) return status.error();
+    return at_;
   }
 
  private:
   uint16_t u16(size_t at) const {
-    const auto byte = [&](size_t i) { return unsigned(static_cast<unsigned char>(content_[at + i])); };
-    return uint16_t(big_ ? byte(0) << 8 | byte(1) : byte(1) << 8 | byte(0));
+    const uint16_t little = little16(content_, at);
+    return big_ ? uint16_t(little << 8 | little >> 8) : little;
   }
   uint32_t u32(size_t at) const {
     return big_ ? uint32_t(u16(at)) << 16 | u16(at + 2) : uint32_t(u16(at + 2)) << 16 | u16(at);
+  }
+  // A double in the file's byte order; 0 for what orders nothing.
+  double real(size_t at) const {
+    const uint64_t a = u32(at), b = u32(at + 4), bits = big_ ? a << 32 | b : b << 32 | a;
+    double value;
+    std::memcpy(&value, &bits, sizeof value);
+    return std::isfinite(value) ? value : 0;
   }
   Error cut() const {
     return Error{fmt::format("{}: is cut or damaged: an element at byte {} does not fit its {} bytes", path_, at_,
                              content_.size())};
   }
 
-  Status choose_syntax() {
-    constexpr std::string_view kBase = "1.2.840.10008.1.2";
-    if (syntax_ == kBase)
-      explicit_ = false;
-    else if (syntax_ == "1.2.840.10008.1.2.2")
-      big_ = true;
-    else if (syntax_ != "1.2.840.10008.1.2.1")
-      return Error{fmt::format("{}: its transfer syntax is {}; supported are uncompressed ones ({}, {}.1, {}.2)", path_,
-                               in_quotes(syntax_), kBase, kBase, kBase)};
-    out_.big_endian = big_;
-    return ok_status();
+  // What the file says of types is not always so: the first element itself shows whether it has one.
+  void choose_syntax() {
+    big_ = base_.big_endian = base_.syntax == "1.2.840.10008.1.2.2";
+    explicit_ = base_.syntax != "1.2.840.10008.1.2";
+    if (!big_ && at_ + 6 <= content_.size()) explicit_ = is_type(content_.substr(at_ + 4, 2));
   }
 
   // Tag, type and length; leaves at_ at the value.
@@ -90,118 +127,186 @@ class Parser {
     return e;
   }
 
-  Status element(int depth) {
+  // inside: of functional groups, whose values are kept.
+  Status element(int depth, bool inside) {
     const auto begun = begin_element();
     if (!begun) return begun.error();
     const Element e = *begun;
-    if (depth == 0 && e.tag == kPixels) return pixels(e);
-    if (e.length == kUndefined) return sequence(depth, e.vr == std::array{'U', 'N'});
-    if (e.length > content_.size() - at_) return cut();
-    if (depth == 0 && !e.sequence()) keep(e.tag, content_.substr(at_, e.length));
+    if (depth == 0 && (e.tag == kPixels || e.tag == kFloatPixels || e.tag == kDoublePixels)) return pixels(e);
+    const bool group =
+        (depth == 0 || inside) && std::find(std::begin(kGroups), std::end(kGroups), e.tag) != std::end(kGroups);
+    if (e.length != kUndefined && e.length > content_.size() - at_) return cut();
+    if (group || e.length == kUndefined) return sequence(e, depth, group);
+    if (depth == 0 || inside) keep(e.tag, content_.substr(at_, e.length));
     at_ += e.length;
     return ok_status();
   }
 
-  // Skips a sequence of undefined length: items, until its end is marked.
-  Status sequence(int depth, bool implicit_inside) {
+  // Goes through the items of a sequence.
+  Status sequence(const Element& e, int depth, bool group) {
     if (depth >= kMostNesting) return Error{fmt::format("{}: has elements nested deeper than {}", path_, kMostNesting)};
     const bool was_explicit = explicit_;
-    if (implicit_inside) explicit_ = false;  // PS3.5 6.2.2 note 2
-    const auto skipped = [&]() -> Status {
-      for (;;) {
-        const auto item = begin_element();
-        if (!item) return item.error();
-        if (item->tag == kSequenceEnd) return ok_status();
-        if (item->tag != kItem) return cut();
-        if (item->length != kUndefined) {
-          if (item->length > content_.size() - at_) return cut();
-          at_ += item->length;
-          continue;
-        }
-        for (;;) {
-          if (content_.size() - at_ < 8) return cut();
-          if ((uint32_t(u16(at_)) << 16 | u16(at_ + 2)) == kItemEnd) break;
-          if (auto status = element(depth + 1); !status) return status;
-        }
-        at_ += 8;
+    if (e.vr == std::array{'U', 'N'}) explicit_ = false;  // PS3.5 6.2.2 note 2
+    const size_t end = e.length == kUndefined ? content_.size() : at_ + e.length;
+    auto status = ok_status();
+    while (status && (e.length == kUndefined || at_ < end)) {
+      const auto begun = begin_element();
+      if (!begun) return begun.error();
+      if (begun->tag == kSequenceEnd) break;
+      if (begun->tag != kItem) return cut();
+      if (e.tag == kPerFrame && depth == 0) {
+        if (frames_.size() == kMostFrames) return Error{fmt::format("{}: has more than {} frames", path_, kMostFrames)};
+        frames_.push_back(base_);
+        into_ = &frames_.back();
       }
-    }();
+      status = item(begun->length, depth, group);
+    }
+    if (depth == 0) into_ = &base_;
     explicit_ = was_explicit;
-    return skipped;
+    return status;
+  }
+
+  Status item(uint32_t length, int depth, bool group) {
+    if (length != kUndefined && length > content_.size() - at_) return cut();
+    const size_t end = length == kUndefined ? content_.size() : at_ + length;
+    if (length != kUndefined && !group) at_ = end;
+    while (length == kUndefined || at_ < end) {
+      if (content_.size() - at_ < 8) return cut();
+      if (length == kUndefined && (uint32_t(u16(at_)) << 16 | u16(at_ + 2)) == kItemEnd) {
+        at_ += 8;
+        break;
+      }
+      if (auto status = element(depth + 1, group); !status) return status;
+    }
+    return ok_status();
   }
 
   Status pixels(const Element& e) {
-    if (e.length == kUndefined) return Error{path_ + ": its pixels are compressed; supported are uncompressed ones"};
-    if (e.length > content_.size() - at_)
+    constexpr std::string_view kBase = "1.2.840.10008.1.2";
+    const std::string_view syntax = base_.syntax;
+    const bool plain = syntax.empty() || syntax == kBase || syntax == "1.2.840.10008.1.2.1" || syntax == kDeflated ||
+                       syntax == "1.2.840.10008.1.2.2";
+    base_.compressed = e.length == kUndefined;
+    base_.is_float = e.tag != kPixels;
+    if (!base_.compressed && !plain && syntax.starts_with(kBase))
+      return Error{fmt::format("{}: its transfer syntax is {}, a compressed one, but its pixels are not in fragments",
+                               path_, in_quotes(syntax))};
+    if (!base_.compressed && e.length > content_.size() - at_)
       return Error{
           fmt::format("{}: is cut: claims {} bytes of pixels, has {}", path_, e.length, content_.size() - at_)};
-    out_.data_at = at_, out_.data_bytes = e.length;
+    base_.data_at = at_, base_.data_bytes = base_.compressed ? content_.size() - at_ : e.length;
     done_ = true;
     return ok_status();
   }
 
+  // A slice of each frame; a file without pixels has one, too.
+  Result<std::vector<DicomSlice>> slices() {
+    const size_t count = base_.data_bytes > 0 ? size_t(base_.frames) : 1;
+    if (count > kMostFrames) return Error{fmt::format("{}: has {} frames, limit {}", path_, count, kMostFrames)};
+    const bool described = frames_.size() >= count && count > 0;
+    if (!frames_.empty() && !described)
+      return Error{fmt::format("{}: has {} frames, and places {} of them", path_, count, frames_.size())};
+    const uint64_t bytes = base_.pixel_bytes();
+    if (count > 1 && (bytes == 0 || count > base_.data_bytes / (base_.compressed ? 1 : bytes)))
+      return Error{fmt::format("{}: claims {} frames of {} x {} pixels ({} bytes each), has {} bytes of them", path_,
+                               count, base_.columns, base_.rows, bytes, base_.data_bytes)};
+    if (!described) place_frames(count);
+    frames_.resize(count);
+    for (size_t f = 0; f < count; ++f) {
+      DicomSlice& s = frames_[f];
+      s.frame = int(f), s.frames = int(count);
+      s.compressed = base_.compressed, s.is_float = base_.is_float;
+      s.data_at = base_.data_at, s.data_bytes = base_.data_bytes;
+      if (count > 1 && !s.compressed) s.data_at += f * bytes, s.data_bytes = bytes;
+    }
+    return std::move(frames_);
+  }
+
+  // Where frames lie that do not say it themselves: as offsets along the normal tell (a dose), or one behind the other.
+  void place_frames(size_t count) {
+    frames_.assign(count, base_);
+    if (count == 1) return;
+    const double spacing = std::abs(base_.slice_spacing);
+    const bool offsets = offsets_.size() >= count;
+    const glm::dvec3 normal = glm::cross(base_.along_row, base_.along_column);
+    for (size_t f = 0; f < count; ++f) {
+      auto& position = frames_[f].position;
+      if (!offsets) frames_[f].stacked = true;
+      if (position && offsets)
+        *position += normal * (offsets_[f] - offsets_[0]);
+      else if (position && spacing > 0)
+        *position += normal * (double(f) * spacing);
+      else
+        position.reset();
+    }
+  }
+
   void keep(uint32_t tag, std::string_view value) {
-    if (value.size() >= 2) keep_word(tag, u16(size_t(value.data() - content_.data())));
+    const size_t at = size_t(value.data() - content_.data());
+    if (value.size() >= 2) keep_word(tag, u16(at));
+    if (value.size() == 8 && tag == 0x00189087) into_->times[4] = real(at);
+    if (value.size() == 8 && tag == 0x00209153) into_->times[1] = real(at);
+    if (value.size() == 8 && tag == 0x00189082) into_->times[3] = real(at);
+    if (value.size() == 4 && tag == 0x00209128) into_->times[0] = u32(at);
     while (!value.empty() && (value.back() == '\0' || value.back() == ' ')) value.remove_suffix(1);
     keep_text(tag, trim(value));
   }
 
+  static std::optional<std::vector<double>> decimals(std::string_view text) {
+    std::string plain(text);
+    std::replace(plain.begin(), plain.end(), '\\', ' ');
+    return numbers(plain);
+  }
   // Decimal strings, separated by backslashes. Nothing changes if they are not as many numbers.
   static bool decimals(std::string_view text, auto&... to) {
-    std::string plain(text.substr(0, 400));
-    std::replace(plain.begin(), plain.end(), '\\', ' ');
-    const auto all = numbers(plain);
+    const auto all = decimals(text.substr(0, 400));
     if (!all || all->size() < sizeof...(to)) return false;
+    if (!std::all_of(all->begin(), all->end(), [](double v) { return std::abs(v) < 1e12; })) return false;
     size_t i = 0;
     ((to = (*all)[i++]), ...);
     return true;
   }
 
   void keep_text(uint32_t tag, std::string_view text) {
+    DicomSlice& out = *into_;
+    const std::pair<uint32_t, std::string*> texts[] = {
+        {0x00020010, &out.syntax}, {0x00080008, &out.image_type},  {0x00089007, &out.image_type},
+        {0x00080018, &out.uid},    {0x00080060, &out.modality},    {0x0008103e, &out.series_text},
+        {0x0020000e, &out.series}, {0x00280004, &out.photometric},
+    };
+    for (const auto& [t, to] : texts)
+      if (t == tag) *to = std::string(text.substr(0, 64));
+    const std::pair<uint32_t, double*> reals[] = {
+        {0x00080032, &out.times[5]},      {0x00180050, &out.thickness}, {0x00180081, &out.times[3]},
+        {0x00180088, &out.slice_spacing}, {0x00181060, &out.times[1]},  {0x00200011, &out.series_number},
+        {0x00200012, &out.times[2]},      {0x00200013, &out.instance},  {0x00200100, &out.times[0]},
+        {0x00281052, &out.intercept},     {0x00281053, &out.slope},     {0x3004000e, &out.slope},
+    };
+    for (const auto& [t, to] : reals)
+      if (t == tag) decimals(text, *to);
+    keep_places(tag, text, out);
+  }
+
+  void keep_places(uint32_t tag, std::string_view text, DicomSlice& out) {
     glm::dvec3 a, b;
     double frames = 1;
     switch (tag) {
-      case 0x00020010:
-        syntax_ = std::string(text.substr(0, 64));
-        break;
-      case 0x00080060:
-        out_.modality = std::string(text.substr(0, 16));
-        break;
-      case 0x0008103e:
-        out_.series_text = std::string(text.substr(0, 64));
-        break;
-      case 0x00200011:
-        decimals(text, out_.series_number);
-        break;
-      case 0x0020000e:
-        out_.series = std::string(text.substr(0, 64));
-        break;
-      case 0x00200013:
-        decimals(text, out_.instance);
-        break;
-      case 0x00180050:
-        decimals(text, out_.thickness);
-        break;
-      case 0x00180088:
-        decimals(text, out_.slice_spacing);
-        break;
       case 0x00200032:
-        if (decimals(text, a.x, a.y, a.z)) out_.position = a;
+        if (decimals(text, a.x, a.y, a.z)) out.position = a;
         break;
       case 0x00200037:
-        if (decimals(text, a.x, a.y, a.z, b.x, b.y, b.z)) out_.along_row = a, out_.along_column = b;
+        if (decimals(text, a.x, a.y, a.z, b.x, b.y, b.z) && glm::length(glm::cross(a, b)) > 0.9)
+          out.along_row = glm::normalize(a), out.along_column = glm::normalize(b);
         break;
       case 0x00280008:
-        if (decimals(text, frames) && frames >= 1 && frames < 1e6) out_.frames = int(frames);
+        if (decimals(text, frames) && frames >= 1 && frames < 1e9) out.frames = int(frames);
         break;
+      case 0x00181164:
       case 0x00280030:
-        decimals(text, out_.spacing.y, out_.spacing.x);
+        decimals(text, out.spacing.y, out.spacing.x);
         break;  // between rows comes first
-      case 0x00281052:
-        decimals(text, out_.intercept);
-        break;
-      case 0x00281053:
-        decimals(text, out_.slope);
+      case 0x3004000c:
+        if (auto all = decimals(text)) offsets_ = std::move(*all);
         break;
       default:
         break;
@@ -209,42 +314,81 @@ class Parser {
   }
 
   void keep_word(uint32_t tag, int word) {
-    switch (tag) {
-      case 0x00280002:
-        out_.components = word;
-        break;
-      case 0x00280010:
-        out_.rows = word;
-        break;
-      case 0x00280011:
-        out_.columns = word;
-        break;
-      case 0x00280100:
-        out_.bits_allocated = word;
-        break;
-      case 0x00280101:
-        out_.bits_stored = word;
-        break;
-      case 0x00280103:
-        out_.is_signed = word == 1;
-        break;
-      default:
-        break;
-    }
+    DicomSlice& out = *into_;
+    const std::pair<uint32_t, int*> words[] = {{0x00280002, &out.components},
+                                               {0x00280010, &out.rows},
+                                               {0x00280011, &out.columns},
+                                               {0x00280100, &out.bits_allocated},
+                                               {0x00280101, &out.bits_stored}};
+    for (const auto& [t, to] : words)
+      if (t == tag) *to = word;
+    if (tag == 0x00280102) out.high_bit = word;
+    if (tag == 0x00280103) out.is_signed = word == 1;
+    if (tag == 0x00280120) out.padding = word;
+    if (tag == 0x00280121) out.padding_limit = word;
   }
 
   std::string_view content_;
+  std::string inflated_;
   const std::string& path_;
   size_t at_ = 0;
   bool explicit_ = true, big_ = false, done_ = false;
-  std::string syntax_;
-  DicomSlice out_;
+  DicomSlice base_;
+  std::vector<DicomSlice> frames_;
+  DicomSlice* into_ = &base_;  // the slice whose values are being read
+  std::vector<double> offsets_;
 };
 
 }  // namespace
 
-Result<DicomSlice> parse_dicom(std::string_view content, const std::string& path) {
+bool is_dicom(std::string_view content) {
+  if (has_preamble(content)) return true;
+  // Without a preamble: three elements by ascending tags, of groups that come before pixels.
+  uint32_t last = 0;
+  for (size_t at = 0, elements = 0; elements < 3; ++elements) {
+    if (content.size() - at < 12) return false;
+    const uint32_t tag = uint32_t(little16(content, at)) << 16 | little16(content, at + 2);
+    const bool typed = is_type(content.substr(at + 4, 2));
+    const size_t length = typed ? little16(content, at + 6) : little16(content, at + 4);
+    if (tag <= last || tag < 0x00020000 || tag > 0x0028ffff || length % 2 > 0 || length > 1024) return false;
+    if (!typed && little16(content, at + 6) != 0) return false;
+    last = tag;
+    const bool with_long_length = typed && content.substr(at + 4, 2) == "OB";
+    at += with_long_length ? 12 + size_t{little16(content, at + 8)} : 8 + length;
+    if (at > content.size()) return false;
+  }
+  return true;
+}
+
+Result<std::vector<DicomSlice>> parse_dicom(std::string_view content, const std::string& path) {
   return Parser(content, path).run();
+}
+
+Result<std::string> inflate_dicom(std::string_view content, const std::string& path) {
+  const auto begin = Parser(content, path).end_of_meta();
+  if (!begin) return begin.error();
+  z_stream stream{};
+  if (inflateInit2(&stream, -15) != Z_OK) return Error{path + ": no memory for unpacking it"};
+  std::string out;
+  int status = Z_OK;
+  content.remove_prefix(*begin);
+  while (status == Z_OK && out.size() < kMostInflated) {
+    if (stream.avail_in == 0) {
+      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
+      stream.avail_in = uInt(std::min<size_t>(content.size(), 1 << 30));
+      content.remove_prefix(stream.avail_in);
+    }
+    const size_t had = out.size();
+    out.resize(had + std::clamp<size_t>(had, 1 << 16, 1 << 24));
+    stream.next_out = reinterpret_cast<Bytef*>(out.data() + had);
+    stream.avail_out = uInt(out.size() - had);
+    status = inflate(&stream, Z_NO_FLUSH);
+    out.resize(out.size() - stream.avail_out);
+  }
+  inflateEnd(&stream);
+  if (status != Z_STREAM_END)
+    return Error{fmt::format("{}: its deflated elements are damaged, cut or more than {} bytes", path, kMostInflated)};
+  return out;
 }
 
 }  // namespace telesplat::data

@@ -12,6 +12,7 @@
 #include <filesystem>
 
 #include "common/volume/grid.h"
+#include "services/data/volume/formats/dicom_header.h"
 #include "services/data/volume/formats/header_text.h"
 
 namespace telesplat::data {
@@ -133,7 +134,7 @@ std::string volume_format(const FileStart& start, const std::string& path) {
   if (extension == ".nii" || lower_path.ends_with(".nii.gz")) return "nifti";
   if (!start.packed) {
     if (content.starts_with("NRRD000")) return "nrrd";
-    if (content.size() > 132 && content.substr(128, 4) == "DICM") return "dicom";
+    if (is_dicom(content)) return "dicom";
     const std::string_view head = content.substr(0, 1000);
     if (head.find("<VTKFile") != head.npos)
       return head.find("type=\"ImageData\"") != head.npos || (extension == ".vti" && head.find("type=") == head.npos)
@@ -186,7 +187,7 @@ Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::
     if (format == "metaimage") return parse_metaimage(start->bytes, path);
     if (format == "nifti") return parse_nifti(start->bytes, path);
     if (format == "vti") return parse_vti(start->bytes, path);
-    if (format == "dicom") return Error{path + ": is one slice of a DICOM series; give the folder that it lies in"};
+    if (format == "dicom") return Error{path + ": is a DICOM file, whose voxels may lie in others, too"};
     return Error{path +
                  ": is no volume; supported are NRRD, MetaImage, NIfTI, VTI, folders of DICOM slices, and raw "
                  "files with --raw"};

@@ -1,0 +1,278 @@
+#include "services/data/volume/dicom_reader.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "services/data/base/mapped_file.h"
+#include "services/data/import/process.h"
+#include "services/data/import/report.h"
+#include "services/data/volume/formats/import_stream.h"
+#include "services/data/volume/formats/payload.h"
+
+namespace telesplat::data {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+constexpr size_t kLayersAtOnce = 32;
+
+bool needs_gdcm(const DicomSlice& s) { return s.compressed || s.components == 3; }
+
+// Slices that GDCM reads, all of one size: all frames of their files, by file.
+Result<std::map<std::string, Bytes>> decode(const std::map<std::string, const DicomSlice*>& files,
+                                            const std::string& path) {
+  std::map<std::string, Bytes> out;
+  if (files.empty()) return out;
+  const DicomSlice& any = *files.begin()->second;
+  const size_t bytes = stored_bytes(stored_type(any)), frame_bytes = size_t(any.columns) * size_t(any.rows) * bytes;
+  uint64_t frames = 0;
+  for (const auto& [name, slice] : files) frames += uint64_t(slice->frames);
+  std::vector<std::string> paths;
+  for (const auto& [name, slice] : files) paths.push_back(name);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    return Error{fmt::format("{}: no pipe for reading it: {}", path, std::strerror(errno))};
+  fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);
+  const uint64_t unpacked = frames * frame_bytes * uint64_t(any.components);
+  const auto child = start_import({"dicom", path, std::to_string(unpacked)}, paths, ends[1]);
+  close(ends[1]);
+  if (!child) {
+    close(ends[0]);
+    return child.error();
+  }
+  auto received = receive_volume(ends[0], frames * frame_bytes, path, nullptr);
+  close(ends[0]);  // if it still writes, that ends it
+  const auto ended = end_import(*child, "GDCM's", "dicom", path);
+  if (received && !*received) return received->error();
+  if (!ended) return ended.error();
+  if (!received) return Error{fmt::format("{}: what {} gave of it is incomplete", path, kImportProgram)};
+  const VolumeFileHeader& h = (*received)->header;
+  if (h.size != std::array<int64_t, 3>{any.columns, any.rows, int64_t(frames)} || stored_bytes(h.stored) != bytes)
+    return Error{fmt::format("{}: GDCM finds {} x {} x {} pixels of {} bytes, the header says {} x {} x {} of {}", path,
+                             h.size[0], h.size[1], h.size[2], stored_bytes(h.stored), any.columns, any.rows, frames,
+                             bytes)};
+  const std::byte* from = (*received)->bytes.data();
+  for (const auto& [name, slice] : files) {
+    const std::byte* end = from + size_t(slice->frames) * frame_bytes;
+    out[name] = Bytes(from, end), from = end;
+  }
+  return out;
+}
+
+// Stored pixels of slices. Keeps what GDCM gave as long as layers ask for it, and the file that was read last.
+class Pixels {
+ public:
+  explicit Pixels(const std::string& path) : path_(path) {}
+
+  // Of these slices all that GDCM has to read are read now, in one run of the program.
+  Status prepare(const std::vector<const DicomSlice*>& slices) {
+    std::map<std::string, const DicomSlice*> missing;
+    std::set<std::string> needed;
+    for (const DicomSlice* s : slices) {
+      if (!needs_gdcm(*s)) continue;
+      needed.insert(s->path);
+      if (!decoded_.contains(s->path)) missing[s->path] = s;
+    }
+    std::erase_if(decoded_, [&](const auto& d) { return !needed.contains(d.first); });
+    auto more = decode(missing, path_);
+    if (!more) return more.error();
+    decoded_.merge(*more);
+    return ok_status();
+  }
+
+  Result<const std::byte*> of(const DicomSlice& s) {
+    const size_t bytes = size_t(s.rows) * size_t(s.columns) * stored_bytes(stored_type(s));
+    if (needs_gdcm(s)) return decoded_[s.path].data() + size_t(s.frame) * bytes;
+    if (s.path != name_) {
+      auto file = MappedFile::open(s.path);
+      if (!file) return file.error();
+      file_ = std::move(*file);
+      if (s.deflated) {
+        auto inflated = inflate_dicom(file_->text(), s.path);
+        if (!inflated) return inflated.error();
+        inflated_ = std::move(*inflated);
+      }
+      name_ = s.path;
+    }
+    const std::string_view content = s.deflated ? std::string_view(inflated_) : file_->text();
+    if (s.data_at > content.size() || bytes > content.size() - s.data_at)
+      return Error{s.path + ": changed while it was read"};
+    return reinterpret_cast<const std::byte*>(content.data()) + s.data_at;
+  }
+
+ private:
+  const std::string& path_;
+  std::map<std::string, Bytes> decoded_;
+  std::string name_, inflated_;
+  std::shared_ptr<const MappedFile> file_;
+};
+
+// A stored value without what lies beside its bits, and turned round where that is asked for.
+template <class T>
+T value_of(T raw, int up, int down, bool inverted) {
+  if constexpr (std::is_integral_v<T>) {
+    using Raw = std::make_unsigned_t<T>;
+    // Up to the top and back: brings the sign along, or zeroes.
+    const T value = T(T(Raw(raw) << up) >> down);
+    return !inverted ? value : std::is_signed_v<T> ? T(~value) : T(Raw(Raw(~Raw(0)) >> down) - value);
+  } else {
+    return raw;
+  }
+}
+
+// The values of padding, as they are shown: from, to.
+template <class T>
+std::optional<std::pair<T, T>> padding_of(const DicomSlice& s) {
+  if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
+    if (!s.padding) return std::nullopt;
+    const T a = T(*s.padding), b = T(s.padding_limit.value_or(*s.padding));
+    const int unused = s.bits_allocated - s.bits_stored;
+    const T from = value_of<T>(a, unused, unused, is_inverted(s)), to = value_of<T>(b, unused, unused, is_inverted(s));
+    return std::minmax(from, to);
+  }
+  return std::nullopt;
+}
+
+template <class T>
+void unpack(const DicomSlice& s, const std::byte* from, size_t count, std::byte* to, bool rescale) {
+  const int high = s.high_bit.value_or(s.bits_stored - 1);
+  const int up = s.bits_allocated - 1 - high, down = s.bits_allocated - s.bits_stored;
+  const bool inverted = is_inverted(s), swap = s.big_endian && !needs_gdcm(s);
+  const auto padding = padding_of<T>(s);
+  for (size_t i = 0; i < count; ++i) {
+    std::byte bytes[sizeof(T)];
+    std::memcpy(bytes, from + i * sizeof(T), sizeof(T));
+    if (swap) std::reverse(bytes, bytes + sizeof(T));
+    T raw;
+    std::memcpy(&raw, bytes, sizeof(T));
+    const T value = value_of<T>(raw, up, down, inverted);
+    if (!rescale) {
+      std::memcpy(to + i * sizeof value, &value, sizeof value);
+      continue;
+    }
+    const bool padded = padding && value >= padding->first && value <= padding->second;
+    const float scaled =
+        padded ? std::numeric_limits<float>::quiet_NaN() : float(double(value) * s.slope + s.intercept);
+    std::memcpy(to + i * sizeof scaled, &scaled, sizeof scaled);
+  }
+}
+
+template <class T>
+void mix(const Bytes& below, const Bytes& above, double share, std::byte* to) {
+  for (size_t at = 0; at < below.size(); at += sizeof(T)) {
+    T a, b;
+    std::memcpy(&a, below.data() + at, sizeof(T));
+    std::memcpy(&b, above.data() + at, sizeof(T));
+    const double mixed = double(a) * (1 - share) + double(b) * share;
+    const T value = std::is_integral_v<T> ? T(std::llround(mixed)) : T(mixed);
+    std::memcpy(to + at, &value, sizeof(T));
+  }
+}
+
+// Calls with a value of a stored type.
+auto with_type(StoredType type, auto&& call) {
+  switch (type) {
+    case StoredType::kU8:
+      return call(uint8_t{});
+    case StoredType::kI8:
+      return call(int8_t{});
+    case StoredType::kU16:
+      return call(uint16_t{});
+    case StoredType::kI16:
+      return call(int16_t{});
+    case StoredType::kU32:
+      return call(uint32_t{});
+    case StoredType::kI32:
+      return call(int32_t{});
+    case StoredType::kF64:
+      return call(double{});
+    default:
+      return call(float{});
+  }
+}
+
+// Padding that lies far from all other values would be most of their range: it becomes the lowest of them.
+template <class T>
+void take_padding(const DicomSlice& s, Bytes& bytes, std::string& remark) {
+  const auto padding = padding_of<T>(s);
+  if (!padding) return;
+  T* const voxels = reinterpret_cast<T*>(bytes.data());
+  const size_t count = bytes.size() / sizeof(T);
+  T lo = std::numeric_limits<T>::max(), hi = std::numeric_limits<T>::lowest();
+  size_t padded = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const bool is = voxels[i] >= padding->first && voxels[i] <= padding->second;
+    padded += is;
+    if (!is) lo = std::min(lo, voxels[i]), hi = std::max(hi, voxels[i]);
+  }
+  const double away = std::max(double(lo) - double(padding->second), double(padding->first) - double(hi));
+  if (padded == 0 || padded == count || away <= 0.01 * (double(hi) - double(lo))) return;
+  for (size_t i = 0; i < count; ++i)
+    if (voxels[i] >= padding->first && voxels[i] <= padding->second) voxels[i] = s.slope < 0 ? hi : lo;
+  remark += fmt::format("{}{} voxels are padding ({}) and count as the lowest value", remark.empty() ? "" : "; ",
+                        padded, double(padding->first) * s.slope + s.intercept);
+}
+
+Status fill(const DicomSeries& series, size_t step, const std::string& path, const ReadProgress& progress,
+            Bytes& bytes) {
+  const VolumeFileHeader& h = series.header;
+  const size_t pixels = size_t(h.size[0]) * size_t(h.size[1]), layer_bytes = pixels * stored_bytes(h.stored);
+  const auto& layers = series.order.steps[step];
+  const auto& slices = series.order.slices;
+  Pixels source(path);
+  // Slices as they are stored in the volume.
+  const auto read = [&](const DicomSlice& s, std::byte* to) -> Status {
+    const auto from = source.of(s);
+    if (!from) return from.error();
+    const bool rescale =
+        h.stored == StoredType::kF32 && (stored_type(s) != h.stored || h.scale != s.slope || h.offset != s.intercept);
+    with_type(stored_type(s), [&](auto zero) { unpack<decltype(zero)>(s, *from, pixels, to, rescale); });
+    return ok_status();
+  };
+  Bytes below, above;
+  for (size_t k = 0; k < layers.size(); ++k) {
+    if (k % kLayersAtOnce == 0) {
+      std::vector<const DicomSlice*> next;
+      for (size_t n = k; n < std::min(k + kLayersAtOnce, layers.size()); ++n)
+        for (const size_t i : {layers[n].below, layers[n].above}) next.push_back(&slices[i]);
+      if (auto status = source.prepare(next); !status) return status;
+    }
+    const DicomLayer& l = layers[k];
+    std::byte* const to = bytes.data() + k * layer_bytes;
+    if (l.share == 0) {
+      if (auto status = read(slices[l.below], to); !status) return status;
+    } else {
+      below.resize(layer_bytes), above.resize(layer_bytes);
+      if (auto status = read(slices[l.below], below.data()); !status) return status;
+      if (auto status = read(slices[l.above], above.data()); !status) return status;
+      with_type(h.stored, [&](auto zero) { mix<decltype(zero)>(below, above, l.share, to); });
+    }
+    if (progress) progress(double(k + 1) / double(layers.size()));
+  }
+  return ok_status();
+}
+
+}  // namespace
+
+Result<Volume> read_dicom(const DicomSeries& series, size_t step, const std::string& path,
+                          const ReadProgress& progress) {
+  const VolumeFileHeader& h = series.header;
+  Bytes bytes(h.voxel_bytes());
+  if (auto status = fill(series, step, path, progress, bytes); !status) return status.error();
+  std::string remark = series.order.remark;
+  with_type(h.stored, [&](auto zero) { take_padding<decltype(zero)>(series.order.slices[0], bytes, remark); });
+  auto volume = make_volume(h, std::move(bytes), path);
+  if (volume) volume->remark = remark;
+  return volume;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,300 @@
+#include "services/data/volume/formats/dicom_order.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <set>
+#include <tuple>
+
+namespace telesplat::data {
+namespace {
+
+using Slices = std::vector<DicomSlice>;
+using Place = std::vector<size_t>;  // slices at the same height, by time
+
+constexpr size_t kMostKinds = 64;    // others count as of no kind
+constexpr double kSamePlace = 1e-3;  // of a pixel
+constexpr double kEven = 0.1;        // of the distance of slices: how far one may lie from where it is shown
+constexpr double kSilentlyEven = 0.01;
+constexpr double kSilentlyTilted = 0.5;  // degrees
+
+std::string name_of(const DicomSlice& s) {
+  const std::string file = std::filesystem::path(s.path).filename().string();
+  return s.frames > 1 ? fmt::format("frame {} of {}", s.frame + 1, file) : file;
+}
+
+std::string counted(size_t n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
+
+void say(std::string& remark, const std::string& more) { remark += (remark.empty() ? "" : "; ") + more; }
+
+glm::dvec3 normal_of(const DicomSlice& s) { return glm::cross(s.along_row, s.along_column); }
+
+bool is_localizer(const DicomSlice& s) { return s.image_type.find("LOCALIZER") != std::string::npos; }
+
+bool same_kind(const DicomSlice& a, const DicomSlice& b) {
+  if (a.stacked && b.stacked && a.path != b.path) return false;
+  return a.rows == b.rows && a.columns == b.columns && is_localizer(a) == is_localizer(b) &&
+         a.position.has_value() == b.position.has_value() && glm::distance(a.along_row, b.along_row) <= 1e-3 &&
+         glm::distance(a.along_column, b.along_column) <= 1e-3 &&
+         glm::distance(a.spacing, b.spacing) <= 1e-3 * glm::length(b.spacing);
+}
+
+std::string why_other(const DicomSlice& s, const DicomSlice& taken) {
+  if (is_localizer(s) && !is_localizer(taken)) return "a localizer";
+  if (s.rows != taken.rows || s.columns != taken.columns)
+    return fmt::format("of {} x {} pixels instead of {} x {}", s.columns, s.rows, taken.columns, taken.rows);
+  if (s.position.has_value() != taken.position.has_value())
+    return s.position ? "of a position among others without" : "without a position";
+  return s.stacked ? "another file of frames" : "turned or spaced otherwise";
+}
+
+// Slices that can make one volume.
+Slices most_alike(Slices all, std::string& remark) {
+  std::vector<Slices> kinds;
+  Slices others;
+  for (DicomSlice& s : all) {
+    const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](auto& k) { return same_kind(s, k.front()); });
+    if (kind != kinds.end())
+      kind->push_back(std::move(s));
+    else if (kinds.size() < kMostKinds)
+      kinds.push_back({std::move(s)});
+    else
+      others.push_back(std::move(s));
+  }
+  const auto rank = [](const Slices& k) { return std::pair(!is_localizer(k.front()), k.size()); };
+  const auto taken = std::max_element(kinds.begin(), kinds.end(), [&](auto& a, auto& b) { return rank(a) < rank(b); });
+  for (Slices& kind : kinds)
+    if (&kind != &*taken)
+      say(remark, fmt::format("left out {}: {} ({})", counted(kind.size(), "slice"),
+                              why_other(kind.front(), taken->front()), name_of(kind.front())));
+  if (!others.empty()) say(remark, fmt::format("left out {} of other kinds", counted(others.size(), "slice")));
+  return std::move(*taken);
+}
+
+// Copies by their UIDs go, the first one stays.
+void drop_copies(Slices& slices, std::string& remark) {
+  std::set<std::pair<std::string, int>> seen;
+  const auto copies = std::stable_partition(slices.begin(), slices.end(), [&](const DicomSlice& s) {
+    return s.uid.empty() || seen.insert({s.uid, s.frame}).second;
+  });
+  if (copies == slices.end()) return;
+  say(remark, fmt::format("left out {} that are there twice ({})", counted(size_t(slices.end() - copies), "slice"),
+                          name_of(*copies)));
+  slices.erase(copies, slices.end());
+}
+
+bool earlier(const DicomSlice& a, const DicomSlice& b) {
+  return std::tie(a.times, a.instance, a.path, a.frame) < std::tie(b.times, b.instance, b.path, b.frame);
+}
+
+// Ascending heights; without positions a place each.
+std::vector<Place> places_of(const Slices& slices) {
+  const glm::dvec3 normal = normal_of(slices.front());
+  std::vector<std::pair<double, size_t>> by_height;
+  for (size_t i = 0; i < slices.size(); ++i)
+    by_height.emplace_back(slices[i].position ? glm::dot(*slices[i].position, normal) : 0, i);
+  std::stable_sort(by_height.begin(), by_height.end(), [&](auto& a, auto& b) {
+    const DicomSlice &s = slices[a.second], &t = slices[b.second];
+    return s.position ? a.first < b.first : std::tie(s.instance, s.frame) < std::tie(t.instance, t.frame);
+  });
+  std::vector<Place> places;
+  double height = 0;
+  for (const auto& [h, i] : by_height) {
+    const bool same = !places.empty() && slices[i].position && h - height <= kSamePlace * slices[i].spacing.x;
+    if (!same) places.emplace_back(), height = h;
+    places.back().push_back(i);
+  }
+  for (Place& p : places)
+    std::sort(p.begin(), p.end(), [&](size_t a, size_t b) { return earlier(slices[a], slices[b]); });
+  return places;
+}
+
+bool equally_many(const std::vector<Place>& places) {
+  return std::all_of(places.begin(), places.end(), [&](auto& p) { return p.size() == places[0].size(); });
+}
+
+std::string told_apart_by(const Slices& slices, const Place& place) {
+  const DicomSlice &a = slices[place[0]], &b = slices[place[1]];
+  for (size_t i = 0; i < a.times.size(); ++i)
+    if (a.times[i] != b.times[i]) return kDicomTimes[i];
+  return "number";
+}
+
+// What lies at a place more than once: copies, time steps, or neither.
+void sort_out(const Slices& slices, std::vector<Place>& places,
+              const std::function<bool(const DicomSlice&, const DicomSlice&)>& same_pixels, std::string& remark) {
+  const auto several = [](const Place& p) { return p.size() > 1; };
+  if (std::none_of(places.begin(), places.end(), several)) return;
+  std::vector<Place> once = places;
+  size_t copies = 0;
+  for (Place& p : once) {
+    const auto end =
+        std::unique(p.begin(), p.end(), [&](size_t a, size_t b) { return same_pixels(slices[a], slices[b]); });
+    copies += size_t(p.end() - end);
+    p.erase(end, p.end());
+  }
+  // Time steps may have slices in common (air), so copies are those whose loss leaves as many slices at each place.
+  if (copies > 0 && equally_many(once)) {
+    say(remark, fmt::format("left out {} with the pixels of others at their place", counted(copies, "slice")));
+    places = std::move(once);
+  }
+  if (std::none_of(places.begin(), places.end(), several)) return;
+  const auto first = std::find_if(places.begin(), places.end(), several);
+  const std::string by = told_apart_by(slices, *first);
+  if (equally_many(places)) {
+    say(remark, fmt::format("{} at each place, told apart by {}: time steps", counted(first->size(), "slice"), by));
+    return;
+  }
+  size_t left_out = 0;
+  for (Place& p : places) left_out += p.size() - 1, p.resize(1);
+  say(remark, fmt::format("left out {} at places that others have, but not all places have as many ({}, by {})",
+                          counted(left_out, "slice"), name_of(slices[first->front()]), by));
+}
+
+// Which layers there are: places of slices, or mixtures of two. Sets the distance from one to the next.
+struct Layers {
+  std::vector<DicomLayer> layers;  // of places
+  double distance = 1;
+};
+
+Layers even_layers(const std::vector<double>& heights) {
+  Layers out;
+  for (size_t k = 0; k < heights.size(); ++k) out.layers.push_back({k, k, 0});
+  out.distance = (heights.back() - heights.front()) / double(heights.size() - 1);
+  return out;
+}
+
+// At `counts` places of a grid each lies a slice; others are mixed.
+Layers layers_with_gaps(const std::vector<double>& heights, const std::vector<size_t>& counts) {
+  Layers out;
+  for (size_t k = 0; k + 1 < heights.size(); ++k)
+    for (size_t n = 0; n < counts[k]; ++n) out.layers.push_back({k, n == 0 ? k : k + 1, double(n) / double(counts[k])});
+  out.layers.push_back({heights.size() - 1, heights.size() - 1, 0});
+  out.distance = (heights.back() - heights.front()) / double(out.layers.size() - 1);
+  return out;
+}
+
+Layers resampled(const std::vector<double>& heights, double distance) {
+  Layers out;
+  const double extent = heights.back() - heights.front();
+  const size_t count = size_t(std::lround(extent / distance)) + 1;
+  out.distance = extent / double(count - 1);
+  size_t k = 0;
+  for (size_t n = 0; n < count; ++n) {
+    const double h = heights[0] + double(n) * out.distance;
+    while (k + 2 < heights.size() && heights[k + 1] <= h) ++k;
+    const double share = std::clamp((h - heights[k]) / (heights[k + 1] - heights[k]), 0.0, 1.0);
+    if (share < kSilentlyEven || share > 1 - kSilentlyEven)
+      out.layers.push_back({share < 0.5 ? k : k + 1, share < 0.5 ? k : k + 1, 0});
+    else
+      out.layers.push_back({k, k + 1, share});
+  }
+  return out;
+}
+
+// Whether each height lies where an even grid has it, `counts` distances behind the one before.
+double unevenness(const std::vector<double>& heights, const std::vector<size_t>& counts) {
+  size_t all = 0, at = 0;
+  for (const size_t n : counts) all += n;
+  const double distance = (heights.back() - heights.front()) / double(all);
+  double most = 0;
+  for (size_t k = 0; k + 1 < heights.size(); ++k) {
+    at += counts[k];
+    most = std::max(most, std::abs(heights[k + 1] - heights[0] - double(at) * distance) / distance);
+  }
+  return most;
+}
+
+Layers layers_of(const std::vector<double>& heights, const std::function<std::string(size_t)>& name,
+                 std::string& remark) {
+  std::vector<double> gaps;
+  for (size_t k = 1; k < heights.size(); ++k) gaps.push_back(heights[k] - heights[k - 1]);
+  std::vector<double> sorted = gaps;
+  std::sort(sorted.begin(), sorted.end());
+  const double least = sorted.front(), most = sorted.back(), usual = sorted[(sorted.size() - 1) / 2];
+  const double uneven = unevenness(heights, std::vector<size_t>(gaps.size(), 1));
+  if (uneven <= kEven) {
+    if (most > 1.01 * least)
+      say(remark, fmt::format("slices are {:.4g} to {:.4g} mm apart and were evened", least, most));
+    return even_layers(heights);
+  }
+  const double extent = heights.back() - heights.front(), most_layers = 4.0 * double(heights.size()) + 64;
+  std::vector<size_t> counts;
+  for (const double gap : gaps) counts.push_back(size_t(std::max(1.0, std::round(std::min(gap / usual, 1e6)))));
+  if (extent / usual < most_layers && unevenness(heights, counts) <= kEven) {
+    const Layers out = layers_with_gaps(heights, counts);
+    std::string where;
+    size_t named = 0;
+    for (size_t k = 0; k < counts.size(); ++k)
+      if (counts[k] > 1 && named++ < 3)
+        where += fmt::format("{}{} between {} and {}", named > 1 ? ", " : "", counts[k] - 1, name(k), name(k + 1));
+    const size_t missing = out.layers.size() - heights.size();
+    say(remark, fmt::format("{} missing, {:.4g} mm apart, mixed from {} neighbours: {}{}",
+                            missing == 1 ? "1 slice is" : fmt::format("{} slices are", missing), out.distance,
+                            missing == 1 ? "its" : "their", where, named > 3 ? ", ..." : ""));
+    return out;
+  }
+  const Layers out = resampled(heights, std::max(least, extent / (most_layers - 1)));
+  say(remark, fmt::format("slices are {:.4g} to {:.4g} mm apart; resampled to {} that are {:.4g} mm apart", least, most,
+                          out.layers.size(), out.distance));
+  return out;
+}
+
+// The way from one layer to the next: as positions say, which may be askew (gantry tilt).
+void place(DicomOrder& out, const std::vector<Place>& places, double distance) {
+  const DicomSlice &first = out.slices[places.front()[0]], &last = out.slices[places.back()[0]];
+  const glm::dvec3 normal = normal_of(first), way = *last.position - *first.position;
+  out.step = way * (distance / glm::dot(way, normal));
+  const double tilt = std::acos(std::min(1.0, distance / glm::length(out.step))) * 180 / M_PI;
+  if (tilt > kSilentlyTilted)
+    say(out.remark, fmt::format("slices are askew by {:.3g} degrees (gantry tilt), and shown so", tilt));
+  double aside = 0;
+  for (const Place& p : places) {
+    const glm::dvec3 from = *out.slices[p[0]].position - *first.position;
+    aside = std::max(aside, glm::distance(from, way * (glm::dot(from, normal) / glm::dot(way, normal))));
+  }
+  if (aside > 0.5 * first.spacing.x)
+    say(out.remark, fmt::format("slices lie up to {:.3g} mm beside a straight line, and are shown on it", aside));
+}
+
+}  // namespace
+
+DicomOrder order_slices(Slices slices, const std::function<bool(const DicomSlice&, const DicomSlice&)>& same_pixels) {
+  DicomOrder out;
+  out.slices = most_alike(std::move(slices), out.remark);
+  drop_copies(out.slices, out.remark);
+  std::vector<Place> places = places_of(out.slices);
+  sort_out(out.slices, places, same_pixels, out.remark);
+  const DicomSlice first = out.slices[places.front()[0]];
+  const double said = first.slice_spacing > 0 ? first.slice_spacing : first.thickness > 0 ? first.thickness : 1;
+  out.origin = first.position.value_or(glm::dvec3(0));
+  out.step = normal_of(first) * said;
+  Layers layers;
+  if (!first.position || places.size() == 1) {
+    for (size_t k = 0; k < places.size(); ++k) layers.layers.push_back({k, k, 0});
+  } else {
+    std::vector<double> heights;
+    for (const Place& p : places) heights.push_back(glm::dot(*out.slices[p[0]].position, normal_of(first)));
+    layers = layers_of(
+        heights, [&](size_t k) { return name_of(out.slices[places[k][0]]); }, out.remark);
+    place(out, places, layers.distance);
+  }
+  if (places.size() > 1 && (!first.position || first.stacked))
+    say(out.remark, fmt::format("{} of no position of their own are stacked {:.4g} mm apart",
+                                counted(places.size(), first.frames > 1 ? "frame" : "slice"), glm::length(out.step)));
+  Slices used;
+  for (Place& p : places)
+    for (size_t& i : p) used.push_back(std::move(out.slices[i])), i = used.size() - 1;
+  out.slices = std::move(used);
+  for (size_t t = 0; t < places[0].size(); ++t) {
+    out.steps.emplace_back();
+    for (const DicomLayer& l : layers.layers)
+      out.steps.back().push_back({places[l.below][t], places[l.above][t], l.share});
+  }
+  return out;
+}
+
+}  // namespace telesplat::data
