@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/core/result.h"
+#include "common/scene/placement.h"
 
 namespace telesplat::data {
 
@@ -17,7 +18,8 @@ struct PlacementOptions {
   double crease_deg = 40;
 };
 
-/// The rotation (determinant +1) that turns data axis `up` to +y. Error unless `up` is x, y, z, -x, -y or -z.
-Result<glm::dmat3> rotation_for_up(const std::string& up);
+/// The rotation (determinant +1) that turns data axis `up` to +y. A patient stands in one way, whether the axes are LPS
+/// or RAS: these are turned by 180 degrees about z. Error unless `up` is x, y, z, -x, -y or -z.
+Result<glm::dmat3> rotation_for_up(const std::string& up, scene::Space space = scene::Space::kPlain);
 
 }  // namespace telesplat::data

@@ -94,7 +94,7 @@ class ServedMesh final : public Served {
     }
     if (as_begun_) hello.facts[scene::kColouringFact] = scene::to_text(*as_begun_);
     hello.facts[scene::kColourMapFact] = colour::to_text(map_);
-    if (const auto rotation = rotation_for_up(info.up); rotation && !info.box_data.empty())
+    if (const auto rotation = rotation_for_up(info.up, info.coordinates.space); rotation && !info.box_data.empty())
       hello.facts[scene::kPlacementFact] = scene::to_text(placement_of(*rotation));
     hello.box_room = info.box_room;
   }

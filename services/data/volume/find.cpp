@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <tuple>
 
 #include "services/data/volume/formats/dicom_series.h"
 #include "services/data/volume/formats/header.h"
@@ -38,49 +40,82 @@ Result<std::vector<std::string>> files_in(const std::string& folder) {
   return paths;
 }
 
-// A name around its last number: phase08.nrrd is "phase*.nrrd" and "8".
+// A name as what lies between its numbers ("run*-phase*.nrrd") and these. A number with a fraction is one.
 struct Numbered {
-  std::string pattern, number;  // number: without leading zeros; pattern without a star: no number
+  std::string pattern;
+  std::vector<std::string> numbers;
 };
 Numbered numbered(const std::string& name) {
-  const size_t dot = std::min(name.find('.', 1), name.size());
-  constexpr const char* kDigits = "0123456789";
-  size_t last = name.substr(0, dot).find_last_of(kDigits);
-  if (last == name.npos) last = name.substr(0, fs::path(name).stem().string().size()).find_last_of(kDigits);
-  if (last == name.npos) return {name, ""};
-  const size_t before = name.find_last_not_of(kDigits, last), first = before == name.npos ? 0 : before + 1;
-  const size_t value = std::min(name.find_first_not_of('0', first), last);
-  return {name.substr(0, first) + "*" + name.substr(last + 1), name.substr(value, last + 1 - value)};
+  Numbered out;
+  const auto digit = [&](size_t at) { return at < name.size() && name[at] >= '0' && name[at] <= '9'; };
+  for (size_t at = 0; at < name.size();) {
+    const size_t begin = at;
+    while (digit(at)) ++at;
+    if (at > begin && name[at] == '.' && digit(at + 1))
+      for (++at; digit(at);) ++at;
+    out.pattern += at > begin ? '*' : name[at];
+    if (at > begin) out.numbers.push_back(name.substr(begin, at - begin));
+    at += at == begin;
+  }
+  return out;
+}
+
+// "007.50" as "7" and "5".
+std::pair<std::string, std::string> parts_of(const std::string& number) {
+  const size_t dot = std::min(number.find('.'), number.size());
+  std::string whole = number.substr(0, dot), fraction = dot < number.size() ? number.substr(dot + 1) : "";
+  whole.erase(0, whole.find_first_not_of('0'));
+  fraction.erase(fraction.find_last_not_of('0') + 1);
+  return {whole, fraction};
 }
 
 bool lower_number(const std::string& a, const std::string& b) {
-  return a.size() != b.size() ? a.size() < b.size() : a < b;
+  const auto [whole_a, fraction_a] = parts_of(a);
+  const auto [whole_b, fraction_b] = parts_of(b);
+  return std::tuple(whole_a.size(), whole_a, fraction_a) < std::tuple(whole_b.size(), whole_b, fraction_b);
 }
 
-// The one numbered series among files; a lone file is one, too.
+Error not_one_series(const std::vector<std::string>& paths, const std::string& folder) {
+  std::map<std::string, size_t> patterns;
+  for (const std::string& path : paths) ++patterns[numbered(file_name(path)).pattern];
+  std::string names;
+  size_t named = 0;
+  for (const auto& [pattern, members] : patterns)
+    if (named++ < 3) names += fmt::format("{}{} ({})", named > 1 ? ", " : "", pattern, members);
+  return Error{fmt::format("{}: holds {} volumes that are not one numbered series: {}{}; name one of its files", folder,
+                           paths.size(), names, named > 3 ? ", ..." : "")};
+}
+
+// The one numbered series among files, by the number in which they differ; a lone file is one, too.
 Result<std::vector<std::string>> series_of(const std::vector<std::string>& paths, const std::string& folder) {
-  std::map<std::string, std::vector<std::pair<std::string, std::string>>> series;  // pattern: number, path
-  for (const std::string& path : paths) {
-    const Numbered n = numbered(file_name(path));
-    series[n.pattern].emplace_back(n.number, path);
+  std::vector<std::pair<Numbered, std::string>> members;
+  for (const std::string& path : paths) members.emplace_back(numbered(file_name(path)), path);
+  const Numbered first = members[0].first;
+  std::set<size_t> differing;
+  for (const auto& [n, path] : members) {
+    if (n.pattern != first.pattern) return not_one_series(paths, folder);
+    for (size_t i = 0; i < n.numbers.size(); ++i)
+      if (lower_number(n.numbers[i], first.numbers[i]) || lower_number(first.numbers[i], n.numbers[i]))
+        differing.insert(i);
   }
-  if (series.size() > 1) {
-    std::string names;
-    size_t named = 0;
-    for (const auto& [pattern, members] : series)
-      if (named++ < 3) names += fmt::format("{}{} ({})", named > 1 ? ", " : "", pattern, members.size());
-    return Error{fmt::format("{}: holds {} volumes that are not one numbered series: {}{}; name one of its files",
-                             folder, paths.size(), names, named > 3 ? ", ..." : "")};
+  if (members.size() > 1 && differing.empty())
+    return Error{fmt::format("{}: {} and {} have the same number", folder, file_name(paths[0]), file_name(paths[1]))};
+  if (differing.empty()) return paths;
+  const size_t counter = *differing.begin();
+  std::sort(members.begin(), members.end(),
+            [&](auto& a, auto& b) { return lower_number(a.first.numbers[counter], b.first.numbers[counter]); });
+  // Numbers that grow with the counter (a step and its time) are well.
+  for (size_t i = 1; i < members.size(); ++i) {
+    const auto &a = members[i - 1].first.numbers, &b = members[i].first.numbers;
+    for (const size_t n : differing)
+      if (!lower_number(a[n], b[n])) {
+        if (differing.size() > 1) return not_one_series(paths, folder);
+        return Error{fmt::format("{}: {} and {} have the same number", folder, file_name(members[i - 1].second),
+                                 file_name(members[i].second))};
+      }
   }
-  auto members = series.begin()->second;
-  std::sort(members.begin(), members.end(), [](auto& a, auto& b) { return lower_number(a.first, b.first); });
   std::vector<std::string> steps;
-  for (size_t i = 0; i < members.size(); ++i) {
-    if (i > 0 && members[i].first == members[i - 1].first)
-      return Error{fmt::format("{}: {} and {} have the same number", folder, file_name(members[i - 1].second),
-                               file_name(members[i].second))};
-    steps.push_back(members[i].second);
-  }
+  for (auto& [n, path] : members) steps.push_back(std::move(path));
   return steps;
 }
 

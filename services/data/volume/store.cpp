@@ -42,7 +42,7 @@ Result<Part> read_part(const std::string& text, int slices) {
 
 // As a mesh's: the box centred, `up` turned to +y, the largest extent the room's size.
 Result<glm::dmat4> place_volume(const Volume& v, const PlacementOptions& options) {
-  const auto rotation = rotation_for_up(up_of_volume(options));
+  const auto rotation = rotation_for_up(up_of_volume(options), v.space);
   if (!rotation) return rotation.error();
   const geometry::DBox box = v.box();
   const glm::dvec3 extent = box.size();

@@ -25,6 +25,17 @@ TEST(RotationForUp, TurnsThatAxisToYWithoutMirroring) {
   EXPECT_FALSE(rotation_for_up("up").ok());
 }
 
+TEST(RotationForUp, APatientStandsInOneWay) {
+  const glm::dmat3 to_lps({-1, 0, 0}, {0, -1, 0}, {0, 0, 1});
+  EXPECT_EQ(*rotation_for_up("z", scene::Space::kRas), *rotation_for_up("z", scene::Space::kLps) * to_lps);
+  for (const std::string up : {"x", "y", "z", "-x", "-y", "-z"}) {
+    const glm::dmat3 ras = *rotation_for_up(up, scene::Space::kRas), plain = *rotation_for_up(up);
+    EXPECT_EQ(glm::transpose(ras)[1], glm::transpose(plain)[1]) << up << ": the file's own axis points up";
+    EXPECT_EQ(glm::determinant(ras), 1.0) << up;
+  }
+  EXPECT_FALSE(rotation_for_up("up", scene::Space::kRas).ok());
+}
+
 TEST(PlaceMesh, CentresAndScalesToTheRoomSize) {
   Mesh mesh;
   mesh.positions = {{100, 5, -3}, {104, 5, -3}, {100, 6, -1}, {1e9, 1e9, 1e9}};  // the last is used by no triangle

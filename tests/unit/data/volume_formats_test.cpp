@@ -1,4 +1,5 @@
 // Every volume format, type, byte order and placement: read voxel by voxel as written.
+#include "services/data/volume/store.h"
 #include "tests/support/volume/files.h"
 
 #include "services/data/inspect.h"
@@ -371,11 +372,51 @@ TEST(Series, GoesByNumberNotByName) {
   for (size_t s = 0; s < 3; ++s) EXPECT_EQ(read_or_fail(folder / "", "", s).value(0), firsts[s]);
 }
 
+TEST(Series, GoesByTheNumberThatDiffers) {
+  const auto order = [](const std::vector<std::string>& names) {
+    const TempFolder folder;
+    for (const std::string& name : names)
+      folder.write(name, nrrd_header({{1, 1, 1}, glm::dmat4(1.0), 0, 1}, "uint8", "encoding: raw\n\n") + "a");
+    const auto source = find_volume(folder / "", "");
+    std::string out;
+    if (!source) return source.error().text;
+    for (const std::string& step : source->steps) out += step.substr((folder / "").size()) + " ";
+    return out;
+  };
+  EXPECT_EQ(order({"case42_t10_v2.nrrd", "case42_t9_v2.nrrd"}), "case42_t9_v2.nrrd case42_t10_v2.nrrd ");
+  EXPECT_EQ(order({"t0.5.nrrd", "t0.25.nrrd", "t10.125.nrrd", "t9.75.nrrd"}),
+            "t0.25.nrrd t0.5.nrrd t9.75.nrrd t10.125.nrrd ");
+  EXPECT_EQ(order({"step2_time0.5.nrrd", "step10_time2.5.nrrd"}), "step2_time0.5.nrrd step10_time2.5.nrrd ");
+  for (const auto& names : {std::vector<std::string>{"p1_t1.nrrd", "p1_t2.nrrd", "p2_t1.nrrd"},
+                            {"a1_b2.nrrd", "a2_b1.nrrd"},
+                            {"liver1.nrrd", "spleen2.nrrd"}})
+    EXPECT_NE(order(names).find("are not one numbered series"), std::string::npos) << order(names);
+  EXPECT_NE(order({"t1.nrrd", "t01.nrrd"}).find("the same number"), std::string::npos);
+}
+
 TEST(Series, OfRawFiles) {
   const TempFolder folder;
   for (int s = 0; s < 3; ++s)
     folder.write(fmt::format("t{:02}.raw", s), Pattern{{2, 2, 2}, glm::dmat4(1.0), s * 10.0, 1}.bytes<uint8_t>());
   EXPECT_EQ(read_or_fail(folder / "", "2x2x2:u8", 2).value(7), 27);
+}
+
+TEST(PatientSpace, IsOneForFilesInLpsAndInRas) {
+  const TempFolder folder;
+  const Pattern lps = turned_pattern();
+  Pattern ras = lps;
+  ras.index_to_data = glm::dmat4({-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}) * lps.index_to_data;
+  folder.write("a.nrrd", nrrd_header(lps, "int16", "encoding: raw\n\n") + lps.bytes<int16_t>());
+  folder.write("a.nii", nifti_header(ras, {}) + ras.bytes<int16_t>());
+  for (const std::string up : {"auto", "z", "-z"}) {
+    const auto open = [&](const std::string& name) {
+      auto store = VolumeStore::open(folder / name, {}, {.up = up}, [](const char*, double) {});
+      EXPECT_TRUE(store.ok()) << store.error().text;
+      return store ? (*store)->session().grid.index_to_room : glm::dmat4(0.0);
+    };
+    const glm::dmat4 a = open("a.nrrd"), b = open("a.nii");
+    for (int c = 0; c < 4; ++c) EXPECT_LT(glm::distance(a[c], b[c]), 1e-6) << up << " " << c;
+  }
 }
 
 TEST(Values, NotFiniteOnesCountAsTheLowest) {

@@ -96,7 +96,7 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, cons
   PlacedMesh placed;
   const UpGuess guess = options.up == "auto" ? guess_up(mesh) : UpGuess{options.up, "--up"};
   placed.up = guess.axis, placed.up_reason = guess.reason;
-  const auto rotation = rotation_for_up(placed.up);
+  const auto rotation = rotation_for_up(placed.up, mesh.coordinates.space);
   if (!rotation) return rotation.error();
 
   const bool smooth = mesh.smooth || (mesh.normals.empty() && is_isosurface(mesh));
