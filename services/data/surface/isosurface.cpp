@@ -82,6 +82,7 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
     mesh->arrays[0].histogram = volume::to_text(volume::histogram_of(count_levels(volume, *levels), *levels, kBins));
   mesh->coordinates.space = volume.space;
   mesh->coordinates.unit = volume.unit;
+  if (!volume.remark.empty()) mesh->notes.push_back(name + ": " + volume.remark);
   return mesh;
 }
 

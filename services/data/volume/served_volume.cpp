@@ -87,6 +87,10 @@ class ServedVolume final : public Served {
   scene::Kind kind() const override { return scene::Kind::kVolume; }
   std::string title() const override { return title_; }
   std::string summary() const override;
+  std::vector<std::string> notes() const override {
+    if (store_->remark().empty()) return {};
+    return {title_ + ": " + store_->remark()};
+  }
   void describe(wire::Hello& hello) const override;
   // Few answers wait for a peer: they are large, and samplers ask for one at a time.
   Requests requests() const override { return {"voxels", 8}; }

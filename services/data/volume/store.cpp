@@ -75,7 +75,7 @@ class Store final : public VolumeStore {
     const auto refuse = [&](const Error& e) { return Error{name_ + ": " + e.text}; };
     const auto index_to_room = place_volume(*first, placement);
     if (!index_to_room) return refuse(index_to_room.error());
-    format_ = first->format;
+    format_ = first->format, remark_ = first->remark;
     session_.grid = {first->size, *index_to_room};
     placement_ = {.data_to_room = *index_to_room * glm::inverse(first->index_to_data),
                   .box_data = first->box(),
@@ -124,6 +124,7 @@ class Store final : public VolumeStore {
   const volume::Session& session() const override { return session_; }
   const volume::Histogram& histogram() const override { return histogram_; }
   std::string format() const override { return format_; }
+  std::string remark() const override { return remark_; }
   const scene::Placement& placement() const override { return placement_; }
   uint64_t content_hash() const override { return content_hash_; }
 
@@ -224,7 +225,7 @@ class Store final : public VolumeStore {
   volume::Session session_;
   volume::Histogram histogram_;
   scene::Placement placement_;
-  std::string format_;
+  std::string format_, remark_;
   uint64_t content_hash_ = 0;
   int begin_ = 0, end_ = 0;
   std::list<std::pair<int, Step>> kept_;  // newest first

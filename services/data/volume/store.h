@@ -41,6 +41,7 @@ class VolumeStore {
   /// Of the values of all slices of the first step.
   virtual const volume::Histogram& histogram() const = 0;
   virtual std::string format() const = 0;
+  virtual std::string remark() const = 0;  ///< Volume::remark of the first step
   /// Of the file's own coordinates.
   virtual const scene::Placement& placement() const = 0;
   /// The hash of all steps that were read when it was opened, the same for all parts: other data have another hash.

@@ -406,7 +406,7 @@ TEST(PatientSpace, IsOneForFilesInLpsAndInRas) {
   const Pattern lps = turned_pattern();
   Pattern ras = lps;
   ras.index_to_data = glm::dmat4({-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}) * lps.index_to_data;
-  folder.write("a.nrrd", nrrd_header(lps, "int16", "encoding: raw\n\n") + lps.bytes<int16_t>());
+  folder.write("a.nrrd", nrrd_header(lps, "int16", "endian: little\nencoding: raw\n\n") + lps.bytes<int16_t>());
   folder.write("a.nii", nifti_header(ras, {}) + ras.bytes<int16_t>());
   for (const std::string up : {"auto", "z", "-z"}) {
     const auto open = [&](const std::string& name) {
