@@ -1,11 +1,9 @@
 #include "services/data/volume/dicom_reader.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -13,8 +11,6 @@
 #include <set>
 
 #include "services/data/base/mapped_file.h"
-#include "services/data/import/process.h"
-#include "services/data/import/report.h"
 #include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/formats/payload.h"
 
@@ -23,7 +19,7 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-constexpr size_t kLayersAtOnce = 32;
+constexpr size_t kLayersAtOnce = 64;
 
 bool needs_gdcm(const DicomSlice& s) { return s.compressed || s.components == 3; }
 
@@ -38,29 +34,16 @@ Result<std::map<std::string, Bytes>> decode(const std::map<std::string, const Di
   for (const auto& [name, slice] : files) frames += uint64_t(slice->frames);
   std::vector<std::string> paths;
   for (const auto& [name, slice] : files) paths.push_back(name);
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0)
-    return Error{fmt::format("{}: no pipe for reading it: {}", path, std::strerror(errno))};
-  fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);
-  const uint64_t unpacked = frames * frame_bytes * uint64_t(any.components);
-  const auto child = start_import({"dicom", path, std::to_string(unpacked)}, paths, ends[1]);
-  close(ends[1]);
-  if (!child) {
-    close(ends[0]);
-    return child.error();
-  }
-  auto received = receive_volume(ends[0], frames * frame_bytes, path, nullptr);
-  close(ends[0]);  // if it still writes, that ends it
-  const auto ended = end_import(*child, "GDCM's", "dicom", path);
-  if (received && !*received) return received->error();
-  if (!ended) return ended.error();
-  if (!received) return Error{fmt::format("{}: what {} gave of it is incomplete", path, kImportProgram)};
-  const VolumeFileHeader& h = (*received)->header;
+  const uint64_t unpacked = frames * frame_bytes;
+  const std::vector<std::string> words{"dicom", path, std::to_string(unpacked * uint64_t(any.components))};
+  const auto received = import_volume(words, paths, unpacked, "GDCM's", nullptr);
+  if (!received) return received.error();
+  const VolumeFileHeader& h = received->header;
   if (h.size != std::array<int64_t, 3>{any.columns, any.rows, int64_t(frames)} || stored_bytes(h.stored) != bytes)
     return Error{fmt::format("{}: GDCM finds {} x {} x {} pixels of {} bytes, the header says {} x {} x {} of {}", path,
                              h.size[0], h.size[1], h.size[2], stored_bytes(h.stored), any.columns, any.rows, frames,
                              bytes)};
-  const std::byte* from = (*received)->bytes.data();
+  const std::byte* from = received->bytes.data();
   for (const auto& [name, slice] : files) {
     const std::byte* end = from + size_t(slice->frames) * frame_bytes;
     out[name] = Bytes(from, end), from = end;

@@ -53,10 +53,7 @@ class Parser {
 
   Result<std::vector<DicomSlice>> run() {
     if (!is_dicom(content_)) return Error{path_ + ": is no DICOM file: no DICM at byte 128, and no elements before"};
-    at_ = has_preamble(content_) ? 132 : 0;
-    // The file's meta group is always explicit and little-endian; its end is where another group begins.
-    while (at_ + 2 <= content_.size() && u16(at_) == 2)
-      if (auto status = element(0, false); !status) return status.error();
+    if (auto begin = end_of_meta(); !begin) return begin.error();
     if (base_.syntax == kDeflated) {
       auto inflated = inflate_dicom(content_, path_);
       if (!inflated) return inflated.error();
@@ -69,7 +66,7 @@ class Parser {
     return slices();
   }
 
-  /// Where the elements behind the meta group begin.
+  // Where the elements behind the meta group begin: it is always explicit and little-endian.
   Result<size_t> end_of_meta() {
     at_ = has_preamble(content_) ? 132 : 0;
     while (at_ + 2 <= content_.size() && u16(at_) == 2)

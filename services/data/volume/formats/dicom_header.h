@@ -45,7 +45,7 @@ struct DicomSlice {
   uint64_t data_at = 0, data_bytes = 0;     ///< of the pixels; 0 bytes: a file without (a directory, a report)
 
   uint64_t pixel_bytes() const {
-    return uint64_t(rows) * uint64_t(columns) * uint64_t(components * bits_allocated / 8);
+    return uint64_t(rows) * uint64_t(columns) * (uint64_t(components) * uint64_t(bits_allocated) / 8);
   }
 };
 

@@ -46,9 +46,7 @@ std::string why_other(const DicomSlice& s, const DicomSlice& taken) {
   if (is_localizer(s) && !is_localizer(taken)) return "a localizer";
   if (s.rows != taken.rows || s.columns != taken.columns)
     return fmt::format("of {} x {} pixels instead of {} x {}", s.columns, s.rows, taken.columns, taken.rows);
-  if (s.position.has_value() != taken.position.has_value())
-    return s.position ? "of a position among others without" : "without a position";
-  return s.stacked ? "another file of frames" : "turned or spaced otherwise";
+  return s.stacked ? "another file of frames" : "turned, spaced or placed otherwise";
 }
 
 // Slices that can make one volume.
@@ -154,93 +152,65 @@ void sort_out(const Slices& slices, std::vector<Place>& places,
                           counted(left_out, "slice"), name_of(slices[first->front()]), by));
 }
 
-// Which layers there are: places of slices, or mixtures of two. Sets the distance from one to the next.
-struct Layers {
-  std::vector<DicomLayer> layers;  // of places
-  double distance = 1;
-};
+// Where on a grid slices lie: a layer lies at each whole number.
+using GridPlaces = std::vector<double>;
 
-Layers even_layers(const std::vector<double>& heights) {
-  Layers out;
-  for (size_t k = 0; k < heights.size(); ++k) out.layers.push_back({k, k, 0});
-  out.distance = (heights.back() - heights.front()) / double(heights.size() - 1);
-  return out;
-}
-
-// At `counts` places of a grid each lies a slice; others are mixed.
-Layers layers_with_gaps(const std::vector<double>& heights, const std::vector<size_t>& counts) {
-  Layers out;
-  for (size_t k = 0; k + 1 < heights.size(); ++k)
-    for (size_t n = 0; n < counts[k]; ++n) out.layers.push_back({k, n == 0 ? k : k + 1, double(n) / double(counts[k])});
-  out.layers.push_back({heights.size() - 1, heights.size() - 1, 0});
-  out.distance = (heights.back() - heights.front()) / double(out.layers.size() - 1);
-  return out;
-}
-
-Layers resampled(const std::vector<double>& heights, double distance) {
-  Layers out;
-  const double extent = heights.back() - heights.front();
-  const size_t count = size_t(std::lround(extent / distance)) + 1;
-  out.distance = extent / double(count - 1);
+std::vector<DicomLayer> layers_at(const GridPlaces& at) {
+  std::vector<DicomLayer> out;
   size_t k = 0;
-  for (size_t n = 0; n < count; ++n) {
-    const double h = heights[0] + double(n) * out.distance;
-    while (k + 2 < heights.size() && heights[k + 1] <= h) ++k;
-    const double share = std::clamp((h - heights[k]) / (heights[k + 1] - heights[k]), 0.0, 1.0);
-    if (share < kSilentlyEven || share > 1 - kSilentlyEven)
-      out.layers.push_back({share < 0.5 ? k : k + 1, share < 0.5 ? k : k + 1, 0});
-    else
-      out.layers.push_back({k, k + 1, share});
+  for (double n = 0; n <= std::round(at.back()); ++n) {
+    while (k + 1 < at.size() && at[k + 1] <= n + kSilentlyEven) ++k;
+    const size_t above = std::min(k + 1, at.size() - 1);
+    const double share = above > k ? (n - at[k]) / (at[above] - at[k]) : 0;
+    out.push_back(share < kSilentlyEven ? DicomLayer{k, k, 0} : DicomLayer{k, above, share});
   }
   return out;
 }
 
-// Whether each height lies where an even grid has it, `counts` distances behind the one before.
-double unevenness(const std::vector<double>& heights, const std::vector<size_t>& counts) {
-  size_t all = 0, at = 0;
-  for (const size_t n : counts) all += n;
-  const double distance = (heights.back() - heights.front()) / double(all);
+// How far slices lie from where the grid has them, by the distance of its layers.
+double unevenness(const std::vector<double>& heights, const GridPlaces& at) {
+  const double distance = (heights.back() - heights.front()) / at.back();
   double most = 0;
-  for (size_t k = 0; k + 1 < heights.size(); ++k) {
-    at += counts[k];
-    most = std::max(most, std::abs(heights[k + 1] - heights[0] - double(at) * distance) / distance);
-  }
+  for (size_t k = 0; k < heights.size(); ++k)
+    most = std::max(most, std::abs((heights[k] - heights[0]) / distance - at[k]));
   return most;
 }
 
-Layers layers_of(const std::vector<double>& heights, const std::function<std::string(size_t)>& name,
-                 std::string& remark) {
+GridPlaces grid_of(const std::vector<double>& heights, const std::function<std::string(size_t)>& name,
+                   std::string& remark) {
   std::vector<double> gaps;
   for (size_t k = 1; k < heights.size(); ++k) gaps.push_back(heights[k] - heights[k - 1]);
+  const auto by_gaps = [&](auto&& count) {
+    GridPlaces at{0};
+    for (const double gap : gaps) at.push_back(at.back() + count(gap));
+    return at;
+  };
   std::vector<double> sorted = gaps;
   std::sort(sorted.begin(), sorted.end());
   const double least = sorted.front(), most = sorted.back(), usual = sorted[(sorted.size() - 1) / 2];
-  const double uneven = unevenness(heights, std::vector<size_t>(gaps.size(), 1));
-  if (uneven <= kEven) {
-    if (most > 1.01 * least)
+  GridPlaces at = by_gaps([](double) { return 1; });
+  if (unevenness(heights, at) <= kEven) {
+    if (most > (1 + kSilentlyEven) * least)
       say(remark, fmt::format("slices are {:.4g} to {:.4g} mm apart and were evened", least, most));
-    return even_layers(heights);
+    return at;
   }
   const double extent = heights.back() - heights.front(), most_layers = 4.0 * double(heights.size()) + 64;
-  std::vector<size_t> counts;
-  for (const double gap : gaps) counts.push_back(size_t(std::max(1.0, std::round(std::min(gap / usual, 1e6)))));
-  if (extent / usual < most_layers && unevenness(heights, counts) <= kEven) {
-    const Layers out = layers_with_gaps(heights, counts);
+  at = by_gaps([&](double gap) { return std::max(1.0, std::round(gap / usual)); });
+  if (at.back() < most_layers && unevenness(heights, at) <= kEven) {
     std::string where;
     size_t named = 0;
-    for (size_t k = 0; k < counts.size(); ++k)
-      if (counts[k] > 1 && named++ < 3)
-        where += fmt::format("{}{} between {} and {}", named > 1 ? ", " : "", counts[k] - 1, name(k), name(k + 1));
-    const size_t missing = out.layers.size() - heights.size();
-    say(remark, fmt::format("{} missing, {:.4g} mm apart, mixed from {} neighbours: {}{}",
-                            missing == 1 ? "1 slice is" : fmt::format("{} slices are", missing), out.distance,
-                            missing == 1 ? "its" : "their", where, named > 3 ? ", ..." : ""));
-    return out;
+    for (size_t k = 0; k + 1 < at.size(); ++k)
+      if (at[k + 1] - at[k] > 1 && named++ < 3)
+        where +=
+            fmt::format("{}{} between {} and {}", named > 1 ? ", " : "", at[k + 1] - at[k] - 1, name(k), name(k + 1));
+    say(remark, fmt::format("{}, {:.4g} mm apart, mixed from neighbours: {}{}",
+                            counted(size_t(at.back()) + 1 - at.size(), "missing slice"), extent / at.back(), where,
+                            named > 3 ? ", ..." : ""));
+    return at;
   }
-  const Layers out = resampled(heights, std::max(least, extent / (most_layers - 1)));
-  say(remark, fmt::format("slices are {:.4g} to {:.4g} mm apart; resampled to {} that are {:.4g} mm apart", least, most,
-                          out.layers.size(), out.distance));
-  return out;
+  const double distance = extent / std::round(extent / std::max(least, extent / most_layers));
+  say(remark, fmt::format("slices are {:.4g} to {:.4g} mm apart; resampled to {:.4g} mm", least, most, distance));
+  return by_gaps([&](double gap) { return gap / distance; });
 }
 
 // The way from one layer to the next: as positions say, which may be askew (gantry tilt).
@@ -251,13 +221,6 @@ void place(DicomOrder& out, const std::vector<Place>& places, double distance) {
   const double tilt = std::acos(std::min(1.0, distance / glm::length(out.step))) * 180 / M_PI;
   if (tilt > kSilentlyTilted)
     say(out.remark, fmt::format("slices are askew by {:.3g} degrees (gantry tilt), and shown so", tilt));
-  double aside = 0;
-  for (const Place& p : places) {
-    const glm::dvec3 from = *out.slices[p[0]].position - *first.position;
-    aside = std::max(aside, glm::distance(from, way * (glm::dot(from, normal) / glm::dot(way, normal))));
-  }
-  if (aside > 0.5 * first.spacing.x)
-    say(out.remark, fmt::format("slices lie up to {:.3g} mm beside a straight line, and are shown on it", aside));
 }
 
 }  // namespace
@@ -272,15 +235,14 @@ DicomOrder order_slices(Slices slices, const std::function<bool(const DicomSlice
   const double said = first.slice_spacing > 0 ? first.slice_spacing : first.thickness > 0 ? first.thickness : 1;
   out.origin = first.position.value_or(glm::dvec3(0));
   out.step = normal_of(first) * said;
-  Layers layers;
-  if (!first.position || places.size() == 1) {
-    for (size_t k = 0; k < places.size(); ++k) layers.layers.push_back({k, k, 0});
-  } else {
+  GridPlaces at;
+  for (size_t k = 0; k < places.size(); ++k) at.push_back(double(k));
+  if (first.position && places.size() > 1) {
     std::vector<double> heights;
     for (const Place& p : places) heights.push_back(glm::dot(*out.slices[p[0]].position, normal_of(first)));
-    layers = layers_of(
+    at = grid_of(
         heights, [&](size_t k) { return name_of(out.slices[places[k][0]]); }, out.remark);
-    place(out, places, layers.distance);
+    place(out, places, (heights.back() - heights.front()) / at.back());
   }
   if (places.size() > 1 && (!first.position || first.stacked))
     say(out.remark, fmt::format("{} of no position of their own are stacked {:.4g} mm apart",
@@ -291,7 +253,7 @@ DicomOrder order_slices(Slices slices, const std::function<bool(const DicomSlice
   out.slices = std::move(used);
   for (size_t t = 0; t < places[0].size(); ++t) {
     out.steps.emplace_back();
-    for (const DicomLayer& l : layers.layers)
+    for (const DicomLayer& l : layers_at(at))
       out.steps.back().push_back({places[l.below][t], places[l.above][t], l.share});
   }
   return out;

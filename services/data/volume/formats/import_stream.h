@@ -29,6 +29,11 @@ bool send_volume(int descriptor, const VolumeFileHeader& header, const void* vox
 std::optional<Result<StreamedVolume>> receive_volume(int descriptor, uint64_t most_bytes, const std::string& path,
                                                      const ReadProgress& progress);
 
+/// Runs telesplat-import, as start_import() does, and receives what it streams. reader: who reads, for error texts.
+/// Error: what it says; crashes and endless readings; receive_volume's.
+Result<StreamedVolume> import_volume(std::vector<std::string> words, const std::vector<std::string>& files,
+                                     uint64_t most_bytes, const std::string& reader, const ReadProgress& progress);
+
 /// Reads a volume with VTK in telesplat-import. `header`: what the file's own header says (checked); what VTK finds
 /// must fit it. Error: VTK's complaint, crashes and endless readings of it.
 Result<StreamedVolume> read_volume_with_vtk(const VolumeFileHeader& header, const std::string& path,

@@ -143,7 +143,7 @@ TEST(DicomFolders, AMissingSliceIsMixedAndACutOneLeftOut) {
   const Volume v = read_or_fail(folder / "");
   expect_same(v, p);
   EXPECT_NE(v.remark.find("left out 1 damaged files"), std::string::npos) << v.remark;
-  EXPECT_NE(v.remark.find("1 slice is missing"), std::string::npos) << v.remark;
+  EXPECT_NE(v.remark.find("1 missing slice, 2 mm apart"), std::string::npos) << v.remark;
 }
 
 TEST(DicomFolders, TimeStepsAreASeries) {
