@@ -11,6 +11,7 @@
 namespace telesplat::data {
 
 inline int use(Result<Mesh> mesh) {
+  if (mesh.ok()) drop_not_finite(*mesh, "fuzz");
   if (!mesh.ok() || !validate_mesh(*mesh, "fuzz").ok()) return 0;
   const auto placed = place_mesh(std::move(*mesh), {}, "fuzz");
   if (!placed.ok()) return 0;

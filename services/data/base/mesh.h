@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ namespace telesplat::data {
 inline constexpr uint64_t kMaxTriangles = uint64_t{1} << 31;
 inline constexpr uint64_t kMaxVertices = (uint64_t{1} << 32) - 2;
 inline constexpr uint32_t kNeutralAlbedo = 0xc8c8c8;  ///< the colour of data without colours
+inline constexpr uint32_t kNoColour = ~uint32_t{0};   ///< of a triangle: its vertices keep theirs
 
 struct Mesh {
   std::string format;                 ///< "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf"
@@ -24,11 +26,14 @@ struct Mesh {
   std::vector<glm::vec3> normals;     ///< empty, or one a vertex; of any length; (0, 0, 0): to be computed
   std::vector<uint32_t> colours;      ///< empty, or one a vertex: 0x00RRGGBB
   std::vector<uint32_t> indices;      ///< three a triangle
+  /// Of the last vertices, in their order: which ones they stand beside for the sake of another colour. A mesh without
+  /// normals is as smooth there as if they were one. double_vertices() adds them.
+  std::vector<uint32_t> copy_of;
   /// The array that the reader was asked for: one value a vertex, or one a triangle where scalars_of_faces. Each is
   /// the file's minus scene::scalar_origin() of its span; NaN where that is not finite. Empty: it was asked for none.
   std::vector<float> scalars;
   bool scalars_of_faces = false;
-  bool smooth = false;  ///< sampled from a field: it has no creases, only coarse places
+  bool smooth = false;                   ///< sampled from a field: it has no creases, only coarse places
   std::vector<scene::ArrayInfo> arrays;  ///< all that the file holds, asked for or not; make_tellable() was called
   uint64_t degenerate_dropped = 0;       ///< faces with fewer than three corners
   std::vector<std::string> notes;        ///< what people should know of how it was read: lines that name the file
@@ -43,6 +48,16 @@ struct Mesh {
 /// below the number of vertices, every position finite, normals and colours absent or one a vertex. Errors start with
 /// `name`.
 Status validate_mesh(const Mesh& mesh, const std::string& name);
+
+/// Drops triangles with corners that are not finite, and tells so in a note; such vertices move to (0, 0, 0). Returns
+/// whether the mesh can be worked with: its indices and positions are as validate_mesh() wants them. Where no triangle
+/// would be left, or an index is wrong, nothing is changed.
+bool drop_not_finite(Mesh& mesh, const std::string& name);
+
+/// Gives triangles one colour each: their vertices get it. Vertices between triangles of different colours are doubled,
+/// with their normals and scalars.
+/// of_triangles: one a triangle, 0x00RRGGBB or kNoColour. Precondition: every index is below the number of vertices.
+void colour_faces(Mesh& mesh, std::span<const uint32_t> of_triangles);
 
 /// 8-bit channels -> 0x00RRGGBB.
 constexpr uint32_t pack_rgb(uint32_t r, uint32_t g, uint32_t b) { return r << 16 | g << 8 | b; }

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
@@ -48,8 +49,8 @@ class TextScanner {
     while (at_<end_&& static_cast<unsigned char>(*at_)> ' ') ++at_;
     return {start, static_cast<size_t>(at_ - start)};
   }
-  /// A number here: decimal, exponent, nan, inf, with or without a leading plus. What follows must not belong to a
-  /// word.
+  /// A number here: decimal, exponent, nan, inf, 1.#QNAN and its like, with or without a leading plus. What follows
+  /// must not belong to a word.
   bool number(double& out) { return parse(out); }
   bool integer(int64_t& out) { return parse(out); }
   bool skip_char(char c) { return at_ < end_ && *at_ == c ? (++at_, true) : false; }
@@ -67,6 +68,11 @@ class TextScanner {
     else if (error != std::errc())
       return false;
     at_ = next;
+    // "1.#QNAN", "-1.#IND", "1.#INF" of C libraries on Windows.
+    if (std::is_floating_point_v<T> && at_ < end_ && *at_ == '#' && at_[-1] == '.') {
+      out = std::numeric_limits<T>::quiet_NaN();
+      word();
+    }
     return true;
   }
 
@@ -74,5 +80,13 @@ class TextScanner {
   const char* end_;
   const char* begin_;
 };
+
+/// The rest of a line as a name: without blanks around it.
+inline std::string rest_of_line(std::string_view content, size_t offset) {
+  std::string_view name = content.substr(offset, content.find('\n', offset) - offset);
+  while (!name.empty() && static_cast<unsigned char>(name.front()) <= ' ') name.remove_prefix(1);
+  while (!name.empty() && static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
+  return std::string(name);
+}
 
 }  // namespace telesplat::data

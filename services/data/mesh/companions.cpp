@@ -5,6 +5,7 @@
 
 #include "services/data/gltf/container.h"
 #include "services/data/mesh/formats/obj_materials.h"
+#include "services/data/mesh/formats/ply_header.h"
 #include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
@@ -48,14 +49,16 @@ std::vector<std::string> vrt_sources(std::string_view content) {
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path) {
   std::vector<std::string> names;
   if (format == "obj") {
-    std::vector<std::string> files = obj_material_libraries(content, path);
-    const auto materials = read_obj_materials(files);
-    for (const auto& [name, material] : materials)
-      if (!material.texture.empty() && std::find(files.begin(), files.end(), material.texture) == files.end() &&
-          files.size() < kMaxCompanions)
-        files.push_back(material.texture);
-    return files;
+    FolderCompanions folder(path);
+    std::vector<std::string> missing;
+    names = obj_material_libraries(content, folder);
+    for (const auto& [name, material] : read_obj_materials(std::vector(names), folder, missing))
+      if (!material.texture.empty() && std::find(names.begin(), names.end(), material.texture) == names.end() &&
+          names.size() < kMaxCompanions)
+        names.push_back(material.texture);
   }
+  if (format == "ply")
+    if (auto header = parse_ply_header(content, path)) names = std::move(header->textures);
   if (format == "gltf") names = gltf_files(content);
   if (format == "raster") {
     names = vrt_sources(content);

@@ -13,9 +13,8 @@ namespace telesplat::data {
 namespace {
 
 constexpr const char* kSupported =
-    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTU, VTK (polygons and unstructured grids), glTF and GLB, "
-    "and elevation rasters "
-    "(GeoTIFF, HGT, 16-bit PNG, ASCII and XYZ grids, VRT)";
+    "supported are meshes (PLY, OBJ, STL, OFF, VTP, VTU, VTK, glTF, GLB), elevation rasters (GeoTIFF, HGT, 16-bit PNG, "
+    "ASCII and XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, raw voxels with --raw)";
 
 std::string extension_of(const std::string& path) {
   std::string out = std::filesystem::path(path).extension().string();
@@ -26,6 +25,33 @@ std::string extension_of(const std::string& path) {
 
 bool is_one_of(const std::string& word, std::initializer_list<const char*> words) {
   return std::any_of(words.begin(), words.end(), [&](const char* w) { return word == w; });
+}
+
+// Formats that are not read: told by their first bytes, else by their name.
+std::string unread_kind(std::string_view content, const std::string& extension) {
+  using namespace std::string_view_literals;
+  const bool zip = content.starts_with("PK\3\4"sv), gzip = content.starts_with("\x1f\x8b"sv);
+  if (content.starts_with("LASF") || content.starts_with("ASTM-E57") || content.starts_with("# .PCD") ||
+      is_one_of(extension, {".las", ".laz", ".e57", ".pcd", ".pts", ".ptx"}))
+    return fmt::format("is a point cloud; point clouds are not read yet; {}", kSupported);
+  if (content.starts_with("NGSP") || is_one_of(extension, {".spz", ".sog", ".splat", ".ksplat"}))
+    return fmt::format("holds Gaussian splats, not a mesh; splats of other programs are not read; {}", kSupported);
+  if (zip && (extension == ".3mf" || content.find("3D/3dmodel") != content.npos))
+    return fmt::format("is a 3MF file, which is not read: save the model as STL, OBJ or PLY; {}", kSupported);
+  constexpr std::pair<const char*, const char*> kModels[] = {
+      {".fbx", "FBX"},   {".dae", "COLLADA"}, {".blend", "Blender"}, {".3ds", "3D Studio"},
+      {".x3d", "X3D"},   {".wrl", "VRML"},    {".step", "STEP"},     {".stp", "STEP"},
+      {".iges", "IGES"}, {".igs", "IGES"},    {".usdz", "USD"}};
+  for (const auto& [ending, program] : kModels)
+    if (extension == ending)
+      return fmt::format("is a {} file, which is not read: save the model as glTF, OBJ or PLY; {}", program,
+                         kSupported);
+  if (zip || gzip ||
+      content.starts_with("\xfd"
+                          "7zXZ"sv) ||
+      content.starts_with("7z\xbc\xaf"sv) || content.starts_with("BZh"sv) || content.starts_with("\x28\xb5\x2f\xfd"sv))
+    return fmt::format("is a compressed file (unpack it first); {}", kSupported);
+  return "";
 }
 
 // Files that people may well take for meshes: what they are, in words, and what to do.
@@ -47,11 +73,7 @@ std::string other_kind(std::string_view content, const std::string& extension) {
       is_one_of(extension, {".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".dcm", ".vti"}) ||
       (content.size() > 132 && content.substr(128, 4) == "DICM"))
     return fmt::format("is a volume, not a mesh; {}", kSupported);
-  if (content.starts_with("\x1f\x8b"sv) || content.starts_with("PK\3\4"sv) ||
-      content.starts_with("\xfd"
-                          "7zXZ"sv))
-    return fmt::format("is a compressed file (unpack it first), not a mesh; {}", kSupported);
-  return "";
+  return unread_kind(content, extension);
 }
 
 // Elevation rasters, by content or name: TIFF, PNG of 16 bits of grey, and formats without a signature.
@@ -64,12 +86,10 @@ bool looks_like_raster(std::string_view content, const std::string& extension) {
   return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2", ".xyz", ".vrt"});
 }
 
-// Ascii STL starts with "solid", and so do some binary ones: their size gives them away.
-bool is_binary_stl(std::string_view content) {
-  if (content.size() < 84) return false;
-  uint32_t triangles;
-  std::copy_n(content.data() + 80, 4, reinterpret_cast<char*>(&triangles));
-  return content.size() == 84 + 50 * uint64_t{triangles};
+// OFF, behind prefixes that its reader knows or names.
+bool looks_like_off(std::string_view content) {
+  const size_t at = content.substr(0, 9).find("OFF");
+  return at != content.npos && content.substr(0, at).find_first_not_of("STCN4n") == content.npos;
 }
 
 // OBJ has no signature: the first line that is neither empty nor a comment starts with one of its words.
@@ -104,15 +124,13 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   if (looks_like_raster(content, extension)) return {"raster", ""};
   if (std::string complaint = other_kind(content, extension); !complaint.empty()) return {"", std::move(complaint)};
   if (is_binary_stl(content)) return {"stl", ""};
-  for (const char* start : {"OFF", "COFF", "NOFF", "CNOFF", "STOFF", "STCOFF", "STNOFF", "STCNOFF"})
-    if (content.starts_with(start)) return {"off", ""};
-  if (content.starts_with("solid") && (extension == ".stl" || content.substr(0, 4096).find("facet") != content.npos))
-    return {"stl", ""};
+  if (looks_like_off(content)) return {"off", ""};
+  if (is_text_stl(content)) return {"stl", ""};
   // By name, where the content says nothing (or is broken, which the reader will say better).
   if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtu", ".vtk"})) return {extension.substr(1), ""};
   if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};
   if (looks_like_obj(content)) return {"obj", ""};
-  return {"", fmt::format("is of no known format; {}; raw voxels need --raw", kSupported)};
+  return {"", fmt::format("is of no known format; {}", kSupported)};
 }
 
 bool has_arrays(std::string_view format) {
@@ -146,15 +164,18 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
   if (const Status s = check_array(array, detected.format, path); !s) return s.error();
   try {
-    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress, array)
+    FolderCompanions folder(path);
+    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress, folder, array, texture_detail)
                 : detected.format == "off"    ? read_off(content, path, progress)
                 : detected.format == "stl"    ? read_stl(content, path, progress)
-                : detected.format == "obj"    ? read_obj(content, path, progress, texture_detail)
+                : detected.format == "obj"    ? read_obj(content, path, progress, folder, texture_detail)
                 : detected.format == "raster" ? read_with_gdal(content, path, elevation, progress)
                 : detected.format == "gltf"   ? read_imported_gltf(content, path, progress, texture_detail)
                                               : read_with_vtk(content, detected.format, path, progress, array);
     if (!mesh) return mesh;
-    if (auto status = validate_mesh(*mesh, path); !status) return status.error();
+    auto status = validate_mesh(*mesh, path);
+    if (!status && drop_not_finite(*mesh, path)) status = validate_mesh(*mesh, path);
+    if (!status) return status.error();
     return mesh;
   } catch (const std::bad_alloc&) {
     return Error{fmt::format("{}: this machine's memory does not suffice to read its {} bytes", path, content.size())};

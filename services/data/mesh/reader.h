@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "services/data/base/companions.h"
 #include "services/data/base/elevation.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
@@ -23,7 +24,7 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 /// Reads a mesh file of any supported format; what it returns passed validate_mesh. Errors name the file.
 /// Nothing is allocated by a count that the file merely claims.
 /// elevation: of rasters alone. array: what the mesh is coloured by, as scene::choose_array() takes it; empty: nothing.
-/// texture_detail: of OBJ and glTF, whose textures are baked: bake_textures().
+/// texture_detail: of OBJ, PLY and glTF, whose textures are baked: bake_textures().
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {},
                        const std::string& array = {}, uint64_t texture_detail = kDefaultTextureDetail);
 
@@ -39,19 +40,26 @@ Status check_array(const std::string& array, const std::string& format, const st
 // validate_mesh checks only as far as sizes go (arrays one a vertex, three indices a triangle); read_mesh checks the
 // rest. Faces of more than three corners become fans around their first corner, which is right for convex ones.
 
-/// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*);
-/// other numbers of vertices and faces are arrays.
+/// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*)
+/// of vertices and faces; comments "TextureFile" with places of vertices (s t, u v, texture_u texture_v) or of corners
+/// (texcoord, texnumber), which are baked; other numbers of vertices and faces are arrays.
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
-                      const std::string& array = {});
-/// OFF in text, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); comments; CRLF.
-Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// STL, binary or ascii. Corners at the same position become one vertex.
-Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
-/// libraries, which are looked for beside `name`; textures are baked. Error: also a texture that is damaged; without
-/// one that is missing the mesh has a note.
-Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
+                      Companions& companions, const std::string& array = {},
                       uint64_t texture_detail = kDefaultTextureDetail);
+/// OFF, text and binary, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours of
+/// faces; comments; CRLF. Error: the prefixes 4 and n, whose vertices are not of three coordinates.
+Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
+/// STL, binary or ascii; colours of facets as VisCAM and Materialise write them. Corners at the same position become
+/// one vertex.
+Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
+/// Whether the content is an STL in text, and one in binary, whose header may begin like text.
+bool is_text_stl(std::string_view content);
+bool is_binary_stl(std::string_view content);
+/// Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
+/// libraries; textures are baked; continued lines. Lines, points, curves and free-form surfaces are left out, with a
+/// note.
+Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
+                      Companions& companions, uint64_t texture_detail = kDefaultTextureDetail);
 /// VTP, VTU and legacy VTK, through VTK (of grids the surface), in the program telesplat-import, which must lie
 /// beside this process's own program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us.
 /// Claimed counts are checked here before VTK sees the file.
@@ -66,8 +74,8 @@ Result<Mesh> read_imported_gltf(std::string_view content, const std::string& pat
 Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
                             const ReadProgress& progress);
 
-/// Other files that `path` pulls in (material libraries of an OBJ and their textures, buffers and images of a glTF,
-/// files of a VRT, what says beside a raster where it lies), as paths; existing or not.
+/// Other files that `path` pulls in (material libraries of an OBJ and their textures, pictures of a PLY, buffers and
+/// images of a glTF, files of a VRT, what says beside a raster where it lies), as paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);
 /// Of a VRT: the files that it is made of, as it names them.
 std::vector<std::string> vrt_sources(std::string_view content);

@@ -42,7 +42,8 @@ class PlyArrays : public testing::TestWithParam<std::string> {};
 
 TEST_P(PlyArrays, OfVerticesAndFacesAreListedAndRead) {
   const std::string file = square_ply(GetParam());
-  const auto plain = read_ply(file, "square.ply", nullptr);
+  FolderCompanions none("/nonexistent/square.ply");
+  const auto plain = read_ply(file, "square.ply", nullptr, none);
   ASSERT_TRUE(plain.ok()) << plain.error().text;
   EXPECT_TRUE(plain->scalars.empty());
   ASSERT_EQ(plain->arrays.size(), 4u);
@@ -51,25 +52,25 @@ TEST_P(PlyArrays, OfVerticesAndFacesAreListedAndRead) {
   EXPECT_EQ(plain->arrays[2], (scene::ArrayInfo{"area", "", true, 1, {{0.5, 1.5}}}));
   EXPECT_EQ(plain->arrays[3], (scene::ArrayInfo{"after", "", true, 1, {{-1, 0}}}));
 
-  const auto heat = read_ply(file, "square.ply", nullptr, "heat");
+  const auto heat = read_ply(file, "square.ply", nullptr, none, "heat");
   ASSERT_TRUE(heat.ok()) << heat.error().text;
   ASSERT_EQ(heat->scalars.size(), 4u);
   EXPECT_FALSE(heat->scalars_of_faces);
   EXPECT_EQ(heat->scalars[0], -1.5f);
   EXPECT_TRUE(std::isnan(heat->scalars[2]));
   for (const auto& [name, values] : {std::pair{"area", std::vector<float>{0.5f, 1.5f}}, {"after", {0, -1}}}) {
-    const auto faces = read_ply(file, "square.ply", nullptr, name);
+    const auto faces = read_ply(file, "square.ply", nullptr, none, name);
     ASSERT_TRUE(faces.ok()) << faces.error().text;
     EXPECT_TRUE(faces->scalars_of_faces);
     EXPECT_EQ(faces->scalars, values) << name;
   }
-  const auto unknown = read_ply(file, "square.ply", nullptr, "cold");
+  const auto unknown = read_ply(file, "square.ply", nullptr, none, "cold");
   ASSERT_FALSE(unknown.ok());
   EXPECT_EQ(unknown.error().text, "square.ply: there is no array \"cold\"; there are: heat, id, area, after");
   for (size_t length = 0; length + 1 < file.size(); ++length) {
     const std::vector<char> cut(file.begin(), file.begin() + long(length));
     for (const char* array : {"heat", "area"})
-      (void)read_ply({cut.data(), length}, "cut", nullptr, array).ok();  // refused or not, without a crash
+      (void)read_ply({cut.data(), length}, "cut", nullptr, none, array).ok();  // refused or not, without a crash
   }
 }
 
@@ -80,7 +81,8 @@ TEST(PlyArray, OfAFaceIsThatOfAllItsTriangles) {
       "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
       "element face 3\nproperty list uchar int vertex_indices\nproperty float part\nend_header\n"
       "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0.5 2 0\n4 0 1 2 3 7\n2 0 1 8\n3 3 2 4 9\n";
-  const auto mesh = read_ply(file, "quad.ply", nullptr, "part");
+  FolderCompanions none("/nonexistent/quad.ply");
+  const auto mesh = read_ply(file, "quad.ply", nullptr, none, "part");
   ASSERT_TRUE(mesh.ok()) << mesh.error().text;
   EXPECT_EQ(mesh->scalars, (std::vector<float>{7, 7, 9}));  // the face of two corners is left out
 }

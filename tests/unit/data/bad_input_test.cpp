@@ -71,7 +71,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"bad-type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\nend_header\n1\n", "type"},
         BadFile{"no-z.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
                 "lacks x, y or z"},
-        BadFile{"points.ply", ply("3", "0", kThree), "no triangles"},
+        BadFile{"points.ply", ply("3", "0", kThree), "holds 3 points and no triangles: point clouds"},
         BadFile{"out-of-range.ply", ply("3", "1", kThree + "3 0 1 3\n"), "names vertex 3, there are 3"},
         BadFile{"negative-index.ply", ply("3", "1", kThree + "3 0 1 -1\n"), "names vertex -1"},
         BadFile{"nan.ply", ply("3", "1", "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"), "vertex 1 is not finite"},
@@ -102,7 +102,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"corners.off", "OFF\n3 1 0\n" + kThree + "4000000000 0 1 2\n", "lacks corner"},
         BadFile{"range.off", "OFF\n3 1 0\n" + kThree + "3 0 1 9\n", "names vertex 9"},
         BadFile{"short.off", "OFF\n3 1 0\n0 0 0\n1 0\n", "vertex 1 of 3"},
-        BadFile{"binary.off", "OFF BINARY\n\1\2\3", "text"},
+        BadFile{"binary.off", "OFF BINARY\n\1\2\3", "stand the numbers"},
+        BadFile{"huge-binary.off", "OFF BINARY\n" + raw(1000000000u, true) + raw(1u, true) + raw(0u, true),
+                "claims 1000000000 vertices"},
+        BadFile{"four.off", "4OFF\n3 1 0\n" + kThree + "3 0 1 2\n", "4OFF has vertices of other than three"},
+        BadFile{"n.off", "nOFF\n3\n3 1 0\n" + kThree + "3 0 1 2\n", "nOFF has vertices of other than three"},
+        BadFile{"lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "holds no faces, only 2 vertices and 1 lines"},
         BadFile{"nan.off", "OFF\n3 1 0\n0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n", "not finite"},
         BadFile{"huge.stl", std::string(80, 'x') + raw(uint32_t{4000000000}) + std::string(16, '\0'),
                 "claims 4000000000 triangles"},
@@ -143,8 +148,18 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"lying.asc", "ncols 2000000000\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n", ""},
         BadFile{"void.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value -9\n-9 -9 -9 -9\n",
                 "data"},
-        BadFile{"mesh.ply.gz", "\x1f\x8b\x08", "compressed"},
-        BadFile{"notes.txt", "Dear diary,\nnothing happened.\n", "no known format"}),
+        BadFile{"mesh.ply.gz", "\x1f\x8b\x08", "is a compressed file (unpack it first)"},
+        BadFile{"mesh.zip", "PK\3\4", "is a compressed file (unpack it first)"},
+        BadFile{"model.3mf", "PK\3\4", "is a 3MF file, which is not read: save the model as STL, OBJ or PLY"},
+        BadFile{"splats.sog", "PK\3\4", "holds Gaussian splats"},
+        BadFile{"splats.spz", "\x1f\x8b\x08", "holds Gaussian splats"},
+        BadFile{"cloud.pts", "1 2 3\n", "point clouds are not read yet"},
+        BadFile{"cloud", "LASF", "point clouds are not read yet"},
+        BadFile{
+            "splats.ply",
+            "ply\nformat ascii 1.0\nelement vertex 1\n" + kPlyVertex + "property float f_dc_0\nend_header\n1 2 3 4\n",
+            "holds 1 Gaussian splats"},
+        BadFile{"notes.txt", "Dear diary,\nnothing happened.\n", "volumes (NRRD, MetaImage"}),
     [](const auto& info) {
       auto n = info.param.name;
       std::replace_if(
@@ -197,8 +212,9 @@ TEST(Truncation, AtEveryLengthOfEachTextFormat) {
       refused += !reader(std::string_view(exact.data(), length), "cut", nullptr).ok();
     }
   };
-  try_all(ply_of(grid), [](auto... given) { return read_ply(given...); });
-  try_all(obj, [](auto... given) { return read_obj(given...); });
+  FolderCompanions none("/nonexistent/file");
+  try_all(ply_of(grid), [&](auto... given) { return read_ply(given..., none); });
+  try_all(obj, [&](auto... given) { return read_obj(given..., none); });
   try_all(off, read_off);
   try_all(stl, read_stl);
   EXPECT_GT(refused, 300u);

@@ -112,9 +112,9 @@ TEST(OffReader, PlainWithCommentsAndCrLf) {
           "a.off",
           "OFF\r\n# a comment\r\n4 2 0 # counts\r\n0 0 0\r\n1 0 0.5\r\n\r\n1 1 0\r\n0 1 .5\r\n3 0 1 2\r\n3 0 2 3\r\n")),
       false);
-  expect_square(
-      read(folder.write("b.off", "OFF 4 2 5\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n3 0 1 2 255 0 0\n3 0 2 3 0.1 0.2 0.3")),
-      false);
+  expect_square(read(folder.write("b.off", "OFF 4 2 5\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n3 0 1 2\n3 0 2 3")), false);
+  expect_square(read(folder.write("c.off", "4 2\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n3 0 1 2\n3 0 2 3")), false);
+  expect_square(read(folder.write("d.off", "OFF\n4\n2\n0\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n3 0 1 2\n3 0 2 3")), false);
   expect_square(read(folder.write("quad.off", "OFF\n4 1 0\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n4 0 1 2 3\n")), false);
 }
 
@@ -128,6 +128,11 @@ TEST(OffReader, ColoursAndNormals) {
       read(folder.write(
           "f.off",
           "COFF\n4 2 0\n0 0 0 1.0 0 0\n1 0 .5 0 1 0\n1 1 0 0 0 1\n0 1 .5 .063 .1255 .188 # rgb\n3 0 1 2\n3 0 2 3\n")),
+      true);
+  expect_square(
+      read(folder.write("meshlab.off",
+                        "CSTOFF\n4 2 0\n0 0 0 255 0 0 255 0 0\n1 0 .5 0 255 0 255 1 0\n1 1 0 0 0 255 255 1 1\n"
+                        "0 1 .5 16 32 48 255 0 1\n3 0 1 2\n3 0 2 3\n")),
       true);
   const Mesh both = read(
       folder.write("cn.off", "CNOFF\n3 1 0\n0 0 0 0 0 1 255 0 0\n1 0 0 0 0 1 255 0 0\n0 1 0 0 0 1 0 255 0\n3 0 1 2\n"));

@@ -143,6 +143,75 @@ TEST(Textures, ObjsOptionsAndNamesWithBlanksAreUnderstood) {
   EXPECT_EQ(colour_near(clamped, {0.1, 0.9, 0}), kRed) << "the picture's left rim goes on";
 }
 
+// A square of four_colours(), as MeshLab (places of corners), Blender (s t) and CloudCompare write it.
+TEST(Textures, PlysPictureLiesTheRightWayRoundInEachWayToNameItsPlaces) {
+  const TempFolder folder;
+  folder.write("a picture.png", png_of(folder, four_colours(32)));
+  const auto ply = [&](const std::string& names, const std::string& places, const std::string& face) {
+    return fmt::format(
+        "ply\nformat ascii 1.0\ncomment TextureFile a picture.png\nelement vertex 4\nproperty float x\nproperty float "
+        "y\n"
+        "property float z\n{}element face 1\nproperty list uchar int vertex_indices\n{}end_header\n{}",
+        names, places, face);
+  };
+  const std::string by_corner = "property list uchar float texcoord\n", four = "0 0 0\n4 0 0\n4 4 0\n0 4 0\n";
+  for (const std::string& file :
+       {ply("", by_corner, four + "4 0 1 2 3 8 0 0 1 0 1 1 0 1\n"),
+        ply("", by_corner + "property int texnumber\n", four + "4 0 1 2 3 8 0 0 1 0 1 1 0 1 0\n"),
+        ply("property float s\nproperty float t\n", "", "0 0 0 0 0\n4 0 0 1 0\n4 4 0 1 1\n0 4 0 0 1\n4 0 1 2 3\n"),
+        ply("property float texture_u\nproperty float texture_v\nproperty uchar red\nproperty uchar green\nproperty "
+            "uchar blue\n",
+            "", "0 0 0 0 0 9 9 9\n4 0 0 1 0 9 9 9\n4 4 0 1 1 9 9 9\n0 4 0 0 1 9 9 9\n4 0 1 2 3\n")}) {
+    const auto mesh = read_mesh(folder.write("a.ply", file), nullptr);
+    ASSERT_TRUE(mesh.ok()) << mesh.error().text;
+    EXPECT_TRUE(mesh->notes.empty());
+    EXPECT_EQ(colour_near(*mesh, {0.1, 3.9, 0}), kRed);
+    EXPECT_EQ(colour_near(*mesh, {3.9, 3.9, 0}), kGreen);
+    EXPECT_EQ(colour_near(*mesh, {0.1, 0.1, 0}), kBlue);
+    EXPECT_EQ(colour_near(*mesh, {3.9, 0.1, 0}), kYellow);
+  }
+  EXPECT_EQ(
+      companion_files("ply\nformat ascii 1.0\ncomment TextureFile a picture.png\nend_header\n", "ply", "/x/a.ply"),
+      std::vector<std::string>{"/x/a picture.png"});
+}
+
+TEST(Textures, PlysFacesHaveThePictureThatTheyNumber) {
+  const TempFolder folder;
+  folder.write("red.png", png_of(folder, image::View{1, 1, {kRed}, {}}));
+  folder.write("green.png", png_of(folder, image::View{1, 1, {kGreen}, {}}));
+  const auto mesh = read_mesh(
+      folder.write(
+          "a.ply",
+          "ply\nformat ascii 1.0\ncomment TextureFile red.png\ncomment TextureFile green.png\ncomment TextureFile "
+          "missing.png\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
+          "property uchar green\nproperty uchar blue\nelement face 4\nproperty list uchar int vertex_indices\n"
+          "property list uchar float texcoord\nproperty int texnumber\nend_header\n"
+          "0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n3 0 1 2 6 0 0 0 0 0 0 0\n3 0 2 3 6 0 0 0 0 0 0 1\n"
+          "3 0 1 3 6 0 0 0 0 0 0 2\n3 1 2 3 6 0 0 0 0 0 0 -1\n"),
+      nullptr);
+  ASSERT_TRUE(mesh.ok()) << mesh.error().text;
+  const std::vector<uint32_t> expected{kRed, kGreen, 0x010203, 0x010203};
+  for (size_t i = 0; i < 12; ++i) EXPECT_EQ(mesh->colours[mesh->indices[i]], expected[i / 3]) << i;
+  ASSERT_EQ(mesh->notes.size(), 1u);
+  EXPECT_NE(mesh->notes[0].find("missing.png is not there"), std::string::npos) << mesh->notes[0];
+}
+
+TEST(Textures, ObjsOptionsThatAreNotAppliedAreTold) {
+  const TempFolder folder;
+  folder.write("a.png", png_of(folder, four_colours(4)));
+  const std::string obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
+  for (const auto& [option, told] : {std::pair{"-mm 0 1", false},
+                                     {"-mm 0.2 1", true},
+                                     {"-cc on", true},
+                                     {"-t 1", true},
+                                     {"-blendu on -s 1 1 1", false}}) {
+    folder.write("a.mtl", fmt::format("newmtl a\nmap_Kd {} a.png\n", option));
+    const auto mesh = read_mesh(folder.write("a.obj", obj), nullptr);
+    ASSERT_TRUE(mesh.ok()) << mesh.error().text;
+    EXPECT_EQ(mesh->notes.size(), told ? 1u : 0u) << option;
+  }
+}
+
 TEST(Textures, MissingPicturesLeaveTheMaterialsColourAndANote) {
   const TempFolder folder;
   const Mesh mesh = read(quad_obj(folder, "Kd 0 0 1\nmap_Kd nowhere.png\n"));

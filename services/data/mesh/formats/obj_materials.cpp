@@ -4,7 +4,6 @@
 #include <array>
 #include <filesystem>
 
-#include "services/data/base/mapped_file.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/text_scanner.h"
 
@@ -12,12 +11,6 @@ namespace telesplat::data {
 namespace {
 
 constexpr size_t kMaxLibraries = 64, kMaxMaterials = 100'000;
-
-std::string trimmed(std::string_view name) {
-  while (!name.empty() && static_cast<unsigned char>(name.front()) <= ' ') name.remove_prefix(1);
-  while (!name.empty() && static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
-  return std::string(name);
-}
 
 std::string beside(const std::string& path, std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');  // as programs on Windows write them
@@ -36,7 +29,7 @@ int take_numbers(TextScanner& scan, double (&out)[3]) {
   return n;
 }
 
-// -s u v w, -o u v w, -clamp on and those that say nothing of the colours; then the file's name, which may have blanks.
+// -s u v w, -o u v w, -clamp on, others that change colours or do not; then the file's name, which may have blanks.
 void read_map(TextScanner& scan, std::string_view content, const std::string& library, ObjMaterial& material) {
   while (scan.skip_blanks()) {
     const size_t begin = scan.offset();
@@ -46,13 +39,16 @@ void read_map(TextScanner& scan, std::string_view content, const std::string& li
       const int n = take_numbers(scan, numbers);
       glm::vec2& to = word == "-s" ? material.scale : material.offset;
       if (n > 0 && word != "-t") to = {float(numbers[0]), float(n > 1 ? numbers[1] : (word == "-s" ? 1.0 : 0.0))};
+      if (word == "-t" && (numbers[0] != 0 || numbers[1] != 0 || numbers[2] != 0)) material.not_applied = word;
     } else if (word == "-mm" || word == "-bm" || word == "-boost" || word == "-texres") {
-      take_numbers(scan, numbers);
+      const int n = take_numbers(scan, numbers);
+      if (word == "-mm" && n > 0 && (numbers[0] != 0 || (n > 1 && numbers[1] != 1))) material.not_applied = word;
     } else if (word == "-clamp" || word == "-blendu" || word == "-blendv" || word == "-cc" || word == "-imfchan" ||
                word == "-type") {
       scan.skip_blanks();
       const std::string_view value = scan.word();
       if (word == "-clamp") material.clamp = value == "on";
+      if (word == "-cc" && value == "on") material.not_applied = word;
     } else {
       if (const std::string name = rest_of_line(content, begin); !name.empty())
         material.texture = beside(library, name);
@@ -61,10 +57,7 @@ void read_map(TextScanner& scan, std::string_view content, const std::string& li
   }
 }
 
-void read_library(const std::string& path, std::map<std::string, ObjMaterial>& materials) {
-  const auto file = MappedFile::open(path);
-  if (!file) return;
-  const std::string_view content = (*file)->text();
+void read_library(const std::string& path, std::string_view content, std::map<std::string, ObjMaterial>& materials) {
   TextScanner scan(content);
   ObjMaterial* material = nullptr;
   for (; scan.skip_space('#') && materials.size() < kMaxMaterials; scan.next_line()) {
@@ -82,26 +75,36 @@ void read_library(const std::string& path, std::map<std::string, ObjMaterial>& m
 
 }  // namespace
 
-std::string rest_of_line(std::string_view content, size_t offset) {
-  return trimmed(content.substr(offset, std::min(content.find('\n', offset), content.size()) - offset));
-}
-
-std::vector<std::string> obj_material_libraries(std::string_view content, const std::string& path) {
+std::vector<std::string> obj_material_libraries(std::string_view content, Companions& companions) {
   std::vector<std::string> out;
-  constexpr std::string_view kWord = "mtllib";
+  constexpr std::string_view kWord = "mtllib", kBlanks = " \t";
   for (size_t at = content.find(kWord); at != content.npos && out.size() < kMaxLibraries;
        at = content.find(kWord, at)) {
-    const bool starts_line = at == 0 || content[at - 1] == '\n';
+    const size_t before = content.substr(0, at).find_last_not_of(kBlanks);
+    const bool starts_line = before == content.npos || content[before] == '\n';
     at += kWord.size();
     if (!starts_line) continue;
-    if (const std::string name = rest_of_line(content, at); !name.empty()) out.push_back(beside(path, name));
+    const std::string names = beside("", rest_of_line(content, at));
+    if (names.empty()) continue;
+    if (names.find_first_of(kBlanks) == names.npos || companions.read(names)) {
+      out.push_back(names);
+    } else {
+      TextScanner scan(names);
+      while (scan.skip_blanks() && out.size() < kMaxLibraries) out.emplace_back(scan.word());
+    }
   }
   return out;
 }
 
-std::map<std::string, ObjMaterial> read_obj_materials(const std::vector<std::string>& libraries) {
+std::map<std::string, ObjMaterial> read_obj_materials(const std::vector<std::string>& libraries, Companions& companions,
+                                                      std::vector<std::string>& missing) {
   std::map<std::string, ObjMaterial> out;
-  for (const auto& library : libraries) read_library(library, out);
+  for (const std::string& library : libraries) {
+    if (const auto content = companions.read(library))
+      read_library(library, *content, out);
+    else
+      missing.push_back(library);
+  }
   return out;
 }
 

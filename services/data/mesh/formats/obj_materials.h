@@ -10,23 +10,24 @@
 #include <string_view>
 #include <vector>
 
+#include "services/data/base/companions.h"
+
 namespace telesplat::data {
 
 struct ObjMaterial {
   std::optional<uint32_t> colour;  ///< Kd, 0x00RRGGBB
-  std::string texture;             ///< path of map_Kd; empty: none
+  std::string texture;             ///< map_Kd, named from the OBJ's folder; empty: none
+  std::string not_applied;         ///< an option of map_Kd that changes its colours; empty: none
   bool clamp = false;              ///< of the texture: outside of 0..1 it shows its rim
   glm::vec2 scale{1, 1}, offset{0, 0};
 };
 
-/// Paths of the libraries that the lines "mtllib" name, beside the OBJ at `path`.
-std::vector<std::string> obj_material_libraries(std::string_view content, const std::string& path);
+/// The libraries that the lines "mtllib" name. The rest of a line is one name, if there is such a file, else several.
+std::vector<std::string> obj_material_libraries(std::string_view content, Companions& companions);
 
-/// By name; of equal names the last. A library that cannot be read has none. Ordered, so that companions are hashed in
-/// one order.
-std::map<std::string, ObjMaterial> read_obj_materials(const std::vector<std::string>& libraries);
-
-/// The rest of a line as a name: without blanks around it.
-std::string rest_of_line(std::string_view content, size_t offset);
+/// By name; of equal names the last. A library that cannot be read has none, and adds itself to `missing`. Ordered, so
+/// that companions are hashed in one order.
+std::map<std::string, ObjMaterial> read_obj_materials(const std::vector<std::string>& libraries, Companions& companions,
+                                                      std::vector<std::string>& missing);
 
 }  // namespace telesplat::data

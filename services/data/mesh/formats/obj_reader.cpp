@@ -5,37 +5,32 @@
 #include <map>
 #include <unordered_map>
 
-#include "services/data/base/mapped_file.h"
+#include "services/data/base/polygon.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/obj_materials.h"
+#include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/reader.h"
-#include "services/data/texture/bake.h"
+#include "services/data/texture/named_textures.h"
 
 namespace telesplat::data {
 namespace {
 
-uint32_t colour_of(const double (&c)[3]) {
-  const auto channel = [](double v) { return v > 0 ? static_cast<uint32_t>(std::min(v * 255 + 0.5, 255.0)) : 0; };
-  return pack_rgb(channel(c[0]), channel(c[1]), channel(c[2]));
-}
-
 constexpr uint32_t kNone = ~uint32_t{0};
+constexpr int kMostSteps = 64;  // through a position's variants: a million normals at one place cost no hours
 
 class ObjReader {
  public:
-  ObjReader(std::string_view content, const std::string& name, const ReadProgress& progress, uint64_t texture_detail)
-      : content_(content), name_(name), progress_(progress), texture_detail_(texture_detail), scan_(content) {}
+  ObjReader(std::string_view content, const std::string& name, const ReadProgress& progress, Companions& companions,
+            uint64_t texture_detail)
+      : content_(content),
+        name_(name),
+        progress_(progress),
+        companions_(companions),
+        texture_detail_(texture_detail),
+        scan_(content) {}
 
   Result<Mesh> read() {
-    std::map<int64_t, uint32_t> looks;
-    for (auto& [name, material] : read_obj_materials(obj_material_libraries(content_, name_))) {
-      // Those without a texture that have one colour are one: fewer vertices are doubled.
-      const auto next = uint32_t(materials_.size());
-      const int64_t look = material.colour ? int64_t(*material.colour) : -1;
-      const uint32_t number = material.texture.empty() ? looks.emplace(look, next).first->second : next;
-      material_numbers_.emplace(name, number);
-      if (number == next) materials_.push_back(std::move(material));
-    }
+    read_materials();
     mesh_.format = "obj";
     for (size_t lines = 0; scan_.skip_space('#'); scan_.next_line(), ++lines) {
       const std::string_view word = scan_.word();
@@ -46,9 +41,15 @@ class ObjReader {
                                            : ok_status();
       if (!status.ok()) return status.error();
       if (word == "usemtl") use_material();
+      if (word == "l" || word == "p" || word == "curv" || word == "surf") ++others_;
       if ((lines & 0xffff) == 0 && progress_)
         progress_(static_cast<double>(scan_.offset()) / static_cast<double>(content_.size()));
     }
+    if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0)
+      return Error{fmt::format("{}: holds no faces, only {} vertices and {} lines, points, curves and surfaces", name_,
+                               positions_.size(), others_)};
+    if (others_ > 0)
+      mesh_.notes.push_back(fmt::format("{}: its {} lines, points, curves and surfaces are left out", name_, others_));
     return finish();
   }
 
@@ -59,18 +60,43 @@ class ObjReader {
     uint32_t normal, material, place, vertex, next;
   };
 
+  void read_materials() {
+    std::map<int64_t, uint32_t> looks;
+    std::vector<std::string> missing;
+    const auto libraries = obj_material_libraries(content_, companions_);
+    for (auto& [name, material] : read_obj_materials(libraries, companions_, missing)) {
+      // Those without a texture that have one colour are one: fewer vertices are doubled.
+      const auto next = uint32_t(materials_.size());
+      const int64_t look = material.colour ? int64_t(*material.colour) : -1;
+      const uint32_t number = material.texture.empty() ? looks.emplace(look, next).first->second : next;
+      material_numbers_.emplace(name, number);
+      if (number == next) materials_.push_back(std::move(material));
+    }
+    for (const std::string& library : missing)
+      mesh_.notes.push_back(
+          fmt::format("{}: the material library {} is not there; its colours are left out", name_, library));
+  }
+
   Error bad(const std::string& what) const { return Error{fmt::format("{}:{}: {}", name_, scan_.line_number(), what)}; }
+
+  // Whether the statement goes on: on the same line, or on the next one behind a backslash.
+  bool more() {
+    while (scan_.skip_blanks('#')) {
+      if (!scan_.skip_char('\\')) return true;
+      scan_.next_line();
+    }
+    return false;
+  }
 
   Status read_vertex() {
     double value[7];
     int count = 0;
-    while (count < 7 && scan_.skip_blanks('#') && scan_.number(value[count])) ++count;
+    while (count < 7 && more() && scan_.number(value[count])) ++count;
     if (count < 3) return bad("a vertex is not three numbers");
     positions_.emplace_back(value[0], value[1], value[2]);
     if (count >= 6) {  // x y z r g b, as MeshLab and others write it; x y z w r g b does not occur
-      const double c[3] = {value[3], value[4], value[5]};
-      vertex_colours_.resize(positions_.size() - 1, kNeutralAlbedo);
-      vertex_colours_.push_back(colour_of(c));
+      colours_.fill(positions_.size() - 1);
+      colours_.add({value[3], value[4], value[5]});
     }
     return ok_status();
   }
@@ -78,7 +104,7 @@ class ObjReader {
   Status read_normal() {
     glm::dvec3 n;
     for (int a = 0; a < 3; ++a)
-      if (!scan_.skip_blanks('#') || !scan_.number(n[a])) return bad("a normal is not three numbers");
+      if (!more() || !scan_.number(n[a])) return bad("a normal is not three numbers");
     normals_.emplace_back(n);
     return ok_status();
   }
@@ -86,8 +112,8 @@ class ObjReader {
   // u [v [w]]; v goes up from the picture's lower rim.
   Status read_texture_coordinate() {
     double u = 0, v = 0;
-    if (!scan_.skip_blanks('#') || !scan_.number(u)) return bad("a texture coordinate is no number");
-    if (scan_.skip_blanks('#')) scan_.number(v);
+    if (!more() || !scan_.number(u)) return bad("a texture coordinate is no number");
+    if (more()) scan_.number(v);
     places_.emplace_back(u, v);
     return ok_status();
   }
@@ -125,7 +151,8 @@ class ObjReader {
 
   uint32_t variant_of(uint32_t position, uint32_t normal, uint32_t place) {
     if (first_variant_.size() < positions_.size()) first_variant_.resize(positions_.size(), kNone);
-    for (uint32_t v = first_variant_[position]; v != kNone; v = variants_[v].next)
+    int steps = 0;
+    for (uint32_t v = first_variant_[position]; v != kNone && ++steps <= kMostSteps; v = variants_[v].next)
       if (variants_[v].normal == normal && variants_[v].material == material_ && variants_[v].place == place) return v;
     const auto id = static_cast<uint32_t>(variants_.size());
     variants_.push_back({normal, material_, place, position, first_variant_[position]});
@@ -133,22 +160,23 @@ class ObjReader {
   }
 
   Status read_face() {
-    uint32_t first = 0, previous = 0;
-    size_t corners = 0;
-    for (; scan_.skip_blanks('#'); ++corners) {
-      if (scan_.skip_char('\\')) {  // the line goes on below
-        scan_.next_line();
-        --corners;
-        continue;
-      }
+    corners_.clear();
+    while (more()) {
       uint32_t corner = 0;
       if (auto status = read_corner(corner); !status) return status;
-      if (corners == 0) first = corner;
-      if (corners >= 2) mesh_.indices.insert(mesh_.indices.end(), {first, previous, corner});
-      previous = corner;
+      corners_.push_back(corner);
     }
-    if (corners < 3) ++mesh_.degenerate_dropped;
+    if (corners_.size() < 3) ++mesh_.degenerate_dropped;
+    if (corners_.size() == 3) mesh_.indices.insert(mesh_.indices.end(), corners_.begin(), corners_.end());
+    if (corners_.size() > 3) cut_face();
     return ok_status();
+  }
+
+  void cut_face() {
+    ring_.clear(), cut_.clear();
+    for (const uint32_t corner : corners_) ring_.push_back(variants_[corner].vertex);
+    cut_corners(ring_, positions_, cut_);
+    for (const uint32_t i : cut_) mesh_.indices.push_back(corners_[i]);
   }
 
   uint32_t colour_of_variant(const Variant& v, bool own_colours, bool textured) const {
@@ -161,11 +189,12 @@ class ObjReader {
   Result<Mesh> finish() {
     auto use = read_textures();
     if (!use) return use.error();
-    const bool own_colours = !vertex_colours_.empty();  // they win over materials
+    const bool own_colours = !colours_.empty();  // they win over materials
     bool any_colour = own_colours || !use->textures.empty(), any_normal = false;
     for (const Variant& v : variants_)
       any_colour |= v.material != kNone && materials_[v.material].colour, any_normal |= v.normal != kNone;
-    vertex_colours_.resize(positions_.size(), kNeutralAlbedo);
+    colours_.fill(positions_.size());
+    vertex_colours_ = colours_.packed(kNeutralAlbedo);
     mesh_.positions.reserve(variants_.size());
     for (const Variant& v : variants_) {
       mesh_.positions.push_back(positions_[v.vertex]);
@@ -177,10 +206,7 @@ class ObjReader {
       use->texture.push_back(texture);
       use->uv.push_back(texture == kNoTexture ? glm::vec2(0) : place_in_picture(v));
     }
-    // A mesh that validate_mesh refuses is left to it.
-    const bool sound =
-        std::all_of(mesh_.indices.begin(), mesh_.indices.end(), [&](uint32_t i) { return i < mesh_.positions.size(); });
-    if (!use->textures.empty() && sound)
+    if (!use->textures.empty() && drop_not_finite(mesh_, name_))
       if (std::string note = bake_textures(mesh_, std::move(*use), texture_detail_); !note.empty())
         mesh_.notes.push_back(name_ + ": " + note);
     return std::move(mesh_);
@@ -192,60 +218,54 @@ class ObjReader {
     return {uv.x, 1 - uv.y};
   }
 
-  // Those that faces use. One file is read once for each way to wrap it.
+  // Those that faces use.
   Result<TextureUse> read_textures() {
-    TextureUse use;
+    NamedTextures textures(name_, companions_);
     textures_of_.assign(materials_.size(), kNoTexture);
     std::vector<bool> used(materials_.size(), false);
     for (const Variant& v : variants_)
       if (v.material != kNone && v.place != kNone) used[v.material] = true;
-    std::map<std::pair<std::string, bool>, uint32_t> read;
-    uint64_t room = kMaxTexels;
     for (size_t m = 0; m < materials_.size(); ++m) {
       const ObjMaterial& material = materials_[m];
       if (!used[m] || material.texture.empty()) continue;
-      const auto [entry, is_new] = read.try_emplace({material.texture, material.clamp}, uint32_t(use.textures.size()));
-      if (is_new) {
-        const auto file = MappedFile::open(material.texture);
-        if (!file) {
-          mesh_.notes.push_back(
-              fmt::format("{}: the texture {} is not there; its material's colour is shown", name_, material.texture));
-          entry->second = kNoTexture;
-        } else {
-          auto picture = image::read_picture((*file)->bytes(), material.texture, room);
-          if (!picture) return Error{fmt::format("{}: {}", name_, picture.error().text)};
-          room -= picture->colour.size();
-          const Wrap wrap = material.clamp ? Wrap::kClamp : Wrap::kRepeat;
-          use.textures.push_back(std::make_shared<Texture>(std::move(*picture), wrap, wrap));
-        }
-      }
-      textures_of_[m] = entry->second;
+      const auto number = textures.number_of(material.texture, material.clamp ? Wrap::kClamp : Wrap::kRepeat);
+      if (!number) return number.error();
+      textures_of_[m] = *number;
+      if (!material.not_applied.empty())
+        mesh_.notes.push_back(fmt::format("{}: the option {} of the texture {} is not applied", name_,
+                                          material.not_applied, material.texture));
     }
-    return use;
+    mesh_.notes.insert(mesh_.notes.end(), textures.notes().begin(), textures.notes().end());
+    return TextureUse{textures.all(), {}, {}};
   }
 
   std::string_view content_;
   const std::string& name_;
   const ReadProgress& progress_;
+  Companions& companions_;
   const uint64_t texture_detail_;
   TextScanner scan_;
   Mesh mesh_;
   std::vector<glm::dvec3> positions_;
   std::vector<glm::vec3> normals_;
-  std::vector<uint32_t> vertex_colours_, first_variant_;
+  RawColours colours_;                    // one a vertex, or none
+  std::vector<uint32_t> vertex_colours_;  // the same, packed
+  std::vector<uint32_t> first_variant_;
   std::vector<Variant> variants_;
   std::vector<glm::vec2> places_;  // in textures
   std::unordered_map<std::string, uint32_t> material_numbers_;
   std::vector<ObjMaterial> materials_;
   std::vector<uint32_t> textures_of_;  // of each material: its number in TextureUse::textures, or kNoTexture
   uint32_t material_ = kNone;
+  std::vector<uint32_t> corners_, ring_, cut_;  // of the face that is read
+  size_t others_ = 0;                           // statements that are left out
 };
 
 }  // namespace
 
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
-                      uint64_t texture_detail) {
-  return ObjReader(content, name, progress, texture_detail).read();
+                      Companions& companions, uint64_t texture_detail) {
+  return ObjReader(content, name, progress, companions, texture_detail).read();
 }
 
 }  // namespace telesplat::data

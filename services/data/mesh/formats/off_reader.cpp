@@ -2,9 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
+#include "services/data/base/polygon.h"
 #include "services/data/base/text_scanner.h"
+#include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
@@ -15,119 +18,206 @@ constexpr char kComment = '#';
 class OffReader {
  public:
   OffReader(std::string_view content, const std::string& name, const ReadProgress& progress)
-      : name_(name), progress_(progress), bytes_(content.size()), scan_(content) {}
+      : content_(content), name_(name), progress_(progress), scan_(content) {}
 
   Result<Mesh> read() {
     mesh_.format = "off";
     if (auto status = read_header(); !status) return status.error();
     if (auto status = read_vertices(); !status) return status.error();
     if (auto status = read_faces(); !status) return status.error();
+    set_colours();
     return std::move(mesh_);
   }
 
  private:
-  Error bad(const std::string& what) const { return Error{fmt::format("{}:{}: {}", name_, scan_.line_number(), what)}; }
+  Error bad(const std::string& what) const {
+    if (binary_) return Error{fmt::format("{}: {}", name_, what)};
+    return Error{fmt::format("{}:{}: {}", name_, scan_.line_number(), what)};
+  }
+  size_t offset() const { return binary_ ? at_ : scan_.offset(); }
+  void tick(size_t done) {
+    if ((done & 0xffff) == 0 && progress_) progress_(double(offset()) / double(content_.size()));
+  }
 
-  bool next_number(double& out) { return scan_.skip_space(kComment) && scan_.number(out); }
+  // Binary files hold four bytes a number, the highest first.
+  bool take(uint32_t& bits) {
+    if (content_.size() - at_ < 4) return false;
+    bits = 0;
+    for (int i = 0; i < 4; ++i) bits = bits << 8 | uint8_t(content_[at_++]);
+    return true;
+  }
+  bool real(double& out) {
+    uint32_t bits;
+    if (!binary_) return scan_.skip_space(kComment) && scan_.number(out);
+    return take(bits) && (out = double(std::bit_cast<float>(bits)), true);
+  }
+  bool integer(double& out) {
+    uint32_t bits;
+    if (!binary_) return real(out) && out == std::floor(out);
+    return take(bits) && (out = double(int32_t(bits)), true);
+  }
+  bool reals(std::initializer_list<double*> out) {
+    return std::all_of(out.begin(), out.end(), [&](double* x) { return real(*x); });
+  }
 
+  // OFF with prefixes [BINARY], which may be missing; then the numbers of vertices, faces and edges.
   Status read_header() {
     scan_.skip_space(kComment);
-    std::string_view word = scan_.word();
-    const std::string keyword(word.substr(0, 20));
-    if (word.starts_with("ST")) texture_ = true, word.remove_prefix(2);
-    if (word.starts_with("C")) colours_ = true, word.remove_prefix(1);
-    if (word.starts_with("N")) normals_ = true, word.remove_prefix(1);
-    if (word != "OFF") return bad(fmt::format("'{}' is not OFF, nor OFF with the prefixes ST, C, N", keyword));
-    double counts[3];
-    for (double& count : counts)
-      if (!next_number(count) || count < 0 || count != std::floor(count))
-        return bad("after OFF stand the numbers of vertices, faces and edges, in text (binary OFF is not read)");
-    // Each number takes a digit and a separator, but for the last.
-    const auto check = [&](const char* what, double count, size_t numbers) -> Status {
-      const double most = static_cast<double>((bytes_ + 1) / (2 * numbers));
-      if (count > most)
-        return bad(
-            fmt::format("header claims {:.0f} {}, a file of {} bytes holds at most {:.0f}", count, what, bytes_, most));
-      return ok_status();
-    };
-    if (auto status = check("vertices", counts[0], 3); !status) return status;
-    if (auto status = check("faces", counts[1], 1); !status) return status;
-    vertices_ = static_cast<size_t>(counts[0]), faces_ = static_cast<size_t>(counts[1]);
+    if (TextScanner first = scan_; !(first.number(counts_[0]) && first.word().empty())) {
+      std::string_view word = scan_.word();
+      const std::string keyword(word.substr(0, 20));
+      const auto skip = [&](std::string_view prefix) {
+        if (!word.starts_with(prefix)) return false;
+        word.remove_prefix(prefix.size());
+        return true;
+      };
+      bool other = false;
+      for (bool any = true; any;) {  // in any order: MeshLab writes CSTOFF
+        any = false;
+        for (const auto& [prefix, has] :
+             {std::pair("ST", &texture_), {"C", &colours_}, {"N", &normals_}, {"4", &other}, {"n", &other}})
+          if (skip(prefix)) any = *has = true;
+      }
+      if (other && word == "OFF")
+        return bad(fmt::format("{} has vertices of other than three coordinates, which are not shown", keyword));
+      if (word != "OFF") return bad(fmt::format("'{}' is not OFF, nor OFF with the prefixes ST, C, N", keyword));
+      TextScanner after = scan_;
+      if (after.skip_blanks(kComment) && after.word() == "BINARY") {
+        after.next_line();
+        at_ = after.offset(), binary_ = true;
+      }
+    }
+    bool one_line = true;
+    for (int i = 0; i < 3; ++i) {
+      const bool goes_on = scan_.skip_blanks(kComment);
+      if (i == 1) one_line = goes_on;
+      if (i == 2 && one_line && !goes_on && !binary_) break;  // some leave out the number of edges
+      if (!integer(counts_[i]) || counts_[i] < 0)
+        return bad("after OFF stand the numbers of vertices, faces and edges");
+    }
+    const size_t vertex_numbers = 3 + (normals_ ? 3 : 0);
+    if (auto status = check_count("vertices", counts_[0], vertex_numbers); !status) return status;
+    if (auto status = check_count("faces", counts_[1], 1); !status) return status;
+    vertices_ = size_t(counts_[0]), faces_ = size_t(counts_[1]);
     return ok_status();
+  }
+
+  // Each number takes four bytes, or a digit and a separator, but for the last.
+  Status check_count(const char* what, double count, size_t numbers) const {
+    const auto most = double((content_.size() + 1) / ((binary_ ? 4 : 2) * numbers));
+    if (count <= most) return ok_status();
+    return bad(fmt::format("header claims {:.0f} {}, a file of {} bytes holds at most {:.0f}", count, what,
+                           content_.size(), most));
   }
 
   Status read_vertices() {
     mesh_.positions.reserve(vertices_);
-    std::vector<glm::dvec3> raw_colours;
-    for (size_t v = 0; v < vertices_; ++v) {
-      double p[3], n[3], c[4] = {};
-      for (double& x : p)
-        if (!next_number(x)) return bad(fmt::format("vertex {} of {} is missing or no number", v, vertices_));
+    for (size_t v = 0; v < vertices_; ++v, tick(v)) {
+      double p[3], c[4], unused;
+      if (!reals({&p[0], &p[1], &p[2]}))
+        return bad(fmt::format("vertex {} of {} is missing or no number", v, vertices_));
       mesh_.positions.emplace_back(p[0], p[1], p[2]);
       if (normals_) {
-        for (double& x : n)
-          if (!next_number(x)) return bad(fmt::format("normal of vertex {} is missing or no number", v));
-        mesh_.normals.emplace_back(n[0], n[1], n[2]);
+        if (!reals({&p[0], &p[1], &p[2]})) return bad(fmt::format("normal of vertex {} is missing or no number", v));
+        mesh_.normals.emplace_back(p[0], p[1], p[2]);
       }
-      if (colours_) {  // three or four numbers, to the line's end
-        int channels = 0;
-        while (channels < 4 && scan_.skip_blanks(kComment)) {
-          if (!scan_.number(c[channels])) return bad(fmt::format("colour of vertex {} is no number", v));
-          ++channels;
-        }
+      if (colours_) {
+        const int channels = numbers_to_line_end(c);
         if (channels < 3) return bad(fmt::format("vertex {} has {} colour channels instead of 3 or 4", v, channels));
-        raw_colours.emplace_back(c[0], c[1], c[2]);
+        vertex_colours_.add({c[0], c[1], c[2]});
       }
-      if (texture_) scan_.next_line();
-      if ((v & 0xffff) == 0 && progress_) progress_(static_cast<double>(scan_.offset()) / static_cast<double>(bytes_));
+      if (texture_ && !binary_) scan_.next_line();
+      if (texture_ && binary_ && !reals({&unused, &unused})) return bad(fmt::format("vertex {} lacks its place", v));
     }
-    set_colours(raw_colours);
     return ok_status();
   }
 
-  // Channels are fractions of 1 if none in the file is larger, else whole numbers to 255.
-  void set_colours(const std::vector<glm::dvec3>& raw) {
-    double largest = 0;
-    for (const glm::dvec3& c : raw) largest = std::max({largest, c.x, c.y, c.z});
-    const double scale = largest <= 1.0 ? 255.0 : 1.0;
-    const auto channel = [scale](double v) {
-      return v > 0 ? static_cast<uint32_t>(std::min(v * scale + 0.5, 255.0)) : 0;
-    };
-    mesh_.colours.reserve(raw.size());
-    for (const glm::dvec3& c : raw) mesh_.colours.push_back(pack_rgb(channel(c.x), channel(c.y), channel(c.z)));
+  // At most four; of vertices in binary files always four.
+  int numbers_to_line_end(double (&out)[4]) {
+    int n = 0;
+    while (n < 4 && (binary_ || scan_.skip_blanks(kComment)) && (binary_ ? real(out[n]) : scan_.number(out[n]))) ++n;
+    return n;
   }
 
   Status read_faces() {
-    mesh_.indices.reserve(std::min(3 * faces_, bytes_ / 2));
-    for (size_t f = 0; f < faces_; ++f) {
+    mesh_.indices.reserve(std::min(3 * faces_, content_.size() / 2));
+    std::vector<uint32_t> ring;
+    for (size_t f = 0; f < faces_; ++f, tick(f)) {
       double corners;
-      if (!next_number(corners) || corners < 0 || corners != std::floor(corners))
+      if (!integer(corners) || corners < 0)
         return bad(fmt::format("face {} of {} is missing or does not start with its number of corners", f, faces_));
-      uint32_t first = 0, previous = 0;
+      ring.clear();
       for (double i = 0; i < corners; ++i) {  // a lying number ends where the file ends
         double index;
-        if (!next_number(index)) return bad(fmt::format("face {} lacks corner {:.0f} of {:.0f}", f, i, corners));
-        if (!(index >= 0 && index < static_cast<double>(vertices_)))
+        if (!integer(index)) return bad(fmt::format("face {} lacks corner {:.0f} of {:.0f}", f, i, corners));
+        if (!(index >= 0 && index < double(vertices_)))
           return bad(fmt::format("face {} names vertex {}, there are {}", f, index, vertices_));
-        const auto corner = static_cast<uint32_t>(index);
-        if (i == 0) first = corner;
-        if (i >= 2) mesh_.indices.insert(mesh_.indices.end(), {first, previous, corner});
-        previous = corner;
+        ring.push_back(uint32_t(index));
       }
       if (corners < 3) ++mesh_.degenerate_dropped;
-      scan_.next_line();  // a face's own colour, if any, is not used
-      if ((f & 0xffff) == 0 && progress_) progress_(static_cast<double>(scan_.offset()) / static_cast<double>(bytes_));
+      const size_t before = mesh_.indices.size() / 3;
+      cut_polygon(ring, mesh_.positions, mesh_.indices);
+      if (!read_face_colour(before)) return bad(fmt::format("face {} has a colour that is no number", f));
     }
     return ok_status();
   }
 
+  // Nothing, one number (a place in Geomview's own colour map), or three or four of a colour: whole numbers to 255 or
+  // fractions of 1.
+  bool read_face_colour(size_t first_triangle) {
+    double c[4], count = 0;
+    if (binary_) {
+      uint32_t bits;
+      if (!integer(count) || count < 0 || count > 4) return false;
+      for (int i = 0; i < int(count); ++i)
+        if (!(count == 1 ? take(bits) : real(c[i]))) return false;
+    } else {
+      count = numbers_to_line_end(c);
+      scan_.next_line();
+    }
+    by_map_ += count == 1;
+    if (count < 3) return true;
+    uint32_t colour = kUndecided;  // 0 and 1 are both: the other faces tell
+    const double largest = std::max({c[0], c[1], c[2]});
+    const auto channel = [](double v) { return v > 0 ? uint32_t(std::min(v + 0.5, 255.0)) : 0; };
+    if (largest > 1)
+      colour = pack_rgb(channel(c[0]), channel(c[1]), channel(c[2])), whole_numbers_ = true;
+    else if (std::all_of(c, c + 3, [](double v) { return v == 0 || v == 1; }))
+      colour |= pack_rgb(uint32_t(c[0]), uint32_t(c[1]), uint32_t(c[2]));
+    else
+      colour = pack_rgb(channel(255 * c[0]), channel(255 * c[1]), channel(255 * c[2]));
+    face_colours_.resize(first_triangle, kNoColour);
+    face_colours_.resize(mesh_.indices.size() / 3, colour);
+    return true;
+  }
+
+  void set_colours() {
+    if (colours_) mesh_.colours = vertex_colours_.packed(kNeutralAlbedo);
+    if (by_map_ > 0)
+      mesh_.notes.push_back(fmt::format(
+          "{}: {} faces name their colours in a colour map of Geomview's, which is not known", name_, by_map_));
+    if (face_colours_.empty()) return;
+    face_colours_.resize(mesh_.indices.size() / 3, kNoColour);
+    for (uint32_t& c : face_colours_)
+      if (c != kNoColour && c >= kUndecided) c = (c & 0x010101) * (whole_numbers_ ? 1 : 255);
+    colour_faces(mesh_, face_colours_);
+  }
+
+  static constexpr uint32_t kUndecided = 0x01000000;
+
+  std::string_view content_;
   const std::string& name_;
   const ReadProgress& progress_;
-  size_t bytes_;
   TextScanner scan_;
-  bool colours_ = false, normals_ = false, texture_ = false;
+  size_t at_ = 0;  // of binary files
+  bool binary_ = false, colours_ = false, normals_ = false, texture_ = false;
+  double counts_[3] = {};
   size_t vertices_ = 0, faces_ = 0;
   Mesh mesh_;
+  RawColours vertex_colours_;
+  std::vector<uint32_t> face_colours_;  // one a triangle, or none
+  bool whole_numbers_ = false;
+  size_t by_map_ = 0;
 };
 
 }  // namespace

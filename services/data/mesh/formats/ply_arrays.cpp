@@ -2,25 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <limits>
-
 #include "common/scene/colouring.h"
 
 namespace telesplat::data {
-namespace {
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
-
-PlyArrays::PlyArrays(const PlyHeader& header, bool (*is_geometry)(std::string_view))
-    : header_(header), of_this_face_(kMissing) {
+PlyArrays::PlyArrays(const PlyHeader& header, const std::function<bool(const PlyElement&, std::string_view)>& is_taken)
+    : header_(header) {
   for (const PlyElement& element : header.elements) {
     const bool vertices = element.name == "vertex", faces = element.name == "face";
     std::vector<int>& of = of_element_.emplace_back(element.properties.size(), -1);
     for (size_t i = 0; i < of.size() && (vertices || faces); ++i) {
       const PlyProperty& p = element.properties[i];
-      if (p.is_list || (vertices && is_geometry(p.name))) continue;
+      if (p.is_list || is_taken(element, p.name)) continue;
       of[i] = int(arrays_.size());
       arrays_.push_back({p.name, "", faces, 1, {scene::ValueSpan{}}});
     }
@@ -40,11 +33,6 @@ Status PlyArrays::choose(const std::string& text, const std::string& file) {
 
 const std::vector<int>& PlyArrays::arrays_of(const PlyElement& element) const {
   return of_element_[size_t(&element - header_.elements.data())];
-}
-
-void PlyArrays::end_face(size_t triangles) {
-  if (faces_chosen()) values_.resize(triangles, of_this_face_);
-  of_this_face_ = kMissing;
 }
 
 void PlyArrays::finish(Mesh& mesh) {

@@ -11,16 +11,16 @@
 namespace telesplat::data {
 namespace {
 
-constexpr size_t kMaxHeaderBytes = 1 << 20, kMaxElements = 64, kMaxProperties = 256;
+constexpr size_t kMaxHeaderBytes = 1 << 20, kMaxElements = 64, kMaxProperties = 256, kMaxTextures = 1024;
 
 std::optional<PlyType> parse_type(std::string_view word) {
   constexpr std::pair<std::string_view, PlyType> kNames[] = {
-      {"char", PlyType::kInt8},      {"int8", PlyType::kInt8},       {"uchar", PlyType::kUint8},
-      {"uint8", PlyType::kUint8},    {"short", PlyType::kInt16},     {"int16", PlyType::kInt16},
-      {"ushort", PlyType::kUint16},  {"uint16", PlyType::kUint16},   {"int", PlyType::kInt32},
-      {"int32", PlyType::kInt32},    {"uint", PlyType::kUint32},     {"uint32", PlyType::kUint32},
-      {"float", PlyType::kFloat32},  {"float32", PlyType::kFloat32}, {"double", PlyType::kFloat64},
-      {"float64", PlyType::kFloat64}};
+      {"char", PlyType::kInt8},       {"int8", PlyType::kInt8},      {"uchar", PlyType::kUint8},
+      {"uint8", PlyType::kUint8},     {"short", PlyType::kInt16},    {"int16", PlyType::kInt16},
+      {"ushort", PlyType::kUint16},   {"uint16", PlyType::kUint16},  {"int", PlyType::kInt32},
+      {"int32", PlyType::kInt32},     {"uint", PlyType::kUint32},    {"uint32", PlyType::kUint32},
+      {"int64", PlyType::kInt64},     {"uint64", PlyType::kUint64},  {"float", PlyType::kFloat32},
+      {"float32", PlyType::kFloat32}, {"double", PlyType::kFloat64}, {"float64", PlyType::kFloat64}};
   for (const auto& [name, type] : kNames)
     if (name == word) return type;
   return std::nullopt;
@@ -52,6 +52,29 @@ Status parse_property(const std::vector<std::string_view>& words, PlyElement& el
   property.count_type = *count_type;
   property.name = words.back();
   element.properties.push_back(std::move(property));
+  return ok_status();
+}
+
+Status parse_encoding(std::string_view word, PlyHeader& header, const std::string& where) {
+  if (word == "ascii")
+    header.encoding = PlyEncoding::kAscii;
+  else if (word == "binary_little_endian")
+    header.encoding = PlyEncoding::kLittleEndian;
+  else if (word == "binary_big_endian")
+    header.encoding = PlyEncoding::kBigEndian;
+  else
+    return Error{fmt::format("{}: unknown PLY format '{}'", where, word)};
+  return ok_status();
+}
+
+Status parse_element(const std::vector<std::string_view>& words, PlyHeader& header, const std::string& where) {
+  TextScanner number(words[2]);
+  int64_t count = -1;
+  if (!number.integer(count) || !number.at_end() || count < 0)
+    return Error{fmt::format("{}: element count '{}' is not a number from 0 on", where, words[2])};
+  if (header.elements.size() == kMaxElements)
+    return Error{fmt::format("{}: more than {} elements", where, kMaxElements)};
+  header.elements.push_back({std::string(words[1]), static_cast<uint64_t>(count), {}});
   return ok_status();
 }
 
@@ -98,7 +121,9 @@ const PlyElement* PlyHeader::find(std::string_view element) const {
 }
 
 Result<PlyHeader> parse_ply_header(std::string_view content, const std::string& name) {
-  TextScanner scan(content.substr(0, kMaxHeaderBytes));
+  std::string text(content.substr(0, kMaxHeaderBytes));
+  if (text.starts_with("ply\r") && !text.starts_with("ply\r\n")) std::replace(text.begin(), text.end(), '\r', '\n');
+  TextScanner scan(text);
   if (scan.word() != "ply") return Error{name + ": does not start with 'ply'"};
   scan.next_line();
   PlyHeader header;
@@ -106,27 +131,17 @@ Result<PlyHeader> parse_ply_header(std::string_view content, const std::string& 
   for (int line = 2;; ++line) {
     const std::string where = fmt::format("{}:{}", name, line);
     if (scan.at_end()) return Error{name + ": PLY header has no 'end_header'"};
+    const std::string_view rest = std::string_view(text).substr(scan.offset());
     const auto words = split(scan);
+    if (words.size() > 2 && words[0] == "comment" && words[1] == "TextureFile" && header.textures.size() < kMaxTextures)
+      header.textures.push_back(rest_of_line(rest, size_t(words[2].data() - rest.data())));
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
     if (words[0] == "end_header") break;
     if (words[0] == "format" && words.size() >= 2) {
-      if (words[1] == "ascii")
-        header.encoding = PlyEncoding::kAscii;
-      else if (words[1] == "binary_little_endian")
-        header.encoding = PlyEncoding::kLittleEndian;
-      else if (words[1] == "binary_big_endian")
-        header.encoding = PlyEncoding::kBigEndian;
-      else
-        return Error{fmt::format("{}: unknown PLY format '{}'", where, words[1])};
+      if (auto status = parse_encoding(words[1], header, where); !status) return status.error();
       has_format = true;
     } else if (words[0] == "element" && words.size() == 3) {
-      TextScanner number(words[2]);
-      int64_t count = -1;
-      if (!number.integer(count) || !number.at_end() || count < 0)
-        return Error{fmt::format("{}: element count '{}' is not a number from 0 on", where, words[2])};
-      if (header.elements.size() == kMaxElements)
-        return Error{fmt::format("{}: more than {} elements", where, kMaxElements)};
-      header.elements.push_back({std::string(words[1]), static_cast<uint64_t>(count), {}});
+      if (auto status = parse_element(words, header, where); !status) return status.error();
     } else if (words[0] == "property" && !header.elements.empty()) {
       if (auto status = parse_property(words, header.elements.back(), where); !status) return status.error();
     } else {

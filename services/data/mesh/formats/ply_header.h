@@ -11,8 +11,8 @@
 namespace telesplat::data {
 
 enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
-enum class PlyType : uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
-inline constexpr size_t kPlyTypeBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+enum class PlyType : uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64 };
+inline constexpr size_t kPlyTypeBytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
 
 struct PlyProperty {
   std::string name;
@@ -35,13 +35,14 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<PlyElement> elements;
-  size_t bytes = 0;  ///< of the header: where the data starts
+  size_t bytes = 0;                   ///< of the header: where the data starts
+  std::vector<std::string> textures;  ///< pictures, of comments "TextureFile", in the order of their numbers
 
   const PlyElement* find(std::string_view element) const;
 };
 
 /// Parses the header. Claimed counts are checked against the size of `content`: what is returned can be allocated by.
-/// Limits: 64 elements, 256 properties each, a header of 1 MiB. Errors start with `name`.
+/// Limits: 64 elements, 256 properties each, 1,024 textures, a header of 1 MiB. Errors start with `name`.
 Result<PlyHeader> parse_ply_header(std::string_view content, const std::string& name);
 
 }  // namespace telesplat::data

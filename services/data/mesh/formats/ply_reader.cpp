@@ -2,77 +2,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <cmath>
-#include <cstring>
 
-#include "services/data/base/text_scanner.h"
+#include "services/data/base/polygon.h"
 #include "services/data/mesh/formats/ply_arrays.h"
+#include "services/data/mesh/formats/ply_cursor.h"
 #include "services/data/mesh/formats/ply_header.h"
+#include "services/data/mesh/formats/ply_textures.h"
+#include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
 namespace {
 
-// Reads one value after the other from the data behind the header. read() returns false where the data ends or is no
-// number.
-class AsciiCursor {
- public:
-  AsciiCursor(std::string_view content, size_t offset) : scan_(content.substr(offset)) {}
-  bool read(PlyType, double& out) { return scan_.skip_space() && scan_.number(out); }
+// Where a property of a vertex or a face goes.
+enum class Target : uint8_t { kNone, kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kRed, kGreen, kBlue, kU, kV, kCount };
 
- private:
-  TextScanner scan_;
-};
-
-template <bool kSwap>
-class BinaryCursor {
- public:
-  BinaryCursor(std::string_view content, size_t offset)
-      : at_(content.data() + offset), end_(content.data() + content.size()) {}
-  bool read(PlyType type, double& out) {
-    switch (type) {
-      case PlyType::kInt8:
-        return take<int8_t>(out);
-      case PlyType::kUint8:
-        return take<uint8_t>(out);
-      case PlyType::kInt16:
-        return take<int16_t>(out);
-      case PlyType::kUint16:
-        return take<uint16_t>(out);
-      case PlyType::kInt32:
-        return take<int32_t>(out);
-      case PlyType::kUint32:
-        return take<uint32_t>(out);
-      case PlyType::kFloat32:
-        return take<float>(out);
-      case PlyType::kFloat64:
-        return take<double>(out);
-    }
-    return false;
-  }
-
- private:
-  template <class T>
-  bool take(double& out) {
-    if (static_cast<size_t>(end_ - at_) < sizeof(T)) return false;
-    char bytes[sizeof(T)];
-    std::memcpy(bytes, at_, sizeof(T));
-    if constexpr (kSwap) std::reverse(bytes, bytes + sizeof(T));
-    T value;
-    std::memcpy(&value, bytes, sizeof(T));
-    out = static_cast<double>(value);
-    at_ += sizeof(T);
-    return true;
-  }
-  const char* at_;
-  const char* end_;
-};
-
-// Where a property of a vertex goes.
-enum class Target : uint8_t { kNone, kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kRed, kGreen, kBlue, kCount };
-
-Target target_of(std::string_view name) {
+// textured: the file names a picture, so that numbers with these names are places in it.
+Target target_of(std::string_view name, bool textured) {
   constexpr std::pair<std::string_view, Target> kTargets[] = {{"x", Target::kX},
                                                               {"y", Target::kY},
                                                               {"z", Target::kZ},
@@ -87,19 +35,45 @@ Target target_of(std::string_view name) {
                                                               {"b", Target::kBlue},
                                                               {"diffuse_red", Target::kRed},
                                                               {"diffuse_green", Target::kGreen},
-                                                              {"diffuse_blue", Target::kBlue}};
+                                                              {"diffuse_blue", Target::kBlue},
+                                                              {"s", Target::kU},
+                                                              {"t", Target::kV},
+                                                              {"u", Target::kU},
+                                                              {"v", Target::kV},
+                                                              {"texture_u", Target::kU},
+                                                              {"texture_v", Target::kV}};
   for (const auto& [word, target] : kTargets)
-    if (word == name) return target;
+    if (word == name) return target < Target::kU || textured ? target : Target::kNone;
   return Target::kNone;
 }
 
-// The factor that brings a colour channel of this type to 0..255.
-double channel_scale(PlyType type) {
-  if (type == PlyType::kFloat32 || type == PlyType::kFloat64) return 255.0;
-  return kPlyTypeBytes[static_cast<int>(type)] == 2 ? 255.0 / 65535.0 : 1.0;
+// The targets of an element's properties, and which of them it has.
+struct Targets {
+  Targets(const PlyElement& element, bool textured) {
+    for (const PlyProperty& p : element.properties) {
+      of.push_back(p.is_list ? Target::kNone : target_of(p.name, textured));
+      has[size_t(of.back())] = true;
+      if (of.back() == Target::kRed) colour_type = p.type;
+    }
+  }
+  bool all(std::initializer_list<Target> targets) const {
+    return std::all_of(targets.begin(), targets.end(), [&](Target t) { return has[size_t(t)]; });
+  }
+  bool colours() const { return all({Target::kRed, Target::kGreen, Target::kBlue}); }
+
+  std::vector<Target> of;
+  bool has[size_t(Target::kCount)] = {};
+  PlyType colour_type = PlyType::kUint8;
+};
+
+using Values = std::array<double, size_t(Target::kCount)>;
+
+glm::vec3 colour_of(const Values& v) {
+  return {v[size_t(Target::kRed)], v[size_t(Target::kGreen)], v[size_t(Target::kBlue)]};
 }
 
-uint32_t channel(double value) { return value > 0 ? static_cast<uint32_t>(std::min(value + 0.5, 255.0)) : 0; }
+// Bytes go up to 255 whatever stands in them; wider integers at least.
+float least_full(PlyType type) { return kPlyTypeBytes[size_t(type)] <= 2 ? 255 : 1; }
 
 template <class Cursor>
 class PlyBody {
@@ -110,23 +84,43 @@ class PlyBody {
         progress_(progress),
         content_bytes_(content.size()),
         cursor_(content, header.bytes),
-        arrays_(header, [](std::string_view property) { return target_of(property) != Target::kNone; }) {
+        textured_(!header.textures.empty()),
+        arrays_(header, [this](const PlyElement& element, std::string_view property) {
+          const Target target = target_of(property, textured_);
+          if (element.name == "vertex") return target != Target::kNone;
+          return target >= Target::kRed && target <= Target::kBlue && Targets(element, textured_).colours();
+        }) {
     for (const PlyElement& e : header.elements) total_ += e.count;
   }
 
   /// array: what the mesh is coloured by; empty: nothing.
-  Result<Mesh> read(const std::string& array) {
+  Result<Mesh> read(const std::string& array, Companions& companions, uint64_t texture_detail) {
     mesh_.format = "ply";
     if (!array.empty())
       if (const Status s = arrays_.choose(array, name_); !s) return s.error();
+    const auto is_vertex = [](const PlyElement& e) { return e.name == "vertex"; };
+    const auto vertices = std::find_if(header_.elements.begin(), header_.elements.end(), is_vertex);
+    const bool faces_first = vertices != header_.elements.end() &&
+                             std::any_of(header_.elements.begin(), vertices,
+                                         [](const PlyElement& e) { return e.name == "face" || e.name == "tristrips"; });
+    if (faces_first) {
+      const Cursor start = cursor_;
+      for (auto e = header_.elements.begin(); e != vertices; ++e)
+        if (const Status s = skip(*e); !s) return s.error();
+      if (const Status s = read_vertices(*vertices); !s) return s.error();
+      cursor_ = start;
+    }
     for (const PlyElement& element : header_.elements) {
-      const Status status = element.name == "vertex"      ? read_vertices(element)
-                            : element.name == "face"      ? read_faces(element, false)
-                            : element.name == "tristrips" ? read_faces(element, true)
-                                                          : skip(element);
+      const Status status = is_vertex(element) && !(faces_first && &element == &*vertices) ? read_vertices(element)
+                            : element.name == "face"                                       ? read_faces(element, false)
+                            : element.name == "tristrips"                                  ? read_faces(element, true)
+                                                                                           : skip(element);
       if (!status.ok()) return status.error();
     }
+    if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0 && !mesh_.positions.empty()) return no_faces();
     arrays_.finish(mesh_);
+    if (array.empty())
+      if (const Status s = colour_triangles(companions, texture_detail); !s) return s.error();
     return std::move(mesh_);
   }
 
@@ -135,74 +129,67 @@ class PlyBody {
     return Error{
         fmt::format("{}: is truncated or damaged: {} {} of {} cannot be read", name_, element.name, at, element.count)};
   }
+  Error no_faces() const {
+    const PlyElement* vertices = header_.find("vertex");
+    const bool splats = vertices && (vertices->find("f_dc_0") >= 0 || vertices->find("packed_position") >= 0);
+    return Error{fmt::format("{}: holds {} {} and no triangles: {}", name_, mesh_.positions.size(),
+                             splats ? "Gaussian splats" : "points",
+                             splats ? "splats of other programs are not read" : "point clouds are not read yet")};
+  }
+  // Colours of triangles, or their pictures, which win.
+  Status colour_triangles(Companions& companions, uint64_t texture_detail) {
+    const size_t triangles = mesh_.indices.size() / 3;
+    if (textured_ && places_) return textures_.bake(mesh_, header_.textures, name_, companions, texture_detail);
+    if (face_colours_.empty()) return ok_status();
+    face_colours_.fill(triangles);
+    colour_faces(mesh_, face_colours_.packed(kNoColour, face_colours_least_));
+    return ok_status();
+  }
   void tick() {
     if ((++done_ & 0x3ffff) == 0 && progress_) progress_(static_cast<double>(done_) / static_cast<double>(total_));
   }
 
-  // Reads a list's items into list_.
-  bool read_list(const PlyProperty& property) {
+  bool read_list(const PlyProperty& property, std::vector<double>& list) {
     double count = 0;
     if (!cursor_.read(property.count_type, count) || count < 0 || count > static_cast<double>(content_bytes_))
       return false;
-    list_.clear();
-    for (double i = 0; i < count; ++i) {  // grows as items arrive, so a lying count ends at the file's end
-      double item;
-      if (!cursor_.read(property.type, item)) return false;
-      list_.push_back(item);
-    }
-    return true;
+    return cursor_.read(property.type, static_cast<uint64_t>(count), list);
   }
 
   Status read_vertices(const PlyElement& element) {
     if (!mesh_.positions.empty()) return Error{name_ + ": has two elements 'vertex'"};
-    bool has[static_cast<int>(Target::kCount)] = {};
-    std::vector<Target> targets;
-    double scale = 1.0;
-    for (const PlyProperty& p : element.properties) {
-      targets.push_back(p.is_list ? Target::kNone : target_of(p.name));
-      has[static_cast<int>(targets.back())] = true;
-      if (targets.back() == Target::kRed) scale = channel_scale(p.type);
-    }
-    const auto all = [&](Target a, Target b, Target c) {
-      return has[static_cast<int>(a)] && has[static_cast<int>(b)] && has[static_cast<int>(c)];
-    };
-    if (!all(Target::kX, Target::kY, Target::kZ)) return Error{name_ + ": element 'vertex' lacks x, y or z"};
+    const Targets targets(element, textured_);
+    if (!targets.all({Target::kX, Target::kY, Target::kZ})) return Error{name_ + ": element 'vertex' lacks x, y or z"};
     if (element.count > kMaxVertices)
       return Error{fmt::format("{}: {} vertices, the limit is {}", name_, element.count, kMaxVertices)};
-    const bool normals = all(Target::kNormalX, Target::kNormalY, Target::kNormalZ),
-               colours = all(Target::kRed, Target::kGreen, Target::kBlue);
+    const bool normals = targets.all({Target::kNormalX, Target::kNormalY, Target::kNormalZ}),
+               colours = targets.colours(), bytes = targets.colour_type == PlyType::kUint8,
+               places = targets.all({Target::kU, Target::kV});
+    RawColours raw_colours;
     mesh_.positions.reserve(element.count);
     if (normals) mesh_.normals.reserve(element.count);
     if (colours) mesh_.colours.reserve(element.count);
     const std::vector<int>& arrays = arrays_.arrays_of(element);
+    Values value{};
+    const auto at = [&](Target t) { return value[size_t(t)]; };
     for (uint64_t v = 0; v < element.count; ++v, tick()) {
-      double value[static_cast<int>(Target::kCount)] = {};
-      for (size_t i = 0; i < targets.size(); ++i) {
+      for (size_t i = 0; i < targets.of.size(); ++i) {
         const PlyProperty& p = element.properties[i];
-        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, value[static_cast<int>(targets[i])]))
+        if (p.is_list ? !read_list(p, list_) : !cursor_.read(p.type, value[size_t(targets.of[i])]))
           return ended(element, v);
-        if (arrays[i] >= 0) arrays_.take_vertex(arrays[i], value[static_cast<int>(Target::kNone)]);
+        if (arrays[i] >= 0) arrays_.take_vertex(arrays[i], at(Target::kNone));
       }
-      const auto at = [&](Target t) { return value[static_cast<int>(t)]; };
       mesh_.positions.emplace_back(at(Target::kX), at(Target::kY), at(Target::kZ));
       if (normals) mesh_.normals.emplace_back(at(Target::kNormalX), at(Target::kNormalY), at(Target::kNormalZ));
-      if (colours)
-        mesh_.colours.push_back(pack_rgb(channel(at(Target::kRed) * scale), channel(at(Target::kGreen) * scale),
-                                         channel(at(Target::kBlue) * scale)));
+      if (places) places_of_vertices_.emplace_back(at(Target::kU), at(Target::kV));
+      if (colours && bytes)
+        mesh_.colours.push_back(
+            pack_rgb(uint32_t(at(Target::kRed)), uint32_t(at(Target::kGreen)), uint32_t(at(Target::kBlue))));
+      else if (colours)
+        raw_colours.add(colour_of(value));
     }
-    return ok_status();
-  }
-
-  // A vertex index as it stands in the file.
-  Status add_index(double value, const PlyElement& element, uint64_t face) {
-    if (!(value >= 0 && value <= static_cast<double>(kMaxVertices)))
-      return Error{fmt::format("{}: {} {} names vertex {}", name_, element.name, face, value)};
-    mesh_.indices.push_back(static_cast<uint32_t>(value));
-    return ok_status();
-  }
-  Status add_triangle(double a, double b, double c, const PlyElement& element, uint64_t face) {
-    for (double corner : {a, b, c})
-      if (auto status = add_index(corner, element, face); !status) return status;
+    if (!raw_colours.empty()) mesh_.colours = raw_colours.packed(kNeutralAlbedo, least_full(targets.colour_type));
+    places_ |= places;
     return ok_status();
   }
 
@@ -211,53 +198,103 @@ class PlyBody {
     if (corners < 0) corners = element.find("vertex_index");
     if (corners < 0 || !element.properties[corners].is_list)
       return Error{fmt::format("{}: element '{}' lacks the list vertex_indices", name_, element.name)};
+    const int places = textured_ ? element.find("texcoord") : -1, picture = textured_ ? element.find("texnumber") : -1;
+    places_ |= places >= 0 && element.properties[places].is_list;
+    const Targets targets(element, textured_);
+    const bool colours = targets.colours(), corners_alone = element.properties.size() == 1;
+    if (colours) face_colours_least_ = least_full(targets.colour_type);
     const size_t item_bytes = kPlyTypeBytes[static_cast<int>(element.properties[corners].type)];
     mesh_.indices.reserve(mesh_.indices.size() + std::min<uint64_t>(3 * element.count, content_bytes_ / item_bytes));
     const std::vector<int>& arrays = arrays_.arrays_of(element);
-    for (uint64_t f = 0; f < element.count; ++f, tick()) {
+    Values value{};
+    double number_of_picture = 0;
+    const auto read_face = [&] {
+      places_list_.clear();
       for (size_t i = 0; i < element.properties.size(); ++i) {
         const PlyProperty& p = element.properties[i];
-        double value;
-        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, value)) return ended(element, f);
-        if (arrays[i] >= 0) arrays_.take_face(arrays[i], value);
-        if (static_cast<int>(i) == corners)
-          if (auto status = strips ? add_strip(element, f) : add_polygon(element, f); !status) return status;
+        double& single = value[size_t(targets.of[i])];
+        auto& list = int(i) == corners ? list_ : int(i) == places ? places_list_ : ignored_;
+        if (p.is_list ? !read_list(p, list) : !cursor_.read(p.type, single)) return false;
+        if (arrays[i] >= 0) arrays_.take_face(arrays[i], single);
+        if (int(i) == picture && !p.is_list) number_of_picture = single;
       }
-      arrays_.end_face(mesh_.indices.size() / 3);
+      return true;
+    };
+    for (uint64_t f = 0; f < element.count; ++f, tick()) {
+      if (corners_alone ? !read_list(element.properties[0], list_) : !read_face()) return ended(element, f);
+      const size_t before = mesh_.indices.size();
+      if (auto status = strips ? add_strip(element, f) : add_polygon(element, f); !status) return status;
       if (mesh_.indices.size() > 3 * kMaxTriangles)
         return Error{fmt::format("{}: more than {} triangles", name_, kMaxTriangles)};
+      arrays_.end_face(mesh_.indices.size() / 3);
+      if (colours) face_colours_.fill(before / 3);
+      for (size_t i = before; i < mesh_.indices.size() && colours; i += 3) face_colours_.add(colour_of(value));
+      if (textured_) add_places(number_of_picture, before);
     }
     return ok_status();
   }
 
+  bool is_vertex(double index) const { return index >= 0 && index < double(mesh_.positions.size()); }
+  Error no_vertex(const PlyElement& element, uint64_t face, double index) const {
+    return Error{fmt::format("{}: {} {} names vertex {}, there are {}", name_, element.name, face, index,
+                             mesh_.positions.size())};
+  }
+
+  // The face in list_; cut_ and ring_ are right afterwards unless it is a triangle without a picture, which is usual.
   Status add_polygon(const PlyElement& element, uint64_t face) {
+    const double* c = list_.data();
+    if (list_.size() != 3 || textured_ || !is_vertex(c[0]) || !is_vertex(c[1]) || !is_vertex(c[2]))
+      return cut_face(element, face);
+    for (int k = 0; k < 3; ++k) mesh_.indices.push_back(uint32_t(c[k]));
+    return ok_status();
+  }
+
+  Status cut_face(const PlyElement& element, uint64_t face) {
+    for (const double index : list_)
+      if (!is_vertex(index)) return no_vertex(element, face, index);
     if (list_.size() < 3) ++mesh_.degenerate_dropped;
-    for (size_t i = 2; i < list_.size(); ++i)
-      if (auto status = add_triangle(list_[0], list_[i - 1], list_[i], element, face); !status) return status;
+    ring_.assign(list_.begin(), list_.end());
+    cut_.clear();
+    cut_corners(ring_, mesh_.positions, cut_);
+    for (const uint32_t i : cut_) mesh_.indices.push_back(ring_[i]);
     return ok_status();
   }
 
   // Corners of strips, one after the other, -1 between them.
   Status add_strip(const PlyElement& element, uint64_t face) {
-    size_t start = 0;
-    for (size_t i = 0; i < list_.size(); ++i) {
-      if (list_[i] == -1)
-        start = i + 1;
-      else if (i >= start + 2) {
-        const bool odd = (i - start) % 2 == 1;
-        if (auto status = add_triangle(list_[i - 2], list_[odd ? i : i - 1], list_[odd ? i - 1 : i], element, face);
-            !status)
-          return status;
-      }
+    ring_.clear(), cut_.clear();
+    for (const double index : list_) {
+      if (!is_vertex(index) && index != -1) return no_vertex(element, face, index);
+      ring_.push_back(index == -1 ? kBreak : uint32_t(index));
     }
+    uint32_t start = 0;
+    for (uint32_t i = 0; i < ring_.size(); ++i) {
+      const bool odd = (i - start) % 2 == 1;
+      if (ring_[i] == kBreak)
+        start = i + 1;
+      else if (i >= start + 2)
+        cut_.insert(cut_.end(), {i - 2, odd ? i : i - 1, odd ? i - 1 : i});
+    }
+    for (const uint32_t i : cut_) mesh_.indices.push_back(ring_[i]);
     return ok_status();
+  }
+
+  // The places of the corners in cut_: a face's own, or those of its vertices.
+  void add_places(double picture, size_t first_index) {
+    const bool own = places_list_.size() >= 2 * ring_.size();
+    for (size_t k = 0; k < cut_.size(); ++k) {
+      const uint32_t i = cut_[k], vertex = mesh_.indices[first_index + k];
+      textures_.add_corner(picture, own ? glm::vec2(places_list_[2 * i], places_list_[2 * i + 1])
+                                    : !places_of_vertices_.empty() ? places_of_vertices_[vertex]
+                                                                   : glm::vec2(RawColours::kNone));
+    }
   }
 
   Status skip(const PlyElement& element) {
     for (uint64_t n = 0; n < element.count; ++n, tick())
       for (const PlyProperty& p : element.properties) {
         double ignored;
-        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, ignored)) return ended(element, n);
+        if (p.is_list ? !read_list(p, ignored_) : !cursor_.read(p.type, ignored)) return ended(element, n);
       }
     return ok_status();
   }
@@ -266,27 +303,37 @@ class PlyBody {
   const std::string& name_;
   const ReadProgress& progress_;
   size_t content_bytes_;
+  static constexpr uint32_t kBreak = ~uint32_t{0};
+
   Cursor cursor_;
+  const bool textured_;  // the header names pictures
+  bool places_ = false;  // there are places in them
   PlyArrays arrays_;
+  PlyTextures textures_;
+  std::vector<glm::vec2> places_of_vertices_;
+  RawColours face_colours_;  // one a triangle, or none
+  float face_colours_least_ = 1;
   Mesh mesh_;
-  std::vector<double> list_;
+  std::vector<double> list_, places_list_, ignored_;  // of the face that is read
+  std::vector<uint32_t> ring_, cut_;
   uint64_t done_ = 0, total_ = 0;
 };
 
 }  // namespace
 
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
-                      const std::string& array) {
+                      Companions& companions, const std::string& array, uint64_t texture_detail) {
   const auto header = parse_ply_header(content, name);
   if (!header) return header.error();
   constexpr bool kLittle = std::endian::native == std::endian::little;
+  const auto read = [&](auto body) { return body.read(array, companions, texture_detail); };
   switch (header->encoding) {
     case PlyEncoding::kAscii:
-      return PlyBody<AsciiCursor>(*header, content, name, progress).read(array);
+      return read(PlyBody<AsciiCursor>(*header, content, name, progress));
     case PlyEncoding::kLittleEndian:
-      return PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress).read(array);
+      return read(PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress));
     case PlyEncoding::kBigEndian:
-      return PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress).read(array);
+      return read(PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress));
   }
   return Error{name + ": unknown PLY encoding"};
 }

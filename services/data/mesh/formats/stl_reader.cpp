@@ -1,6 +1,8 @@
-// STL. Source: 3D Systems, "StereoLithography Interface Specification", 1989.
+// STL. Sources: 3D Systems, "StereoLithography Interface Specification", 1989; colours: "STL (file format)", Wikipedia,
+// and files that VisCAM, Materialise Magics and MeshLab write.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -52,6 +54,42 @@ class Welder {
   std::vector<uint32_t> table_;
 };
 
+// Case is ignored, as programs write it both ways.
+bool is_word(std::string_view word, std::string_view lower) {
+  return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
+                    [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + ('a' - 'A') : a) == b; });
+}
+
+// Bit 15 of a facet's last two bytes and 5 bits a channel: VisCAM sets it where the facet has a colour, whose blue is
+// lowest. Materialise tells a colour for all in the header and sets it where that holds; red is lowest. MeshLab has
+// Materialise's header without the comma, but sets the bit of colours.
+std::vector<uint32_t> facet_colours(std::string_view header, const std::vector<uint16_t>& bits) {
+  constexpr uint16_t kTop = 0x8000;
+  constexpr std::string_view kWord = "COLOR=", kNext = "MATERIAL=";
+  const size_t at = header.find(kWord), rgba = at + kWord.size();
+  const bool by_header = at != header.npos && rgba + 4 <= header.size();
+  const bool meshlab = by_header && header.substr(rgba + 4).starts_with(kNext), materialise = by_header && !meshlab;
+  const auto any = [&](uint16_t mask) {
+    return std::any_of(bits.begin(), bits.end(), [&](uint16_t b) { return b & mask; });
+  };
+  if (!materialise && !any(kTop)) return {};
+  uint32_t of_all = kNoColour;
+  if (materialise) {
+    const auto byte = [&](size_t i) { return uint32_t(uint8_t(header[rgba + i])); };
+    of_all = pack_rgb(byte(0), byte(1), byte(2));
+  }
+  const bool used = any(0xffff);  // else the program wrote no colours of facets: they are not all black
+  std::vector<uint32_t> out;
+  out.reserve(bits.size());
+  for (const uint16_t b : bits) {
+    const auto channel = [&](int shift) { return ((b >> shift & 31u) * 255 + 15) / 31; };
+    const bool own = used && ((b & kTop) == 0) == materialise;
+    const uint32_t low = channel(0), high = channel(10);
+    out.push_back(!own ? of_all : by_header ? pack_rgb(low, channel(5), high) : pack_rgb(high, channel(5), low));
+  }
+  return out;
+}
+
 Result<Mesh> read_binary(std::string_view content, const std::string& name, const ReadProgress& progress) {
   uint32_t triangles;
   std::memcpy(&triangles, content.data() + 80, 4);
@@ -63,12 +101,16 @@ Result<Mesh> read_binary(std::string_view content, const std::string& name, cons
   mesh.format = "stl";
   mesh.indices.reserve(3 * size_t{triangles});
   Welder weld(mesh.positions);
+  std::vector<uint16_t> bits(triangles);
   for (uint32_t t = 0; t < triangles; ++t) {
     float corner[9];
-    std::memcpy(corner, content.data() + kBinaryHeader + size_t{t} * kBinaryTriangle + 12, sizeof corner);
+    const char* const facet = content.data() + kBinaryHeader + size_t{t} * kBinaryTriangle;
+    std::memcpy(corner, facet + 12, sizeof corner);
+    std::memcpy(&bits[t], facet + 12 + sizeof corner, 2);
     for (int k = 0; k < 3; ++k) mesh.indices.push_back(weld({corner[3 * k], corner[3 * k + 1], corner[3 * k + 2]}));
     if ((t & 0xffff) == 0 && progress) progress(static_cast<double>(t) / triangles);
   }
+  if (const auto colours = facet_colours(content.substr(0, 80), bits); !colours.empty()) colour_faces(mesh, colours);
   return mesh;
 }
 
@@ -81,16 +123,16 @@ Result<Mesh> read_ascii(std::string_view content, const std::string& name, const
   bool ended = false;
   for (size_t lines = 0; scan.skip_space(); ++lines) {
     const std::string_view word = scan.word();
-    if (word == "vertex" || word == "VERTEX") {
+    if (is_word(word, "vertex")) {
       glm::dvec3 p;
       for (int a = 0; a < 3; ++a)
         if (!scan.skip_blanks() || !scan.number(p[a]))
           return Error{fmt::format("{}:{}: a vertex is not three numbers", name, scan.line_number())};
       mesh.indices.push_back(weld(p));
-    } else if (word == "endfacet" || word == "ENDFACET") {
+    } else if (is_word(word, "endfacet")) {
       if (mesh.indices.size() % 3 != 0)
         return Error{fmt::format("{}:{}: a facet does not have three vertices", name, scan.line_number())};
-    } else if (word == "endsolid" || word == "ENDSOLID") {
+    } else if (is_word(word, "endsolid")) {
       ended = true;
     }
     scan.next_line();
@@ -104,12 +146,31 @@ Result<Mesh> read_ascii(std::string_view content, const std::string& name, const
 
 }  // namespace
 
-Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress) {
+bool is_binary_stl(std::string_view content) {
   uint32_t triangles = 0;
-  if (content.size() >= kBinaryHeader) std::memcpy(&triangles, content.data() + 80, 4);
-  const bool exact = content.size() == kBinaryHeader + kBinaryTriangle * uint64_t{triangles};
-  if (content.starts_with("solid") && !(exact && content.size() >= kBinaryHeader))
-    return read_ascii(content, name, progress);
+  if (content.size() < kBinaryHeader) return false;
+  std::memcpy(&triangles, content.data() + 80, 4);
+  return content.size() == kBinaryHeader + kBinaryTriangle * uint64_t{triangles};
+}
+
+bool is_text_stl(std::string_view content) {
+  constexpr int kMostNameLines = 16, kBytesToTell = 512;
+  if (is_binary_stl(content) || content.substr(0, kBytesToTell).find('\0') != content.npos) return false;
+  if (content.starts_with("\xef\xbb\xbf")) content.remove_prefix(3);
+  TextScanner scan(content);
+  scan.skip_space();
+  if (!is_word(scan.word(), "solid")) return false;
+  for (int line = 0; line < kMostNameLines; ++line) {  // behind the name, which binary files have, too
+    scan.next_line();
+    if (!scan.skip_space()) return true;
+    const std::string_view word = scan.word();
+    if (is_word(word, "facet") || is_word(word, "endsolid")) return true;
+  }
+  return false;
+}
+
+Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress) {
+  if (is_text_stl(content)) return read_ascii(content, name, progress);
   if (content.size() < kBinaryHeader)
     return Error{fmt::format("{}: {} bytes are too few for an STL file, its header alone has {}", name, content.size(),
                              kBinaryHeader)};

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <unordered_map>
 
 #include "common/image/normal.h"
 #include "common/parallel/in_parallel.h"
@@ -70,12 +71,32 @@ void set_normals(PlacedMesh& placed, const std::vector<glm::vec3>& from_file, co
   });
 }
 
-// Where the file has no normals: vertices are split at creases.
-void make_normals(PlacedMesh& placed, double crease_deg) {
-  const SmoothNormals smooth = smooth_normals(placed.positions_room, crease_deg, placed.indices);
-  for (const uint32_t vertex : smooth.copies) {
-    placed.positions_room.push_back(glm::vec3(placed.positions_room[vertex]));
-    if (!placed.colours.empty()) placed.colours.push_back(uint32_t(placed.colours[vertex]));
+uint32_t append_copy(PlacedMesh& placed, uint32_t vertex) {
+  placed.positions_room.push_back(glm::vec3(placed.positions_room[vertex]));
+  if (!placed.colours.empty()) placed.colours.push_back(uint32_t(placed.colours[vertex]));
+  return uint32_t(placed.positions_room.size() - 1);
+}
+
+// Where the file has no normals: vertices are split at creases. copy_of: as Mesh has it.
+void make_normals(PlacedMesh& placed, double crease_deg, const std::vector<uint32_t>& copy_of) {
+  const size_t originals = placed.positions_room.size() - copy_of.size();
+  const std::vector<uint32_t> looks = copy_of.empty() ? std::vector<uint32_t>() : placed.indices;
+  for (uint32_t& index : placed.indices)
+    if (index >= originals) index = copy_of[index - originals];
+  SmoothNormals smooth = smooth_normals(placed.positions_room, crease_deg, placed.indices);
+  for (const uint32_t vertex : smooth.copies) append_copy(placed, vertex);
+  std::unordered_map<uint64_t, uint32_t> of_look;  // by normal and colour
+  for (size_t corner = 0; corner < looks.size(); ++corner) {
+    uint32_t& index = placed.indices[corner];
+    const uint32_t normal = index, colour = placed.colours[looks[corner]];
+    if (placed.colours[index] == colour) continue;
+    const auto [found, is_new] =
+        of_look.try_emplace(uint64_t{normal} << 32 | colour, uint32_t(placed.positions_room.size()));
+    if (is_new) {
+      placed.colours[append_copy(placed, normal)] = colour;
+      smooth.normals.push_back(glm::vec3(smooth.normals[normal]));
+    }
+    index = found->second;
   }
   placed.normals.resize(smooth.normals.size());
   parallel(placed.normals.size(), [&](size_t i) { placed.normals[i] = encode(smooth.normals[i]); });
@@ -124,7 +145,8 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, cons
 
   if (!placed.scalars) placed.colours = std::move(mesh.colours);
   if (mesh.normals.empty())
-    make_normals(placed, smooth ? kNoCrease_deg : options.crease_deg);
+    make_normals(placed, smooth ? kNoCrease_deg : options.crease_deg,
+                 placed.colours.empty() ? std::vector<uint32_t>() : mesh.copy_of);
   else
     set_normals(placed, mesh.normals, glm::mat3(*rotation));
   if (placed.colours.empty() && placed.face_colours.empty())
