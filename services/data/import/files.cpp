@@ -86,7 +86,7 @@ uint64_t ImportFiles::bytes() const {
   return sum;
 }
 
-Result<std::string_view> ImportFiles::mapped(const ImportFile& file) {
+Result<std::string_view> ImportFiles::content_of(const ImportFile& file) {
   auto content = file.map();
   if (!content) return content.error();
   mapped_.push_back(*content);
@@ -95,13 +95,13 @@ Result<std::string_view> ImportFiles::mapped(const ImportFile& file) {
 
 Result<std::string_view> ImportFiles::content() {
   if (files_.empty()) return Error{"the file to be read did not arrive"};
-  return mapped(files_[0]);
+  return content_of(files_[0]);
 }
 
 Result<std::string_view> ImportFiles::read(const std::string& named) {
   const fs::path path = files_.empty() ? fs::path(named) : fs::path(files_[0].path()).parent_path() / named;
   for (const ImportFile& file : files_)
-    if (fs::path(file.path()).lexically_normal() == path.lexically_normal()) return mapped(file);
+    if (fs::path(file.path()).lexically_normal() == path.lexically_normal()) return content_of(file);
   return Error{fmt::format("{}: there is no such file, or it may not be read", path.string())};
 }
 

@@ -41,12 +41,11 @@ class ImportFiles : public Companions {
   uint64_t bytes() const;  ///< of all files together
   /// The content of the first one. Error: it did not come; it is empty.
   Result<std::string_view> content();
+  Result<std::string_view> content_of(const ImportFile& file);
   /// named: relative to the folder of the first one.
   Result<std::string_view> read(const std::string& named) override;
 
  private:
-  Result<std::string_view> mapped(const ImportFile& file);
-
   std::vector<ImportFile> files_;
   std::vector<std::shared_ptr<const MappedFile>> mapped_;
 };

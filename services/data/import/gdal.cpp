@@ -1,21 +1,18 @@
 // Elevation rasters, read by GDAL: heights, where they lie on earth, and a texture draped over them.
-#include <cpl_error.h>
-#include <cpl_vsi.h>
 #include <fmt/format.h>
 #include <gdal.h>
 #include <ogr_srs_api.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <memory>
 #include <optional>
 
 #include "common/core/utf8.h"
 #include "common/core/within.h"
 #include "services/data/import/gdal.h"
+#include "services/data/import/gdal_files.h"
 #include "services/data/import/raster_facts.h"
 
 namespace telesplat::data {
@@ -23,63 +20,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kMaxSide = 1 << 18;
-
-struct Close {
-  void operator()(void* dataset) const { GDALClose(dataset); }
-};
-using Dataset = std::unique_ptr<void, Close>;
-
-// Formats of elevation. GDAL knows many more, and tells them by what a file holds, whatever its name is: some name
-// other files, on this machine or on others. A VRT's are those that we were given.
-constexpr const char* kElevationDrivers[] = {"GTiff", "PNG",  "SRTMHGT", "AAIGrid", "GRASSASCIIGrid", "USGSDEM", "DTED",
-                                             "EHdr",  "GSAG", "VRT",     "XYZ",     nullptr};
-
-// Formats of textures. A file of theirs names no other file.
-constexpr const char* kPictureDrivers[] = {"GTiff", "PNG", "JPEG", "JP2OpenJPEG", "WEBP", "BMP", "GIF", "PNM", nullptr};
-
-// Where GDAL finds a file that was sent: in its memory files, which are the sent ones themselves.
-std::string place_of(const std::string& path) {
-  return "/vsimem/" + std::filesystem::absolute(path).lexically_normal().relative_path().string();
-}
-
-// Drivers but those above go, so that no file of a VRT is read by one of them.
-Status prepare(ImportFiles& files) {
-  CPLSetErrorHandler(CPLQuietErrorHandler);
-  GDALAllRegister();
-  const auto listed = [](const char* name, const char* const* drivers) {
-    for (; *drivers; ++drivers)
-      if (std::string_view(name) == *drivers) return true;
-    return false;
-  };
-  for (int i = GDALGetDriverCount() - 1; i >= 0; --i) {
-    const GDALDriverH driver = GDALGetDriver(i);
-    const char* const name = GDALGetDriverShortName(driver);
-    if (!listed(name, kElevationDrivers) && !listed(name, kPictureDrivers)) GDALDeregisterDriver(driver);
-  }
-  for (const ImportFile& file : files.all()) {
-    const auto content = files.read(file.path());
-    if (!content) continue;  // empty, for one
-    // GDAL reads them alone: they are open for nothing else.
-    auto* const bytes = reinterpret_cast<GByte*>(const_cast<char*>(content->data()));
-    if (VSILFILE* memory = VSIFileFromMemBuffer(place_of(file.path()).c_str(), bytes, content->size(), FALSE))
-      VSIFCloseL(memory);
-  }
-  return files.all().empty() ? Status(Error{"no file arrived"}) : ok_status();
-}
-
-// What GDAL complained of last, in one line that names files as they are.
-std::string complaint() {
-  std::string why = CPLGetLastErrorMsg();
-  for (size_t at; (at = why.find("/vsimem/")) != why.npos;) why.erase(at, 7);
-  why = why.substr(0, std::min(why.find('\n'), size_t{200}));
-  return why.empty() ? "GDAL does not know it" : why;
-}
-
-Result<Dataset> open(const std::string& path, const char* what, const char* const* drivers) {
-  Dataset dataset(GDALOpenEx(place_of(path).c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers, nullptr, nullptr));
-  if (dataset) return dataset;
-  return Error{fmt::format("{}: cannot be read as {}: {}", path, what, complaint())};
-}
 
 // Where pixels lie: in degrees, or in some unit of length.
 struct Placement {
@@ -201,7 +141,7 @@ scene::Coordinates coordinates_of(GDALDatasetH dataset, const HeightUnit& height
 // The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the
 // raster.
 Status drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
-  auto opened = open(path, "an image", kPictureDrivers);
+  auto opened = open_with_gdal(gdal_place_of(path), path, "an image", kPictureDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH image = opened->get();
   const int bands = GDALGetRasterCount(image), w = GDALGetRasterXSize(image), h = GDALGetRasterYSize(image);
@@ -216,7 +156,7 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
       return Error{fmt::format("{}: has {} channels, only 8-bit ones can be draped", path,
                                GDALGetDataTypeName(GDALGetRasterDataType(band)))};
     if (GDALRasterIO(band, GF_Read, 0, 0, w, h, texels.data() + c, tw, th, GDT_Byte, 3, 3 * tw) != CE_None)
-      return Error{fmt::format("{}: cannot be read: {}", path, complaint())};
+      return Error{fmt::format("{}: cannot be read: {}", path, gdal_complaint())};
   }
   const Placement of = placement_of(image);
   const bool by_place = of.georeferenced && at.georeferenced && of.degrees == at.degrees;
@@ -271,7 +211,7 @@ Status read_heights(GDALRasterBandH band, const std::string& path, double metres
   out.heights.reserve(size_t(out.width) * size_t(out.height));
   for (int y = 0; y < out.height; ++y) {
     if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
-      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, complaint())};
+      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, gdal_complaint())};
     for (int x = 0; x < out.width; ++x) {
       double v = row[size_t(x) * size_t(out.step)];
       // -32768 and -9999 are what void samples usually have, said or not.
@@ -288,8 +228,8 @@ Status read_heights(GDALRasterBandH band, const std::string& path, double metres
 }  // namespace
 
 Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture) {
-  if (const Status s = prepare(files); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
-  auto opened = open(path, "an elevation raster", kElevationDrivers);
+  if (const Status s = prepare_gdal(files); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
+  auto opened = open_with_gdal(gdal_place_of(path), path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH dataset = opened->get();
   const int w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
@@ -331,7 +271,7 @@ Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& pa
 Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& path) {
   const auto raster = read_elevation(files, path, "");
   if (!raster) return raster.error();
-  auto opened = open(path, "an elevation raster", kElevationDrivers);
+  auto opened = open_with_gdal(gdal_place_of(path), path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH dataset = opened->get();
   RasterFacts out;
