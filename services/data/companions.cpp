@@ -38,10 +38,11 @@ Status check_volume(const DataOptions& o) {
   if (source->dicom) return ok_status();  // slices name nothing
   for (const std::string& step : source->steps) {
     const auto header = read_volume_header(step, o.volume.raw);
-    if (!header || header->data_path.empty() || header->data_path == step) continue;
-    if (const Status s = check_named(step, header->data_path); !s) return s;
-    for (const std::string& part : header->more_paths)
-      if (const Status s = check_named(step, part); !s) return s;
+    if (!header) continue;
+    std::vector<std::string> named = header->more_paths;
+    if (!header->data_path.empty() && header->data_path != step) named.push_back(header->data_path);
+    for (const std::string& file : named)
+      if (const Status s = check_named(step, file); !s) return s;
   }
   return ok_status();
 }

@@ -69,7 +69,8 @@ constexpr Row kRows[] = {
      "volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a numbered series)",
      is_volume, open_as_volume},
     {Kind::kMesh,
-     "mesh file (PLY, OBJ, STL, OFF, VTP, VTU, VTK, glTF, GLB) or elevation raster (GeoTIFF, HGT, 16-bit PNG, ASCII "
+     "mesh file (PLY, OBJ, STL, OFF, VTP, VTU, VTS, VTR, VTM, PVD, VTK, glTF, GLB) or elevation raster (GeoTIFF, HGT, "
+     "16-bit PNG, ASCII "
      "grid)",
      is_mesh, open_as_mesh},
 };

@@ -39,7 +39,7 @@ FLOORS = {
     "services/data": [
         ["services/data/base"],
         ["services/data/texture"],
-        ["services/data/gltf"],
+        ["services/data/gltf", "services/data/vtk"],
         ["services/data/volume/formats"],
         ["services/data/import"],
         ["services/data/served.h"],
@@ -114,7 +114,8 @@ OUTSIDE_HEADERS = [
     (r"msgpack.*", ["common/wire"]),
     (r"zmq.*", ["common/net"]),
     (r"sodium\.h", ["common/net/keys", "common/wire/lease_seal.cpp"]),
-    (r"vtk.*", ["services/data/import"]),
+    (r"pugixml\.hpp", ["services/data/vtk", "services/data/mesh"]),
+    (r"lz(4|ma)\.h", ["services/data/vtk", "tests/unit/data/vtk"]),
     (r"(draco/.*|meshoptimizer\.h)", ["services/data/gltf", "tests/unit/data/gltf"]),
     (r"(gdal|ogr|cpl)[_a-z]*\.h", ["services/data/import"]),
     (r"embree.*", ["services/sampler/mesh", "tests/bench"]),

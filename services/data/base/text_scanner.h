@@ -1,6 +1,7 @@
 // Walking over the words and numbers of a text file in memory. Never reads past its end, never throws.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <limits>
@@ -53,6 +54,10 @@ class TextScanner {
   /// must not belong to a word.
   bool number(double& out) { return parse(out); }
   bool integer(int64_t& out) { return parse(out); }
+  bool value(double& out) { return parse(out); }
+  bool value(int64_t& out) { return parse(out); }
+  /// Skips bytes that are no text; at most those that there are.
+  void skip(uint64_t bytes) { at_ += std::min(bytes, static_cast<uint64_t>(end_ - at_)); }
   bool skip_char(char c) { return at_ < end_ && *at_ == c ? (++at_, true) : false; }
 
  private:

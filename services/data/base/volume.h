@@ -26,11 +26,12 @@ struct Volume {
   double scale = 1, offset = 0;  ///< value = stored * scale + offset (a CT's rescale, NIfTI's scl_slope)
   /// i fastest, then j, k; native byte order; size[0] * size[1] * size[2] * voxel_bytes(type) bytes.
   std::vector<std::byte> stored;
-  std::string format;       ///< "nrrd", "metaimage", "nifti", "vti", "dicom", "raw"
+  std::string format;       ///< "nrrd", "metaimage", "nifti", "vti", "vtk", "dicom", "raw"
   bool hounsfield = false;  ///< a CT, by what the file says or by its range
   double lo = 0, hi = 0;    ///< smallest and largest finite value
   uint64_t not_finite = 0;  ///< NaN and infinite ones; they count as lo
   std::string remark;       ///< for people: what was left out or evened (DICOM); often empty
+  std::string array{};      ///< its name, of a file that names arrays
 
   double value(size_t at) const;  ///< of voxel `at` in stored order
   /// Of all voxels, from edge to edge, in the file's own units: what is centred in the room.

@@ -1,6 +1,6 @@
-// telesplat-import FORMAT FILE: reads a mesh, raster or volume file with VTK, GDAL or GDCM and leaves it on standard
-// output for the process that asked (process.cpp; volumes: volume/vtk_reader.cpp). A program of its own so that neither
-// a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
+// telesplat-import FORMAT FILE: reads a glTF, raster or DICOM file with other people's libraries and leaves it on
+// standard output for the process that asked (process.cpp). A program of its own so that neither a crash of these
+// libraries, nor their messages, nor the time that they take to load reach anyone.
 #include <fmt/format.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -18,12 +18,9 @@
 #include "services/data/import/dicom.h"
 #include "services/data/import/files.h"
 #include "services/data/import/gdal.h"
-#include "services/data/import/iso.h"
 #include "services/data/import/process.h"
 #include "services/data/import/raster_facts.h"
 #include "services/data/import/report.h"
-#include "services/data/import/vtk_import.h"
-#include "services/data/import/vtk_volume.h"
 #include "services/data/volume/formats/import_stream.h"
 
 namespace {
@@ -50,24 +47,6 @@ telesplat::Result<telesplat::data::Mesh> import_gltf(telesplat::data::ImportFile
   const auto content = files.content();
   if (!content) return telesplat::Error{fmt::format("{}: {}", path, content.error().text)};
   return telesplat::data::read_gltf(*content, path, files, texture_detail);
-}
-
-bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
-  namespace data = telesplat::data;
-  const auto header = data::read_volume_header(path, "");
-  if (!header) return data::send_error(out, header.error().text);
-  // The voxels, of any type, twice more while they are unpacked or turned; the packed file.
-  const uint64_t bytes = header->voxels() * 8;
-  limit_time(file_bytes + bytes / 10);
-  try {
-    const auto volume =
-        data::read_vtk_volume(*header, path, [&](double fraction) { data::send_progress(out, fraction); });
-    if (!volume) return data::send_error(out, volume.error().text);
-    return data::send_volume(out, volume->header, volume->image->GetScalarPointer());
-  } catch (const std::bad_alloc&) {
-    return data::send_error(out, fmt::format("{}: takes more memory than its {} x {} x {} voxels can need", path,
-                                             header->size[0], header->size[1], header->size[2]));
-  }
 }
 
 // All frames of all files, one after the other, as one volume. bytes: of their pixels.
@@ -100,13 +79,10 @@ bool import_dicom(int out, const telesplat::data::ImportFiles& files, uint64_t b
 int main(int argc, char** argv) {
   if (argc < 3 || argc > 5) {
     std::fputs(
-        "usage: telesplat-import vtp|vtu|vtk FILE [ARRAY]   (standard output: the mesh, for telesplat-data)\n"
-        "       telesplat-import gltf FILE TEXTURE_DETAIL\n"
-        "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
+        "usage: telesplat-import gltf FILE TEXTURE_DETAIL   (standard output: the mesh, for telesplat-data)\n"
         "       telesplat-import dicom NAME BYTES    (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
-        "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n"
-        "       telesplat-import iso NAME            (standard input: iso.h)\n",
+        "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n",
         stderr);
     return 2;
   }
@@ -121,22 +97,19 @@ int main(int argc, char** argv) {
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what libraries print must not get between
   try {
-    if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
     limit_time(file_bytes);
     if (format == "dicom" && argc == 4) return import_dicom(out, files, std::strtoull(argv[3], nullptr, 10)) ? 0 : 1;
-    const bool gltf = format == "gltf" && argc == 4;
-    const uint64_t texture_detail = gltf ? std::strtoull(argv[3], nullptr, 10) : 0;
+    const bool gltf = format == "gltf";
+    const uint64_t texture_detail = gltf && argc == 4 ? std::strtoull(argv[3], nullptr, 10) : 0;
     // Pictures hold many texels a byte; baked triangles are divided into a copy.
     const uint64_t memory = memory_with(100 * file_bytes + (gltf ? (uint64_t{3} << 30) + 300 * texture_detail : 0));
-    if (gltf || format.starts_with("raster")) telesplat::data::confine(memory);
+    telesplat::data::confine(memory);
     if (format == "raster-facts") {
       const auto facts = telesplat::data::read_raster_facts(files, path);
       return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
     }
-    const auto mesh = argc == 5         ? import_elevation(files, path, std::atof(argv[3]), argv[4])
-                      : format == "iso" ? telesplat::data::flying_edges(files.all().at(0).descriptor(), path)
-                      : gltf            ? import_gltf(files, path, texture_detail)
-                                        : telesplat::data::import_with_vtk(path, format, argc == 4 ? argv[3] : "");
+    const auto mesh = argc == 5 ? import_elevation(files, path, std::atof(argv[3]), argv[4])
+                                : import_gltf(files, path, texture_detail);
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{

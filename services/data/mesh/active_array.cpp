@@ -5,6 +5,7 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
 namespace {
@@ -18,25 +19,6 @@ bool names_colours(std::string name) {
   for (const char* colours : {"rgb", "rgba", "color", "colors", "colours", "color_0"})
     if (name == colours) return true;
   return false;
-}
-
-// Of an XML tag "<PointData ... Scalars="NAME" ...>".
-std::string attribute(std::string_view tag, std::string_view name) {
-  const size_t at = tag.find(" " + std::string(name) + "=\"");
-  if (at == kNoMark) return {};
-  const size_t begin = at + name.size() + 3, end = tag.find('"', begin);
-  return end == kNoMark || end - begin > kMostName ? std::string() : std::string(tag.substr(begin, end - begin));
-}
-
-std::string active_of_xml(std::string_view text) {
-  text = text.substr(0, text.find("<AppendedData"));
-  for (const char* part : {"<PointData", "<CellData"}) {
-    const size_t at = text.find(part);
-    if (at == kNoMark) continue;
-    const std::string_view tag = text.substr(at, text.find('>', at) - at);
-    if (std::string name = attribute(tag, "Scalars"); !name.empty()) return name;
-  }
-  return {};
 }
 
 // "SCALARS NAME TYPE" below "POINT_DATA N" or "CELL_DATA N"; the first one is active.
@@ -56,11 +38,8 @@ std::string active_of_legacy(std::string_view text) {
 }  // namespace
 
 std::string active_array(std::string_view text) {
-  const std::string_view head = text.substr(0, 1024);
-  std::string name = head.find("<VTKFile") != kNoMark     ? active_of_xml(text)
-                     : head.starts_with("# vtk DataFile") ? active_of_legacy(text)
-                                                          : std::string();
-  return names_colours(name) ? std::string() : name;
+  const std::string name = text.starts_with("# vtk DataFile") ? active_of_legacy(text) : vtk::active_scalars(text);
+  return names_colours(name) || name.size() > kMostName ? std::string() : name;
 }
 
 std::string active_array_of(const std::string& path) {

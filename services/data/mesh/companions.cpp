@@ -7,6 +7,7 @@
 #include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/formats/ply_header.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
 namespace {
@@ -60,6 +61,10 @@ std::vector<std::string> companion_files(std::string_view content, const std::st
   if (format == "ply")
     if (auto header = parse_ply_header(content, path)) names = std::move(header->textures);
   if (format == "gltf") names = gltf_files(content);
+  if (vtk::is_mesh_kind(format)) {
+    FolderCompanions companions(path);
+    names = vtk::named_files(content, path, companions);
+  }
   if (format == "raster") {
     names = vrt_sources(content);
     for (std::string& side : raster_sides(path)) names.push_back(std::move(side));

@@ -8,13 +8,15 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/gltf/container.h"
+#include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
 namespace {
 
 constexpr const char* kSupported =
-    "supported are meshes (PLY, OBJ, STL, OFF, VTP, VTU, VTK, glTF, GLB), elevation rasters (GeoTIFF, HGT, 16-bit PNG, "
-    "ASCII and XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, raw voxels with --raw)";
+    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK's files), elevation rasters (GeoTIFF, HGT, 16-bit PNG, ASCII "
+    "and "
+    "XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, raw voxels with --raw)";
 
 std::string extension_of(const std::string& path) {
   std::string out = std::filesystem::path(path).extension().string();
@@ -114,12 +116,9 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   const std::string extension = extension_of(path);
   if (content.starts_with("ply\n") || content.starts_with("ply\r")) return {"ply", ""};
   if (looks_like_gltf(content)) return {"gltf", ""};
-  if (content.starts_with("# vtk DataFile")) return {"vtk", ""};
-  if (const std::string_view start = content.substr(0, 1000); start.find("<VTKFile") != start.npos) {
-    if (start.find("type=\"PolyData\"") != start.npos) return {"vtp", ""};
-    if (start.find("type=\"UnstructuredGrid\"") != start.npos) return {"vtu", ""};
-    return {"", fmt::format("is a VTK file, but neither of polygons (type=\"PolyData\") nor an unstructured grid; {}",
-                            kSupported)};
+  if (const std::string kind = vtk::kind_of(content); !kind.empty()) {
+    if (vtk::is_image(content)) return {"", fmt::format("is a volume, not a mesh; {}", kSupported)};
+    return {kind, ""};
   }
   if (looks_like_raster(content, extension)) return {"raster", ""};
   if (std::string complaint = other_kind(content, extension); !complaint.empty()) return {"", std::move(complaint)};
@@ -127,15 +126,14 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   if (looks_like_off(content)) return {"off", ""};
   if (is_text_stl(content)) return {"stl", ""};
   // By name, where the content says nothing (or is broken, which the reader will say better).
-  if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtu", ".vtk"})) return {extension.substr(1), ""};
+  if (is_one_of(extension, {".ply", ".off", ".stl", ".obj"}) || vtk::is_mesh_kind(extension.substr(!extension.empty())))
+    return {extension.substr(1), ""};
   if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};
   if (looks_like_obj(content)) return {"obj", ""};
   return {"", fmt::format("is of no known format; {}", kSupported)};
 }
 
-bool has_arrays(std::string_view format) {
-  return format == "ply" || format == "vtp" || format == "vtu" || format == "vtk";
-}
+bool has_arrays(std::string_view format) { return format == "ply" || vtk::is_mesh_kind(format); }
 
 Status check_array(const std::string& array, const std::string& format, const std::string& path) {
   if (array.empty() || has_arrays(format)) return ok_status();
@@ -144,6 +142,13 @@ Status check_array(const std::string& array, const std::string& format, const st
         fmt::format("--colour-by {}: {} is an elevation raster, which is coloured by its heights", array, path)};
   return Error{fmt::format("--colour-by {}: {} is a file of format {}, which has no arrays; PLY, VTP, VTU and VTK have",
                            array, path, format)};
+}
+
+Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
+                      const std::string& array) {
+  if (progress) progress(0.0);
+  FolderCompanions companions(path);
+  return vtk::read_mesh(content, path, companions, array);
 }
 
 Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const ReadProgress& progress) {
@@ -171,7 +176,7 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
                 : detected.format == "obj"    ? read_obj(content, path, progress, folder, texture_detail)
                 : detected.format == "raster" ? read_with_gdal(content, path, elevation, progress)
                 : detected.format == "gltf"   ? read_imported_gltf(content, path, progress, texture_detail)
-                                              : read_with_vtk(content, detected.format, path, progress, array);
+                                              : read_vtk(content, path, progress, array);
     if (!mesh) return mesh;
     auto status = validate_mesh(*mesh, path);
     if (!status && drop_not_finite(*mesh, path)) status = validate_mesh(*mesh, path);

@@ -12,9 +12,9 @@
 
 namespace telesplat::data {
 
-/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtu", "vtk",
-/// "gltf", "raster", or "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and
-/// what is supported.
+/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "gltf", "raster", what
+/// vtk::kind_of() gives, or "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster)
+/// and what is supported.
 struct DetectedFormat {
   std::string format;
   std::string complaint;
@@ -60,12 +60,11 @@ bool is_binary_stl(std::string_view content);
 /// note.
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
                       Companions& companions, uint64_t texture_detail = kDefaultTextureDetail);
-/// VTP, VTU and legacy VTK, through VTK (of grids the surface), in the program telesplat-import, which must lie
-/// beside this process's own program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us.
-/// Claimed counts are checked here before VTK sees the file.
-Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress, const std::string& array = {});
-/// glTF, as read_gltf() (gltf/reader.h), in the program telesplat-import like the above.
+/// VTK's files: vtk/reader.h. Files that it names are read from its folder.
+Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
+                      const std::string& array = {});
+/// glTF, as read_gltf() (gltf/reader.h), in the program telesplat-import, which must lie beside this process's own
+/// program or in $PATH: a crash on a hostile file does not reach us.
 Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
                                 uint64_t texture_detail);
 

@@ -1,18 +1,14 @@
 #include "services/data/surface/isosurface.h"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 
 #include "common/volume/histogram.h"
-#include "services/data/import/iso.h"
-#include "services/data/import/process.h"
+#include "services/data/surface/flying_edges.h"
+#include "services/data/volume/formats/header.h"
 #include "services/data/volume/statistics.h"
 #include "services/data/volume/volume.h"
 
@@ -20,17 +16,6 @@ namespace telesplat::data {
 namespace {
 
 constexpr int kBins = 128;
-
-bool write_all(int descriptor, const void* data, size_t bytes) {
-  const auto* at = static_cast<const std::byte*>(data);
-  while (bytes > 0) {
-    const ssize_t n = write(descriptor, at, std::min(bytes, size_t{1} << 30));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    at += n, bytes -= size_t(n);
-  }
-  return true;
-}
 
 // Text as hexadecimal digits of its hash: for file names.
 std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
@@ -47,8 +32,13 @@ Result<MeshSource> surface_source(const std::string& path, const std::string& ra
     return isosurface(*volume, iso, source.name);
   };
   const std::string which = raw.empty() && series.empty() ? "" : "-" + hex(raw + series);
-  // What the volume's first step is read from: one file, or all slices of a series.
-  const auto files = found->dicom ? found->files() : std::vector{found->steps.front()};
+  // What the volume's first step is read from: one file and those that it names, or all slices of a series.
+  auto files = found->dicom ? found->files() : std::vector{found->steps.front()};
+  if (!found->dicom)
+    if (const auto header = read_volume_header(files[0], raw)) {
+      if (header->data_path != files[0]) files.push_back(header->data_path);
+      files.insert(files.end(), header->more_paths.begin(), header->more_paths.end());
+    }
   return MeshSource{hash_files(files, progress), fmt::format("-surface{}{}", iso, which), read};
 }
 
@@ -60,21 +50,11 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
     if (n < 2)
       return Error{fmt::format("{}: {} x {} x {} voxels are too flat for a surface", name, volume.size[0],
                                volume.size[1], volume.size[2])};
-  VolumeHeader header;
-  for (size_t a = 0; a < 3; ++a) header.size[a] = volume.size[a];
-  header.type = int32_t(volume.type);
-  header.iso = (iso - volume.offset) / volume.scale;
-  std::memcpy(header.index_to_data, &volume.index_to_data[0][0], sizeof header.index_to_data);
-  const int input = memfd_create("telesplat-volume", MFD_CLOEXEC);
-  if (input < 0 || !write_all(input, &header, sizeof header) ||
-      !write_all(input, volume.stored.data(), volume.stored.size())) {
-    const int reason = errno;
-    if (input >= 0) close(input);
-    return Error{fmt::format("{}: no memory file for its voxels: {}", name, std::strerror(reason))};
-  }
-  auto mesh = import("VTK's surface", {"iso", name}, {fmt::format("/proc/self/fd/{}", input)});
-  close(input);
+  const auto stored = [&](double value) { return (value - volume.offset) / volume.scale; };
+  auto mesh = flying_edges(volume, stored(iso), stored(volume.lo), name);
   if (!mesh) return mesh;
+  if (mesh->indices.empty()) return Error{fmt::format("{}: has no surface at this value", name)};
+  mesh->format = "iso";
   mesh->frame = volume.box();
   // The store keeps what other values a surface may have.
   mesh->arrays = {{.name = "value", .unit = {}, .spans = {{volume.lo, volume.hi}}}};

@@ -6,11 +6,9 @@
 
 namespace telesplat::data {
 
-/// The surface where the volume has the value `iso`, by flying edges (Schroeder, Maynard, Geveci, "Flying edges: a
-/// high-performance scalable isocontouring algorithm", LDAV 2015; VTK's, in the program telesplat-import). Positions
-/// are in the volume's own units and axes, and the volume's box is the mesh's frame. Normals come from gradients and
-/// point to lower values. The volume's border stays open. Error, starting with `name`: iso is not inside the values, no
-/// triangle, too many of them.
+/// The surface where the volume has the value `iso`: flying_edges.h. Positions are in the volume's own units and axes,
+/// and the volume's box is the mesh's frame. Normals come from gradients and point to lower values. The volume's border
+/// stays open. Error, starting with `name`: iso is not inside the values, no triangle, too many of them.
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name);
 
 /// That surface of the volume at `path` (its first step), for a store of chunks. raw, series: as find_volume takes

@@ -161,28 +161,6 @@ void mix(const Bytes& below, const Bytes& above, double share, std::byte* to) {
   }
 }
 
-// Calls with a value of a stored type.
-auto with_type(StoredType type, auto&& call) {
-  switch (type) {
-    case StoredType::kU8:
-      return call(uint8_t{});
-    case StoredType::kI8:
-      return call(int8_t{});
-    case StoredType::kU16:
-      return call(uint16_t{});
-    case StoredType::kI16:
-      return call(int16_t{});
-    case StoredType::kU32:
-      return call(uint32_t{});
-    case StoredType::kI32:
-      return call(int32_t{});
-    case StoredType::kF64:
-      return call(double{});
-    default:
-      return call(float{});
-  }
-}
-
 // Padding that lies far from all other values would be most of their range: it becomes the lowest of them.
 template <class T>
 void take_padding(const DicomSlice& s, Bytes& bytes, std::string& remark) {

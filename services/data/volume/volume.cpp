@@ -5,7 +5,6 @@
 #include <new>
 
 #include "services/data/volume/dicom_reader.h"
-#include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/formats/payload.h"
 
 namespace telesplat::data {
@@ -17,9 +16,9 @@ Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t ste
   if (step >= source.steps.size())
     return Error{fmt::format("{}: has no step {}, it has {}", source.name, step, source.steps.size())};
   if (source.dicom) return source.dicom->header;
-  auto header = read_volume_header(source.steps[step], source.raw);
+  auto header = read_volume_header(source.steps[step], source.raw, source.array);
   if (!header || step == 0) return header;
-  const auto first = read_volume_header(source.steps[0], source.raw);
+  const auto first = read_volume_header(source.steps[0], source.raw, source.array);
   if (first && first->size != header->size)
     return Error{fmt::format("{}: has {} x {} x {} voxels, the first of its series, {}, has {} x {} x {}",
                              source.steps[step], header->size[0], header->size[1], header->size[2], source.steps[0],
@@ -27,12 +26,12 @@ Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t ste
   return header;
 }
 
-// Without VTK, in this process.
-Result<Volume> read_step_here(const VolumeFileHeader& header, const VolumeSource& source, size_t step,
-                              const ReadProgress& progress) {
+Result<Volume> read_voxels(const VolumeFileHeader& header, const VolumeSource& source, size_t step,
+                           const ReadProgress& progress) {
   const std::string& path = source.steps[step];
   if (source.dicom) return read_dicom(*source.dicom, step, path, progress);
-  auto bytes = read_payload(header, path, progress);
+  const bool image = header.format == "vti" || header.format == "vtk";
+  auto bytes = image ? read_vtk_image(header, path) : read_payload(header, path, progress);
   if (!bytes) return bytes.error();
   return make_volume(header, std::move(*bytes), path);
 }
@@ -43,24 +42,12 @@ Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadPr
   const auto header = read_step_header(source, step);
   if (!header) return header.error();
   const std::string& path = source.steps[step];
-  // VTK's copy lives beside ours until it has been handed over.
-  const uint64_t bytes = header->voxel_bytes() * (reads_with_vtk(header->format) ? 2 : 1);
-  if (auto status = check_memory(bytes, path); !status) return status.error();
+  if (auto status = check_memory(header->voxel_bytes(), path); !status) return status.error();
   if (progress) progress(0.0);
   try {
-    if (!reads_with_vtk(header->format)) {
-      auto volume = read_step_here(*header, source, step, progress);
-      if (volume && progress) progress(1.0);
-      return volume;
-    }
-    auto streamed = read_volume_with_vtk(*header, path, progress);
-    if (!streamed) return streamed.error();
-    streamed->header.format = header->format;
-    streamed->header.unit = header->unit;
-    streamed->header.space = header->space;
-    // What VTK found must be a grid too; the header of its own format says only part of it.
-    if (auto status = check_header(streamed->header, streamed->bytes.size(), path); !status) return status.error();
-    return make_volume(streamed->header, std::move(streamed->bytes), path);
+    auto volume = read_voxels(*header, source, step, progress);
+    if (volume && progress) progress(1.0);
+    return volume;
   } catch (const std::bad_alloc&) {
     return Error{fmt::format("{}: this machine's memory does not suffice for its {} bytes of voxels", path,
                              header->voxel_bytes())};

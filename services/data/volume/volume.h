@@ -20,6 +20,7 @@ struct VolumeSource {
   std::string name;                          ///< for people
   std::string series;                        ///< --series: which of a DICOM folder's; empty: the one of most slices
   std::shared_ptr<const DicomSeries> dicom;  ///< of a DICOM folder, file or disc
+  std::string array{};                       ///< of a file that names arrays; empty: as read_volume_header() chooses
 
   /// All files that its voxels come from.
   std::vector<std::string> files() const;
@@ -33,8 +34,7 @@ bool looks_like_volume(const std::string& path);
 /// series: of a DICOM folder alone.
 /// Error: nothing of the kind; names path and what it is instead.
 Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series = "");
-/// Reads one step. Formats that VTK reads are read in the program telesplat-import (vtk_reader.cpp), so that neither
-/// crashes nor claims of hostile files reach us. Error: truncated, lying and mismatched headers (sizes against file
+/// Reads one step. Error: truncated, lying and mismatched headers (sizes against file
 /// sizes), more than volume::kMaxSide on an axis, several components, types that are none of VoxelType's (wider ones
 /// become f32 where that keeps them), memory. Names file, value and limit.
 Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadProgress& progress);

@@ -11,6 +11,8 @@
 #include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/formats/payload.h"
 #include "services/data/volume/volume.h"
+#include "services/data/vtk/image.h"
+#include "services/data/vtk/reader.h"
 #include "tests/support/files/memory_file.h"
 
 namespace telesplat::data {
@@ -51,6 +53,15 @@ void stream(Bytes bytes) {
   const test::MemoryFile file(bytes);
   (void)receive_volume(file.descriptor(), 1 << 20, "fuzz", nullptr);
 }
+void vtk_file(Bytes bytes) {
+  struct NoFiles : Companions {
+    Result<std::string_view> read(const std::string& named) override { return Error{named}; }
+  } companions;
+  const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto mesh = vtk::read_mesh(content, "fuzz", companions, "");
+  if (mesh.ok()) (void)validate_mesh(*mesh, "fuzz");
+  (void)vtk::read_image_header(content, "fuzz", companions, "");
+}
 void gltf(Bytes bytes) {
   const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   companion_files(content, "gltf", "fuzz/fuzz.gltf");
@@ -83,7 +94,7 @@ void payload(Bytes bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace telesplat::data;
-  constexpr void (*kReaders[])(Bytes) = {chunk, store, report, stream, gltf, companions, payload};
+  constexpr void (*kReaders[])(Bytes) = {chunk, store, report, stream, vtk_file, gltf, companions, payload};
   if (size == 0) return 0;
   kReaders[data[0] % std::size(kReaders)]({data + 1, size - 1});
   return 0;

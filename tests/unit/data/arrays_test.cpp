@@ -114,7 +114,7 @@ TEST(VtpArrays, OfPointsAndCellsAndComponents) {
   ASSERT_EQ(arrays->size(), 4u);
   EXPECT_EQ((*arrays)[0], (scene::ArrayInfo{"t", "", false, 1, {{1, 3}}}));
   EXPECT_EQ((*arrays)[1], (scene::ArrayInfo{"v", "", false, 3, {{1, 7}, {0, 3}, {0, 4}, {-7, 2}}}));
-  EXPECT_EQ((*arrays)[2], (scene::ArrayInfo{"c", "", true, 1, {{5, 100}}}));
+  EXPECT_EQ((*arrays)[2], (scene::ArrayInfo{"c", "", true, 1, {{5, 6}}})) << "a vertex cell is not shown";
   EXPECT_EQ((*arrays)[3].name, "t (cell)");
 
   const auto read = [&](const std::string& array) {

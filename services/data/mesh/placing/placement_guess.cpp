@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include "services/data/mesh/placing/placement.h"
+#include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
 namespace {
@@ -61,11 +62,10 @@ bool is_isosurface(const Mesh& mesh) {
 
 UpGuess guess_up(const Mesh& mesh) {
   if (mesh.format == "raster") return {"z", "an elevation raster"};
-  if (mesh.format == "iso" || mesh.format == "isosurface") return {"z", "the surface of a volume"};
+  if (mesh.format == "iso") return {"z", "the surface of a volume"};
   geometry::DBox box;
   for (uint32_t i : mesh.indices) box.extend(mesh.positions[i]);
-  if (mesh.format == "vtp" || mesh.format == "vtu" || mesh.format == "vtk")
-    return {"z", "VTK's formats hold scans and simulations"};
+  if (vtk::is_mesh_kind(mesh.format)) return {"z", "VTK's formats hold scans and simulations"};
   if (is_height_field(mesh, box.size())) return {"z", "shaped like a terrain"};
   if (is_isosurface(mesh)) return {"z", "its vertices lie on a voxel grid, as a scan's surface does"};
   return {"y", "nothing tells of a terrain or a scan"};

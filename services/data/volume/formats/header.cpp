@@ -14,6 +14,7 @@
 #include "common/volume/grid.h"
 #include "services/data/volume/formats/dicom_header.h"
 #include "services/data/volume/formats/header_text.h"
+#include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
 namespace {
@@ -50,30 +51,6 @@ bool is_nifti(std::string_view start) {
 }
 
 }  // namespace
-
-size_t stored_bytes(StoredType type) {
-  switch (type) {
-    case StoredType::kU8:
-    case StoredType::kI8:
-      return 1;
-    case StoredType::kU16:
-    case StoredType::kI16:
-      return 2;
-    case StoredType::kU32:
-    case StoredType::kI32:
-    case StoredType::kF32:
-      return 4;
-    default:
-      return 8;
-  }
-}
-
-const char* name_of(StoredType type) {
-  constexpr const char* kNames[] = {"u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "f32", "f64"};
-  return kNames[static_cast<size_t>(type)];
-}
-
-bool reads_with_vtk(const std::string& format) { return format == "nifti" || format == "vti"; }
 
 Status check_header(const VolumeFileHeader& h, uint64_t data_bytes, const std::string& path) {
   for (const int64_t n : h.size)
@@ -135,67 +112,38 @@ std::string volume_format(const FileStart& start, const std::string& path) {
   if (!start.packed) {
     if (content.starts_with("NRRD000")) return "nrrd";
     if (is_dicom(content)) return "dicom";
-    const std::string_view head = content.substr(0, 1000);
-    if (head.find("<VTKFile") != head.npos)
-      return head.find("type=\"ImageData\"") != head.npos || (extension == ".vti" && head.find("type=") == head.npos)
-                 ? "vti"
-                 : "";
+    if (const std::string kind = vtk::kind_of(content); !kind.empty())
+      return !vtk::is_image(content) ? "" : kind == "vtk" ? "vtk" : "vti";
     if (content.starts_with("ObjectType") && content.substr(0, 100).find("Image") != content.npos) return "metaimage";
   }
   if (extension == ".nrrd" || extension == ".nhdr") return "nrrd";
   if (extension == ".mha" || extension == ".mhd") return "metaimage";
-  if (extension == ".vti") return "vti";
+  if (extension == ".vti" || extension == ".pvti") return "vti";
   if (extension == ".dcm") return "dicom";
   return "";
 }
 
-Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& path) {
-  constexpr std::string_view kKey = "WholeExtent=\"";
-  const size_t at = content.find(kKey);
-  if (content.find("<ImageData") == content.npos || at == content.npos)
-    return Error{path + ": is no VTK image: no ImageData with a WholeExtent near its start"};
-  const std::string_view text = content.substr(at + kKey.size(), 200);
-  const auto extent = numbers(text.substr(0, text.find('"')));
-  if (!extent || extent->size() != 6)
-    return Error{
-        fmt::format("{}: its WholeExtent is {}, not six numbers", path, in_quotes(text.substr(0, text.find('"'))))};
-  VolumeFileHeader h;
-  h.format = "vti";
-  h.data_path = path;
-  for (size_t a = 0; a < 3; ++a) {
-    const double n = (*extent)[2 * a + 1] - (*extent)[2 * a] + 1;
-    if (!(n >= 1 && n <= volume::kMaxSide + 1) || n != std::floor(n) || !(std::abs((*extent)[2 * a]) < 1e6))
-      return Error{fmt::format("{}: claims the extent {}; limits are 1 and {} voxels on each axis", path,
-                               in_quotes(text.substr(0, text.find('"'))), volume::kMaxSide)};
-    h.size[a] = static_cast<int64_t>(n);
-  }
-  // Cells are one fewer than points; a file with nothing but cells holds that many.
-  const bool cells = content.find("<PointData") == content.npos || content.find("<CellData Scalars") != content.npos;
-  if (cells)
-    for (auto& n : h.size) n = std::max<int64_t>(n - 1, 1);
-  h.encoding = content.substr(0, 1000).find("compressor=\"") != content.npos ? Encoding::kGzip : Encoding::kRaw;
-  return h;
-}
-
-Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw) {
+Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw, const std::string& array) {
   const auto start = read_start(path);
   if (!start) return start.error();
+  uint64_t data_bytes = start->file_bytes;
   const auto header = [&]() -> Result<VolumeFileHeader> {
     if (!raw.empty()) return parse_raw_spec(raw, path);
     const std::string format = volume_format(*start, path);
     if (format == "nrrd") return parse_nrrd(start->bytes, path);
     if (format == "metaimage") return parse_metaimage(start->bytes, path);
     if (format == "nifti") return parse_nifti(start->bytes, path);
-    if (format == "vti") return parse_vti(start->bytes, path);
+    if (format == "vti" || format == "vtk") return parse_vtk_image(path, array, data_bytes);
     if (format == "dicom") return Error{path + ": is a DICOM file, whose voxels may lie in others, too"};
-    return Error{path +
-                 ": is no volume; supported are NRRD, MetaImage, NIfTI, VTI, folders of DICOM slices, and raw "
-                 "files with --raw"};
+    return Error{
+        path +
+        ": is no volume; supported are NRRD, MetaImage, NIfTI, VTK's images (VTI, PVTI, VTK), folders of DICOM slices, "
+        "and raw files with --raw"};
   }();
   if (!header) return header;
   VolumeFileHeader h = *header;
   const bool detached = h.data_path != path;
-  uint64_t data_bytes = detached ? ~uint64_t{0} : start->file_bytes;  // of the smallest file
+  if (detached) data_bytes = ~uint64_t{0};  // of the smallest file
   for (size_t i = 0; detached && i < h.parts(); ++i) {
     const std::string& part = i == 0 ? h.data_path : h.more_paths[i - 1];
     std::error_code error;

@@ -12,13 +12,9 @@
 
 #include "common/core/result.h"
 #include "common/scene/placement.h"
+#include "services/data/base/stored_type.h"
 
 namespace telesplat::data {
-
-/// Types that files store. Volume has the narrower ones of them (VoxelType); the others become f32.
-enum class StoredType { kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64 };
-size_t stored_bytes(StoredType type);
-const char* name_of(StoredType type);  ///< "u8" .. "f64"
 
 enum class Encoding { kRaw, kGzip, kText };
 
@@ -30,7 +26,9 @@ struct VolumeFileHeader {
   scene::Space space = scene::Space::kPlain;  ///< of its axes
   StoredType stored = StoredType::kU8;
   double scale = 1, offset = 0;
-  bool ct = false;  ///< the file says that it is a CT
+  bool ct = false;                  ///< the file says that it is a CT
+  std::string array;                ///< the one that is read, of a file that names them
+  std::vector<std::string> arrays;  ///< all that such a file has
   // Where the voxels are. kGzip: a gzip or zlib stream from data_at on.
   std::string data_path;  ///< a file; often the header's own
   /// Further files, where the voxels lie in several: each has as many of them, and begins as the first.
@@ -66,9 +64,11 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
 /// one, else the qform, else the spacing. Error: time steps, colours, Analyze files. Source:
 /// nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h.
 Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string& path);
-/// VTK's XML images: size (of cells, if there are no point data) and the most bytes a voxel can take; type and
-/// placement are VTK's to say.
-Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& path);
+/// VTK's images: XML ones, those in pieces (which must be beside it), and legacy structured points. array: which one is
+/// read; empty: as vtk::read_image_header() chooses. data_bytes becomes the size of all its files.
+Result<VolumeFileHeader> parse_vtk_image(const std::string& path, const std::string& array, uint64_t& data_bytes);
+/// The voxels of a checked header that parse_vtk_image() gave.
+Result<std::vector<std::byte>> read_vtk_image(const VolumeFileHeader& header, const std::string& path);
 
 /// For help texts and errors.
 inline constexpr const char* kRawTypes =
@@ -94,15 +94,13 @@ struct FileStart {
 /// Error: not a regular file, empty, not readable.
 Result<FileStart> read_start(const std::string& path);
 
-/// What kind of volume file this is: "nrrd", "metaimage", "nifti", "vti", "dicom"; "" if none. By content first, then
-/// by name.
+/// What kind of volume file this is: "nrrd", "metaimage", "nifti", "vti", "vtk", "dicom"; "" if none. By content first,
+/// then by name.
 std::string volume_format(const FileStart& start, const std::string& path);
-/// Whether files of a format go through VTK. The others are read without it: VTK 9.1 knows neither NRRD's compression
-/// and directions, nor DICOM's order, orientation and signs of slices, nor MetaImage's directions, and takes damaged
-/// compressed MetaImages for whole (what is missing stays what the memory held).
-bool reads_with_vtk(const std::string& format);
 /// Reads and checks the header of a volume file that is no DICOM slice (dicom_series.h). With `raw`: of a raw file that
-/// is as it says. Error: cannot be read, is no volume; those of the parsers and of check_header.
-Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw);
+/// is as it says. array: which one, of a file that has several; empty: the one that it marks, else its first. Error:
+/// cannot be read, is no volume, has no such array; those of the parsers and of check_header.
+Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw,
+                                            const std::string& array = {});
 
 }  // namespace telesplat::data

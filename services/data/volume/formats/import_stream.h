@@ -13,7 +13,7 @@
 namespace telesplat::data {
 
 struct StreamedVolume {
-  /// Sizes, type and placement are as VTK has them, in native byte order; scale, offset and ct are the file's.
+  /// Sizes, type and placement are as its reader has them, in native byte order; scale, offset and ct are the file's.
   VolumeFileHeader header;
   std::vector<std::byte> bytes;
 };
@@ -33,10 +33,5 @@ std::optional<Result<StreamedVolume>> receive_volume(int descriptor, uint64_t mo
 /// Error: what it says; crashes and endless readings; receive_volume's.
 Result<StreamedVolume> import_volume(std::vector<std::string> words, const std::vector<std::string>& files,
                                      uint64_t most_bytes, const std::string& reader, const ReadProgress& progress);
-
-/// Reads a volume with VTK in telesplat-import. `header`: what the file's own header says (checked); what VTK finds
-/// must fit it. Error: VTK's complaint, crashes and endless readings of it.
-Result<StreamedVolume> read_volume_with_vtk(const VolumeFileHeader& header, const std::string& path,
-                                            const ReadProgress& progress);
 
 }  // namespace telesplat::data

@@ -124,6 +124,7 @@ Result<Volume> make_volume(const VolumeFileHeader& h, std::vector<std::byte> byt
   v.space = h.space;
   v.stored = std::move(bytes);
   v.format = h.format;
+  v.array = h.array;
   const Range range = range_of(v.type, v.stored.data(), h.voxels());
   if (range.not_finite == h.voxels())
     return Error{fmt::format("{}: none of its {} values is finite", path, h.voxels())};

@@ -33,11 +33,4 @@ Result<StreamedVolume> import_volume(std::vector<std::string> words, const std::
   return Error{fmt::format("{}: what {} gave of it is incomplete", path, kImportProgram)};
 }
 
-Result<StreamedVolume> read_volume_with_vtk(const VolumeFileHeader& header, const std::string& path,
-                                            const ReadProgress& progress) {
-  // VTK's own format alone tells its type only to VTK.
-  const uint64_t most = header.format == "vti" ? 8 * header.voxels() : header.voxel_bytes();
-  return import_volume({header.format, path}, {path}, most, "VTK's " + header.format, progress);
-}
-
 }  // namespace telesplat::data

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <map>
 #include <numeric>
+#include <random>
 
 #include "common/volume/histogram.h"
 
@@ -92,6 +95,46 @@ TEST(Isosurface, RefusesValuesWithoutASurface) {
   flat.size = {26, 24 * 22, 1};
   EXPECT_FALSE(isosurface(flat, 100, "flat"));
 }
+
+// Noise has every case of marching cubes: no edge of a triangle but at the volume's border is left open.
+TEST(Isosurface, OfNoiseIsClosedWithinTheVolume) {
+  Volume v;
+  v.size = {37, 21, 40};
+  v.type = VoxelType::kU8;
+  std::mt19937 random(5);
+  for (int i = 0; i < 37 * 21 * 40; ++i) v.stored.push_back(std::byte(random()));
+  v.lo = 0, v.hi = 255;
+  const auto mesh = isosurface(v, 128.5, "noise");
+  ASSERT_TRUE(mesh) << mesh.error().text;
+  std::map<std::pair<uint32_t, uint32_t>, int> edges;
+  for (size_t i = 0; i < mesh->indices.size(); ++i) {
+    const uint32_t a = mesh->indices[i], b = mesh->indices[i % 3 == 2 ? i - 2 : i + 1];
+    a < b ? ++edges[{a, b}] : --edges[{b, a}];
+  }
+  const auto at_border = [&](uint32_t i) {
+    for (int a = 0; a < 3; ++a)
+      if (mesh->positions[i][a] == 0 || mesh->positions[i][a] == v.size[size_t(a)] - 1) return true;
+    return false;
+  };
+  size_t open = 0;
+  for (const auto& [edge, sides] : edges) open += sides != 0 && !(at_border(edge.first) && at_border(edge.second));
+  EXPECT_EQ(open, 0u);
+  std::vector<std::array<double, 3>> places;
+  for (const auto& p : mesh->positions) places.push_back({p.x, p.y, p.z});
+  std::sort(places.begin(), places.end());
+  EXPECT_EQ(std::adjacent_find(places.begin(), places.end()), places.end()) << "each grid edge has one vertex";
+}
+
+TEST(Isosurface, TakesValuesThatAreNotFiniteForTheLowest) {
+  Volume v = ball<float>(VoxelType::kF32, placement(1));
+  const float nothing = std::nanf("");
+  std::memcpy(v.stored.data(), &nothing, sizeof nothing);
+  v.not_finite = 1;
+  check_ball(v);
+}
+
+// Where larger stored values mean lower ones, inside and outside change places.
+TEST(Isosurface, OfANegativeScaleFacesLowerValues) { check_ball(ball<float>(VoxelType::kF32, placement(1), -2, 500)); }
 
 }  // namespace
 }  // namespace telesplat::data

@@ -13,7 +13,11 @@ namespace {
 
 const std::string kXml =
     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">\n<PolyData><Piece>\n<PointData Scalars=\"temperature\" "
-    "Normals=\"n\">\n</PointData><CellData Scalars=\"age\"></CellData></Piece></PolyData>\n<AppendedData>";
+    "Normals=\"n\">\n</PointData><CellData Scalars=\"age\"></CellData></Piece></PolyData>\n<AppendedData>_\1<CellData ";
+
+std::string piece(const std::string& data, const std::string& behind = "</VTKFile>") {
+  return "<VTKFile type='PolyData'><PolyData><Piece>" + data + "</Piece></PolyData>" + behind;
+}
 
 // Two triangles with heat of points and, after it, id of cells.
 std::string legacy(const std::string& scalars = "SCALARS heat float 1\nLOOKUP_TABLE default\n0 1 2 30\n") {
@@ -24,13 +28,14 @@ std::string legacy(const std::string& scalars = "SCALARS heat float 1\nLOOKUP_TA
 
 TEST(ActiveArray, IsReadFromTheWordsOfTheFile) {
   EXPECT_EQ(active_array(kXml), "temperature");
-  EXPECT_EQ(active_array("<VTKFile><PointData><CellData Scalars=\"age\">"), "age");
-  EXPECT_EQ(active_array("<VTKFile><PointData Vectors=\"v\"><CellData>"), "");
-  EXPECT_EQ(active_array("<VTKFile><AppendedData><PointData Scalars=\"x\">"), "") << "what follows is no markup";
+  EXPECT_EQ(active_array(piece("<PointData/><CellData Scalars = 'a&amp;b'/>")), "a&b");
+  EXPECT_EQ(active_array(piece("<PointData Vectors=\"v\"/><CellData/>")), "");
+  EXPECT_EQ(active_array(piece("<!-- <PointData Scalars=\"x\"/> -->")), "") << "a comment";
+  EXPECT_EQ(active_array(piece("", "<AppendedData>_<PointData Scalars=\"x\">")), "") << "what follows is no markup";
   EXPECT_EQ(active_array(legacy()), "heat");
   EXPECT_EQ(active_array(legacy("")), "id") << "of cells, where points have none";
   EXPECT_EQ(active_array("ply\nformat ascii 1.0\n"), "");
-  EXPECT_EQ(active_array("<VTKFile><PointData Scalars=\"RGB\">"), "") << "colours are colours";
+  EXPECT_EQ(active_array(piece("<PointData Scalars=\"RGB\"/>")), "") << "colours are colours";
   for (size_t n = 0; n < kXml.size(); n += 3) active_array(std::string_view(kXml).substr(0, n));
 }
 

@@ -1,0 +1,163 @@
+#include "services/data/vtk/cell_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+namespace telesplat::data::vtk {
+namespace {
+
+constexpr int kDuplicate = 1, kRefined = 8, kHidden = 32, kHiddenPoint = 2;  // bits of vtkGhostType
+
+const Array* marks_of(const Attributes& data, size_t count) {
+  const Array* marks = data.find("vtkGhostType");
+  return marks && marks->type == StoredType::kU8 && marks->values == count ? marks : nullptr;
+}
+
+}  // namespace
+
+CellReader::CellReader(const DataSet& set) : set_(set), states_(set.cell_count(), CellState::kShown) {
+  if (set.structured) {
+    size_t step = 1;
+    for (size_t a = 0; a < 3; step *= size_t(set.side(a++))) {
+      sides_[a] = size_t(std::max<int64_t>(set.side(a) - 1, 1));
+      if (set.side(a) > 1) steps_.push_back(step);
+    }
+    structured_type_ = steps_.size() == 3 ? kHexahedron : steps_.size() == 2 ? kQuad : kPolyLine;
+  }
+  if (const Array* marks = marks_of(set.cell_data, count()))
+    for (size_t i = 0; i < count(); ++i) {
+      const int mark = int(marks->at(i));
+      states_[i] = mark & (kHidden | kRefined) ? CellState::kAbsent
+                   : mark & kDuplicate         ? CellState::kGhost
+                                               : CellState::kShown;
+    }
+  if (const Array* levels = set.cell_data.find("vtkGhostLevels"); levels && levels->tuples() == count())
+    for (size_t i = 0; i < count(); ++i)
+      if (levels->at(i * levels->components) > 0) states_[i] = CellState::kGhost;
+  if (const Array* marks = marks_of(set.point_data, set.point_count()))
+    for (size_t i = 0; i < count(); ++i)
+      for (const uint32_t point : nodes(i))
+        if (int(marks->at(point)) & kHiddenPoint) states_[i] = CellState::kAbsent;
+}
+
+const CellKind* CellReader::kind(size_t cell) const {
+  return kind_of_cell(type(cell), set_.structured ? 8 : set_.cells[cell].size());
+}
+
+Status CellReader::check() const {
+  if (set_.structured) return ok_status();
+  for (size_t i = 0; i < count(); ++i)
+    if (const CellKind* k = kind(i); k && set_.cells[i].size() < k->nodes)
+      return Error{fmt::format("{}: cell {} of type {} has {} points of {}", set_.name, i, set_.types[i],
+                               set_.cells[i].size(), k->nodes)};
+  return ok_status();
+}
+
+std::span<const uint32_t> CellReader::nodes(size_t cell) {
+  if (!set_.structured) return set_.cells[cell];
+  const size_t i = cell % sides_[0], j = cell / sides_[0] % sides_[1], k = cell / (sides_[0] * sides_[1]);
+  const size_t first = i + size_t(set_.side(0)) * (j + size_t(set_.side(1)) * k);
+  const size_t u = steps_.empty() ? 0 : steps_[0], v = steps_.size() < 2 ? 0 : steps_[1];
+  const size_t square[4] = {first, first + u, first + u + v, first + v};
+  for (size_t c = 0; c < 8; ++c) corners_[c] = uint32_t(square[c % 4] + (c < 4 || steps_.size() < 3 ? 0 : steps_[2]));
+  return std::span(corners_).first(steps_.size() == 3 ? 8 : steps_.size() == 2 ? 4 : 2);
+}
+
+size_t CellReader::face_count(size_t cell) const {
+  if (type(cell) == kPolyhedron)
+    return set_.face_begins.empty() ? 0 : set_.face_begins[cell + 1] - set_.face_begins[cell];
+  const CellKind* k = kind(cell);
+  return !k || k->dimension < 2 ? 0 : k->dimension == 2 ? 1 : k->faces.size();
+}
+
+FacePoints CellReader::face(size_t cell, size_t face) {
+  if (type(cell) == kPolyhedron) return {set_.faces[set_.face_begins[cell] + face], {}, {}};
+  const auto points = nodes(cell);
+  const CellKind* k = kind(cell);
+  if (k->faces.empty()) {
+    const size_t corners = type(cell) == kQuadraticPolygon ? points.size() / 2 : points.size();
+    return {points.first(corners), points.subspan(corners, points.size() == 2 * corners ? corners : 0), {}};
+  }
+  const FaceRow& row = k->faces[face];
+  face_.clear();
+  for (size_t n = 0; n < row.nodes; ++n) face_.push_back(points[row.node[n]]);
+  const auto all = std::span<const uint32_t>(face_);
+  return {all.first(row.corners), all.subspan(row.corners, row.middles), all.subspan(row.corners + row.middles)};
+}
+
+glm::dvec3 CellReader::area_vector(std::span<const uint32_t> corners) const {
+  glm::dvec3 area(0);
+  if (corners.empty()) return area;
+  const glm::dvec3 first = set_.point(corners[0]);
+  for (size_t i = 2; i < corners.size(); ++i)
+    area += glm::cross(set_.point(corners[i - 1]) - first, set_.point(corners[i]) - first);
+  return area;
+}
+
+double CellReader::volume_under(std::span<const uint32_t> corners, const glm::dvec3& from) const {
+  return corners.empty() ? 0 : glm::dot(set_.point(corners[0]) - from, area_vector(corners));
+}
+
+void CellReader::orient(size_t cell) {
+  oriented_ = cell;
+  if (type(cell) == kPolyhedron) return orient_polyhedron(cell);
+  const glm::dvec3 from = set_.point(nodes(cell)[0]);
+  double volume = 0;
+  for (size_t f = 0; f < face_count(cell); ++f) volume += volume_under(face(cell, f).corners, from);
+  inward_.assign(face_count(cell), volume < 0);
+}
+
+// Faces of polyhedra have either sense: neighbours are made to go along their edge in opposite ways first.
+void CellReader::orient_polyhedron(size_t cell) {
+  struct Edge {
+    uint32_t low, high;
+    uint32_t face;
+    bool forward;
+    bool operator<(const Edge& o) const { return low != o.low ? low < o.low : high < o.high; }
+  };
+  const size_t faces = face_count(cell);
+  inward_.assign(faces, false);
+  std::vector<Edge> edges;
+  const auto edge_of = [](std::span<const uint32_t> c, size_t i, uint32_t f) {
+    const uint32_t a = c[i], b = c[(i + 1) % c.size()];
+    return Edge{std::min(a, b), std::max(a, b), f, a < b};
+  };
+  for (uint32_t f = 0; f < faces; ++f)
+    for (size_t i = 0; i < face(cell, f).corners.size(); ++i) edges.push_back(edge_of(face(cell, f).corners, i, f));
+  std::sort(edges.begin(), edges.end());
+  std::vector<bool> reached(faces, false);
+  std::vector<uint32_t> part;
+  const glm::dvec3 from = edges.empty() ? glm::dvec3(0) : set_.point(edges[0].low);
+  for (uint32_t start = 0; start < faces; ++start) {
+    if (reached[start]) continue;
+    part.assign(1, start), reached[start] = true;
+    double volume = 0;
+    for (size_t at = 0; at < part.size(); ++at) {
+      const uint32_t f = part[at];
+      const auto corners = face(cell, f).corners;
+      volume += volume_under(corners, from) * (inward_[f] ? -1 : 1);
+      for (size_t i = 0; i < corners.size(); ++i) {
+        const Edge edge = edge_of(corners, i, f);
+        // More than two faces at an edge: a damaged cell, of which the first ones must do.
+        auto other = std::lower_bound(edges.begin(), edges.end(), edge);
+        for (int n = 0; n < 4 && other != edges.end() && !(edge < *other); ++n, ++other)
+          if (!reached[other->face]) {
+            reached[other->face] = true;
+            inward_[other->face] = inward_[f] != (other->forward == edge.forward);
+            part.push_back(other->face);
+          }
+      }
+    }
+    if (volume < 0)
+      for (const uint32_t f : part) inward_[f] = !inward_[f];
+  }
+}
+
+bool CellReader::looks_inward(size_t cell, size_t face) {
+  if (oriented_ != cell) orient(cell);
+  return inward_[face];
+}
+
+}  // namespace telesplat::data::vtk

@@ -1,0 +1,110 @@
+// Data sets as VTK's files hold them: points, cells, arrays.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+#include "services/data/base/stored_type.h"
+
+namespace telesplat::data::vtk {
+
+/// Numbers in native byte order: tuples of `components` each.
+struct Array {
+  std::string name, unit;
+  StoredType type = StoredType::kF32;
+  size_t components = 1;
+  size_t values = 0;                ///< of all components
+  const std::byte* data = nullptr;  ///< unaligned; in `owned`, or in the file, which must stay
+  std::vector<std::byte> owned;
+
+  Array() = default;
+  Array(Array&&) = default;
+  Array& operator=(Array&&) = default;
+  size_t tuples() const { return values / components; }
+  double at(size_t value) const {
+    return with_type(type, [&](auto v) {
+      std::memcpy(&v, data + value * sizeof v, sizeof v);
+      return double(v);
+    });
+  }
+  /// Makes room for this many values, for a caller who writes to owned.data().
+  void own(size_t count) {
+    owned.resize(count * stored_bytes(type));
+    data = owned.data(), values = count;
+  }
+  void swap_bytes();  ///< to the other byte order; copies what lies in a file
+};
+
+struct Attributes {
+  std::vector<Array> arrays;
+  std::string scalars, normals;  ///< names of those that are active; empty: none
+
+  const Array* find(std::string_view name) const;
+};
+
+/// Lists of point numbers, one a cell (or a face).
+struct Cells {
+  std::vector<size_t> begins{0};  ///< one more than there are cells
+  std::vector<uint32_t> points;
+
+  size_t size() const { return begins.size() - 1; }
+  std::span<const uint32_t> operator[](size_t i) const {
+    return std::span(points).subspan(begins[i], begins[i + 1] - begins[i]);
+  }
+};
+
+struct DataSet {
+  std::string name;  ///< of its file, for error texts
+  /// A structured data set (image, rectilinear or structured grid): the first and last point of each axis; points go
+  /// along the first axis fastest, cells likewise. Else `cells` are its cells.
+  bool structured = false;
+  std::array<int64_t, 6> extent{0, -1, 0, -1, 0, -1};
+  bool image = false;  ///< its points are index_to_data * (i, j, k, 1)
+  glm::dmat4 index_to_data{1.0};
+  std::array<Array, 3> axes;  ///< of a rectilinear grid: coordinates along each axis
+  Array points;               ///< of all others: three components
+  Cells cells;
+  std::vector<uint8_t> types;       ///< one a cell: VTK's numbers ("VTK File Formats")
+  Cells faces;                      ///< of polyhedra
+  std::vector<size_t> face_begins;  ///< a cell's faces: from face_begins[cell] to [cell + 1]; empty: no polyhedra
+  Attributes point_data, cell_data;
+
+  int64_t side(size_t axis) const { return extent[2 * axis + 1] - extent[2 * axis] + 1; }  ///< in points
+  size_t point_count() const;
+  size_t cell_count() const;
+  glm::dvec3 point(size_t i) const;
+};
+
+/// Checks an extent: sides of at least 1, points that 32 bits can number, and at most a thousand a byte of the file.
+/// `name` begins the error.
+Status check_extent(const std::array<int64_t, 6>& extent, size_t file_bytes, const std::string& name);
+
+/// Whole numbers as indices; one that is negative or too large becomes ~0.
+std::vector<uint32_t> indices_of(const Array& array);
+/// Types of cells.
+std::vector<uint8_t> types_of(const Array& array);
+/// Adds cells of one type behind those of the data set.
+void append_cells(Cells cells, uint8_t type, DataSet& set);
+
+/// Makes cells of point numbers and of the ends of each cell's part of them. Error: ends that fall or lie behind
+/// the numbers, a number that is not below `points`.
+Result<Cells> make_cells(const Array& ids, const Array& ends, bool with_first, size_t points, const std::string& name);
+
+/// Makes cells of the older layout: each cell's count, then its point numbers. `count`: of cells, as claimed.
+Result<Cells> make_listed_cells(const Array& list, size_t count, const std::string& name);
+
+/// Error: one of these point numbers is not below `points`.
+Status check_ids(std::span<const uint32_t> ids, size_t points, const std::string& name);
+
+/// Adds the faces of a polyhedron as streams hold them: their number, then each one's count and points.
+/// Point numbers are not checked. Error: the stream is cut.
+Status add_face_stream(std::span<const uint32_t> stream, DataSet& set);
+
+}  // namespace telesplat::data::vtk

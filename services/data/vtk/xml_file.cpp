@@ -1,0 +1,201 @@
+#include "services/data/vtk/xml_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "services/data/base/text_scanner.h"
+#include "services/data/vtk/packed.h"
+
+namespace telesplat::data::vtk {
+namespace {
+
+constexpr size_t kNone = std::string_view::npos;
+
+std::string_view trim(std::string_view text) {
+  while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
+  while (!text.empty() && static_cast<unsigned char>(text.back()) <= ' ') text.remove_suffix(1);
+  return text;
+}
+
+// The end of the markup that begins at `at`, behind its '>'; npos: it has none.
+size_t markup_end(std::string_view text, size_t at) {
+  const auto behind = [&](std::string_view mark) {
+    const size_t found = text.find(mark, at);
+    return found == kNone ? kNone : found + mark.size();
+  };
+  const std::string_view start = text.substr(at, 9);
+  if (start.starts_with("<!--")) return behind("-->");
+  if (start.starts_with("<?")) return behind("?>");
+  if (start == "<![CDATA[") return behind("]]>");
+  for (char quote = 0; at < text.size(); ++at) {
+    if (quote != 0)
+      quote = text[at] == quote ? 0 : quote;
+    else if (text[at] == '"' || text[at] == '\'')
+      quote = text[at];
+    else if (text[at] == '>')
+      return at + 1;
+  }
+  return kNone;
+}
+
+bool is_tag(std::string_view markup) { return markup.size() > 1 && markup[1] != '!' && markup[1] != '?'; }
+
+// The file's tags; instead of each text between them, where it lies: "offset length". Ends before appended data, at
+// `appended`.
+std::string skeleton_of(std::string_view content, size_t& appended) {
+  std::string out;
+  appended = kNone;
+  for (size_t at = content.find('<'); at != kNone;) {
+    if (content.substr(at).starts_with("<AppendedData")) {
+      appended = at;
+      return out + "</VTKFile>";
+    }
+    const size_t end = markup_end(content, at);
+    if (end == kNone) break;
+    if (const auto markup = content.substr(at, end - at); is_tag(markup)) out += markup;
+    at = content.find('<', end);
+    if (const auto text = trim(content.substr(end, at == kNone ? 0 : at - end)); !text.empty())
+      out += fmt::format("{} {}", text.data() - content.data(), text.size());
+  }
+  return out;
+}
+
+template <class T>
+Status parse_all(std::string_view text, Array& out, size_t most, const std::string& what) {
+  TextScanner in(text);
+  constexpr bool kFloats = std::is_floating_point_v<T>;
+  out.owned.reserve(std::min(most, text.size() / 2 + 1) * sizeof(T));
+  while (out.values < most && in.skip_space()) {
+    std::conditional_t<kFloats, double, int64_t> value{};
+    const bool fits = [&] {
+      if constexpr (kFloats)
+        return in.number(value);
+      else
+        return in.integer(value);
+    }();
+    if (!fits) return Error{fmt::format("{}: value {} is no number of type {}", what, out.values, name_of(out.type))};
+    const T stored = static_cast<T>(value);
+    const auto* bytes = reinterpret_cast<const std::byte*>(&stored);
+    out.owned.insert(out.owned.end(), bytes, bytes + sizeof stored);
+    ++out.values;
+  }
+  out.data = out.owned.data();
+  return ok_status();
+}
+
+}  // namespace
+
+bool type_of(std::string_view text, StoredType& out) {
+  constexpr const char* kNames[] = {"UInt8", "Int8",   "UInt16", "Int16",   "UInt32",
+                                    "Int32", "UInt64", "Int64",  "Float32", "Float64"};
+  const auto found = std::find(std::begin(kNames), std::end(kNames), text);
+  out = StoredType(found - std::begin(kNames));
+  return found != std::end(kNames);
+}
+
+pugi::xml_document root_tag(std::string_view content) {
+  pugi::xml_document out;
+  size_t at = 0;
+  if (content.starts_with("\xef\xbb\xbf")) at = 3;
+  for (;;) {
+    while (at < content.size() && static_cast<unsigned char>(content[at]) <= ' ') ++at;
+    if (at >= content.size() || content[at] != '<') return out;
+    const size_t end = markup_end(content, at);
+    if (end == kNone) return out;
+    const std::string_view markup = content.substr(at, end - at);
+    at = end;
+    if (!is_tag(markup)) continue;
+    if (!markup.starts_with("<VTKFile") || markup.size() > 4096) return out;
+    const std::string closed = std::string(markup.substr(0, markup.size() - 1)) + "/>";
+    if (!out.load_buffer(closed.data(), closed.size())) out.reset();
+    return out;
+  }
+}
+
+Result<std::unique_ptr<const XmlFile>> XmlFile::open(std::string_view content, const std::string& name) {
+  auto out = std::make_unique<XmlFile>();
+  out->content_ = content;
+  out->name_ = name;
+  size_t appended;
+  out->skeleton_ = skeleton_of(content, appended);
+  const auto parsed = out->tree_.load_buffer_inplace(out->skeleton_.data(), out->skeleton_.size(), pugi::parse_default,
+                                                     pugi::encoding_utf8);
+  if (!parsed || !out->root())
+    return Error{fmt::format("{}: is cut off or no XML file of VTK's: {}", name,
+                             parsed ? "it has no VTKFile element" : parsed.description())};
+  if (appended != kNone) {
+    const size_t end = std::min(markup_end(content, appended), content.size());
+    pugi::xml_document tag;
+    tag.load_string((std::string(content.substr(appended, end - appended)) + "</AppendedData>").c_str());
+    out->appended_base64_ = std::string_view(tag.first_child().attribute("encoding").value()) == "base64";
+    const size_t mark = content.find_first_not_of(" \t\r\n", end);
+    if (mark != kNone && content[mark] == '_') out->appended_ = content.substr(mark + 1);
+  }
+  const auto root = out->root();
+  out->big_endian_ = std::string_view(root.attribute("byte_order").value()) == "BigEndian";
+  out->header_bytes_ = std::string_view(root.attribute("header_type").value()) == "UInt64" ? 8 : 4;
+  out->compressor_ = root.attribute("compressor").value();
+  return std::unique_ptr<const XmlFile>(std::move(out));
+}
+
+std::string_view XmlFile::text(pugi::xml_node element) const {
+  const std::string_view where = element.text().get();
+  size_t begin = 0, size = 0;
+  const auto first = std::from_chars(where.data(), where.data() + where.size(), begin);
+  if (first.ptr == where.data() + where.size()) return {};
+  std::from_chars(first.ptr + 1, where.data() + where.size(), size);
+  return content_.substr(std::min(begin, content_.size()), size);
+}
+
+Result<Array> XmlFile::array(pugi::xml_node element, int64_t tuples) const {
+  if (!element) return Error{name_ + ": an array that its cells or points need is missing"};
+  Array out;
+  out.name = element.attribute("Name").value();
+  const std::string what = fmt::format("{}: array {}", name_, out.name);
+  if (!type_of(element.attribute("type").value(), out.type))
+    return Error{fmt::format("{} is of type {}, not of numbers", what, element.attribute("type").value())};
+  out.components = std::clamp<size_t>(element.attribute("NumberOfComponents").as_uint(1), 1, 1 << 16);
+  for (const auto key : element.children("InformationKey"))
+    if (std::string_view(key.attribute("name").value()) == "UNITS_LABEL") out.unit = text(key);
+  const std::string_view format = element.attribute("format").value();
+  const size_t most = tuples < 0 ? ~size_t{0} : size_t(tuples) * out.components;
+  const bool appended = format == "appended" || (format.empty() && element.attribute("offset"));
+  if (appended || format == "binary") {
+    std::string_view encoded = appended ? appended_ : text(element);
+    const uint64_t offset = appended ? element.attribute("offset").as_ullong() : 0;
+    if (offset > encoded.size())
+      return Error{fmt::format("{} begins at byte {} of {} appended ones", what, offset, encoded.size())};
+    encoded.remove_prefix(offset);
+    const bool nothing = !appended && encoded.empty();  // as some write arrays without values
+    auto decoded =
+        nothing ? Result<Array>(std::move(out)) : decode(std::move(out), encoded, !appended || appended_base64_, what);
+    if (!decoded) return decoded;
+    out = std::move(*decoded);
+  } else {
+    const Status parsed =
+        with_type(out.type, [&](auto v) { return parse_all<decltype(v)>(text(element), out, most, what); });
+    if (!parsed) return parsed.error();
+  }
+  if (tuples >= 0 && out.values < most)
+    return Error{fmt::format("{} has {} values, {} are needed", what, out.values, most)};
+  if (tuples >= 0) out.values = most;
+  return out;
+}
+
+Result<Array> XmlFile::decode(Array out, std::string_view encoded, bool base64, const std::string& what) const {
+  EncodedBytes in(encoded, base64);
+  const auto packing = packing_of(compressor_);
+  if (!packing) return Error{fmt::format("{}: is packed by {}, which is not known", name_, compressor_)};
+  auto bytes = *packing == Packing::kNone ? read_plain(in, header_bytes_, big_endian_, what)
+                                          : unpack(in, *packing, header_bytes_, big_endian_, what);
+  if (!bytes) return bytes.error();
+  out.owned = std::move(bytes->owned);
+  out.data = out.owned.empty() ? bytes->in_file.data() : out.owned.data();
+  out.values = (out.owned.empty() ? bytes->in_file.size() : out.owned.size()) / stored_bytes(out.type);
+  if (big_endian_) out.swap_bytes();
+  return out;
+}
+
+}  // namespace telesplat::data::vtk
