@@ -150,7 +150,7 @@ class Assembly {
 
 Result<Image> read_image_header(std::string_view content, const std::string& path, Companions& companions,
                                 const std::string& array) {
-  if (kind_of(content) == "vtk") return legacy_header(content, path, array);
+  if (legacy_kind(content) == "STRUCTURED_POINTS") return legacy_header(content, path, array);
   const auto file = XmlFile::open(content, path);
   if (!file) return Error{file.error().text + "; an image has a WholeExtent"};
   const auto root = (*file)->root();

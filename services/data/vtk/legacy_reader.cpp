@@ -195,6 +195,7 @@ class Parser {
 
   // "N SIZE" and a list of counts and points; since version 5 "OFFSETS" and "CONNECTIVITY" behind N + 1 and SIZE.
   Status cells(Cells& out) {
+    if (set_.structured) return fail("has cells of its own, which a structured data set has not");
     int64_t n = 0, size = 0;
     if (!count(n) || !count(size)) return fail("its number of cells is no number");
     if (uint64_t(n) > content_.size() || uint64_t(size) > content_.size())
@@ -223,6 +224,7 @@ class Parser {
   Status poly_cells(size_t kind) { return cells(of_poly_[kind]); }
 
   Status cell_types() {
+    if (set_.structured) return fail("has CELL_TYPES, which a structured data set has not");
     int64_t n = 0;
     if (!count(n)) return fail("its number of CELL_TYPES is no number");
     const auto types = values(StoredType::kI32, uint64_t(n), "CELL_TYPES");
@@ -397,6 +399,7 @@ class Parser {
   }
 
   Result<DataSet> finish() {
+    if (set_.structured && kind_ != "STRUCTURED_GRID") set_.points = {};
     if (set_.structured && set_.side(0) < 1) return fail("has no DIMENSIONS");
     if (kind_ == "STRUCTURED_GRID" && set_.points.tuples() != set_.point_count())
       return fail(fmt::format("has {} POINTS for its DIMENSIONS of {}", set_.points.tuples(), set_.point_count()));
