@@ -22,7 +22,7 @@ image::Legend legend_of(const Colouring& c) {
 image::Legend legend_of(const volume::Session& session) {
   const auto& points = session.transfer.points;
   image::Legend out;
-  out.title = session.range.hounsfield ? "CT number [HU]" : "value";
+  out.title = session.range.hounsfield ? "CT number [HU]" : session.array.empty() ? "value" : session.array;
   out.lo = std::max(points.front().value, session.range.lo);
   out.hi = std::min(points.back().value, session.range.hi);
   if (!(out.lo < out.hi)) out.lo = session.range.lo, out.hi = std::max(session.range.lo, session.range.hi);

@@ -69,7 +69,11 @@ std::map<std::string, double> to_parameters(const Session& s) {
   return out;
 }
 
-std::map<std::string, std::string> to_facts(const Session& s) { return {{"transfer", to_text(s.transfer)}}; }
+std::map<std::string, std::string> to_facts(const Session& s) {
+  std::map<std::string, std::string> out{{"transfer", to_text(s.transfer)}};
+  if (!s.array.empty()) out["volume_array"] = s.array;
+  return out;
+}
 
 Result<Session> read_session(const std::map<std::string, double>& parameters,
                              const std::map<std::string, std::string>& facts) {
@@ -102,6 +106,8 @@ Result<Session> read_session(const std::map<std::string, double>& parameters,
   auto parsed = parse_transfer(transfer->second, s.range);
   if (!parsed) return parsed.error();
   s.transfer = std::move(*parsed);
+  if (const auto array = facts.find("volume_array"); array != facts.end())
+    s.array = array->second.substr(0, kMaxArrayName);
   return s;
 }
 

@@ -10,10 +10,13 @@
 
 namespace telesplat::volume {
 
+inline constexpr size_t kMaxArrayName = 200;
+
 struct Session {
   Grid grid;
   Levels levels;
   ValueRange range;
+  std::string array;          ///< of a file that names its values; facts["volume_array"]; at most kMaxArrayName bytes
   TransferFunction transfer;  ///< facts["transfer"]: its text form
   bool lit = true;            ///< voxels carry normals of their gradient and are shaded
   int steps = 1;              ///< of a time-varying volume

@@ -33,7 +33,7 @@ Status check_named(const std::string& path, const std::string& named) {
 
 // The file's own voxels lie in itself, or in the file that its header names.
 Status check_volume(const DataOptions& o) {
-  const auto source = find_volume(o.scene, o.volume.raw, o.volume.series);
+  const auto source = find_volume(o.scene, o.volume);
   if (!source) return ok_status();
   if (source->dicom) return ok_status();  // slices name nothing
   for (const std::string& step : source->steps) {

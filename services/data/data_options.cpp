@@ -10,6 +10,7 @@
 #include "common/volume/transfer/function.h"
 #include "services/data/kinds.h"
 #include "services/data/mesh/active_array.h"
+#include "services/data/mesh/reader.h"
 #include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
@@ -127,8 +128,8 @@ Table volume_table(DataOptions& o) {
       {
           {.flag = "--raw",
            .value = &o.volume.raw,
-           .help = fmt::format("layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING], "
-                               "TYPE one of {}",
+           .help = fmt::format("layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING]"
+                               "[:skip=BYTES], TYPE one of {}",
                                kRawTypes),
            .fits = kVolumesAndTheirSurfaces,
            .reach = Reach::kRecorded},
@@ -136,6 +137,17 @@ Table volume_table(DataOptions& o) {
            .value = &o.volume.series,
            .help = "which series of a DICOM folder: its place in the list that telesplat inspect prints, or its UID; "
                    "default: the one of most slices",
+           .fits = kVolumesAndTheirSurfaces,
+           .reach = Reach::kRecorded},
+          {.flag = "--spacing",
+           .value = &o.volume.spacing,
+           .help = "distances of a volume's voxels, X,Y,Z, instead of those that its files tell or lack (pictures)",
+           .fits = kVolumesAndTheirSurfaces,
+           .reach = Reach::kRecorded},
+          {.flag = "--array",
+           .value = &o.volume.array,
+           .help = "which array of a VTI or VTK volume file is shown, by its name (telesplat inspect lists them); "
+                   "default: the one that the file marks, else its first",
            .fits = kVolumesAndTheirSurfaces,
            .reach = Reach::kRecorded},
           {.flag = "--iso",
@@ -172,9 +184,10 @@ Table volume_table(DataOptions& o) {
 
 MeshOptions DataOptions::mesh_options() const {
   MeshOptions out = mesh;
-  out.raw = volume.raw, out.series = volume.series;
+  out.volume = volume;
   if (!out.colouring.by.empty() || out.iso) return out;
-  out.colouring.by = active_array_of(scene);
+  const auto file = find_mesh_file(scene);
+  out.colouring.by = file ? active_array_of(file->path) : "";
   out.colouring.by_file = !out.colouring.by.empty();
   return out;
 }

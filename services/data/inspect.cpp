@@ -34,10 +34,10 @@ const char* unit_of(const MeshFileFacts& facts) {
 
 // As inspect_volume() tells it, but read from the header alone.
 std::string unit_of_volume(const std::string& path, const MeshOptions& options) {
-  const auto source = find_volume(path, options.raw, options.series);
+  const auto source = find_volume(path, options.volume);
   if (!source) return "";
   if (source->dicom) return "mm";
-  const auto header = read_volume_header(source->steps[0], options.raw);
+  const auto header = read_volume_header(source->steps[0], options.volume.raw);
   return header ? header->unit : "";
 }
 
@@ -149,10 +149,11 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   facts.iso = options.iso;
   facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {
-    const auto file = MappedFile::open(path);
+    const std::string& read = facts.info.source;  // of a folder its first file
+    const auto file = MappedFile::open(read);
     if (!file) return file.error();
-    std::vector<std::string> files = companion_files((*file)->text(), "raster", path);
-    files.insert(files.begin(), path);
+    std::vector<std::string> files = companion_files((*file)->text(), "raster", read);
+    files.insert(files.begin(), read);
     auto raster = inspect_raster(files);
     if (!raster) return raster.error();
     facts.raster = std::move(*raster);
@@ -211,6 +212,8 @@ Description describe(const MeshFileFacts& facts) {
 }
 
 bool is_mesh_file(const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return find_mesh_file(path).ok();
   const auto file = MappedFile::open(path);
   return file.ok() && !detect_format((*file)->text(), path).format.empty();
 }

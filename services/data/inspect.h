@@ -48,6 +48,7 @@ struct VolumeFileFacts {
   size_t steps_read = 1;                 ///< session.range.lo and hi are those of so many steps
   std::string up, up_reason;
   std::string transfer, transfer_reason;  ///< the transfer function's name, if it has one
+  std::vector<std::string> arrays;        ///< of a file that names them
   std::vector<std::string> series;        ///< of a DICOM folder, as text_of() says
 };
 

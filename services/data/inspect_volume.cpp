@@ -1,5 +1,6 @@
 // What `telesplat inspect` says of a volume.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 
 #include "services/data/inspect.h"
 #include "services/data/volume/formats/dicom_series.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 namespace {
@@ -32,8 +34,8 @@ void take(const Volume& v, VolumeFileFacts& facts) {
   const double scale = v.hi > v.lo ? double(facts.histogram.size()) / (v.hi - v.lo) : 0;
   for (size_t at = 0; at < count; ++at)
     ++facts.histogram[std::min(size_t(std::max(0.0, (v.value(at) - v.lo) * scale)), facts.histogram.size() - 1)];
-  facts.volume = {v.size, v.index_to_data, v.unit,       v.space, v.type, v.scale,      v.offset,
-                  {},     v.format,        v.hounsfield, v.lo,    v.hi,   v.not_finite, v.remark};
+  facts.volume = {v.size,   v.index_to_data, v.unit, v.space, v.type,       v.scale,  v.offset, {},
+                  v.format, v.hounsfield,    v.lo,   v.hi,    v.not_finite, v.remark, v.array};
 }
 
 std::string unit_of(const VolumeFileFacts& facts) {
@@ -65,6 +67,16 @@ void describe_grid(const VolumeFileFacts& facts, Description& out) {
   for (int a = 0; a < 4; ++a) out.json["index_to_data"].push_back(vector_json(glm::dvec3(m[a])));
   out.json["handed"] = left ? "left" : "right";
   out.json["box"] = box_json(box);
+}
+
+// Those that a file names, and which one is shown.
+void describe_arrays(const VolumeFileFacts& facts, Description& out) {
+  if (facts.volume.array.empty()) return;
+  out.row("array", facts.volume.array);
+  out.json["array"] = facts.volume.array;
+  out.json["arrays"] = facts.arrays;
+  if (facts.arrays.size() > 1)
+    out.row("", fmt::format("of {} (--array NAME shows another)", fmt::join(facts.arrays, ", ")));
 }
 
 void describe_values(const VolumeFileFacts& facts, Description& out) {
@@ -116,7 +128,7 @@ Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOpti
                                        const PlacementOptions& placement, const Progress& progress) {
   VolumeFileFacts facts;
   facts.path = path;
-  const auto source = find_volume(path, options.raw, options.series);
+  const auto source = find_volume(path, options);
   if (!source) return source.error();
   facts.source = *source;
   if (auto status = check_steps(facts.source); !status) return status.error();
@@ -132,6 +144,9 @@ Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOpti
       VolumeStore::make(read, source->steps.size(), path, options, placement, progress ? progress : silent);
   if (!store) return store.error();
   facts.session = (*store)->session();
+  if (!facts.volume.array.empty())
+    if (const auto header = read_volume_header(source->steps[0], options.raw, options.array))
+      facts.arrays = header->arrays;
   std::error_code error;
   for (const std::string& file : source->files()) facts.file_bytes += fs::file_size(file, error);
   facts.up = up_of_volume(placement);
@@ -155,6 +170,7 @@ Description describe(const VolumeFileFacts& facts) {
   out.json["format"] = facts.volume.format;
   out.json["bytes"] = facts.file_bytes;
   describe_grid(facts, out);
+  describe_arrays(facts, out);
   describe_values(facts, out);
   describe_steps(facts, out);
   describe_room(out, facts.session.grid.box_room(), facts.up, facts.up_reason);

@@ -26,10 +26,7 @@ bool is_julia(const DataOptions& o) { return o.scene == julia::kSceneWord; }
 bool holds_volume(const DataOptions& o) { return !o.volume.raw.empty() || looks_like_volume(o.scene); }
 bool is_volume(const DataOptions& o) { return !o.mesh.iso && holds_volume(o); }
 // A file that nobody else claims is a mesh or a raster; which one, or why not, its reader tells.
-bool is_mesh(const DataOptions& o) {
-  std::error_code error;
-  return o.mesh.iso ? holds_volume(o) : !std::filesystem::is_directory(o.scene, error);
-}
+bool is_mesh(const DataOptions& o) { return o.mesh.iso ? holds_volume(o) : find_mesh_file(o.scene).ok(); }
 
 OpenServed open_as_mesh(const DataOptions& o, const Progress& progress) {
   const MeshOptions options = o.mesh_options();
@@ -66,7 +63,8 @@ struct Row {
 constexpr Row kRows[] = {
     {Kind::kJulia, "the word julia", is_julia, open_as_julia},
     {Kind::kVolume,
-     "volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a numbered series)",
+     "volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, DICOM: a folder, disc or file, slices as TIFF or PNG, or a "
+     "folder with a numbered series)",
      is_volume, open_as_volume},
     {Kind::kMesh,
      "mesh file (PLY, OBJ, STL, OFF, VTP, VTU, VTS, VTR, VTM, PVD, VTK, glTF, GLB) or elevation raster (GeoTIFF, HGT, "

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "services/data/mesh/file_source.h"
+#include "services/data/mesh/reader.h"
 #include "services/data/surface/isosurface.h"
 
 namespace telesplat::data {
@@ -23,10 +26,25 @@ Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const M
   if (options.iso && !array.empty())
     return Error{
         fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};
-  const auto source = options.iso ? surface_source(path, options.raw, options.series, *options.iso, progress)
-                                  : file_source(path, options.elevation, array, options.texture_detail, progress);
+  if (options.iso) {
+    const auto surface = surface_source(path, options.volume, *options.iso, progress);
+    return surface ? MeshStore::make(path, *surface, options, progress) : surface.error();
+  }
+  const auto file = find_mesh_file(path);
+  if (!file) return file.error();
+  auto source = file_source(file->path, options.elevation, array, options.texture_detail, progress);
   if (!source) return source.error();
-  return MeshStore::make(path, *source, options, progress);
+  if (file->steps > 1) {
+    source->variant += "-first";
+    source->read = [read = source->read, folder = path, file = *file](const ReadProgress& p) {
+      auto mesh = read(p);
+      if (mesh)
+        mesh->notes.push_back(fmt::format("its folder, {}, holds {} time steps; the first one is shown ({})", folder,
+                                          file.steps, std::filesystem::path(file.path).filename().string()));
+      return mesh;
+    };
+  }
+  return MeshStore::make(file->path, *source, options, progress);
 }
 
 Result<colour::ColourMap> colour_map_of(const MeshOptions& options) {

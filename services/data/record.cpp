@@ -47,7 +47,7 @@ std::vector<std::string> files_of(const DataOptions& o, scene::Kind kind) {
   if (kind == scene::Kind::kJulia) return {};
   std::vector<std::string> paths{o.scene};
   if (kind == scene::Kind::kVolume)
-    if (const auto volume = find_volume(o.scene, o.volume.raw, o.volume.series)) paths = volume->files();
+    if (const auto volume = find_volume(o.scene, o.volume)) paths = volume->files();
   std::vector<std::string> out;
   std::error_code error;
   for (const std::string& path : paths) {

@@ -1,11 +1,14 @@
-// The parsers of all volume headers: whatever a header says, what passes the checks must be a grid whose voxels the
-// data can hold.
+// The parsers of all volume headers, of VTK's files and of TIFF directories: whatever a header says, what passes the
+// checks must be a grid whose voxels the data can hold.
 #include <cstdint>
 #include <cstdlib>
 
 #include "common/volume/grid.h"
 #include "services/data/volume/formats/dicom_order.h"
 #include "services/data/volume/formats/header.h"
+#include "services/data/volume/formats/tiff_pages.h"
+#include "services/data/vtk/image.h"
+#include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
 namespace {
@@ -18,8 +21,13 @@ void use(const Result<VolumeFileHeader>& header, uint64_t data_bytes) {
   if (!check_header(*header, data_bytes, "fuzz").ok()) return;
   const volume::Grid grid{{int(header->size[0]), int(header->size[1]), int(header->size[2])}, header->index_to_data};
   if (!volume::validate(grid).ok()) std::abort();
-  if (header->encoding == Encoding::kRaw && header->voxel_bytes() > data_bytes) std::abort();
+  if (header->encoding == Encoding::kRaw && header->voxel_bytes() / header->parts() > data_bytes) std::abort();
 }
+
+class NoCompanions final : public Companions {
+ public:
+  Result<std::string_view> read(const std::string& named) override { return Error{"fuzz: no " + named}; }
+};
 
 }  // namespace
 }  // namespace telesplat::data
@@ -30,7 +38,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   use(parse_nrrd(content, "fuzz"), size);
   use(parse_metaimage(content, "fuzz"), size);
   use(parse_nifti(content, "fuzz"), size);
-  use(parse_vti(content, "fuzz"), size);
+  NoCompanions none;
+  if (const auto image = vtk::read_image_header(content, "fuzz", none, "");
+      image && image->extent[1] < 64 && image->extent[3] < 64 && image->extent[5] < 64)
+    vtk::read_image(*image, content, "fuzz", none);
+  if (const auto mesh = vtk::read_mesh(content, "fuzz", none, ""); !mesh && mesh.error().text.find("fuzz") != 0)
+    std::abort();
+  if (const auto pages = tiff_pages(content); pages && pages->data_at > size) std::abort();
   use(parse_raw_spec(content, "fuzz"), size);
   const auto slices = parse_dicom(content, "fuzz");
   if (slices.ok() && slices->empty()) std::abort();

@@ -363,6 +363,7 @@ class NoMemory final : public VolumeStore {
   const volume::Session& session() const override { return store_->session(); }
   const volume::Histogram& histogram() const override { return store_->histogram(); }
   std::string format() const override { return store_->format(); }
+  std::string remark() const override { return store_->remark(); }
   const scene::Placement& placement() const override { return store_->placement(); }
   uint64_t content_hash() const override { return store_->content_hash(); }
   Result<volume::Voxels> voxels(int, int, int, const volume::LevelSet&, const volume::LevelSet&) override {

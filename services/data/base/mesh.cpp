@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "services/data/base/double_vertices.h"
+#include "services/data/base/polygons/double_vertices.h"
 
 namespace telesplat::data {
 

@@ -207,16 +207,21 @@ Status read_heights(GDALRasterBandH band, const std::string& path, double metres
   int has_none = 0, has_scale = 0, has_offset = 0;
   const double none = GDALGetRasterNoDataValue(band, &has_none);
   const double scale = GDALGetRasterScale(band, &has_scale), offset = GDALGetRasterOffset(band, &has_offset);
+  // A mask of its own: no-data values are looked at below, and a mask of all samples says nothing.
+  const bool masked = (GDALGetMaskFlags(band) & GMF_PER_DATASET) != 0;
+  const GDALRasterBandH mask = GDALGetMaskBand(band);
   std::vector<float> row(size_t(w), 0.0f);
+  std::vector<uint8_t> shown(size_t(w), 255);
   out.heights.reserve(size_t(out.width) * size_t(out.height));
   for (int y = 0; y < out.height; ++y) {
-    if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
+    if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None ||
+        (masked && GDALRasterIO(mask, GF_Read, 0, y * out.step, w, 1, shown.data(), w, 1, GDT_Byte, 0, 0) != CE_None))
       return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, gdal_complaint())};
     for (int x = 0; x < out.width; ++x) {
       double v = row[size_t(x) * size_t(out.step)];
       // -32768 and -9999 are what void samples usually have, said or not.
-      const bool no_data =
-          !std::isfinite(v) || (has_none && v == float(none)) || v == -32768 || v == -9999 || std::abs(v) > 1e9;
+      const bool no_data = shown[size_t(x) * size_t(out.step)] == 0 || !std::isfinite(v) ||
+                           (has_none && v == float(none)) || v == -32768 || v == -9999 || std::abs(v) > 1e9;
       if (has_scale) v *= scale;
       if (has_offset) v += offset;
       out.heights.push_back(no_data ? std::numeric_limits<float>::quiet_NaN() : float(v * metres));

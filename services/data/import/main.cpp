@@ -21,6 +21,8 @@
 #include "services/data/import/process.h"
 #include "services/data/import/raster_facts.h"
 #include "services/data/import/report.h"
+#include "services/data/import/stack.h"
+#include "services/data/mesh/formats/readers.h"
 #include "services/data/volume/formats/import_stream.h"
 
 namespace {
@@ -42,11 +44,15 @@ telesplat::Result<telesplat::data::Mesh> import_elevation(telesplat::data::Impor
   return telesplat::data::elevation_mesh(*raster, {z_scale, texture}, path);
 }
 
-telesplat::Result<telesplat::data::Mesh> import_gltf(telesplat::data::ImportFiles& files, const std::string& path,
-                                                     uint64_t texture_detail) {
+telesplat::Result<telesplat::data::Mesh> import_mesh(telesplat::data::ImportFiles& files, const std::string& format,
+                                                     const std::string& path, uint64_t texture_detail,
+                                                     const std::string& array) {
   const auto content = files.content();
   if (!content) return telesplat::Error{fmt::format("{}: {}", path, content.error().text)};
-  return telesplat::data::read_gltf(*content, path, files, texture_detail);
+  if (format == "obj") return telesplat::data::read_obj(*content, path, nullptr, files, texture_detail);
+  if (format == "ply") return telesplat::data::read_ply(*content, path, nullptr, files, array, texture_detail);
+  if (format == "gltf") return telesplat::data::read_gltf(*content, path, files, texture_detail);
+  return telesplat::Error{fmt::format("{}: {} is no format that is read here", path, format)};
 }
 
 // All frames of all files, one after the other, as one volume. bytes: of their pixels.
@@ -74,13 +80,26 @@ bool import_dicom(int out, const telesplat::data::ImportFiles& files, uint64_t b
   return pixels.size() == header.voxel_bytes() && data::send_volume(out, header, pixels.data());
 }
 
+bool import_stack(int out, telesplat::data::ImportFiles& files, const std::string& path, const std::string& layout) {
+  namespace data = telesplat::data;
+  const auto header = data::parse_raw_spec(layout, path);
+  if (!header) return data::send_error(out, header.error().text);
+  limit_time(header->voxel_bytes());
+  data::confine(memory_with(2 * header->voxel_bytes() + 2 * files.bytes()));
+  const auto voxels = data::read_stack(files, *header);
+  if (!voxels) return data::send_error(out, voxels.error().text);
+  return data::send_volume(out, *header, voxels->data());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 3 || argc > 5) {
     std::fputs(
-        "usage: telesplat-import gltf FILE TEXTURE_DETAIL   (standard output: the mesh, for telesplat-data)\n"
+        "usage: telesplat-import gltf|obj|ply FILE TEXTURE_DETAIL [ARRAY]   (standard input: files.h; output: "
+        "report.h)\n"
         "       telesplat-import dicom NAME BYTES    (standard output: import_stream.h)\n"
+        "       telesplat-import stack NAME SIZExSIZExSIZE:TYPE  (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
         "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n",
         stderr);
@@ -98,18 +117,19 @@ int main(int argc, char** argv) {
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what libraries print must not get between
   try {
     limit_time(file_bytes);
+    if (format == "stack" && argc == 4) return import_stack(out, files, path, argv[3]) ? 0 : 1;
     if (format == "dicom" && argc == 4) return import_dicom(out, files, std::strtoull(argv[3], nullptr, 10)) ? 0 : 1;
-    const bool gltf = format == "gltf";
-    const uint64_t texture_detail = gltf && argc == 4 ? std::strtoull(argv[3], nullptr, 10) : 0;
+    const bool raster = format.starts_with("raster");
+    const uint64_t texture_detail = !raster && argc > 3 ? std::strtoull(argv[3], nullptr, 10) : 0;
     // Pictures hold many texels a byte; baked triangles are divided into a copy.
-    const uint64_t memory = memory_with(100 * file_bytes + (gltf ? (uint64_t{3} << 30) + 300 * texture_detail : 0));
-    telesplat::data::confine(memory);
+    const uint64_t pictures = raster ? 0 : (uint64_t{3} << 30) + 300 * texture_detail;
+    telesplat::data::confine(memory_with(100 * file_bytes + pictures));
     if (format == "raster-facts") {
       const auto facts = telesplat::data::read_raster_facts(files, path);
       return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
     }
-    const auto mesh = argc == 5 ? import_elevation(files, path, std::atof(argv[3]), argv[4])
-                                : import_gltf(files, path, texture_detail);
+    const auto mesh = raster && argc == 5 ? import_elevation(files, path, std::atof(argv[3]), argv[4])
+                                          : import_mesh(files, format, path, texture_detail, argc == 5 ? argv[4] : "");
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{

@@ -24,6 +24,8 @@ struct Report {
   uint32_t arrays_bytes = 0;       // scene::to_text() of the arrays
   uint64_t notes_bytes = 0;        // each ends with a line's end
   uint64_t coordinates_bytes = 0;  // scene::to_text() of them
+  uint64_t copies = 0;             // vertices that are copies
+  uint64_t smooth = 0;             // Mesh::smooth
 };
 
 bool write_all(int descriptor, const void* data, size_t bytes) {
@@ -70,12 +72,15 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
             mesh.scalars_of_faces,
             static_cast<uint32_t>(arrays.size()),
             notes.size(),
-            coordinates.size()};
+            coordinates.size(),
+            mesh.copy_of.size(),
+            mesh.smooth};
   const auto put = [&](const auto& array) {
     return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
   };
   return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) &&
-         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(arrays) && put(notes) && put(coordinates);
+         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(mesh.copy_of) && put(arrays) &&
+         put(notes) && put(coordinates);
 }
 
 Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format) {
@@ -94,8 +99,12 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
       take(rest, report.colours ? report.vertices : 0, mesh.colours) && report.triangles <= kMaxTriangles &&
       take(rest, 3 * report.triangles, mesh.indices) &&
       (report.scalars == 0 || report.scalars == (report.of_faces ? report.triangles : report.vertices)) &&
-      take(rest, report.scalars, mesh.scalars);
+      take(rest, report.scalars, mesh.scalars) && report.copies <= report.vertices &&
+      take(rest, report.copies, mesh.copy_of) && std::all_of(mesh.copy_of.begin(), mesh.copy_of.end(), [&](uint32_t v) {
+        return v < report.vertices - report.copies;
+      });
   mesh.scalars_of_faces = report.of_faces != 0;
+  mesh.smooth = report.smooth != 0;
   std::vector<char> text;
   if (!whole || report.arrays_bytes > scene::kMaxArraysText || !take(rest, report.arrays_bytes, text))
     return incomplete;

@@ -6,6 +6,7 @@
 
 #include "services/data/base/elevation_options.h"
 #include "services/data/base/placement_options.h"
+#include "services/data/base/volume_layout.h"
 #include "services/data/texture/bake.h"
 
 namespace telesplat::data {
@@ -28,7 +29,7 @@ struct MeshOptions : StoreOptions {
   uint64_t texture_detail = kDefaultTextureDetail;  ///< triangles, at most, of a mesh whose textures are baked
   ColouringOptions colouring;
   std::optional<double> iso;  ///< of volumes alone: the surface where they have this value
-  std::string raw, series;    ///< with iso: those of VolumeSource
+  VolumeLayout volume;        ///< with iso
 };
 
 }  // namespace telesplat::data

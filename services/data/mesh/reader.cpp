@@ -7,6 +7,7 @@
 #include <new>
 
 #include "services/data/base/mapped_file.h"
+#include "services/data/base/numbered.h"
 #include "services/data/gltf/container.h"
 #include "services/data/vtk/reader.h"
 
@@ -160,6 +161,21 @@ Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const
   return std::move(mesh->arrays);
 }
 
+Result<MeshFile> find_mesh_file(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(path, error)) return MeshFile{path};
+  const auto files = files_of_folder(path);
+  if (!files) return files.error();
+  std::vector<std::string> meshes;
+  for (const std::string& name : *files)
+    if (const auto file = MappedFile::open(name); file && !detect_format((*file)->text(), name).format.empty())
+      meshes.push_back(name);
+  if (meshes.empty()) return Error{fmt::format("{}: is a folder without mesh files", path)};
+  auto steps = numbered_series(meshes, path);
+  if (!steps) return steps.error();
+  return MeshFile{steps->front(), steps->size()};
+}
+
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation,
                        const std::string& array, uint64_t texture_detail) {
   const auto file = MappedFile::open(path);
@@ -170,7 +186,9 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
   if (const Status s = check_array(array, detected.format, path); !s) return s.error();
   try {
     FolderCompanions folder(path);
-    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress, folder, array, texture_detail)
+    auto pictured = read_pictured(content, detected.format, path, progress, array, texture_detail);
+    auto mesh = pictured                      ? *std::move(pictured)
+                : detected.format == "ply"    ? read_ply(content, path, progress, folder, array, texture_detail)
                 : detected.format == "off"    ? read_off(content, path, progress)
                 : detected.format == "stl"    ? read_stl(content, path, progress)
                 : detected.format == "obj"    ? read_obj(content, path, progress, folder, texture_detail)

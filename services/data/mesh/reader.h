@@ -1,6 +1,7 @@
 // Reading mesh files: one function a format, and one that finds out which.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -8,6 +9,7 @@
 #include "services/data/base/elevation.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
+#include "services/data/mesh/formats/readers.h"
 #include "services/data/texture/bake.h"
 
 namespace telesplat::data {
@@ -28,6 +30,14 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {},
                        const std::string& array = {}, uint64_t texture_detail = kDefaultTextureDetail);
 
+/// The mesh file that a path means: itself, or the first one of a folder with a numbered series of mesh files and no
+/// others. steps: how many there are. Error: the folder holds no such series.
+struct MeshFile {
+  std::string path;
+  size_t steps = 1;
+};
+Result<MeshFile> find_mesh_file(const std::string& path);
+
 /// What arrays of numbers a mesh file holds, with the ranges of their values. It is read for that, but kept nowhere.
 /// Empty: of a format that has none, or a file without. Errors name the file.
 Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const ReadProgress& progress = {});
@@ -36,30 +46,6 @@ bool has_arrays(std::string_view format);
 /// Error: an array is named, but files of this format have none.
 Status check_array(const std::string& array, const std::string& format, const std::string& path);
 
-// The readers of single formats. `content` is the whole file, `name` stands in error texts. They promise what
-// validate_mesh checks only as far as sizes go (arrays one a vertex, three indices a triangle); read_mesh checks the
-// rest. Faces of more than three corners become fans around their first corner, which is right for convex ones.
-
-/// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*)
-/// of vertices and faces; comments "TextureFile" with places of vertices (s t, u v, texture_u texture_v) or of corners
-/// (texcoord, texnumber), which are baked; other numbers of vertices and faces are arrays.
-Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
-                      Companions& companions, const std::string& array = {},
-                      uint64_t texture_detail = kDefaultTextureDetail);
-/// OFF, text and binary, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours of
-/// faces; comments; CRLF. Error: the prefixes 4 and n, whose vertices are not of three coordinates.
-Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// STL, binary or ascii; colours of facets as VisCAM and Materialise write them. Corners at the same position become
-/// one vertex.
-Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// Whether the content is an STL in text, and one in binary, whose header may begin like text.
-bool is_text_stl(std::string_view content);
-bool is_binary_stl(std::string_view content);
-/// Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
-/// libraries; textures are baked; continued lines. Lines, points, curves and free-form surfaces are left out, with a
-/// note.
-Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
-                      Companions& companions, uint64_t texture_detail = kDefaultTextureDetail);
 /// VTK's files: vtk/reader.h. Files that it names are read from its folder.
 Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
                       const std::string& array = {});
@@ -67,6 +53,12 @@ Result<Mesh> read_vtk(std::string_view content, const std::string& path, const R
 /// program or in $PATH: a crash on a hostile file does not reach us.
 Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
                                 uint64_t texture_detail);
+
+/// An OBJ or PLY that pictures cover, read by the readers above in telesplat-import: decoders of pictures are foreign,
+/// too. None: it is of another format, or names no picture.
+std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::string& format, const std::string& path,
+                                          const ReadProgress& progress, const std::string& array,
+                                          uint64_t texture_detail);
 
 /// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
 /// elevation.h.

@@ -22,20 +22,21 @@ std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64
 
 }  // namespace
 
-Result<MeshSource> surface_source(const std::string& path, const std::string& raw, const std::string& series,
-                                  double iso, const Progress& progress) {
-  auto found = find_volume(path, raw, series);
+Result<MeshSource> surface_source(const std::string& path, const VolumeLayout& layout, double iso,
+                                  const Progress& progress) {
+  auto found = find_volume(path, layout);
   if (!found) return found.error();
   const auto read = [source = *found, iso](const ReadProgress& p) -> Result<Mesh> {
     const auto volume = read_volume(source, 0, p);
     if (!volume) return volume.error();
     return isosurface(*volume, iso, source.name);
   };
-  const std::string which = raw.empty() && series.empty() ? "" : "-" + hex(raw + series);
+  const std::string said = layout.text(), which = said.empty() ? "" : "-" + hex(said);
   // What the volume's first step is read from: one file and those that it names, or all slices of a series.
-  auto files = found->dicom ? found->files() : std::vector{found->steps.front()};
-  if (!found->dicom)
-    if (const auto header = read_volume_header(files[0], raw)) {
+  const bool several = found->dicom || !found->slices.empty();
+  auto files = several ? found->files() : std::vector{found->steps.front()};
+  if (!several)
+    if (const auto header = read_volume_header(files[0], layout.raw, layout.array)) {
       if (header->data_path != files[0]) files.push_back(header->data_path);
       files.insert(files.end(), header->more_paths.begin(), header->more_paths.end());
     }

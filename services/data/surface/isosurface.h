@@ -3,6 +3,7 @@
 
 #include "services/data/base/mesh_source.h"
 #include "services/data/base/volume.h"
+#include "services/data/base/volume_layout.h"
 
 namespace telesplat::data {
 
@@ -11,9 +12,8 @@ namespace telesplat::data {
 /// stays open. Error, starting with `name`: iso is not inside the values, no triangle, too many of them.
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name);
 
-/// That surface of the volume at `path` (its first step), for a store of chunks. raw, series: as find_volume takes
-/// them. Error: as find_volume.
-Result<MeshSource> surface_source(const std::string& path, const std::string& raw, const std::string& series,
-                                  double iso, const Progress& progress);
+/// That surface of the volume at `path` (its first step), for a store of chunks. Error: as find_volume.
+Result<MeshSource> surface_source(const std::string& path, const VolumeLayout& layout, double iso,
+                                  const Progress& progress);
 
 }  // namespace telesplat::data

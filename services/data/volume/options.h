@@ -4,11 +4,11 @@
 #include <optional>
 #include <string>
 
+#include "services/data/base/volume_layout.h"
+
 namespace telesplat::data {
 
-struct VolumeOptions {
-  std::string raw;       ///< VolumeSource::raw
-  std::string series;    ///< VolumeSource::series
+struct VolumeOptions : VolumeLayout {
   std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
   bool lit = true;
   /// Steps of a series a second; nothing: all of them in a second, at most 12.5; 0: it does not play.

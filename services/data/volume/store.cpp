@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 #include <list>
 
+#include "common/core/utf8.h"
 #include "services/data/volume/cast.h"
 #include "services/data/volume/slices.h"
 
@@ -102,6 +103,7 @@ class Store final : public VolumeStore {
     if (!levels) return refuse(levels.error());
     session_.levels = *levels;
     const auto counts = count_levels(all[0], *levels);
+    session_.array = to_utf8(all[0].array.substr(0, volume::kMaxArrayName - 4));
     session_.range = describe_values(counts, *levels, lo, hi, all[0].hounsfield);
     histogram_ = volume::histogram_of(counts, *levels);
     for (size_t step = 0; step < all.size(); ++step) {
@@ -239,7 +241,7 @@ std::string up_of_volume(const PlacementOptions& options) { return options.up ==
 
 Result<std::unique_ptr<VolumeStore>> VolumeStore::open(const std::string& path, const VolumeOptions& options,
                                                        const PlacementOptions& placement, const Progress& progress) {
-  const auto source = find_volume(path, options.raw, options.series);
+  const auto source = find_volume(path, options);
   if (!source) return source.error();
   const StepReader read = [source = *source](size_t step, const ReadProgress& told) {
     return read_volume(source, step, told);

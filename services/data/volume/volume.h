@@ -8,19 +8,19 @@
 #include "common/core/result.h"
 #include "services/data/base/progress.h"
 #include "services/data/base/volume.h"
+#include "services/data/base/volume_layout.h"
 
 namespace telesplat::data {
 
 struct DicomSeries;
 
-/// Files of one data set: what --raw and a path say. One file a time step.
+/// Files of one data set: what a layout and a path say. One file a time step.
 struct VolumeSource {
-  std::vector<std::string> steps;            ///< a file each, or a DICOM folder as often as its series has steps
-  std::string raw;                           ///< --raw: "256x256x256:u8[:sx,sy,sz]"; empty: files tell themselves
-  std::string name;                          ///< for people
-  std::string series;                        ///< --series: which of a DICOM folder's; empty: the one of most slices
-  std::shared_ptr<const DicomSeries> dicom;  ///< of a DICOM folder, file or disc
-  std::string array{};                       ///< of a file that names arrays; empty: as read_volume_header() chooses
+  std::vector<std::string> steps;  ///< a file each, or a DICOM folder as often as its series has steps
+  VolumeLayout layout{};
+  std::string name{};                          ///< for people
+  std::shared_ptr<const DicomSeries> dicom{};  ///< of a DICOM folder, file or disc
+  std::vector<std::string> slices{};           ///< pictures in order (formats/stack.h), of a volume that these make
 
   /// All files that its voxels come from.
   std::vector<std::string> files() const;
@@ -30,10 +30,10 @@ struct VolumeSource {
 /// numbered volume files.
 bool looks_like_volume(const std::string& path);
 /// A volume file, a DICOM folder or file (dicom_series.h), or a folder with a numbered series of volume files
-/// (phase00.nrrd, phase02.nrrd, ...), in order of their numbers. With `raw`, a raw file or a folder of numbered ones.
-/// series: of a DICOM folder alone.
+/// (phase00.nrrd, phase02.nrrd, ...), in order of their numbers; a TIFF file of several pages, or a folder with a
+/// picture a slice. With `raw`, a raw file or a folder of numbered ones. series: of a DICOM folder alone.
 /// Error: nothing of the kind; names path and what it is instead.
-Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series = "");
+Result<VolumeSource> find_volume(const std::string& path, const VolumeLayout& layout = {});
 /// Reads one step. Error: truncated, lying and mismatched headers (sizes against file
 /// sizes), more than volume::kMaxSide on an axis, several components, types that are none of VoxelType's (wider ones
 /// become f32 where that keeps them), memory. Names file, value and limit.

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <string_view>
 
-#include "services/data/base/polygon.h"
+#include "services/data/base/polygons/polygon.h"
 
 namespace telesplat::data::vtk {
 namespace {

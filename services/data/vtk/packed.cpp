@@ -82,7 +82,8 @@ Result<Blocks> read_blocks(EncodedBytes& in, Packing packing, size_t header_byte
     out.packed_total += packed;
   }
   const uint64_t most = (out.packed_total + 64) * best_packing(packing);
-  if (out.bytes > most || out.last_bytes > out.bytes || out.count > most / std::max<uint64_t>(out.bytes, 1) + 1)
+  if (out.last_bytes > out.bytes || out.last_bytes > most ||
+      (out.count > 1 && out.count - 1 > most / std::max<uint64_t>(out.bytes, 1)))
     return Error{
         fmt::format("{} claims {} blocks of {} bytes, packed to {}", what, out.count, out.bytes, out.packed_total)};
   out.total = (out.count - 1) * out.bytes + out.last_bytes;

@@ -220,12 +220,19 @@ class Joint {
     const auto surface = std::find_if_not(same.begin(), same.end(), is_volume);
     if (surface != same.end()) {
       const glm::dvec3 own = cells_[surface->set].area_vector(points(*surface).corners);
-      const glm::dvec3 outward = cells_[volume->set].area_vector(points(*volume).corners);
-      const bool inward = cells_[volume->set].looks_inward(at(*volume).cell, at(*volume).face);
-      at(*surface).inward = (glm::dot(own, outward) < 0) != inward;
+      at(*surface).inward = glm::dot(own, outward(*volume)) < 0;
     }
+    // Cells on both sides hide it; those on one side are one cell that several pieces have.
+    const auto other = std::find_if(volume + 1, same.end(), is_volume);
+    const bool repeated = other != same.end() && glm::dot(outward(*volume), outward(*other)) > 0;
+    const auto kept = surface != same.end() || !repeated ? surface : volume;
     for (auto p = same.begin(); p != same.end(); ++p)
-      if (p != surface) at(*p).data_cell = ~uint32_t{0};
+      if (p != kept) at(*p).data_cell = ~uint32_t{0};
+  }
+
+  glm::dvec3 outward(const Placed& p) {
+    const glm::dvec3 own = cells_[p.set].area_vector(points(p).corners);
+    return cells_[p.set].looks_inward(at(p).cell, at(p).face) ? -own : own;
   }
 
   std::span<const DataSet> sets_;

@@ -59,10 +59,10 @@ void write(const ToldTable& known, const toml::table& table, Told& out) {
 
 const std::vector<ToldTable>& told_tables(const std::string& role) {
   static const std::vector<ToldTable> none,
-      data{{"scene", {"kind",        "file",    "title",          "room_size", "up",         "crease_angle",
-                      "z_scale",     "texture", "texture_detail", "colour_by", "colour_map", "cache",
-                      "no_cache",    "raw",     "series",         "iso",       "tf",         "lighting",
-                      "series_rate", "animate"}},
+      data{{"scene", {"kind",     "file",     "title",          "room_size", "up",         "crease_angle",
+                      "z_scale",  "texture",  "texture_detail", "colour_by", "colour_map", "cache",
+                      "no_cache", "raw",      "series",         "spacing",   "array",      "iso",
+                      "tf",       "lighting", "series_rate",    "animate"}},
            {"julia", keys_of(julia::to_map(julia::Parameters{}))},
            {"placement", keys_of(julia::to_map(julia::Placement{}), {"lo", "hi"})}},
       viewer{{"display",

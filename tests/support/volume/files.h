@@ -248,7 +248,7 @@ inline std::string dicom_slice(const Pattern& p, int k, const Dicom& d) {
 
 /// Reads what lies at `path`, or fails the test.
 inline Volume read_or_fail(const std::string& path, const std::string& raw = "", size_t step = 0) {
-  const auto source = find_volume(path, raw);
+  const auto source = find_volume(path, {.raw = raw});
   EXPECT_TRUE(source.ok()) << (source ? "" : source.error().text);
   if (!source) return {};
   auto volume = read_volume(*source, step, nullptr);

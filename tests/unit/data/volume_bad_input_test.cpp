@@ -27,7 +27,7 @@ constexpr long kMostTaken_kb = 64 * 1024;
 // Reads what must be refused. Returns the error's text, after checking what every such text promises.
 std::string refusal(const std::string& path, const std::string& spec = "", const std::string& named = "") {
   const long before_kb = peak_rss_kb();
-  const auto source = find_volume(path, spec);
+  const auto source = find_volume(path, {.raw = spec});
   std::string text;
   if (!source) {
     text = source.error().text;
@@ -337,7 +337,7 @@ TEST(BadSeries, StepsOfOtherSizesAreRefusedWithBothSizes) {
   const Pattern small{{2, 2, 2}, glm::dmat4(1.0), 0, 1}, large{{3, 2, 2}, glm::dmat4(1.0), 0, 1};
   folder.write("p1.nrrd", nrrd_header(small, "uint8", "encoding: raw\n\n") + small.bytes<uint8_t>());
   folder.write("p2.nrrd", nrrd_header(large, "uint8", "encoding: raw\n\n") + large.bytes<uint8_t>());
-  const auto source = find_volume(folder / "", "");
+  const auto source = find_volume(folder / "");
   ASSERT_TRUE(source.ok()) << source.error().text;
   const auto steps = check_steps(*source);
   const auto second = read_volume(*source, 1, nullptr);

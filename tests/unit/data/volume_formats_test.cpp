@@ -327,7 +327,7 @@ TEST(DicomSeries, TakesTheOneThatIsAskedFor) {
   for (int k = 0; k < 3; ++k) folder.write(fmt::format("{}.dcm", k), dicom_slice(p, k, {}));
   for (int k = 0; k < 2; ++k) folder.write(fmt::format("b{}.dcm", k), dicom_slice(other, k, {.series = "1.2.4"}));
   for (const char* which : {"2", "1.2.4"}) {
-    const auto source = find_volume(folder / "", "", which);
+    const auto source = find_volume(folder / "", {.series = which});
     ASSERT_TRUE(source.ok()) << source.error().text;
     const auto volume = read_volume(*source, 0, nullptr);
     ASSERT_TRUE(volume.ok()) << volume.error().text;
@@ -335,10 +335,10 @@ TEST(DicomSeries, TakesTheOneThatIsAskedFor) {
     EXPECT_NE(volume->remark.find("1: MR, 3 slices of 5 x 4; 2: MR, 2 slices of 4 x 3"), std::string::npos)
         << volume->remark;
   }
-  const auto refused = find_volume(folder / "", "", "3");
+  const auto refused = find_volume(folder / "", {.series = "3"});
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().text.find("--series \"3\": there is none"), std::string::npos) << refused.error().text;
-  EXPECT_FALSE(find_volume(folder / "0.dcm", "", "1").ok()) << "a series of a single file";
+  EXPECT_FALSE(find_volume(folder / "0.dcm", {.series = "1"}).ok()) << "a series of a single file";
 }
 
 TEST(DicomSeries, GoesByNumberWithoutPositionsAndRescalesEachSlice) {
@@ -364,7 +364,7 @@ TEST(Series, GoesByNumberNotByName) {
   };
   write("run2-phase9.nrrd", 9), write("run2-phase10.nrrd", 10), write("run2-phase100.nrrd", 100);
   folder.write("notes.txt", "what this is");
-  const auto source = find_volume(folder / "", "");
+  const auto source = find_volume(folder / "");
   ASSERT_TRUE(source.ok()) << source.error().text;
   ASSERT_EQ(source->steps.size(), 3u);
   EXPECT_TRUE(check_steps(*source).ok());
@@ -377,7 +377,7 @@ TEST(Series, GoesByTheNumberThatDiffers) {
     const TempFolder folder;
     for (const std::string& name : names)
       folder.write(name, nrrd_header({{1, 1, 1}, glm::dmat4(1.0), 0, 1}, "uint8", "encoding: raw\n\n") + "a");
-    const auto source = find_volume(folder / "", "");
+    const auto source = find_volume(folder / "");
     std::string out;
     if (!source) return source.error().text;
     for (const std::string& step : source->steps) out += step.substr((folder / "").size()) + " ";

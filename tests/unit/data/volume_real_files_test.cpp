@@ -32,7 +32,7 @@ TEST_P(RealVolumes, AreAsTheirSourcesSay) {
   const std::string path = data_folder() + "/volumes/" + expected.name;
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
   EXPECT_TRUE(looks_like_volume(path));
-  const auto source = find_volume(path, "");
+  const auto source = find_volume(path);
   ASSERT_TRUE(source.ok()) << source.error().text;
   EXPECT_EQ(source->steps.size(), expected.steps);
   double last = -1;
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 Volume read_or_fail(const std::string& path, size_t step = 0) {
-  const auto source = find_volume(path, "");
+  const auto source = find_volume(path);
   EXPECT_TRUE(source.ok()) << source.error().text;
   auto volume = source ? read_volume(*source, step, nullptr) : source.error();
   EXPECT_TRUE(volume.ok()) << volume.error().text;
@@ -121,7 +121,7 @@ TEST(RealVolumeSlices, OfTheDicomFolderAreThoseOfTheMetaImage) {
 TEST(RealVolumeSeries, PlaysInTheOrderOfItsNumbers) {
   const std::string path = data_folder() + "/volumes/heart-cine";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
-  const auto source = find_volume(path, "");
+  const auto source = find_volume(path);
   ASSERT_TRUE(source.ok()) << source.error().text;
   EXPECT_EQ(source->name, "heart-cine");
   ASSERT_EQ(source->steps.size(), 13u);
@@ -135,7 +135,7 @@ TEST(RealVolumeSeries, PlaysInTheOrderOfItsNumbers) {
 TEST(RealVolumeFolder, OfUnrelatedVolumesIsNoSeries) {
   const std::string path = data_folder() + "/volumes";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
-  const auto source = find_volume(path, "");
+  const auto source = find_volume(path);
   ASSERT_FALSE(source.ok());
   EXPECT_NE(source.error().text.find("not one numbered series"), std::string::npos) << source.error().text;
 }

@@ -386,7 +386,7 @@ int bench_volume(VolumeBenchOptions o, const options::Given&) {
   const auto size = viewer::parse_size(o.size, "--size");
   if (!size) return tools::complain(size.error());
   if (!o.data.scene.empty())
-    if (const auto found = data::find_volume(o.data.scene, o.data.volume.raw); !found)
+    if (const auto found = data::find_volume(o.data.scene, o.data.volume); !found)
       return tools::complain(found.error());
   std::error_code error;
   fs::create_directories(o.out, error);

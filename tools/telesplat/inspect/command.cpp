@@ -74,7 +74,9 @@ Subject subject_of(const data::DataOptions& o) {
   if (path == julia::kSceneWord || !o.volume.raw.empty()) return Subject::kData;
   // A folder is a run's, unless it holds a volume and no run.
   if (fs::is_directory(path, error))
-    return fs::exists(path + "/summary.json", error) || !data::looks_like_volume(path) ? Subject::kRun : Subject::kData;
+    return fs::exists(path + "/summary.json", error) || !(data::looks_like_volume(path) || data::is_mesh_file(path))
+               ? Subject::kRun
+               : Subject::kData;
   const std::string extension = lower_extension(path);
   if (extension == ".depth") return Subject::kDepthImage;
   if (extension == ".mesh") return Subject::kStore;

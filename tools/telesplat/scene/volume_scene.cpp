@@ -104,7 +104,7 @@ Result<VolumeScene::Epoch> VolumeScene::Epochs::at(EpochId epoch) const {
 }
 
 Status VolumeScene::check() const {
-  const auto found = data::find_volume(options_.scene, options_.volume.raw, options_.volume.series);
+  const auto found = data::find_volume(options_.scene, options_.volume);
   return found ? ok_status() : Status(found.error());
 }
 

@@ -5,11 +5,11 @@
 #include <map>
 #include <unordered_map>
 
-#include "services/data/base/polygon.h"
+#include "services/data/base/polygons/polygon.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/formats/raw_colours.h"
-#include "services/data/mesh/reader.h"
+#include "services/data/mesh/formats/readers.h"
 #include "services/data/texture/named_textures.h"
 
 namespace telesplat::data {

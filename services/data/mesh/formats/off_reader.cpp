@@ -5,10 +5,10 @@
 #include <bit>
 #include <cmath>
 
-#include "services/data/base/polygon.h"
+#include "services/data/base/polygons/polygon.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/raw_colours.h"
-#include "services/data/mesh/reader.h"
+#include "services/data/mesh/formats/readers.h"
 
 namespace telesplat::data {
 namespace {

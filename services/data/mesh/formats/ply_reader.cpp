@@ -5,13 +5,13 @@
 #include <array>
 #include <bit>
 
-#include "services/data/base/polygon.h"
+#include "services/data/base/polygons/polygon.h"
 #include "services/data/mesh/formats/ply_arrays.h"
 #include "services/data/mesh/formats/ply_cursor.h"
 #include "services/data/mesh/formats/ply_header.h"
 #include "services/data/mesh/formats/ply_textures.h"
 #include "services/data/mesh/formats/raw_colours.h"
-#include "services/data/mesh/reader.h"
+#include "services/data/mesh/formats/readers.h"
 
 namespace telesplat::data {
 namespace {

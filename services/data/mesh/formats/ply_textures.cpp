@@ -1,6 +1,6 @@
 #include "services/data/mesh/formats/ply_textures.h"
 
-#include "services/data/base/double_vertices.h"
+#include "services/data/base/polygons/double_vertices.h"
 #include "services/data/texture/named_textures.h"
 
 namespace telesplat::data {

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "services/data/base/text_scanner.h"
-#include "services/data/mesh/reader.h"
+#include "services/data/mesh/formats/readers.h"
 
 namespace telesplat::data {
 namespace {

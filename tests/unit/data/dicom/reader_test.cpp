@@ -83,7 +83,7 @@ TEST_P(CompressedDicom, CutAnywhereNeitherCrashesNorGivesVoxels) {
   const size_t pixels = content.find(std::string("\xe0\x7f\x10\0", 4));
   for (size_t cut = pixels; cut < content.size() - 20; cut += 40) {
     const std::string path = folder.write("a.dcm", content.substr(0, cut));
-    const auto source = find_volume(path, "");
+    const auto source = find_volume(path);
     const auto volume = source ? read_volume(*source, 0, nullptr) : source.error();
     if (volume.ok()) continue;  // a codec may give what it has
     EXPECT_EQ(volume.error().text.find(fs::path(path).parent_path().string()), 0u) << volume.error().text;
@@ -128,7 +128,7 @@ TEST(DicomFolders, AreSearchedBelowADiscAndByOneSlice) {
   DicomWriter directory(DicomWriter::Syntax::kExplicit);
   directory.put(0x00041130, "CS", "DISC");
   folder.write("DICOMDIR", directory.content());
-  const auto disc = find_volume(folder / "DICOMDIR", "");
+  const auto disc = find_volume(folder / "DICOMDIR");
   ASSERT_TRUE(disc.ok()) << disc.error().text;
   EXPECT_EQ(disc->files().size(), 3u);
   expect_same(read_or_fail(folder / "DICOMDIR"), p);
@@ -152,7 +152,7 @@ TEST(DicomFolders, TimeStepsAreASeries) {
     for (int k = 0; k < 3; ++k)
       folder.write(fmt::format("{}{}.dcm", t, k),
                    dicom_slice({{5, 4, 3}, turned(), t * 100.0, 1}, k, {.temporal_position = 2 - t}));
-  const auto source = find_volume(folder / "", "");
+  const auto source = find_volume(folder / "");
   ASSERT_TRUE(source.ok()) << source.error().text;
   ASSERT_EQ(source->steps.size(), 2u);
   EXPECT_TRUE(check_steps(*source).ok());

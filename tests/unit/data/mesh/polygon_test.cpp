@@ -1,5 +1,5 @@
 // Polygons of any shape become triangles that cover them once.
-#include "services/data/base/polygon.h"
+#include "services/data/base/polygons/polygon.h"
 
 #include <gtest/gtest.h>
 

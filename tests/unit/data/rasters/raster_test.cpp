@@ -139,6 +139,19 @@ TEST_F(Rasters, AWorldFilePlacesAPicture) {
   EXPECT_EQ(mesh->positions[5], glm::dvec3(500025, 4000005, 250));
 }
 
+TEST_F(Rasters, SamplesThatAMaskHidesHaveNoData) {
+  folder.write("mask.asc",
+               "ncols 3\nnrows 2\nxllcorner 500000\nyllcorner 4000000\ncellsize 10\n255 255 0\n255 255 255\n");
+  std::string masked = vrt("500000, 10, 0, 4000020, 0, -10", "EPSG:32632");
+  masked.insert(masked.find("</VRTDataset>"),
+                "<MaskBand><VRTRasterBand dataType=\"Byte\"><SimpleSource><SourceFilename relativeToVRT=\"1\">mask.asc"
+                "</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand></MaskBand>");
+  masked.replace(masked.find("<NoDataValue>-9999</NoDataValue>"), 32, "");
+  const auto mesh = read("a.vrt", masked);
+  ASSERT_TRUE(mesh) << mesh.error().text;
+  EXPECT_EQ(mesh->positions.size(), 4u) << "one is masked, one has no data";
+}
+
 TEST_F(Rasters, AnXyzFileIsAGrid) {
   const auto mesh = read("a.xyz", "500005 4000015 1\n500015 4000015 2\n500005 4000005 3\n500015 4000005 4\n");
   ASSERT_TRUE(mesh) << mesh.error().text;

@@ -6,7 +6,7 @@ namespace telesplat::data::test {
 namespace {
 
 Result<Volume> read_step(const std::string& path, const std::string& spec = "") {
-  const auto source = find_volume(path, spec, "");
+  const auto source = find_volume(path, {.raw = spec});
   if (!source) return source.error();
   return read_volume(*source, 0, nullptr);
 }

@@ -25,6 +25,17 @@ TEST(VtkComposite, FacesBetweenPiecesAreGone) {
   EXPECT_NE(cut.error().text.find("p1.vtu"), std::string::npos) << cut.error().text;
 }
 
+// As VTK writes data that it cannot cut: each piece has all of them, and nothing says so.
+TEST(VtkComposite, ACellThatSeveralPiecesHaveIsOne) {
+  const TempFolder folder;
+  for (const char* name : {"p0.vtu", "p1.vtu", "p2.vtu"}) folder.write(name, vtu(bricks(2)));
+  expect_shape(mesh_or_fail(folder.write("a.pvtu", naming("PUnstructuredGrid",
+                                                          "<PUnstructuredGrid GhostLevel='0'><Piece Source='p0.vtu'/>"
+                                                          "<Piece Source='p1.vtu'/><Piece Source='p2.vtu'/>"
+                                                          "</PUnstructuredGrid>"))),
+               20, 10, 2);
+}
+
 TEST(VtkComposite, StructuredPiecesMeet) {
   const TempFolder folder;
   VtkWriter w;

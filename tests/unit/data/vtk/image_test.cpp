@@ -8,10 +8,10 @@ namespace {
 
 Volume volume_or_fail(const std::string& path, const std::string& array = {}) {
   EXPECT_TRUE(looks_like_volume(path));
-  auto source = find_volume(path, "");
+  auto source = find_volume(path);
   EXPECT_TRUE(source.ok()) << (source ? "" : source.error().text);
   if (!source) return {};
-  source->array = array;
+  source->layout.array = array;
   auto volume = read_volume(*source, 0, nullptr);
   EXPECT_TRUE(volume.ok()) << (volume ? "" : volume.error().text);
   return volume ? std::move(*volume) : Volume();
@@ -58,7 +58,7 @@ TEST(VtkImage, PiecesInOneFileAndInSeveral) {
   VtkWriter writer;
   const std::string left = piece(0, 2, writer), right = piece(2, 4, writer);
   expect_ramp(volume_or_fail(folder.write("a.vti", image(left + right, writer))));
-  const auto missing = find_volume(folder.write("cut.vti", image(left, writer)), "");
+  const auto missing = find_volume(folder.write("cut.vti", image(left, writer)));
   ASSERT_TRUE(missing);
   const auto cut = read_volume(*missing, 0, nullptr);
   ASSERT_FALSE(cut);

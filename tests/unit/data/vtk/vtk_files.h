@@ -19,6 +19,7 @@ struct VtkEncoding {
   std::string packing;  ///< "ZLib", "LZ4", "LZMA"
   bool wide_header = false, big_endian = false;
   bool joined = false;  ///< base64 of header and data in one, as some writers do
+  size_t block = 64;    ///< bytes that are packed at once: several blocks, the last one smaller
 };
 
 inline std::string base64(const std::string& bytes) {
@@ -87,11 +88,10 @@ class VtkWriter {
   std::string encoded(const std::string& bytes, bool base) const {
     std::string header = number(bytes.size()), data = bytes;
     if (!encoding_.packing.empty()) {
-      constexpr size_t kBlock = 64;  // so that there are several, the last one smaller
-      const size_t blocks = (bytes.size() + kBlock - 1) / kBlock;
-      header = number(blocks) + number(kBlock) + number(bytes.size() % kBlock), data = {};
+      const size_t block = encoding_.block, blocks = (bytes.size() + block - 1) / block;
+      header = number(blocks) + number(block) + number(bytes.size() % block), data = {};
       for (size_t b = 0; b < blocks; ++b) {
-        const std::string one = packed_by(encoding_.packing, bytes.substr(b * kBlock, kBlock));
+        const std::string one = packed_by(encoding_.packing, bytes.substr(b * block, block));
         header += number(one.size()), data += one;
       }
     }

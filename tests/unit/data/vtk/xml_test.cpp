@@ -249,5 +249,14 @@ TEST(VtkXml, RefusesWhatDoesNotFit) {
   EXPECT_NE(says(packed).find("claims 1 blocks of 4294967295 bytes"), std::string::npos) << says(packed);
 }
 
+// VTK's own blocks have 32768 bytes; what is packed is shorter than one, and its beginning packs to little.
+TEST(VtkXml, ABlockThatIsNotFullIsPackedAlone) {
+  for (const char* packing : {"ZLib", "LZ4", "LZMA"}) {
+    const TempFolder folder;
+    const VtkEncoding encoding{.mode = VtkEncoding::Mode::kAppendedRaw, .packing = packing, .block = 32768};
+    expect_shape(mesh_or_fail(folder.write("a.vtu", vtu(bricks(2), encoding))), 20, 10, 2);
+  }
+}
+
 }  // namespace
 }  // namespace telesplat::data::test

@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 
 #include "services/data/import/process.h"
+#include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
@@ -14,6 +16,19 @@ Result<Mesh> read_imported_gltf(std::string_view content, const std::string& pat
   std::vector<std::string> files = companion_files(content, "gltf", path);
   files.insert(files.begin(), path);
   return import("the glTF", {"gltf", path, std::to_string(texture_detail)}, files);
+}
+
+std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::string& format, const std::string& path,
+                                          const ReadProgress& progress, const std::string& array,
+                                          uint64_t texture_detail) {
+  if (format != "obj" && format != "ply") return std::nullopt;
+  std::vector<std::string> files = companion_files(content, format, path);
+  FolderCompanions folder(path);
+  const size_t libraries = format == "obj" ? obj_material_libraries(content, folder).size() : 0;
+  if (files.size() <= libraries) return std::nullopt;
+  if (progress) progress(0.0);
+  files.insert(files.begin(), path);
+  return import("the " + format, {format, path, std::to_string(texture_detail), array}, files);
 }
 
 Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,

@@ -1,5 +1,5 @@
 // Ears of polygons. Source: D. Eberly, "Triangulation by Ear Clipping", Geometric Tools, 2002; the grid is ours.
-#include "services/data/base/polygon.h"
+#include "services/data/base/polygons/polygon.h"
 
 #include <algorithm>
 #include <cmath>
