@@ -172,7 +172,7 @@ def by_dcmtk():
     each("dcmtk", "jpeg_lossless_process_14", ["dcmcjpeg", "+el"], "pydicom/unsigned")
     each("dcmtk", "jpeg_baseline", ["dcmcjpeg", "+eb", "+q", "98"], "pydicom/bytes")
     each("dcmtk", "jpeg_ls", ["dcmcjpls", "+el"])
-    each("dcmtk", "jpeg_ls_near", ["dcmcjpls", "+en", "+md", "1"])
+    each("dcmtk", "jpeg_ls_near", ["dcmcjpls", "+en", "+md", "1"], "pydicom/unsigned")
 
     def disc():
         for z, path in enumerate(sorted(pathlib.Path("pydicom/plain").iterdir())):
@@ -192,11 +192,12 @@ def by_gdcm():
         "rle": ["--rle"],
         "implicit": ["--implicit", "--raw"],
     }.items():
-        each("gdcm", name, ["gdcmconv", *flags, "-i"][:-1], "pydicom/unsigned" if "lossless" in name else "pydicom/plain")
+        each("gdcm", name, ["gdcmconv", *flags], "pydicom/unsigned" if "lossless" in name else "pydicom/plain")
     each("gdcm", "jpeg_2000_lossy", ["gdcmconv", "--j2k", "--lossy", "-q", "90"], "pydicom/unsigned")
 
 
 def from_dicom():
+    shutil.rmtree("dcm2niix", ignore_errors=True)  # dcm2niix gives names that are taken another letter
     shapes.note("dcm2niix", version(["dcm2niix", "--version"], r"(v\d\S+)"))
     for name, flags in (("plain", ["-z", "n"]), ("gz", ["-z", "i"]), ("nrrd", ["-z", "n", "-e", "y"])):
         path = shapes.place("dcm2niix", f"{name}/volume")

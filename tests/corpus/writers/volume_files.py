@@ -1,6 +1,5 @@
-"""Writes volumes by nibabel, tifffile, imageio, scikit-image and Pillow."""
+"""Writes volumes by nibabel, tifffile, scikit-image and Pillow."""
 
-import imageio
 import nibabel
 import numpy
 import PIL
@@ -79,7 +78,6 @@ def stacks():
     ):
         path = shapes.place("tifffile", name)
         shapes.attempt(path, lambda: tifffile.imwrite(path, array, **{"photometric": "minisblack", **options}))
-    shapes.attempt("imageio", lambda: imageio.mimwrite(shapes.place("imageio", "stack.tif"), list(wide), format="TIFF"))
     for z in range(16):
         shapes.attempt("skimage", lambda: skimage.io.imsave(shapes.place("skimage", f"png/slice_{z:03}.png"), shades[z], check_contrast=False))
         shapes.attempt("skimage", lambda: skimage.io.imsave(shapes.place("skimage", f"png16/s{z}.png"), wide[z], check_contrast=False))
@@ -94,7 +92,7 @@ def stacks():
     pages[0].save(shapes.place("pillow", "pages_lzw.tif"), save_all=True, append_images=pages[1:], compression="tiff_lzw")
 
 
-for name, module in (("nibabel", nibabel), ("tifffile", tifffile), ("imageio", imageio), ("skimage", skimage), ("pillow", PIL)):
+for name, module in (("nibabel", nibabel), ("tifffile", tifffile), ("skimage", skimage), ("pillow", PIL)):
     shapes.note(name, module.__version__)
 for part in (nifti, stacks):
     shapes.attempt(part.__name__, part)

@@ -143,7 +143,8 @@ def save(writer, data, name, *settings):
 
     def run():
         writer.SetFileName(path)
-        writer.SetInputData(data)
+        if data:
+            writer.SetInputData(data)
         for setting in settings:
             setting(writer)
         if writer.Write() == 0:
@@ -201,17 +202,20 @@ def xml():
 
 
 def pieces():
-    """Files of several pieces: writers divide what they are given."""
-    for writer, data, name in (
-        (vtk.vtkXMLPPolyDataWriter(), prism(), "pieces/prism.pvtp"),
-        (vtk.vtkXMLPUnstructuredGridWriter(), blocks(), "pieces/blocks.pvtu"),
-        (vtk.vtkXMLPImageDataWriter(), image(), "pieces/image.pvti"),
-        (vtk.vtkXMLPRectilinearGridWriter(), rectilinear(), "pieces/grid.pvtr"),
-        (vtk.vtkXMLPStructuredGridWriter(), structured(), "pieces/grid.pvts"),
+    """Files of several pieces, each cell in one of them, with ghosts of one layer around."""
+    split = lambda w: (w.SetNumberOfPieces(3), w.SetStartPiece(0), w.SetEndPiece(2), w.SetGhostLevel(1))
+    for writer, cut, data, name in (
+        (vtk.vtkXMLPPolyDataWriter(), vtk.vtkExtractPolyDataPiece(), prism(), "prism.pvtp"),
+        (vtk.vtkXMLPUnstructuredGridWriter(), vtk.vtkExtractUnstructuredGridPiece(), blocks(), "blocks.pvtu"),
+        (vtk.vtkXMLPImageDataWriter(), vtk.vtkImageCast(), image(), "image.pvti"),
     ):
-        split = lambda w: (w.SetNumberOfPieces(3), w.SetStartPiece(0), w.SetEndPiece(2), w.SetGhostLevel(1))
-        save(writer, data, name, split)
-
+        cut.SetInputData(data)
+        if name.endswith("i"):
+            cut.SetOutputScalarTypeToShort()
+        put = lambda w, c=cut: w.SetInputConnection(c.GetOutputPort())
+        save(writer, None, f"pieces/{name}", put, split)
+        # Data that cannot be cut: the first piece holds all cells, the others hold them as ghosts.
+        save(type(writer)(), data, f"pieces/whole_{name}", split)
 
 def groups():
     boxes = vtk.vtkMultiBlockDataSet()
@@ -229,7 +233,12 @@ def groups():
     save(vtk.vtkXMLMultiBlockDataWriter(), boxes, "groups/boxes.vtm")
     nested = vtk.vtkMultiBlockDataSet()
     nested.SetBlock(0, boxes)
-    nested.SetBlock(2, blocks())
+    apart, points = blocks(), vtk.vtkPoints()
+    for i in range(36):
+        x, y, z = apart.GetPoint(i)
+        points.InsertNextPoint(x, y + 3, z)
+    apart.SetPoints(points)
+    nested.SetBlock(2, apart)
     save(vtk.vtkXMLMultiBlockDataWriter(), nested, "groups/nested.vtm")
     parts = vtk.vtkPartitionedDataSet()
     parts.SetPartition(0, blocks(0, 2))
