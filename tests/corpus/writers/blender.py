@@ -49,7 +49,9 @@ def textured():
     """The boxes with one picture for both, red in its left half and blue in its right half."""
     empty()
     picture = bpy.data.images.new("halves", 8, 8)
-    picture.pixels = [c for _ in range(8) for x in range(8) for c in ((0.78, 0.1, 0.1, 1) if x < 4 else (0.1, 0.1, 0.78, 1))]
+    picture.pixels = [
+        c for _ in range(8) for x in range(8) for c in ((0.78, 0.1, 0.1, 1) if x < 4 else (0.1, 0.1, 0.78, 1))
+    ]
     picture.filepath_raw = os.path.abspath(shapes.place("blender", "halves.png"))
     picture.file_format = "PNG"
     picture.save()

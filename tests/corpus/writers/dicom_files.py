@@ -201,12 +201,24 @@ def from_dicom():
     shapes.note("dcm2niix", version(["dcm2niix", "--version"], r"(v\d\S+)"))
     for name, flags in (("plain", ["-z", "n"]), ("gz", ["-z", "i"]), ("nrrd", ["-z", "n", "-e", "y"])):
         path = shapes.place("dcm2niix", f"{name}/volume")
-        shapes.attempt(path, lambda: run("dcm2niix", *flags, "-f", "volume", "-o", f"dcm2niix/{name}", "pydicom/plain"))
+        shapes.attempt(
+            path, lambda: run("dcm2niix", *flags, "-f", "volume", "-o", f"dcm2niix/{name}", "pydicom/plain")
+        )
     shapes.note("plastimatch", version(["plastimatch", "--version"], r"version (\S+)"))
     for name in ("volume.mha", "volume.nrrd", "volume.nii.gz", "volume.mhd"):
         path = shapes.place("plastimatch", name)
         shapes.attempt(path, lambda: run("plastimatch", "convert", "--input", "pydicom/plain", "--output-img", path))
-    shapes.attempt("plastimatch", lambda: run("plastimatch", "convert", "--input", "pydicom/plain", "--output-dicom", shapes.place("plastimatch", "dicom")))
+    shapes.attempt(
+        "plastimatch",
+        lambda: run(
+            "plastimatch",
+            "convert",
+            "--input",
+            "pydicom/plain",
+            "--output-dicom",
+            shapes.place("plastimatch", "dicom"),
+        ),
+    )
     shapes.note("mrtrix", version(["mrconvert", "--version"], r"mrconvert (\S+)"))
     for name in ("volume.nii", "volume.nii.gz", "volume.mif", "volume.mgz", "separate.mih"):
         path = shapes.place("mrtrix", name)

@@ -58,7 +58,12 @@ def layouts():
     }.items():
         save(f"tiff/{name}.tif", data(), **options)
     save("tiff/cog.tif", data(), "COG")
-    for name, kind in (("int16", gdal.GDT_Int16), ("uint16", gdal.GDT_UInt16), ("int32", gdal.GDT_Int32), ("float64", gdal.GDT_Float64)):
+    for name, kind in (
+        ("int16", gdal.GDT_Int16),
+        ("uint16", gdal.GDT_UInt16),
+        ("int32", gdal.GDT_Int32),
+        ("float64", gdal.GDT_Float64),
+    ):
         low = 0 if kind == gdal.GDT_UInt16 else shapes.NO_DATA
         save(f"types/{name}.tif", data(numpy.round(shapes.terrain(low)), kind, no_data=low))
     no_number = shapes.terrain(math.nan)
@@ -73,7 +78,9 @@ def scaled(band, scale, offset, unit=""):
 
 def feet():
     foot, survey = 0.3048, 1200 / 3937
-    in_feet = lambda f: numpy.where(shapes.terrain() == shapes.NO_DATA, shapes.NO_DATA, shapes.terrain() / f).astype("f4")
+    in_feet = lambda f: numpy.where(shapes.terrain() == shapes.NO_DATA, shapes.NO_DATA, shapes.terrain() / f).astype(
+        "f4"
+    )
     save("units/ft.tif", data(in_feet(foot), set_up=lambda b: b.SetUnitType("ft")))
     save("units/us_survey_foot.tif", data(in_feet(survey), set_up=lambda b: b.SetUnitType("US survey foot")))
     save("units/compound_feet.tif", data(in_feet(survey), code="EPSG:32632+6360"))
@@ -81,12 +88,18 @@ def feet():
     counts = numpy.where(shapes.terrain() == shapes.NO_DATA, -9999, (shapes.terrain() - 100) * 100).astype("i2")
     save("units/int16_scale_offset.tif", data(counts, gdal.GDT_Int16, set_up=lambda b: scaled(b, 0.01, 100)))
     west, north = shapes.WEST / survey, shapes.NORTH / survey
-    save("units/plan_in_us_feet.tif", data(code=2263, affine=(west, shapes.STEP / survey, 0, north, 0, -shapes.STEP / survey)))
+    save(
+        "units/plan_in_us_feet.tif",
+        data(code=2263, affine=(west, shapes.STEP / survey, 0, north, 0, -shapes.STEP / survey)),
+    )
 
 
 def placement():
     step = shapes.STEP
-    save("placed/south_up.tif", data(shapes.terrain()[::-1], affine=(shapes.WEST, step, 0, shapes.NORTH - 30 * step, 0, step)))
+    save(
+        "placed/south_up.tif",
+        data(shapes.terrain()[::-1], affine=(shapes.WEST, step, 0, shapes.NORTH - 30 * step, 0, step)),
+    )
     save("placed/point.tif", data(set_up=lambda b: b.GetDataset().SetMetadataItem("AREA_OR_POINT", "Point")))
     turn = math.radians(30)
     a, b = step * math.cos(turn), step * math.sin(turn)
@@ -106,8 +119,14 @@ def other_formats():
     heights = numpy.full((1201, 1201), 100, "i2")
     heights[600:, 600:] = 300
     heights[:10, :] = -32768
-    save("N47E008.hgt", data(heights, gdal.GDT_Int16, 4326, (8 - 0.5 / 1200, 1 / 1200, 0, 48 + 0.5 / 1200, 0, -1 / 1200), -32768), "SRTMHGT")
-    save("heights.png", data(numpy.round(shapes.terrain(None)), gdal.GDT_UInt16, no_data=None), "PNG", WORLDFILE="YES")
+    save(
+        "N47E008.hgt",
+        data(heights, gdal.GDT_Int16, 4326, (8 - 0.5 / 1200, 1 / 1200, 0, 48 + 0.5 / 1200, 0, -1 / 1200), -32768),
+        "SRTMHGT",
+    )
+    save(
+        "heights.png", data(numpy.round(shapes.terrain(None)), gdal.GDT_UInt16, no_data=None), "PNG", WORLDFILE="YES"
+    )
     bare = gdal.GetDriverByName("MEM").Create("", 40, 30, 1, gdal.GDT_UInt16)
     bare.GetRasterBand(1).WriteArray(numpy.round(shapes.terrain(None)))
     save("bare.png", bare, "PNG")
@@ -141,7 +160,9 @@ def by_rasterio():
         with rasterio.open(shapes.place("rasterio", "mask.tif"), "w", count=1, **common) as out:
             out.write(shapes.terrain(None), 1)
             out.write_mask(shapes.terrain() != shapes.NO_DATA)
-    with rasterio.open(shapes.place("rasterio", "two_bands.tif"), "w", count=2, nodata=shapes.NO_DATA, **common) as out:
+    with rasterio.open(
+        shapes.place("rasterio", "two_bands.tif"), "w", count=2, nodata=shapes.NO_DATA, **common
+    ) as out:
         out.write(shapes.terrain(), 1)
         out.write(numpy.ones((30, 40), "f4"), 2)
 

@@ -1,4 +1,4 @@
-"""Writes meshes by CloudCompare, MeshLab, Assimp, Open3D, meshio, gmsh, OpenSCAD, admesh, FreeCAD, Draco and OpenSceneGraph."""
+"""Writes meshes by the viewers, converters, libraries and CAD programs of Debian, Blender and VTK aside."""
 
 import os
 import pathlib
@@ -25,7 +25,7 @@ def package(name):
 
 
 def sources():
-    """What converters are given: the prism as a PLY with vertex colours and as triangles, the boxes as an OBJ with materials."""
+    """Writes the inputs of converters: the prism as a PLY with vertex colours, the boxes as an OBJ with materials."""
     lines = ["ply", "format ascii 1.0", "element vertex 16", *(f"property float {a}" for a in "xyz")]
     lines += [f"property uchar {c}" for c in ("red", "green", "blue")]
     lines += ["element face 28", "property list uchar int vertex_indices", "end_header"]
@@ -55,7 +55,9 @@ def cloudcompare():
         name = ("text" if flags else "prism") + "." + extension
         path = os.path.abspath(shapes.place("cloudcompare", name))
         command = ["xvfb-run", "-a", "CloudCompare", "-SILENT", "-AUTO_SAVE", "OFF", "-M_EXPORT_FMT", kind, *flags]
-        shapes.attempt(path, lambda: run(*command, "-O", os.path.abspath("source/prism.ply"), "-SAVE_MESHES", "FILE", path))
+        shapes.attempt(
+            path, lambda: run(*command, "-O", os.path.abspath("source/prism.ply"), "-SAVE_MESHES", "FILE", path)
+        )
 
 
 def meshlab():
@@ -82,7 +84,21 @@ def assimp():
     shapes.note("assimp", package("assimp-utils"))
     for source in ("prism.ply", "boxes.obj"):
         stem = pathlib.Path(source).stem
-        for kind, extension in (("obj", "obj"), ("objnomtl", "obj"), ("stl", "stl"), ("stlb", "stl"), ("ply", "ply"), ("plyb", "ply"), ("gltf2", "gltf"), ("glb2", "glb"), ("gltf", "gltf"), ("glb", "glb"), ("collada", "dae"), ("3mf", "3mf"), ("fbx", "fbx")):
+        for kind, extension in (
+            ("obj", "obj"),
+            ("objnomtl", "obj"),
+            ("stl", "stl"),
+            ("stlb", "stl"),
+            ("ply", "ply"),
+            ("plyb", "ply"),
+            ("gltf2", "gltf"),
+            ("glb2", "glb"),
+            ("gltf", "gltf"),
+            ("glb", "glb"),
+            ("collada", "dae"),
+            ("3mf", "3mf"),
+            ("fbx", "fbx"),
+        ):
             path = shapes.place("assimp", f"{kind}/{stem}.{extension}")
             shapes.attempt(path, lambda: run("assimp", "export", f"source/{source}", path, f"-f{kind}"))
 
@@ -96,7 +112,15 @@ def open3d():
     mesh.triangles = o3d.utility.Vector3iVector(numpy.array(shapes.PRISM_TRIANGLES))
     mesh.vertex_colors = o3d.utility.Vector3dVector(shapes.PRISM_COLOURS / 255.0)
     mesh.compute_vertex_normals()
-    for name, options in (("prism.ply", {}), ("text.ply", {"write_ascii": True}), ("prism.obj", {}), ("prism.stl", {}), ("prism.off", {}), ("prism.glb", {}), ("prism.gltf", {})):
+    for name, options in (
+        ("prism.ply", {}),
+        ("text.ply", {"write_ascii": True}),
+        ("prism.obj", {}),
+        ("prism.stl", {}),
+        ("prism.off", {}),
+        ("prism.glb", {}),
+        ("prism.gltf", {}),
+    ):
         path = shapes.place("open3d", name)
         shapes.attempt(path, lambda: o3d.io.write_triangle_mesh(path, mesh, **options))
 
@@ -113,11 +137,25 @@ def by_meshio():
     values = {"u": points[:, 0], "v": points.copy()}
     for stem, kind, blocks in (("blocks", "hexahedron", cells), ("fenics", "tetra", tetrahedra)):
         mesh = meshio.Mesh(points, [(kind, numpy.array(blocks))], point_data=values)
-        for name, options in ((f"{stem}.vtu", {}), (f"{stem}_text.vtu", {"binary": False}), (f"{stem}.vtk", {}), (f"{stem}_text.vtk", {"binary": False})):
+        for name, options in (
+            (f"{stem}.vtu", {}),
+            (f"{stem}_text.vtu", {"binary": False}),
+            (f"{stem}.vtk", {}),
+            (f"{stem}_text.vtk", {"binary": False}),
+        ):
             path = shapes.place("meshio", name)
             shapes.attempt(path, lambda: mesh.write(path, **options))
     surface = meshio.Mesh(shapes.PRISM_POINTS, [("triangle", numpy.array(shapes.PRISM_TRIANGLES))])
-    for name, options in (("prism.ply", {}), ("text.ply", {"binary": False}), ("prism.obj", {}), ("prism.off", {}), ("prism.stl", {"binary": True}), ("text.stl", {}), ("prism.vtk", {}), ("prism.vtu", {})):
+    for name, options in (
+        ("prism.ply", {}),
+        ("text.ply", {"binary": False}),
+        ("prism.obj", {}),
+        ("prism.off", {}),
+        ("prism.stl", {"binary": True}),
+        ("text.stl", {}),
+        ("prism.vtk", {}),
+        ("prism.vtu", {}),
+    ):
         path = shapes.place("meshio", name)
         shapes.attempt(path, lambda: surface.write(path, **options))
 
@@ -125,7 +163,9 @@ def by_meshio():
 def gmsh():
     shapes.note("gmsh", package("gmsh"))
     script = pathlib.Path(shapes.place("source", "box.geo"))
-    script.write_text('SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 3, 2, 1};\nMesh.MeshSizeMin = 5;\nMesh.MeshSizeMax = 5;\n')
+    script.write_text(
+        'SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 3, 2, 1};\nMesh.MeshSizeMin = 5;\nMesh.MeshSizeMax = 5;\n'
+    )
     for name, flags in {
         "box.vtk": ["-3", "-format", "vtk"],
         "box_binary.vtk": ["-3", "-format", "vtk", "-bin"],
@@ -146,7 +186,13 @@ def solids():
     script = pathlib.Path(shapes.place("source", "prism.scad"))
     outline = "[[0,0],[3,0],[3,2],[2,2],[2,1],[1,1],[1,2],[0,2]]"
     script.write_text(f"linear_extrude(1) polygon({outline});\n")
-    for name, flags in (("prism.stl", []), ("binary.stl", ["--export-format", "binstl"]), ("prism.off", []), ("prism.3mf", []), ("prism.amf", [])):
+    for name, flags in (
+        ("prism.stl", []),
+        ("binary.stl", ["--export-format", "binstl"]),
+        ("prism.off", []),
+        ("prism.3mf", []),
+        ("prism.amf", []),
+    ):
         path = shapes.place("openscad", name)
         shapes.attempt(path, lambda: run("openscad", str(script), "-o", path, *flags))
     shapes.note("admesh", package("admesh"))
@@ -169,7 +215,9 @@ def solids():
 
 def draco_and_scene_graph():
     shapes.note("draco", package("draco"))
-    shapes.attempt("draco", lambda: run("draco_encoder", "-i", "source/prism.ply", "-o", shapes.place("draco", "prism.drc")))
+    shapes.attempt(
+        "draco", lambda: run("draco_encoder", "-i", "source/prism.ply", "-o", shapes.place("draco", "prism.drc"))
+    )
     shapes.attempt("draco", lambda: run("draco_decoder", "-i", "draco/prism.drc", "-o", "draco/decoded.ply"))
     shapes.attempt("draco", lambda: run("draco_decoder", "-i", "draco/prism.drc", "-o", "draco/decoded.obj"))
     shapes.note("openscenegraph", package("openscenegraph"))

@@ -41,7 +41,7 @@ def volume(kind="i2"):
 
 
 def terrain(no_data=NO_DATA):
-    """Heights in metres as an array [row from the north, column from the west]; no_data None: there is data everywhere."""
+    """Heights in metres as an array [row from the north, column from the west]; no_data None: no gap."""
     row, column = numpy.mgrid[0:30, 0:40]
     heights = 100 + 100 * (numpy.maximum(column - 4, 0) / 35 + numpy.maximum(row - 2, 0) / 27)
     if no_data is not None:

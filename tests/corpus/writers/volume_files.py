@@ -66,9 +66,17 @@ def stacks():
         ("plain.tif", wide, {}),
         ("bytes.tif", shades, {}),
         ("floats.tif", shapes.volume("f4"), {}),
-        ("imagej.tif", wide, {"imagej": True, "resolution": (1, 1 / 1.5), "metadata": {"axes": "ZYX", "spacing": 2.0, "unit": "mm"}}),
+        (
+            "imagej.tif",
+            wide,
+            {"imagej": True, "resolution": (1, 1 / 1.5), "metadata": {"axes": "ZYX", "spacing": 2.0, "unit": "mm"}},
+        ),
         ("imagej_contiguous.tif", wide, {"imagej": True, "contiguous": True}),
-        ("ome.ome.tif", wide, {"metadata": {"axes": "ZYX", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.5, "PhysicalSizeZ": 2.0}}),
+        (
+            "ome.ome.tif",
+            wide,
+            {"metadata": {"axes": "ZYX", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.5, "PhysicalSizeZ": 2.0}},
+        ),
         ("deflate.tif", wide, {"compression": "zlib"}),
         ("deflate_predictor.tif", wide, {"compression": "zlib", "predictor": True}),
         ("tiles.tif", wide, {"tile": (16, 16)}),
@@ -79,9 +87,20 @@ def stacks():
         path = shapes.place("tifffile", name)
         shapes.attempt(path, lambda: tifffile.imwrite(path, array, **{"photometric": "minisblack", **options}))
     for z in range(16):
-        shapes.attempt("skimage", lambda: skimage.io.imsave(shapes.place("skimage", f"png/slice_{z:03}.png"), shades[z], check_contrast=False))
-        shapes.attempt("skimage", lambda: skimage.io.imsave(shapes.place("skimage", f"png16/s{z}.png"), wide[z], check_contrast=False))
-        shapes.attempt("skimage", lambda: skimage.io.imsave(shapes.place("skimage", f"tif/{z:04}.tif"), wide[z], check_contrast=False))
+        shapes.attempt(
+            "skimage",
+            lambda: skimage.io.imsave(
+                shapes.place("skimage", f"png/slice_{z:03}.png"), shades[z], check_contrast=False
+            ),
+        )
+        shapes.attempt(
+            "skimage",
+            lambda: skimage.io.imsave(shapes.place("skimage", f"png16/s{z}.png"), wide[z], check_contrast=False),
+        )
+        shapes.attempt(
+            "skimage",
+            lambda: skimage.io.imsave(shapes.place("skimage", f"tif/{z:04}.tif"), wide[z], check_contrast=False),
+        )
         PIL.Image.fromarray(shades[z]).save(shapes.place("pillow", f"png/z{z:02}.png"), optimize=True)
         PIL.Image.fromarray(shades[z]).convert("P").save(shapes.place("pillow", f"palette/z{z:02}.png"))
         PIL.Image.fromarray(shades[z]).convert("RGB").save(shapes.place("pillow", f"rgb/z{z:02}.png"))
@@ -89,7 +108,9 @@ def stacks():
         PIL.Image.fromarray(shades[z]).save(shapes.place("pillow", f"bmp/z{z:02}.bmp"))
     pages = [PIL.Image.fromarray(s) for s in shades]
     pages[0].save(shapes.place("pillow", "pages.tif"), save_all=True, append_images=pages[1:])
-    pages[0].save(shapes.place("pillow", "pages_lzw.tif"), save_all=True, append_images=pages[1:], compression="tiff_lzw")
+    pages[0].save(
+        shapes.place("pillow", "pages_lzw.tif"), save_all=True, append_images=pages[1:], compression="tiff_lzw"
+    )
 
 
 for name, module in (("nibabel", nibabel), ("tifffile", tifffile), ("skimage", skimage), ("pillow", PIL)):

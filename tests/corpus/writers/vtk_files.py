@@ -40,7 +40,9 @@ def prism(by="cells"):
         data.GetPointData().SetScalars(array(shapes.PRISM_COLOURS, "colour"))
     elif by == "cells":
         middle = [shapes.PRISM_POINTS[f][:, 0].mean() for f in shapes.PRISM_FACES]
-        data.GetCellData().SetScalars(array(numpy.array([shapes.RED if m < 1.5 else shapes.BLUE for m in middle], "u1"), "colour"))
+        data.GetCellData().SetScalars(
+            array(numpy.array([shapes.RED if m < 1.5 else shapes.BLUE for m in middle], "u1"), "colour")
+        )
     else:
         data.GetPointData().SetScalars(array(shapes.PRISM_POINTS[:, 0] * 10, "heat"))
     return data
@@ -88,7 +90,9 @@ def blocks(lo=0, hi=3, kind="hexahedron"):
                 whole.InsertNextId(faces.GetId(i))
             grid.InsertNextCell(vtk.VTK_POLYHEDRON, whole)
     count = points.GetNumberOfPoints()
-    grid.GetPointData().SetScalars(array(numpy.array([points.GetPoint(i)[0] for i in range(count)], "f4"), "pressure"))
+    grid.GetPointData().SetScalars(
+        array(numpy.array([points.GetPoint(i)[0] for i in range(count)], "f4"), "pressure")
+    )
     return grid
 
 
@@ -167,7 +171,13 @@ def legacy():
         for mode in ("ascii", "binary"):
             for version in (42, 51):
                 put = lambda w, m=mode: w.SetFileTypeToASCII() if m == "ascii" else w.SetFileTypeToBinary()
-                save(writer(), data, f"legacy_{version}/{name}_{mode}.vtk", put, lambda w, v=version: w.SetFileVersion(v))
+                save(
+                    writer(),
+                    data,
+                    f"legacy_{version}/{name}_{mode}.vtk",
+                    put,
+                    lambda w, v=version: w.SetFileVersion(v),
+                )
 
 
 def xml():
@@ -217,6 +227,7 @@ def pieces():
         # Data that cannot be cut: the first piece holds all cells, the others hold them as ghosts.
         save(type(writer)(), data, f"pieces/whole_{name}", split)
 
+
 def groups():
     boxes = vtk.vtkMultiBlockDataSet()
     for i, (_, colour, points) in enumerate(shapes.BOXES):
@@ -258,7 +269,9 @@ def others():
         save(vtk.vtkPLYWriter(), triangles.GetOutput(), f"prism_{name}.ply", put, lambda w: w.SetArrayName("colour"))
     save(vtk.vtkOBJWriter(), prism("points"), "prism.obj")
     save(vtk.vtkMetaImageWriter(), image(), "volume.mha", lambda w: w.SetCompression(True))
-    save(vtk.vtkMetaImageWriter(), image(), "volume.mhd", lambda w: w.SetRAWFileName(shapes.place("vtk", "volume.raw")))
+    save(
+        vtk.vtkMetaImageWriter(), image(), "volume.mhd", lambda w: w.SetRAWFileName(shapes.place("vtk", "volume.raw"))
+    )
     save(vtk.vtkNIFTIImageWriter(), image(), "volume.nii.gz")
     for writer, kind in ((vtk.vtkTIFFWriter(), "tif"), (vtk.vtkPNGWriter(), "png")):
         shapes.place("vtk", f"{kind}_stack/slice")
