@@ -8,6 +8,7 @@ four columns in the west and two rows in the north are without data, so its box 
 """
 
 import pathlib
+import sys
 
 import numpy
 
@@ -67,5 +68,7 @@ def attempt(what, action):
     """Does one file; a writer that fails is told and costs no other file."""
     try:
         action()
+    except KeyboardInterrupt:
+        sys.exit(130)
     except Exception as error:
         print(f"{what}: {type(error).__name__}: {error}", flush=True)
