@@ -73,7 +73,6 @@ def meshlab():
         "prism.wrl": "vc",
         "prism.ctm": "vc",
         "prism.x3d": "vc",
-        "prism.gltf": "vc",
     }.items():
         path = shapes.place("meshlab", name)
         command = ["xvfb-run", "-a", "meshlabserver", "-i", "source/prism.ply", "-o", path, "-m", *masks.split()]
