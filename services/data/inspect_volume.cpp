@@ -54,6 +54,12 @@ void describe_grid(const VolumeFileFacts& facts, Description& out) {
   out.row("spacing", fmt::format("{}, {}", extent_text(spacing), unit_of(facts)));
   out.row("axes", fmt::format("i {}, j {}, k {}: {}-handed", vector_text(i / spacing.x), vector_text(j / spacing.y),
                               vector_text(k / spacing.z), left ? "left" : "right"));
+  if (v.space == scene::Space::kLps || v.space == scene::Space::kRas) {
+    const bool lps = v.space == scene::Space::kLps;
+    out.row("patient", fmt::format("x grows to the {}, y to the {}, z to the head ({})", lps ? "left" : "right",
+                                   lps ? "back" : "front", scene::axis_letters(v.space)));
+  }
+  out.json["space"] = scene::axis_letters(v.space);
   const geometry::DBox box = v.box();
   out.row("box", fmt::format("{} .. {}, {}", vector_text(box.lo), vector_text(box.hi), unit_of(facts)));
   out.row("size", extent_text(box.size()));

@@ -11,8 +11,7 @@ namespace telesplat::net {
 /// "CURVE". Empty: no peer that speaks so names one within half a second.
 std::string mechanism_at(const std::string& endpoint);
 
-/// Whether something listens at tcp://HOST:PORT, as far as half a second tells; endpoints of other kinds count as
-/// reachable. Error: why not, in the system's words.
-Status check_reachable(const std::string& endpoint);
+/// Whether this machine reaches itself at 127.0.0.1. Error: why not, in the system's words.
+Status check_loopback();
 
 }  // namespace telesplat::net

@@ -1,6 +1,6 @@
-// telesplat-import FORMAT FILE: reads a glTF, raster or DICOM file with other people's libraries and leaves it on
-// standard output for the process that asked (process.cpp). A program of its own so that neither a crash of these
-// libraries, nor their messages, nor the time that they take to load reach anyone.
+// telesplat-import FORMAT FILE: reads a glTF, a mesh that pictures cover, a raster, slices or DICOM files with other
+// people's libraries and leaves them on standard output for the process that asked (process.cpp). A program of its own
+// so that neither a crash of these libraries, nor their messages, nor what they could do to the machine reach anyone.
 #include <fmt/format.h>
 #include <sys/prctl.h>
 #include <unistd.h>

@@ -124,6 +124,17 @@ TEST(Inspect, AVolumesUnitIsTheOneItsFileSays) {
   EXPECT_EQ(unit_of(folder / "scan"), "mm");
 }
 
+TEST(Inspect, APatientsAxesAreNamed) {
+  const TempFolder folder;
+  const Pattern p{{5, 4, 3}, glm::dmat4(1.0), 0, 1};
+  const auto facts = inspect_volume(folder.write("a.nii", nifti_header(p, {.sform = true}) + p.bytes<int16_t>()), {}, {},
+                                    nullptr);
+  ASSERT_TRUE(facts) << facts.error().text;
+  const Description told = describe(*facts);
+  EXPECT_EQ(told.json["space"], "RAS");
+  expect_rows(told, {"x grows to the right, y to the front, z to the head (RAS)"});
+}
+
 TEST(Inspect, AVolumeTellsWhatARunWouldChoose) {
   const TempFolder folder;
   std::string stored;

@@ -41,10 +41,10 @@ Status Pipeline::start_servers() {
   const int nice = o.background_servers ? 10 : 0;
   if (const Status s = group_.start_master(master_arguments(o), kMasterPatience_s); !s) return s;
   // The others would ask for ever where there is no loopback device.
-  if (const Status s = net::check_reachable(group_.endpoint()); !s)
+  if (const Status s = net::check_loopback(); !s)
     return Error{
-        fmt::format("the session's master was started, but cannot be reached at {}: {}; is the loopback "
-                    "device up (ip link set lo up)?",
+        fmt::format("the session's master cannot be reached at {}: {}; is the loopback device up (ip link set "
+                    "lo up)?",
                     group_.endpoint(), s.error().text)};
   if (const Status s = start_data(); !s) return s;
   // A headset's frames come first; else views are worth more than that they are drawn a little later.
