@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/core/within.h"
 #include "services/data/volume/formats/header_text.h"
 
 namespace telesplat::data {
@@ -44,6 +45,7 @@ class Walker {
       if (int64_t(seen.size()) == kMostPages || entries_ > kMostEntries || !seen.insert(at).second || !directory(at))
         return std::nullopt;
     if (out_.pages == 0) return std::nullopt;
+    if (out_.pages == 1 && listed_ > 1) out_.pages = listed_, out_.data_at = listed_at_;
     out_.big_endian = big_endian_;
     return out_;
   }
@@ -163,13 +165,15 @@ class Walker {
     out_.spacing = {spacing(page.x_resolution), spacing(page.y_resolution),
                     std::abs(data::number(said("spacing=")).value_or(1))};
     if (!(out_.spacing.z > 0)) out_.spacing.z = 1;
-    out_.channels *= int(data::number(said("channels=")).value_or(1));
+    // Where nothing else has several, what it calls channels or frames are slices.
+    const auto several = [&](std::string_view key) { return data::number(said(key)).value_or(1) > 1; };
+    const int axes = several("slices=") + several("frames=") + several("channels=");
+    if (axes > 1) out_.channels = int(within(data::number(said("images=")).value_or(2), 2.0, 1e6));
     const auto images = data::number(said("images="));
     if (!images || !(*images > 1 && *images <= double(kMostPages)) || page.compression != 1 || !out_.type) return;
     const auto pages = int64_t(*images);
-    if (!inside(page.strip, uint64_t(pages) * uint64_t(out_.width) * uint64_t(out_.height) * stored_bytes(*out_.type)))
-      return;
-    out_.pages = pages, out_.data_at = page.strip;
+    if (inside(page.strip, uint64_t(pages) * uint64_t(out_.width) * uint64_t(out_.height) * stored_bytes(*out_.type)))
+      listed_ = pages, listed_at_ = page.strip;
   }
 
   static std::string line_of(std::string_view text, std::string_view key) {
@@ -195,6 +199,8 @@ class Walker {
   std::string_view content_;
   bool big_endian_ = false, large_ = false;
   uint64_t entries_ = 0;
+  int64_t listed_ = 0;  // images behind one directory, as ImageJ says, and where the first of them lies
+  uint64_t listed_at_ = 0;
   TiffPages out_;
 };
 

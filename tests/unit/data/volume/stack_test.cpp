@@ -121,6 +121,23 @@ TEST_F(Stack, ImageJWritesOneDirectoryForAllSlices) {
   }
 }
 
+TEST_F(Stack, ImageJsOtherFilesAreStacksTooUnlessTheyHaveMoreAxes) {
+  // A directory a slice, and a list of as many images: each is counted once.
+  auto all = pages<uint16_t>(16, 1);
+  all[0].description = "ImageJ=1.11a\nimages=3\nslices=3\n";
+  expect_same(read_or_fail(folder.write("a.tif", tiff(all))), p);
+  // What a writer that was told of no axes calls channels.
+  TiffPage page = pages<uint16_t>(16, 1)[0];
+  page.pixels = p.bytes<uint16_t>();
+  page.description = "ImageJ=1.11a\nimages=3\nchannels=3\nmode=grayscale\n";
+  expect_same(read_or_fail(folder.write("b.tif", tiff({page}))), p);
+  page.pixels += page.pixels;
+  page.description = "ImageJ=1.11a\nimages=6\nchannels=2\nslices=3\n";
+  const auto source = find_volume(folder.write("c.tif", tiff({page})));
+  ASSERT_TRUE(source);
+  EXPECT_FALSE(read_volume(*source, 0, nullptr));
+}
+
 TEST_F(Stack, AFolderOfPicturesIsInOrderOfItsNumbers) {
   const auto all = pages<uint16_t>(16, 1);
   for (const char* name : {"9", "10", "11"})
