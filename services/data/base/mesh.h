@@ -26,7 +26,7 @@ struct Mesh {
   std::vector<glm::vec3> normals;     ///< empty, or one a vertex; of any length; (0, 0, 0): to be computed
   std::vector<uint32_t> colours;      ///< empty, or one a vertex: 0x00RRGGBB
   std::vector<uint32_t> indices;      ///< three a triangle
-  /// Of the last vertices, in their order: which ones they stand beside for the sake of another colour. A mesh without
+  /// The vertices that the last ones, in their order, stand beside for the sake of another colour. A mesh without
   /// normals is as smooth there as if they were one. double_vertices() adds them.
   std::vector<uint32_t> copy_of;
   /// The array that the reader was asked for: one value a vertex, or one a triangle where scalars_of_faces. Each is

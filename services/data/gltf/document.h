@@ -75,7 +75,7 @@ class Document {
   Values values(size_t accessor, int width);
   /// The same of whole numbers.
   std::vector<uint32_t> indices(size_t accessor);
-  /// Of the file and the buffers that are there.
+  /// Bytes in the file and in the buffers that are there.
   uint64_t bytes_of_files();
   /// What a URI stands for: text within it, or a file. It stays valid as long as this object. Error: text within that
   /// is no base64, or Companions::read().

@@ -15,7 +15,7 @@ struct MeshoptView {
 };
 
 /// The bytes, count times stride, that were packed: all modes, filters and versions of both extensions. Throws Refusal:
-/// it is damaged, or claims more than so many bytes can hold.
+/// it is damaged, or claims more than that many bytes can hold.
 std::vector<std::byte> decode_meshopt(std::span<const std::byte> packed, const MeshoptView& view);
 
 }  // namespace telesplat::data::gltf

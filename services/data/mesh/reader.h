@@ -68,7 +68,7 @@ Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, c
 /// Other files that `path` pulls in (material libraries of an OBJ and their textures, pictures of a PLY, buffers and
 /// images of a glTF, files of a VRT, what says beside a raster where it lies), as paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);
-/// Of a VRT: the files that it is made of, as it names them.
+/// Returns the files that a VRT is made of, as it names them.
 std::vector<std::string> vrt_sources(std::string_view content);
 
 }  // namespace telesplat::data

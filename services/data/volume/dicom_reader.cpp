@@ -56,7 +56,7 @@ class Pixels {
  public:
   explicit Pixels(const std::string& path) : path_(path) {}
 
-  // Of these slices all that GDCM has to read are read now, in one run of the program.
+  // Reads all of these slices that GDCM has to read, in one run of the program.
   Status prepare(const std::vector<const DicomSlice*>& slices) {
     std::map<std::string, const DicomSlice*> missing;
     std::set<std::string> needed;

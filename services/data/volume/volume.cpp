@@ -16,7 +16,7 @@ namespace telesplat::data {
 
 namespace {
 
-// Gives voxels the spacing that people say, in the directions that they have. Error: it is none.
+// Gives voxels the spacing that people say, in the directions that they have. Error: it is no spacing.
 Status space_out(const std::string& spacing, glm::dmat4& index_to_data) {
   if (spacing.empty()) return ok_status();
   const auto s = numbers(spacing, true);

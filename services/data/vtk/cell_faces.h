@@ -27,8 +27,8 @@ struct CellKind {
 inline constexpr uint8_t kPolyVertex = 2, kPolyLine = 4, kStrip = 6, kPolygon = 7, kQuad = 9, kHexahedron = 12,
                          kQuadraticPolygon = 36, kPolyhedron = 42;
 
-/// Of one of VTK's numbers ("VTK File Formats"); null: it is not known. nodes: Lagrange's cells of second order have
-/// all their nodes.
+/// Returns the kind that one of VTK's numbers means ("VTK File Formats"); null: it is not known. nodes: Lagrange's
+/// cells of second order have all their nodes.
 const CellKind* kind_of_cell(uint8_t type, size_t nodes);
 
 /// One face of a cell: its nodes as points of the data set.

@@ -43,7 +43,7 @@ struct Bytes {
   std::vector<std::byte> owned;
   std::span<const std::byte> in_file;  ///< instead of `owned`
 };
-/// Reads a header of one number, the count, and so many bytes. Error, starting with `what`: they are not there.
+/// Reads a header of one number, the count, and as many bytes. Error, starting with `what`: they are not there.
 Result<Bytes> read_plain(EncodedBytes& in, size_t header_bytes, bool big_endian, const std::string& what);
 /// Reads a header (number of blocks, bytes of a block, bytes of the last one, packed bytes of each) and its blocks.
 /// Unpacks them on all cores. Error, starting with `what`: they are not there, are damaged, or claim more than such

@@ -1,5 +1,7 @@
 #include "services/data/volume/formats/header_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>

@@ -95,7 +95,7 @@ TEST(DicomOrder, LeavesOutLocalizersOthersAndCopies) {
             "left out 9 slices: a localizer (slice9); left out 1 slice: turned, spaced or placed otherwise (slice20); "
             "left out 1 "
             "slice: of 5 x 3 pixels instead of 5 x 4 (slice21); left out 1 slice that are there twice (slice1)");
-  EXPECT_EQ(order({scout}).steps[0].size(), 1u) << "a localizer alone is what there is";
+  EXPECT_EQ(order({scout}).steps[0].size(), 1u) << "a localizer alone is shown";
 }
 
 TEST(DicomOrder, SamePlacesAreTimeStepsIfAllHaveAsMany) {

@@ -121,7 +121,7 @@ TEST(Gltf, ColoursOfAllTypesAreLinear) {
   EXPECT_EQ(read(coloured(floats, 4, half).glb()).colours[0], 0xbc0000u);
   EXPECT_EQ(read(coloured(floats, 4, gloss).glb()).colours[0], 0xbc0000u);
   Json lamp = {{"emissiveFactor", {0.5, 0, 0}}, {"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}}}};
-  EXPECT_EQ(read(coloured(floats, 4, lamp).glb()).colours[0], 0xbc0000u) << "what shines is not black";
+  EXPECT_EQ(read(coloured(floats, 4, lamp).glb()).colours[0], 0xbc0000u) << "a lamp is not black";
   MadeGltf silent = coloured(bytes, 4);
   silent.json["accessors"][0].erase("normalized");
   EXPECT_EQ(read(silent.glb()).colours, right);

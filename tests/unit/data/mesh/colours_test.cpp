@@ -13,7 +13,7 @@ Mesh read(const std::string& path) {
   return mesh ? std::move(*mesh) : Mesh();
 }
 
-// Of a triangle whose corners have one colour.
+// A triangle whose corners have one colour.
 uint32_t colour_of(const Mesh& mesh, size_t triangle) {
   if (mesh.colours.empty()) return kNoColour;
   const uint32_t colour = mesh.colours[mesh.indices.at(3 * triangle)];

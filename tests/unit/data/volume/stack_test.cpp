@@ -99,7 +99,7 @@ TEST_F(Stack, ReducedCopiesAndMasksAreNone) {
   auto all = pages<uint16_t>(16, 1);
   all.insert(all.begin() + 1, {.pixels = std::string(16, 'x'), .width = 4, .height = 2, .subfile = 1});
   expect_same(read_or_fail(folder.write("a.tif", tiff(all))), p);
-  // One picture with its overviews is none, nor is a raster of several pages.
+  // A picture with its overviews is no stack, nor is a raster of several pages.
   EXPECT_FALSE(looks_like_volume(folder.write("one.tif", tiff({all[0], all[1]}))));
   for (TiffPage& page : all) page.placed = true;
   EXPECT_FALSE(looks_like_volume(folder.write("placed.tif", tiff(all))));

@@ -31,7 +31,7 @@ TEST(ActiveArray, IsReadFromTheWordsOfTheFile) {
   EXPECT_EQ(active_array(piece("<PointData/><CellData Scalars = 'a&amp;b'/>")), "a&b");
   EXPECT_EQ(active_array(piece("<PointData Vectors=\"v\"/><CellData/>")), "");
   EXPECT_EQ(active_array(piece("<!-- <PointData Scalars=\"x\"/> -->")), "") << "a comment";
-  EXPECT_EQ(active_array(piece("", "<AppendedData>_<PointData Scalars=\"x\">")), "") << "what follows is no markup";
+  EXPECT_EQ(active_array(piece("", "<AppendedData>_<PointData Scalars=\"x\">")), "") << "text behind it is no markup";
   EXPECT_EQ(active_array(legacy()), "heat");
   EXPECT_EQ(active_array(legacy("")), "id") << "of cells, where points have none";
   EXPECT_EQ(active_array("ply\nformat ascii 1.0\n"), "");
