@@ -23,6 +23,15 @@ const std::vector<Named> kNaming{
      "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = ", "\n"},
     {"ObjMaterials", "a.obj", "mtllib ", "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"},
     {"GltfBuffer", "a.gltf", R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 8, "uri": ")", R"("}]})"},
+    {"PlyPicture", "a.ply", "ply\nformat ascii 1.0\ncomment TextureFile ",
+     "\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"},
+    {"VrtSource", "a.vrt",
+     "<VRTDataset rasterXSize=\"2\" rasterYSize=\"2\"><VRTRasterBand><SimpleSource><SourceFilename "
+     "relativeToVRT=\"1\">",
+     "</SourceFilename></SimpleSource></VRTRasterBand></VRTDataset>"},
+    {"VtkPiece", "a.pvtu",
+     "<VTKFile type='PUnstructuredGrid' version='1.0'><PUnstructuredGrid GhostLevel='0'><Piece Source='",
+     "'/></PUnstructuredGrid></VTKFile>"},
     {"GltfImage", "a.gltf", R"({"asset": {"version": "2.0"}, "images": [{"uri": ")", R"("}]})"},
 };
 
