@@ -27,8 +27,8 @@ class Materials {
   /// name: of the file, for notes. document: outlives this.
   explicit Materials(Document& document, std::string name) : document_(document), name_(std::move(name)) {}
 
-  /// The material of this number, white if there is none, with its picture. Throws Refusal: that is damaged, of no
-  /// known format, too large.
+  /// Returns a material with its picture; without a number a white one. Throws Refusal: the picture is damaged, too
+  /// large, or of no known format.
   const Material& at(std::optional<size_t> number);
 
   std::vector<std::shared_ptr<const Texture>> textures;

@@ -14,8 +14,8 @@ struct MeshoptView {
   std::string mode, filter;  ///< as the extension names them; filter: "" or "NONE": none
 };
 
-/// The bytes, count times stride, that were packed: all modes, filters and versions of both extensions. Throws Refusal:
-/// it is damaged, or claims more than that many bytes can hold.
+/// Unpacks count times stride bytes: all modes, filters and versions of both extensions. Throws Refusal: the data are
+/// damaged, or claim more than their bytes can hold.
 std::vector<std::byte> decode_meshopt(std::span<const std::byte> packed, const MeshoptView& view);
 
 }  // namespace telesplat::data::gltf

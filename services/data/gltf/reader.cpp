@@ -99,7 +99,7 @@ class Reader {
                        [&](uint32_t v) { return opacity(material, primitive, v) < limit; });
   }
 
-  // Triangles of which nothing is to be seen: cut away, or fully transparent.
+  // Leaves out triangles that are cut away or fully transparent.
   void drop_invisible(const Material& material, Primitive& primitive) {
     if (!material.cut && !material.blend) return;
     const double limit = material.cut ? material.cutoff : kInvisible;

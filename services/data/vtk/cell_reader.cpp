@@ -140,7 +140,7 @@ void CellReader::orient_polyhedron(size_t cell) {
       volume += volume_under(corners, from) * (inward_[f] ? -1 : 1);
       for (size_t i = 0; i < corners.size(); ++i) {
         const Edge edge = edge_of(corners, i, f);
-        // More than two faces at an edge: a damaged cell, of which the first ones must do.
+        // More than two faces at an edge: the cell is damaged, and its first ones count.
         auto other = std::lower_bound(edges.begin(), edges.end(), edge);
         for (int n = 0; n < 4 && other != edges.end() && !(edge < *other); ++n, ++other)
           if (!reached[other->face]) {

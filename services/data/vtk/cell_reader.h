@@ -13,7 +13,7 @@ class CellReader {
  public:
   explicit CellReader(const DataSet& set);
 
-  /// Error: a cell of which something is missing.
+  /// Error: a cell lacks points or faces.
   Status check() const;
   size_t count() const { return states_.size(); }
   uint8_t type(size_t cell) const { return set_.structured ? structured_type_ : set_.types[cell]; }

@@ -15,7 +15,7 @@ struct Image {
   std::array<int64_t, 6> extent{};  ///< of points
   glm::dmat4 index_to_data{1.0};    ///< of points
   std::vector<std::string> arrays;  ///< all of numbers, of points first
-  std::string array;                ///< the one that is read; empty: there is none
+  std::string array;                ///< the one that is read; empty: the image has no array
   bool of_cells = false;            ///< it has one value a cell
   StoredType type = StoredType::kU8;
   size_t components = 1;

@@ -22,8 +22,8 @@ struct DicomOrder {
   std::string remark;                          ///< for people: what was left out, mixed or evened; often empty
 };
 
-/// Orders the slices of one series (at least one). Takes those of one size, spacing and orientation, of which most
-/// are; localizers only if there is nothing else. Leaves out copies: the same SOP Instance UID and frame, or a place
+/// Orders the slices of one series (at least one). Takes those that have the commonest size, spacing and orientation;
+/// localizers only if there is nothing else. Leaves out copies: the same SOP Instance UID and frame, or a place
 /// where same_pixels() finds no difference. Slices at one place become time steps if all places have equally many. A
 /// layer that is missing is mixed from its neighbours by their distance; slices at uneven distances are resampled.
 /// Slices without positions go by number.

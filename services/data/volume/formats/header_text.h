@@ -22,8 +22,8 @@ std::optional<std::vector<int64_t>> whole_numbers(std::string_view text);
 /// A path beside another one's file.
 std::string beside(const std::string& path, std::string_view name);
 inline constexpr size_t kMostFiles = 100'000;  ///< that hold one volume
-/// "slice%03d.raw 1 16 1": a name with a number in it, from the first to the last in steps. Error: it is none, or of
-/// more than kMostFiles.
+/// Returns the names that a pattern stands for: "slice%03d.raw 1 16 1" has a number from 1 to 16 in steps of 1. Error:
+/// it is no pattern, or names more than kMostFiles.
 Result<std::vector<std::string>> files_of_pattern(std::string_view text);
 /// Makes these the files of a volume, beside the header at `path`. Error: there are none, or more than voxels.
 Status take_files(const std::vector<std::string>& names, const std::string& path, VolumeFileHeader& header);
