@@ -86,7 +86,7 @@ bool import_stack(int out, telesplat::data::ImportFiles& files, const std::strin
   if (!header) return data::send_error(out, header.error().text);
   limit_time(header->voxel_bytes());
   data::confine(memory_with(2 * header->voxel_bytes() + 2 * files.bytes()));
-  const auto voxels = data::read_stack(files, *header);
+  const auto voxels = data::read_stack(files, *header, [&](double f) { data::send_progress(out, f); });
   if (!voxels) return data::send_error(out, voxels.error().text);
   return data::send_volume(out, *header, voxels->data());
 }

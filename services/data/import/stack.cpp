@@ -31,7 +31,8 @@ GDALDataType type_of(StoredType type) {
 
 }  // namespace
 
-Result<std::vector<std::byte>> read_stack(ImportFiles& files, const VolumeFileHeader& header) {
+Result<std::vector<std::byte>> read_stack(ImportFiles& files, const VolumeFileHeader& header,
+                                          const ReadProgress& progress) {
   if (const Status s = prepare_gdal(files); !s) return s.error();
   const int w = int(header.size[0]), h = int(header.size[1]);
   const size_t page_bytes = size_t(w) * size_t(h) * stored_bytes(header.stored);
@@ -58,6 +59,7 @@ Result<std::vector<std::byte>> read_stack(ImportFiles& files, const VolumeFileHe
                        w, h, type_of(header.stored), 0, 0) != CE_None)
         return Error{fmt::format("{}: page {} cannot be read: {}", file.path(), page, gdal_complaint())};
       --left;
+      progress(double(out.size()) / double(header.voxel_bytes()));
     }
   }
   if (out.size() != header.voxel_bytes()) return Error{"fewer pages than their headers say"};

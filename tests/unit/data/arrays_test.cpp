@@ -295,7 +295,7 @@ TEST(ArrayStore, EachArrayHasAStoreOfItsOwnThatKnowsAllArrays) {
       EXPECT_EQ((*store)->info().array, array);
       EXPECT_EQ((*store)->info().arrays.size(), 4u);
     }
-  options.colouring = {"heat:-1:1", "plasma"};  // map and range are no part of it
+  options.colouring = {.by = "heat:-1:1", .map = "plasma"};  // map and range are no part of it
   EXPECT_TRUE((*open_mesh(path, options, nullptr))->info().from_cache);
 }
 

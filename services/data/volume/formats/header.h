@@ -1,6 +1,5 @@
-// What a volume file's header says, before a voxel is read: one parser a format. VTK's readers trust headers, and those
-// of some formats leave out placement or compression; so headers are read and checked here, in the process that asked,
-// and voxels elsewhere.
+// What a volume file's header says, before a voxel is read: one parser a format. Headers are checked here, so that
+// nothing is allocated by what a file merely claims.
 #pragma once
 
 #include <array>
