@@ -93,7 +93,7 @@ class Page:
         self._beside = ""  # what `telesplat ctl` wants to have running
         self.failures = 0
         self.ran = 0
-        for name in ("scenes", "tools", "walls", "panels"):
+        for name in ("examples", "tools"):
             os.symlink(os.path.join(root, name), os.path.join(folder, name))
         os.makedirs(os.path.join(folder, "build/release"))
         os.symlink(programs, os.path.join(folder, "build/release/bin"))

@@ -246,7 +246,7 @@ def sentences(tree):
                 yield Finding(page.path, number, "sentences", f'a second sentence begins behind "{ends[0][1]}"')
 
 
-_TOPS = "|".join(["cmake", "client", "common", "compose", "docs", "scenes", "services", "tests", "tools"])
+_TOPS = "|".join(["cmake", "client", "common", "compose", "docs", "examples", "services", "tests", "tools"])
 _PAGE_PATH = re.compile(rf"`((?:{_TOPS})/[\w./*{{}},-]+|[\w/-]+\.(?:h|cpp))`")
 _COMMENT_PATH = re.compile(r"(?<![\w/.<-])((?:[\w-]+/)*[\w-]+\.(?:h|cpp|md))\b")
 

@@ -7,7 +7,7 @@ import pathlib
 import re
 
 # The folders that rules look at. Build folders and run folders lie beside them.
-ROOTS = ("cmake", "client", "common", "compose", "docs", "scenes", "services", "tests", "tools")
+ROOTS = ("cmake", "client", "common", "compose", "docs", "examples", "services", "tests", "tools")
 SOURCES = (".h", ".cpp")
 
 # Whatever is not code: raw strings, strings, characters, comments.

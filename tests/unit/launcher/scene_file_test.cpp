@@ -254,7 +254,7 @@ TEST_F(SceneFile, ErrorsOfJuliaSetsNameTheLine) {
 
 TEST_F(SceneFile, TheScenesThatComeWithTelesplatCanBeRead) {
   int read = 0;
-  for (const auto& entry : std::filesystem::directory_iterator("scenes")) {
+  for (const auto& entry : std::filesystem::directory_iterator("examples/scenes")) {
     if (entry.path().extension() != ".toml") continue;
     const auto flags = read_scene_file(entry.path().string());
     ASSERT_TRUE(flags.ok()) << flags.error().text;
