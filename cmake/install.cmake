@@ -2,7 +2,7 @@
 include(GNUInstallDirs)
 
 install(TARGETS telesplat telesplat-data telesplat-health telesplat-import telesplat-master telesplat-packer
-  telesplat-pose-replay telesplat-sampler telesplat-viewer telesplat-wan-relay)
+  telesplat-sampler telesplat-viewer telesplat-wan-relay)
 
 set(manuals ${CMAKE_BINARY_DIR}/manuals)
 install(CODE "

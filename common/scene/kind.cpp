@@ -15,7 +15,8 @@ struct Row {
 
 // Fewer and larger clusters are chosen from sooner. A Julia set along a walk at 2560x1600 had 54 fps, 237 ms, 28.5 dB
 // and 0.9 % holes with 5 levels, 44 fps, 284 ms, 28.2 dB and 0.3 % with 6. The isosurface of a bonsai after a minute's
-// orbit (bench cache) was chosen from in 1.7 ms with 5 levels, 5.2 ms with 6, and splatted in 10.6 instead of 13.4 ms.
+// orbit (telesplat-lab cache) was chosen from in 1.7 ms with 5 levels, 5.2 ms with 6, and splatted in 10.6 instead of
+// 13.4 ms.
 constexpr int kDepth = 5;
 
 // A frame of a Julia set is dear: it is sampled coarser while the head moves. Where everything was kept, its pictures

@@ -32,14 +32,12 @@ from files import Files
 SKIPPED = {
     r"tools/(demo|test|setup)\b": "it sets up and builds this tree",
     r"(cmake|ctest)\b": "it builds this tree",
-    r"(tools/gpu-check|tar -xf gpu-check)\b": "it packs this build for another machine",
+    r"(tools/lab/gpu-check|tar -xf gpu-check)\b": "it packs this build for another machine",
     r"(compose/prepare|cp .* compose/files|(\w+=\S+ )*docker|for s in master)\b":
         "it needs docker; compose/test runs it",
     r"(apt-get|debootstrap|tar -C|rm -rf /tmp/bookworm)\b": "it needs root and a network",
 }
-SERVICES = {
-    f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay", "pose-replay")
-}
+SERVICES = {f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay")}
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
 SECONDS, SIZE = 3, "320x240"  # of a run that does not say
@@ -170,7 +168,7 @@ class Page:
     def _run_one(self, command, text):
         program, verb = os.path.basename(command.words[0]), (command.words[1:] + [""])[0]
         where = f"line {command.line}"
-        if program in SERVICES:
+        if program in SERVICES or (program == "telesplat-lab" and verb == "pose-replay"):
             self._start_service(where, text, program)
         elif program == "telesplat" and verb in ("run", "view"):
             self._beside = text

@@ -14,9 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPrograms[] = {"telesplat",         "telesplat-master",      "telesplat-data",
-                                     "telesplat-sampler", "telesplat-packer",      "telesplat-viewer",
-                                     "telesplat-health",  "telesplat-pose-replay", "telesplat-wan-relay"};
+constexpr const char* kPrograms[] = {"telesplat",        "telesplat-master", "telesplat-data",   "telesplat-sampler",
+                                     "telesplat-packer", "telesplat-viewer", "telesplat-health", "telesplat-wan-relay"};
 
 std::string output_of(const TemporaryFolder& folder, const std::string& name, std::vector<std::string> arguments) {
   Program program(name, std::move(arguments), folder / "program");

@@ -132,6 +132,17 @@ def floors(tree):
                 )
 
 
+def rings(tree):
+    """A ring of tables.RINGS is included by itself and by those that its row names."""
+    for file in tree.sources():
+        for include in file.includes:
+            for ring, others in tables.RINGS.items():
+                if not include.own or not _is_in(include.target, ring):
+                    continue
+                if not any(_is_in(file.path, place) for place in (ring, *others)):
+                    yield Finding(file.path, include.line, "rings", f"includes {include.target}, which is of {ring}")
+
+
 def outside_headers(tree):
     """The headers of an outside library are included in its own place only."""
     rows = [(re.compile(pattern), places) for pattern, places in tables.OUTSIDE_HEADERS]
@@ -148,4 +159,4 @@ def outside_headers(tree):
                     )
 
 
-RULES = (directions, circles, floors, outside_headers)
+RULES = (directions, circles, floors, rings, outside_headers)

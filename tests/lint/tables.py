@@ -16,6 +16,10 @@ PARTS = {
     "tools": ("common", "services", "client", "tools"),
     "tests": ("common", "services", "client", "tools", "tests"),
 }
+# Rings, from the inside out: the product, then these. Folder of a ring -> the parts that may include it beside itself.
+RINGS = {
+    "tools/lab": ("tests",),
+}
 # Processes: nothing in one includes another.
 PROCESSES = ("services/data", "services/master", "services/packer", "services/sampler", "client/viewer")
 # What one folder of tests may use of the others.
@@ -91,8 +95,7 @@ FLOORS = {
     ],
     "tools": [
         ["tools/common"],
-        ["tools/health", "tools/make_terrain", "tools/make_volume", "tools/pose_replay",
-         "tools/wan_relay", "tools/xr_test_runtime"],
+        ["tools/health", "tools/make_terrain", "tools/lab/make_volume", "tools/wan_relay", "tools/xr_test_runtime"],
         ["tools/telesplat/command.h"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
@@ -102,9 +105,10 @@ FLOORS = {
         ["tools/telesplat/top"],
         ["tools/telesplat/sweep"],
         ["tools/telesplat/tune"],
-        ["tools/telesplat/autostereo", "tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare",
+        ["tools/telesplat/autostereo", "tools/telesplat/cache", "tools/telesplat/compare",
          "tools/telesplat/inspect", "tools/telesplat/keys"],
         ["tools/telesplat"],
+        ["tools/lab"],
     ],
 }
 

@@ -60,16 +60,17 @@ void put_help_behind(std::vector<std::string>& arguments) {
 
 }  // namespace
 
-int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments) {
+int run_commands(const std::string& program, const std::string& about, const std::vector<Command>& commands,
+                 std::vector<std::string> arguments) {
   put_help_behind(arguments);
   if (const Status s = expand(commands, arguments); !s) return tools::complain(s.error());
   put_flags_behind(commands, arguments);
   options::Parser parser(about);
   parser.version(version());
-  parser.footer("telesplat help COMMAND tells what a command does, and its flags.");
+  parser.footer(program + " help COMMAND tells what a command does, and its flags.");
   Parsers parsers;
   declare(parser, commands, parsers);
-  parser.parse_or_exit("telesplat", std::move(arguments));
+  parser.parse_or_exit(program, std::move(arguments));
   for (const auto& [command, own] : parsers)
     if (own->chosen()) return command->run(own->given());
   return 2;

@@ -43,7 +43,6 @@ Command movie_command();
 Command report_command();
 Command sweep_command();
 Command tune_command();
-Command bench_command();
 Command cache_command();
 Command presets_command();
 Command autostereo_command();
@@ -53,7 +52,9 @@ Command keys_command();
 /// `commands`, and two more that tell of all of them: completion and man.
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);
 
-/// Runs the command that the arguments name; --help prints and ends the program, bad usage too, with code 2.
-int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments);
+/// Runs the command of `program` that the arguments name; --help prints and ends the program, bad usage too, with code
+/// 2.
+int run_commands(const std::string& program, const std::string& about, const std::vector<Command>& commands,
+                 std::vector<std::string> arguments);
 
 }  // namespace telesplat::launcher

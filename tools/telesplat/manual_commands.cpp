@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kServices{"master", "data", "sampler", "packer", "viewer", "health", "pose-replay", "wan-relay"};
+constexpr std::array kServices{"master", "data", "sampler", "packer", "viewer", "health", "wan-relay"};
 
 struct CompletionOptions {
   std::string shell;
@@ -41,8 +41,8 @@ options::Table completion_table(CompletionOptions& o) {
 options::Table man_table(ManOptions& o) {
   return {{.flag = "command",
            .value = &o.words,
-           .help = "a command of telesplat, or a service: master, data, sampler, packer, viewer, health, pose-replay, "
-                   "wan-relay; default: telesplat itself"},
+           .help = "a command of telesplat, or a service: master, data, sampler, packer, viewer, health, wan-relay; "
+                   "default: telesplat itself"},
           {.flag = "--out", .value = &o.out, .help = "folder to write all pages to instead: telesplat.1, ..."}};
 }
 

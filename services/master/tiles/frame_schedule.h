@@ -23,12 +23,12 @@ namespace telesplat::master {
 inline constexpr double kLeastOverdue_s = 0.015;  ///< nothing that has been out for less gets a backup
 
 /// Seconds of lease_target_s that each sampler adds at least: so master and packer have no more than 4000 leases of
-/// rows a second to look after, however many samplers there are. Set by `telesplat bench scaling`: on two cores that
+/// rows a second to look after, however many samplers there are. Set by `telesplat-lab scaling`: on two cores that
 /// leaves the samplers' processes their part.
 inline constexpr double kTargetPerSampler_s = 0.25e-3;
 
 /// Rows that take longer are not kept in store at the end of a frame; of cheaper ones it takes longer to fetch the next
-/// than to wait for one in store (3 to 8 ms between idle and busy with 40 samplers on two cores; `telesplat bench
+/// than to wait for one in store (3 to 8 ms between idle and busy with 40 samplers on two cores; `telesplat-lab
 /// scaling`).
 inline constexpr double kDearRow_s = 0.01;
 

@@ -1,4 +1,4 @@
-// Heads that other programs move: telesplat-pose-replay, silent and hostile publishers, real processes.
+// Heads that other programs move: telesplat-lab pose-replay, silent and hostile publishers, real processes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,8 +39,8 @@ class Replay {
  private:
   static std::unique_ptr<Program> make(const TemporaryFolder& folder, std::vector<std::string> arguments) {
     write_swaying(folder / "swaying.csv");
-    arguments.insert(arguments.begin(), {folder / "swaying.csv", "--bind", "tcp://127.0.0.1:*"});
-    return std::make_unique<Program>("telesplat-pose-replay", std::move(arguments), folder / "replay");
+    arguments.insert(arguments.begin(), {"pose-replay", folder / "swaying.csv", "--bind", "tcp://127.0.0.1:*"});
+    return std::make_unique<Program>("telesplat-lab", std::move(arguments), folder / "replay");
   }
   std::unique_ptr<Program> program_;
   std::string address_;
@@ -126,25 +126,12 @@ TEST(Tracking, WhatCannotBeIsRefused) {
     EXPECT_NE(run.program().complaint().find(arguments[0]), std::string::npos) << run.program().complaint();
   }
   TemporaryFolder folder;
-  Program missing("telesplat-pose-replay", {folder / "nothing.csv"}, folder / "missing");
+  Program missing("telesplat-lab", {"pose-replay", folder / "nothing.csv"}, folder / "missing");
   EXPECT_EQ(missing.wait(), 2);
   write_swaying(folder / "swaying.csv");
-  Program open("telesplat-pose-replay", {folder / "swaying.csv", "--bind", "tcp://0.0.0.0:*"}, folder / "open");
+  Program open("telesplat-lab", {"pose-replay", folder / "swaying.csv", "--bind", "tcp://0.0.0.0:*"}, folder / "open");
   EXPECT_EQ(open.wait(), 2);
   EXPECT_NE(open.err().find("--insecure"), std::string::npos) << open.err();
-}
-
-TEST(Tracking, TheBenchComparesWaysOfPredicting) {
-  TemporaryFolder folder;
-  write_swaying(folder / "swaying.csv");
-  Program bench("telesplat",
-                {"bench", "tracking", folder / "swaying.csv", "--horizons", "40,60", "--csv", folder / "table.csv"},
-                folder / "bench");
-  ASSERT_EQ(bench.wait(), 0) << bench.err();
-  EXPECT_NE(bench.out().find("| swaying | 60 |"), std::string::npos) << bench.out();
-  const std::string table = read_text(folder / "table.csv");
-  EXPECT_TRUE(table.starts_with("movement,horizon_ms,prediction,poses,mean_mm,")) << table;
-  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 7);
 }
 
 }  // namespace

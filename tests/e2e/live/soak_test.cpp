@@ -1,5 +1,5 @@
-// tools/soak itself, for some seconds in which nothing happens: that each of its scenes begins, is displayed and ends.
-// What it demands of an hour cannot be told from these.
+// tools/lab/soak itself, for some seconds in which nothing happens: that each of its scenes begins, is displayed and
+// ends. What it demands of an hour cannot be told from these.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -18,7 +18,7 @@ class Soak : public ::testing::TestWithParam<const char*> {
 TEST_P(Soak, ItsSceneBeginsIsDisplayedAndEnds) {
   const std::string out = folder_ / "soak";
   Program soak(
-      TELESPLAT_SOURCE "/tools/soak",
+      TELESPLAT_SOURCE "/tools/lab/soak",
       {"--minutes", "0.12", "--calm", "1000", "--scene", GetParam(), "--build", TELESPLAT_BIN "/..", "--out", out},
       folder_ / "told");
   soak.wait(120);

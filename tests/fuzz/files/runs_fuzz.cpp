@@ -1,4 +1,4 @@
-// Any bytes as files of run folders and sweeps, and as scene files, as the launcher reads them: tables, traces,
+// Any bytes as files of run folders and sweeps, and as scene files, as the launcher reads them: tables,
 // manifests, session.toml. The first byte chooses.
 #include <cmath>
 #include <cstdlib>
@@ -8,7 +8,6 @@
 #include "common/core/log.h"
 #include "tests/support/files/memory_file.h"
 #include "tools/common/csv_table.h"
-#include "tools/telesplat/bench/thesis/timeline.h"
 #include "tools/telesplat/record/recorded_run.h"
 #include "tools/telesplat/report/reading/loose_table.h"
 #include "tools/telesplat/run/run_options.h"
@@ -64,10 +63,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const test::MemoryFile file({data + 1, size - 1});
   switch (data[0] % 6) {
     case 0:
-      tables(file.path());
-      break;
     case 1:
-      if (const auto lanes = read_timeline(file.path()); lanes.ok() && !lanes->empty()) steady_part(*lanes);
+      tables(file.path());
       break;
     case 2:
       (void)read_manifest(folder.with(kManifestFile, content));

@@ -1,0 +1,13 @@
+// The commands of telesplat-lab. Each prints a table or plays a recording; none leaves a process behind.
+#pragma once
+
+#include "tools/telesplat/command.h"
+
+namespace telesplat::lab {
+
+launcher::Command cache_command();
+launcher::Command codec_command();
+launcher::Command pose_replay_command();
+launcher::Command scaling_command();
+
+}  // namespace telesplat::lab

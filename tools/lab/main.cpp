@@ -1,0 +1,15 @@
+// telesplat-lab: measures parts of Telesplat, and plays recorded heads to it. It is not installed.
+#include "common/net/service.h"
+#include "services/data/base/cut_off.h"
+#include "tools/lab/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace telesplat;
+  return net::guarded_main([&] {
+    data::end_at_cut_off_files(2);
+    return launcher::run_commands(
+        "telesplat-lab", "telesplat-lab: measures parts of Telesplat, and plays recorded heads to it",
+        {lab::scaling_command(), lab::cache_command(), lab::codec_command(), lab::pose_replay_command()},
+        {argv + 1, argv + argc});
+  });
+}
