@@ -11,7 +11,7 @@
 #include <string>
 
 #include "common/codec/depth_codec.h"
-#include "common/image/plane_file.h"
+#include "tests/bench/plane_file.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/masks.h"
 

@@ -1,4 +1,4 @@
-#include "common/image/plane_file.h"
+#include "tests/bench/plane_file.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
