@@ -38,10 +38,7 @@ class HalfAPicture : public DirectScene {
       }
     return out;
   }
-  Result<image::DepthImage> sample_tile(const geometry::Camera&, const geometry::Rect&, const image::PixelMask*,
-                                        EpochId, double) override {
-    return Error{"is not sampled"};
-  }
+  Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override { return Error{"is not sampled"}; }
   bool has_surface() const override { return surface_; }
   geometry::Box box_room() const override { return {}; }
   std::string size() const override { return "half a picture"; }

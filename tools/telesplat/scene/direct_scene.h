@@ -13,7 +13,6 @@
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
 #include "common/image/measures/reference.h"
-#include "common/image/pixel_mask.h"
 #include "common/image/shading.h"
 
 namespace telesplat::launcher {
@@ -42,18 +41,8 @@ class DirectScene {
       return drawn;
     });
   }
-  /// The pixels `tile` of a sampling frame, of them those of `mask` (null: all), as a sampler takes them. Error: as
-  /// draw(), or the scene has no surface. Preconditions: the tile lies in the camera's image, and has the mask's size.
-  virtual Result<image::DepthImage> sample_tile(const geometry::Camera& camera, const geometry::Rect& tile,
-                                                const image::PixelMask* mask, EpochId epoch, double footprint_px) = 0;
-  Result<image::DepthImage> sample_tile(const geometry::Camera& camera, const geometry::Rect& tile,
-                                        const image::PixelMask* mask, EpochId epoch) {
-    return sample_tile(camera, tile, mask, epoch, 1);
-  }
-  /// All of a sampling frame.
-  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) {
-    return sample_tile(camera, {0, 0, camera.width, camera.height}, nullptr, epoch);
-  }
+  /// All of a sampling frame, as samplers take it. Error: as draw(), or the scene has no surface.
+  virtual Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) = 0;
 
   /// Whether pictures have the depth of a surface.
   virtual bool has_surface() const { return true; }

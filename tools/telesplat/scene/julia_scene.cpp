@@ -26,11 +26,10 @@ class DirectJulia : public DirectScene {
     if (!scene) return scene.error();
     return sampler::render_julia_directly(*scene, camera, image::Shading(shading, camera), threads_, footprint_px);
   }
-  Result<image::DepthImage> sample_tile(const geometry::Camera& camera, const geometry::Rect& tile,
-                                        const image::PixelMask* mask, EpochId epoch, double footprint_px) override {
+  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) override {
     const auto scene = at(epoch);
     if (!scene) return scene.error();
-    return sampler_.sample(*scene, camera, tile, footprint_px, mask);
+    return sampler_.sample(*scene, camera, {0, 0, camera.width, camera.height}, 1);
   }
   geometry::Box box_room() const override { return julia_.placement.box_room; }
   std::string size() const override { return fmt::format("{} iterations", julia_.begin.iterations); }

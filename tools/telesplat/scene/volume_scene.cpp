@@ -38,8 +38,7 @@ class DirectVolume : public DirectScene {
     for (size_t i = 0; i < view.colour.size(); ++i)
       if (view.colour[i] >> 24 >= kVisible) view.depth_m[i] = 1;
   }
-  Result<image::DepthImage> sample_tile(const geometry::Camera&, const geometry::Rect&, const image::PixelMask*,
-                                        EpochId, double) override {
+  Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override {
     return Error{fmt::format("{}: is a volume, of which no depth images are sampled", file_)};
   }
   geometry::Box box_room() const override { return store_->session().grid.box_room(); }
