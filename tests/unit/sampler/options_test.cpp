@@ -22,7 +22,6 @@ TEST(SamplerOptions, ValuesBeyondTheirLimitsAreRefused) {
   for (const auto& [flag, value] : {std::pair{"--threads", "1025"},
                                     {"--sampler", "gpu"},
                                     {"--chunk-cache-mb", "0.5"},
-                                    {"--repeat-views", "-1"},
                                     {"--cost-scale", "much"}})
     EXPECT_FALSE(options::set(*options::find(rows, flag), value).ok()) << flag;
   ASSERT_TRUE(options::set(*options::find(rows, "--chunk-cache-mb"), "512").ok());
