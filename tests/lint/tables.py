@@ -99,7 +99,6 @@ FLOORS = {
         ["tools/telesplat/movie"],
         ["tools/telesplat/report"],
         ["tools/telesplat/run"],
-        ["tools/telesplat/top"],
         ["tools/telesplat/sweep"],
         ["tools/telesplat/tune"],
         ["tools/telesplat/autostereo", "tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare",
@@ -159,7 +158,6 @@ OUTSIDE_HEADERS = [
     (r"((oneapi/)?tbb(\.h|/(tbb\.h|parallel_.*|task_group\.h|flow.*))|execution)", ["common/parallel"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
     (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/common/inference.cpp", "tools/wan_relay"]),
-    (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),
 ]
 
 # Folders without a limit of files: data and pages, not sources.

@@ -47,7 +47,6 @@ Command bench_command();
 Command cache_command();
 Command presets_command();
 Command autostereo_command();
-Command top_command();
 Command keys_command();
 
 /// `commands`, and two more that tell of all of them: completion and man.

@@ -66,8 +66,14 @@ int show_status(StatusOptions o, const options::Given& given) {
   const auto client = reach(o.session, given, exit_code, net::any_role());  // everybody may ask that
   if (!client) return exit_code;
   if (o.watch) net::install_signal_handlers();
+  bool shown = false;
   do {
-    if (const Status s = print_status(*client, o); !s) return tools::complain(s.error(), 1);
+    if (const Status s = print_status(*client, o); !s) {
+      if (!shown || net::stop_requested() || !client->nobody_there()) return tools::complain(s.error(), 1);
+      std::printf("the session has ended\n");
+      return 0;
+    }
+    shown = true;
     for (int i = 0; i < kLooksASecond && o.watch && !net::stop_requested(); ++i)
       std::this_thread::sleep_for(kLookAtSignals);
   } while (o.watch && !net::stop_requested());
