@@ -100,7 +100,6 @@ FLOORS = {
         ["tools/telesplat/report"],
         ["tools/telesplat/run"],
         ["tools/telesplat/sweep"],
-        ["tools/telesplat/tune"],
         ["tools/telesplat/autostereo", "tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare",
          "tools/telesplat/inspect", "tools/telesplat/keys"],
         ["tools/telesplat"],

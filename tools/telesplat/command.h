@@ -42,7 +42,6 @@ Command compare_command();
 Command movie_command();
 Command report_command();
 Command sweep_command();
-Command tune_command();
 Command bench_command();
 Command cache_command();
 Command presets_command();
