@@ -73,29 +73,39 @@ Result<CsvTable> CsvTable::read(const std::string& path, const Limits& limits) {
   if (content->empty()) return Error{fmt::format("{}: is empty", path)};
   out.bytes_ = *std::move(content);
 
-  size_t number = 0;
-  for (size_t begin = 0; begin < out.bytes_.size();) {
-    const size_t end = std::min(out.bytes_.find('\n', begin), out.bytes_.size());
-    const std::string_view line(out.bytes_.data() + begin, end - begin);
-    const auto wrong = [&, n = ++number](const std::string& what) {
-      return Error{fmt::format("{}:{}: {}", path, n, what)};
-    };
-    const size_t place = begin;
+  for (size_t begin = 0, number = 1; begin < out.bytes_.size(); ++number) {
+    const size_t end = std::min(out.bytes_.find('\n', begin), out.bytes_.size()), place = begin;
+    std::string_view line(out.bytes_.data() + begin, end - begin);
     begin = end + 1;
-    if (line.size() > limits.line_bytes) return wrong(fmt::format("a line of more than {} bytes", limits.line_bytes));
-    size_t fields = 0;
-    const bool whole = each_field(line, [&](const std::string& field) {
-      if (number == 1) out.header_.push_back(field);
-      return ++fields > 0;
-    });
-    if (!whole) return wrong("a quoted text that does not end");
-    if (fields != out.header_.size()) return wrong(fmt::format("{} values instead of {}", fields, out.header_.size()));
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    const std::string wrong = number == 1 ? out.take_header(line, limits) : out.problem(line, limits);
+    if (number > 1 && limits.lenient && (!wrong.empty() || end == out.bytes_.size())) {
+      ++out.damaged_;
+      continue;
+    }
+    if (!wrong.empty()) return Error{fmt::format("{}:{}: {}", path, number, wrong)};
     if (number == 1) continue;
-    if (end == out.bytes_.size()) return wrong("the line is cut off");
-    if (out.lines_.size() == limits.rows) return wrong(fmt::format("more than {} rows", limits.rows));
+    if (end == out.bytes_.size()) return Error{fmt::format("{}:{}: the line is cut off", path, number)};
+    if (out.lines_.size() == limits.rows)
+      return Error{fmt::format("{}:{}: more than {} rows", path, number, limits.rows)};
     out.lines_.push_back({place, line.size()});
   }
   return out;
+}
+
+// Why a line cannot be read; empty: it can.
+std::string CsvTable::problem(std::string_view line, const Limits& limits) const {
+  if (line.size() > limits.line_bytes) return fmt::format("a line of more than {} bytes", limits.line_bytes);
+  size_t fields = 0;
+  if (!each_field(line, [&](const std::string&) { return ++fields > 0; })) return "a quoted text that does not end";
+  return fields == header_.size() ? "" : fmt::format("{} values instead of {}", fields, header_.size());
+}
+
+// The same of the first line. Editors put a byte order mark in front of it.
+std::string CsvTable::take_header(std::string_view line, const Limits& limits) {
+  if (line.starts_with("\xef\xbb\xbf")) line.remove_prefix(3);
+  if (line.size() <= limits.line_bytes) header_ = csv_fields(line).value_or(std::vector<std::string>());
+  return problem(line, limits);
 }
 
 std::optional<size_t> CsvTable::find(std::string_view name) const {

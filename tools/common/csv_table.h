@@ -20,19 +20,23 @@ class CsvTable {
  public:
   struct Limits {
     size_t rows = 10'000'000, line_bytes = 1 << 16;
+    bool lenient = false;  ///< lines that cannot be read are left out, and counted by damaged()
   };
-  /// Error: the file is not there or empty, a line is longer than the limit, cut off, or has another number of values
-  /// than the header, a quoted text does not end, or there are too many rows. A file may have 4 GiB.
+  /// Error: the file is not there or empty, there are too many rows, or a line cannot be read: it is longer than the
+  /// limit, is cut off, has another number of values than the header, or a quoted text does not end. A file may have
+  /// 4 GiB.
   static Result<CsvTable> read(const std::string& path, const Limits& limits);
 
   const std::string& path() const { return path_; }
   size_t rows() const { return lines_.size(); }
+  size_t damaged() const { return damaged_; }
   const std::vector<std::string>& header() const { return header_; }
 
   /// Where a column is. Error: there is none of that name.
   Result<size_t> column(std::string_view name) const;
   std::optional<size_t> find(std::string_view name) const;
 
+  std::vector<std::string> fields(size_t row) const { return *csv_fields(line(row)); }
   std::string text(size_t row, size_t column) const;
   /// Error: not a finite number.
   Result<double> number(size_t row, size_t column) const;
@@ -45,8 +49,12 @@ class CsvTable {
   Error wrong(size_t row, const std::string& what) const;
 
  private:
+  std::string problem(std::string_view line, const Limits& limits) const;
+  std::string take_header(std::string_view line, const Limits& limits);
+
   std::string path_, bytes_;
   std::vector<std::string> header_;
+  size_t damaged_ = 0;
   struct Line {
     size_t begin, size;
   };
