@@ -1,4 +1,4 @@
-// Any bytes as files of run folders and sweeps, and as scene files, as the launcher reads them: tables, traces,
+// Any bytes as files of run folders and sweeps, and as scene files, as the launcher reads them: tables,
 // manifests, session.toml. The first byte chooses.
 #include <cmath>
 #include <cstdlib>
@@ -8,9 +8,9 @@
 #include "common/core/log.h"
 #include "tests/support/files/memory_file.h"
 #include "tools/common/csv_table.h"
-#include "tools/telesplat/bench/thesis/timeline.h"
 #include "tools/telesplat/record/recorded_run.h"
 #include "tools/telesplat/report/reading/loose_table.h"
+#include "tools/telesplat/report/sweep_part.h"
 #include "tools/telesplat/run/run_options.h"
 #include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/scene/scene_file.h"
@@ -67,7 +67,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       tables(file.path());
       break;
     case 1:
-      if (const auto lanes = read_timeline(file.path()); lanes.ok() && !lanes->empty()) steady_part(*lanes);
+      static_cast<void>(settle_report({.runs = {folder.with("sweep.csv", content)}, .labels = {}}));
       break;
     case 2:
       (void)read_manifest(folder.with(kManifestFile, content));

@@ -7,7 +7,7 @@ Command bench_command() {
   out.name = "bench";
   out.help = "measure the pipeline";
   out.commands = {bench_scaling_command(),  bench_volume_command(), bench_cache_command(),   bench_codec_command(),
-                  bench_steering_command(), bench_thesis_command(), bench_tracking_command()};
+                  bench_steering_command(), bench_tracking_command()};
   return out;
 }
 

@@ -10,7 +10,6 @@ Command bench_volume_command();
 Command bench_cache_command();
 Command bench_codec_command();
 Command bench_steering_command();
-Command bench_thesis_command();
 Command bench_tracking_command();
 
 }  // namespace telesplat::launcher
