@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "tools/telesplat/control/process_tables.h"
 #include "tools/telesplat/run/live_figures.h"
 
 namespace telesplat::launcher {

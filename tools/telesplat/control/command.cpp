@@ -10,11 +10,8 @@
 #include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/choice.h"
-#include "tools/telesplat/control/coupling.h"
-#include "tools/telesplat/control/hands.h"
-#include "tools/telesplat/control/list.h"
+#include "tools/telesplat/control/commands.h"
 #include "tools/telesplat/control/orders.h"
-#include "tools/telesplat/control/settings.h"
 #include "tools/telesplat/control/status_text.h"
 
 namespace telesplat::launcher {
@@ -99,11 +96,7 @@ int give_order(OrderOptions o, const options::Given& given) {
   if (o.words.empty() && !o.order.shown.empty()) return print_shown(*client, o.order.shown);
   auto arguments = o.order.read ? o.order.read(o.words, *client) : Result<Order::Arguments>(Order::Arguments{});
   if (!arguments) return tools::complain(arguments.error(), client->unanswered() ? 1 : 2);
-  const auto reply = client->order(o.order.name, kPatience_s, *arguments);
-  if (!reply) return tools::complain(reply.error(), 1);
-  if (!reply->ok) return tools::complain({reply->text});
-  std::printf("%s\n", reply->text.c_str());
-  return 0;
+  return tell_answer(client->order(o.order.name, kPatience_s, *arguments));
 }
 
 Command order_command(const Order& order) {

@@ -1,5 +1,4 @@
-#include "tools/telesplat/control/process_tables.h"
-
+// The processes of a session as tables.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,6 +11,7 @@
 #include "common/core/utf8.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/json_fields.h"
+#include "tools/telesplat/control/status_text.h"
 
 namespace telesplat::launcher {
 namespace {
