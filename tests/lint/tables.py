@@ -93,7 +93,7 @@ FLOORS = {
         ["tools/common"],
         ["tools/health", "tools/make_terrain", "tools/make_volume", "tools/pose_replay",
          "tools/wan_relay", "tools/xr_test_runtime"],
-        ["tools/telesplat/command.h"],
+        ["tools/telesplat/command.h", "tools/telesplat/run/child_process.*"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
         ["tools/telesplat/movie"],

@@ -8,6 +8,7 @@
 
 #include "common/core/utf8.h"
 #include "common/image/file.h"
+#include "tools/telesplat/movie/contact_sheet.h"
 #include "tools/telesplat/report/page.h"
 #include "tools/telesplat/report/picture_part.h"
 #include "tools/telesplat/report/report.h"
@@ -286,12 +287,12 @@ TEST(ReportRun, StagesOfNoKnownColumnAreNone) {
 
 TEST(ReportPictures, AreScaledToMeansAndBounded) {
   image::View view{4, 2, {0x000000, 0xffffff, 0xff0000, 0xff0000, 0x000000, 0xffffff, 0x00ff00, 0x00ff00}, {}};
-  const auto small = scaled_down(view, 2);
+  const auto small = small_picture(view, 2);
   EXPECT_EQ(small.width, 2);
   EXPECT_EQ(small.height, 1);
   EXPECT_EQ(small.colour[0], 0x808080u);
   EXPECT_EQ(small.colour[1], 0x808000u);
-  EXPECT_EQ(scaled_down(view, 100).width, 4);
+  EXPECT_EQ(small_picture(view, 100).width, 4);
 
   const TemporaryFolder folder;
   write(folder / "frames.csv", kFrames);

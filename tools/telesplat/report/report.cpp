@@ -168,7 +168,8 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   return out;
 }
 
-Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& progress, const ShouldStop& should_stop) {
+Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& progress,
+                               const tools::ShouldStop& should_stop) {
   const auto names = names_of(o);
   ordered_json data{{"version", version()}, {"figures", figure_kinds()}, {"runs", ordered_json::array()}};
   if (!o.sweep.is_null()) data["sweep"] = o.sweep;

@@ -1,7 +1,6 @@
 // Reports of recorded runs, or of a sweep: a page.
 #pragma once
 
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -11,9 +10,6 @@
 #include "tools/telesplat/report/reading/run_tables.h"
 
 namespace telesplat::launcher {
-
-/// Whether the person wants an end to it.
-using ShouldStop = std::function<bool()>;
 
 struct ReportOptions {
   std::vector<std::string> runs;    ///< folders; the first is what others are compared with; or a sweep's folder alone
@@ -38,7 +34,7 @@ nlohmann::ordered_json run_json(const std::string& directory, const std::string&
 
 /// Reads the runs and writes the page. Error: something cannot be written. Precondition: settle_report().
 Result<ReportMade> make_report(const ReportOptions& options, tools::ProgressLine& progress,
-                               const ShouldStop& should_stop);
+                               const tools::ShouldStop& should_stop);
 
 /// What was made, for people.
 std::string line_of(const ReportMade& made);

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "common/image/plane_file.h"
-#include "tools/telesplat/bench/codec/jpeg_xl.h"
 #include "tools/telesplat/bench/codec/lzw.h"
 #include "tools/telesplat/bench/codec/rvl.h"
 #include "tools/telesplat/bench/codec/zstd_size.h"
@@ -74,7 +73,6 @@ const std::vector<Baseline>& baselines() {
          return PlaneBits{8 * rvl_encode(i.depth).size(), 0, 0};
        },
        here},
-      {"jxl", "JPEG XL -e 3", false, jpeg_xl_bits, why_no_jpeg_xl},
   };
   return all;
 }
