@@ -51,6 +51,11 @@ std::optional<double> finite(const std::string& text) {
   return value;
 }
 
+std::string out_of(std::string_view column, double value, double end) {
+  const std::string most = end >= 9e15 ? "9e15" : fmt::format("{}", end - 1);
+  return fmt::format("{} is {}, limits are 0..{}", column, value, most);
+}
+
 }  // namespace
 
 std::optional<std::vector<std::string>> csv_fields(std::string_view line) {
@@ -105,13 +110,13 @@ std::string CsvTable::problem(std::string_view line, const Limits& limits) const
 std::string CsvTable::take_header(std::string_view line, const Limits& limits) {
   if (line.starts_with("\xef\xbb\xbf")) line.remove_prefix(3);
   if (line.size() <= limits.line_bytes) header_ = csv_fields(line).value_or(std::vector<std::string>());
+  for (size_t i = 0; i < header_.size(); ++i) places_.emplace(header_[i], i);
   return problem(line, limits);
 }
 
 std::optional<size_t> CsvTable::find(std::string_view name) const {
-  const auto found = std::find(header_.begin(), header_.end(), name);
-  if (found == header_.end()) return std::nullopt;
-  return size_t(found - header_.begin());
+  const auto found = places_.find(name);
+  return found == places_.end() ? std::nullopt : std::optional(found->second);
 }
 
 Result<size_t> CsvTable::column(std::string_view name) const {
@@ -138,14 +143,45 @@ Result<uint64_t> CsvTable::count(size_t row, size_t column, double end) const {
   const auto value = number(row, column);
   if (!value) return value.error();
   if (*value >= 0 && *value < end) return uint64_t(*value);
-  const std::string most = end >= 9e15 ? "9e15" : fmt::format("{}", end - 1);
-  return wrong(row, fmt::format("{} is {}, limits are 0..{}", header_[column], *value, most));
+  return wrong(row, out_of(header_[column], *value, end));
 }
 
 std::vector<double> CsvTable::numbers(size_t column) const {
   std::vector<double> out;
   for (size_t row = 0; row < rows(); ++row) out.push_back(finite(text(row, column)).value_or(0));
   return out;
+}
+
+void CsvRow::demand(bool good, const std::string& what) {
+  if (!good && !wrong_) wrong_ = table_.wrong(row_, what);
+}
+
+std::string CsvRow::text(std::string_view column) const {
+  const auto at = table_.find(column);
+  return at ? fields_[*at] : std::string();
+}
+
+std::map<std::string, double> CsvRow::numbers() const {
+  std::map<std::string, double> out;
+  for (size_t i = 0; i < fields_.size(); ++i)
+    if (const auto value = finite(fields_[i])) out[table_.header()[i]] = *value;
+  return out;
+}
+
+double CsvRow::number(std::string_view column) {
+  const auto at = table_.column(column);
+  if (!at && !wrong_) wrong_ = at.error();
+  if (!at) return 0;
+  const auto value = finite(fields_[*at]);
+  if (!value) demand(false, fmt::format("{} is \"{}\", not a number", column, fields_[*at].substr(0, 40)));
+  return value.value_or(0);
+}
+
+uint64_t CsvRow::count(std::string_view column, double end) {
+  const double value = number(column);
+  if (value >= 0 && value < end) return uint64_t(value);
+  demand(false, out_of(column, value, end));
+  return 0;
 }
 
 Error CsvTable::wrong(size_t row, const std::string& what) const {

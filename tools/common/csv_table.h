@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -54,12 +55,45 @@ class CsvTable {
 
   std::string path_, bytes_;
   std::vector<std::string> header_;
+  std::map<std::string, size_t, std::less<>> places_;  // of columns, by their names
   size_t damaged_ = 0;
   struct Line {
     size_t begin, size;
   };
   std::vector<Line> lines_;  // of bytes_, without the header; places, since short texts move with their table
   std::string_view line(size_t row) const { return {bytes_.data() + lines_[row].begin, lines_[row].size}; }
+};
+
+/// One row, its values by the names of their columns. The first thing that is wrong with it is kept, so that whoever
+/// reads asks once, at the end.
+class CsvRow {
+ public:
+  CsvRow(const CsvTable& table, size_t row) : table_(table), row_(row), fields_(table.fields(row)) {}
+
+  const CsvTable& table() const { return table_; }
+  bool has(std::string_view column) const { return table_.find(column).has_value(); }
+  /// Of columns whose value is one.
+  std::map<std::string, double> numbers() const;
+  /// Empty where the table has no such column.
+  std::string text(std::string_view column) const;
+  /// Wrong: there is no such column, or the value is no finite number.
+  double number(std::string_view column);
+  /// `fallback` where the table has no such column.
+  double number(std::string_view column, double fallback) { return has(column) ? number(column) : fallback; }
+  /// A whole number of 0 up to, not including, `end`.
+  uint64_t count(std::string_view column, double end = 9e15);
+  uint64_t count(std::string_view column, uint64_t fallback, double end) {
+    return has(column) ? count(column, end) : fallback;
+  }
+  /// Notes that something is wrong with the row unless `good`.
+  void demand(bool good, const std::string& what);
+  Status status() const { return wrong_ ? Status(*wrong_) : ok_status(); }
+
+ private:
+  const CsvTable& table_;
+  size_t row_;
+  std::vector<std::string> fields_;
+  std::optional<Error> wrong_;
 };
 
 }  // namespace telesplat::tools
