@@ -5,9 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "common/core/clock.h"
 #include "tools/common/text_table.h"
-#include "tools/common/time_left.h"
 #include "tools/telesplat/movie/contact_sheet.h"
 #include "tools/telesplat/movie/encoder.h"
 #include "tools/telesplat/movie/epoch_captions.h"
@@ -21,20 +19,6 @@ namespace fs = std::filesystem;
 constexpr double kMostFrames = 1e7;
 constexpr int kSmallWidth = 400;  // of a picture of a contact sheet
 constexpr size_t kMostLetters = 60;
-
-/// "making the movie 43 %, 12 s left"
-class Progress {
- public:
-  Progress(tools::ProgressLine& line, const char* what, uint64_t of) : line_(line), what_(what), of_(of) {}
-
-  void show(uint64_t done) { line_.show(left_.text(what_, double(done) / double(of_), monotonic_s())); }
-
- private:
-  tools::ProgressLine& line_;
-  tools::TimeLeft left_;
-  const char* what_;
-  uint64_t of_;
-};
 
 std::string cut_short(const Screen& screen, double t_s) {
   return fmt::format(
@@ -138,8 +122,6 @@ class Movie {
  private:
   // How many frames the movie has. What cannot be written stands in the report.
   Result<uint64_t> draw(Pictures& pictures, uint64_t frames, tools::ProgressLine& line) {
-    Progress progress(line, "making the movie", frames);
-    progress.show(0);
     for (uint64_t k = 0; k < frames; ++k) {
       if (should_stop_()) return k;
       const double t_s = double(k) / plan_.options.fps;
@@ -152,7 +134,7 @@ class Movie {
       }
       report_.written = pictures.add(screen_.view(), *shown == Screen::Shown::kSame);
       if (!report_.written) return k;
-      progress.show(k + 1);
+      line.show("making the movie", double(k + 1) / double(frames));
     }
     return frames;
   }
@@ -193,7 +175,6 @@ std::vector<SheetRow> in_rows(const std::vector<SheetCell>& cells) {
 Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::ProgressLine& line,
                                const tools::ShouldStop& should_stop) {
   const int count = plan.options.pictures;
-  Progress progress(line, "making the contact sheet", uint64_t(count));
   auto epochs = epoch_captions(screen.run().directory);
   std::vector<SheetCell> cells;
   MovieReport report;
@@ -212,7 +193,7 @@ Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::Pro
         {{small_picture(screen.view(), kSmallWidth)}, {fmt::format("{:.2f} s  frame {}", frame.t_s, frame.number)}});
     if (const std::string& text = epochs[frame.epoch.value]; !text.empty())
       cells.back().texts.push_back(tools::shortened(text, kMostLetters));
-    progress.show(uint64_t(i) + 1);
+    line.show("making the contact sheet", double(i + 1) / count);
   }
   const std::string& path = plan.target.path;
   std::error_code error;

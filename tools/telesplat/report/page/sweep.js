@@ -41,11 +41,11 @@ function plotOfFigure(kind, configurations, values, median, name) {
     width = w;
     c.clearRect(0, 0, w, height);
     const y = (v) => 6 + (1 - (v - low) / (top - low)) * (height - bottom - 6), each = (w - left) / configurations.length;
-    c.strokeStyle = R.css("--line");
-    c.fillStyle = R.css("--muted");
     c.textAlign = "right";
     for (const v of R.ticks(low, top, 3)) {
+      c.fillStyle = R.css("--line");
       c.fillRect(left, y(v), w - left, 0.6);
+      c.fillStyle = R.css("--muted");
       c.fillText(R.short(v), left - 5, y(v) + 4);
     }
     c.textAlign = "center";
