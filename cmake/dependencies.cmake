@@ -31,10 +31,6 @@ find_package(glfw3 3.3 REQUIRED)
 pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
 pkg_check_modules(openxr REQUIRED IMPORTED_TARGET openxr)
 find_package(Boost 1.74 REQUIRED)  # headers alone: asio and beast
-set(CURSES_NEED_WIDE TRUE)
-find_package(Curses REQUIRED)
-add_library(Curses::Wide INTERFACE IMPORTED)
-target_link_libraries(Curses::Wide INTERFACE ${CURSES_LIBRARIES})
 # Charts of the page that telesplat report makes: put into the program when it is built.
 find_path(TELESPLAT_DYGRAPHS dygraph.min.js PATHS /usr/share/javascript/dygraphs REQUIRED NO_DEFAULT_PATH
   DOC "folder of dygraph.min.js and dygraph.min.css (Debian's libjs-dygraphs)")

@@ -175,7 +175,6 @@ TEST(KeysOfSessions, TheOwnerOfARunNeedsNoKeysFlag) {
   };
   expect_done("telesplat", {"ctl", "status"});
   expect_done("telesplat", {"ctl", "coupling", "async"});
-  expect_done("telesplat", {"top", "--once"});
   expect_done("telesplat-health", {"--role", "sampler"});
   Program joined("telesplat",
                  {"run", "--master", master, "--size", "160x100", "--frames", "20", "--out", folder / "run"},

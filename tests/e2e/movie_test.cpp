@@ -173,6 +173,7 @@ TEST(Movie, AsAVideoHasTheRateTheSizeAndTheNumberOfFrames) {
   EXPECT_NE(run.program().out().find(file), std::string::npos) << run.program().out();
   ASSERT_TRUE(fs::exists(file));
   EXPECT_FALSE(fs::exists(file + ".part"));
+  EXPECT_FALSE(fs::exists(file + ".pictures"));
   const std::string command = fmt::format(
       "ffprobe -v error -count_frames -select_streams v -show_entries "
       "stream=codec_name,width,height,pix_fmt,r_frame_rate,nb_read_frames -of csv=p=0 '{}' > '{}'",
@@ -286,12 +287,13 @@ TEST(Movie, ThatIsInterruptedLeavesNoFileAndNoProcess) {
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
   const std::string file = run.folder() / "long.mp4";
   Program program("telesplat", {"movie", run.out(), file, "--fps", "1000"}, run.folder() / "long");
-  ASSERT_TRUE(wait_until([&] { return fs::exists(file + ".part"); }));
+  ASSERT_TRUE(wait_until([&] { return fs::exists(file + ".pictures/000009.png"); }));
   program.signal(SIGINT);
   EXPECT_EQ(program.wait(20), 130) << program.err();
   EXPECT_NE(program.err().find("interrupted"), std::string::npos) << program.err();
   EXPECT_FALSE(fs::exists(file));
   EXPECT_FALSE(fs::exists(file + ".part"));
+  EXPECT_FALSE(fs::exists(file + ".pictures"));
   EXPECT_TRUE(run.all_gone()) << "an ffmpeg is left";
 }
 

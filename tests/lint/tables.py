@@ -96,15 +96,13 @@ FLOORS = {
     "tools": [
         ["tools/common"],
         ["tools/health", "tools/make_terrain", "tools/lab/make_volume", "tools/wan_relay", "tools/xr_test_runtime"],
-        ["tools/telesplat/command.h"],
+        ["tools/telesplat/command.h", "tools/telesplat/run/child_process.*"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
         ["tools/telesplat/movie"],
         ["tools/telesplat/report"],
         ["tools/telesplat/run"],
-        ["tools/telesplat/top"],
         ["tools/telesplat/sweep"],
-        ["tools/telesplat/tune"],
         ["tools/telesplat/autostereo", "tools/telesplat/cache", "tools/telesplat/compare",
          "tools/telesplat/inspect", "tools/telesplat/keys"],
         ["tools/telesplat"],
@@ -163,7 +161,6 @@ OUTSIDE_HEADERS = [
     (r"((oneapi/)?tbb(\.h|/(tbb\.h|parallel_.*|task_group\.h|flow.*))|execution)", ["common/parallel"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
     (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/common/inference.cpp", "tools/wan_relay"]),
-    (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),
 ]
 
 # Folders without a limit of files: data and pages, not sources.

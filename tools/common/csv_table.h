@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,19 +21,23 @@ class CsvTable {
  public:
   struct Limits {
     size_t rows = 10'000'000, line_bytes = 1 << 16;
+    bool lenient = false;  ///< lines that cannot be read are left out, and counted by damaged()
   };
-  /// Error: the file is not there or empty, a line is longer than the limit, cut off, or has another number of values
-  /// than the header, a quoted text does not end, or there are too many rows. A file may have 4 GiB.
+  /// Error: the file is not there or empty, there are too many rows, or a line cannot be read: it is longer than the
+  /// limit, is cut off, has another number of values than the header, or a quoted text does not end. A file may have
+  /// 4 GiB.
   static Result<CsvTable> read(const std::string& path, const Limits& limits);
 
   const std::string& path() const { return path_; }
   size_t rows() const { return lines_.size(); }
+  size_t damaged() const { return damaged_; }
   const std::vector<std::string>& header() const { return header_; }
 
   /// Where a column is. Error: there is none of that name.
   Result<size_t> column(std::string_view name) const;
   std::optional<size_t> find(std::string_view name) const;
 
+  std::vector<std::string> fields(size_t row) const { return *csv_fields(line(row)); }
   std::string text(size_t row, size_t column) const;
   /// Error: not a finite number.
   Result<double> number(size_t row, size_t column) const;
@@ -45,13 +50,50 @@ class CsvTable {
   Error wrong(size_t row, const std::string& what) const;
 
  private:
+  std::string problem(std::string_view line, const Limits& limits) const;
+  std::string take_header(std::string_view line, const Limits& limits);
+
   std::string path_, bytes_;
   std::vector<std::string> header_;
+  std::map<std::string, size_t, std::less<>> places_;  // of columns, by their names
+  size_t damaged_ = 0;
   struct Line {
     size_t begin, size;
   };
   std::vector<Line> lines_;  // of bytes_, without the header; places, since short texts move with their table
   std::string_view line(size_t row) const { return {bytes_.data() + lines_[row].begin, lines_[row].size}; }
+};
+
+/// One row, its values by the names of their columns. The first thing that is wrong with it is kept, so that whoever
+/// reads asks once, at the end.
+class CsvRow {
+ public:
+  CsvRow(const CsvTable& table, size_t row) : table_(table), row_(row), fields_(table.fields(row)) {}
+
+  const CsvTable& table() const { return table_; }
+  bool has(std::string_view column) const { return table_.find(column).has_value(); }
+  /// Of columns whose value is one.
+  std::map<std::string, double> numbers() const;
+  /// Empty where the table has no such column.
+  std::string text(std::string_view column) const;
+  /// Wrong: there is no such column, or the value is no finite number.
+  double number(std::string_view column);
+  /// `fallback` where the table has no such column.
+  double number(std::string_view column, double fallback) { return has(column) ? number(column) : fallback; }
+  /// A whole number of 0 up to, not including, `end`.
+  uint64_t count(std::string_view column, double end = 9e15);
+  uint64_t count(std::string_view column, uint64_t fallback, double end) {
+    return has(column) ? count(column, end) : fallback;
+  }
+  /// Notes that something is wrong with the row unless `good`.
+  void demand(bool good, const std::string& what);
+  Status status() const { return wrong_ ? Status(*wrong_) : ok_status(); }
+
+ private:
+  const CsvTable& table_;
+  size_t row_;
+  std::vector<std::string> fields_;
+  std::optional<Error> wrong_;
 };
 
 }  // namespace telesplat::tools

@@ -1,12 +1,16 @@
 // What a command tells on stderr while it works.
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <string>
 
 #include "tools/common/time_left.h"
 
 namespace telesplat::tools {
+
+/// Whether the person wants an end to it.
+using ShouldStop = std::function<bool()>;
 
 /// On a terminal one line that rewrites itself, at most 10 times a second; elsewhere one line every 5 seconds. Any
 /// thread may call.

@@ -42,11 +42,9 @@ Command compare_command();
 Command movie_command();
 Command report_command();
 Command sweep_command();
-Command tune_command();
 Command cache_command();
 Command presets_command();
 Command autostereo_command();
-Command top_command();
 Command keys_command();
 
 /// `commands`, and two more that tell of all of them: completion and man.

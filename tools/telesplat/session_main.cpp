@@ -7,8 +7,7 @@ int main(int argc, char** argv) {
   using namespace telesplat;
   return net::guarded_main([&] {
     const std::string about = "telesplat in a container: asks and tells a running session, and makes keys";
-    return launcher::run_commands("telesplat", about,
-                                  {launcher::control_command(), launcher::top_command(), launcher::keys_command()},
+    return launcher::run_commands("telesplat", about, {launcher::control_command(), launcher::keys_command()},
                                   {argv + 1, argv + argc});
   });
 }

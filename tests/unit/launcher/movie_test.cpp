@@ -1,16 +1,14 @@
-// Movies: what a name asks for, where it is refused, and what goes through an encoder.
+// Movies: what a name asks for, where it is refused, and what an encoder is told.
 #include <gtest/gtest.h>
 
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include <csignal>
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 
-#include "common/core/clock.h"
+#include "tools/telesplat/movie/contact_sheet.h"
 #include "tools/telesplat/movie/encoder.h"
 #include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/movie/movie_target.h"
@@ -42,17 +40,10 @@ std::string read_text(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-bool wait_until(const std::function<bool()>& condition) {
-  for (const double until = monotonic_s() + 20; monotonic_s() < until; usleep(10'000))
-    if (condition()) return true;
-  return false;
-}
-
 class Movies : public ::testing::Test {
  protected:
   Folder folder;
   const std::string path_before = std::getenv("PATH") ? std::getenv("PATH") : "";
-  Movies() { signal(SIGPIPE, SIG_IGN); }  // as every program of this project does
   ~Movies() override { setenv("PATH", path_before.c_str(), 1); }
 
   void write(const std::string& name, const std::string& content) const { std::ofstream(folder / name) << content; }
@@ -67,9 +58,6 @@ class Movies : public ::testing::Test {
     std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
     chmod(program.c_str(), 0755);
     setenv("PATH", (folder / "bin").c_str(), 1);
-  }
-  static image::View grey(int width, int height, uint32_t level) {
-    return {width, height, std::vector<uint32_t>(size_t(width) * size_t(height), level * 0x010101u), {}};
   }
 };
 
@@ -155,55 +143,51 @@ TEST_F(Movies, SizesThatAVideoCannotHaveAreRefused) {
   for (const char* size : {"0x0", "x", "640", "99999x10"}) EXPECT_NE(error("a.mp4", size), "") << size;
 }
 
-TEST_F(Movies, AnEncoderGetsEveryPictureAndTheFileItsNameAtTheEnd) {
-  // What comes in becomes the file that the last argument names.
-  only_ffmpeg(std::string(kKnowsX264) + "\nfor a; do out=\"$a\"; done\n/bin/cat > \"${out#file:}\"");
-  const std::string file = folder / "a film; $(touch oops) 'x'.mp4";
-  auto encoder = Encoder::start(folder / "bin/ffmpeg", file, 5, 3, 30, never);
-  ASSERT_TRUE(encoder.ok()) << encoder.error().text;
-  EXPECT_EQ((*encoder)->name(), "libx264");
-  for (uint32_t i = 0; i < 40; ++i) ASSERT_TRUE((*encoder)->add(grey(5, 3, i)).ok());
-  EXPECT_FALSE(fs::exists(file));
-  ASSERT_TRUE((*encoder)->finish().ok());
-  const std::string bytes = read_text(file);
-  ASSERT_EQ(bytes.size(), 40u * 4 * 2 * 4) << "the odd column and row are left out";
-  EXPECT_EQ(uint8_t(bytes[39 * 32]), 39);
+// What ffmpeg is told: words in lines. The file that the last one names appears.
+constexpr const char* kTellsItsWords =
+    "\nfor a; do out=\"$a\"; echo \"$a\"; done > \"${0%bin/ffmpeg}words\"\necho film > \"${out#file:}\"";
+
+TEST_F(Movies, AnEncoderReadsTheFolderAndTheFileGetsItsNameAtTheEnd) {
+  only_ffmpeg(std::string(kKnowsX264) + kTellsItsWords);
+  const std::string file = folder / "a film; $(touch oops) 'x'.mp4", pictures = folder / "100 %";
+  fs::create_directory(pictures);
+  const auto made = encode_video(folder / "bin/ffmpeg", pictures, file, 25, never);
+  ASSERT_TRUE(made.ok()) << made.error().text;
+  EXPECT_EQ(*made, "libx264");
+  EXPECT_EQ(read_text(file), "film\n");
+  const std::string words = read_text(folder / "words");
+  EXPECT_NE(words.find("\n-framerate\n25\n"), std::string::npos) << words;
+  EXPECT_NE(words.find("\n" + (folder / "100 %%/%06d.png") + "\n"), std::string::npos) << words;
+  EXPECT_TRUE(words.ends_with("\nfile:" + file + ".part\n")) << words;
   EXPECT_FALSE(fs::exists(file + ".part"));
   EXPECT_FALSE(fs::exists("oops"));
 }
 
 TEST_F(Movies, AnEncoderDoesNotWriteThroughALinkThatLiesThere) {
-  only_ffmpeg(std::string(kKnowsX264) + "\nfor a; do out=\"$a\"; done\n/bin/cat > \"${out#file:}\"");
+  only_ffmpeg(std::string(kKnowsX264) + kTellsItsWords);
   std::ofstream(folder / "precious") << "mine";
   fs::create_symlink(folder / "precious", folder / "a.mp4.part");
-  auto encoder = Encoder::start(folder / "bin/ffmpeg", folder / "a.mp4", 4, 2, 30, never);
-  ASSERT_TRUE(encoder.ok()) << encoder.error().text;
-  ASSERT_TRUE((*encoder)->add(grey(4, 2, 1)).ok());
-  ASSERT_TRUE((*encoder)->finish().ok());
+  ASSERT_TRUE(encode_video(folder / "bin/ffmpeg", folder / "", folder / "a.mp4", 30, never).ok());
   EXPECT_EQ(read_text(folder / "precious"), "mine");
   EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(folder / "a.mp4")));
 }
 
 TEST_F(Movies, WhatAnEncoderComplainsOfIsToldByItsLastLine) {
   only_ffmpeg(std::string(kKnowsX264) + "\necho first >&2; echo 'no space left' >&2; exit 3");
-  auto encoder = Encoder::start(folder / "bin/ffmpeg", folder / "a.mp4", 640, 480, 30, never);
-  ASSERT_TRUE(encoder.ok());
-  Status s = ok_status();
-  for (int i = 0; i < 1000 && s; ++i) s = (*encoder)->add(grey(640, 480, 1));
-  ASSERT_FALSE(s.ok()) << "a program that has ended takes no pictures";
-  EXPECT_NE(s.error().text.find("code 3: no space left"), std::string::npos) << s.error().text;
-  EXPECT_EQ(s.error().text.find("first"), std::string::npos);
-  encoder->reset();
+  const auto made = encode_video(folder / "bin/ffmpeg", folder / "", folder / "a.mp4", 30, never);
+  ASSERT_FALSE(made.ok());
+  EXPECT_EQ(made.error().text, (folder / "a.mp4") + ": ffmpeg ended with code 3: no space left");
   EXPECT_FALSE(fs::exists(folder / "a.mp4"));
   EXPECT_FALSE(fs::exists(folder / "a.mp4.part"));
 }
 
 TEST_F(Movies, AnotherEncoderIsTakenWhereTheFirstIsMissing) {
-  only_ffmpeg("echo ' V.S... mpeg4 MPEG-4 part 2'; /bin/cat > /dev/null");
-  auto encoder = Encoder::start(folder / "bin/ffmpeg", folder / "a.mp4", 4, 4, 30, never);
-  ASSERT_TRUE(encoder.ok()) << encoder.error().text;
-  EXPECT_EQ((*encoder)->name(), "mpeg4");
-  const auto none = Encoder::start(folder / "bin/ffmpeg", folder / "a.webm", 4, 4, 30, never);
+  only_ffmpeg(std::string("for a; do [ \"$a\" = -encoders ] && { echo ' V.S... mpeg4 MPEG-4 part 2'; exit 0; }; done") +
+              kTellsItsWords);
+  const auto made = encode_video(folder / "bin/ffmpeg", folder / "", folder / "a.mp4", 30, never);
+  ASSERT_TRUE(made.ok()) << made.error().text;
+  EXPECT_EQ(*made, "mpeg4");
+  const auto none = encode_video(folder / "bin/ffmpeg", folder / "", folder / "a.webm", 30, never);
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.error().text.find("no encoder libvpx-vp9 or libvpx"), std::string::npos) << none.error().text;
 }
@@ -211,15 +195,21 @@ TEST_F(Movies, AnotherEncoderIsTakenWhereTheFirstIsMissing) {
 TEST_F(Movies, AnEncoderThatHangsIsEndedWithWhatItHadWritten) {
   only_ffmpeg(std::string(kKnowsX264) +
               "\nfor a; do out=\"$a\"; done\necho half > \"${out#file:}\"\nexec /bin/sleep 600");
-  bool stop = false;
-  auto encoder = Encoder::start(folder / "bin/ffmpeg", folder / "a.mp4", 640, 480, 30, [&] { return stop; });
-  ASSERT_TRUE(encoder.ok()) << encoder.error().text;
-  ASSERT_TRUE(wait_until([&] { return fs::exists(folder / "a.mp4.part"); }));
-  stop = true;
-  EXPECT_FALSE((*encoder)->add(grey(640, 480, 1)).ok());
-  EXPECT_FALSE((*encoder)->finish().ok());
-  encoder->reset();
+  const auto made = encode_video(folder / "bin/ffmpeg", folder / "", folder / "a.mp4", 30,
+                                 [&] { return fs::exists(folder / "a.mp4.part"); });
+  EXPECT_FALSE(made.ok());
   EXPECT_FALSE(fs::exists(folder / "a.mp4.part"));
+}
+
+TEST(ContactSheets, HaveTheirPicturesInRowsAndColumns) {
+  const image::View red{3, 2, std::vector<uint32_t>(6, 0xff0000), {}},
+      blue{5, 4, std::vector<uint32_t>(20, 0x0000ff), {}};
+  const auto sheet =
+      contact_sheet({"caption"}, {{"a row", {{{red, blue}, {"text"}}, {{red}, {}}}}, {"", {{{blue}, {}}}}});
+  const auto count = [&](uint32_t colour) { return std::count(sheet.colour.begin(), sheet.colour.end(), colour); };
+  EXPECT_EQ(count(0xff0000), 2 * 6);
+  EXPECT_EQ(count(0x0000ff), 2 * 20);
+  EXPECT_GT(count(0xe8e8e8), 0) << "the row's label";
 }
 
 TEST(ShellWords, AreQuotedWhereTheyNeedIt) {

@@ -83,8 +83,8 @@ TEST(DatedFolder, ASecondOneOfTheSameSecondHasItsOwnName) {
   fs::current_path(tests::own_folder());
   std::set<std::string> names;
   for (int i = 0; i < 5; ++i) {
-    const std::string name = dated_folder("tune-");
-    EXPECT_TRUE(name.starts_with("runs/tune-2")) << name;
+    const std::string name = dated_folder("sweep-");
+    EXPECT_TRUE(name.starts_with("runs/sweep-2")) << name;
     EXPECT_TRUE(fs::create_directories(name)) << name;
     names.insert(name);
   }

@@ -1,16 +1,13 @@
 // What a report reads of runs that ended anyhow, and how it makes long measurements short.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "common/core/utf8.h"
 #include "tools/telesplat/report/reading/loose_table.h"
 #include "tools/telesplat/report/reading/thinning.h"
-#include "tools/telesplat/report/reading/trace_reader.h"
 #include "tools/telesplat/report/reading/update_stages.h"
 
 namespace telesplat::launcher {
@@ -157,127 +154,6 @@ TEST(Thinning, SpreadsTellSharesWithinADisplaysPeriod) {
   EXPECT_TRUE(spread_json({NAN}).is_null());
   EXPECT_TRUE(spread_json({}).is_null());
   EXPECT_EQ(spread_json({0, 0}).at("n"), 2) << "a delay of nothing has a logarithm of its own";
-}
-
-Trace trace_of(const std::string& text, size_t most = 1000) {
-  std::istringstream in(text);
-  return read_trace(in, most);
-}
-
-TEST(TraceReader, ReadsSpansOfTodaysTraces) {
-  const Trace t = trace_of(R"([
-{"args":{"name":"viewer-1"},"name":"process_name","ph":"M","pid":7},
-{"dur":2.5,"name":"decode","ph":"X","pid":7,"tid":1,"ts":20},
-{"dur":9,"name":"display frame","ph":"X","pid":7,"tid":0,"ts":10}
-])");
-  EXPECT_TRUE(t.whole);
-  ASSERT_EQ(t.events.size(), 2u);
-  EXPECT_EQ(t.names[t.events[0].name], "display frame");  // by begin
-  EXPECT_EQ(t.events[0].duration_us, 9);
-  EXPECT_EQ(t.events[1].request, -1);
-  EXPECT_EQ(t.lanes[t.events[1].lane].process, "viewer-1");
-  EXPECT_EQ(t.lanes[t.events[1].lane].tid, 1);
-}
-
-TEST(TraceReader, ReadsNamesIdsAndAsyncSpans) {
-  const Trace t = trace_of(R"({"traceEvents":[
-{"ph":"b","cat":"lease","id":1,"name":"lease","pid":1,"ts":10,"args":{"frame":3}},
-{"ph":"b","cat":"lease","id":"0x2","name":"lease","pid":1,"ts":12},
-{"ph":"e","cat":"lease","id":"0x2","name":"lease","pid":1,"ts":15,"args":{"tile":4,"extra":{"name":"inner","frame":99}}},
-{"ph":"e","cat":"lease","id":1,"name":"lease","pid":1,"ts":30},
-{"ph":"e","cat":"lease","id":77,"name":"lease","pid":1,"ts":31},
-{"ph":"b","cat":"view","id":1,"name":"view","pid":1,"ts":40},
-{"ph":"C","name":"counter","pid":1,"ts":1,"args":{"frame":5}},
-{"ph":"X","name":"pack","pid":2,"tid":5,"ts":50,"dur":1,"args":{"frame":1,"tile":2,"request":3,"name":"no"}},
-{"ph":"M","name":"thread_name","pid":2,"tid":5,"args":{"name":"packing"}},
-{"ph":"M","name":"process_name","pid":1,"args":{"name":"master"}}],"other":[{"ph":"X"}]})");
-  ASSERT_EQ(t.events.size(), 3u);
-  EXPECT_EQ(t.open, 1u);
-  EXPECT_EQ(t.events[0].frame, 3);
-  EXPECT_EQ(t.events[0].duration_us, 20);
-  EXPECT_EQ(t.events[1].duration_us, 3);
-  EXPECT_EQ(t.events[1].tile, 4);
-  EXPECT_EQ(t.events[1].frame, -1) << "what stands in an object of an object is not the event's";
-  EXPECT_TRUE(t.lanes[t.events[0].lane].async);
-  EXPECT_EQ(t.lanes[t.events[0].lane].name, "lease");
-  EXPECT_EQ(t.lanes[t.events[0].lane].process, "master");
-  const auto& pack = t.events[2];
-  EXPECT_EQ(t.lanes[pack.lane].name, "packing");
-  EXPECT_EQ(std::tuple(pack.frame, pack.tile, pack.request), std::tuple(1, 2, 3));
-}
-
-TEST(TraceReader, EveryBeginningOfATraceIsReadWithoutHarm) {
-  const std::string whole =
-      R"([{"ph":"X","name":"a","pid":1,"ts":1,"dur":2},{"ph":"X","name":"b\u00e9","pid":1,"ts":4,"dur":2}])";
-  for (size_t n = 0; n < whole.size(); ++n) {
-    const Trace t = trace_of(whole.substr(0, n));
-    EXPECT_FALSE(t.whole) << n;
-    EXPECT_LE(t.events.size(), 2u);
-  }
-  EXPECT_TRUE(trace_of(whole).whole);
-}
-
-TEST(TraceReader, LeavesOutWhatMakesNoSenseAndWhatIsTooMuch) {
-  std::string text =
-      R"([{"ph":"X","name":"a","pid":1,"ts":1e300,"dur":2},{"ph":"X","name":"a","pid":1,"ts":1,"dur":-2})";
-  for (int i = 0; i < 20; ++i) text += R"(,{"ph":"X","name":"a","pid":1,"ts":5,"dur":1})";
-  const Trace t = trace_of(text + "]", 12);
-  EXPECT_EQ(t.events.size(), 12u);
-  EXPECT_EQ(t.left_out, 10u);
-}
-
-TEST(TraceReader, BoundsNamesAndLanes) {
-  std::string text = R"([{"ph":"X","name":"first","pid":1,"tid":1,"ts":1,"dur":1})";
-  for (int i = 0; i < 12'000; ++i)
-    text += fmt::format(R"(,{{"ph":"X","name":"n{0}","pid":2,"tid":{0},"ts":5,"dur":1}})", i);
-  const Trace t = trace_of(text + "]", 100'000);
-  EXPECT_EQ(t.events.size(), 12'001u);
-  EXPECT_LE(t.names.size(), 10'001u);
-  EXPECT_LE(t.lanes.size(), 10'001u);
-  EXPECT_EQ(t.names[t.events.back().name], "others");
-  EXPECT_EQ(t.lanes[t.events.back().lane].process, "others");
-  EXPECT_EQ(t.names[t.events[0].name], "first");
-}
-
-std::vector<TraceEvent> even_events(size_t n) {
-  std::vector<TraceEvent> out(n);
-  for (size_t i = 0; i < n; ++i) out[i].begin_us = double(i) * 10, out[i].duration_us = 8;
-  return out;
-}
-
-TEST(TraceWindows, HoldAllOfAShortRun) {
-  const auto w = choose_windows(even_events(100), 0, 1000, 100, 4);
-  EXPECT_TRUE(w.all);
-  EXPECT_EQ(w.events.size(), 100u);
-  ASSERT_EQ(w.windows_us.size(), 1u);
-  EXPECT_EQ(w.windows_us[0], (std::pair{0.0, 998.0}));
-}
-
-TEST(TraceWindows, AreBoundedAndSpreadOverALongRun) {
-  const auto events = even_events(100'000);
-  const auto w = choose_windows(events, 0, 1e6, 2000, 10);
-  EXPECT_FALSE(w.all);
-  EXPECT_LE(w.events.size(), 2000u);
-  EXPECT_GT(w.events.size(), 900u);
-  ASSERT_EQ(w.windows_us.size(), 10u);
-  for (size_t k = 0; k < 10; ++k)
-    EXPECT_NEAR((w.windows_us[k].first + w.windows_us[k].second) / 2, 5e4 + 1e5 * double(k), 1);
-  // Every span of a window is there.
-  for (const auto& [from, to] : w.windows_us) {
-    size_t wanted = 0, there = 0;
-    const auto inside = [&, a = from, b = to](const TraceEvent& e) {
-      return e.begin_us < b && e.begin_us + e.duration_us > a;
-    };
-    for (const auto& e : events) wanted += inside(e);
-    for (const size_t i : w.events) there += inside(events[i]);
-    EXPECT_EQ(there, wanted);
-  }
-}
-
-TEST(TraceWindows, AreBoundedWhereAllHappensAtOnce) {
-  const auto w = choose_windows(std::vector<TraceEvent>(5000), 0, 1e6, 100, 4);
-  EXPECT_LE(w.events.size(), 100u);
-  EXPECT_TRUE(choose_windows({}, 0, 1, 100, 4).events.empty());
 }
 
 TEST(UpdateStages, AreGroupedByTheirNames) {

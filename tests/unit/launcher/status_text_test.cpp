@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "tools/telesplat/control/process_tables.h"
 #include "tools/telesplat/run/live_figures.h"
 
 namespace telesplat::launcher {
@@ -25,11 +24,13 @@ Json volume_status() {
                 "bytes": 0}]}},
   "processes": [
     {"role": "sampler", "name": "sampler-1", "alive": true, "silent_s": 0.24, "leases": 1, "facts": {"host": "a",
-     "threads": "2"}, "values": {"tiles_sampled": 303, "rss_mb": 101.7, "voxel_mb": 6.2}, "rates": {"tiles_sampled": 8}},
+     "threads": "2"}, "values": {"tiles_sampled": 303, "rss_mb": 101.7, "voxel_mb": 6.2}, "rates": {"tiles_sampled": 8, "busy_s": 0.97}},
     {"role": "sampler", "name": "sampler-2", "alive": true, "silent_s": 4.5, "facts": {"host": "b"}},
     {"role": "sampler", "name": "sampler-3", "alive": false, "silent_s": 9},
     {"role": "viewer", "name": "viewer-1", "alive": true, "silent_s": 0.5, "facts": {"host": "a", "width": "640",
-     "height": "400"}, "values": {"frames": 1200, "points": 0, "pixels": 1250000, "messages_rejected": 0},
+     "height": "400"}, "values": {"frames": 1200, "points": 0, "pixels": 1250000, "messages_rejected": 0,
+     "inter_frame_ms": 16.7, "inter_frame_p95_ms": 20.14, "update_latency_ms": 137, "update_latency_p95_ms": 186,
+     "update_age_ms": 210, "coupling": 2, "buffers": 3, "waits_s": 0, "rtt_ms": 40, "backlog_bytes": 1500},
      "rates": {"frames": 59.94}}]})");
 }
 
@@ -52,12 +53,15 @@ TEST(StatusText, HasEveryFigureInItsPlace) {
                 "sampler-2  40 to 98         1400000            0          0.0  being filled\n"
                 "sampler-9                                                      spare\n"
                 "\n"
-                "viewer    host     size   fps  M pixels  frames   heard of\n"
-                "viewer-1  a     640x400  59.9      1.25    1200  0.5 s ago\n"
+                "viewer    host     size  coupling   fps   delay ms  latency ms  age ms  M pixels  frames   heard of\n"
+                "viewer-1  a     640x400  loose(3)  59.9  16.7/20.1     137/186     210      1.25    1200  0.5 s ago\n"
                 "\n"
-                "sampler    host  threads  leases  tiles/s  tiles  voxel MB   MB          heard of\n"
-                "sampler-1  a           2       1      8.0    303         6  102         0.2 s ago\n"
-                "sampler-2  b                                                     silent for 4.5 s\n"
+                "sampler    host  threads  leases  busy  tiles/s  tiles  voxel MB   MB          heard of\n"
+                "sampler-1  a           2       1  97 %      8.0    303         6  102         0.2 s ago\n"
+                "sampler-2  b                                                           silent for 4.5 s\n"
+                "\n"
+                "link of   rtt ms  backlog kB\n"
+                "viewer-1   40.00         1.5\n"
                 "\n"
                 "left: sampler-3\n");
 }

@@ -23,9 +23,7 @@ Result<WallLayout> parse_wall(const std::string& text) { return viewer::parse_wa
 struct RecordedVolume {
   std::unique_ptr<Scene> scene;
   const data::DataOptions* operator->() const { return &scene->options(); }
-  Result<VolumeScene::Epoch> at(EpochId epoch) const {
-    return static_cast<const VolumeScene&>(*scene).epochs().at(epoch);
-  }
+  Result<VolumeScene::Epoch> at(EpochId epoch) const { return static_cast<const VolumeScene&>(*scene).at(epoch); }
 };
 Result<RecordedVolume> read_recorded_volume(const std::string& directory) {
   auto scene = recorded_scene(directory);

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMaxStrips = 6;  // columns of the run's sheet
+constexpr size_t kMostColumns = 6;  // of the run's sheet
 
 // Which renderers to use: those asked for; without a wish cpu, and gl where it can be had.
 Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
@@ -82,16 +82,17 @@ class Comparison {
                 "\n");
         !s)
       return s;
-    std::vector<std::string> rows{"reference"};
-    for (size_t i = 0; i < poses_.front().cells.size(); ++i) rows.push_back(median_label(poses_, i));
-    std::vector<PoseStrip> strips;
-    const size_t n = std::min(kMaxStrips, strips_.size());
-    for (size_t i = 0; i < n; ++i) strips.push_back(strips_[(2 * i + 1) * strips_.size() / (2 * n)]);
+    std::vector<SheetRow> rows{{"reference", {}}};
+    for (size_t i = 0; i < poses_.front().cells.size(); ++i) rows.push_back({median_label(poses_, i), {}});
+    const size_t n = std::min(kMostColumns, columns_.size());
+    for (size_t i = 0; i < n; ++i)
+      for (size_t r = 0; r < rows.size(); ++r)
+        rows[r].cells.push_back(columns_[(2 * i + 1) * columns_.size() / (2 * n)][r]);
     return image::write_png(subject_.out + "/contact-sheet.png",
-                            run_sheet(strips, rows,
-                                      {caption(),
-                                       "figures of a row: medians over the poses; squares: where all "
-                                       "rows together differ most from the reference, 4 times as large"}));
+                            contact_sheet({caption(),
+                                           "figures of a row: medians over the poses; squares: where all rows together "
+                                           "differ most from the reference, 4 times as large"},
+                                          rows));
   }
 
   void print() const {
@@ -188,7 +189,8 @@ class Comparison {
         fmt::format("{} points cached", pose.points_cached),
         "finish " + splat::finish_name(finish_),
         "",
-        "below: picture, FLIP error map, the square where it errs most (4x), the reference there"};
+        "below: picture, FLIP error map (black is 0, white 1), the square where it errs most (4x), the reference "
+        "there"};
     if (const Status s = image::write_png(name + ".png", pose_sheet(reference, pose.cells, captions)); !s) return s;
     if (options_.pictures) {
       if (const Status s = image::write_png(name + "-reference.png", reference); !s) return s;
@@ -199,7 +201,7 @@ class Comparison {
         if (const Status s = image::write_png(cell_name + "-flip.png", errors); !s) return s;
       }
     }
-    strips_.push_back(make_strip(
+    columns_.push_back(pose_column(
         reference, pose.cells,
         subject_.events.empty() ? std::string("still camera") : fmt::format("frame {} at {:.2f} s", f.number, f.t_s)));
     for (Cell& c : pose.cells) c.view = {}, c.flip_map = {};
@@ -215,7 +217,7 @@ class Comparison {
   std::unique_ptr<DirectScene> scene_;
   std::unique_ptr<PoseModels> models_;
   std::vector<ComparedPose> poses_;
-  std::vector<PoseStrip> strips_;
+  std::vector<std::vector<SheetCell>> columns_;  // of the run's sheet
 };
 
 // What is drawn of a run is what it has recorded.

@@ -24,10 +24,7 @@ nlohmann::ordered_json comparison_json(nlohmann::ordered_json about, const std::
 /// For a person: a line per pose and cell, then the medians.
 std::string comparison_table(const std::vector<ComparedPose>& poses);
 
-/// Medians over poses of cell `i`'s figures, in a line as long as cell_label's.
+/// Medians over poses of cell `i`'s figures, in a line.
 std::string median_label(const std::vector<ComparedPose>& poses, size_t i);
-
-/// Writes a text file whole or not at all.
-Status write_text(const std::string& path, const std::string& text);
 
 }  // namespace telesplat::launcher

@@ -1,6 +1,7 @@
 #include "tools/telesplat/control/choice.h"
 
 #include <algorithm>
+#include <cstdio>
 
 #include "common/net/master_address.h"
 #include "common/net/service.h"
@@ -38,6 +39,13 @@ std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Give
     return nullptr;
   }
   return std::make_unique<ControlClient>(search.address, *access);
+}
+
+int tell_answer(const Result<wire::ControlReply>& reply, const std::string& done) {
+  if (!reply) return tools::complain(reply.error(), 1);
+  if (!reply->ok) return tools::complain({reply->text});
+  std::printf("%s\n", reply->text == "{}" && !done.empty() ? done.c_str() : reply->text.c_str());
+  return 0;
 }
 
 }  // namespace telesplat::launcher

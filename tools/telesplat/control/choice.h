@@ -21,4 +21,8 @@ options::Table session_rows(SessionChoice& choice);
 std::unique_ptr<ControlClient> reach(const SessionChoice& choice, const options::Given& given, int& exit_code,
                                      const std::vector<net::Role>& roles = net::asking_roles());
 
+/// Prints what the master answered to an order; done: in place of an answer that says nothing. Exit code: 1: there is
+/// no answer, 2: it refused, so it was asked for something wrong.
+int tell_answer(const Result<wire::ControlReply>& reply, const std::string& done = {});
+
 }  // namespace telesplat::launcher

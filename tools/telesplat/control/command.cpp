@@ -10,11 +10,8 @@
 #include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/choice.h"
-#include "tools/telesplat/control/coupling.h"
-#include "tools/telesplat/control/hands.h"
-#include "tools/telesplat/control/list.h"
+#include "tools/telesplat/control/commands.h"
 #include "tools/telesplat/control/orders.h"
-#include "tools/telesplat/control/settings.h"
 #include "tools/telesplat/control/status_text.h"
 
 namespace telesplat::launcher {
@@ -66,8 +63,14 @@ int show_status(StatusOptions o, const options::Given& given) {
   const auto client = reach(o.session, given, exit_code, net::any_role());  // everybody may ask that
   if (!client) return exit_code;
   if (o.watch) net::install_signal_handlers();
+  bool shown = false;
   do {
-    if (const Status s = print_status(*client, o); !s) return tools::complain(s.error(), 1);
+    if (const Status s = print_status(*client, o); !s) {
+      if (!shown || net::stop_requested() || !client->nobody_there()) return tools::complain(s.error(), 1);
+      std::printf("the session has ended\n");
+      return 0;
+    }
+    shown = true;
     for (int i = 0; i < kLooksASecond && o.watch && !net::stop_requested(); ++i)
       std::this_thread::sleep_for(kLookAtSignals);
   } while (o.watch && !net::stop_requested());
@@ -93,11 +96,7 @@ int give_order(OrderOptions o, const options::Given& given) {
   if (o.words.empty() && !o.order.shown.empty()) return print_shown(*client, o.order.shown);
   auto arguments = o.order.read ? o.order.read(o.words, *client) : Result<Order::Arguments>(Order::Arguments{});
   if (!arguments) return tools::complain(arguments.error(), client->unanswered() ? 1 : 2);
-  const auto reply = client->order(o.order.name, kPatience_s, *arguments);
-  if (!reply) return tools::complain(reply.error(), 1);
-  if (!reply->ok) return tools::complain({reply->text});
-  std::printf("%s\n", reply->text.c_str());
-  return 0;
+  return tell_answer(client->order(o.order.name, kPatience_s, *arguments));
 }
 
 Command order_command(const Order& order) {

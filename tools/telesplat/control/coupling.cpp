@@ -1,11 +1,8 @@
-#include "tools/telesplat/control/coupling.h"
-
-#include <cstdio>
-
 #include "common/scene/settings.h"
 #include "common/wire/limits.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/control/choice.h"
+#include "tools/telesplat/control/commands.h"
 #include "tools/telesplat/control/orders.h"
 
 namespace telesplat::launcher {
@@ -43,17 +40,11 @@ int order(CouplingOptions o, const options::Given& given) {
   std::map<std::string, std::string> arguments{{"coupling", o.coupling}};
   if (o.buffers) arguments["buffers"] = std::to_string(*o.buffers);
   if (!o.viewer.empty()) arguments["viewer"] = o.viewer;
-  const auto reply = client->order("coupling", kPatience_s, arguments);
-  if (!reply) return tools::complain(reply.error(), 1);
-  if (!reply->ok) return tools::complain({reply->text});
-  std::printf("%s\n", reply->text.c_str());
-  return 0;
+  return tell_answer(client->order("coupling", kPatience_s, arguments));
 }
 
 }  // namespace
 
-Command coupling_command() {
-  return make_command("coupling", scene::help_of_order("coupling"), table, order);
-}
+Command coupling_command() { return make_command("coupling", scene::help_of_order("coupling"), table, order); }
 
 }  // namespace telesplat::launcher

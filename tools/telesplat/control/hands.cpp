@@ -1,5 +1,3 @@
-#include "tools/telesplat/control/hands.h"
-
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,6 +13,7 @@
 #include "common/scene/settings.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/control/choice.h"
+#include "tools/telesplat/control/commands.h"
 #include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/control/orders.h"
 #include "tools/telesplat/control/pick.h"
@@ -269,11 +268,7 @@ int go(Subject& subject, const notes::Shelf& shelf, const std::string& name) {
   auto arguments = subject.viewer();
   const auto& [p, q] = bookmark->pose;
   arguments["pose"] = fmt::format("{},{},{},{},{},{},{}", p.x, p.y, p.z, q.w, q.x, q.y, q.z);
-  const auto reply = client->order("go", kPatience_s, arguments);
-  if (!reply) return tools::complain(reply.error(), 1);
-  if (!reply->ok) return tools::complain({reply->text});
-  std::printf("at %s\n", name.c_str());
-  return 0;
+  return tell_answer(client->order("go", kPatience_s, arguments), "at " + name);
 }
 
 int bookmark(KeptOptions o, const options::Given& given) {

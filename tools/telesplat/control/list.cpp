@@ -1,5 +1,3 @@
-#include "tools/telesplat/control/list.h"
-
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -10,6 +8,7 @@
 #include "common/net/session_file.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/client.h"
+#include "tools/telesplat/control/commands.h"
 #include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/control/status_text.h"
 

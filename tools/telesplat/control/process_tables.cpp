@@ -1,5 +1,4 @@
-#include "tools/telesplat/control/process_tables.h"
-
+// The processes of a session as tables.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,6 +11,7 @@
 #include "common/core/utf8.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/json_fields.h"
+#include "tools/telesplat/control/status_text.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -44,7 +44,7 @@ Field value(const char* title, const char* group, const char* key, double unit, 
 Field rate(const char* title, const char* key, double unit = 1) { return value(title, "rates", key, unit, 1); }
 Field counted(const char* title, const char* key) { return value(title, "values", key, 1, 0); }
 Field millions(const char* title, const char* key) { return value(title, "values", key, 1e6, 2); }
-// What is none of a process' business it tells as 0.
+// Processes report 0 for figures that do not concern them.
 Field unless_zero(Field shown) {
   return {shown.title,
           [cell = shown.cell](const Json& p) {
@@ -55,6 +55,34 @@ Field unless_zero(Field shown) {
 }
 Field fact(const char* title, const char* key) {
   return {title, [=](const Json& p) { return tools::shortened(fact_of(p, key), 20); }};
+}
+// "16.7/20.1": median and 95th percentile of the last seconds.
+Field median_and_p95(const char* title, const std::string& name, int digits) {
+  return {title, [=](const Json& p) {
+            const auto* values = field(p, "values");
+            const auto median = values ? number(*values, (name + "_ms").c_str()) : std::nullopt;
+            const auto p95 = values ? number(*values, (name + "_p95_ms").c_str()) : std::nullopt;
+            return median && p95 ? fmt::format("{:.{}f}/{:.{}f}", *median, digits, *p95, digits) : std::string();
+          }};
+}
+Field coupling() {
+  return {"coupling", [](const Json& p) -> std::string {
+            const auto* values = field(p, "values");
+            const auto mode = values ? number(*values, "coupling") : std::nullopt;
+            if (!mode) return {};
+            if (*mode == 0) return "async";
+            if (*mode == 1) return "sync";
+            if (*mode == 3) return "images";
+            return fmt::format("loose({:.0f})", number(*values, "buffers").value_or(0));
+          }};
+}
+// Share of its time in which a sampler samples and encodes.
+Field busy() {
+  return {"busy", [](const Json& p) {
+            const auto* rates = field(p, "rates");
+            const auto share = rates ? number(*rates, "busy_s") : std::nullopt;
+            return share ? fmt::format("{:.0f} %", 100 * std::clamp(*share, 0.0, 1.0)) : std::string();
+          }};
 }
 Field leases() {
   return {"leases", [](const Json& p) {
@@ -99,9 +127,13 @@ const std::vector<RoleTable>& role_tables() {
   static const std::vector<RoleTable> all{
       {"viewer",
        "viewer",
-       {size(), fact("renderer", "renderer"), rate("fps", "frames"), rate("updates/s", "updates"),
-        rate("MB/s", "bytes_received", 1e6), unless_zero(millions("M points", "points")),
-        unless_zero(millions("M pixels", "pixels")), counted("frames", "frames"), counted("epoch", "epoch")}},
+       {size(), fact("renderer", "renderer"), coupling(), rate("fps", "frames"),
+        median_and_p95("delay ms", "inter_frame", 1), rate("updates/s", "updates"),
+        median_and_p95("latency ms", "update_latency", 0), counted("age ms", "update_age_ms"),
+        unless_zero(value("waits s", "values", "waits_s", 1, 1)), rate("MB/s", "bytes_received", 1e6),
+        unless_zero(millions("M points", "points")), unless_zero(millions("M pixels", "pixels")),
+        unless_zero(value("holes %", "values", "holes_percent", 1, 2)), counted("frames", "frames"),
+        counted("epoch", "epoch"), unless_zero(counted("gaps", "gaps_resynced"))}},
       {"packer",
        "packer",
        {rate("tiles/s", "tiles"), rate("blocks/s", "blocks"), rate("frames/s", "volume_frames_complete"),
@@ -109,9 +141,9 @@ const std::vector<RoleTable>& role_tables() {
         millions("M points", "points"), counted("forgotten", "points_forgotten")}},
       {"sampler",
        "sampler",
-       {fact("kind", "sampler"), fact("threads", "threads"), leases(), rate("tiles/s", "tiles_sampled"),
-        counted("tiles", "tiles_sampled"), value("chunk MB", "values", "chunk_mb", 1, 0),
-        value("voxel MB", "values", "voxel_mb", 1, 0)}},
+       {fact("kind", "sampler"), fact("threads", "threads"), leases(), counted("queue", "leases_held"), busy(),
+        rate("tiles/s", "tiles_sampled"), counted("tiles", "tiles_sampled"),
+        value("chunk MB", "values", "chunk_mb", 1, 0), value("voxel MB", "values", "voxel_mb", 1, 0)}},
       {"data",
        "data server",
        {fact("format", "format"), fact("primitives", "primitives"), counted("requests", "requests"),
@@ -119,22 +151,15 @@ const std::vector<RoleTable>& role_tables() {
   return all;
 }
 
-std::string table_of(const RoleTable& role, const std::vector<Json>& processes, bool hosts_differ) {
-  std::vector<Field> fields{
-      {role.title, [](const Json& p) { return tools::shortened(printable(text(p, "name")), kMostName); }, false}};
-  if (hosts_differ)
-    fields.push_back(
-        {"host", [](const Json& p) { return tools::shortened(printable(fact_of(p, "host")), 16); }, false});
-  fields.insert(fields.end(), role.fields.begin(), role.fields.end());
-  fields.push_back(value("MB", "values", "rss_mb", 1, 0));
-  fields.push_back(value("most MB", "values", "peak_rss_mb", 1, 0));
-  fields.push_back(clock_offset());
-  fields.push_back(unless_zero(counted("rejected", "messages_rejected")));
-  fields.push_back(unless_zero(counted("keys refused", "keys_refused")));
-  fields.push_back(unless_zero(counted("connections refused", "connections_refused")));
-  fields.push_back(unless_zero(counted("requests dropped", "messages_refused")));
-  fields.push_back(unless_zero(counted("answers dropped", "queue_refused")));
-  fields.push_back({"heard of", heard});
+Field name(const char* title) {
+  return {title, [](const Json& p) { return tools::shortened(printable(text(p, "name")), kMostName); }, false};
+}
+Field host() {
+  return {"host", [](const Json& p) { return tools::shortened(printable(fact_of(p, "host")), 16); }, false};
+}
+
+// Empty: there are no processes.
+std::string table_with(const std::vector<Field>& fields, const std::vector<Json>& processes) {
   std::vector<tools::TextTable::Column> columns;
   for (const Field& f : fields) columns.push_back({f.title, f.right});
   tools::TextTable table(columns);
@@ -144,6 +169,33 @@ std::string table_of(const RoleTable& role, const std::vector<Json>& processes, 
     table.add(std::move(cells));
   }
   return table.empty() ? std::string() : "\n" + table.text();
+}
+
+std::string table_of(const RoleTable& role, const std::vector<Json>& processes, bool hosts_differ) {
+  std::vector<Field> fields{name(role.title)};
+  if (hosts_differ) fields.push_back(host());
+  fields.insert(fields.end(), role.fields.begin(), role.fields.end());
+  fields.push_back(value("MB", "values", "rss_mb", 1, 0));
+  fields.push_back(value("most MB", "values", "peak_rss_mb", 1, 0));
+  fields.push_back(unless_zero(counted("rejected", "messages_rejected")));
+  fields.push_back(unless_zero(counted("keys refused", "keys_refused")));
+  fields.push_back(unless_zero(counted("connections refused", "connections_refused")));
+  fields.push_back(unless_zero(counted("requests dropped", "messages_refused")));
+  fields.push_back(unless_zero(counted("answers dropped", "queue_refused")));
+  fields.push_back({"heard of", heard});
+  return table_with(fields, processes);
+}
+
+// How processes are connected, those that report it.
+std::string link_table(const std::vector<Json>& processes) {
+  const std::vector<Field> fields{name("link of"), value("rtt ms", "values", "rtt_ms", 1, 2),
+                                  value("Mbit/s", "values", "link_mbit", 1, 1),
+                                  value("backlog kB", "values", "backlog_bytes", 1e3, 1), clock_offset()};
+  std::vector<Json> linked;
+  for (const Json& p : processes)
+    if (std::any_of(fields.begin() + 1, fields.end(), [&](const Field& f) { return !f.cell(p).empty(); }))
+      linked.push_back(p);
+  return table_with(fields, linked);
 }
 
 }  // namespace
@@ -169,6 +221,7 @@ std::string process_tables(const Json& processes) {
                  [&](const Json& p) { return text(p, "role") == role.role; });
     out += table_of(role, of_role, hosts.size() > 1);
   }
+  out += link_table(here);
   if (left.empty()) return out;
   const size_t more = left.size() - std::min(left.size(), kMostNamed);
   left.resize(left.size() - more);

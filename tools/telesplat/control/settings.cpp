@@ -1,5 +1,3 @@
-#include "tools/telesplat/control/settings.h"
-
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -12,6 +10,7 @@
 #include "services/data/data_options.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/control/choice.h"
+#include "tools/telesplat/control/commands.h"
 #include "tools/telesplat/control/orders.h"
 
 namespace telesplat::launcher {
@@ -73,11 +72,7 @@ int change(ChangeOptions o, const options::Given& given) {
   std::map<std::string, std::string> arguments{{"value", o.value}};
   if (!o.viewer.empty()) arguments["viewer"] = o.viewer;
   const std::string order(o.setting->order);
-  const auto reply = client->order(order, kPatience_s, arguments);
-  if (!reply) return tools::complain(reply.error(), 1);
-  if (!reply->ok) return tools::complain({reply->text});
-  std::printf("%s\n", reply->text == "{}" ? fmt::format("{} {}", order, o.value).c_str() : reply->text.c_str());
-  return 0;
+  return tell_answer(client->order(order, kPatience_s, arguments), fmt::format("{} {}", order, o.value));
 }
 
 struct ListOptions {};

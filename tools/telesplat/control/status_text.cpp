@@ -12,7 +12,6 @@
 #include "common/net/connections/waiting.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/json_fields.h"
-#include "tools/telesplat/control/process_tables.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -1,106 +1,78 @@
 #include "tools/telesplat/movie/contact_sheet.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <filesystem>
-
-#include "common/image/canvas.h"
-#include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
 namespace {
 
-constexpr int kMargin = 12, kLine = 20, kCellWidth = 400;
-constexpr uint32_t kPaper = 0x181818, kInk = 0xe8e8e8, kPale = 0xa0a0a0;
-constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = 1 << 18};
-constexpr int kTextScale = 2, kSmallScale = 1;
+constexpr uint32_t kPaper = 0x101214, kInk = 0xe8e8e8, kFaint = 0x9aa4ae;
+constexpr int kGap = 8, kTextScale = 2, kLine = image::kGlyphHeight * kTextScale + 8;
 
-// A number with four digits behind the point, anything else as it is.
-std::string short_value(const std::string& text) {
-  double value = 0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || stop != text.data() + text.size()) return text;
-  return fmt::format("{:.4g}", value);
+int widest(const std::vector<std::string>& lines) {
+  int out = 0;
+  for (const auto& l : lines) out = std::max(out, image::text_width(l, kTextScale));
+  return out;
 }
 
-std::string cut(std::string text, int scale, int width) {
-  const auto most = size_t(std::max(1, width / (image::kGlyphAdvance * scale)));
-  if (text.size() > most) text = text.substr(0, most - 1) + "~";
-  return text;
+int width_of(const SheetCell& cell) {
+  int out = -kGap;
+  for (const auto& p : cell.pictures) out += p.width + kGap;
+  return std::max(out, widest(cell.texts));
+}
+
+int picture_height(const SheetRow& row) {
+  int out = 0;
+  for (const auto& cell : row.cells)
+    for (const auto& p : cell.pictures) out = std::max(out, p.height);
+  return out;
+}
+
+int height_of(const SheetRow& row) {
+  size_t lines = row.label.empty() ? 0 : 1, below = 0;
+  for (const auto& cell : row.cells) below = std::max(below, cell.texts.size());
+  return picture_height(row) + int(lines + below) * kLine + 2 * kGap;
 }
 
 }  // namespace
 
-EpochCaptions::EpochCaptions(const std::string& run_directory) {
-  const std::string path = run_directory + "/epochs.csv";
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return;
-  const auto table = tools::CsvTable::read(path, kEpochs);
-  if (!table) return;
-  const auto epoch = table->find("epoch");
-  if (!epoch) return;
-  std::vector<size_t> differing;
-  for (size_t c = 0; c < table->header().size(); ++c) {
-    const std::string& name = table->header()[c];
-    if (c == *epoch || name == "t_s" || name.starts_with("room.")) continue;
-    if (table->rows() == 0 || !table->number(0, c)) continue;  // transfer functions and the like are no caption
-    for (size_t row = 1; row < table->rows(); ++row)
-      if (table->text(row, c) != table->text(0, c)) {
-        differing.push_back(c);
-        break;
+image::View small_picture(const image::View& picture, int width) {
+  const int w = std::min(width, picture.width);
+  return image::shrink(picture, w,
+                       std::clamp(int(std::lround(double(w) * picture.height / picture.width)), 1, picture.height));
+}
+
+image::View contact_sheet(const std::vector<std::string>& captions, const std::vector<SheetRow>& rows) {
+  const int top = 2 * kGap + int(captions.size()) * kLine;
+  std::vector<int> columns;
+  int width = widest(captions), height = top;
+  for (const auto& row : rows) {
+    columns.resize(std::max(columns.size(), row.cells.size()));
+    for (size_t i = 0; i < row.cells.size(); ++i) columns[i] = std::max(columns[i], width_of(row.cells[i]));
+    width = std::max(width, image::text_width(row.label, kTextScale));
+    height += height_of(row);
+  }
+  int all = 0;
+  for (const int column : columns) all += column + 2 * kGap;
+  image::Canvas canvas(std::max(width, all) + 2 * kGap, height, kPaper);
+  for (size_t i = 0; i < captions.size(); ++i) canvas.text(kGap, kGap + int(i) * kLine, captions[i], kFaint);
+  int y = top;
+  for (const auto& row : rows) {
+    canvas.text(kGap, y, row.label, kInk);
+    const int pictures = y + (row.label.empty() ? 0 : kLine), texts = pictures + picture_height(row) + 4;
+    int left = kGap;
+    for (size_t i = 0; i < row.cells.size(); left += columns[i++] + 2 * kGap) {
+      int x = left;
+      for (const auto& p : row.cells[i].pictures) {
+        canvas.place(p, x, pictures);
+        x += p.width + kGap;
       }
+      for (size_t l = 0; l < row.cells[i].texts.size(); ++l)
+        canvas.text(left, texts + int(l) * kLine, row.cells[i].texts[l], kFaint);
+    }
+    y += height_of(row);
   }
-  for (size_t row = 0; row < table->rows(); ++row) {
-    const auto number = table->count(row, *epoch);
-    if (!number) continue;
-    std::string text;
-    for (const size_t c : differing)
-      text += fmt::format("{}{} {}", text.empty() ? "" : "  ", table->header()[c], short_value(table->text(row, c)));
-    captions_.emplace_back(*number, std::move(text));
-  }
-}
-
-std::string EpochCaptions::of(EpochId epoch) const {
-  const auto found =
-      std::find_if(captions_.begin(), captions_.end(), [&](const auto& c) { return c.first == epoch.value; });
-  return found == captions_.end() ? std::string() : found->second;
-}
-
-void ContactSheet::add(const image::View& picture, const DisplayedFrame& frame) {
-  const int width = std::min(kCellWidth, picture.width);
-  const int height = std::clamp(int(std::lround(double(width) * picture.height / picture.width)), 1, picture.height);
-  cells_.push_back({image::shrink(picture, width, height), fmt::format("{:.2f} s  frame {}", frame.t_s, frame.number),
-                    epochs_.of(frame.epoch)});
-}
-
-Status ContactSheet::write(const std::string& path, const std::string& title) const {
-  int width = 1, height = 1;
-  bool parameters = false;
-  for (const Cell& c : cells_) {
-    width = std::max(width, c.picture.width), height = std::max(height, c.picture.height);
-    parameters |= !c.parameters.empty();
-  }
-  width = std::max(width, 180);
-  const int n = int(cells_.size());
-  const int columns = std::max(1, int(std::ceil(std::sqrt(double(n) * height / width)))),
-            rows = (n + columns - 1) / columns;
-  const int across = width + kMargin, down = height + (parameters ? 2 : 1) * kLine + kMargin;
-  image::Canvas sheet(kMargin + columns * across, 2 * kMargin + kLine + rows * down, kPaper);
-  sheet.text(kMargin, kMargin, cut(title, kTextScale, columns * across), kInk, kTextScale);
-  for (int i = 0; i < n; ++i) {
-    const Cell& c = cells_[size_t(i)];
-    const int x = kMargin + i % columns * across, y = kMargin + kLine + kMargin + i / columns * down;
-    sheet.place(c.picture, x, y);
-    sheet.text(x, y + height + 4, cut(c.caption, kTextScale, width), kInk, kTextScale);
-    sheet.text(x, y + height + 4 + kLine, cut(c.parameters, kSmallScale, width), kPale, kSmallScale);
-  }
-  std::error_code error;
-  const auto folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty()) std::filesystem::create_directories(folder, error);
-  return image::write_png(path, sheet.view());
+  return canvas.view();
 }
 
 }  // namespace telesplat::launcher

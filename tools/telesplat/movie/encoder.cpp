@@ -3,19 +3,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include "common/core/check.h"
+#include "common/core/whole_file.h"
+#include "tools/telesplat/run/child_process.h"
 
 namespace telesplat::launcher {
 namespace {
 
+namespace fs = std::filesystem;
 using Arguments = std::vector<std::string>;
+
+constexpr uint64_t kMostLog = 1 << 20;
 
 // Pictures are sRGB with all codes; players expect video of BT.709 primaries and the narrow range.
 const Arguments kColours{"-vf",
-                         "scale=in_range=full:out_range=tv:out_color_matrix=bt709",
+                         "crop=trunc(iw/2)*2:trunc(ih/2)*2,scale=in_range=full:out_range=tv:out_color_matrix=bt709",
                          "-pix_fmt",
                          "yuv420p",
                          "-colorspace",
@@ -55,23 +61,48 @@ std::string lower_case(std::string text) {
   return text;
 }
 
-// The first of them that this ffmpeg has.
-Result<const Container::Encoder*> choose_encoder(const std::string& ffmpeg, const Container& container,
-                                                 const ShouldStop& should_stop) {
-  auto process = PipedProcess::start(ffmpeg, {"-nostdin", "-hide_banner", "-loglevel", "error", "-encoders"});
+std::string part_of(const std::string& path) { return path + ".part"; }
+
+// Runs ffmpeg to its end. What it writes to its output. log: a file for what it complains of.
+Result<std::string> run(const std::string& ffmpeg, const Arguments& arguments, const std::string& log,
+                        const tools::ShouldStop& should_stop) {
+  auto process = ChildProcess::start("ffmpeg", ffmpeg,
+                                     joined({"-nostdin", "-hide_banner", "-loglevel", "error"}, arguments), log, 0);
   if (!process) return process.error();
-  if (const int code = process->finish(should_stop); code != 0)
-    return Error{fmt::format("{} ended with code {}: {}", ffmpeg, code, process->last_error_line())};
-  const std::string known = process->output();
+  std::string out;
+  for (bool ended = false; !ended; std::this_thread::sleep_for(std::chrono::milliseconds(5))) {
+    if (should_stop()) return Error{"interrupted"};
+    ended = process->ended();
+    for (const auto& line : process->read_lines()) out += line + "\n";
+  }
+  if (process->exit_code() == 0) return out;
+  const auto complaints = read_whole(log, kMostLog);
+  std::string said = complaints ? *complaints : "";
+  said.erase(said.find_last_not_of("\r\n") + 1);
+  const std::string line = said.substr(said.find_last_of("\r\n") + 1);
+  return Error{fmt::format("ffmpeg ended with code {}{}{}", process->exit_code(), line.empty() ? "" : ": ", line)};
+}
+
+// The first of the encoders that this ffmpeg has.
+Result<const Container::Encoder*> choose_encoder(const std::string& ffmpeg, const Container& container,
+                                                 const std::string& log, const tools::ShouldStop& should_stop) {
+  const auto known = run(ffmpeg, {"-encoders"}, log, should_stop);
+  if (!known) return known.error();
   std::string names;
   for (const auto& encoder : container.encoders) {
-    if (known.find(" " + encoder.name + " ") != known.npos) return &encoder;
+    if (known->find(" " + encoder.name + " ") != known->npos) return &encoder;
     names += (names.empty() ? "" : " or ") + encoder.name;
   }
   return Error{fmt::format("{} has no encoder {} for {} files", ffmpeg, names, container.extension)};
 }
 
-std::string part_of(const std::string& path) { return path + ".part"; }
+// Names of numbered pictures, as ffmpeg reads them: only one % may mean something, and no protocol stands in front.
+std::string pattern_in(const std::string& folder) {
+  std::error_code error;
+  std::string out;
+  for (const char c : fs::absolute(folder, error).string()) out += c == '%' ? std::string("%%") : std::string(1, c);
+  return out + "/%06d.png";
+}
 
 }  // namespace
 
@@ -88,80 +119,38 @@ std::string container_names() {
   return out;
 }
 
-Result<std::unique_ptr<Encoder>> Encoder::start(const std::string& ffmpeg, const std::string& path, int width,
-                                                int height, double fps, const ShouldStop& should_stop) {
+Result<std::string> encode_video(const std::string& ffmpeg, const std::string& folder, const std::string& path,
+                                 double fps, const tools::ShouldStop& should_stop) {
   const Container* container = container_of(path);
   CHECK(container);
-  if (container->even_sides) width -= width % 2, height -= height % 2;
-  if (width < 1 || height < 1) return Error{fmt::format("{}: a video has at least 2x2 pixels", path)};
-  const auto encoder = choose_encoder(ffmpeg, *container, should_stop);
-  if (!encoder) return encoder.error();
-  Arguments arguments{"-nostdin",
-                      "-hide_banner",
-                      "-loglevel",
-                      "error",
-                      "-y",
+  const std::string log = folder + "/ffmpeg.log";
+  const auto encoder = choose_encoder(ffmpeg, *container, log, should_stop);
+  if (!encoder) return Error{fmt::format("{}: {}", path, encoder.error().text)};
+  Arguments arguments{"-y",
                       "-f",
-                      "rawvideo",
-                      "-pixel_format",
-                      "bgr0",
-                      "-video_size",
-                      fmt::format("{}x{}", width, height),
+                      "image2",
+                      "-pattern_type",
+                      "sequence",
                       "-framerate",
                       fmt::format("{}", fps),
+                      "-start_number",
+                      "0",
                       "-i",
-                      "pipe:0",
+                      pattern_in(folder),
                       "-an",
                       "-c:v",
                       (*encoder)->name};
   arguments = joined(std::move(arguments), (*encoder)->arguments);
   // "file:" keeps names from being taken for options or protocols.
   arguments = joined(std::move(arguments), {"-f", container->format, "file:" + part_of(path)});
-  std::remove(part_of(path).c_str());  // ffmpeg would write through a link
-  auto process = PipedProcess::start(ffmpeg, arguments);
-  if (!process) return process.error();
-  return std::unique_ptr<Encoder>(new Encoder(std::move(*process), path, (*encoder)->name, width, height, should_stop));
-}
-
-Encoder::Encoder(PipedProcess process, std::string path, std::string encoder, int width, int height,
-                 ShouldStop should_stop)
-    : process_(std::move(process)),
-      path_(std::move(path)),
-      encoder_(std::move(encoder)),
-      width_(width),
-      height_(height),
-      should_stop_(std::move(should_stop)) {}
-
-Encoder::~Encoder() {
-  if (done_) return;
-  { const PipedProcess ended = std::move(process_); }
-  std::remove(part_of(path_).c_str());
-}
-
-Error Encoder::failed(int code) const {
-  const std::string line = process_.last_error_line();
-  return {fmt::format("{}: ffmpeg ended with code {}{}{}", path_, code, line.empty() ? "" : ": ", line)};
-}
-
-Status Encoder::add(const image::View& picture) {
-  CHECK(picture.width >= width_ && picture.height >= height_);
-  for (int y = 0; y < height_; ++y) {
-    const std::span row(picture.colour.data() + size_t(y) * size_t(picture.width), size_t(width_));
-    if (!process_.write(std::as_bytes(row), should_stop_)) {
-      if (should_stop_()) return Error{fmt::format("{}: interrupted", path_)};
-      return failed(process_.finish(should_stop_));
-    }
-  }
-  return ok_status();
-}
-
-Status Encoder::finish() {
-  if (const int code = process_.finish(should_stop_); code != 0) return failed(code);
   std::error_code error;
-  std::filesystem::rename(part_of(path_), path_, error);
-  if (error) return Error{fmt::format("{}: cannot be written: {}", path_, error.message())};
-  done_ = true;
-  return ok_status();
+  fs::remove(part_of(path), error);  // ffmpeg would write through a link
+  const auto done = run(ffmpeg, arguments, log, should_stop);
+  if (done) fs::rename(part_of(path), path, error);
+  if (done && !error) return (*encoder)->name;
+  const std::string why = done ? "cannot be written: " + error.message() : done.error().text;
+  fs::remove(part_of(path), error);
+  return Error{fmt::format("{}: {}", path, why)};
 }
 
 }  // namespace telesplat::launcher

@@ -1,13 +1,11 @@
 // A video from pictures, through ffmpeg, which need not be installed: it is started as a program.
 #pragma once
 
-#include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "common/image/file.h"
-#include "tools/telesplat/movie/piped_process.h"
+#include "common/core/result.h"
+#include "tools/common/progress_line.h"
 
 namespace telesplat::launcher {
 
@@ -27,32 +25,10 @@ const Container* container_of(const std::string& path);
 /// ".mp4, .mov, ..."
 std::string container_names();
 
-class Encoder {
- public:
-  /// Pictures of width x height pixels, fps of them a second. The file appears under its name when all is done; until
-  /// then it is PATH.part. Error: ffmpeg cannot be started, or has none of the encoders.
-  static Result<std::unique_ptr<Encoder>> start(const std::string& ffmpeg, const std::string& path, int width,
-                                                int height, double fps, const ShouldStop& should_stop);
-  /// Removes what is half done.
-  ~Encoder();
-
-  /// Error: ffmpeg took it not; its last line.
-  Status add(const image::View& picture);
-  /// Waits until ffmpeg has written everything, and gives the file its name.
-  Status finish();
-  /// "libx264"
-  const std::string& name() const { return encoder_; }
-
- private:
-  Encoder(PipedProcess process, std::string path, std::string encoder, int width, int height, ShouldStop should_stop);
-  /// Of what went wrong, in the words of ffmpeg.
-  Error failed(int code) const;
-
-  PipedProcess process_;
-  std::string path_, encoder_;
-  int width_, height_;
-  ShouldStop should_stop_;
-  bool done_ = false;
-};
+/// Makes a video of the pictures folder/000000.png, 000001.png, ..., fps of them a second. Returns the encoder's name,
+/// "libx264". The file appears under its name when all is done; until then it is PATH.part. Error: ffmpeg cannot be
+/// started, has none of the encoders or fails (its last line), or should_stop says so; no file is left.
+Result<std::string> encode_video(const std::string& ffmpeg, const std::string& folder, const std::string& path,
+                                 double fps, const tools::ShouldStop& should_stop);
 
 }  // namespace telesplat::launcher

@@ -3,31 +3,22 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 
-#include "common/core/clock.h"
-#include "tools/common/time_left.h"
+#include "tools/common/text_table.h"
 #include "tools/telesplat/movie/contact_sheet.h"
-#include "tools/telesplat/movie/picture_sink.h"
+#include "tools/telesplat/movie/encoder.h"
+#include "tools/telesplat/movie/epoch_captions.h"
 #include "tools/telesplat/movie/screen.h"
 
 namespace telesplat::launcher {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr double kMostFrames = 1e7;
-
-/// "making the movie 43 %, 12 s left"
-class Progress {
- public:
-  Progress(tools::ProgressLine& line, const char* what, uint64_t of) : line_(line), what_(what), of_(of) {}
-
-  void show(uint64_t done) { line_.show(left_.text(what_, double(done) / double(of_), monotonic_s())); }
-
- private:
-  tools::ProgressLine& line_;
-  tools::TimeLeft left_;
-  const char* what_;
-  uint64_t of_;
-};
+constexpr int kSmallWidth = 400;  // of a picture of a contact sheet
+constexpr size_t kMostLetters = 60;
 
 std::string cut_short(const Screen& screen, double t_s) {
   return fmt::format(
@@ -48,9 +39,58 @@ std::string advice(const MovieTarget& target, double fps) {
       target.wanted_video, command);
 }
 
+// Numbered pictures in a folder; they go again unless they are kept.
+class Pictures {
+ public:
+  // Of a video they go into a folder beside it, from which ffmpeg reads them.
+  Pictures(const MovieTarget& target, image::Alpha alpha) : target_(target), alpha_(alpha) {
+    if (target.kind != MovieTarget::Kind::kVideo) return;
+    target_.path = target.path + ".pictures";
+    alpha_ = image::Alpha::kNone;
+    temporary_ = true;
+  }
+  ~Pictures() {
+    if (kept_) return;
+    std::error_code error;
+    for (uint64_t n = 0; n < count_; ++n) fs::remove(target_.picture(n), error);
+    if (temporary_) fs::remove(target_.path + "/ffmpeg.log", error);
+    if (made_) fs::remove(target_.path, error);  // if it is empty
+  }
+  Status open() {
+    std::error_code error;
+    made_ = fs::create_directories(target_.path, error);
+    if (error) return Error{fmt::format("{}: cannot be made a folder: {}", target_.path, error.message())};
+    if (temporary_ && !made_) return Error{fmt::format("{}: is in the way; remove it", target_.path)};
+    return ok_status();
+  }
+  // again: it is the picture before once more.
+  Status add(const image::View& picture, bool again) {
+    const std::string path = target_.picture(count_);
+    std::error_code error;
+    if (!again) {
+      if (const Status s = image::write_png(path, picture, alpha_); !s) return s;
+    } else if (temporary_) {
+      fs::create_hard_link(target_.picture(count_ - 1), path, error);
+    } else {
+      fs::copy_file(target_.picture(count_ - 1), path, fs::copy_options::overwrite_existing, error);
+    }
+    if (error) return Error{fmt::format("{}: cannot be written: {}", path, error.message())};
+    ++count_;
+    return ok_status();
+  }
+  const std::string& folder() const { return target_.path; }
+  void keep() { kept_ = true; }
+
+ private:
+  MovieTarget target_;
+  image::Alpha alpha_;
+  bool temporary_ = false, made_ = false, kept_ = false;
+  uint64_t count_ = 0;
+};
+
 class Movie {
  public:
-  Movie(Screen& screen, const MoviePlan& plan, const ShouldStop& should_stop)
+  Movie(Screen& screen, const MoviePlan& plan, const tools::ShouldStop& should_stop)
       : screen_(screen), plan_(plan), should_stop_(should_stop) {}
 
   Result<MovieReport> make(tools::ProgressLine& line) {
@@ -58,23 +98,30 @@ class Movie {
     const double frames = std::floor(screen_.duration_s() * fps) + 1;
     if (!(frames <= kMostFrames))
       return Error{fmt::format("{}: a movie of {:.0f} frames; at most {:.0f}", plan_.target.path, frames, kMostFrames)};
-    const auto alpha = screen_.run().transparent ? image::Alpha::kCoverage : image::Alpha::kNone;
-    auto sink = PictureSink::open(plan_.target, screen_.width(), screen_.height(), fps, alpha, should_stop_);
-    if (!sink) return MovieReport{.written = sink.error()};
-    const auto count = draw(**sink, uint64_t(frames), line);
+    Pictures pictures(plan_.target, screen_.run().transparent ? image::Alpha::kCoverage : image::Alpha::kNone);
+    report_.written = pictures.open();
+    if (!report_.written) return std::move(report_);
+    const auto count = draw(pictures, uint64_t(frames), line);
     if (!count) return count.error();
+    std::string with = "PNG";
+    if (report_.written && plan_.target.kind == MovieTarget::Kind::kVideo && !should_stop_()) {
+      line.show(fmt::format("ffmpeg makes {}", plan_.target.path));
+      auto encoder = encode_video(plan_.target.ffmpeg, pictures.folder(), plan_.target.path, fps, should_stop_);
+      if (encoder)
+        with = *std::move(encoder);
+      else
+        report_.written = encoder.error();
+    }
     if (should_stop_()) return MovieReport{.interrupted = true};
-    if (report_.written) report_.written = (*sink)->finish();
-    if (should_stop_()) return MovieReport{.interrupted = true};
-    if (report_.written) describe(*count, (*sink)->with());
+    if (!report_.written) return std::move(report_);
+    if (plan_.target.kind == MovieTarget::Kind::kPictures) pictures.keep();
+    describe(*count, with);
     return std::move(report_);
   }
 
  private:
   // How many frames the movie has. What cannot be written stands in the report.
-  Result<uint64_t> draw(PictureSink& sink, uint64_t frames, tools::ProgressLine& line) {
-    Progress progress(line, "making the movie", frames);
-    progress.show(0);
+  Result<uint64_t> draw(Pictures& pictures, uint64_t frames, tools::ProgressLine& line) {
     for (uint64_t k = 0; k < frames; ++k) {
       if (should_stop_()) return k;
       const double t_s = double(k) / plan_.options.fps;
@@ -85,9 +132,9 @@ class Movie {
         report_.lines.push_back(cut_short(screen_, t_s));
         return k;
       }
-      report_.written = sink.add(screen_.view(), *shown == Screen::Shown::kSame);
+      report_.written = pictures.add(screen_.view(), *shown == Screen::Shown::kSame);
       if (!report_.written) return k;
-      progress.show(k + 1);
+      line.show("making the movie", double(k + 1) / double(frames));
     }
     return frames;
   }
@@ -108,15 +155,28 @@ class Movie {
 
   Screen& screen_;
   const MoviePlan& plan_;
-  const ShouldStop& should_stop_;
+  const tools::ShouldStop& should_stop_;
   MovieReport report_;
 };
 
+// About as high as it is wide.
+std::vector<SheetRow> in_rows(const std::vector<SheetCell>& cells) {
+  const image::View& first = cells.front().pictures.front();
+  const auto columns =
+      std::max(size_t{1}, size_t(std::ceil(std::sqrt(double(cells.size()) * first.height / first.width))));
+  std::vector<SheetRow> out;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (i % columns == 0) out.emplace_back();
+    out.back().cells.push_back(cells[i]);
+  }
+  return out;
+}
+
 Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::ProgressLine& line,
-                               const ShouldStop& should_stop) {
+                               const tools::ShouldStop& should_stop) {
   const int count = plan.options.pictures;
-  Progress progress(line, "making the contact sheet", uint64_t(count));
-  ContactSheet sheet(screen.run().directory);
+  auto epochs = epoch_captions(screen.run().directory);
+  std::vector<SheetCell> cells;
   MovieReport report;
   for (int i = 0; i < count; ++i) {
     if (should_stop()) return MovieReport{.interrupted = true};
@@ -128,13 +188,21 @@ Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::Pro
       report.lines.push_back(cut_short(screen, t_s));
       break;
     }
-    sheet.add(screen.view(), screen.frame());
-    progress.show(uint64_t(i) + 1);
+    const DisplayedFrame& frame = screen.frame();
+    cells.push_back(
+        {{small_picture(screen.view(), kSmallWidth)}, {fmt::format("{:.2f} s  frame {}", frame.t_s, frame.number)}});
+    if (const std::string& text = epochs[frame.epoch.value]; !text.empty())
+      cells.back().texts.push_back(tools::shortened(text, kMostLetters));
+    line.show("making the contact sheet", double(i + 1) / count);
   }
   const std::string& path = plan.target.path;
-  report.written = sheet.write(path, fmt::format("{}, {:.1f} s, {} frames", screen.run().scene->name(),
-                                                 screen.duration_s(), screen.run().frames.size()));
-  if (report.written) report.lines.push_back(fmt::format("{}: {} frames of the run", path, sheet.pictures()));
+  std::error_code error;
+  if (const auto folder = fs::path(path).parent_path(); !folder.empty()) fs::create_directories(folder, error);
+  report.written =
+      image::write_png(path, contact_sheet({fmt::format("{}, {:.1f} s, {} frames", screen.run().scene->name(),
+                                                        screen.duration_s(), screen.run().frames.size())},
+                                           in_rows(cells)));
+  if (report.written) report.lines.push_back(fmt::format("{}: {} frames of the run", path, cells.size()));
   return report;
 }
 
@@ -152,7 +220,7 @@ Result<MoviePlan> plan_movie(const MovieOptions& options, const char* size_flag)
 }
 
 Result<MovieReport> make_movie(const std::string& run_directory, const MoviePlan& plan, tools::ProgressLine& progress,
-                               const ShouldStop& should_stop) {
+                               const tools::ShouldStop& should_stop) {
   auto screen = Screen::open(run_directory, plan.width, plan.height, plan.size_flag, plan.options.threads);
   if (!screen) return screen.error();
   auto report = plan.target.kind == MovieTarget::Kind::kSheet ? make_sheet(*screen, plan, progress, should_stop)

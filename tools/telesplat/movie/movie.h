@@ -7,7 +7,6 @@
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/movie/movie_options.h"
 #include "tools/telesplat/movie/movie_target.h"
-#include "tools/telesplat/movie/piped_process.h"
 
 namespace telesplat::launcher {
 
@@ -32,6 +31,6 @@ struct MovieReport {
 };
 /// Makes it of the run in this folder. Error: what is wrong with the record.
 Result<MovieReport> make_movie(const std::string& run_directory, const MoviePlan& plan, tools::ProgressLine& progress,
-                               const ShouldStop& should_stop);
+                               const tools::ShouldStop& should_stop);
 
 }  // namespace telesplat::launcher

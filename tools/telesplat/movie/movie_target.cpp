@@ -1,6 +1,5 @@
 #include "tools/telesplat/movie/movie_target.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -19,36 +18,16 @@ namespace fs = std::filesystem;
 
 constexpr int kMostDigits = 9;
 
-Error cannot_write(const std::string& path, int error) {
-  return {fmt::format("{}: cannot be written: {}", path, std::strerror(error))};
-}
-
-// A file that is made in the folder and removed again.
-Status try_folder(const fs::path& folder, const std::string& path) {
-  std::string probe = (folder / ".telesplat-XXXXXX").string();
-  const int file = mkstemp(probe.data());
-  if (file < 0) return cannot_write(path, errno);
-  ::close(file);
-  unlink(probe.c_str());
-  return ok_status();
-}
-
-// Whether a folder can be made where there is none yet.
-Status try_to_make(const fs::path& above, const std::string& path) {
-  std::string probe = (above / ".telesplat-XXXXXX").string();
-  if (!mkdtemp(probe.data())) return cannot_write(path, errno);
-  rmdir(probe.c_str());
-  return ok_status();
-}
-
-// Whether a file can be made in this folder, which may have to be made first.
+// Whether something can be made in this folder, which may have to be made first.
 Status check_folder(fs::path folder, const std::string& path) {
   std::error_code error;
   folder = fs::absolute(folder.empty() ? "." : folder, error);
-  if (fs::is_directory(folder, error)) return try_folder(folder, path);
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   if (!fs::is_directory(folder, error)) return Error{fmt::format("{}: {} is no folder", path, folder.string())};
-  return try_to_make(folder, path);
+  std::string probe = (folder / ".telesplat-XXXXXX").string();
+  if (!mkdtemp(probe.data())) return Error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};
+  rmdir(probe.c_str());
+  return ok_status();
 }
 
 Status check_file(const std::string& path) {

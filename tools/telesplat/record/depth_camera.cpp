@@ -23,24 +23,18 @@ std::optional<uint64_t> number_of(const std::string& path) {
   return parsed.ec == std::errc() && parsed.ptr == stem.data() + stem.size() ? std::optional(out) : std::nullopt;
 }
 
-Result<geometry::Camera> camera_in(const tools::CsvTable& table, size_t row) {
+Result<geometry::Camera> camera_in(const tools::CsvTable& table, size_t index) {
+  tools::CsvRow row(table, index);
   geometry::Camera c;
-  double width = 0, height = 0;
-  auto& p = c.pose.position_room;
-  auto& q = c.pose.orientation;
-  const std::pair<const char*, double*> columns[] = {
-      {"width", &width},   {"height", &height},   {"px", &p.x},    {"py", &p.y},         {"pz", &p.z},
-      {"qw", &q.w},        {"qx", &q.x},          {"qy", &q.y},    {"qz", &q.z},         {"left", &c.left},
-      {"right", &c.right}, {"bottom", &c.bottom}, {"top", &c.top}, {"near_m", &c.near_m}};
-  for (const auto& [name, to] : columns) {
-    const auto column = table.column(name);
-    if (!column) return column.error();
-    const auto value = table.number(row, *column);
-    if (!value) return value.error();
-    *to = *value;
-  }
-  c.width = int(std::clamp(width, 0.0, 1e6)), c.height = int(std::clamp(height, 0.0, 1e6));
-  if (const Status s = geometry::validate(c); !s) return table.wrong(row, s.error().text);
+  c.pose = {{row.number("px"), row.number("py"), row.number("pz")},
+            {row.number("qw"), row.number("qx"), row.number("qy"), row.number("qz")}};
+  for (const auto& [name, to] :
+       {std::pair{"left", &c.left}, {"right", &c.right}, {"bottom", &c.bottom}, {"top", &c.top}, {"near_m", &c.near_m}})
+    *to = row.number(name);
+  c.width = int(std::clamp(row.number("width"), 0.0, 1e6));
+  c.height = int(std::clamp(row.number("height"), 0.0, 1e6));
+  if (const Status s = row.status(); !s) return s.error();
+  if (const Status s = geometry::validate(c); !s) return table.wrong(index, s.error().text);
   return c;
 }
 

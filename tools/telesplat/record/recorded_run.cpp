@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <map>
 
 #include "client/viewer/stereo_flags.h"
 #include "common/core/whole_file.h"
@@ -156,167 +154,69 @@ Status read_display(const std::string& path, const toml::table& session, const t
   return read_look(path, viewer, run);
 }
 
-// The columns of frames.csv that make a frame again.
-struct FrameColumns {
-  size_t viewer, frame, t_s, sequence, points_drawn;
-  std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Where a file lacks them they count as 0, 1, 0, all, as the run began, 0, 1, 0, 0, 0.
-  std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, head_light, background, refined,
-      sub_pixels, swap_wait_ms, screen_m, halved;
-  std::array<std::optional<size_t>, 6> eyes;  // left_x left_y left_z right_x right_y right_z
-};
-
-Result<FrameColumns> find_columns(const tools::CsvTable& table) {
-  FrameColumns out{};
-  const std::pair<const char*, size_t*> wanted[] = {{"viewer", &out.viewer},
-                                                    {"frame", &out.frame},
-                                                    {"t_s", &out.t_s},
-                                                    {"sequence", &out.sequence},
-                                                    {"points_drawn", &out.points_drawn},
-                                                    {"px", &out.pose[0]},
-                                                    {"py", &out.pose[1]},
-                                                    {"pz", &out.pose[2]},
-                                                    {"qw", &out.pose[3]},
-                                                    {"qx", &out.pose[4]},
-                                                    {"qy", &out.pose[5]},
-                                                    {"qz", &out.pose[6]}};
-  for (const auto& [name, column] : wanted) {
-    const auto found = table.column(name);
-    if (!found) return found.error();
-    *column = *found;
-  }
-  out.construction_ms = table.find("construction_ms");
-  out.detail = table.find("detail");
-  out.epoch = table.find("epoch");
-  out.summaries = table.find("summaries");
-  out.splat = table.find("splat");
-  out.finish = table.find("finish");
-  out.lit = table.find("lit");
-  out.head_light = table.find("head_light");
-  out.background = table.find("background");
-  out.refined = table.find("refined");
-  out.sub_pixels = table.find("sub_pixels");
-  out.halved = table.find("halved");
-  out.swap_wait_ms = table.find("swap_wait_ms");
-  out.screen_m = table.find("screen_m");
-  const char* const eyes[] = {"left_x", "left_y", "left_z", "right_x", "right_y", "right_z"};
-  for (size_t i = 0; i < out.eyes.size(); ++i) out.eyes[i] = table.find(eyes[i]);
-  return out;
+// How the frame was drawn, where its row tells; else as the run began.
+void read_look(tools::CsvRow& row, viewer::Look& look) {
+  const auto kernel = row.count("splat", uint64_t(look.render.kernel), splat::kKernels.size());
+  const auto finish = row.count("finish", splat::finish_bits(look.render.finish), 8);
+  const bool halved = row.count("halved", 0, 2) == 1;
+  look = {.render = {splat::kKernels[kernel], *splat::finish_of_bits(finish), halved},
+          .lit = row.count("lit", look.lit, 2) == 1,
+          .head_light = row.count("head_light", look.head_light, 2) == 1,
+          .background = uint32_t(row.count("background", look.background, 0x1000000))};
 }
 
-// A whole number below `end`; `fallback` where the table has no such column.
-Result<uint64_t> optional_count(const tools::CsvTable& table, size_t row, const std::optional<size_t>& column,
-                                uint64_t fallback, double end) {
-  return column ? table.count(row, *column, end) : Result<uint64_t>(fallback);
+void read_refinement(tools::CsvRow& row, DisplayedFrame& f) {
+  if (!row.has("refined") || !row.has("sub_pixels")) return;
+  f.refined = row.number("refined");
+  f.sub_pixels = int(row.count("sub_pixels", 5));
+  row.demand(f.refined >= 0 && f.refined <= 1, fmt::format("refined is {}, limits are 0 and 1", f.refined));
+  row.demand(f.refined <= 0 || f.sub_pixels == 2 || f.sub_pixels == 4,
+             fmt::format("sub_pixels is {}, limits are 2 and 4", f.sub_pixels));
 }
 
-Status read_look(const tools::CsvTable& table, size_t row, const FrameColumns& at, DisplayedFrame& f) {
-  const auto splat = optional_count(table, row, at.splat, uint64_t(f.look.render.kernel), splat::kKernels.size());
-  const auto finish = optional_count(table, row, at.finish, splat::finish_bits(f.look.render.finish), 8);
-  const auto lit = optional_count(table, row, at.lit, f.look.lit, 2);
-  const auto head = optional_count(table, row, at.head_light, f.look.head_light, 2);
-  const auto background = optional_count(table, row, at.background, f.look.background, 0x1000000);
-  const auto halved = optional_count(table, row, at.halved, 0, 2);
-  for (const auto* value : {&splat, &finish, &lit, &head, &background, &halved})
-    if (!*value) return value->error();
-  f.look = {.render = {splat::kKernels[*splat], *splat::finish_of_bits(*finish), *halved == 1},
-            .lit = *lit == 1,
-            .head_light = *head == 1,
-            .background = uint32_t(*background)};
-  return ok_status();
+// Where two eyes were.
+void read_eyes(tools::CsvRow& row, DisplayedFrame& f) {
+  for (const char* column : {"left_x", "left_y", "left_z", "right_x", "right_y", "right_z", "screen_m"})
+    row.demand(row.has(column), "two eyes saw the frame, but there are no columns that tell where they were");
+  f.eyes_room = {glm::dvec3(row.number("left_x"), row.number("left_y"), row.number("left_z")),
+                 glm::dvec3(row.number("right_x"), row.number("right_y"), row.number("right_z"))};
+  f.screen_m = row.number("screen_m");
+  row.demand(f.screen_m > 0 && f.screen_m <= 1e6,
+             fmt::format("screen_m is {}, limits are above 0 and 1e6", f.screen_m));
 }
 
-Status read_refinement(const tools::CsvTable& table, size_t row, const FrameColumns& at, DisplayedFrame& f) {
-  if (!at.refined || !at.sub_pixels) return ok_status();
-  const auto refined = table.number(row, *at.refined);
-  if (!refined) return refined.error();
-  if (!(*refined >= 0 && *refined <= 1))
-    return table.wrong(row, fmt::format("refined is {}, limits are 0 and 1", *refined));
-  const auto side = table.count(row, *at.sub_pixels, 5);
-  if (!side) return side.error();
-  if (*refined > 0 && *side != 2 && *side != 4)
-    return table.wrong(row, fmt::format("sub_pixels is {}, limits are 2 and 4", *side));
-  f.refined = *refined;
-  f.sub_pixels = int(*side);
-  return ok_status();
-}
-
-// Where the eyes were.
-Status read_eyes(const tools::CsvTable& table, size_t row, const FrameColumns& at, const RecordedRun& run,
-                 DisplayedFrame& f) {
-  if (!run.stereo.on()) return ok_status();
-  double values[7] = {};
-  for (size_t i = 0; i < 7; ++i) {
-    const auto& column = i < 6 ? at.eyes[i] : at.screen_m;
-    if (!column) return table.wrong(row, "two eyes saw the frame, but there are no columns that tell where they were");
-    const auto value = table.number(row, *column);
-    if (!value) return value.error();
-    values[i] = *value;
-  }
-  f.eyes_room = {glm::dvec3(values[0], values[1], values[2]), glm::dvec3(values[3], values[4], values[5])};
-  f.screen_m = values[6];
-  if (!(f.screen_m > 0 && f.screen_m <= 1e6))
-    return table.wrong(row, fmt::format("screen_m is {}, limits are above 0 and 1e6", f.screen_m));
-  return ok_status();
-}
-
-Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, const FrameColumns& at,
-                                  const RecordedRun& run) {
-  const auto number = table.count(row, at.frame), sequence = table.count(row, at.sequence),
-             drawn = table.count(row, at.points_drawn);
-  for (const auto* count : {&number, &sequence, &drawn})
-    if (!*count) return count->error();
-  double v[9] = {};
-  for (size_t i = 0; i < (at.construction_ms ? 9 : 8); ++i) {
-    const auto value = table.number(row, i < 7 ? at.pose[i] : i < 8 ? at.t_s : *at.construction_ms);
-    if (!value) return value.error();
-    v[i] = *value;
-  }
-  const geometry::Pose pose{{v[0], v[1], v[2]}, {v[3], v[4], v[5], v[6]}};
+Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t index, const RecordedRun& run) {
+  tools::CsvRow row(table, index);
   DisplayedFrame f;
-  f.number = *number;
-  f.t_s = v[7];
-  f.shown_s = v[7] + v[8] / 1e3;
-  if (at.swap_wait_ms) {
-    const auto wait_ms = table.number(row, *at.swap_wait_ms);
-    if (!wait_ms) return wait_ms.error();
-    f.shown_s += *wait_ms / 1e3;
-  }
-  f.sequence = {*sequence};
-  f.points_drawn = *drawn;
-  f.head = pose;
-  f.camera = run.camera_at(pose, run.width, run.height);
+  f.number = row.count("frame");
+  f.sequence = {row.count("sequence")};
+  f.points_drawn = row.count("points_drawn");
+  f.head = {{row.number("px"), row.number("py"), row.number("pz")},
+            {row.number("qw"), row.number("qx"), row.number("qy"), row.number("qz")}};
+  f.t_s = row.number("t_s");
+  f.shown_s = f.t_s + row.number("construction_ms", 0) / 1e3 + row.number("swap_wait_ms", 0) / 1e3;
+  f.summaries = row.count("summaries", f.summaries, 9e15);
+  f.epoch = EpochId{row.count("epoch", 0, 9e15)};
+  f.detail = row.number("detail", 1);
+  row.demand(f.detail > 0 && f.detail <= 1, fmt::format("detail is {}, limits are above 0 and 1", f.detail));
   f.look = run.look;
-  if (const Status s = geometry::validate(f.camera); !s) return table.wrong(row, s.error().text);
-  if (const Status s = read_look(table, row, at, f); !s) return s.error();
-  if (const Status s = read_refinement(table, row, at, f); !s) return s.error();
-  if (const Status s = read_eyes(table, row, at, run, f); !s) return s.error();
-  const auto summaries = optional_count(table, row, at.summaries, f.summaries, 9e15);
-  if (!summaries) return summaries.error();
-  f.summaries = *summaries;
-  if (at.detail) {
-    const auto detail = table.number(row, *at.detail);
-    if (!detail) return detail.error();
-    if (!(*detail > 0 && *detail <= 1))
-      return table.wrong(row, fmt::format("detail is {}, limits are above 0 and 1", *detail));
-    f.detail = *detail;
-  }
-  if (at.epoch) {
-    const auto epoch = table.count(row, *at.epoch);
-    if (!epoch) return epoch.error();
-    f.epoch = EpochId{*epoch};
-  }
+  read_look(row, f.look);
+  read_refinement(row, f);
+  if (run.stereo.on()) read_eyes(row, f);
+  if (const Status s = row.status(); !s) return s.error();
+  f.camera = run.camera_at(f.head, run.width, run.height);
+  if (const Status s = geometry::validate(f.camera); !s) return table.wrong(index, s.error().text);
   return f;
 }
 
 Status read_frames(const std::string& path, const std::string& viewer, RecordedRun& run) {
   const auto table = tools::CsvTable::read(path, kFrames);
   if (!table) return table.error();
-  const auto at = find_columns(*table);
-  if (!at) return at.error();
+  const auto whose = table->column("viewer");
+  if (!whose) return whose.error();
   for (size_t row = 0; row < table->rows(); ++row) {
-    if (table->text(row, at->viewer) != viewer) continue;
-    auto f = read_frame(*table, row, *at, run);
+    if (table->text(row, *whose) != viewer) continue;
+    auto f = read_frame(*table, row, run);
     if (!f) return f.error();
     if (!run.frames.empty()) {
       const DisplayedFrame& before = run.frames.back();

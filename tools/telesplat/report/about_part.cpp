@@ -205,6 +205,8 @@ ordered_json figure_kinds() {
   ordered_json out = ordered_json::array();
   for (const Measure& f : kFigures)
     out.push_back({{"key", f.key},
+                   {"path", f.path},
+                   {"scale", f.scale},
                    {"label", f.label},
                    {"unit", f.unit},
                    {"meaning", f.meaning},

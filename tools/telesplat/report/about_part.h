@@ -14,8 +14,8 @@ nlohmann::ordered_json read_summary(const std::string& directory);
 /// [[what, how], ...]: scene, size, samplers, coupling, version, ... What nobody told is left out.
 nlohmann::ordered_json facts_json(const nlohmann::ordered_json& summary);
 
-/// The kinds of figures that a page has, in their order: key, label, unit, what it means, whether more or less is
-/// better, and to which of the page's tables it belongs.
+/// The kinds of figures that a page has, in their order: key, place in summary.json, scale, label, unit, what it means,
+/// whether more or less is better, and to which of the page's tables it belongs.
 nlohmann::ordered_json figure_kinds();
 
 /// Figures of one run by key: those of the summary; without one, what the tables tell. What is not known is left out.

@@ -15,8 +15,7 @@ using namespace page_files;
 
 std::string code() {
   std::string out;
-  for (const auto part :
-       {dygraph_js, base_js, tables_js, series_js, stages_js, shapes_js, timeline_js, walk_js, main_js})
+  for (const auto part : {dygraph_js, base_js, tables_js, series_js, stages_js, shapes_js, sweep_js, walk_js, main_js})
     (out += "<script>\n") += std::string(part) + "\n</script>\n";
   return out;
 }

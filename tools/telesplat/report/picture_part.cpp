@@ -9,6 +9,9 @@
 #include <map>
 #include <optional>
 
+#include "common/image/file.h"
+#include "tools/telesplat/movie/contact_sheet.h"
+
 namespace telesplat::launcher {
 namespace {
 
@@ -83,7 +86,7 @@ class Gallery {
         ++left_out_;
         continue;
       }
-      const auto jpeg = image::encode_jpeg(scaled_down(*view, width), kQuality);
+      const auto jpeg = image::encode_jpeg(small_picture(*view, width), kQuality);
       if (!jpeg || jpeg->size() * 4 / 3 > bytes_left_) {
         ++left_out_;
         continue;
@@ -104,29 +107,6 @@ class Gallery {
 };
 
 }  // namespace
-
-image::View scaled_down(const image::View& view, int width) {
-  if (view.width <= width) return view;
-  const int height = std::max(1, int(std::lround(double(view.height) * width / view.width)));
-  image::View out{width, height, std::vector<uint32_t>(size_t(width) * height), {}};
-  for (int y = 0; y < height; ++y) {
-    const int y0 = int(int64_t(y) * view.height / height);
-    const int y1 = std::max(y0 + 1, int(int64_t(y + 1) * view.height / height));
-    for (int x = 0; x < width; ++x) {
-      const int x0 = int(int64_t(x) * view.width / width);
-      const int x1 = std::max(x0 + 1, int(int64_t(x + 1) * view.width / width));
-      uint32_t r = 0, g = 0, b = 0;
-      for (int v = y0; v < y1; ++v)
-        for (int u = x0; u < x1; ++u) {
-          const uint32_t c = view.colour[size_t(v) * view.width + u];
-          r += c >> 16 & 255, g += c >> 8 & 255, b += c & 255;
-        }
-      const uint32_t n = uint32_t(x1 - x0) * uint32_t(y1 - y0);
-      out.colour[size_t(y) * width + x] = (r + n / 2) / n << 16 | (g + n / 2) / n << 8 | (b + n / 2) / n;
-    }
-  }
-  return out;
-}
 
 std::string base64(std::string_view bytes) {
   constexpr const char* kSigns = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

@@ -5,13 +5,9 @@
 #include <string>
 #include <string_view>
 
-#include "common/image/file.h"
 #include "tools/telesplat/report/reading/run_tables.h"
 
 namespace telesplat::launcher {
-
-/// The picture with at most `width` pixels a row: means over the pixels that fall into one.
-image::View scaled_down(const image::View& view, int width);
 
 /// RFC 4648, with padding.
 std::string base64(std::string_view bytes);

@@ -14,9 +14,8 @@
 #include "tools/telesplat/report/about_part.h"
 #include "tools/telesplat/report/page.h"
 #include "tools/telesplat/report/picture_part.h"
-#include "tools/telesplat/report/plots.h"
+#include "tools/telesplat/report/sweep_part.h"
 #include "tools/telesplat/report/time_part.h"
-#include "tools/telesplat/report/trace_part.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -86,6 +85,20 @@ std::vector<std::string> links_in(const std::string& directory) {
   return out;
 }
 
+// Where the run's trace lies; null: it has none.
+ordered_json trace_json(const std::string& directory) {
+  const fs::path path = fs::path(directory) / "trace.json";
+  std::error_code error;
+  if (!lies_within(directory, "trace.json") || !fs::is_regular_file(path, error)) return {};
+  return fs::absolute(path, error).lexically_normal().string();
+}
+
+// A link from the page to a file.
+std::string from_page(const std::string& page, const fs::path& file) {
+  std::error_code error;
+  return to_utf8(file.lexically_relative(fs::absolute(page, error).lexically_normal().parent_path()).string());
+}
+
 std::string kind_of(const ordered_json& summary) {
   if (!summary.is_object()) return {};
   const auto found = summary.find("kind");
@@ -96,6 +109,9 @@ std::string kind_of(const ordered_json& summary) {
 
 Result<ReportOptions> settle_report(ReportOptions o) {
   if (o.runs.empty()) return Error{"a run folder is needed"};
+  const std::string sweep = o.runs.size() == 1 && is_sweep(o.runs.front()) ? o.runs.front() : std::string();
+  if (!sweep.empty())
+    if (const Status s = take_sweep(sweep, o); !s) return s.error();
   if (o.runs.size() > kMostRuns)
     return Error{fmt::format("{} runs are given, a page compares at most {}", o.runs.size(), kMostRuns)};
   for (const auto& run : o.runs)
@@ -105,17 +121,12 @@ Result<ReportOptions> settle_report(ReportOptions o) {
   for (const auto& run : o.runs)
     if (o.skip_s > 0 && read_summary(run).is_object())
       if (const auto later = summary_without_beginning(run, o.skip_s); !later) return later.error();
-  const bool several = o.runs.size() > 1;
   if (o.out.empty()) {
-    const fs::path first = without_slash(o.runs.front());
-    o.out = ((several ? first.parent_path() : first) / "report.html").string();
+    const fs::path first = without_slash(sweep.empty() ? o.runs.front() : sweep);
+    o.out = ((o.runs.size() > 1 && sweep.empty() ? first.parent_path() : first) / "report.html").string();
   }
   std::error_code error;
   if (fs::is_directory(o.out, error)) return Error{fmt::format("--out {}: is a folder, not a file", o.out)};
-  if (o.plots.empty()) {
-    const fs::path page(o.out);
-    o.plots = (page.parent_path() / (several ? page.stem().string() + "-plots" : "plots")).string();
-  }
   return o;
 }
 
@@ -149,7 +160,7 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   out["series"] = time_series(tables, own);
   out["stages"] = stages_json(tables, own);
   out["walk"] = walk_json(tables, limits);
-  out["trace"] = trace_part(directory, tables, limits.trace_events / runs, limits.trace_windows);
+  out["trace"] = trace_json(directory);
   out["pictures"] = pictures_json(directory, tables, limits, limits.picture_bytes / runs);
   out["config"] = config_of(directory, limits);
   out["logs"] = logs_json(directory);
@@ -157,13 +168,16 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   return out;
 }
 
-Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& progress, const ShouldStop& should_stop) {
+Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& progress,
+                               const tools::ShouldStop& should_stop) {
   const auto names = names_of(o);
   ordered_json data{{"version", version()}, {"figures", figure_kinds()}, {"runs", ordered_json::array()}};
+  if (!o.sweep.is_null()) data["sweep"] = o.sweep;
   ReportMade made;
   for (size_t i = 0; i < o.runs.size(); ++i) {
     progress.show(fmt::format("report: reading {}, run {} of {}", names[i], i + 1, o.runs.size()));
-    data["runs"].push_back(run_json(o.runs[i], names[i], o.runs.size(), {}, o.skip_s));
+    auto& run = data["runs"].emplace_back(run_json(o.runs[i], names[i], o.runs.size(), {}, o.skip_s));
+    if (!run["trace"].is_null()) run["trace"] = from_page(o.out, run["trace"].get<std::string>());
     if (should_stop()) {
       made.interrupted = true;
       return made;
@@ -175,27 +189,13 @@ Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& prog
   if (const auto folder = fs::path(o.out).parent_path(); !folder.empty()) fs::create_directories(folder, error);
   if (const Status s = write_whole(o.out, page_html(title, data)); !s) return s.error();
   made.page = o.out;
-  if (o.no_plots) return made;
-  progress.show("report: drawing plots");
-  auto plots = make_plots(data, o.plots, should_stop);
-  if (plots)
-    made.plots = std::move(*plots);
-  else
-    made.no_plots = plots.error().text;
-  progress.close();
   return made;
 }
 
-std::vector<std::string> lines_of(const ReportMade& made) {
-  std::vector<std::string> out;
+std::string line_of(const ReportMade& made) {
   std::error_code error;
   const double mb = double(fs::file_size(made.page, error)) / 1e6;
-  out.push_back(fmt::format("The report is {} ({:.1f} MB); open it in a browser", made.page, error ? 0.0 : mb));
-  if (!made.plots.empty())
-    out.push_back(fmt::format("Plots for papers are in {} ({} pictures)",
-                              fs::path(made.plots.front()).parent_path().string(), made.plots.size()));
-  if (!made.no_plots.empty()) out.push_back("No plots for papers were drawn: " + made.no_plots);
-  return out;
+  return fmt::format("The report is {} ({:.1f} MB); open it in a browser", made.page, error ? 0.0 : mb);
 }
 
 }  // namespace telesplat::launcher

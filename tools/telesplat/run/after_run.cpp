@@ -153,7 +153,7 @@ int AfterRun::make_the_report(bool stopped) {
     progress_.line(fmt::format("interrupted: the report was not made; {}", later));
     return kInterrupted;
   }
-  for (const auto& line : lines_of(*made)) std::printf("%s\n", line.c_str());
+  std::printf("%s\n", line_of(*made).c_str());
   return 0;
 }
 

@@ -126,7 +126,7 @@ Table own_rows(RunOptions& o) {
        .not_in_scene = kWhatIsKept},
       {.flag = "--report",
        .value = &o.report,
-       .help = "at the end make a page about the run, report.html in the run folder, and plots (telesplat report)",
+       .help = "at the end make a page about the run, report.html in the run folder (telesplat report)",
        .not_in_scene = kWhatIsKept},
       {.flag = "--verify-samples",
        .value = &o.verify_samples,

@@ -7,14 +7,12 @@
 #include <filesystem>
 
 #include "common/core/whole_file.h"
+#include "common/scene/clip_order.h"
 #include "services/sampler/julia/sampler.h"
-#include "tools/common/csv_table.h"
 #include "tools/telesplat/scene/toml_file.h"
 
 namespace telesplat::launcher {
 namespace {
-
-constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = 1 << 14};
 
 class DirectJulia : public DirectScene {
  public:
@@ -38,7 +36,7 @@ class DirectJulia : public DirectScene {
   Result<sampler::JuliaScene> at(EpochId epoch) const {
     const auto parameters = julia_.at(epoch);
     if (!parameters) return parameters.error();
-    return sampler::JuliaScene(*parameters, julia_.placement, julia_.clips.at(epoch));
+    return sampler::JuliaScene(*parameters, julia_.placement, julia_.epochs.clip_at(epoch));
   }
 
   JuliaScene::Record julia_;
@@ -90,26 +88,18 @@ Status read_session(const std::string& path, JuliaScene::Record& out) {
   return ok_status();
 }
 
-Status read_epochs(const std::string& path, JuliaScene::Record& out) {
-  const auto table = tools::CsvTable::read(path, kEpochs);
-  if (!table) return table.error();
-  const auto epoch = table->column("epoch");
-  if (!epoch) return epoch.error();
-  for (size_t row = 0; row < table->rows(); ++row) {
-    const auto id = table->count(row, *epoch);
-    if (!id) return id.error();
-    if (const Status s = out.clips.read(*table, row, *id); !s) return s;
-    std::map<std::string, double> values;
-    for (size_t i = 0; i < table->header().size(); ++i) {
-      if (table->header()[i] == scene::kClipFact) continue;
-      const auto value = table->number(row, i);
-      if (!value) return value.error();
-      values[table->header()[i]] = *value;
-    }
-    const auto parameters = julia::from_map(values);
-    if (!parameters) return table->wrong(row, parameters.error().text);
-    out.epochs[*id] = *parameters;
-  }
+// All columns of a row are parameters but for the clip.
+Status read_epoch(uint64_t epoch, tools::CsvRow& row, Epochs<julia::Parameters>& out) {
+  read_clip(epoch, row, out.clips);
+  std::map<std::string, double> values;
+  for (const std::string& name : row.table().header())
+    if (name != scene::kClipFact) values[name] = row.number(name);
+  if (!row.status()) return row.status();
+  const auto parameters = julia::from_map(values);
+  if (parameters)
+    out.by_id[epoch] = *parameters;
+  else
+    row.demand(false, parameters.error().text);
   return ok_status();
 }
 
@@ -122,21 +112,13 @@ std::string lines_of(const julia::Parameters& parameters) {
 
 }  // namespace
 
-Result<julia::Parameters> JuliaScene::Record::at(EpochId epoch) const {
-  if (epochs.empty()) return begin;
-  const auto found = epochs.find(epoch.value);
-  if (found != epochs.end()) return found->second;
-  return Error{fmt::format("{}/epochs.csv: has no epoch {}; it holds {} to {}", directory, epoch.value,
-                           epochs.begin()->first, epochs.rbegin()->first)};
-}
-
 Result<JuliaScene::Record> JuliaScene::record() const {
   if (record_) return *record_;
   const auto scene = julia::read_scene(options_.julia);
   if (!scene) return scene.error();
   const auto placement = julia::place(*scene, options_.mesh.room_size_m);
   if (!placement) return placement.error();
-  return Record{{}, scene->title, scene->parameters, *placement, {}, {}};
+  return Record{scene->title, scene->parameters, *placement, {}};
 }
 
 std::string JuliaScene::name() const {
@@ -153,13 +135,12 @@ Status JuliaScene::check() const {
 
 Status JuliaScene::read_record(const std::string& run_directory) {
   Record out;
-  out.directory = run_directory;
+  out.epochs.directory = run_directory;
   if (const Status s = read_session(run_directory + "/session.toml", out); !s) return s;
-  std::error_code error;
-  if (const std::string path = run_directory + "/epochs.csv"; std::filesystem::exists(path, error))
-    if (const Status s = read_epochs(path, out); !s) return s;
-  record_ = std::move(out);
-  return ok_status();
+  const Status read = read_epochs(
+      run_directory, {"epoch"}, [&](uint64_t epoch, tools::CsvRow& row) { return read_epoch(epoch, row, out.epochs); });
+  if (read) record_ = std::move(out);
+  return read;
 }
 
 Status JuliaScene::move_to(const std::string& file) {
@@ -177,7 +158,7 @@ std::string JuliaScene::summary(uint64_t) const {
   if (!julia) return {};
   const auto& c = julia->begin.c;
   return fmt::format(": c = ({:.4g}, {:.4g}, {:.4g}, {:.4g}){}", c.x, c.y, c.z, c.w,
-                     julia->epochs.size() > 1 ? fmt::format(", {} epochs", julia->epochs.size()) : "");
+                     julia->epochs.by_id.size() > 1 ? fmt::format(", {} epochs", julia->epochs.by_id.size()) : "");
 }
 
 std::string JuliaScene::describe_record() const {
@@ -187,7 +168,7 @@ std::string JuliaScene::describe_record() const {
   std::string out =
       fmt::format("{}, {}\n", julia->title, animate.empty() ? "not animated when it began" : "animated: " + animate);
   out += lines_of(julia->begin);
-  if (!julia->epochs.empty()) out += fmt::format("  {} epochs (epochs.csv)\n", julia->epochs.size());
+  if (const size_t n = julia->epochs.by_id.size()) out += fmt::format("  {} epochs (epochs.csv)\n", n);
   return out;
 }
 

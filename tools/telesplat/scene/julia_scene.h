@@ -1,9 +1,7 @@
 // A Julia set: parameters instead of a data file, and in each epoch others.
 #pragma once
 
-#include <map>
-
-#include "tools/telesplat/scene/epoch_clips.h"
+#include "tools/telesplat/scene/epochs.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -24,14 +22,12 @@ class JuliaScene : public Scene {
   Result<data::Description> describe_data(const data::Progress& progress) const override;
 
   struct Record {
-    std::string directory, title;
+    std::string title;
     julia::Parameters begin;
     julia::Placement placement;
-    std::map<uint64_t, julia::Parameters>
-        epochs;  ///< by EpochId; empty if the run has no epochs.csv, it showed one set only
-    EpochClips clips;
+    Epochs<julia::Parameters> epochs;  ///< none if the run has no epochs.csv, it showed one set only
     /// Error: epochs.csv has no such epoch.
-    Result<julia::Parameters> at(EpochId epoch) const;
+    Result<julia::Parameters> at(EpochId epoch) const { return epochs.at(epoch, begin); }
   };
 
  private:

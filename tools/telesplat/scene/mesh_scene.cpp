@@ -8,20 +8,16 @@
 #include "services/data/inspect.h"
 #include "services/data/open_mesh.h"
 #include "services/sampler/mesh/sampler.h"
-#include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
 namespace {
-
-// Quotes double the text's length, numbers stand beside it.
-constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = scene::kMaxColouringText * 2 + (1 << 14)};
 
 // Begins as the options colour it; each epoch of a record has colours of its own, and maybe another array's chunks.
 class DirectMesh : public DirectScene {
  public:
   using Open = std::function<Result<std::shared_ptr<data::MeshStore>>(const std::string& array)>;
 
-  DirectMesh(MeshScene::Epochs epochs, Open open, int threads)
+  DirectMesh(MeshScene::Colours epochs, Open open, int threads)
       : epochs_(std::move(epochs)), open_(std::move(open)), sampler_(sampler::make_ray_sampler(threads)) {}
 
   // Holds the chunks of this store and no others.
@@ -54,7 +50,7 @@ class DirectMesh : public DirectScene {
  private:
   // Frames come in order, so there is seldom another epoch than before.
   Status prepare(EpochId id) {
-    if (!epochs_.told || prepared_ == id) return ok_status();
+    if (epochs_.by_id.empty() || prepared_ == id) return ok_status();
     const auto colouring = epochs_.at(id);
     if (!colouring) return colouring.error();
     const std::string array = *colouring ? (*colouring)->array : "";
@@ -64,55 +60,36 @@ class DirectMesh : public DirectScene {
       if (const Status s = load(std::move(*store)); !s) return s;
     }
     colour_by(*colouring);
-    sampler_->set_clip(epochs_.clips.at(id));
+    sampler_->set_clip(epochs_.clip_at(id));
     prepared_ = id;
     return ok_status();
   }
 
-  MeshScene::Epochs epochs_;
+  MeshScene::Colours epochs_;
   Open open_;
   std::shared_ptr<data::MeshStore> store_;
   std::unique_ptr<sampler::Sampler> sampler_;
   std::optional<EpochId> prepared_;
 };
 
-Status read_epochs(const std::string& path, MeshScene::Epochs& out) {
-  const auto table = tools::CsvTable::read(path, kEpochs);
-  if (!table) return table.error();
-  const auto epoch = table->column("epoch"), text = table->column(scene::kColouringFact);
-  if (!epoch) return epoch.error();
-  if (!text) return ok_status();  // a run of before meshes were coloured
-  out.told = true;
-  for (size_t row = 0; row < table->rows(); ++row) {
-    const auto id = table->count(row, *epoch);
-    if (!id) return id.error();
-    if (const Status s = out.clips.read(*table, row, *id); !s) return s;
-    const std::string colouring = table->text(row, *text);
-    auto& at = out.by_id[*id];
-    if (colouring.empty()) continue;
-    auto read = scene::colouring_from_text(colouring);
-    if (!read) return Error{fmt::format("{}: epoch {}: {}", path, *id, read.error().text)};
-    at = *std::move(read);
-  }
-  return ok_status();
-}
-
 }  // namespace
-
-Result<std::optional<scene::Colouring>> MeshScene::Epochs::at(EpochId epoch) const {
-  const auto found = by_id.find(epoch.value);
-  if (found != by_id.end()) return found->second;
-  if (by_id.empty()) return Error{fmt::format("{}/epochs.csv: holds no epochs", directory)};
-  return Error{fmt::format("{}/epochs.csv: has no epoch {}; it holds {} to {}", directory, epoch.value,
-                           by_id.begin()->first, by_id.rbegin()->first)};
-}
 
 Status MeshScene::read_record(const std::string& run_directory) {
   epochs_.directory = run_directory;
   std::error_code error;
-  const std::string path = run_directory + "/epochs.csv";
-  const bool there = std::filesystem::exists(path, error) && std::filesystem::file_size(path, error) > 0;
-  return there ? read_epochs(path, epochs_) : ok_status();
+  if (std::filesystem::file_size(run_directory + "/epochs.csv", error) == 0) return ok_status();
+  return read_epochs(run_directory, {"epoch"}, [&](uint64_t epoch, tools::CsvRow& row) -> Status {
+    if (!row.has(scene::kColouringFact)) return ok_status();  // a run of before meshes were coloured
+    read_clip(epoch, row, epochs_.clips);
+    auto& at = epochs_.by_id[epoch];
+    const std::string text = row.text(scene::kColouringFact);
+    if (text.empty()) return ok_status();
+    auto colouring = scene::colouring_from_text(text);
+    if (!colouring)
+      return Error{fmt::format("{}/epochs.csv: epoch {}: {}", run_directory, epoch, colouring.error().text)};
+    at = *std::move(colouring);
+    return ok_status();
+  });
 }
 
 Result<std::unique_ptr<DirectScene>> MeshScene::open_direct(int threads, const data::Progress& progress) const {

@@ -1,11 +1,10 @@
 // Triangles: meshes, elevation rasters and isosurfaces of volumes.
 #pragma once
 
-#include <map>
 #include <optional>
 
 #include "common/scene/colouring.h"
-#include "tools/telesplat/scene/epoch_clips.h"
+#include "tools/telesplat/scene/epochs.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -20,18 +19,11 @@ class MeshScene : public Scene {
   std::string summary(uint64_t primitives) const override;
   Result<data::Description> describe_data(const data::Progress& progress) const override;
 
-  /// The colours of a run's epochs.
-  struct Epochs {
-    std::string directory;
-    std::map<uint64_t, std::optional<scene::Colouring>> by_id;  ///< nothing: the file's own colours
-    EpochClips clips;
-    bool told = false;  ///< else the run's record does not tell: all epochs look as the run began
-    /// Error: epochs.csv has no such epoch.
-    Result<std::optional<scene::Colouring>> at(EpochId epoch) const;
-  };
+  /// Nothing: the file's own colours. Where a record does not tell, all epochs look as the run began.
+  using Colours = Epochs<std::optional<scene::Colouring>>;
 
  private:
-  Epochs epochs_;
+  Colours epochs_;
 };
 
 }  // namespace telesplat::launcher

@@ -12,17 +12,14 @@
 #include "services/data/inspect.h"
 #include "services/data/volume/store.h"
 #include "services/sampler/volume/raycaster.h"
-#include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
 namespace {
 
-// Quotes double the text's length, numbers stand beside it.
-constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = volume::kMaxTransferText * 2 + (1 << 14)};
-
 class DirectVolume : public DirectScene {
  public:
-  DirectVolume(std::string file, VolumeScene::Epochs epochs, std::unique_ptr<data::VolumeStore> store, int threads)
+  DirectVolume(std::string file, Epochs<VolumeScene::Epoch> epochs, std::unique_ptr<data::VolumeStore> store,
+               int threads)
       : file_(std::move(file)), epochs_(std::move(epochs)), store_(std::move(store)), threads_(threads) {}
 
   Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading, EpochId epoch,
@@ -51,7 +48,7 @@ class DirectVolume : public DirectScene {
   // Frames come in order, so there is seldom another epoch than before.
   Status prepare(EpochId id) {
     if (prepared_ == id && raycaster_) return ok_status();
-    const auto epoch = epochs_.at(id);
+    const auto epoch = epochs_.at(id, {});
     if (!epoch) return epoch.error();
     const volume::Session& session = store_->session();
     auto transfer = Result<volume::TransferFunction>(session.transfer);
@@ -63,44 +60,20 @@ class DirectVolume : public DirectScene {
                                        data::shown_levels(*transfer, session.levels), volume::LevelSet());
     if (!voxels) return voxels.error();
     raycaster_ = std::make_unique<sampler::VolumeRaycaster>(
-        session.grid, *voxels, volume::level_colours(*transfer, session.levels), threads_, epochs_.clips.at(id));
+        session.grid, *voxels, volume::level_colours(*transfer, session.levels), threads_, epochs_.clip_at(id));
     prepared_ = id;
     return ok_status();
   }
 
   std::string file_;
-  VolumeScene::Epochs epochs_;
+  Epochs<VolumeScene::Epoch> epochs_;
   std::unique_ptr<data::VolumeStore> store_;
   int threads_;
   EpochId prepared_;
   std::unique_ptr<sampler::VolumeRaycaster> raycaster_;
 };
 
-Status read_epochs(const std::string& path, VolumeScene::Epochs& out) {
-  const auto table = tools::CsvTable::read(path, kEpochs);
-  if (!table) return table.error();
-  const auto epoch = table->column("epoch"), step = table->column("volume.step"), transfer = table->column("transfer");
-  for (const auto* column : {&epoch, &step, &transfer})
-    if (!*column) return column->error();
-  for (size_t row = 0; row < table->rows(); ++row) {
-    const auto id = table->count(row, *epoch), at = table->count(row, *step, volume::kMaxSteps);
-    if (!id) return id.error();
-    if (!at) return at.error();
-    if (const Status s = out.clips.read(*table, row, *id); !s) return s;
-    out.by_id[*id] = {table->text(row, *transfer), int(*at)};
-  }
-  return ok_status();
-}
-
 }  // namespace
-
-Result<VolumeScene::Epoch> VolumeScene::Epochs::at(EpochId epoch) const {
-  if (by_id.empty()) return Epoch{};
-  const auto found = by_id.find(epoch.value);
-  if (found != by_id.end()) return found->second;
-  return Error{fmt::format("{}/epochs.csv: has no epoch {}; it holds {} to {}", directory, epoch.value,
-                           by_id.begin()->first, by_id.rbegin()->first)};
-}
 
 Status VolumeScene::check() const {
   const auto found = data::find_volume(options_.scene, options_.volume);
@@ -109,9 +82,11 @@ Status VolumeScene::check() const {
 
 Status VolumeScene::read_record(const std::string& run_directory) {
   epochs_.directory = run_directory;
-  std::error_code error;
-  const std::string path = run_directory + "/epochs.csv";
-  return std::filesystem::exists(path, error) ? read_epochs(path, epochs_) : ok_status();
+  return read_epochs(run_directory, {"epoch", "volume.step", "transfer"}, [&](uint64_t epoch, tools::CsvRow& row) {
+    read_clip(epoch, row, epochs_.clips);
+    epochs_.by_id[epoch] = {row.text("transfer"), int(row.count("volume.step", volume::kMaxSteps))};
+    return ok_status();
+  });
 }
 
 Result<std::unique_ptr<DirectScene>> VolumeScene::open_direct(int threads, const data::Progress& progress) const {

@@ -1,9 +1,7 @@
 // A volume, its transfer function and the time step it stands at; an epoch has others of both.
 #pragma once
 
-#include <map>
-
-#include "tools/telesplat/scene/epoch_clips.h"
+#include "tools/telesplat/scene/epochs.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -23,17 +21,11 @@ class VolumeScene : public Scene {
     std::string transfer;  ///< text form, absolute values; empty: as the data server begins
     int step = 0;
   };
-  struct Epochs {
-    std::string directory;
-    std::map<uint64_t, Epoch> by_id;  ///< empty if the run has no epochs.csv: it showed one
-    EpochClips clips;
-    /// Error: epochs.csv has no such epoch.
-    Result<Epoch> at(EpochId epoch) const;
-  };
-  const Epochs& epochs() const { return epochs_; }
+  /// What a run's epoch showed; a run without epochs.csv showed one. Error: epochs.csv has no such epoch.
+  Result<Epoch> at(EpochId epoch) const { return epochs_.at(epoch, {}); }
 
  private:
-  Epochs epochs_;
+  Epochs<Epoch> epochs_;
 };
 
 }  // namespace telesplat::launcher

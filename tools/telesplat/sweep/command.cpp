@@ -17,10 +17,10 @@
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/record/dated_folder.h"
+#include "tools/telesplat/report/report.h"
 #include "tools/telesplat/run/process_group.h"
 #include "tools/telesplat/run/run_options.h"
 #include "tools/telesplat/sweep/cells/cells.h"
-#include "tools/telesplat/sweep/page.h"
 #include "tools/telesplat/sweep/sweep.h"
 #include "tools/telesplat/sweep/tables.h"
 
@@ -108,19 +108,25 @@ void list(const Sweep& sweep) {
 }
 
 // Writes and prints what is there; the exit code that follows from it.
-Result<int> conclude(const Sweep& sweep, const std::string& directory, double skip_s) {
+Result<int> conclude(const Sweep& sweep, const std::string& directory, double skip_s, tools::ProgressLine& progress) {
   const SweepRecord record = read_record(sweep.manifest(), directory, skip_s);
   if (const Status s = write_whole(directory + "/sweep.csv", to_csv(record)); !s) return s.error();
   if (const Status s = write_whole(directory + "/cells.csv", cells_csv(record)); !s) return s.error();
-  if (const Status s = write_whole(directory + "/sweep.html", to_html(record, sweep.manifest(), directory, skip_s)); !s)
-    return s.error();
+  // Without a run that is done there is no report.
+  std::string report;
+  if (const auto settled = settle_report({.runs = {directory}, .labels = {}, .skip_s = skip_s})) {
+    const auto made = make_report(*settled, progress, [] { return false; });
+    progress.close();
+    if (!made) return made.error();
+    report = fmt::format("report: {}\n", made->page);
+  }
   std::printf("%s", to_text(record).c_str());
   for (const Noise& n : noises(record)) std::printf("! %s\n", sentence(record, n).c_str());
   if (const std::string few = too_few(record.grid); !few.empty()) std::printf("! %s\n", few.c_str());
   const auto failed = failures(record);
   for (const std::string& f : failed) std::printf("failed: %s\n", f.c_str());
-  std::printf("\nreport: %s/sweep.html\ntable: %s/sweep.csv\nmeans, intervals, tests: %s/cells.csv\n",
-              directory.c_str(), directory.c_str(), directory.c_str());
+  std::printf("\n%stable: %s/sweep.csv\nmeans, intervals, tests: %s/cells.csv\n", report.c_str(), directory.c_str(),
+              directory.c_str());
   std::fflush(stdout);
   return failed.empty() ? 0 : 1;
 }
@@ -137,7 +143,7 @@ int carry_out(Sweep& sweep, const std::string& directory, double skip_s) {
   const auto end = sweep.carry_out(progress);
   progress.close();
   if (!end) return tools::complain(end.error(), 1);
-  const auto code = conclude(sweep, directory, skip_s);
+  const auto code = conclude(sweep, directory, skip_s, progress);
   if (!code) return tools::complain(code.error(), 1);
   if (*end == Sweep::End::kDone) return *code;
   std::fprintf(stderr, "telesplat: interrupted; %zu of %zu runs are done, telesplat sweep --out %s goes on\n",

@@ -16,16 +16,14 @@ using Figures = std::vector<std::pair<std::string, double>>;
 Figures flatten(const nlohmann::ordered_json& summary);
 const double* find(const Figures& figures, const std::string& name);
 
-/// What tables and plots show.
+/// What tables show.
 struct Measure {
   const char* name;   ///< in summary.json
   const char* title;  ///< for people
   const char* brief;  ///< head of a column
   const char* unit;
-  const char* help;  ///< what it says, in a sentence
   int decimals;
   double scale;         ///< shown = measured * scale
-  bool from_zero;       ///< an axis begins at 0
   bool judges_machine;  ///< where runs of one configuration differ much in it, the machine was too noisy
 };
 std::span<const Measure> main_figures();

@@ -4,10 +4,11 @@
 R.header();
 R.tiles();
 R.notes();
+R.sweep();
 R.photons();
 R.delays();
 R.stages();
-R.timelines();
+R.traces();
 R.overTime();
 R.walk();
 R.measures();

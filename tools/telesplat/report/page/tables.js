@@ -18,7 +18,7 @@ R.header = function () {
     text: "dark / light", onclick: () => R.setTheme(R.dark() ? "light" : "dark"),
   });
   const names = R.runs.map((r) => r.name);
-  const title = R.several ? `${names.length} runs compared` : names[0];
+  const title = R.data.sweep ? "Sweep of " + R.data.sweep.flags.join(", ") : R.several ? `${names.length} runs compared` : names[0];
   R.nav = R.el("nav", { class: "no-print" });
   document.getElementById("main").append(
     R.el("div", { class: "bar" },
@@ -135,6 +135,13 @@ R.allFigures = function () {
     R.several ? null : R.help("What else was measured over the whole run."),
     R.several ? R.el("p", { class: "muted", text: `Differences are from ${R.runs[0].name}; the best one is marked with \u2713, where more or less is better and it is so by 1 % or more.` }) : null,
     R.el("div", { class: "panel" }, R.table(R.figureHead(false), rows)));
+};
+
+// What each process did when: trace.json of the run.
+R.traces = function () {
+  const box = R.runs.map((run, i) => R.el("p", {}, R.several ? [R.runSwatch(i), run.name + ": "] : null,
+    run.trace === null ? "trace.json is not there." : R.el("a", { href: "./" + run.trace.split("/").map(encodeURIComponent).join("/"), text: run.trace })));
+  R.section("trace", "Timeline", R.help("What each process did at each moment, as spans: open the file in ui.perfetto.dev, a page that reads it in the browser, or in chrome://tracing."), R.el("div", { class: "panel" }, box));
 };
 
 R.errors = function () {

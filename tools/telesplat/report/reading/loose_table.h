@@ -10,12 +10,10 @@
 
 namespace telesplat::launcher {
 
-/// Columns of a table, by name. A line that is cut off (the last one, without a line end), has another number of values
-/// than the header, or more than 64 KiB, is left out.
+/// Columns of a table, by name. Lines that cannot be read (tools::CsvTable), or have more than 64 KiB, are left out.
 class LooseTable {
  public:
-  /// The columns that are asked for, as far as the file has them. Error: the file is not there, is empty, has more than
-  /// 4 GiB, or a header of more than 64 KiB.
+  /// The columns that are asked for, as far as the file has them. Error: as of tools::CsvTable.
   static Result<LooseTable> read(const std::string& path, const std::vector<std::string>& numbers,
                                  const std::vector<std::string>& texts = {});
 

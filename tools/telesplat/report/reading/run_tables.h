@@ -32,8 +32,6 @@ struct PageLimits {
   size_t buckets = 2000;           ///< of a series over time: twice as many points
   size_t stacked_updates = 1500;   ///< bars of the stages
   size_t poses = 1500;             ///< of the map
-  size_t trace_events = 120'000;   ///< of all runs together
-  size_t trace_windows = 16;       ///< parts of a trace that is too long
   size_t pictures = 10;            ///< of each run, and three that compare
   size_t picture_bytes = 6 << 20;  ///< of all runs together
   size_t text_bytes = 200'000;     ///< of a configuration
