@@ -11,12 +11,16 @@ def _is_in(path, place):
     return path == place or path.startswith(place + "/")
 
 
+def _ring_of(path):
+    return next((ring for ring in tables.RINGS if _is_in(path, ring)), None)
+
+
 def _process_of(path):
     return next((p for p in tables.PROCESSES if _is_in(path, p)), None)
 
 
 def directions(tree):
-    """Includes run down (tests, tools > services, client > common) and never from one process into another."""
+    """Includes run down (tests, tools > services, client > common), never into another process nor an outer ring."""
     for file in tree.sources():
         part = file.path.split("/")[0]
         if part not in tables.PARTS:
@@ -29,7 +33,9 @@ def directions(tree):
             other = target.split("/")[0]
             if other in tables.PARTS and other not in tables.PARTS[part]:
                 wrong = f"{part}/ must not include {other}/"
-            elif part in ("services", "client") and _process_of(target) not in (None, _process_of(file.path)):
+            elif part != "tests" and _ring_of(target) not in (None, _ring_of(file.path)):
+                wrong = f"only {_ring_of(target)} and tests include it"
+            elif part in ("services", "client") and not _ring_of(file.path) and _process_of(target) not in (None, _process_of(file.path)):
                 wrong = f"{_process_of(file.path) or part} must not include {_process_of(target)}"
             elif other == "tests" and not _is_in(target, tables.SHARED_TESTS) and not _is_in(target, file.folder):
                 wrong = f"tests share only {tables.SHARED_TESTS}"

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <tuple>
 
+#include "client/viewer/tracking/rotation.h"
 #include "common/metrics/statistics.h"
-#include "common/tracking/rotation.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "client/viewer/tracking/pose_predictor.h"
 #include "common/core/result.h"
 #include "common/geometry/trajectory.h"
-#include "common/tracking/pose_predictor.h"
 
 namespace telesplat::launcher {
 
