@@ -35,7 +35,11 @@ def directions(tree):
                 wrong = f"{part}/ must not include {other}/"
             elif part != "tests" and _ring_of(target) not in (None, _ring_of(file.path)):
                 wrong = f"only {_ring_of(target)} and tests include it"
-            elif part in ("services", "client") and not _ring_of(file.path) and _process_of(target) not in (None, _process_of(file.path)):
+            elif (
+                part in ("services", "client")
+                and not _ring_of(file.path)
+                and _process_of(target) not in (None, _process_of(file.path))
+            ):
                 wrong = f"{_process_of(file.path) or part} must not include {_process_of(target)}"
             elif other == "tests" and not _is_in(target, tables.SHARED_TESTS) and not _is_in(target, file.folder):
                 wrong = f"tests share only {tables.SHARED_TESTS}"

@@ -42,9 +42,15 @@ VIOLATIONS = [
         "directions", "common/core/up.cpp",
         '\n#include "services/data/data.h"\n', 2, "common/ must not include services/",
     ),
-    ("widgets", "client/viewer/panel/gui/x.cpp", 'int a;\nbool b = ImGui::Button("b");\n', 2, "ImGui::Button("),
-    ("widgets", "client/viewer/panel/gui/x.cpp", 'bool b = ImGui::SliderInt("b", &i);\n', 1, "seen() is not told"),
-    ("clamps", "client/viewer/panel/x.cpp", "int a;\nint b = std::clamp(a, lo, hi);\n", 2, "within()"),
+    (
+        "widgets", "client/displays/window/panel/gui/x.cpp",
+        'int a;\nbool b = ImGui::Button("b");\n', 2, "ImGui::Button(",
+    ),
+    (
+        "widgets", "client/displays/window/panel/gui/x.cpp",
+        'bool b = ImGui::SliderInt("b", &i);\n', 1, "seen() is not told",
+    ),
+    ("clamps", "client/displays/window/x.cpp", "int a;\nint b = std::clamp(a, lo, hi);\n", 2, "within()"),
     ("directions", "common/core/up.cpp", '#include "tools/telesplat/run.h"\n', 1, "common/ must not include tools/"),
     ("directions", "services/data/up.cpp", '#include "tests/support/near.h"\n', 1, "services/ must not include tests/"),
     ("directions", "client/viewer/up.cpp", '#include "tools/telesplat/run.h"\n', 1, "client/ must not include tools/"),
@@ -53,6 +59,14 @@ VIOLATIONS = [
         '#include "services/sampler/work.h"\n', 1, "must not include services/sampler",
     ),
     ("directions", "client/viewer/x.cpp", '#include "services/data/data.h"\n', 1, "client/ must not include services/"),
+    (
+        "directions", "tools/telesplat/x.cpp",
+        '#include "client/displays/window/window.h"\n', 1, "only client/displays and tests include it",
+    ),
+    (
+        "directions", "client/viewer/x.cpp",
+        '#include "client/displays/xr/hands.h"\n', 1, "only client/displays and tests include it",
+    ),
     ("directions", "tests/golden/x_test.cpp", '#include "tests/unit/core/x.h"\n', 1, "tests share only tests/support"),
     ("circles", "common/core/result.h", '#pragma once\n#include "common/core/result.h"\n', 2, "which includes it"),
     ("floors", "common/core/high.h", '#include "common/wire/messages.h"\n', 1, "stands above common/core"),
