@@ -6,7 +6,7 @@
 #include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/gl/point_arena.h"
 #include "client/viewer/render/gl/programs.h"
-#include "common/gl/stream_buffer.h"
+#include "client/viewer/render/gl/stream_buffer.h"
 #include "common/image/shading.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/kernel_traits.h"

@@ -1,4 +1,4 @@
-#include "common/gl/stream_buffer.h"
+#include "client/viewer/render/gl/stream_buffer.h"
 
 #include <epoxy/gl.h>
 
