@@ -3,7 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
-#include <cstring>
+#include <utility>
 
 namespace telesplat::viewer {
 namespace {
@@ -28,34 +28,17 @@ void main() {
 }
 )";
 
-Status compile(GLuint program, GLenum kind, const char* source) {
-  const GLuint shader = glCreateShader(kind);
-  glShaderSource(shader, 1, &source, nullptr);
-  glCompileShader(shader);
-  GLint good = 0;
-  char log[512] = "";
-  glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
-  if (!good) glGetShaderInfoLog(shader, sizeof log, nullptr, log);
-  glAttachShader(program, shader);
-  glDeleteShader(shader);
-  return good ? ok_status() : Status(Error{std::string("the window's shader does not compile: ") + log});
-}
-
 }  // namespace
 
 Result<std::unique_ptr<FramePresenter>> FramePresenter::make() {
+  auto program =
+      gl::Program::link("window", {{GL_VERTEX_SHADER, {kVertexShader}}, {GL_FRAGMENT_SHADER, {kFragmentShader}}});
+  if (!program) return program.error();
   std::unique_ptr<FramePresenter> out(new FramePresenter);
-  out->program_ = glCreateProgram();
-  if (const Status s = compile(out->program_, GL_VERTEX_SHADER, kVertexShader); !s) return s.error();
-  if (const Status s = compile(out->program_, GL_FRAGMENT_SHADER, kFragmentShader); !s) return s.error();
-  glLinkProgram(out->program_);
-  GLint linked = 0;
-  glGetProgramiv(out->program_, GL_LINK_STATUS, &linked);
-  if (!linked) return Error{"the window's shaders do not link"};
-  out->keeps_alpha_ = glGetUniformLocation(out->program_, "keeps_alpha");
-  out->part_ = glGetUniformLocation(out->program_, "part");
+  out->program_ = std::move(*program);
+  out->keeps_alpha_ = out->program_.uniform("keeps_alpha");
+  out->part_ = out->program_.uniform("part");
   glGenVertexArrays(1, &out->vertex_array_);
-  out->has_ring_ = epoxy_gl_version() >= 44 || epoxy_has_gl_extension("GL_ARB_buffer_storage");
   return out;
 }
 
@@ -63,7 +46,6 @@ FramePresenter::~FramePresenter() {
   resize(0, 0);
   load_overlays({});
   glDeleteVertexArrays(1, &vertex_array_);
-  glDeleteProgram(program_);
 }
 
 void FramePresenter::resize(int width, int height) {
@@ -71,11 +53,6 @@ void FramePresenter::resize(int width, int height) {
   height_ = height;
   glDeleteTextures(1, &texture_);
   texture_ = 0;
-  for (Slot& s : ring_) {
-    if (s.fence) glDeleteSync(static_cast<GLsync>(s.fence));
-    glDeleteBuffers(1, &s.buffer);  // which unmaps it
-    s = {};
-  }
   if (width == 0) return;
   glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);
@@ -83,35 +60,6 @@ void FramePresenter::resize(int width, int height) {
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  if (!has_ring_) return;
-  const GLsizeiptr bytes = GLsizeiptr(width) * height * 4;
-  constexpr GLbitfield kAccess = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-  for (Slot& s : ring_) {
-    glGenBuffers(1, &s.buffer);
-    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, s.buffer);
-    glBufferStorage(GL_PIXEL_UNPACK_BUFFER, bytes, nullptr, kAccess);
-    s.memory = glMapBufferRange(GL_PIXEL_UNPACK_BUFFER, 0, bytes, kAccess);
-  }
-  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
-}
-
-void FramePresenter::upload(const image::View& view) {
-  const auto copy = [&](const void* from) {
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, from);
-  };
-  Slot& s = ring_[slot_];
-  if (!s.memory) return copy(view.colour.data());
-  slot_ = (slot_ + 1) % kRing;
-  if (s.fence) {
-    constexpr GLuint64 kPatience_ns = 1'000'000'000;
-    glClientWaitSync(static_cast<GLsync>(s.fence), GL_SYNC_FLUSH_COMMANDS_BIT, kPatience_ns);
-    glDeleteSync(static_cast<GLsync>(s.fence));
-  }
-  std::memcpy(s.memory, view.colour.data(), view.colour.size() * 4);
-  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, s.buffer);
-  copy(nullptr);
-  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
-  s.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
 }
 
 void FramePresenter::load_overlays(const Overlays& overlays) {
@@ -154,7 +102,7 @@ void FramePresenter::draw(const image::View& view, int width, int height, const 
   if (view.width != width_ || view.height != height_) resize(view.width, view.height);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, texture_);
-  upload(view);
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, view.colour.data());
   const bool same = view.width == (two_eyes_ ? 2 * width : width) && view.height == height;
   const GLint filter = same ? GL_NEAREST : GL_LINEAR;
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
@@ -174,7 +122,7 @@ void FramePresenter::draw_part(float begin, float share, int width, int height, 
   glViewport(0, 0, width, height);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
-  glUseProgram(program_);
+  program_.use();
   glUniform1i(keeps_alpha_, 0);
   glUniform2f(part_, begin, share);
   glBindVertexArray(vertex_array_);

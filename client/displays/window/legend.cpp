@@ -15,7 +15,7 @@ void WindowLegend::on_legend(const std::shared_ptr<const image::Legend>& legend)
 
 bool WindowLegend::built() const {
   const bool on_wall = display_.wall.described || display_.wall.tiles() > 1;
-  return legend_ && display_.legend && window_.has_gui() && !on_wall;
+  return legend_ && display_.legend && !on_wall;
 }
 
 void WindowLegend::build(ColourControls& colours, double now_s, double hidden) {
@@ -26,7 +26,7 @@ void WindowLegend::build(ColourControls& colours, double now_s, double hidden) {
   part_ = show_legend(shown, view_, hidden, editable ? change : nullptr);
 }
 
-// As an overlay: in a wall's tile at the lower right, and in a window without Dear ImGui.
+// As an overlay: in the wall's tile at the lower right.
 void WindowLegend::show() {
   const WallTile& wall = display_.wall;
   const int tiles = wall.described ? int(wall.described->screens.size()) : wall.columns * wall.rows;

@@ -16,8 +16,8 @@ constexpr double kPoint_s = 0.1;
 
 // The cursor's overlay follows it a few times a second.
 std::optional<glm::dvec2> Measuring::points_at() {
-  tells_pick_ = interaction_.take_pick_wish();
-  centres_ = centres_ || interaction_.take_centre_wish();
+  tells_pick_ = interaction_.take(Wish::kPick);
+  centres_ = centres_ || interaction_.take(Wish::kCentre);
   const double now_s = monotonic_s();
   const auto pointer = interaction_.pointer();
   if (!pointer || (!tells_pick_ && !centres_ && (!hands_.shows("cursor") || now_s - pointed_s_ < kPoint_s)))

@@ -31,7 +31,7 @@ void Opening::take_launcher_lines(double now_s, bool has_scene, bool seen) {
     if (!seen) interaction_.show_dialog(true);
   }
   interaction_.set_dialog(bool(ask_), has_scene);
-  if (interaction_.take_open_wish()) open("");
+  if (interaction_.take(Wish::kOpen)) open("");
   if (interaction_.shows_dialog() != view_.shown) view_ = {.shown = interaction_.shows_dialog()};
 }
 

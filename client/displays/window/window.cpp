@@ -203,8 +203,7 @@ struct Window::Impl {
   void say_renderer(int width, int height) {
     const std::string_view renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
     draws_without_gpu = gl::is_software(renderer);
-    log::info("window: {}x{} pixels, {}, {}", width, height, renderer,
-              presenter->has_pixel_ring() ? "mapped pixel buffers" : "no mapped pixel buffers");
+    log::info("window: {}x{} pixels, {}", width, height, renderer);
   }
 
   static Impl& of(GLFWwindow* w) { return *static_cast<Impl*>(glfwGetWindowUserPointer(w)); }
@@ -217,7 +216,7 @@ struct Window::Impl {
   }
 
   bool gui_takes_pointer() const {
-    if (!gui || pointer_caught) return false;
+    if (pointer_caught) return false;
     double x = 0, y = 0;
     glfwGetCursorPos(window, &x, &y);
     return gui->takes_pointer(x, y);
@@ -227,10 +226,10 @@ struct Window::Impl {
   // letter that opens the dialog is not the first of its path.
   void on_key(int key, int scancode, int action, int mods) {
     if (!interaction) return;
-    const bool dialog = interaction->shows_dialog(), field = gui && gui->takes_text();
+    const bool dialog = interaction->shows_dialog(), field = gui->takes_text();
     if (action == GLFW_PRESS) writes = dialog || field;  // a key that is held goes on as it began
-    if (gui && action == GLFW_PRESS && key == GLFW_KEY_ESCAPE && gui->close_popup()) return;
-    if (gui) gui->on_key(key, scancode, action, mods);
+    if (action == GLFW_PRESS && key == GLFW_KEY_ESCAPE && gui->close_popup()) return;
+    gui->on_key(key, scancode, action, mods);
     if (action == GLFW_REPEAT) return;
     const bool down = action == GLFW_PRESS;
     if (down && (mods & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER))) {
@@ -242,7 +241,7 @@ struct Window::Impl {
     if (down && !writes && (mods & GLFW_MOD_SHIFT) && interaction->shifted(letter_of(key, scancode))) return;
     if (down && field && !(dialog && key == GLFW_KEY_ESCAPE)) return;
     if (const auto known = key_of(key)) interaction->key(*known, down);
-    if (gui) gui->expect_text(interaction->shows_dialog());
+    gui->expect_text(interaction->shows_dialog());
   }
 
   void listen() {
@@ -251,17 +250,15 @@ struct Window::Impl {
       of(w).on_key(key, scancode, action, mods);
     });
     glfwSetCharCallback(window, [](GLFWwindow* w, unsigned code) {
-      if (of(w).gui && of(w).writes) of(w).gui->on_character(code);
+      if (of(w).writes) of(w).gui->on_character(code);
     });
-    glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) {
-      if (of(w).gui) of(w).gui->on_enter(entered);
-    });
+    glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) { of(w).gui->on_enter(entered); });
     glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
       of(w).dropped.insert(of(w).dropped.end(), paths, paths + count);
     });
     glfwSetWindowPosCallback(window, [](GLFWwindow* w, int, int) { of(w).moved = true; });
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int mods) {
-      if (of(w).gui) of(w).gui->on_button(button, action, mods);
+      of(w).gui->on_button(button, action, mods);
       if (action == GLFW_PRESS && of(w).gui_takes_pointer()) return;
       static constexpr std::pair<int, MouseButton> kButtons[] = {{GLFW_MOUSE_BUTTON_LEFT, MouseButton::kLeft},
                                                                  {GLFW_MOUSE_BUTTON_MIDDLE, MouseButton::kMiddle},
@@ -270,16 +267,16 @@ struct Window::Impl {
         if (code == button && of(w).interaction) of(w).interaction->button(known, action == GLFW_PRESS);
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
-      if (of(w).gui) of(w).gui->on_move();
+      of(w).gui->on_move();
       if (of(w).interaction) of(w).interaction->move(x * of(w).per_height(), y * of(w).per_height());
     });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double across, double steps) {
-      if (of(w).gui) of(w).gui->on_wheel(across, steps);
+      of(w).gui->on_wheel(across, steps);
       if (of(w).gui_takes_pointer()) return;
       if (of(w).interaction) of(w).interaction->wheel(steps);
     });
     glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
-      if (of(w).gui) of(w).gui->on_focus(focused);
+      of(w).gui->on_focus(focused);
       if (!focused && of(w).interaction) of(w).interaction->focus_lost();
     });
   }
@@ -334,7 +331,6 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
     return Error{fmt::format("no window with {}OpenGL: {}", o.two_eyes ? "quad-buffered " : "", tried)};
   survive_broken_connection();
   glfwSetWindowSizeLimits(impl->window, kSmallestSide, kSmallestSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
-  impl->listen();
   std::unique_ptr<Window> out(new Window(std::move(impl)));
   {
     const Current current(*out);
@@ -348,10 +344,10 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
       if (!there) return Error{"the driver has no quad-buffered OpenGL, which --stereo quad-buffer needs"};
       out->impl_->presenter->draw_two_eyes();
     }
-    if (auto gui = Gui::make(out->impl_->window))
-      out->impl_->gui = std::move(*gui);
-    else
-      log::warn("{}", gui.error().text);
+    auto gui = Gui::make(out->impl_->window);
+    if (!gui) return gui.error();
+    out->impl_->gui = std::move(*gui);
+    out->impl_->listen();
     out->impl_->say_renderer(out->width(), out->height());
   }
   if (glfwGetCurrentContext() == out->impl_->window) glfwMakeContextCurrent(nullptr);
@@ -409,7 +405,7 @@ void Window::poll(Interaction& interaction) {
     impl_->pointer_caught = interaction.wants_pointer();
     glfwSetInputMode(impl_->window, GLFW_CURSOR, impl_->pointer_caught ? GLFW_CURSOR_DISABLED : GLFW_CURSOR_NORMAL);
   }
-  if (impl_->gui) impl_->gui->expect_text(interaction.shows_dialog());
+  impl_->gui->expect_text(interaction.shows_dialog());
   read_size();
 }
 
@@ -468,10 +464,9 @@ double Window::content_scale() const {
 
 std::vector<std::string> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
 
-bool Window::has_gui() const { return impl_->gui != nullptr; }
 int Window::hidden() const { return impl_->hidden; }
 
-bool Window::gui_due(double now_s) const { return impl_->gui && impl_->gui->due(now_s); }
+bool Window::gui_due(double now_s) const { return impl_->gui->due(now_s); }
 
 void Window::present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui) {
   if (lost()) return;
@@ -480,10 +475,9 @@ void Window::present(const image::View& view, const Overlays& overlays, const st
   if (width <= 0 || height <= 0) return;
   const Current current(*this);
   const Gui::Place place{width, height, content_scale()};
-  const int hidden = impl_->gui ? impl_->gui->prepare(place, monotonic_s(), gui) : 0;
-  impl_->hidden = hidden;
+  const int hidden = impl_->hidden = impl_->gui->prepare(place, monotonic_s(), gui);
   impl_->presenter->draw(view, width, height, overlays, hidden);
-  if (impl_->gui) impl_->gui->show(place);
+  impl_->gui->show(place);
   if (impl_->draws_without_gpu) glFinish();  // which the swap would do; the display may go away until it is done
   if (lost()) return;
   glfwSwapBuffers(impl_->window);

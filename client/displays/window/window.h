@@ -70,8 +70,6 @@ class Window {
   /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised. gui:
   /// builds what lies over all (Gui::prepare()); null: nothing.
   void present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui = {});
-  /// Whether what `gui` builds can be shown.
-  bool has_gui() const;
   /// How many columns of pixels at the left of what was presented nothing shines through.
   int hidden() const;
   /// Whether what `gui` builds has changed since it was presented.

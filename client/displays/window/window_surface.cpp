@@ -164,7 +164,7 @@ void WindowSurface::look_from(const Side& side) {
 
 geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look) {
   window_->poll(interaction_);
-  if (interaction_.take_fullscreen_wish()) window_->toggle_fullscreen();
+  if (interaction_.take(Wish::kFullscreen)) window_->toggle_fullscreen();
   fit_views();
   for (const auto& side : {interaction_.take_side_wish(), panel_.take_side()})
     if (side) look_from(*side);
@@ -178,7 +178,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   opening_.take_dropped(*window_);
   run_panel(now_s, look);
   follow_bookmarks(head_);
-  if (interaction_.take_overlay_wish()) hands_.toggle_all();
+  if (interaction_.take(Wish::kOverlays)) hands_.toggle_all();
   if (auto picture = hands_.update(now_s, camera, scene_.box_room)) {
     if (picture->width > 0)
       overlays_.show("hands", {std::move(*picture), Overlay::Corner::kLowerLeft});
@@ -417,7 +417,7 @@ void WindowSurface::save_transfer() {
 }
 
 void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
-  if (!interaction_.take_screenshot_wish()) return;
+  if (!interaction_.take(Wish::kScreenshot)) return;
   image::View copy{view.width, view.height, view.colour, {}};
   legend_.draw_into(copy, options_.display.wall);
   screenshots_.take(copy, alpha);
@@ -474,7 +474,7 @@ void WindowSurface::follow_notes() {
 }
 
 void WindowSurface::follow_bookmarks(const geometry::Pose& pose) {
-  const bool keeps = interaction_.take_bookmark_wish(), next = interaction_.take_next_wish();
+  const bool keeps = interaction_.take(Wish::kBookmark), next = interaction_.take(Wish::kNextBookmark);
   if (keeps && terms_) bookmarks_.keep(shelf(), pose);
   if (next && terms_) bookmarks_.next(shelf());
   if (const auto found = bookmarks_.take_found()) interaction_.go_to(found->pose);

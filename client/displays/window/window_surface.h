@@ -71,7 +71,7 @@ class WindowSurface final : public DisplaySurface {
   double refresh_s() override { return window_->refresh_s(); }
   void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override { legend_.on_legend(legend); }
-  bool wants_picture() const override { return interaction_.wants_screenshot(); }
+  bool wants_picture() const override { return interaction_.wants(Wish::kScreenshot); }
   void take_picture(const image::View& view, image::Alpha alpha) override;
   std::optional<PictureWish> take_picture_wish(geometry::Camera& camera) override;
   void take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) override;

@@ -265,18 +265,18 @@ TEST_F(HandTest, ADoubleClickAsksForTheCentreOnce) {
   wait(0.1);
   i_.move(0.4, 0.4);
   click();
-  EXPECT_FALSE(i_.take_centre_wish());
+  EXPECT_FALSE(i_.take(Wish::kCentre));
   click();
-  EXPECT_TRUE(i_.take_centre_wish());
-  EXPECT_FALSE(i_.take_centre_wish());
+  EXPECT_TRUE(i_.take(Wish::kCentre));
+  EXPECT_FALSE(i_.take(Wish::kCentre));
   click();
-  EXPECT_FALSE(i_.take_centre_wish()) << "the third click begins anew";
+  EXPECT_FALSE(i_.take(Wish::kCentre)) << "the third click begins anew";
   wait(1);
   click();
-  EXPECT_FALSE(i_.take_centre_wish()) << "long ago";
+  EXPECT_FALSE(i_.take(Wish::kCentre)) << "long ago";
   i_.move(0.6, 0.4);
   click();
-  EXPECT_FALSE(i_.take_centre_wish()) << "elsewhere";
+  EXPECT_FALSE(i_.take(Wish::kCentre)) << "elsewhere";
 }
 
 TEST_F(HandTest, ShiftAndALetterNameASideAndItsOppositeAgain) {

@@ -398,8 +398,8 @@ TEST_F(InteractionTest, AHeldKeyCountsOnce) {
   Interaction i(std::nullopt, look_);
   i.key(Key::kP, true);
   i.key(Key::kP, true);
-  EXPECT_TRUE(i.take_screenshot_wish());
-  EXPECT_FALSE(i.take_screenshot_wish());
+  EXPECT_TRUE(i.take(Wish::kScreenshot));
+  EXPECT_FALSE(i.take(Wish::kScreenshot));
 }
 
 TEST_F(InteractionTest, FlightUsesTheKeysAndEscapeEndsItFirst) {
@@ -458,19 +458,20 @@ TEST_F(InteractionTest, NoLetterIsACommandWhileTheDialogIsOpen) {
   expect_same_pose(wait(i), before);
   EXPECT_TRUE(i.shows_dialog());
   EXPECT_FALSE(i.wants_pointer() || i.shows_panel() || i.wants_to_quit() || i.records_path() || i.playing());
-  EXPECT_FALSE(i.take_pick_wish() || i.take_next_wish() || i.take_bookmark_wish() || i.take_overlay_wish());
-  EXPECT_FALSE(i.take_screenshot_wish());
+  EXPECT_FALSE(i.take(Wish::kPick) || i.take(Wish::kNextBookmark) || i.take(Wish::kBookmark) ||
+               i.take(Wish::kOverlays));
+  EXPECT_FALSE(i.take(Wish::kScreenshot));
   EXPECT_TRUE(i.take_notes().empty());
   tap(i, Key::kF11);
-  EXPECT_TRUE(i.take_fullscreen_wish());
+  EXPECT_TRUE(i.take(Wish::kFullscreen));
   // What a button of the panel stands for is done all the same.
   i.press(Key::kP);
-  EXPECT_TRUE(i.take_screenshot_wish());
+  EXPECT_TRUE(i.take(Wish::kScreenshot));
   // Where nothing can be opened the key says so and opens nothing.
   Interaction guest(std::nullopt, look_);
   tap(guest, Key::kO);
   EXPECT_FALSE(guest.shows_dialog());
-  EXPECT_TRUE(guest.take_open_wish());
+  EXPECT_TRUE(guest.take(Wish::kOpen));
 }
 
 TEST_F(InteractionTest, QQuitsWhenItIsPressedTwiceAndControlQAtOnce) {
@@ -521,10 +522,10 @@ TEST_F(InteractionTest, TabShowsThePanelAndF11AsksForAFullScreenOnce) {
   EXPECT_TRUE(i.shows_panel());
   tap(i, Key::kTab);
   EXPECT_FALSE(i.shows_panel());
-  EXPECT_FALSE(i.take_fullscreen_wish());
+  EXPECT_FALSE(i.take(Wish::kFullscreen));
   tap(i, Key::kF11);
-  EXPECT_TRUE(i.take_fullscreen_wish());
-  EXPECT_FALSE(i.take_fullscreen_wish());
+  EXPECT_TRUE(i.take(Wish::kFullscreen));
+  EXPECT_FALSE(i.take(Wish::kFullscreen));
 }
 
 TEST_F(InteractionTest, KeysGoOnFromALookThatWasSet) {

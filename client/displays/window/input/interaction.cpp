@@ -183,13 +183,12 @@ void Interaction::show_help() {
 
 // Whether the key asks others for something.
 bool Interaction::make_wish(Key key) {
-  static constexpr std::pair<Key, bool Interaction::*> kWishes[] = {
-      {Key::kP, &Interaction::screenshot_},   {Key::kF12, &Interaction::screenshot_},
-      {Key::kF11, &Interaction::fullscreen_}, {Key::kB, &Interaction::bookmark_wish_},
-      {Key::kN, &Interaction::next_wish_},    {Key::kI, &Interaction::overlay_wish_},
-      {Key::kX, &Interaction::pick_wish_}};
-  for (const auto& [of, wish] : kWishes)
-    if (of == key) return this->*wish = true;
+  static constexpr std::pair<Key, Wish> kKeyWishes[] = {{Key::kP, Wish::kScreenshot},   {Key::kF12, Wish::kScreenshot},
+                                                        {Key::kF11, Wish::kFullscreen}, {Key::kB, Wish::kBookmark},
+                                                        {Key::kN, Wish::kNextBookmark}, {Key::kI, Wish::kOverlays},
+                                                        {Key::kX, Wish::kPick}};
+  for (const auto& [of, wish] : kKeyWishes)
+    if (of == key) return wishes_[size_t(wish)] = true;
   return false;
 }
 
@@ -213,7 +212,7 @@ void Interaction::press(Key key) {
       shows_panel_ = !shows_panel_;
       return;
     case Key::kO:
-      open_ = !can_open_;
+      wishes_[size_t(Wish::kOpen)] = !can_open_;
       return show_dialog(can_open_ && !shows_dialog_);
     case Key::kEscape:
       return close_what_is_open();
@@ -228,8 +227,9 @@ void Interaction::button(MouseButton button, bool down) {
   (button == MouseButton::kLeft ? left_ : button == MouseButton::kMiddle ? middle_ : right_) = down;
   if (button != MouseButton::kLeft || !down || controls_.flying()) return;
   const Click now{last_s_.value_or(0), pointer_.value_or(glm::dvec2(0))};
-  centre_wish_ = click_ && now.s - click_->s <= kDoubleClick_s && glm::distance(now.at, click_->at) <= kDoubleClick;
-  click_ = centre_wish_ ? std::nullopt : std::optional(now);
+  const bool twice = click_ && now.s - click_->s <= kDoubleClick_s && glm::distance(now.at, click_->at) <= kDoubleClick;
+  wishes_[size_t(Wish::kCentre)] = twice;
+  click_ = twice ? std::nullopt : std::optional(now);
 }
 
 void Interaction::move(double x, double y) {
@@ -319,9 +319,5 @@ void Interaction::record_pose(double now_s, const geometry::Pose& pose) {
   const double t_s = now_s - path_from_s_;
   if (path_.empty() || t_s > path_.back().t_s + kLeastStep_s) path_.push_back({t_s, pose});
 }
-
-Interaction::Path Interaction::take_path() { return std::exchange(finished_path_, {}); }
-bool Interaction::take_screenshot_wish() { return std::exchange(screenshot_, false); }
-std::vector<std::string> Interaction::take_notes() { return std::exchange(notes_, {}); }
 
 }  // namespace telesplat::viewer

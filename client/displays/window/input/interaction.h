@@ -2,6 +2,7 @@
 // it is tested without one.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
@@ -15,6 +16,19 @@
 #include "common/scene/kind.h"
 
 namespace telesplat::viewer {
+
+/// What a person asks others for, by keys and clicks.
+enum class Wish {
+  kScreenshot,
+  kFullscreen,
+  kOpen,      ///< another data set, where there is no dialog for it
+  kOverlays,  ///< shows or hides axes, scale and cursor
+  kPick,
+  kBookmark,      ///< keeps one
+  kNextBookmark,  ///< leads to it
+  kCentre         ///< centre_on() what lies under the pointer
+};
+inline constexpr size_t kWishes = size_t(Wish::kCentre) + 1;
 
 class Interaction {
  public:
@@ -78,31 +92,22 @@ class Interaction {
   void show_dialog(bool shown);
   /// Whether there is such a dialog, and whether there is something to look at beside it.
   void set_dialog(bool can_open, bool can_close) { can_open_ = can_open, can_close_ = can_close; }
-  /// True once after each press of the key for it.
-  bool take_fullscreen_wish() { return std::exchange(fullscreen_, false); }
-  bool take_open_wish() { return std::exchange(open_, false); }
   /// For the lines that tell of keys.
   void set_key_names(KeyNames names) { key_names_ = std::move(names); }
   bool records_path() const { return records_path_; }
   /// Seconds of the path that is being recorded.
   double path_s() const { return path_.empty() ? 0 : path_.back().t_s; }
   /// The camera's path that was recorded last, once; T plays it from now on. Empty: there is none.
-  Path take_path();
+  Path take_path() { return std::exchange(finished_path_, {}); }
   /// A path that is being recorded ends.
   void end_path();
-  bool wants_screenshot() const { return screenshot_; }
+  bool wants(Wish wish) const { return wishes_[size_t(wish)]; }
+  /// True once after each time that the person asked for it.
+  bool take(Wish wish) { return std::exchange(wishes_[size_t(wish)], false); }
   /// Where the pointer is, in window heights; nothing: it was not seen yet, or is caught.
   std::optional<glm::dvec2> pointer() const { return wants_pointer() ? std::nullopt : pointer_; }
-  /// True once after each press of the key that shows or hides axes, scale and cursor, or of the one that picks.
-  bool take_overlay_wish() { return std::exchange(overlay_wish_, false); }
-  bool take_pick_wish() { return std::exchange(pick_wish_, false); }
-  /// Likewise of the keys that keep a bookmark and that lead to the next one.
-  bool take_bookmark_wish() { return std::exchange(bookmark_wish_, false); }
-  bool take_next_wish() { return std::exchange(next_wish_, false); }
   /// The side that somebody wants to see the data from, once after each press of its keys.
   std::optional<Side> take_side_wish() { return std::exchange(side_wish_, std::nullopt); }
-  /// True once after each double click: centre_on() what lies under the pointer.
-  bool take_centre_wish() { return std::exchange(centre_wish_, false); }
   /// The person's camera goes on from there, at once.
   void go_to(const geometry::Pose& pose);
   /// The person's camera goes there. what: for the line of undo.
@@ -110,10 +115,8 @@ class Interaction {
   void centre_on(const glm::dvec3& place_room);
   /// What was done to the picture.
   UndoStack& undo() { return undo_; }
-  /// True once after each press of the screenshot key.
-  bool take_screenshot_wish();
   /// Lines to tell the person, since the last call.
-  std::vector<std::string> take_notes();
+  std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
 
  private:
   bool make_wish(Key key);
@@ -136,9 +139,8 @@ class Interaction {
   Look look_;
   CameraControls controls_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
-  bool overlay_wish_ = false, pick_wish_ = false, bookmark_wish_ = false, next_wish_ = false;
-  bool playing_ = false, quit_ = false, screenshot_ = false, shows_help_ = false;
-  bool shows_panel_ = false, fullscreen_ = false, open_ = false;
+  std::array<bool, kWishes> wishes_{};
+  bool playing_ = false, quit_ = false, shows_help_ = false, shows_panel_ = false;
   bool shows_dialog_ = false, can_open_ = false, can_close_ = true;
   std::optional<double> asked_to_quit_s_;
   KeyNames key_names_ = us_name;
@@ -158,7 +160,6 @@ class Interaction {
   };
   std::optional<Click> click_;            // of the left button; the next may make it a double one
   std::optional<Side> side_wish_, side_;  // side_: the one that was asked for last
-  bool centre_wish_ = false;
   UndoStack undo_;
   std::vector<std::string> notes_;
 };

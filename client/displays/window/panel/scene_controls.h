@@ -52,7 +52,6 @@ class SceneControls {
   void choose_step(double now_s, int step);
   void choose_speed(double now_s, double steps_a_second);
   void play_series(bool plays);
-  bool series_plays() const { return series_plays_; }
 
   // ---- Julia sets ----
   /// As it is, or was set and is not yet.

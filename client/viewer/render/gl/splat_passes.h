@@ -68,8 +68,6 @@ class SplatPasses {
   /// After the frame's last pass.
   void end_frame();
 
-  const PointArenas& arenas() const { return arenas_; }
-
  private:
   struct DrawCommand {
     uint32_t count, instances, first, base_instance;

@@ -70,7 +70,6 @@ inline PlotArea plot_area(const char* name, float height) {
 inline bool button(const char* label) { return seen("button", label, ImGui::Button(label)); }
 inline bool small_button(const char* label) { return seen("button", label, ImGui::SmallButton(label)); }
 inline bool checkbox(const char* label, bool* on) { return seen("box", label, ImGui::Checkbox(label, on)); }
-inline bool radio_button(const char* label, bool on) { return seen("button", label, ImGui::RadioButton(label, on)); }
 
 /// A list that drops down, its name hidden. True: it is open, its choices come next, and ImGui::EndCombo after them.
 inline bool begin_list(const char* name, const char* shown) {
