@@ -64,18 +64,15 @@ void SceneControls::wish(double now_s, const std::string& name, double value) {
 
 void SceneControls::choose_step(double now_s, int step) {
   if (!volume_) return;
-  series_plays_ = false;
   wish(now_s, "volume.step", within(step, 0, volume_->steps - 1));
 }
 
 void SceneControls::choose_speed(double now_s, double steps_a_second) {
   if (!volume_) return;
-  series_plays_ = steps_a_second > 0;
   wish(now_s, "volume.steps-per-s", within(steps_a_second, 0.0, 1000.0));
 }
 
 void SceneControls::play_series(bool plays) {
-  series_plays_ = plays;
   give_({"animate", {{"timeline", plays ? "on" : "off"}}, "animate"});
 }
 

@@ -78,7 +78,6 @@ class SceneControls {
   std::optional<scene::Kind> kind_;
   TransferEditor transfer_;
   std::optional<volume::Session> volume_;
-  bool series_plays_ = false;
   std::map<std::string, double> told_;
   struct Wish {
     double value = 0, since_s = 0;
