@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <string_view>
 
-#include "client/displays/window/window_surface.h"
+#include "client/displays/window/open_window.h"
 #include "client/displays/xr/xr_surface.h"
 #include "common/net/service_main.h"
 

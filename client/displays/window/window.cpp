@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "client/displays/window/frame_presenter.h"
+#include "client/displays/window/open_window.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/within.h"

@@ -14,9 +14,6 @@
 
 namespace telesplat::viewer {
 
-/// Whether windows can be opened here; else why not, naming DISPLAY and WAYLAND_DISPLAY. Opens none.
-Status check_display();
-
 class Window {
  public:
   struct Options {

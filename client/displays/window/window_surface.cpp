@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "client/displays/window/new_file.h"
+#include "client/displays/window/open_window.h"
 #include "common/core/clock.h"
 #include "common/core/within.h"
 #include "common/geometry/fit.h"

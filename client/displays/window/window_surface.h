@@ -27,7 +27,6 @@
 #include "client/viewer/display/display_surface.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/input/pose_feed.h"
-#include "client/viewer/viewer_service.h"
 
 namespace telesplat::viewer {
 
@@ -173,8 +172,5 @@ class WindowSurface final : public DisplaySurface {
 /// A camera whose field of view `fov_deg` spans the longer side of the image: a window that is made narrow does not
 /// become a tunnel.
 geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int width, int height, double near_m);
-
-/// Displays::window.
-Result<std::unique_ptr<DisplaySurface>> open_window(ViewerOptions& options, const DisplayHelp& help);
 
 }  // namespace telesplat::viewer

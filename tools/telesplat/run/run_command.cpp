@@ -11,6 +11,7 @@
 #include <set>
 #include <thread>
 
+#include "client/viewer/input/keys.h"
 #include "client/viewer/recent_files.h"
 #include "client/viewer/viewer_service.h"
 #include "common/core/clock.h"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/displays/window/input/camera_controls.h"
-#include "client/displays/window/input/keys.h"
 #include "client/displays/window/input/undo.h"
+#include "client/viewer/input/keys.h"
 #include "client/viewer/input/look.h"
 #include "common/scene/kind.h"
 

@@ -120,7 +120,7 @@ class PanelTest : public testing::Test {
 
 TEST_F(PanelTest, RatesAreMeansOfHalfASecond) {
   FrameFigures f{
-      .now_s = 100, .frames = 10, .updates = 1, .inter_frame_ms = 16, .latency_ms = 80, .points_drawn = 500'000};
+      .now_s = 100, .frames = 10, .updates = 1, .latency_ms = 80, .points_drawn = 500'000, .inter_frame_ms = 16};
   panel_.on_figures(f);
   EXPECT_EQ(panel_.frames_a_second(), 0);
   for (int i = 1; i <= 60; ++i) {

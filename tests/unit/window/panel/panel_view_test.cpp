@@ -71,14 +71,14 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
   void frame() {
     now_s_ += 1 / 60.0;
     panel_.on_figures({.now_s = now_s_,
+                       .scene = "a scene",
                        .frames = uint64_t(now_s_ * 60),
                        .updates = uint64_t(now_s_ * 5),
-                       .inter_frame_ms = 16 + std::sin(now_s_),
                        .latency_ms = 90,
                        .points_drawn = 100'000,
-                       .hole_share = 0.01,
+                       .inter_frame_ms = 16 + std::sin(now_s_),
                        .coupling = coupling_,
-                       .scene = "a scene"});
+                       .hole_share = 0.01});
     ImGui::NewFrame();
     show_panel(panel_, view_, now_s_, {[&](Panel&) {
                  show_scene(controls_, scene_view_, now_s_, [this] { ++saved_; });

@@ -1,4 +1,4 @@
-#include "client/displays/window/input/keys.h"
+#include "client/viewer/input/keys.h"
 
 #include <algorithm>
 #include <string_view>
