@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "client/viewer/display/eyes/eye_pair.h"
+
 namespace telesplat::viewer {
 namespace {
 
