@@ -27,9 +27,11 @@ pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(hwy REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
 pkg_check_modules(egl REQUIRED IMPORTED_TARGET egl)
-find_package(glfw3 3.3 REQUIRED)
-pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
-pkg_check_modules(openxr REQUIRED IMPORTED_TARGET openxr)
+if(TELESPLAT_DISPLAYS)
+  find_package(glfw3 3.3 REQUIRED)
+  pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
+  pkg_check_modules(openxr REQUIRED IMPORTED_TARGET openxr)
+endif()
 find_package(Boost 1.74 REQUIRED)  # headers alone: asio and beast
 # Charts of the page that telesplat report makes: put into the program when it is built.
 find_path(TELESPLAT_DYGRAPHS dygraph.min.js PATHS /usr/share/javascript/dygraphs REQUIRED NO_DEFAULT_PATH

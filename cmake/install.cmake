@@ -3,6 +3,9 @@ include(GNUInstallDirs)
 
 install(TARGETS telesplat telesplat-data telesplat-health telesplat-import telesplat-master telesplat-packer
   telesplat-sampler telesplat-viewer telesplat-wan-relay)
+if(TELESPLAT_DISPLAYS)
+  install(TARGETS telesplat-display)
+endif()
 
 set(manuals ${CMAKE_BINARY_DIR}/manuals)
 install(CODE "

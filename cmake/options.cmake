@@ -9,6 +9,7 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 
 option(TELESPLAT_TESTS "Build the tests and benchmarks" ON)
+option(TELESPLAT_DISPLAYS "Windows and headsets: telesplat-display" ON)
 option(TELESPLAT_PCH "Compile common headers once" ON)
 option(TELESPLAT_FUZZ "Build the libFuzzer targets (needs clang)" OFF)
 set(TELESPLAT_COMMIT "" CACHE STRING "HASH,DATE of the sources, where neither git nor an archive of git's tells them")

@@ -1,13 +1,5 @@
-// telesplat-viewer: shows a session's points from wherever the head is, and records what it showed.
+// telesplat-viewer: shows a session's points from wherever the head is, and records what it showed. It becomes
+// telesplat-display where a window or a headset is to show it.
 #include "client/viewer/viewer_service.h"
-#include "common/net/service_main.h"
 
-int main(int argc, char** argv) {
-  using namespace telesplat;
-  viewer::ViewerOptions options;
-  options.service.name = net::unique_name("viewer");
-  return net::service_main(
-      argc, argv,
-      "telesplat-viewer: caches points, splats them at display rate, headless or in a window, records frames", options,
-      viewer::table, viewer::run);
-}
+int main(int argc, char** argv) { return telesplat::viewer::viewer_main(argc, argv, {}); }

@@ -9,9 +9,9 @@
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
+#include "client/viewer/display/xr_options.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/stereo_flags.h"
-#include "client/viewer/xr/xr_options.h"
 #include "common/net/service.h"
 #include "common/options/table.h"
 

@@ -3,20 +3,21 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 
 #include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
-#include "client/viewer/display/window_surface.h"
 #include "client/viewer/session_record.h"
-#include "client/viewer/xr/xr_display.h"
 #include "common/core/clock.h"
 #include "common/core/file_hash.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
 #include "common/metrics/about.h"
 #include "common/net/control.h"
+#include "common/net/service_main.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -47,13 +48,6 @@ void tell(const std::string& text) {
   std::fflush(stdout);
 }
 
-// The launcher reads it.
-void ask_to_open(const std::string& path) {
-  if (path.find('\n') != path.npos) return;
-  std::printf("open %s\n", path.c_str());
-  std::fflush(stdout);
-}
-
 // Null: nobody publishes poses.
 Result<std::shared_ptr<PoseFeed>> open_poses(const ViewerOptions& o) {
   if (o.poses.empty()) return std::shared_ptr<PoseFeed>();
@@ -62,68 +56,14 @@ Result<std::shared_ptr<PoseFeed>> open_poses(const ViewerOptions& o) {
   return std::shared_ptr<PoseFeed>(std::move(*opened));
 }
 
-// A window may be given another size than it asked for: the options follow.
-Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net::Access& asking,
-                                                     const std::shared_ptr<PoseFeed>& poses) {
-  if (!o.window) {
-    if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
-    auto made = std::make_unique<HeadlessSurface>(o.display, o.movement, tell);
-    if (poses) made->follow(poses);
-    return std::unique_ptr<DisplaySurface>(std::move(made));
-  }
-  const std::string folder = o.out.empty() ? "." : o.out;
-  const auto& r = o.requests;
-  const WindowSurface::Options options{
-      .display = o.display,
-      .movement = o.movement,
-      .poses = poses,
-      .fullscreen = o.fullscreen,
-      .screenshot_directory = o.out.empty() ? "." : o.out + "/images",
-      .path_directory = folder,
-      .panel = o.panel,
-      .viewer = o.service.name,
-      .sampling = {r.adaptive, r.sampling_width, r.sampling_height, o.least_sampling.value_or(r.min_scale)},
-      .sampling_chosen = o.least_sampling.has_value(),
-      .open = o.launched ? std::function<void(const std::string&)>(ask_to_open) : nullptr,
-      .recorded = !o.out.empty(),
-      .begins_empty = o.begins_empty,
-      .launcher_fd = o.launched ? STDIN_FILENO : -1};
-  auto opened = WindowSurface::open(options, tell, std::make_unique<ControlDesk>(o.service.master, asking));
-  if (!opened) return opened.error();
-  o.display.width = (*opened)->width();
-  o.display.height = (*opened)->height();
-  if (const auto& panel = o.display.stereo.panel;
-      panel && (panel->width != o.display.width || panel->height != o.display.height))
-    tell(
-        fmt::format("the window has {}x{} pixels and the autostereo display of --barrier {}x{}: it must fill that "
-                    "display pixel by pixel (--fullscreen)",
-                    o.display.width, o.display.height, panel->width, panel->height));
-  return std::unique_ptr<DisplaySurface>(std::move(*opened));
-}
-
-// Where frames go, and who moves the head.
-struct Display {
-  std::unique_ptr<DisplaySurface> surface;  // null: a headset's
-  std::unique_ptr<XrDevice> headset;
-  std::shared_ptr<PoseFeed> poses;  // null: nobody publishes any
-};
-
-// A headset wants pictures of another size than the options tell: they follow.
-Result<Display> open_display(ViewerOptions& o, const net::Access& asking, const std::shared_ptr<PoseFeed>& poses) {
-  Display out{nullptr, nullptr, poses};
-  if (o.xr) {
-    auto headset = XrDevice::open();
-    if (!headset) return Error{"--xr: " + headset.error().text};
-    out.headset = std::move(*headset);
-    const auto& eye = out.headset->system().eye_size();
-    o.display.width = eye.width;
-    o.display.height = eye.height;
-    return out;
-  }
-  auto surface = open_surface(o, asking, poses);
-  if (!surface) return surface.error();
-  out.surface = std::move(*surface);
-  return out;
+Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const Displays& displays,
+                                                     const DisplayHelp& help) {
+  if (o.xr) return displays.headset(o, help);
+  if (o.window) return displays.window(o, help);
+  if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
+  auto made = std::make_unique<HeadlessSurface>(o.display, o.movement, tell);
+  if (help.poses) made->follow(help.poses);
+  return std::unique_ptr<DisplaySurface>(std::move(made));
 }
 
 Result<Renderers> open_renderers(ViewerOptions& o) {
@@ -217,8 +157,8 @@ struct Served {
 };
 
 // Shows the session until it, the person or the clock ends it.
-Served serve(const ViewerOptions& o, const net::Access& access, const Display& display, Renderers& renderers,
-             SessionRecord& record) {
+Served serve(const ViewerOptions& o, const net::Access& access, const std::shared_ptr<PoseFeed>& poses,
+             DisplaySurface& surface, Renderers& renderers, SessionRecord& record) {
   net::Context context(access);
   CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
@@ -231,26 +171,18 @@ Served serve(const ViewerOptions& o, const net::Access& access, const Display& d
                                       .facts = facts(o, renderers),
                                       .received = {.epoch_patience_s = o.epoch_patience_s, .in_step = in_step(o)},
                                       .record = &record,
-                                      .poses = display.poses,
+                                      .poses = poses,
                                       .started_s = o.started_s};
   ViewerWorker worker(context, options, gate, frames, spans);
-  const SourceMaker make_source = [&](Received& r) { return r.make_source(o.display, renderers); };
-  // Eyes never stand still, and each has half of the time.
-  DisplayOptions eye = o.display;
-  eye.still_samples = 1;
-  const XrSourceMaker make_source_for_eyes = [&](Received& r, double pictures_s) {
-    eye.target_fps = pictures_s;
-    return r.make_source(eye, renderers);
+  DisplayOptions paced = o.display;
+  const SourceMaker make_source = [&](Received& r, double pictures_a_second) {
+    if (pictures_a_second > 0) paced.target_fps = pictures_a_second;
+    return r.make_source(paced, renderers);
   };
   Served served;
   const auto wall = wall_pace(o, context, worker);
   const std::function<FrameSpool*()> spool = [&] { return record.spool(); };
-  if (display.headset)
-    served.display = run_xr_display(o.display, o.xr_options, *display.headset, make_source_for_eyes, worker, frames,
-                                    spans, spool, tell);
-  else
-    served.display =
-        run_display(o.display, *display.surface, make_source, gate, worker, frames, spans, spool, wall.get());
+  served.display = run_display(o.display, surface, make_source, gate, worker, frames, spans, spool, wall.get());
   served.session_ended = worker.shutdown_requested();
   served.why = worker.shutdown_reason();
   served.link_code = worker.link_code();
@@ -298,7 +230,7 @@ int farewell(const ViewerOptions& o, const net::Access& asking, const Served& se
 
 }  // namespace
 
-int run(ViewerOptions o) {
+int run(ViewerOptions o, const Displays& displays) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();
@@ -310,18 +242,19 @@ int run(ViewerOptions o) {
   if (!asking) return refuse(asking.error());
   const auto poses = open_poses(o);
   if (!poses) return refuse(poses.error());
-  auto display = open_display(o, *asking, *poses);  // before the renderers, whose contexts may depend on the window's
-  if (!display) return refuse(display.error());
+  // Before the renderers, whose contexts may depend on the window's.
+  auto surface = open_surface(o, displays, {*asking, *poses, tell});
+  if (!surface) return refuse(surface.error());
   auto renderers = open_renderers(o);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
   if (!record) return refuse(record.error());
 
-  const Served served = serve(o, *access, *display, *renderers, **record);
+  const Served served = serve(o, *access, *poses, **surface, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
   if (o.window && served.session_ended && !served.why.empty()) tell(served.why);
-  const std::string lost = display->surface ? display->surface->failure() : "";
-  display->surface.reset();  // the window goes at once, however much there is to write
+  const std::string lost = (*surface)->failure();
+  surface->reset();  // the window goes at once, however much there is to write
   FrameSpool* const spool = (*record)->spool();
   const Status developed = spool ? develop((*record)->directory(), *spool) : ok_status();
   const int code = farewell(o, *asking, served);
@@ -330,6 +263,36 @@ int run(ViewerOptions o) {
   const std::string failed = developed ? (*record)->failure() : developed.error().text;
   if (code == 0 && !failed.empty()) return not_recorded((*record)->directory(), failed);
   return code;
+}
+
+Result<std::string> display_program() {
+  std::error_code error;
+  const auto here = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  const std::string path = here / kDisplayProgram;
+  if (access(path.c_str(), X_OK) == 0) return path;
+  return Error{fmt::format(
+      "windows and headsets need {0}, which is not in {1}: cmake --build build/release --target {0} builds it",
+      kDisplayProgram, here.string())};
+}
+
+int become_display_program(char** argv) {
+  const auto path = display_program();
+  if (path) execv(path->c_str(), argv);
+  const std::string why = path ? *path + ": " + std::strerror(errno) : path.error().text;
+  std::fprintf(stderr, "telesplat: %s\n", why.c_str());
+  return 2;
+}
+
+int viewer_main(int argc, char** argv, const Displays& displays) {
+  ViewerOptions options;
+  options.service.name = net::unique_name("viewer");
+  return net::service_main(
+      argc, argv,
+      "telesplat-viewer: caches points, splats them at display rate, headless or in a window, records frames", options,
+      table, [&](ViewerOptions o) {
+        const OpenDisplay& wanted = o.xr ? displays.headset : displays.window;
+        return has_person(o) && !wanted ? become_display_program(argv) : run(std::move(o), displays);
+      });
 }
 
 }  // namespace telesplat::viewer

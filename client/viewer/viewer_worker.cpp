@@ -100,9 +100,15 @@ void ViewerWorker::on_measured(const MeasuredFrame& f) {
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
 }
 
-ViewerWorker::Figures ViewerWorker::figures() const {
+FrameFigures ViewerWorker::figures() const {
   const std::lock_guard lock(mutex_);
-  return {scene_, updates_, bytes_received_, latency_ms_, epochs_shown_, sampled_width_, sampled_height_};
+  return {.scene = scene_,
+          .updates = updates_,
+          .latency_ms = latency_ms_,
+          .bytes_received = bytes_received_,
+          .epochs_shown = epochs_shown_,
+          .sampled_width = sampled_width_,
+          .sampled_height = sampled_height_};
 }
 
 std::shared_ptr<const wire::Welcome> ViewerWorker::session() const {

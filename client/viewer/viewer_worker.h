@@ -79,15 +79,8 @@ class ViewerWorker {
   InstanceId instance() const { return instance_; }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
-  /// For people who watch.
-  struct Figures {
-    std::string scene;  ///< name of the data set; empty until the master told it
-    uint64_t updates = 0, bytes_received = 0;
-    double latency_ms = 0;                      ///< of the newest update; 0 before the first
-    uint64_t epochs_shown = 0;                  ///< times a new epoch took the place of one on display
-    int sampled_width = 0, sampled_height = 0;  ///< of the newest view request; 0: there was none
-  };
-  Figures figures() const;
+  /// For people who watch: what the network has of them.
+  FrameFigures figures() const;
   /// The session as its master told it last; null before that.
   std::shared_ptr<const wire::Welcome> session() const;
   /// Views are sampled like this from now on.

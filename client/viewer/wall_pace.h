@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "client/viewer/tracking/pose_predictor.h"
 #include "common/net/socket.h"
-#include "common/tracking/pose_predictor.h"
 #include "common/wire/wall_messages.h"
 
 namespace telesplat::viewer {

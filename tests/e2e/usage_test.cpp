@@ -158,5 +158,20 @@ TEST(UsageOfSceneFiles, NamesFileAndLine) {
   EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
+// A viewer without windows and headsets names the program that has them, and what builds it.
+TEST(UsageOfDisplays, TheirProgramIsNamedWhereItIsMissing) {
+  TemporaryFolder folder;
+  const std::string copy = folder / "telesplat-viewer";
+  fs::copy_file(std::string(TELESPLAT_BIN) + "/telesplat-viewer", copy);
+  for (const std::string flag : {"--window", "--xr"}) {
+    Program program(copy, {flag, "--master", "tcp://127.0.0.1:7"}, folder / "program");
+    EXPECT_EQ(program.wait(30), 2);
+    const std::string line = "telesplat: windows and headsets need telesplat-display, which is not in " +
+                             fs::canonical(copy).parent_path().string() +
+                             ": cmake --build build/release --target telesplat-display builds it\n";
+    EXPECT_EQ(program.err(), line);
+  }
+}
+
 }  // namespace
 }  // namespace telesplat::test

@@ -1,5 +1,4 @@
-// What only the GL renderer has: contexts of others, frames left on the GPU, and ways to move data that must make no
-// difference.
+// What only the GL renderer has: limits of the GPU, and ways to move data that must make no difference.
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
@@ -113,83 +112,6 @@ TEST_F(GlRendererTest, PointsOfAnotherReplicaAreNotTakenForThoseKept) {
   EXPECT_TRUE(green == draw(*fresh));
 }
 
-// State that a window or a user interface may leave behind.
-void disturb_state() {
-  for (const GLenum on : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE, GL_FRAMEBUFFER_SRGB})
-    glEnable(on);
-  glBlendFunc(GL_ZERO, GL_SRC_COLOR);
-  glBlendEquation(GL_FUNC_REVERSE_SUBTRACT);
-  glDepthFunc(GL_NEVER);
-  glDepthMask(GL_FALSE);
-  glDepthRange(0.25, 0.5);
-  glColorMask(GL_FALSE, GL_TRUE, GL_FALSE, GL_FALSE);
-  glScissor(3, 3, 5, 5);
-  glCullFace(GL_FRONT_AND_BACK);
-  glStencilFunc(GL_NEVER, 0, 0);
-  glPointParameteri(GL_POINT_SPRITE_COORD_ORIGIN, GL_LOWER_LEFT);
-  glPixelStorei(GL_PACK_ROW_LENGTH, 7);
-  glPixelStorei(GL_PACK_SKIP_ROWS, 2);
-  glPixelStorei(GL_PACK_ALIGNMENT, 8);
-  glActiveTexture(GL_TEXTURE5);
-}
-
-TEST_F(GlRendererTest, SharesAContextWithOthers) {
-  const Scene scene;
-  for (const splat::Kernel kernel : splat::kKernels) {
-    const splat::RenderOptions options{kernel, {}};
-    testing::Frame alone(0, 0);
-    {
-      const auto own = made(GlRenderer::make());
-      ASSERT_TRUE(own);
-      alone = render(*own, scene, options);
-    }
-    const gl::EglContext::Current current(*context_);
-    ASSERT_TRUE(current.ok());
-    const auto guest = made(GlRenderer::make_in_current_context());
-    ASSERT_TRUE(guest);
-    for (int i = 0; i < 2; ++i) {
-      disturb_state();
-      EXPECT_TRUE(render(*guest, scene, options) == alone) << splat::kernel_name(kernel) << " " << i;
-      GLint bound = -1;
-      for (const GLenum what : {GL_CURRENT_PROGRAM, GL_VERTEX_ARRAY_BINDING, GL_DRAW_FRAMEBUFFER_BINDING,
-                                GL_READ_FRAMEBUFFER_BINDING, GL_PIXEL_PACK_BUFFER_BINDING}) {
-        glGetIntegerv(what, &bound);
-        EXPECT_EQ(bound, 0) << what;
-      }
-      EXPECT_FALSE(glIsEnabled(GL_BLEND) || glIsEnabled(GL_DEPTH_TEST) || glIsEnabled(GL_SCISSOR_TEST));
-      EXPECT_EQ(glGetError(), GLenum{GL_NO_ERROR});
-    }
-  }
-}
-
-TEST_F(GlRendererTest, LeavesTheFrameInATexture) {
-  const gl::EglContext::Current current(*context_);
-  ASSERT_TRUE(current.ok());
-  const auto renderer = made(GlRenderer::make_in_current_context());
-  ASSERT_TRUE(renderer);
-  EXPECT_EQ(renderer->last_frame().width, 0);
-  const Scene scene;
-  const splat::RenderOptions options{splat::Kernel::kEllipse, {}};
-  const testing::Frame expected = render(*renderer, scene, options);
-  ASSERT_TRUE(renderer->render_on_gpu(Scene(1).list, scene.camera, options, scene.shading));
-  for (const bool with_depth : {false, true}) {
-    ASSERT_TRUE(renderer->render_on_gpu(scene.list, scene.camera, options, scene.shading, with_depth));
-    const viewer::GlFrame& frame = renderer->last_frame();
-    ASSERT_EQ(frame.width, scene.camera.width);
-    ASSERT_EQ(frame.height, scene.camera.height);
-    testing::Frame read(frame.width, frame.height);
-    glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    glBindTexture(GL_TEXTURE_2D, frame.colour_texture);
-    glGetTexImage(GL_TEXTURE_2D, 0, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, read.colour.data());
-    EXPECT_EQ(read.colour, expected.colour);
-    EXPECT_EQ(frame.depth_texture != 0, with_depth);
-    if (!with_depth) continue;
-    glBindTexture(GL_TEXTURE_2D, frame.depth_texture);
-    glGetTexImage(GL_TEXTURE_2D, 0, GL_RED, GL_FLOAT, read.depth_m.data());
-    EXPECT_EQ(read.depth_m, expected.depth_m);
-  }
-}
-
 TEST_F(GlRendererTest, StagesThatAreOffTakeNoTime) {
   const auto renderer = made(GlRenderer::make());
   ASSERT_TRUE(renderer);
@@ -209,17 +131,15 @@ TEST_F(GlRendererTest, StagesThatAreOffTakeNoTime) {
 }
 
 TEST_F(GlRendererTest, RefusesWhatTheGpuCannotHold) {
-  const gl::EglContext::Current current(*context_);
-  const auto renderer = made(GlRenderer::make_in_current_context());
+  const auto renderer = made(GlRenderer::make());
   ASSERT_TRUE(renderer);
   GLint limit = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
+  {
+    const gl::EglContext::Current current(*context_);
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &limit);
+  }
   Scene scene;
   scene.camera = testing::front_camera(limit, 2);
-  const auto refused = renderer->render_on_gpu(scene.list, scene.camera, {}, scene.shading);
-  ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().text.find(std::to_string(limit)), std::string::npos) << refused.error().text;
-  EXPECT_EQ(renderer->last_frame().width, 0);
   const testing::Frame shown = render(*renderer, scene, {});
   EXPECT_EQ(shown.colour, std::vector<uint32_t>(shown.colour.size(), 0xff000000u | scene.shading.background()));
   EXPECT_TRUE(std::isinf(shown.depth_m.front()) && std::isinf(shown.depth_m.back()));

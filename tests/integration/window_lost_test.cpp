@@ -1,7 +1,7 @@
 // A window in this process, whose window system ends at a moment of the test's choice.
 #include <gtest/gtest.h>
 
-#include "client/viewer/display/window.h"
+#include "client/displays/window/window.h"
 #include "tests/support/virtual_display.h"
 
 namespace telesplat::viewer {

@@ -11,12 +11,16 @@ def _is_in(path, place):
     return path == place or path.startswith(place + "/")
 
 
+def _ring_of(path):
+    return next((ring for ring in tables.RINGS if _is_in(path, ring)), None)
+
+
 def _process_of(path):
     return next((p for p in tables.PROCESSES if _is_in(path, p)), None)
 
 
 def directions(tree):
-    """Includes run down (tests, tools > services, client > common) and never from one process into another."""
+    """Includes run down (tests, tools > services, client > common), never into another process nor an outer ring."""
     for file in tree.sources():
         part = file.path.split("/")[0]
         if part not in tables.PARTS:
@@ -29,7 +33,13 @@ def directions(tree):
             other = target.split("/")[0]
             if other in tables.PARTS and other not in tables.PARTS[part]:
                 wrong = f"{part}/ must not include {other}/"
-            elif part in ("services", "client") and _process_of(target) not in (None, _process_of(file.path)):
+            elif part != "tests" and _ring_of(target) not in (None, _ring_of(file.path)):
+                wrong = f"only {_ring_of(target)} and tests include it"
+            elif (
+                part in ("services", "client")
+                and not _ring_of(file.path)
+                and _process_of(target) not in (None, _process_of(file.path))
+            ):
                 wrong = f"{_process_of(file.path) or part} must not include {_process_of(target)}"
             elif other == "tests" and not _is_in(target, tables.SHARED_TESTS) and not _is_in(target, file.folder):
                 wrong = f"tests share only {tables.SHARED_TESTS}"
@@ -132,17 +142,6 @@ def floors(tree):
                 )
 
 
-def rings(tree):
-    """A ring of tables.RINGS is included by itself and by those that its row names."""
-    for file in tree.sources():
-        for include in file.includes:
-            for ring, others in tables.RINGS.items():
-                if not include.own or not _is_in(include.target, ring):
-                    continue
-                if not any(_is_in(file.path, place) for place in (ring, *others)):
-                    yield Finding(file.path, include.line, "rings", f"includes {include.target}, which is of {ring}")
-
-
 def outside_headers(tree):
     """The headers of an outside library are included in its own place only."""
     rows = [(re.compile(pattern), places) for pattern, places in tables.OUTSIDE_HEADERS]
@@ -159,4 +158,4 @@ def outside_headers(tree):
                     )
 
 
-RULES = (directions, circles, floors, rings, outside_headers)
+RULES = (directions, circles, floors, outside_headers)

@@ -16,12 +16,10 @@ PARTS = {
     "tools": ("common", "services", "client", "tools"),
     "tests": ("common", "services", "client", "tools", "tests"),
 }
-# Rings, from the inside out: the product, then these. Folder of a ring -> the parts that may include it beside itself.
-RINGS = {
-    "tools/lab": ("tests",),
-}
 # Processes: nothing in one includes another.
 PROCESSES = ("services/data", "services/master", "services/packer", "services/sampler", "client/viewer")
+# Rings: nothing outside one includes it, tests aside. What is inside does not know what is around it.
+RINGS = ("client/displays", "tools/lab")
 # What one folder of tests may use of the others.
 SHARED_TESTS = "tests/support"
 
@@ -30,7 +28,7 @@ FLOORS = {
         ["common/core", "common/parallel"],
         ["common/geometry", "common/colour", "common/links"],
         ["common/notes"],
-        ["common/image", "common/gl", "common/wall", "common/tracking"],
+        ["common/image", "common/gl", "common/wall"],
         ["common/codec", "common/points", "common/stereo"],
         [("common/volume", "common/volume/transfer"), "common/splat", "common/refinement"],
         ["common/volume/slices"],
@@ -84,18 +82,25 @@ FLOORS = {
         ["services/packer"],
     ],
     "client/viewer": [
+        ["client/viewer/tracking"],
         ["client/viewer/render", "client/viewer/coupling", "client/viewer/input", "client/viewer/hands"],
-        ["client/viewer/record", "client/viewer/panel"],
-        ["client/viewer/panel/gui"],
-        ["client/viewer/display", "client/viewer/xr"],
+        ["client/viewer/record"],
+        ["client/viewer/display"],
         [("client/viewer/received.h", "client/viewer/feeds.*")],
         [("client/viewer/points", "client/viewer/record/event_record.*"),
          ("client/viewer/slices", "client/viewer/record/slice_record.*"), "client/viewer/pictures"],
-        [("client/viewer", "client/viewer/display/display_loop.*", "client/viewer/xr/xr_display.*")],
+        [("client/viewer", "client/viewer/display/display_loop.*")],
+    ],
+    "client/displays": [
+        ["client/displays/window/input", "client/displays/window/hands", "client/displays/xr"],
+        ["client/displays/window/panel"],
+        ["client/displays/window/panel/gui"],
+        ["client/displays/window"],
+        ["client/displays/main.cpp"],
     ],
     "tools": [
         ["tools/common"],
-        ["tools/health", "tools/make_terrain", "tools/lab/make_volume", "tools/wan_relay", "tools/xr_test_runtime"],
+        ["tools/health", "tools/make_terrain", "tools/lab/make_volume", "tools/wan_relay"],
         ["tools/telesplat/command.h", "tools/telesplat/run/child_process.*"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
@@ -129,20 +134,20 @@ OUTSIDE_HEADERS = [
             "common/gl",
             "client/viewer/render/gl",
             "client/viewer/render/slices/gl_renderer.cpp",
-            "client/viewer/display/window.cpp",
-            "client/viewer/display/frame_presenter.cpp",
-            "client/viewer/panel/gui/gui.cpp",
-            "client/viewer/xr",
-            "tools/xr_test_runtime",
+            "client/displays/window/window.cpp",
+            "client/displays/window/frame_presenter.cpp",
+            "client/displays/window/panel/gui/gui.cpp",
+            "client/displays/xr",
+            "tests/support/xr",
             "services/sampler/mesh/raster_sampler.cpp",
             "tests/golden",
         ],
     ),
     (r"(epoxy/egl\.h|EGL/.*)",
-     ["common/gl", "client/viewer/display/window.cpp", "client/viewer/xr", "tools/xr_test_runtime"]),
-    (r"openxr/.*", ["client/viewer/xr", "tools/xr_test_runtime"]),
-    (r"GLFW/.*", ["client/viewer/display/window.cpp", "client/viewer/panel/gui/gui.cpp"]),
-    (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui", "tests/unit/viewer/panel"]),
+     ["common/gl", "client/displays/window/window.cpp", "client/displays/xr", "tests/support/xr"]),
+    (r"openxr/.*", ["client/displays/xr", "tests/support/xr"]),
+    (r"GLFW/.*", ["client/displays/window/window.cpp", "client/displays/window/panel/gui/gui.cpp"]),
+    (r"(imgui|backends/imgui_impl_).*", ["client/displays/window/panel/gui", "tests/unit/window/panel"]),
     (r"GL/.*", []),
     (r"CLI/.*", ["common/options/parser.cpp"]),
     (

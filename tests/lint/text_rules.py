@@ -126,7 +126,7 @@ _SEEN = re.compile(r"\bImGui::(?:InvisibleButton|(?:V?Slider|Drag|Input|ColorEdi
 
 def widgets(tree):
     """Widgets of the window are made by functions of panel/gui/widgets.h, or told to its seen()."""
-    for file in tree.files(".cpp", below="client/viewer/panel/gui"):
+    for file in tree.files(".cpp", below="client/displays/window/panel/gui"):
         for match in _LOGGED.finditer(file.code):
             line = file.line_of(match.start())
             yield Finding(file.path, line, "widgets", f"{match[0]}: widgets.h has a function for it")
@@ -137,13 +137,13 @@ def widgets(tree):
 
 
 # What a person or an order can reach in a window.
-_WITHIN_REACH = ("panel", "display", "input", "hands")
+_WITHIN_REACH = ("displays/window", "viewer/display", "viewer/input", "viewer/hands")
 
 
 def clamps(tree):
     """What a person can reach in a window uses within() for bounds: std::clamp ends the program where they cross."""
     for folder in _WITHIN_REACH:
-        for file in tree.files(".cpp", ".h", below=f"client/viewer/{folder}"):
+        for file in tree.files(".cpp", ".h", below=f"client/{folder}"):
             for match in re.finditer(r"\bstd::clamp\(", file.code):
                 line = file.line_of(match.start())
                 yield Finding(file.path, line, "clamps", "std::clamp: common/core/within.h has within()")

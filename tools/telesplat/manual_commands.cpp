@@ -1,6 +1,5 @@
 // `telesplat completion SHELL` and `telesplat man`: what shells and man(1) are told, from the tables of --help.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdio>
@@ -49,23 +48,6 @@ options::Table man_table(ManOptions& o) {
 options::Manual manual_of(const std::string& name, const Command& command) {
   options::Manual out{name, command.help, command.table, command.footer, {}};
   for (const Command& c : command.commands) out.commands.push_back(manual_of(name + " " + c.name, c));
-  return out;
-}
-
-// What a program prints; empty: it is not there, or prints nothing.
-std::string output_of(const std::string& program, const std::string& flag) {
-  const std::string path = program_directory() + "/" + program;
-  if (access(path.c_str(), X_OK) != 0) return {};
-  std::string quoted;
-  for (const char c : path) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(fmt::format("'{}' {}", quoted, flag).c_str(), "r"), pclose);
-  std::string out;
-  std::array<char, 4096> part;
-  while (pipe)
-    if (const size_t n = fread(part.data(), 1, part.size(), pipe.get()); n > 0)
-      out.append(part.data(), n);
-    else
-      break;
   return out;
 }
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "common/tracking/pose_predictor.h"
+#include "client/viewer/tracking/pose_predictor.h"
 
 namespace telesplat::viewer {
 

@@ -10,9 +10,9 @@
 
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/coupling/sampling_wish.h"
+#include "client/viewer/tracking/pose_predictor.h"
+#include "client/viewer/tracking/prediction_meter.h"
 #include "common/geometry/camera.h"
-#include "common/tracking/pose_predictor.h"
-#include "common/tracking/prediction_meter.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::viewer {

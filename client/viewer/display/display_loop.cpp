@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -17,6 +18,7 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kPicturePeriod_s = 2.5, kRestPeriod_s = 1.0 / 30, kLookAfterSurface_s = 0.1;
+constexpr double kUnseen_s = 1;
 
 bool told_to_stop(const ViewerWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
@@ -32,33 +34,35 @@ geometry::Camera drawn_size(const geometry::Camera& camera, const DrawnFrame& dr
   return drawn.halved ? geometry::half_size(camera) : camera;
 }
 
-LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
-                         const ViewerWorker& worker) {
-  const auto network = worker.figures();
-  return {now_s,
-          network.scene,
-          frames,
-          network.updates,
-          network.latency_ms,
-          drawn.drawn,
-          drawn.cached,
-          network.bytes_received,
-          network.epochs_shown,
-          source.drawn_name(),
-          source.cached_name(),
-          0,
-          0,
-          {},
-          drawn.detail,
-          network.sampled_width,
-          network.sampled_height};
+// What the worker knows, and what the frame shows.
+FrameFigures figures_of(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
+                        const ViewerWorker& worker) {
+  FrameFigures out = worker.figures();
+  out.now_s = now_s;
+  out.frames = frames;
+  out.points_drawn = drawn.drawn;
+  out.points_cached = drawn.cached;
+  out.drawn_name = source.drawn_name();
+  out.cached_name = source.cached_name();
+  out.detail = drawn.detail;
+  return out;
 }
 
-class Display {
+// Both eyes of a headset are one frame of the tables.
+void add(const DrawnFrame& other, DrawnFrame& sum) {
+  sum.empty = sum.empty && other.empty;
+  for (const auto figure : {&DrawnFrame::prepare_ms, &DrawnFrame::project_cpu_ms, &DrawnFrame::resolve_cpu_ms,
+                            &DrawnFrame::fill_cpu_ms, &DrawnFrame::smooth_cpu_ms, &DrawnFrame::antialias_cpu_ms})
+    sum.*figure += other.*figure;
+  sum.selected += other.selected, sum.drawn += other.drawn, sum.items += other.items;
+  sum.detail = std::min(sum.detail, other.detail);
+}
+
+class DisplayLoop {
  public:
-  Display(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ViewerWorker& worker,
-          metrics::TableRecorder& frames, metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
-          const SourceMaker& make_source, WallPace* wall)
+  DisplayLoop(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ViewerWorker& worker,
+              metrics::TableRecorder& frames, metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
+              const SourceMaker& make_source, WallPace* wall)
       : o_(o),
         surface_(surface),
         gate_(gate),
@@ -77,10 +81,16 @@ class Display {
     if (!wait_for_scene()) return stopped_early();
     spool_ = find_spool_ ? find_spool_() : nullptr;
     if (!draw_from(newest_drawn()) || !rest()) return stopped_early();
-    worker_.on_first_points(monotonic_s());
-    start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
+    if (!surface_.paces()) {
+      worker_.on_first_points(monotonic_s());
+      start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
+    }
     if (wall_) swap_with_wall();
-    while (!last_) frame();
+    while (!last_)
+      if (ready())
+        frame();
+      else
+        see_whether_over();
     add_row();
     return result_;
   }
@@ -92,13 +102,15 @@ class Display {
   }
 
   // Draws from what frames are to show that show the update of this request; the same as before, unless the session
-  // changed between points and slice images. False: it cannot be drawn, result_ says why.
+  // changed between points and slice images, or a headset its pace. False: it cannot be drawn, result_ says why.
   bool draw_from(RequestId request) {
     auto received = worker_.received_at(request);
-    if (received == received_) return true;
+    const double pictures = surface_.pictures_a_second();
+    if (received == received_ && pictures == pictures_a_second_) return true;
     source_.reset();  // its renderer's context must be gone before another one is made
     received_ = std::move(received);
-    auto made = make_source_(*received_);
+    pictures_a_second_ = pictures;
+    auto made = make_source_(*received_, pictures);
     if (!made) {
       result_.error = made.error().text;
       return false;
@@ -131,31 +143,81 @@ class Display {
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
+  // Whether a frame can be shown now. Nobody waits for a headset that nobody wears.
+  bool ready() {
+    const bool ready = surface_.ready();
+    if (!ready) refuse_orders();
+    if (surface_.take_jump()) worker_.on_jump();
+    return ready;
+  }
+  // Until the next frame of a head that rests; a surface that paces frames waits by itself.
+  void rest_until_next() const {
+    if (!surface_.paces()) sleep_until(monotonic_s() + kRestPeriod_s);
+  }
+  void present(bool changed) {
+    if (surface_.eyes())
+      surface_.present_eyes(eye_views_);
+    else
+      surface_.present(view_, changed);
+  }
+
   // What samplers are to be asked for: what the camera sees, or its eyes.
   geometry::Camera asked(double now_s, double t_s, const geometry::Camera& camera, const geometry::Pose& head) {
     return eyes_.begin(now_s, camera, head.orientation, t_s, scene_.box_room);
   }
 
-  DrawnFrame draw(const FrameInput& input) {
+  DrawnFrame draw(const FrameInput& input, bool kept) {
+    if (const auto* eyes = surface_.eyes()) return draw_eyes(input, *eyes, kept);
     if (eyes_.on()) return eyes_.draw(*source_, input, spool_ != nullptr, view_);
     // A view that may be recorded has room for depth all the time: growing it costs milliseconds.
     fit(view_, input.camera, spool_ != nullptr);
     return source_->draw(input, view_);
   }
 
+  // Each eye's picture is as large as a frame, and has depth.
+  DrawnFrame draw_eyes(FrameInput input, const std::array<geometry::Camera, 2>& eyes, bool kept) {
+    input.with_depth = true;
+    input.intact = false;
+    std::array<splat::FrameTarget, 2> targets;
+    for (size_t eye = 0; eye < 2; ++eye) {
+      image::View& view = eye_views_[eye];
+      fit(view, eyes[eye], true);
+      targets[eye] = {view.width, view.height, view.colour.data(), view.depth_m.data()};
+    }
+    DrawnFrame out;
+    if (alike(eyes)) {
+      input.camera = between(eyes);
+      out = source_->draw_pair(input, eyes, targets);
+    } else {
+      input.camera = eyes[0];
+      out = source_->draw(input, eye_views_[0]);
+      input.camera = eyes[1];
+      add(source_->draw(input, eye_views_[1]), out);
+    }
+    if (kept) view_ = eye_views_[0];  // before the surface draws over it
+    return out;
+  }
+
+  void clear(image::View& view, const geometry::Camera& camera, bool with_depth) {
+    fit(view, camera, with_depth);
+    std::fill(view.colour.begin(), view.colour.end(), look_.background);
+    std::fill(view.depth_m.begin(), view.depth_m.end(), std::numeric_limits<float>::infinity());
+  }
+
   // Until it is known what there is to show.
   bool wait_for_scene() {
-    for (; !worker_.received_at({}) || worker_.shown_scene().box_room.empty();
-         sleep_until(monotonic_s() + kRestPeriod_s)) {
+    for (; !worker_.received_at({}) || worker_.shown_scene().box_room.empty(); rest_until_next()) {
       if (told_to_stop(worker_, surface_)) return false;
+      if (!ready()) continue;
       const geometry::Camera camera = next_camera(monotonic_s(), -1);
       refuse_orders();
       if (!surface_.visible()) continue;
-      fit(view_, camera, false);
-      std::fill(view_.colour.begin(), view_.colour.end(), look_.background);
-      surface_.present(view_, true);
-      const auto network = worker_.figures();
-      surface_.report({.now_s = monotonic_s(), .scene = network.scene});
+      if (const auto* eyes = surface_.eyes())
+        for (size_t eye = 0; eye < 2; ++eye) clear(eye_views_[eye], (*eyes)[eye], true);
+      else
+        clear(view_, camera, false);
+      present(true);
+      surface_.report({.now_s = monotonic_s(), .scene = worker_.figures().scene});
     }
     return true;
   }
@@ -163,24 +225,41 @@ class Display {
   // The head rests until the first view is complete; what comes of it is shown as it comes, unless the display waits
   // for whole updates.
   bool rest() {
-    for (; !worker_.first_update_complete(); sleep_until(monotonic_s() + kRestPeriod_s)) {
+    for (; !worker_.first_update_complete(); rest_until_next()) {
       if (told_to_stop(worker_, surface_)) return false;
+      if (!ready()) continue;
       if (!draw_from(newest_drawn())) return false;
       const double now_s = monotonic_s();
       const geometry::Camera camera = next_camera(now_s, -1);
-      worker_.on_pose(now_s, asked(now_s, -1, camera, surface_.head()));
+      tell_expected(now_s);
+      worker_.on_pose(surface_.seen_s(now_s), asked(now_s, -1, camera, surface_.head()));
       const DrawnFrame drawn =
-          draw({.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()});
+          draw({.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()},
+               false);
       if (drawn.empty && !surface_.visible()) {
         refuse_orders();
         continue;
       }
-      surface_.present(view_, true);
+      present(true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
-      carry_out_orders({camera, surface_.head(), drawn.epoch, eyes_.pair()});
-      surface_.report(live_figures(monotonic_s(), 0, drawn, *source_, worker_));
+      carry_out_orders({picked_with(camera), surface_.head(), drawn.epoch, eyes_.pair()});
+      surface_.report(figures_of(monotonic_s(), 0, drawn, *source_, worker_));
     }
     return true;
+  }
+
+  // Places are the left eye's, where each has a display of its own.
+  geometry::Camera picked_with(const geometry::Camera& camera) const {
+    return surface_.eyes() ? (*surface_.eyes())[0] : camera;
+  }
+  void tell_expected(double now_s) {
+    if (const auto head = surface_.expected(now_s + worker_.horizon_s())) worker_.on_expected(head->at_s, head->pose);
+  }
+
+  // Frames that nobody sees end the display, too, if a little later.
+  void see_whether_over() {
+    if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
+    last_ = last_ || (start_s_ > 0 && o_.duration_s > 0 && monotonic_s() > start_s_ + o_.duration_s + kUnseen_s);
   }
 
   // Whether the frame that begins now is the last one.
@@ -247,12 +326,6 @@ class Display {
     const double waits_s = stall_.told_s(now_s);
     if (waits_s == 0 && live_.waits_s == 0) return;
     worker_.on_waiting(waits_s);
-    if (Overlays* overlays = surface_.overlays(); overlays && (waits_s > 0) != overlays->shows("waiting")) {
-      if (waits_s > 0)
-        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kUpperLeft});
-      else
-        overlays->hide("waiting");
-    }
     live_.now_s = now_s;
     live_.waits_s = waits_s;
     surface_.report(live_);
@@ -304,6 +377,20 @@ class Display {
     return use;
   }
 
+  void draw_measured(uint32_t use, bool coverage, MeasuredFrame& m) {
+    const bool same_size = view_.width == m.camera.width && view_.height == m.camera.height;
+    m.drawn = draw({.begin_s = m.begin_s,
+                    .camera = m.camera,
+                    .look = m.look,
+                    .with_depth = (use & (kVerify | kExr)) != 0,
+                    .with_coverage = coverage,
+                    .intact = view_intact_ && (same_size || eyes_.on())},
+                   use != 0);
+    m.end_s = monotonic_s();
+    if (m.drawn.picture_of) m.posed = {m.drawn.update.posed_s - worker_.to_master_s(0)};
+    if (eyes_.on()) m.stereo = {stereo_.mode, eyes_.pair()};
+  }
+
   void frame() {
     const Waited waited = wait_for_update();
     MeasuredFrame m{.number = result_.frames,
@@ -317,38 +404,32 @@ class Display {
       return;
     }
     m.begin_s = monotonic_s();
+    if (start_s_ == 0) start_s_ = m.start_s = m.begin_s;
     const double t_s = wall_ ? wall_->turn().t_s : m.begin_s - start_s_;
     see_whether_last(t_s);
     // The view of now, from what is cached now.
     begin_view(t_s, m);
+    tell_expected(m.begin_s);
     const geometry::Camera sampled = asked(m.begin_s, t_s, m.camera, m.head);
     if (m.coupling.mode == CouplingMode::kImages) worker_.on_pose(m.posed.taken_s, sampled);
     m.look = look_;
     const uint32_t use = use_of_frame(t_s);
-    const bool with_depth = use & (kVerify | kExr);
-    const bool same_size = view_.width == m.camera.width && view_.height == m.camera.height;
-    const bool intact = view_intact_ && (same_size || eyes_.on());
     const bool wished = surface_.wants_picture();
     const bool coverage = o_.transparent && ((use & kPicture) || wished);
-    m.drawn = draw({.begin_s = m.begin_s,
-                    .camera = m.camera,
-                    .look = m.look,
-                    .with_depth = with_depth,
-                    .with_coverage = coverage,
-                    .intact = intact});
-    m.end_s = monotonic_s();
-    if (m.drawn.picture_of) m.posed = {m.drawn.update.posed_s - worker_.to_master_s(0)};
-    if (eyes_.on()) m.stereo = {stereo_.mode, eyes_.pair()};
-    worker_.on_frame(m.end_s, drawn_size(sampled, m.drawn), m.drawn.epoch, m.drawn.update, waited.for_update);
+    draw_measured(use, coverage, m);
+    worker_.on_frame(surface_.seen_s(m.end_s), drawn_size(sampled, m.drawn), m.drawn.epoch, m.drawn.update,
+                     waited.for_update);
     // A flat legend would lie in one eye's picture, or be torn by the other's.
     const auto legend = eyes_.on() ? nullptr : worker_.legend_at(m.drawn.epoch);
     surface_.on_legend(legend);
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
-    surface_.present(view_, m.drawn.changed);
+    present(m.drawn.changed);
     note_seen(m);
+    if (!m.drawn.empty) worker_.on_first_points(m.seen_s);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     take_wished_picture(m.camera);
     m.presented_s = monotonic_s();
+    surface_.measure(m);
     if (wall_) note_swap(swapped, m);
     m.filled = gate_.filled();
     source_->displayed();
@@ -357,8 +438,8 @@ class Display {
     keep(use, t_s, m, o_.legend ? legend : nullptr);
     ++result_.frames;
     tell_of(m);
-    carry_out_orders(shown_ = {m.camera, m.head, m.drawn.epoch, eyes_.pair()});
-    if (wall_ && !swapped.alone) return;  // the wall has its pace
+    carry_out_orders(shown_ = {picked_with(m.camera), m.head, m.drawn.epoch, eyes_.pair()});
+    if ((wall_ && !swapped.alone) || surface_.paces()) return;
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
     else if (!m.drawn.changed)
@@ -366,7 +447,7 @@ class Display {
   }
 
   void tell_of(const MeasuredFrame& m) {
-    live_ = live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_);
+    live_ = figures_of(m.presented_s, result_.frames, m.drawn, *source_, worker_);
     live_.waits_s = stall_.told_s(m.presented_s);
     live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
     live_.coupling = m.coupling;
@@ -464,7 +545,7 @@ class Display {
     if (!use) return;
     if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
     // A picture is compared with what its server was to draw; how old that is, other columns tell.
-    geometry::Camera camera = m.drawn.picture_of.value_or(m.camera);
+    geometry::Camera camera = m.drawn.picture_of.value_or(picked_with(m.camera));
     camera.width = view_.width, camera.height = view_.height;
     if (m.drawn.picture_of) use |= kPictureOnly;
     SpooledFrame frame{m.number, t_s,           use,    camera,
@@ -505,13 +586,15 @@ class Display {
   std::shared_ptr<Received> received_;
   std::unique_ptr<ViewSource> source_;  // draws received_; null: it cannot be drawn
   image::View view_;
-  bool view_intact_ = false;  // it holds what is on display
+  std::array<image::View, 2> eye_views_;  // of a surface that has eyes
+  double pictures_a_second_ = 0;          // that source_ was made for
+  bool view_intact_ = false;              // it holds what is on display
   DisplayResult result_;
   double due_s_ = 0;  // when the frame at hand was
   double start_s_ = 0, previous_s_ = 0, seen_s_ = 0, seen_before_s_ = 0, next_picture_s_ = 0;
   bool last_ = false;
   StallWatch stall_;
-  LiveFigures live_;  // of the newest frame
+  FrameFigures live_;  // of the newest frame
 };
 
 }  // namespace
@@ -519,7 +602,7 @@ class Display {
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
                           CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
                           metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool, WallPace* wall) {
-  return Display(options, surface, gate, worker, frames, spans, spool, make_source, wall).run();
+  return DisplayLoop(options, surface, gate, worker, frames, spans, spool, make_source, wall).run();
 }
 
 }  // namespace telesplat::viewer

@@ -21,7 +21,8 @@ struct DisplayResult {
 
 /// Makes what the display draws from. Called in the display's thread: when it is known what the session shows, and
 /// again when the session goes on with something that is drawn another way; what was made before is destroyed by then.
-using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&)>;
+/// pictures_a_second: DisplaySurface's.
+using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&, double pictures_a_second)>;
 
 /// Waits until it is known what there is to show and for the first complete view update (the head rests at the
 /// trajectory's beginning), then displays frames on the surface. Where the coupling says so each frame waits for a

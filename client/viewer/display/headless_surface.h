@@ -52,7 +52,7 @@ class HeadlessSurface final : public DisplaySurface {
   void present(const image::View&, bool) override {
     if (poses_) poses_->presented(monotonic_s());
   }
-  void report(const LiveFigures& figures) override {
+  void report(const FrameFigures& figures) override {
     if (!poses_) return;
     if (const auto news = poses_->take_news(figures.now_s)) tell_(*news);
   }

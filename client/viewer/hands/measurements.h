@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "client/viewer/hands/meaning.h"
-#include "common/geometry/camera.h"
-#include "common/image/file.h"
 
 namespace telesplat::viewer {
 
@@ -59,13 +57,5 @@ class Measurements {
   uint64_t last_ = 0, version_ = 0;
   bool begins_ = true;
 };
-
-/// The part of the camera's picture that marks of the places lie in, with points, lines and labels on nothing
-/// (0xAARRGGBB); x, y: of its upper left pixel. Empty: none is seen. scale: pixels a side of a letter's dot.
-struct MarksPicture {
-  image::View view;
-  int x = 0, y = 0;
-};
-MarksPicture draw_marks(const Measurements& measurements, const geometry::Camera& camera, int scale);
 
 }  // namespace telesplat::viewer

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "client/viewer/input/pose_moment.h"
-#include "common/tracking/pose_clock.h"
-#include "common/tracking/pose_predictor.h"
-#include "common/tracking/prediction_meter.h"
+#include "client/viewer/tracking/pose_clock.h"
+#include "client/viewer/tracking/pose_predictor.h"
+#include "client/viewer/tracking/prediction_meter.h"
 #include "common/wire/head_pose.h"
 
 namespace telesplat::viewer {

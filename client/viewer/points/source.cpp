@@ -25,12 +25,6 @@ constexpr double kSeenPeriod_s = 0.5;
 
 int still_side(const DisplayOptions& o) { return o.still_samples >= 16 ? 4 : 2; }
 
-bool same_look(const Look& a, const Look& b) {
-  return a.render.kernel == b.render.kernel && a.lit == b.lit && a.head_light == b.head_light &&
-         a.background == b.background && a.most_detail == b.most_detail &&
-         splat::finish_bits(a.render.finish) == splat::finish_bits(b.render.finish);
-}
-
 }  // namespace
 
 PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ReceivedPoints& received)
@@ -58,7 +52,7 @@ void PointSource::count_same(const FrameInput& input) {
   const uint64_t cut_before = cut_.version;
   cut_ = received_.cut();
   const bool same =
-      !input.resting && input.camera == camera_ && same_look(input.look, look_) && cut_.version == cut_before;
+      !input.resting && input.camera == camera_ && input.look == look_ && cut_.version == cut_before;
   same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
   camera_ = input.camera;
   look_ = input.look;

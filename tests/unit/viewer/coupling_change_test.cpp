@@ -9,7 +9,6 @@
 #include "client/viewer/coupling/coupling_gate.h"
 #include "client/viewer/coupling/stall_watch.h"
 #include "client/viewer/coupling/view_requester.h"
-#include "client/viewer/display/title_line.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/slices/cache.h"
 #include "common/core/clock.h"
@@ -199,19 +198,6 @@ TEST(StallWatch, DrawsFromWhatIsThereUntilAnUpdateComes) {
   EXPECT_FALSE(watch.waiting(111.2, 111, 0, kLoose));
   EXPECT_FALSE(watch.waiting(120.9, 111, 111.5, kLoose)) << "part of an answer came";
   EXPECT_TRUE(watch.waiting(121.5, 111, 111.5, kLoose));
-}
-
-TEST(StallWatch, TheTitleTellsIt) {
-  TitleLine title;
-  LiveFigures f{.now_s = 1, .scene = "crater", .frames = 5};
-  title.update(f);
-  f.now_s = 4;
-  f.waits_s = 3.2;
-  EXPECT_EQ(title.update(f), "crater - waiting for a view update, 3 s");
-  f.now_s = 5;
-  f.waits_s = 0;
-  f.frames = 65;
-  EXPECT_TRUE(title.update(f)->starts_with("crater - 60.0 fps"));
 }
 
 class ReleasedBatches : public testing::Test {

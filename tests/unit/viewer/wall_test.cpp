@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "client/viewer/display/headless_surface.h"
-#include "client/viewer/display/title_line.h"
 #include "client/viewer/display/wall.h"
 
 namespace telesplat::viewer {
@@ -44,20 +43,6 @@ TEST(Wall, TilesSeeTogetherWhatTheWholeSees) {
 TEST(Wall, ADisplayThatIsNoneShowsTheWhole) {
   const geometry::Camera whole = geometry::make_camera({}, 80, 640, 400);
   EXPECT_EQ(tile_of(whole, {}), whole);
-}
-
-TEST(TitleLine, CountsWhatIsDrawn) {
-  TitleLine line;
-  LiveFigures f{.now_s = 1, .scene = "bonsai", .frames = 1};
-  line.update(f);
-  f.now_s = 2;
-  f.points_drawn = 12'310'000;
-  f.points_cached = 2'100'000;
-  f.drawn_name = "samples";
-  f.cached_name = " pixels";
-  const auto text = line.update(f);
-  ASSERT_TRUE(text);
-  EXPECT_NE(text->find("12.31 M samples drawn, 2.10 M pixels cached"), std::string::npos) << *text;
 }
 
 // The front edges of a cube s times 1 m across are seen s / 2 above the middle: (1.3 - s / 2) of 0.7 times 0.15 m.

@@ -1,12 +1,16 @@
 #include "tools/telesplat/run/process_group.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -33,6 +37,23 @@ constexpr std::string_view kListening = "listening on ";
 std::string program_directory() {
   std::error_code error;
   return fs::read_symlink("/proc/self/exe", error).parent_path().string();
+}
+
+std::string output_of(const std::string& program, const std::string& argument) {
+  const std::string path = program_directory() + "/" + program;
+  if (access(path.c_str(), X_OK) != 0) return {};
+  std::string quoted;
+  for (const char c : path) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(fmt::format("'{}' {}", quoted, argument).c_str(), "r"),
+                                                   pclose);
+  std::string out;
+  std::array<char, 4096> part;
+  while (pipe)
+    if (const size_t n = fread(part.data(), 1, part.size(), pipe.get()); n > 0)
+      out.append(part.data(), n);
+    else
+      break;
+  return out;
 }
 
 Status ProcessGroup::use_keys(const std::string& folder) {

@@ -15,6 +15,8 @@ namespace telesplat::launcher {
 
 /// Folder of the program that runs: the others lie beside it.
 std::string program_directory();
+/// What a program beside it prints; empty: it is not there, or prints nothing.
+std::string output_of(const std::string& program, const std::string& argument);
 
 /// A service program of this project, and how it is started.
 struct Member {

@@ -11,8 +11,9 @@
 #include <set>
 #include <thread>
 
-#include "client/viewer/display/window.h"
-#include "client/viewer/panel/recent_files.h"
+#include "client/viewer/input/keys.h"
+#include "client/viewer/recent_files.h"
+#include "client/viewer/viewer_service.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
@@ -43,6 +44,15 @@ using State = Pipeline::State;
 
 constexpr double kAskEvery_s = 0.5;  // the master for its status
 constexpr double kResultPatience_s = 2;
+
+// Whether the viewer could show its window here: nothing is started for one that cannot.
+Status check_display(const RunOptions& o) {
+  if (!viewer::has_person(o.viewer)) return ok_status();
+  if (const auto program = viewer::display_program(); !program) return program.error();
+  std::string why = o.viewer.xr ? "" : output_of(viewer::kDisplayProgram, "check");
+  if (why.ends_with('\n')) why.pop_back();
+  return why.empty() ? ok_status() : Status(Error{why});
+}
 
 // What ctl must be told where the session's file is not there, by which it finds others: the master's log tells why.
 std::string flags_of_ctl(const std::string& master, const std::string& keys) {
@@ -379,8 +389,7 @@ int run(RunOptions o, const options::Given& given) {
   if (const int code = find_session(o)) return code;
   const auto passing_keys = settle_keys(o);
   if (!passing_keys) return tools::complain(passing_keys.error());
-  if (o.viewer.window && !o.viewer.xr)
-    if (const Status s = viewer::check_display(); !s) return tools::complain(s.error());
+  if (const Status s = check_display(o); !s) return tools::complain(s.error());
   if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())
     std::fprintf(stderr, "%s\n", end.c_str());
   std::optional<MoviePlan> movie;

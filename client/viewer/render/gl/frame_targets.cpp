@@ -27,7 +27,6 @@ void FrameTargets::make_texture(Texture which, uint32_t format, bool padded) {
   glBindTexture(GL_TEXTURE_2D, textures_[which]);
   const int margin = padded ? 2 * kMargin : 0;
   glTexStorage2D(GL_TEXTURE_2D, 1, format, width_ + margin, height_ + margin);
-  // A window may sample the output; integers and depths are fetched.
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
     glTexParameteri(GL_TEXTURE_2D, filter, GL_NEAREST);
   for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
@@ -88,10 +87,6 @@ Status FrameTargets::make_sums() {
   const Status made = make_framebuffer(kSumming, &textures_[kSums0], 2, false);
   if (!made) release();  // otherwise the next frame would take them for complete
   return made;
-}
-
-GlFrame FrameTargets::output(bool with_depth) const {
-  return {textures_[kColour], with_depth ? textures_[kDepth] : 0, framebuffers_[kOutputColour], width_, height_};
 }
 
 void FrameTargets::draw_to(Buffer buffer) const {

@@ -7,15 +7,6 @@
 
 namespace telesplat::viewer {
 
-/// A finished frame on the GPU, in the renderer's context, until its next frame.
-struct GlFrame {
-  /// RGBA8, alpha 1. Row 0 is the upper row of the picture: a window draws it upside down.
-  uint32_t colour_texture = 0;
-  uint32_t depth_texture = 0;  ///< R32F, metres, +infinity where nothing is; 0 if depth was not asked for
-  uint32_t framebuffer = 0;    ///< has the colour texture as attachment 0: for glBlitFramebuffer
-  int width = 0, height = 0;
-};
-
 /// Textures and the frame buffers that they are attached to. "Padded" ones have kMargin more pixels on all sides, since
 /// GL drops points of any size whose centre is outside. Every member function needs a current GL context.
 class FrameTargets {
@@ -43,7 +34,6 @@ class FrameTargets {
   uint32_t visible() const { return textures_[kVisible]; }      ///< padded, depth component: the depth test's
   uint32_t sums(int i) const { return textures_[kSums0 + i]; }  ///< padded, RGBA32F: weighted sums, 2 of them
   uint32_t pairs(int i) const { return textures_[kPairs0 + i]; }  ///< padded, RG32UI: colour and info, 2 of them
-  GlFrame output(bool with_depth) const;
 
   // Frame buffers.
   enum Buffer { kSplat, kVisibility, kSumming, kPair0, kPair1, kOutput, kOutputColour, kBuffers };

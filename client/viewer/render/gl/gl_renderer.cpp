@@ -10,9 +10,9 @@
 #include "client/viewer/render/gl/programs.h"
 #include "client/viewer/render/gl/read_back.h"
 #include "client/viewer/render/gl/splat_passes.h"
+#include "client/viewer/render/gl/stage_timer.h"
 #include "common/core/check.h"
 #include "common/core/clock.h"
-#include "common/gl/stage_timer.h"
 #include "common/splat/finish.h"
 #include "common/splat/flat/splat_table.h"
 
@@ -47,6 +47,8 @@ struct GlRenderer::Parts {
         read_back(options.pack_buffers.value_or(!gl::is_software(device_name()))),
         timer(kStages) {
     glGenVertexArrays(1, &no_vertices);
+    glDisable(GL_DITHER);
+    glPointParameteri(GL_POINT_SPRITE_COORD_ORIGIN, GL_UPPER_LEFT);
   }
   ~Parts() { glDeleteVertexArrays(1, &no_vertices); }
 
@@ -78,22 +80,12 @@ Result<std::unique_ptr<GlRenderer>> GlRenderer::make(const GlOptions& options) {
   return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(*parts), std::move(device)));
 }
 
-Result<std::unique_ptr<GlRenderer>> GlRenderer::make_in_current_context(const GlOptions& options) {
-  auto parts = make_parts(options);
-  if (!parts) return parts.error();
-  return std::unique_ptr<GlRenderer>(new GlRenderer(nullptr, std::move(*parts), device_name()));
-}
-
 GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device)
     : context_(std::move(context)), parts_(std::move(parts)), device_(std::move(device)) {}
 
 GlRenderer::~GlRenderer() {
-  const Current current = use_context();
+  const gl::EglContext::Current current(*context_);
   parts_.reset();
-}
-
-GlRenderer::Current GlRenderer::use_context() const {
-  return context_ ? std::make_unique<gl::EglContext::Current>(*context_) : nullptr;
 }
 
 void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with_depth) {
@@ -144,21 +136,11 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
 
 Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& camera,
                         const splat::RenderOptions& options, const image::Shading& shading, bool with_depth) {
-  frame_ = {};
   const bool part = int64_t{camera.width} * camera.height <= kPartPixels;
   parts_->targets = part ? &parts_->part_targets : &parts_->frame_targets;
   if (const Status resized = parts_->targets->resize(camera.width, camera.height); !resized) return resized;
   if (splat::traits_of(options.kernel).passes == splat::Passes::kSums)
     if (const Status made = parts_->targets->make_sums(); !made) return made;
-  // Others may have left these on in a shared context.
-  for (const GLenum off : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE,
-                           GL_RASTERIZER_DISCARD, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_FRAMEBUFFER_SRGB, GL_DITHER})
-    glDisable(off);
-  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-  glPointParameteri(GL_POINT_SPRITE_COORD_ORIGIN, GL_UPPER_LEFT);
-  glDepthRange(0, 1);
-
   const double start = monotonic_s();
   parts_->splatting.prepare(list, camera, options.kernel, shading);
   prepare_ms_ = (monotonic_s() - start) * 1e3;
@@ -167,22 +149,13 @@ Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& cam
   parts_->timer.end_stage(kSplatting);
   shade_and_finish(options, with_depth);
   parts_->splatting.end_frame();
-  frame_ = parts_->targets->output(with_depth);
   return ok_status();
 }
 
-void GlRenderer::release_state() const {
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
-  glBindVertexArray(0);
-  glUseProgram(0);
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, 0);
-}
-
-splat::SplatStats GlRenderer::stats(const splat::DrawList& list, bool wait) {
+splat::SplatStats GlRenderer::stats(const splat::DrawList& list) {
   splat::SplatStats out;
   out.points_projected = out.points_drawn = list.points;
-  const std::vector<double>& ms = parts_->timer.results(wait);
+  const std::vector<double>& ms = parts_->timer.results();
   out.project_ms = prepare_ms_ + ms[kSplatting];
   out.resolve_ms = ms[kResolving];
   out.fill_ms = ms[kFilling];
@@ -191,25 +164,14 @@ splat::SplatStats GlRenderer::stats(const splat::DrawList& list, bool wait) {
   return out;
 }
 
-Result<splat::SplatStats> GlRenderer::render_on_gpu(const splat::DrawList& list, const geometry::Camera& camera,
-                                                    const splat::RenderOptions& options, const image::Shading& shading,
-                                                    bool with_depth) {
-  const Current current = use_context();
-  const Status drawn = draw(list, camera, options, shading, with_depth);
-  release_state();
-  if (!drawn) return drawn.error();
-  return stats(list, false);
-}
-
 splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry::Camera& camera,
                                      const splat::RenderOptions& options, const image::Shading& shading,
                                      const splat::FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
-  const Current current = use_context();
+  const gl::EglContext::Current current(*context_);
   const double start = monotonic_s();
   if (const Status drawn = draw(list, camera, options, shading, target.depth_m != nullptr); !drawn) {
     // A frame that the GPU cannot hold shows nothing, rather than ending the viewer.
-    release_state();
     if (refusals_.allow(start)) log::error("{}", drawn.error().text);
     for (size_t y = 0; y < static_cast<size_t>(target.height); ++y) {
       std::fill_n(target.colour + y * target.row(), target.width, 0xff000000u | shading.background());
@@ -221,9 +183,8 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
   if (!parts_->timer.available()) glFinish();
   const double drawn = monotonic_s();
   parts_->read_back.read(parts_->targets->framebuffer(FrameTargets::kOutput), target);
-  release_state();
   const double end = monotonic_s();
-  splat::SplatStats out = stats(list, true);
+  splat::SplatStats out = stats(list);
   if (!parts_->timer.available()) out.project_ms = (drawn - start) * 1e3;
   const double rest = (end - start) * 1e3 - out.project_ms - out.fill_ms - out.smooth_ms - out.antialias_ms;
   out.resolve_ms = std::max(out.resolve_ms, rest);

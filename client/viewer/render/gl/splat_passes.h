@@ -6,7 +6,7 @@
 #include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/gl/point_arena.h"
 #include "client/viewer/render/gl/programs.h"
-#include "common/gl/stream_buffer.h"
+#include "client/viewer/render/gl/stream_buffer.h"
 #include "common/image/shading.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/kernel_traits.h"
@@ -67,8 +67,6 @@ class SplatPasses {
   void splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel);
   /// After the frame's last pass.
   void end_frame();
-
-  const PointArenas& arenas() const { return arenas_; }
 
  private:
   struct DrawCommand {

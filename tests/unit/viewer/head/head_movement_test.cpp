@@ -6,7 +6,6 @@
 #include <fstream>
 
 #include "client/viewer/display/headless_surface.h"
-#include "client/viewer/display/overlay.h"
 #include "client/viewer/viewer_options.h"
 #include "common/geometry/fit.h"
 
@@ -155,30 +154,6 @@ TEST(Background, ComesFromItsFlag) {
   o.background = "whitish";
   EXPECT_NE(refusal(o).find("--background whitish: not #rrggbb, transparent or one of white, black"), std::string::npos)
       << refusal(o);
-}
-
-TEST(Overlay, LiesInItsCornerAndShrinksToFit) {
-  Overlay overlay{text_panel({"ab", "c"}, 2), Overlay::Corner::kLowerRight};
-  const auto& picture = overlay.picture;
-  EXPECT_GT(picture.width, 20);
-  EXPECT_GT(std::count(picture.colour.begin(), picture.colour.end(), 0xfff0f0f0u), 20) << "letters";
-  const auto place = place_overlay(overlay, 640, 480);
-  EXPECT_EQ(place.width, picture.width);
-  EXPECT_EQ(640 - place.x - place.width, 480 - place.y - place.height) << "the same margin on both sides";
-  const auto small = place_overlay(overlay, 30, 300);
-  EXPECT_LT(small.width, 30);
-  EXPECT_GE(small.x, 0);
-  overlay.corner = Overlay::Corner::kUpperLeft;
-  EXPECT_EQ(place_overlay(overlay, 640, 480).x, place_overlay(overlay, 640, 480).y);
-  // Beside a panel.
-  EXPECT_EQ(place_overlay(overlay, 640, 480, 200).x, 200 + place_overlay(overlay, 640, 480).x);
-  Overlays overlays;
-  const auto before = overlays.version();
-  overlays.show("help", overlay);
-  EXPECT_TRUE(overlays.shows("help"));
-  EXPECT_NE(overlays.version(), before);
-  overlays.hide("help");
-  EXPECT_TRUE(overlays.all().empty());
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "client/viewer/input/interaction.h"
-
 namespace telesplat::viewer {
 namespace {
 
@@ -93,21 +91,6 @@ TEST(TrackedHead, ItsPredictionsAreMeasured) {
   EXPECT_GT(f.count, 150u);
   EXPECT_NEAR(f.unpredicted_m, 0.05, 0.002);
   EXPECT_LT(f.error_m, 0.005);
-}
-
-TEST(Interaction, ATrackedHeadMovesTheCameraUntilThePersonTakesIt) {
-  Interaction interaction(std::nullopt, {});
-  interaction.set_tracked([](double now_s) {
-    return std::optional(geometry::Pose{{0.1 * now_s, 0.2, 1}, {1, 0, 0, 0}});
-  });
-  EXPECT_EQ(interaction.advance(3, true).position_room.x, 0.1 * 3);
-  EXPECT_EQ(interaction.advance(4, false).position_room.x, 0.1 * 4);
-  interaction.key(Key::kT, true);
-  interaction.key(Key::kT, false);
-  EXPECT_FALSE(interaction.playing());
-  EXPECT_NEAR(interaction.advance(5, true).position_room.x, 0.4, 0.02) << "it stays where it was taken";
-  interaction.key(Key::kT, true);
-  EXPECT_EQ(interaction.advance(6, true).position_room.x, 0.1 * 6);
 }
 
 }  // namespace

@@ -1,0 +1,140 @@
+// What the panel of a window shows and what a person does with it, without any window system, OpenGL or sockets:
+// figures come in, wishes and orders go out.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/displays/window/input/interaction.h"
+#include "client/displays/window/panel/history.h"
+#include "client/displays/window/panel/order.h"
+#include "client/displays/window/panel/session_status.h"
+#include "client/viewer/display/frame_figures.h"
+#include "client/viewer/input/picture_wish.h"
+#include "common/scene/kind.h"
+
+namespace telesplat::viewer {
+
+/// One thread, the display's.
+class Panel {
+ public:
+  struct Setup {
+    bool transparent = false;  ///< the background is not the person's to choose
+    std::string viewer;        ///< this viewer's name, for orders that are meant for it alone
+    bool shown = false;
+    bool opens = false;  ///< other data sets can be opened here
+  };
+  explicit Panel(Setup setup);
+
+  static constexpr double kSpan_s = 20;  ///< of the plots
+  static constexpr double kGrace_s = 3;  ///< for so long a service may be missing before that is told
+  static constexpr double kTold_s = 6;   ///< for so long the newest message is told outside the panel too
+  static constexpr size_t kMostMessages = 100;
+
+  struct Plot {
+    std::string name, unit;
+    History history;
+    uint32_t colour;  ///< 0x00RRGGBB, of Okabe and Ito's palette, which colour-blind people tell apart
+    int digits;       ///< after the point
+    double floor;     ///< the plot's top is no lower
+  };
+  struct Message {
+    double t_s = 0;
+    std::string text;
+    bool problem = false;
+  };
+
+  /// What is done with paths of the camera.
+  struct PathState {
+    bool records = false, plays = false, can_play = false;
+    double recorded_s = 0;
+  };
+
+  // ---- facts ----
+  void on_path(const PathState& path) { path_ = path; }
+  /// What the session's processes are busy with, such as reading; empty: nothing.
+  void on_progress(const std::string& progress) { progress_ = progress; }
+  void on_figures(const FrameFigures& figures);
+  /// The session shows a scene of this kind.
+  void on_scene(scene::Pipeline pipeline) { pipeline_ = pipeline; }
+  void on_kind(std::optional<scene::Kind> kind) { kind_ = kind; }
+  /// Whether a plot means something for what is shown: slice images have no holes.
+  bool means_something(const Plot& plot) const;
+  /// The window's settings as texts, by their orders (scene::settings()).
+  void on_values(std::map<std::string, std::string> values) { values_ = std::move(values); }
+  void on_answer(double now_s, const OrderAnswer& answer);
+  /// Nothing: the master did not answer; then `problem` says why.
+  void on_status(double now_s, const std::optional<SessionStatus>& status, const std::string& problem);
+  void tell(double now_s, std::string text, bool problem = false);
+
+  bool shown() const { return shown_; }
+  void show(bool shown) { shown_ = shown; }
+  const std::string& progress() const { return progress_; }
+  const PathState& path() const { return path_; }
+  const FrameFigures& figures() const { return figures_; }
+  const std::vector<Plot>& plots() const { return plots_; }
+  double frames_a_second() const { return frames_a_second_; }
+  scene::Pipeline pipeline() const { return pipeline_; }
+  std::optional<scene::Kind> kind() const { return kind_; }
+  const Setup& setup() const { return setup_; }
+  /// Empty: it is not known.
+  std::string value(const std::string& order) const;
+  /// The coupling in force, or the one that was ordered and is not in force yet.
+  const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.coupling; }
+  bool coupling_pending() const { return wished_coupling_.has_value(); }
+  const std::optional<SessionStatus>& status() const { return status_; }
+  /// The oldest first.
+  const std::deque<Message>& messages() const { return messages_; }
+  /// What a person should know though the panel is hidden: what goes on, else what is missing, else
+  /// the newest message if it is young.
+  std::vector<std::string> news(double now_s) const;
+
+  // ---- the person ----
+  /// As an order of `telesplat ctl` to this window.
+  void choose(const std::string& order, const std::string& value);
+  void choose_coupling(const CouplingState& coupling);
+  /// As if the person pressed this key.
+  void press(Key key) { pressed_.push_back(key); }
+  /// To see the data from there.
+  void choose_side(const Side& side) { side_ = side; }
+  void choose_picture(const PictureWish& wish) { wished_picture_ = wish; }
+  void order(Order order) { orders_.push_back(std::move(order)); }
+
+  // ---- what comes of it, once each ----
+  std::vector<std::pair<std::string, std::string>> take_chosen() { return std::exchange(chosen_, {}); }
+  std::optional<Side> take_side() { return std::exchange(side_, std::nullopt); }
+  std::vector<Key> take_pressed() { return std::exchange(pressed_, {}); }
+  std::optional<PictureWish> take_picture() { return std::exchange(wished_picture_, std::nullopt); }
+  std::vector<Order> take_orders() { return std::exchange(orders_, {}); }
+
+ private:
+  void count_rates(const FrameFigures& figures);
+
+  Setup setup_;
+  bool shown_;
+  scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
+  std::optional<scene::Kind> kind_;
+  FrameFigures figures_, rated_;  // the newest; those that rates were last counted from
+  double frames_a_second_ = 0;
+  std::vector<Plot> plots_;
+  std::optional<CouplingState> wished_coupling_;
+  std::map<std::string, std::string> values_;
+  std::vector<std::pair<std::string, std::string>> chosen_;
+  std::vector<Order> orders_;
+  std::vector<Key> pressed_;
+  std::optional<Side> side_;
+  std::optional<PictureWish> wished_picture_;
+  PathState path_;
+  std::string progress_;
+  std::optional<SessionStatus> status_;
+  std::vector<std::string> missing_;
+  double missing_since_s_ = 0;  // what the newest status lacks; 0: nothing
+  std::deque<Message> messages_;
+};
+
+}  // namespace telesplat::viewer

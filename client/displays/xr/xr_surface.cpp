@@ -1,0 +1,199 @@
+#include "client/displays/xr/xr_surface.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "client/displays/xr/hand_rays.h"
+#include "client/viewer/display/frame_table.h"
+#include "common/core/clock.h"
+#include "common/core/log.h"
+
+namespace telesplat::viewer {
+namespace {
+
+// Share of a refresh period that both eyes may take to draw.
+constexpr double kDrawingShare = 0.6, kShortest_s = 1.0 / 1000;
+constexpr double kIdle_s = 0.02, kOpenAgain_s = 1.0, kLeave_s = 2.0;
+constexpr uint32_t kHandColours[]{0x56b4e9, 0xe69f00};  // left, right; told apart by everyone
+constexpr const char* kHandNames[]{"left", "right"};
+
+void sleep_s(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
+
+}  // namespace
+
+Result<std::unique_ptr<XrSurface>> XrSurface::open(const XrOptions& options, double near_m, Tell tell) {
+  std::unique_ptr<XrSurface> out(new XrSurface(options, near_m, std::move(tell)));
+  auto context = gl::EglContext::make();
+  if (!context) return context.error();
+  out->context_ = std::move(*context);
+  if (const Status s = out->open_system(); !s) return s.error();
+  return out;
+}
+
+XrSurface::~XrSurface() {
+  if (!session_) return;
+  const gl::EglContext::Current current(*context_);
+  session_->request_exit();
+  for (const double until_s = monotonic_s() + kLeave_s;
+       monotonic_s() < until_s && !session_->over() && !session_->quits() && session_->running();) {
+    session_->poll();
+    if (!session_->running()) break;
+    const auto frame = session_->begin_frame();
+    if (frame) session_->end_frame(*frame, nullptr);
+  }
+  session_->poll();
+  session_.reset();
+}
+
+Status XrSurface::open_system() {
+  const gl::EglContext::Current current(*context_);
+  system_.reset();
+  auto opened = XrSystem::open();
+  if (!opened) return opened.error();
+  system_ = std::move(*opened);
+  return ok_status();
+}
+
+void XrSurface::open_session() {
+  if (monotonic_s() < open_at_s_) return;
+  open_at_s_ = monotonic_s() + kOpenAgain_s;
+  // The same trouble every second is told once.
+  const auto fails = [&](const std::string& text) {
+    if (text != std::exchange(trouble_, text)) tell_(fmt::format("no headset: {}; trying again every second", text));
+  };
+  if (lost_)
+    if (const Status s = open_system(); !s) return fails(s.error().text);
+  const gl::EglContext::Current current(*context_);
+  auto opened = HeadsetSession::open(*system_, *context_, options_, near_m_);
+  if (!opened) {
+    lost_ = true;
+    return fails(opened.error().text);
+  }
+  session_ = std::move(*opened);
+  trouble_.clear();
+  tell_(fmt::format("headset: {}, {}x{} pixels an eye{}", system_->name(), session_->width(), session_->height(),
+                    session_->takes_depth() ? ", with depth" : ""));
+  jumped_ = true;
+  last_display_s_ = 0;
+}
+
+// Whether the session shows frames.
+bool XrSurface::follow_session() {
+  if (!session_) open_session();
+  if (!session_) return false;
+  const gl::EglContext::Current current(*context_);
+  session_->poll();
+  for (const auto& line : session_->take_news()) tell_(line);
+  quits_ = quits_ || session_->quits();
+  if (quits_ || !session_->over()) return !quits_ && session_->running();
+  session_.reset();
+  lost_ = true;
+  open_at_s_ = monotonic_s() + kOpenAgain_s;
+  return false;
+}
+
+bool XrSurface::ready() {
+  located_.reset();
+  if (follow_session()) return begin();
+  if (!quits_) sleep_s(kIdle_s);
+  return false;
+}
+
+// Waits for the runtime. A frame without eyes, or that nobody sees, is ended at once.
+bool XrSurface::begin() {
+  const gl::EglContext::Current current(*context_);
+  const auto begun = session_->begin_frame();
+  if (!begun) return false;
+  frame_ = *begun;
+  if (frame_.discarded) log::debug("the runtime discarded a frame");
+  missed_ = refreshes_missed(last_display_s_, frame_.display_s, frame_.period_s);
+  last_display_s_ = frame_.display_s;
+  jumped_ = session_->take_recentring() || jumped_;
+  located_s_ = monotonic_s();
+  located_ = session_->locate_eyes(frame_.display_time);
+  if (!located_ || !frame_.renders) {
+    located_.reset();
+    session_->end_frame(frame_, nullptr);
+    return false;
+  }
+  follow_pace();
+  camera_ = both_eyes(located_->cameras);
+  head_ = session_->locate_head(frame_.display_time).value_or(camera_.pose);
+  return true;
+}
+
+// A pair has another share of a frame's time than two pictures. Runtimes' periods differ a little from frame to frame.
+void XrSurface::follow_pace() {
+  const bool pair = alike(located_->cameras);
+  if (pictures_a_second_ > 0 && (pair || !as_pair_)) return;
+  as_pair_ = pair;
+  pictures_a_second_ = (pair ? 1 : 2) / (kDrawingShare * std::max(frame_.period_s, kShortest_s));
+}
+
+// Where the head will be when an answer can be there is the runtime's to say: it has more to tell it from than poses.
+std::optional<ExpectedHead> XrSurface::expected(double at_s) {
+  if (!session_ || at_s <= frame_.display_s) return std::nullopt;
+  const auto head = session_->locate_head(frame_.display_time);
+  const auto then = session_->locate_head(system_->to_time(at_s));
+  if (!head || !then) return std::nullopt;
+  // camera_ stands still beside the head.
+  const glm::dquat turn = then->orientation * glm::conjugate(head->orientation);
+  return ExpectedHead{at_s,
+                      {then->position_room + turn * (camera_.pose.position_room - head->position_room),
+                       glm::normalize(turn * camera_.pose.orientation)}};
+}
+
+void XrSurface::present_eyes(std::array<image::View, 2>& views) {
+  const gl::EglContext::Current current(*context_);
+  const HandRays rays = session_->locate_hands(frame_.display_time);
+  point(rays, views[0]);  // both eyes see rays that end in one place
+  for (size_t eye = 0; eye < 2; ++eye) {
+    for (size_t hand = 0; hand < rays.size(); ++hand)
+      if (rays[hand])
+        draw_line(views[eye], located_->cameras[eye], rays[hand]->pose.position_room, ends_[hand], kHandColours[hand]);
+    session_->put(int(eye), views[eye]);
+  }
+  session_->end_frame(frame_, &*located_);
+}
+
+// What controllers point at; a person who presses one is told where that is.
+void XrSurface::point(const HandRays& rays, const image::View& view) {
+  for (size_t hand = 0; hand < rays.size(); ++hand) {
+    const bool pressed = rays[hand] && rays[hand]->pressed, before = std::exchange(pressed_[hand], pressed);
+    const bool begins = pressed && !before;
+    if (!rays[hand]) continue;
+    const geometry::Pose& pose = rays[hand]->pose;
+    const glm::dvec3 along = pose.orientation * glm::dvec3(0, 0, -1);
+    const auto hit = first_hit(view, located_->cameras[0], pose.position_room, along);
+    ends_[hand] = hit.value_or(pose.position_room + kFarthest_m * along);
+    if (!begins) continue;
+    tell_(hit ? fmt::format("the {} hand points at {:.3f},{:.3f},{:.3f} in the room", kHandNames[hand], hit->x, hit->y,
+                            hit->z)
+              : fmt::format("the {} hand points at nothing", kHandNames[hand]));
+  }
+}
+
+// A frame that is handed over late is shown at a later refresh.
+void XrSurface::measure(MeasuredFrame& m) {
+  const double period_s = frame_.period_s;
+  m.lead_s = frame_.display_s - m.presented_s;
+  m.refresh_s = period_s;
+  m.missed = missed_;
+  const double late_s = m.lead_s < 0 && period_s > 0 ? std::ceil(-m.lead_s / period_s) * period_s : 0;
+  m.seen_s = frame_.display_s + late_s;
+}
+
+// A headset wants pictures of another size than the options tell: they follow. Eyes never stand still.
+Result<std::unique_ptr<DisplaySurface>> open_headset(ViewerOptions& o, const DisplayHelp& help) {
+  auto opened = XrSurface::open(o.xr_options, o.display.near_m, help.tell);
+  if (!opened) return Error{"--xr: " + opened.error().text};
+  o.display.width = (*opened)->eye_size().width;
+  o.display.height = (*opened)->eye_size().height;
+  o.display.still_samples = 1;
+  return std::unique_ptr<DisplaySurface>(std::move(*opened));
+}
+
+}  // namespace telesplat::viewer

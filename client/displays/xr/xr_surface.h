@@ -1,0 +1,90 @@
+// The display in a headset: every refresh shows what is cached to both eyes, from where the runtime says that they will
+// be then, even if the server is late.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "client/displays/xr/headset_session.h"
+#include "client/viewer/display/display_surface.h"
+#include "client/viewer/viewer_service.h"
+
+namespace telesplat::viewer {
+
+/// The runtime's clock paces frames. A session that is lost is opened anew every second. Pictures that are recorded are
+/// the left eye's.
+class XrSurface final : public DisplaySurface {
+ public:
+  using Tell = std::function<void(const std::string&)>;
+
+  /// tell: lines for the person. Error: what of a runtime, a headset or OpenGL there is not.
+  static Result<std::unique_ptr<XrSurface>> open(const XrOptions& options, double near_m, Tell tell);
+  /// Tells the runtime that the application goes: states follow, for which there is little time.
+  ~XrSurface() override;
+
+  /// Pixels of an eye's picture that the runtime recommends.
+  const XrSystem::EyeSize& eye_size() const { return system_->eye_size(); }
+
+  bool ready() override;
+  bool paces() const override { return true; }
+  const std::array<geometry::Camera, 2>* eyes() const override { return located_ ? &located_->cameras : nullptr; }
+  double pictures_a_second() const override { return pictures_a_second_; }
+  double seen_s(double) const override { return frame_.display_s; }
+  bool take_jump() override { return std::exchange(jumped_, false); }
+  std::optional<ExpectedHead> expected(double at_s) override;
+  void on_scene(const ShownScene&) override {}
+  geometry::Camera begin_frame(double, double, Look&) override { return camera_; }
+  geometry::Pose head() const override { return head_; }
+  std::optional<PoseMoment> pose_moment() const override {
+    return PoseMoment{located_s_, frame_.display_s - located_s_};
+  }
+  geometry::Camera camera_of(const geometry::Pose&) const override { return camera_; }
+  bool visible() const override { return true; }
+  void present(const image::View&, bool) override {}
+  void present_eyes(std::array<image::View, 2>& views) override;
+  void measure(MeasuredFrame& frame) override;
+  void report(const FrameFigures&) override {}
+  Status set(const std::string&, const std::string&) override {
+    return Error{"a headset's display keeps what it began with"};
+  }
+  bool wants_to_stop() const override { return quits_; }
+
+ private:
+  XrSurface(const XrOptions& options, double near_m, Tell tell)
+      : options_(options), near_m_(near_m), tell_(std::move(tell)) {}
+  Status open_system();
+  void open_session();
+  bool follow_session();
+  bool begin();
+  void follow_pace();
+  void point(const HandRays& rays, const image::View& view);
+
+  const XrOptions options_;
+  const double near_m_;
+  const Tell tell_;
+  std::unique_ptr<gl::EglContext> context_;  // of the pictures' textures
+  std::unique_ptr<XrSystem> system_;
+  std::unique_ptr<HeadsetSession> session_;
+  bool lost_ = false, quits_ = false, jumped_ = false;
+  double open_at_s_ = 0;
+  std::string trouble_;  // that was told last
+  // The frame at hand.
+  HeadsetSession::Frame frame_;
+  std::optional<HeadsetSession::Eyes> located_;
+  geometry::Camera camera_;  // sees all that both eyes see
+  geometry::Pose head_;
+  double located_s_ = 0, last_display_s_ = 0, pictures_a_second_ = 0;
+  int missed_ = 0;
+  bool as_pair_ = true;               // one choice of points has served both eyes so far
+  std::array<glm::dvec3, 2> ends_{};  // of the hands' rays
+  std::array<bool, 2> pressed_{};
+};
+
+/// Displays::headset.
+Result<std::unique_ptr<DisplaySurface>> open_headset(ViewerOptions& options, const DisplayHelp& help);
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,65 @@
+// A headset as an OpenXR runtime offers it: an instance, a system, what it wants pictures to be like.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/displays/xr/xr_api.h"
+#include "common/core/result.h"
+
+namespace telesplat::viewer {
+
+class XrSystem {
+ public:
+  /// Finds the runtime (XR_RUNTIME_JSON, else the system's) and a headset with two eyes. Error: what there is not.
+  static Result<std::unique_ptr<XrSystem>> open();
+  ~XrSystem();
+  XrSystem(const XrSystem&) = delete;
+  XrSystem& operator=(const XrSystem&) = delete;
+
+  XrInstance instance() const { return instance_; }
+  XrSystemId system() const { return system_; }
+  /// "RUNTIME 1.2.3, HEADSET"
+  const std::string& name() const { return name_; }
+  /// Pixels of an eye's picture that the runtime recommends, and takes at most.
+  struct EyeSize {
+    int width, height, most_width, most_height;
+  };
+  const EyeSize& eye_size() const { return eye_size_; }
+  /// Whether layers may have depth.
+  bool takes_depth() const { return takes_depth_; }
+  XrEnvironmentBlendMode blend_mode() const { return blend_mode_; }
+
+  /// Between the runtime's clock and monotonic_s().
+  double to_monotonic_s(XrTime time) const;
+  XrTime to_time(double monotonic_s) const;
+
+  /// "WHAT: XR_ERROR_..."
+  Error error(const char* what, XrResult result) const;
+  Status check(const char* what, XrResult result) const;
+
+ private:
+  XrSystem() = default;
+  Status make_instance();
+  Status find_headset();
+  Status read_sizes();
+  Status read_blend_mode();
+  Status check_opengl();
+  template <class Function>
+  Status load(const char* name, Function& function);
+
+  XrInstance instance_ = XR_NULL_HANDLE;
+  XrSystemId system_ = XR_NULL_SYSTEM_ID;
+  std::string name_;
+  EyeSize eye_size_{};
+  bool takes_depth_ = false;
+  XrEnvironmentBlendMode blend_mode_ = XR_ENVIRONMENT_BLEND_MODE_OPAQUE;
+  PFN_xrConvertTimespecTimeToTimeKHR to_time_ = nullptr;
+  PFN_xrConvertTimeToTimespecTimeKHR to_timespec_ = nullptr;
+};
+
+inline constexpr XrViewConfigurationType kTwoEyes = XR_VIEW_CONFIGURATION_TYPE_PRIMARY_STEREO;
+
+}  // namespace telesplat::viewer
