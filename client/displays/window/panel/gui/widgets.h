@@ -1,5 +1,5 @@
 // Small things that the parts of the panel share, between Dear ImGui's frames. Every widget that a person can use goes
-// through one of these functions, so that a WidgetLog lists it and tools/monkey reaches it.
+// through one of these functions, so that a WidgetLog lists it and tools/lab/monkey reaches it.
 #pragma once
 
 #include <algorithm>
