@@ -23,11 +23,6 @@ namespace {
 
 constexpr double kPicturesAfterSignal_s = 1.0, kMasterPatience_s = 2.0;
 
-int refuse(const Error& error) {
-  std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
-  return 2;
-}
-
 int fail(const Error& error) {
   log::error("{}", error.text);
   return 1;
@@ -298,24 +293,22 @@ int farewell(const ViewerOptions& o, const net::Access& asking, const Served& se
 
 }  // namespace
 
-int run(ViewerOptions o) {
-  log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
+Result<int> run(ViewerOptions o) {
+  const auto access = net::begin_service(o.service, {net::Role::kViewer, net::Role::kOperator});
   net::keep_freed_memory();
-  if (const Status s = settle(o); !s) return refuse(s.error());
-  const auto access = net::access_of(o.service, {net::Role::kViewer, net::Role::kOperator});
-  if (!access) return refuse(access.error());
+  if (const Status s = settle(o); !s) return s.error();
+  if (!access) return access.error();
   // Whoever may change the session for everyone may do so at a window, too.
   const auto asking = net::access_of(o.service, net::asking_roles());
-  if (!asking) return refuse(asking.error());
+  if (!asking) return asking.error();
   const auto poses = open_poses(o);
-  if (!poses) return refuse(poses.error());
+  if (!poses) return poses.error();
   auto display = open_display(o, *asking, *poses);  // before the renderers, whose contexts may depend on the window's
-  if (!display) return refuse(display.error());
+  if (!display) return display.error();
   auto renderers = open_renderers(o);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
-  if (!record) return refuse(record.error());
+  if (!record) return record.error();
 
   const Served served = serve(o, *access, *display, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});

@@ -7,6 +7,6 @@ namespace telesplat::viewer {
 
 /// Exit code: 0 done, 1 failed while running (with end_session: also if the session ended before anything was shown), 2
 /// bad usage or input. A signal ends it within 2 s: recorded frames that are not pictures by then stay in OUT/spool.
-int run(ViewerOptions options);
+Result<int> run(ViewerOptions options);
 
 }  // namespace telesplat::viewer

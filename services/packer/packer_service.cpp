@@ -292,21 +292,13 @@ class PackerService {
 
 }  // namespace
 
-int run(const PackerOptions& o) {
-  log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
+Result<int> run(const PackerOptions& o) {
+  const auto access = net::begin_service(o.service, {net::Role::kPacker}, true);
+  if (!access) return access.error();
   net::keep_freed_memory();
-  const auto access = net::access_of(o.service, {net::Role::kPacker}, true);
-  if (!access) {
-    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
-    return 2;
-  }
   net::Context context(*access);
   PackerService service(o, context);
-  if (const Status s = service.open(context); !s) {
-    log::error("{}", s.error().text);
-    return 2;
-  }
+  if (const Status s = service.open(context); !s) return s.error();
   return service.serve();
 }
 
