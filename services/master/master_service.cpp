@@ -139,7 +139,7 @@ class MasterService {
                                .version = version(),
                                .begin = record_->begin(),
                                .end_unix_ns = metrics::begin_now().unix_ns,
-                               .settings = core_.settings(),
+                               .settings = wire::numbers_of(core_.settings()),
                                .label = options_.label};
     // It is among the files that finish() tells of.
     if (const Status s = record_->write_file("session.toml", session_text(options_, core_, about, processes)); !s)

@@ -114,8 +114,7 @@ void set_defaults(const Read& read, TuneSubject& out) {
   d.tile_px = int(read.number("--tile-size", 256));
   d.update_rate_hz = read.number("--update-rate", 0);
   if (d.update_rate_hz <= 0) d.update_rate_hz = viewer::RequestOptions{}.max_rate_hz;  // what a run's viewers take then
-  const int depth = int(read.number("--octree-depth", 0));
-  d.octree_depth = depth > 0 ? depth : scene::policy_of(out.kind).octree_depth;
+  d.octree_depth = int(read.number("--octree-depth", double(master::MasterOptions{}.octree_depth)));
   const std::string sampling = read.text("--sampling-size");
   int width = 0, height = 0;
   TuneCosts& c = out.base;
