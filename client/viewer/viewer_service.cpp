@@ -224,7 +224,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const Display& d
                                       .requests = requests,
                                       .least_sampling = o.least_sampling,
                                       .facts = facts(o, renderers),
-                                      .received = {.epoch_patience_s = o.epoch_patience_s, .in_step = in_step(o)},
+                                      .received = {.in_step = in_step(o)},
                                       .record = &record,
                                       .poses = display.poses,
                                       .started_s = o.started_s};

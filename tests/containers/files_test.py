@@ -168,6 +168,15 @@ class Files(unittest.TestCase):
             for flag in re.findall(r'"(--[a-z-]+)"', line):
                 self.assertIn(flag, known["telesplat-health"])
 
+    def test_flags_are_those_of_the_programs(self):
+        sources = [f for folder in ("services", "client", "common", "tools") for f in (ROOT / folder).rglob("*.cpp")]
+        known = {flag for file in sources for flag in re.findall(r'"!?(--[a-z-]+)', file.read_text())}
+        for _, _, service in self.each():
+            text = re.sub(r"\$\{[^}]*\}", " ", " ".join(words(service)))
+            self.assertLessEqual(set(re.findall(r"--[a-z-]+", text)), known, image_of(service))
+        for line in re.findall(r'HEALTHCHECK.*', (COMPOSE / "Dockerfile").read_text()):
+            self.assertLessEqual(set(re.findall(r'"(--[a-z-]+)"', line)), known)
+
     def test_pages_have_the_order_that_works(self):
         """prepare makes keys with what is in the images, and up needs keys."""
         for page in (COMPOSE / "README.md", COMPOSE / "compose.yaml", ROOT / "docs/deploying.md"):
