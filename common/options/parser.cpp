@@ -151,6 +151,7 @@ Status Parser::Impl::read(const std::string& called, Words words, Told& told) {
   std::vector<Value> values;
   size_t places = 0;
   bool flags = true;
+  Status extra = ok_status();  // told if nothing else is wrong
   for (size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (flags && (word == "-h" || word == "--help")) {
@@ -166,7 +167,7 @@ Status Parser::Impl::read(const std::string& called, Words words, Told& told) {
     } else if (flags && is_flag(word)) {
       if (const Status s = take_flag(called, words, i, values); !s) return s;
     } else if (commands.empty()) {
-      if (const Status s = take(called, word, places++, values); !s) return s;
+      if (Status s = take(called, word, places++, values); extra && !s) extra = std::move(s);
     } else {
       for (Parser& p : commands)
         if (p.impl_->name == word) {
@@ -176,7 +177,9 @@ Status Parser::Impl::read(const std::string& called, Words words, Told& told) {
       return unknown_command(called, word);
     }
   }
-  return commands.empty() ? set_all(called, std::move(values)) : unknown_command(called, {});
+  if (!commands.empty()) return unknown_command(called, {});
+  const Status all = set_all(called, std::move(values));
+  return all ? extra : all;
 }
 
 void Parser::parse_or_exit(const std::string& program, std::vector<std::string> arguments) {

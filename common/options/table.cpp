@@ -25,7 +25,7 @@ Result<T> read_number(const std::string& text, const char* what) {
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
   if (stop == end && error == std::errc::result_out_of_range) return Error{"is too large or too small a number"};
-  if constexpr (std::is_integral_v<T>)  // "20e6" is a whole number, too
+  if constexpr (std::is_same_v<T, uint64_t>)  // counts of points: "20e6"
     if (const auto number = read_number<double>(text, what); error == std::errc() && *stop == 'e' && number)
       if (*number == std::floor(*number) && *number >= 0 &&
           *number < static_cast<double>(std::numeric_limits<T>::max()))

@@ -140,16 +140,14 @@ TEST(ParserDeathTest, HelpEndsWithZeroAndShowsSeldomFlagsOnlyIfAllAreAskedFor) {
   EXPECT_EXIT((dup2(2, 1), parsed({"a", "--help", "all"})), zero, "--seldom number");
 }
 
-TEST(Parser, WholeNumbersMayHaveAnExponent) {
+TEST(Parser, CountsMayHaveAnExponent) {
   uint64_t points = 0;
-  int few = 0;
   Parser parser("about");
-  parser.add({{.flag = "--points", .value = &points, .help = ""}, {.flag = "--few", .value = &few, .help = ""}});
-  EXPECT_TRUE(parser.parse("program", {"--points=20e6", "--few", "2e1"}));
+  parser.add({{.flag = "--points", .value = &points, .help = ""}});
+  EXPECT_TRUE(parser.parse("program", {"--points=20e6"}));
   EXPECT_EQ(points, 20'000'000u);
-  EXPECT_EQ(few, 20);
   for (const char* wrong : {"1.5", "1e-1", "-1e3", "1e99", "e3"})
-    EXPECT_FALSE(parser.parse("program", {fmt::format("--few={}", wrong)})) << wrong;
+    EXPECT_FALSE(parser.parse("program", {fmt::format("--points={}", wrong)})) << wrong;
 }
 
 TEST(Parser, SubCommandsHaveTheirOwnFlags) {
