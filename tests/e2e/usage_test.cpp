@@ -134,6 +134,7 @@ TEST(UsageOfHelp, HelpNamesACommandOrOneOfItsOwn) {
   };
   EXPECT_EQ(said({"help"}), said({"--help"}));
   EXPECT_EQ(said({"help", "run"}), said({"run", "--help"}));
+  EXPECT_EQ(said({"help", "run", "all"}), said({"run", "--help", "all"}));
   EXPECT_EQ(said({"help", "ctl", "clip"}), said({"ctl", "clip", "--help"}));
   EXPECT_NE(said({"--help"}).find("telesplat help COMMAND"), std::string::npos) << "it is told";
   EXPECT_EQ(said({"help", "rnu"}, 2), "telesplat: rnu: no such command of telesplat; did you mean run?\n");
