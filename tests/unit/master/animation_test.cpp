@@ -12,8 +12,8 @@ namespace {
 class Animation : public ::testing::Test {
  protected:
   explicit Animation(MasterOptions o = {.schedule = {.frames_in_flight = 2},
-                                        .progressive = Progressive::kOff,
-                                        .settings = {.steering = false}})
+                                        .settings = {.steering = false},
+                                        .progressive = Progressive::kOff})
       : options(std::move(o)), core(options, {42}, *record) {}
 
   static wire::Hello hello(const std::string& role, uint64_t instance) {
