@@ -62,10 +62,6 @@ Table head_source_table(ViewerOptions& o) {
        .help = "where the head will be when what is asked for arrives: none: where it is; velocity: its pose and its "
                "velocity; kalman: a Kalman filter",
        .limits = Names(tracking::kPredictionNames.begin(), tracking::kPredictionNames.end())},
-      {.flag = "--prediction-horizon",
-       .value = &o.requests.horizon_s,
-       .help = "seconds that views are asked for ahead; 0: the latency of view updates, as it is measured",
-       .limits = Range{0, 2}},
   };
 }
 

@@ -194,11 +194,6 @@ Table coupling_table(ViewerOptions& o) {
            "--coupling async, images: view requests a second at most; 0: 20, 10 for a headset, whose frames must be in "
            "time, and of images --target-fps",
        .limits = Range{0, 1000}},
-      {.flag = "--epoch-patience",
-       .value = &o.epoch_patience_s,
-       .help = "seconds that a changed scene's last picture is kept while the new one is incomplete",
-       .limits = Range{0, 60},
-       .fits = kPoints},
   };
 }
 

@@ -45,8 +45,7 @@ struct ViewerOptions {
   double wall_scale = 1;      ///< of a description: of the screens' pixels, on each axis
   bool swap_barrier = true;   ///< a wall's displays present their frames together
   double update_rate_hz = 0;  ///< view requests a second at most; 0: what suits the display
-  double epoch_patience_s = 0.15;  ///< EpochSwitch
-  double splat_scale = 0;          ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
+  double splat_scale = 0;     ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
   uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
   bool window = false;               ///< show a window instead of running headless

@@ -24,11 +24,6 @@ namespace {
 
 constexpr double kPicturesAfterSignal_s = 1.0, kMasterPatience_s = 2.0;
 
-int refuse(const Error& error) {
-  std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
-  return 2;
-}
-
 int fail(const Error& error) {
   log::error("{}", error.text);
   return 1;
@@ -169,7 +164,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const std::share
                                       .requests = requests,
                                       .least_sampling = o.least_sampling,
                                       .facts = facts(o, renderers),
-                                      .received = {.epoch_patience_s = o.epoch_patience_s, .in_step = in_step(o)},
+                                      .received = {.in_step = in_step(o)},
                                       .record = &record,
                                       .poses = poses,
                                       .started_s = o.started_s};
@@ -230,25 +225,23 @@ int farewell(const ViewerOptions& o, const net::Access& asking, const Served& se
 
 }  // namespace
 
-int run(ViewerOptions o, const Displays& displays) {
-  log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
+Result<int> run(ViewerOptions o, const Displays& displays) {
+  const auto access = net::begin_service(o.service, {net::Role::kViewer, net::Role::kOperator});
   net::keep_freed_memory();
-  if (const Status s = settle(o); !s) return refuse(s.error());
-  const auto access = net::access_of(o.service, {net::Role::kViewer, net::Role::kOperator});
-  if (!access) return refuse(access.error());
+  if (const Status s = settle(o); !s) return s.error();
+  if (!access) return access.error();
   // Whoever may change the session for everyone may do so at a window, too.
   const auto asking = net::access_of(o.service, net::asking_roles());
-  if (!asking) return refuse(asking.error());
+  if (!asking) return asking.error();
   const auto poses = open_poses(o);
-  if (!poses) return refuse(poses.error());
+  if (!poses) return poses.error();
   // Before the renderers, whose contexts may depend on the window's.
   auto surface = open_surface(o, displays, {*asking, *poses, tell});
-  if (!surface) return refuse(surface.error());
+  if (!surface) return surface.error();
   auto renderers = open_renderers(o);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
-  if (!record) return refuse(record.error());
+  if (!record) return record.error();
 
   const Served served = serve(o, *access, *poses, **surface, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
@@ -291,7 +284,7 @@ int viewer_main(int argc, char** argv, const Displays& displays) {
       "telesplat-viewer: caches points, splats them at display rate, headless or in a window, records frames", options,
       table, [&](ViewerOptions o) {
         const OpenDisplay& wanted = o.xr ? displays.headset : displays.window;
-        return has_person(o) && !wanted ? become_display_program(argv) : run(std::move(o), displays);
+        return has_person(o) && !wanted ? Result<int>(become_display_program(argv)) : run(std::move(o), displays);
       });
 }
 

@@ -37,7 +37,7 @@ int become_display_program(char** argv);
 
 /// Exit code: 0 done, 1 failed while running (with end_session: also if the session ended before anything was shown), 2
 /// bad usage or input. A signal ends it within 2 s: recorded frames that are not pictures by then stay in OUT/spool.
-int run(ViewerOptions options, const Displays& displays = {});
+Result<int> run(ViewerOptions options, const Displays& displays = {});
 
 /// telesplat-viewer and telesplat-display: the same flags, and one name for people and records.
 int viewer_main(int argc, char** argv, const Displays& displays);

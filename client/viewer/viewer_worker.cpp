@@ -203,13 +203,12 @@ void ViewerWorker::follow_session() {
   const scene::SessionView view(session);
   follow_record(session);
   legends_.follow(session);
-  const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
-  requester_.set_min_scale(options_.least_sampling.value_or(told));
-  follow_coupling(view);
+  requester_.set_min_scale(options_.least_sampling.value_or(session.settings.least_sampling));
+  follow_coupling(session.settings);
   follow_pictures(view);
   if (std::exchange(session_epoch_, session.epoch) != session.epoch)
     requester_.on_new_epoch(to_master_s(monotonic_s()));
-  requester_.set_steered(view.setting("sampling.steering", 0) != 0);
+  requester_.set_steered(session.settings.steering);
   if (std::exchange(master_, session.master) != session.master) {
     all_again_ = true;  // it knows nothing of what was asked for
     if (received_) received_->on_new_master();
@@ -238,11 +237,9 @@ void ViewerWorker::follow_session() {
 }
 
 // What `telesplat ctl coupling` wishes; a master that wishes nothing leaves it as it is.
-void ViewerWorker::follow_coupling(const scene::SessionView& session) {
-  const double mode = session.setting("viewer.coupling", -1);
-  if (mode < 0) return;
-  const auto told = coupling_told(mode, session.setting("viewer.buffers", 0));
-  if (!told) return log::warn("the session's coupling {} is none: it stays {}", mode, coupling_text(gate_.state()));
+void ViewerWorker::follow_coupling(const wire::SessionSettings& session) {
+  const auto told = coupling_told(session.coupling, session.buffers);
+  if (!told) return;
   if (told == wished_) return;
   wished_ = *told != gate_.state() ? told : std::nullopt;
   wished_since_s_ = monotonic_s();
@@ -431,10 +428,10 @@ void ViewerWorker::request_views(double now_s) {
 
 // Once: the master samples it coarser than it was asked for.
 void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
-  const double most = scene::value_or(link_.session()->settings, "sampling.max_pixels", 0.0);
-  const double pixels = double(camera.width) * double(camera.height);
-  if (most <= 0 || pixels <= most || std::exchange(told_coarser_, true)) return;
-  log::warn("views of {}x{} pixels are sampled coarser: the master's --max-sampling-pixels is {:.0f}", camera.width,
+  const uint64_t most = link_.session()->settings.max_sampling_pixels;
+  const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
+  if (pixels <= most || std::exchange(told_coarser_, true)) return;
+  log::warn("views of {}x{} pixels are sampled coarser: the master's --max-sampling-pixels is {}", camera.width,
             camera.height, most);
 }
 

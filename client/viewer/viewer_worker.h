@@ -29,8 +29,7 @@ class ViewerWorker {
   struct Options {
     net::ServiceOptions service;
     RequestOptions requests;  ///< buffers are the gate's, as it begins
-    /// RequestOptions::min_scale. Nothing: the session's setting "viewer.least_sampling"; without that:
-    /// requests.min_scale.
+    /// RequestOptions::min_scale. Nothing: the session's setting least_sampling.
     std::optional<double> least_sampling;
     std::map<std::string, std::string> facts;  ///< for the hello
     ReceivedOptions received;                  ///< its recorders are the record's
@@ -102,7 +101,7 @@ class ViewerWorker {
   void renew(InstanceId instance);
   void follow_session();
   void follow_record(const wire::Welcome& session);
-  void follow_coupling(const scene::SessionView& session);
+  void follow_coupling(const wire::SessionSettings& session);
   void follow_pictures(const scene::SessionView& session);
   void follow_depth(const metrics::StagesMs& stages, uint64_t ahead);
   void change_coupling(double now_s);

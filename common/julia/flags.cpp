@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 
 namespace telesplat::julia {
@@ -85,9 +84,6 @@ options::Table scene_table(SceneOptions& o) {
   for (const auto& p : presets()) names.push_back(p.name);
   options::Table table{
       {.flag = "--preset", .value = &o.preset, .help = fmt::format("{}; default: {}", joined(names), names.front())},
-      {.flag = "--list-presets",
-       .value = options::Action{[] { std::fputs(describe_presets().c_str(), stdout); }},
-       .help = "tell the presets' constants and end"},
       {.flag = "--c", .value = &o.c, .help = "the constant: i,j,k,real, each -4..4"},
       {.flag = "--animate",
        .value = &o.animate,

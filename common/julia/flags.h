@@ -29,7 +29,7 @@ struct SceneOptions {
   bool any() const;     ///< something was given that only a Julia set takes
 };
 
-/// --preset, --c, --animate, --list-presets and one flag a parameter: --c.x, --iterations, ..., limits in their help.
+/// --preset, --c, --animate and one flag a parameter: --c.x, --iterations, ..., limits in their help.
 options::Table scene_table(SceneOptions& options);
 
 struct Scene {

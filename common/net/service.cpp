@@ -8,10 +8,11 @@
 
 #include <atomic>
 #include <csignal>
-#include <cstdio>
 #include <fstream>
 
+#include "common/core/log.h"
 #include "common/net/master_address.h"
+#include "common/options/complain.h"
 
 namespace telesplat::net {
 namespace {
@@ -130,13 +131,16 @@ Result<Access> access_of(const ServiceOptions& o, const std::vector<Role>& roles
   return access;
 }
 
+Result<Access> begin_service(const ServiceOptions& o, const std::vector<Role>& roles, bool binds) {
+  log::initialise(o.name, o.log_level);
+  install_signal_handlers();
+  return access_of(o, roles, binds);
+}
+
 int settle_master(ServiceOptions& o, bool connects) {
   if (connects) {
     MasterSearch search = find_master(o.master);
-    if (search.address.empty()) {
-      std::fprintf(stderr, "telesplat: %s\n", search.problem.c_str());
-      return search.exit_code();
-    }
+    if (search.address.empty()) return complain({search.problem}, search.exit_code());
     o.master = std::move(search.address);
     if (o.keys.empty()) o.keys = std::move(search.keys);
   }
@@ -220,8 +224,7 @@ int guarded_main(const std::function<int()>& body) {
   try {
     return body();
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "telesplat: %s\n", e.what());
-    return 1;
+    return complain({e.what()}, 1);
   }
 }
 

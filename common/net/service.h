@@ -50,6 +50,9 @@ options::Row give_up_row(double& after_s);
 /// value.
 Result<Access> access_of(const ServiceOptions& options, const std::vector<Role>& roles, bool binds = false);
 
+/// What every service begins with: its log, SIGINT and SIGTERM that set a flag, and its access, as access_of() has it.
+Result<Access> begin_service(const ServiceOptions& options, const std::vector<Role>& roles, bool binds = false);
+
 /// Finds the session that --master auto means, and the keys that it runs with. connects: the program has a master.
 /// Returns 0, or writes to stderr why no master is found and returns the exit code.
 int settle_master(ServiceOptions& options, bool connects);

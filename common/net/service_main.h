@@ -3,12 +3,13 @@
 
 #include "common/core/version.h"
 #include "common/net/service.h"
+#include "common/options/complain.h"
 #include "common/options/parser.h"
 
 namespace telesplat::net {
 
-/// table(options) has a row a flag; run(options) serves and returns the exit code. Bad usage exits 2; exceptions that
-/// escape become one line and exit code 1.
+/// table(options) has a row a flag; run(options) serves and returns the exit code (Result<int>). Its error, and bad
+/// usage, become one line and exit code 2; exceptions that escape one line and exit code 1.
 template <class Options>
 int service_main(int argc, char** argv, const char* about, Options options,
                  telesplat::options::Table (*table)(Options&), auto run) {
@@ -21,7 +22,8 @@ int service_main(int argc, char** argv, const char* about, Options options,
     parser.parse_or_exit(argv[0], {argv + 1, argv + argc});
     const bool connects = telesplat::options::find(table(options), "--master") != nullptr;
     if (const int code = settle_master(options.service, connects)) return code;
-    return run(options);
+    const Result<int> code = run(options);
+    return code ? *code : complain(code.error());
   });
 }
 

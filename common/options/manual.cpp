@@ -49,16 +49,47 @@ std::string type_word(const Row& row) {
   return row.is_file ? "file" : "text";
 }
 
-std::string entry(const Row& row) {
-  std::string head;
-  for (const auto& name : names_of(row)) head += fmt::format("{}\\fB{}\\fR", head.empty() ? "" : ", ", roff(name));
-  if (!is_positional(row) && takes_value(row)) head += fmt::format(" \\fI{}\\fR", type_word(row));
+// Its help, what it may be, and what it is anyway.
+std::string described(const Row& row) {
   std::string text = row.help;
   if (const std::string values = values_text(row); !values.empty()) text += fmt::format(" ({})", values);
   const std::string usual = row.default_text.empty() ? text_of(row) : row.default_text;
   if (takes_value(row) && !usual.empty()) text += fmt::format(". Default: {}", usual);
   if (!row.environment.empty()) text += fmt::format(", or ${}", row.environment);
-  return fmt::format(".TP\n{}\n{}.\n", head, roff(text));
+  return text + '.';
+}
+
+std::string entry(const Row& row) {
+  std::string head;
+  for (const auto& name : names_of(row)) head += fmt::format("{}\\fB{}\\fR", head.empty() ? "" : ", ", roff(name));
+  if (!is_positional(row) && takes_value(row)) head += fmt::format(" \\fI{}\\fR", type_word(row));
+  return fmt::format(".TP\n{}\n{}\n", head, roff(described(row)));
+}
+
+// A line of --help: what a person types, and beside it, in as many lines as it takes, what it does.
+std::string line(const std::string& typed, const std::string& text) {
+  constexpr size_t kIndent = 28, kWidth = 100;
+  std::string out = "  " + typed;
+  size_t column = out.size() + 2 > kIndent ? kWidth : out.size();
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find_first_of(" \n", at), text.size());
+    if (column + 1 + (end - at) > kWidth) out += '\n', column = 0;
+    const size_t blanks = column < kIndent ? kIndent - column : 1;
+    out += std::string(blanks, ' ') + text.substr(at, end - at);
+    column += blanks + (end - at);
+    at = end + 1;
+  }
+  return out + '\n';
+}
+
+std::string group_of(const Row& row) {
+  return is_positional(row) ? "Arguments" : row.group.empty() ? "Flags" : row.group;
+}
+
+std::string line(const Row& row) {
+  std::string typed = fmt::format("{}", fmt::join(names_of(row), ", "));
+  if (!is_positional(row) && takes_value(row)) typed += ' ' + type_word(row);
+  return line(typed, described(row));
 }
 
 std::string entries(const Table& table, bool positional) {
@@ -99,10 +130,7 @@ std::string sections(const Manual& m) {
 
 }  // namespace
 
-bool takes_value(const Row& row) {
-  if (std::holds_alternative<Action>(row.value)) return false;
-  return !std::holds_alternative<bool*>(row.value) || row.on_off;
-}
+bool takes_value(const Row& row) { return !std::holds_alternative<bool*>(row.value) || row.on_off; }
 
 std::string values_text(const Row& row) {
   if (row.on_off) return "on or off";
@@ -118,6 +146,29 @@ std::string about_text(const Manual& m) {
   while (out.ends_with('.')) out.pop_back();
   if (!out.empty()) out[0] = char(std::tolower(static_cast<unsigned char>(out[0])));
   return out;
+}
+
+std::string help_text(const Manual& m, bool all) {
+  const auto lacks = [&](const Row& row) { return row.seldom && !all; };
+  std::string out = fmt::format("{}\n\nUsage: {}", m.about, m.name);
+  std::vector<std::string> groups;
+  for (const Row& row : m.table)
+    if (const std::string group = group_of(row);
+        !lacks(row) && std::find(groups.begin(), groups.end(), group) == groups.end())
+      groups.push_back(group);
+  if (!m.table.empty()) out += " [FLAGS]";
+  for (const Row& row : m.table)
+    if (is_positional(row)) out += row.required ? " " + name_of(row) : " [" + name_of(row) + "]";
+  out += m.commands.empty() ? "\n" : " COMMAND\n\nCommands:\n";
+  for (const Manual& c : m.commands) out += line(c.name.substr(c.name.rfind(' ') + 1), c.about);
+  for (const std::string& group : groups) {
+    out += fmt::format("\n{}:\n", group);
+    for (const Row& row : m.table)
+      if (group_of(row) == group && !lacks(row)) out += line(row);
+  }
+  if (const auto hidden = std::count_if(m.table.begin(), m.table.end(), lacks))
+    out += fmt::format("\n{} more flags: {} --help all\n", hidden, m.name);
+  return m.footer.empty() ? out : fmt::format("{}\n{}\n", out, m.footer);
 }
 
 std::string man_page(const Manual& m, const std::string& version, bool separate) {

@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
-#include <iostream>
 #include <span>
 
 #include "common/core/utf8.h"
@@ -15,115 +13,64 @@
 #include "common/options/suggest.h"
 
 namespace telesplat::options {
-
-struct Parser::Impl {
-  Impl(CLI::App& a, std::string n) : name(std::move(n)), app(&a) {}
-  explicit Impl(const std::string& about) : own(std::make_unique<CLI::App>(about)), app(own.get()) {
-    // The command line wins over a scene file, whose flags come first.
-    app->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-  }
-  std::string name;  // of a command
-  std::unique_ptr<CLI::App> own;
-  CLI::App* app;
-  Table table;
-  std::string version;
-  std::deque<Parser> commands;
-  std::vector<std::pair<std::string, CLI::Option*>> options;  // by the row's name
-
-  Manual manual(const std::string& called) const;
-  Status refuse_unknown(const std::string& called, std::span<const std::string> arguments, std::string& command) const;
-  Status unknown_flag(const std::string& called, const std::string& flag) const;
-  Status unknown_command(const std::string& called, const std::string& name) const;
-  Status read(const std::string& called, std::vector<std::string> arguments, std::ostream& told, bool& ends);
-};
-
 namespace {
 
-// CLI11 converts nothing: rows read their text, with their own limits.
-void throw_if_wrong(const Row& row, const std::string& text) {
-  if (const Status s = set(row, text); !s) throw CLI::ValidationError(s.error().text);
-}
-
-std::string type_name(const Row& row) {
-  if (const auto* names = std::get_if<Names>(&row.limits)) return fmt::format("{{{}}}", fmt::join(*names, ","));
-  std::string type = "TEXT";
-  if (std::holds_alternative<int*>(row.value) || std::holds_alternative<std::optional<int>*>(row.value)) type = "INT";
-  if (std::holds_alternative<uint64_t*>(row.value)) type = "UINT";
-  if (std::holds_alternative<double*>(row.value) || std::holds_alternative<std::optional<double>*>(row.value))
-    type = "FLOAT";
-  if (row.on_off) type = "{on,off}";
-  if (const auto* range = std::get_if<Range>(&row.limits))
-    return fmt::format("{} in [{} - {}]", type, number_text(range->least), number_text(range->most));
-  return type;
-}
+using Words = std::span<const std::string>;
 
 // A negative number is no flag.
 bool is_number(const std::string& word) {
   return word.find_first_not_of("-+.,:0123456789eE%") == word.npos && word.find_first_of("0123456789") != word.npos;
 }
+bool is_flag(const std::string& word) { return word.size() > 1 && word.starts_with("-") && !is_number(word); }
 
 std::string shown(const std::string& word) { return word.empty() ? "\"\"" : to_utf8(word.substr(0, 200)); }
 
-std::ostream& discarded() {
-  static std::ostream nowhere(nullptr);
-  return nowhere;
-}
-
-CLI::Option* add_row(CLI::App& app, const Row& row) {
-  if (const auto* action = std::get_if<Action>(&row.value))
-    return app.add_flag_callback(
-        row.flag,
-        [act = action->act] {
-          act();
-          throw CLI::Success();
-        },
-        row.help);
-  if (auto* const* flag = std::get_if<bool*>(&row.value); flag && !row.on_off)
-    return app.add_flag_callback(
-        name_of(row), [row] { throw_if_wrong(row, "true"); }, row.help);
-  if (auto* const* many = std::get_if<std::vector<std::string>*>(&row.value)) {
-    auto* option = app.add_option(row.flag, **many, row.help)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    // Of a flag that is given several times each takes one value: what follows is an argument.
-    return row.flag.starts_with("-") ? option->allow_extra_args(false) : option;
-  }
-  auto* option = app.add_option_function<std::string>(
-      row.flag, [row](const std::string& text) { throw_if_wrong(row, text); }, row.help);
-  option->type_name(type_name(row));
-  const std::string usual = row.default_text.empty() ? text_of(row) : row.default_text;
-  if (!usual.empty()) option->default_str(usual);
-  return option;
-}
+bool takes_several(const Row& row) { return std::holds_alternative<std::vector<std::string>*>(row.value); }
 
 }  // namespace
 
-Parser::Parser(const std::string& about) : impl_(std::make_unique<Impl>(about)) {}
-Parser::Parser(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+struct Parser::Impl {
+  std::string name, about, end, version;
+  Table table;
+  std::deque<Parser> commands;
+  bool chosen = false;
+  Given given;
+
+  // What is to be printed instead of going on.
+  struct Told {
+    std::string text;
+  };
+  struct Value {
+    const Row* row;
+    std::string text;
+  };
+
+  Manual manual(const std::string& called) const;
+  Status unknown_flag(const std::string& called, const std::string& flag) const;
+  Status unknown_command(const std::string& called, const std::string& word) const;
+  Status take(const std::string& called, const std::string& word, size_t places, std::vector<Value>& values) const;
+  Status take_flag(const std::string& called, Words words, size_t& at, std::vector<Value>& values) const;
+  Status set_all(const std::string& called, std::vector<Value> values);
+  Status read(const std::string& called, Words words, Told& told);
+};
+
+Parser::Parser(const std::string& about) : impl_(std::make_unique<Impl>()) { impl_->about = about; }
 Parser::~Parser() = default;
 Parser::Parser(Parser&&) noexcept = default;
 
-void Parser::add(const Table& table) {
-  for (const Row& row : table) {
-    auto* option = add_row(*impl_->app, row);
-    if (!row.group.empty()) option->group(row.group);
-    if (row.required) option->required();
-    if (!row.environment.empty()) option->envname(row.environment);
-    impl_->options.emplace_back(name_of(row), option);
-    impl_->table.push_back(row);
-  }
-}
+void Parser::add(const Table& table) { impl_->table = joined(std::move(impl_->table), table); }
 
 Parser& Parser::command(const std::string& name, const std::string& about) {
-  impl_->app->require_subcommand(1);
-  impl_->commands.push_back(Parser(std::make_unique<Impl>(*impl_->app->add_subcommand(name, about), name)));
+  impl_->commands.emplace_back(about).impl_->name = name;
   return impl_->commands.back();
 }
 
-void Parser::footer(const std::string& text) { impl_->app->footer(text); }
+void Parser::footer(const std::string& text) { impl_->end = text; }
 
 void Parser::version(const std::string& text) { impl_->version = text; }
 
 Manual Parser::Impl::manual(const std::string& called) const {
-  Manual out{called, app->get_description(), table, app->get_footer(), {}};
+  Manual out{called, about, table, end, {}};
   for (const Parser& p : commands) out.commands.push_back(p.impl_->manual(called + " " + p.impl_->name));
   return out;
 }
@@ -149,94 +96,114 @@ Status Parser::Impl::unknown_command(const std::string& called, const std::strin
                            meant.empty() ? fmt::format(", which has {}", all) : meant)};
 }
 
-// CLI11 counts a misspelt flag's value among what is wrong, and does not name the flag. command: the one that was
-// chosen, with the program's name.
-Status Parser::Impl::refuse_unknown(const std::string& called, std::span<const std::string> arguments,
-                                    std::string& command) const {
-  command = called;
-  for (size_t i = 0; i < arguments.size(); ++i) {
-    const std::string& word = arguments[i];
-    if (word == "--" || word == "-h" || word == "--help" || (word == "--version" && !version.empty()))
-      return ok_status();  // CLI11 has the rest
-    if (word.starts_with("-") && !is_number(word) && word != "-") {
-      const size_t equals = word.find('=');
-      const Row* row = find(table, word.substr(0, equals));
-      if (!row && word.size() > 2 && word[1] != '-') row = find(table, word.substr(0, 2));  // "-s4"
-      if (!row) return unknown_flag(called, word.substr(0, equals));
-      if (takes_value(*row) && equals == word.npos) ++i;
-    } else if (!commands.empty()) {
-      for (const Parser& p : commands)
-        if (p.impl_->name == word)
-          return p.impl_->refuse_unknown(fmt::format("{} {}", called, word), arguments.subspan(i + 1), command);
-      return unknown_command(called, word);
-    }
+// An argument by its place, of which there were `places`.
+Status Parser::Impl::take(const std::string& called, const std::string& word, size_t places,
+                          std::vector<Value>& values) const {
+  for (const Row& row : table) {
+    if (name_of(row).starts_with("-")) continue;
+    if (places > 0 && !takes_several(row) && places--) continue;
+    values.push_back({&row, word});
+    return ok_status();
   }
-  return commands.empty() ? ok_status() : unknown_command(called, {});
+  return Error{fmt::format("{}: {} takes no more arguments", shown(word), called)};
 }
 
-// ends: help or the like was asked for, and told.
-Status Parser::Impl::read(const std::string& called, std::vector<std::string> arguments, std::ostream& told,
-                          bool& ends) {
-  std::string command;
-  if (const Status s = refuse_unknown(called, arguments, command); !s) return s;
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
-  try {
-    app->parse(std::move(arguments));
-  } catch (const CLI::ExtrasError&) {
-    return Error{fmt::format("{}: {} takes no more arguments", shown(app->remaining(true).front()), command)};
-  } catch (const CLI::RequiredError& e) {
-    const std::string_view what = e.what();
-    return Error{
-        fmt::format("{} needs {}; {} --help tells what that is", command, what.substr(0, what.find(' ')), command)};
-  } catch (const CLI::ArgumentMismatch& e) {
-    const std::string_view what = e.what();
-    return Error{fmt::format("{}: its value is missing", what.substr(0, what.find(':')))};
-  } catch (const CLI::ParseError& e) {
-    if (app->exit(e, told, discarded()) != 0) return Error{e.what()};
-    ends = true;
+// at: of the flag, and then of the last word that belongs to it.
+Status Parser::Impl::take_flag(const std::string& called, Words words, size_t& at, std::vector<Value>& values) const {
+  const std::string& word = words[at];
+  size_t end = word.find('=');
+  std::string name = word.substr(0, end);
+  const Row* row = find(table, name);
+  if (!row && word[1] != '-') row = find(table, name = word.substr(0, end = 2));  // "-s4"
+  if (!row) return unknown_flag(called, word.substr(0, word.find('=')));
+  const bool attached = end < word.size();
+  if (!takes_value(*row)) {
+    values.push_back({row, "true"});
+    return attached ? Status(Error{fmt::format("{}: takes no value", name)}) : ok_status();
+  }
+  if (!attached && at + 1 == words.size()) return Error{fmt::format("{}: its value is missing", name)};
+  values.push_back({row, attached ? word.substr(end + (word[end] == '=' ? 1 : 0)) : words[++at]});
+  return ok_status();
+}
+
+// The last value of each counts: flags of a scene file come before those of the command line.
+Status Parser::Impl::set_all(const std::string& called, std::vector<Value> values) {
+  for (const Row& row : table) {
+    const auto is_its = [&](const Value& v) { return v.row == &row; };
+    const char* const usual = row.environment.empty() ? nullptr : std::getenv(row.environment.c_str());
+    if (std::none_of(values.begin(), values.end(), is_its)) {
+      if (row.required) return Error{fmt::format("{0} needs {1}; {0} --help tells what that is", called, name_of(row))};
+      if (!usual || !*usual) continue;
+      values.push_back({&row, usual});
+    }
+    given.push_back(name_of(row));
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (!is_its(values[i])) continue;
+      if (!takes_several(row) && std::any_of(values.begin() + ptrdiff_t(i) + 1, values.end(), is_its)) continue;
+      if (const Status s = set(row, values[i].text); !s) return s;
+    }
   }
   return ok_status();
 }
 
+Status Parser::Impl::read(const std::string& called, Words words, Told& told) {
+  chosen = true;
+  std::vector<Value> values;
+  size_t places = 0;
+  bool flags = true;
+  Status extra = ok_status();  // told if nothing else is wrong
+  for (size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (flags && (word == "-h" || word == "--help")) {
+      told.text = help_text(manual(called), i + 1 < words.size() && words[i + 1] == "all");
+      return ok_status();
+    }
+    if (flags && word == "--version" && !version.empty()) {
+      told.text = fmt::format("{} {}\n", called, version);
+      return ok_status();
+    }
+    if (flags && word == "--") {
+      flags = false;
+    } else if (flags && is_flag(word)) {
+      if (const Status s = take_flag(called, words, i, values); !s) return s;
+    } else if (commands.empty()) {
+      if (Status s = take(called, word, places++, values); extra && !s) extra = std::move(s);
+    } else {
+      for (Parser& p : commands)
+        if (p.impl_->name == word) {
+          if (const Status s = set_all(called, std::move(values)); !s) return s;
+          return p.impl_->read(fmt::format("{} {}", called, word), words.subspan(i + 1), told);
+        }
+      return unknown_command(called, word);
+    }
+  }
+  if (!commands.empty()) return unknown_command(called, {});
+  const Status all = set_all(called, std::move(values));
+  return all ? extra : all;
+}
+
 void Parser::parse_or_exit(const std::string& program, std::vector<std::string> arguments) {
-  auto& app = *impl_->app;
   const std::string name = program.substr(program.rfind('/') + 1);
-  const auto refuse = [&](const std::string& why) {
-    std::fputs(fmt::format("{}: {}\n", name, why).c_str(), stderr);
+  Impl::Told told;
+  if (!impl_->version.empty() && arguments == std::vector<std::string>{"--man"})
+    told.text = man_page(impl_->manual(name), impl_->version, true);
+  else if (const Status s = impl_->read(name, arguments, told); !s) {
+    std::fputs(fmt::format("{}: {}\n", name, s.error().text).c_str(), stderr);
     std::exit(2);
-  };
-  if (app.get_name().empty()) app.name(name);
-  if (!impl_->version.empty()) {
-    const std::string told = fmt::format("{} {}", name, impl_->version);
-    app.set_version_flag("--version", told, "Print which version this is and exit");
   }
-  if (!impl_->version.empty() && arguments == std::vector<std::string>{"--man"}) {
-    std::fputs(man_page(impl_->manual(name), impl_->version, true).c_str(), stdout);
-    std::exit(0);
-  }
-  bool ends = false;
-  if (const Status s = impl_->read(name, std::move(arguments), std::cout, ends); !s) refuse(s.error().text);
-  if (ends) std::exit(0);
+  if (told.text.empty()) return;
+  std::fputs(told.text.c_str(), stdout);
+  std::exit(0);
 }
 
 Status Parser::parse(const std::string& called, std::vector<std::string> arguments) {
-  for (const Row& row : impl_->table)
-    if (std::holds_alternative<Action>(row.value))
-      for (const std::string& name : names_of(row))
-        if (std::find(arguments.begin(), arguments.end(), name) != arguments.end())
-          return Error{fmt::format("{}: tells something and ends {}", name, called)};
-  bool ends = false;
-  if (const Status s = impl_->read(called, std::move(arguments), discarded(), ends); !s) return s;
-  return ends ? Status(Error{fmt::format("--help: is of {} alone", called)}) : ok_status();
+  Impl::Told told;
+  if (const Status s = impl_->read(called, arguments, told); !s) return s;
+  return told.text.empty() ? ok_status() : Status(Error{fmt::format("--help: is of {} alone", called)});
 }
 
-bool Parser::chosen() const { return impl_->app->parsed(); }
+bool Parser::chosen() const { return impl_->chosen; }
 
-Given Parser::given() const {
-  Given out;
-  for (const auto& [name, option] : impl_->options)
-    if (option->count() > 0) out.push_back(name);
-  return out;
-}
+Given Parser::given() const { return impl_->given; }
 
 }  // namespace telesplat::options

@@ -1,4 +1,4 @@
-// Tables of flags as a command line. The one place that knows CLI11.
+// Tables of flags as a command line.
 #pragma once
 
 #include <memory>
@@ -25,8 +25,8 @@ class Parser {
   /// Without it there are no such flags.
   void version(const std::string& text);
 
-  /// --help prints and exits 0, bad usage prints "PROGRAM: what is wrong" in one line and exits 2. program: its name,
-  /// which may have a path in front. arguments: without it.
+  /// --help prints and exits 0 (--help all: what few need, too), bad usage prints "PROGRAM: what is wrong" in one line
+  /// and exits 2. program: its name, which may have a path in front. arguments: without it.
   void parse_or_exit(const std::string& program, std::vector<std::string> arguments);
 
   /// The same for words that a program was given for later: nothing is printed, and the program goes on. called: what a
@@ -39,7 +39,6 @@ class Parser {
 
  private:
   struct Impl;
-  explicit Parser(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 
 #include "common/core/utf8.h"
 #include "common/options/suggest.h"
@@ -24,6 +25,11 @@ Result<T> read_number(const std::string& text, const char* what) {
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
   if (stop == end && error == std::errc::result_out_of_range) return Error{"is too large or too small a number"};
+  if constexpr (std::is_same_v<T, uint64_t>)  // counts of points: "20e6"
+    if (const auto number = read_number<double>(text, what); error == std::errc() && *stop == 'e' && number)
+      if (*number == std::floor(*number) && *number >= 0 &&
+          *number < static_cast<double>(std::numeric_limits<T>::max()))
+        return static_cast<T>(*number);
   if (error != std::errc() || stop != end) return Error{fmt::format("is not {}", what)};
   return value;
 }
@@ -74,7 +80,6 @@ struct Reader {
     return ok_status();
   }
   Status operator()(const Text& v) const { return v.read(text); }
-  Status operator()(const Action&) const { return Error{"takes no value"}; }
 };
 
 struct Writer {
@@ -91,7 +96,6 @@ struct Writer {
   std::string operator()(const std::optional<int>* v) const { return *v ? std::to_string(**v) : std::string(); }
   std::string operator()(const std::vector<std::string>* v) const { return fmt::format("{}", fmt::join(*v, ",")); }
   std::string operator()(const Text& v) const { return v.write(); }
-  std::string operator()(const Action&) const { return {}; }
 };
 
 bool clears(const Row& row) { return row.flag.starts_with("!"); }
@@ -204,7 +208,7 @@ Status check(const Row& row, const std::string& text) {
 std::vector<std::string> arguments(const Table& table, const Table& defaults) {
   std::vector<std::string> out;
   for (const Row& row : table) {
-    if (row.reach == Reach::kHere || std::holds_alternative<Action>(row.value)) continue;
+    if (row.reach == Reach::kHere) continue;
     const std::string name = name_of(row), value = text_of(row);
     const Row* usual = find(defaults, name);
     if (usual && text_of(*usual) == value) continue;

@@ -23,16 +23,11 @@ struct Text {
   std::function<std::string()> write;
 };
 
-/// Takes no value: does something (prints a list) and ends the program with exit code 0.
-struct Action {
-  std::function<void()> act;
-};
-
 /// Where the value lies; pointers are into the struct that the table was made for. An empty optional was not given. A
 /// bool is a flag that is there or not ("!--no-cache": it sets false), or a switch that takes on or off if its row says
 /// so.
 using Value = std::variant<bool*, int*, uint64_t*, double*, std::string*, std::optional<double>*, std::optional<int>*,
-                           std::vector<std::string>*, Text, Action>;
+                           std::vector<std::string>*, Text>;
 
 /// least <= value <= most; NaN is neither.
 struct Range {
@@ -57,6 +52,7 @@ struct Row {
   scene::Kinds fits = scene::Kinds::all();  ///< of another kind of scene the flag is refused
   Reach reach = Reach::kChild;
   std::string group = {};         ///< heading in --help
+  bool seldom = false;            ///< few need it: --help all shows it, --help does not
   std::string default_text = {};  ///< in --help, where the value itself does not tell
   bool on_off = false;            ///< of a bool: takes on or off
   bool is_file = false;           ///< a file, beside the scene file that names it

@@ -47,10 +47,7 @@ Pipeline pipeline_of(Kind kind);
 /// What a session does with a kind of scene unless told otherwise. The master tells everyone, so that sessions in
 /// containers and those of `telesplat run` agree.
 struct Policy {
-  int octree_depth;       ///< levels of the point model's octree
-  bool keep_redundant;    ///< the packer packs what the model already shows, viewers draw the best patches
   bool progressive;       ///< a view arrives with every 4th pixel of every 4th row first
-  double max_points;      ///< that the model holds
   double least_sampling;  ///< sampled pixels a displayed pixel, on each axis, at least
 };
 const Policy& policy_of(Kind kind);

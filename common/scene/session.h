@@ -15,9 +15,6 @@ V value_or(const std::map<std::string, V>& map, const std::string& key, V fallba
   return found == map.end() ? fallback : found->second;
 }
 
-/// Setting: JPEG quality of the pictures that views come as, 1 to 100; 0, or not there: they come as the kind has it.
-inline constexpr const char* kPictureQuality = "picture.quality";
-
 /// Looks into a welcome; holds a reference to it.
 class SessionView {
  public:
@@ -30,12 +27,12 @@ class SessionView {
     const auto k = kind();
     if (!k) return std::nullopt;
     const Pipeline usual = pipeline_of(*k);
-    return usual == Pipeline::kPoints && setting(kPictureQuality, 0) > 0 ? Pipeline::kPictures : usual;
+    return usual == Pipeline::kPoints && session_.settings.pictures ? Pipeline::kPictures : usual;
   }
   std::string fact(const std::string& name) const { return value_or(session_.facts, name, std::string()); }
   /// Empty if nobody serves it.
   std::string endpoint(const std::string& name) const { return value_or(session_.endpoints, name, std::string()); }
-  double setting(const std::string& name, double fallback) const { return value_or(session_.settings, name, fallback); }
+  const wire::SessionSettings& settings() const { return session_.settings; }
   double parameter(const std::string& name, double fallback) const {
     return value_or(session_.parameters, name, fallback);
   }

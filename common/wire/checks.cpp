@@ -54,7 +54,33 @@ std::optional<Error> check_slab(uint64_t slab, uint64_t slabs, uint64_t begin, u
   return check_slices(begin, end);
 }
 
+// NaN is within nothing.
+struct Setting {
+  const char* name;
+  double value, least, most;
+};
+
 }  // namespace
+
+std::optional<Error> check(const Welcome& m) {
+  const SessionSettings& s = m.settings;
+  for (const Setting& row : {Setting{"max_points", double(s.max_points), 0, 1e12},
+                             {"obsolete_after_s", s.obsolete_after_s, 0, 1e12},
+                             {"max_rate_mbit", s.max_rate_mbit, 0, 1e6},
+                             {"view_cell_m", s.view_cell_m, 0, 1e3},
+                             {"validation", double(s.validation), 0, 4096},
+                             {"still_rays", double(s.still_rays), 1, 16},
+                             {"layers", double(s.layers), 1, volume::kMaxLayers},
+                             {"least_sampling", s.least_sampling, 0.01, 1},
+                             {"buffers", double(s.buffers), 1, double(kMaxBuffers)},
+                             {"picture_quality", double(s.picture_quality), 1, 100},
+                             {"picture_samples", double(s.picture_samples), 1, 16},
+                             {"picture_shading", double(s.picture_shading), 0, 2},
+                             {"picture_background", double(s.picture_background), 0, 0xffffff}})
+    if (!(row.value >= row.least && row.value <= row.most))
+      return Error{fmt::format("setting {} is {}, limits {} and {}", row.name, row.value, row.least, row.most)};
+  return std::nullopt;
+}
 
 std::optional<Error> check(const Lease& m) {
   if (auto bad = check_tile(m.camera, m.rect, m.tile, kMaxTiles)) return bad;

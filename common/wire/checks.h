@@ -14,6 +14,7 @@ std::optional<Error> check(const M&) {
   return std::nullopt;
 }
 
+std::optional<Error> check(const Welcome& m);
 std::optional<Error> check(const Lease& m);
 std::optional<Error> check(const PlanRequest& m);
 std::optional<Error> check(const Plan& m);

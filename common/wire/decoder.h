@@ -6,6 +6,7 @@
 #include <msgpack/object_fwd.hpp>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include "common/core/result.h"
 #include "common/wire/fields.h"
@@ -49,6 +50,15 @@ class Decoder {
   void get(const msgpack::object& o, bool& v);
   void get(const msgpack::object& o, uint64_t& v);
   void get(const msgpack::object& o, double& v);
+  /// The field's limit says how many values there are.
+  template <class E>
+  requires std::is_enum_v<E>
+  void get(const msgpack::object& o, E& v) {
+    uint64_t number = 0;
+    get(o, number);
+    if (number >= limit_) return fail("is not one of its values");
+    v = static_cast<E>(number);
+  }
   void get(const msgpack::object& o, std::string& v);
   void get(const msgpack::object& o, std::vector<std::string>& v);
   void get(const msgpack::object& o, std::map<std::string, std::string>& v);

@@ -4,6 +4,7 @@
 #include <concepts>
 #include <map>
 #include <string>
+#include <type_traits>
 
 #include "common/wire/fields.h"
 #include "common/wire/messages.h"
@@ -80,6 +81,9 @@ class Encoder {
   void put(bool v);
   void put(uint64_t v);
   void put(double v);
+  template <class E>
+  requires std::is_enum_v<E>
+  void put(E v) { put(static_cast<uint64_t>(v)); }
   void put(const std::string& v) { put_text(v); }
   void put(const std::vector<std::string>& v);
   void put(const std::map<std::string, std::string>& v);

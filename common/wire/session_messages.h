@@ -40,6 +40,63 @@ struct Hello {
   }
 };
 
+/// What `telesplat ctl coupling` makes of a viewer's coupling.
+enum class CouplingOrder : uint8_t {
+  kOwn,  ///< stays as the viewer began
+  kAsync,
+  kSync,
+  kLoose
+};
+inline constexpr uint64_t kCouplingOrders = 4;
+
+/// How a session runs. The defaults of all of it stand here; checks.cpp has the limits.
+struct SessionSettings {
+  // The point model, and how it travels.
+  bool keep_redundant = false;        ///< packs what the model shows already, too (T7.3)
+  uint64_t max_points = 20'000'000;   ///< least recently drawn clusters are forgotten above it; 0: no limit
+  double obsolete_after_s = 0;        ///< clusters that nothing drew for longer are forgotten (T4.3.3); 0: never
+  double depth_error = -1;            ///< of points, in pixels' footprints at their depth; negative: by the link
+  double normal_error = -1;           ///< likewise in codes,
+  double colour_error = -1;           ///< and of 255
+  double max_rate_mbit = 0;           ///< to each viewer, wished; 0: what its link carries
+  // Sampling.
+  bool steering = true;               ///< the packer plans which rays of a view are cast
+  double view_cell_m = 0.2;           ///< a head movement this long shall uncover nothing unknown; 0: no such rays
+  uint64_t validation = 32;           ///< every good pixel is cast once in this many plans of a view; 0: never
+  uint64_t still_rays = 16;           ///< rays a pixel everywhere while the head stands still: 1, 4 or 16
+  uint64_t max_sampling_pixels = 1u << 24;  ///< of a view; larger ones are sampled coarser
+  uint64_t layers = 16;               ///< slice images that a frame of a volume has at most
+  // Viewers.
+  double least_sampling = 0.5;        ///< sampled pixels a displayed pixel, on each axis, at least
+  CouplingOrder coupling = CouplingOrder::kOwn;
+  uint64_t buffers = 3;               ///< of loose coupling
+  // Views that come as pictures.
+  bool pictures = false;
+  uint64_t picture_quality = 80;      ///< of JPEG, 1 to 100
+  uint64_t picture_samples = 1;       ///< rays a pixel: 1, 4 or 16
+  uint64_t picture_shading = 0;       ///< its place among image::kShadingNames
+  uint64_t picture_background = 0x141820;  ///< 0xRRGGBB
+  bool operator==(const SessionSettings&) const = default;
+  template <class F> static void fields(F& f, auto& m) {
+    f("keep_redundant", m.keep_redundant); f("max_points", m.max_points);
+    f("obsolete_after_s", m.obsolete_after_s); f("depth_error", m.depth_error);
+    f("normal_error", m.normal_error); f("colour_error", m.colour_error); f("max_rate_mbit", m.max_rate_mbit);
+    f("steering", m.steering); f("view_cell_m", m.view_cell_m); f("validation", m.validation);
+    f("still_rays", m.still_rays); f("max_sampling_pixels", m.max_sampling_pixels); f("layers", m.layers);
+    f("least_sampling", m.least_sampling); f("coupling", m.coupling, kCouplingOrders); f("buffers", m.buffers);
+    f("pictures", m.pictures); f("picture_quality", m.picture_quality); f("picture_samples", m.picture_samples);
+    f("picture_shading", m.picture_shading); f("picture_background", m.picture_background);
+  }
+};
+
+/// All of them as numbers by their fields' names, for records.
+inline std::map<std::string, double> numbers_of(const SessionSettings& settings) {
+  std::map<std::string, double> out;
+  auto add = [&](const char* name, const auto& value, uint64_t = 0) { out[name] = static_cast<double>(value); };
+  SessionSettings::fields(add, settings);
+  return out;
+}
+
 /// The session as the master knows it; sent in answer to hello and again to everyone whenever it changes.
 struct Welcome {
   static constexpr std::string_view kName = "welcome";
@@ -53,7 +110,7 @@ struct Welcome {
   std::map<std::string, std::string> endpoints;  ///< as in the hellos, as far as they are known
   std::map<std::string, std::string> facts;      ///< "scene", "kind", "triangles"
   std::map<std::string, double> parameters;      ///< of the scene in this epoch
-  std::map<std::string, double> settings;        ///< packing.* and session.* values
+  SessionSettings settings;
   std::vector<uint32_t> lease_key;               ///< to the packer alone: kLeaseKeyWords numbers (lease_seal.h)
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <cstdio>
 #include <filesystem>
 
 #include "common/colour/colour_map.h"
@@ -41,11 +40,6 @@ std::string transfer_names() {
   for (const auto& preset : volume::transfer_presets())
     out += fmt::format("{}{}", out.empty() ? "" : ", ", preset.name);
   return out;
-}
-
-void list_transfer_presets() {
-  for (const auto& preset : volume::transfer_presets())
-    std::fputs(fmt::format("{:10} {}\n", preset.name, preset.text).c_str(), stdout);
 }
 
 Table grouped(Table table, const std::string& group) {
@@ -214,10 +208,6 @@ Table server_table(DataOptions& o) {
        .value = &o.volume.cache_mb,
        .help = "memory for the steps of a series",
        .limits = Range{16, 1 << 20},
-       .fits = kVolumes},
-      {.flag = "--list-tf",
-       .value = options::Action{list_transfer_presets},
-       .help = "tell the transfer functions there are and end",
        .fits = kVolumes},
   };
   return joined(std::move(table), grouped(std::move(volume), "Volumes"));

@@ -159,27 +159,18 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
   return link.exit_code();
 }
 
-int run(const DataServiceOptions& o) {
-  log::initialise(o.service.name, o.service.log_level);
-  const auto access = net::access_of(o.service, {net::Role::kData}, true);
-  if (!access) {
-    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
-    return 2;
-  }
+Result<int> run(const DataServiceOptions& o) {
+  const auto access = net::begin_service(o.service, {net::Role::kData}, true);
+  if (!access) return access.error();
+  net::end_on_signals();  // while it reads: what was being read is read again next time
   const double begin_s = monotonic_s();
   end_at_cut_off_files(2);
-  if (const Status s = check_companions(o); !s) {
-    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
-    return 2;
-  }
+  if (const Status s = check_companions(o); !s) return s.error();
   const auto served = open(o, make_progress(o.report_progress, o.scene));
-  if (!served) {
-    std::fprintf(stderr, "telesplat: %s\n", served.error().text.c_str());
-    return 2;
-  }
-  end_at_cut_off_files(
-      1);  // now it is the chunk store or a later step of a series: whoever starts it again may succeed
-  net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
+  if (!served) return served.error();
+  // A file that is cut off from now on is the chunk store or a later step of a series: another start may succeed.
+  end_at_cut_off_files(1);
+  net::install_signal_handlers();
   log::info("{}: {}; ready in {:.0f} ms", o.scene, (*served)->summary(), 1e3 * (monotonic_s() - begin_s));
   tell_notes(**served, o.report_progress);
   net::Context context(*access);

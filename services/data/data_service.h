@@ -28,6 +28,6 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& opti
 
 /// Opens the data set and serves it until told to stop. Exit code: 0, or 2 if the data cannot be read (one line on
 /// stderr says why).
-int run(const DataServiceOptions& options);
+Result<int> run(const DataServiceOptions& options);
 
 }  // namespace telesplat::data

@@ -23,8 +23,7 @@ Result<CouplingOrder> read_coupling(const wire::Control& m) {
                     buffers = scene::value_or(m.arguments, "buffers", std::string());
   CouplingOrder out{.viewer = scene::value_or(m.arguments, "viewer", std::string()), .text = name};
   if (name == "sync" || name == "loose") {
-    out.mode = name == "sync" ? 1 : 2;
-    out.buffers = name == "sync" ? 1 : kLooseBuffers;
+    out.mode = name == "sync" ? wire::CouplingOrder::kSync : wire::CouplingOrder::kLoose;
   } else if (name == "images") {
     return Error{"coupling images is of a session from its beginning: telesplat run --coupling images"};
   } else if (name != "async") {
@@ -37,9 +36,9 @@ Result<CouplingOrder> read_coupling(const wire::Control& m) {
     if (*number < 1 || *number > double(wire::kMaxBuffers) || *number != std::floor(*number))
       return Error{
           fmt::format("buffers is {}, not a whole number of 1 to {}", buffers.substr(0, 40), wire::kMaxBuffers)};
-    out.buffers = *number;
+    out.buffers = uint64_t(*number);
   }
-  if (out.mode == 2) out.text = fmt::format("loose, {} buffer{}", out.buffers, out.buffers == 1 ? "" : "s");
+  if (name == "loose") out.text = fmt::format("loose, {} buffer{}", out.buffers, out.buffers == 1 ? "" : "s");
   return out;
 }
 

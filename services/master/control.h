@@ -23,17 +23,15 @@ struct PlayOrder {
 /// Arguments "how" (play, pause or step) and "steps" (-4096 to 4096, not 0). Error: what is wrong with them.
 Result<PlayOrder> read_play(const wire::Control& command);
 
-/// `telesplat ctl coupling`, as everyone is told it: settings of the welcome.
+/// `telesplat ctl coupling`, as viewers are told it: settings of the welcome.
 struct CouplingOrder {
-  double mode = 0;     ///< "viewer.coupling": 0 async, 1 sync, 2 loose
-  double buffers = 0;  ///< "viewer.buffers"
+  wire::CouplingOrder mode = wire::CouplingOrder::kAsync;
+  uint64_t buffers = wire::SessionSettings{}.buffers;
   std::string viewer;  ///< whose; empty: everyone's who is here
   std::string text;    ///< for people: "loose, 3 buffers"
 };
-/// Arguments "coupling" (async, sync or loose), "buffers" (of loose; kLooseBuffers without it) and "viewer". Error:
-/// what is wrong with them.
+/// Arguments "coupling" (async, sync or loose), "buffers" (of loose) and "viewer". Error: what is wrong with them.
 Result<CouplingOrder> read_coupling(const wire::Control& command);
-inline constexpr double kLooseBuffers = 3;
 
 /// Reads the value that someone wants a parameter to have. Error: no finite number; names it.
 Result<double> read_number(const std::string& name, const std::string& text);

@@ -112,8 +112,8 @@ class MasterCore {
   bool progressive() const { return plan_->progressive(); }
   std::string animation() const { return plan_->animation(); }
   /// As everyone is told them: what was left to the kind of scene is decided.
-  uint64_t octree_depth() const { return master::octree_depth(options_, kind_); }
-  std::map<std::string, double> settings() const { return scene_as_told().settings; }
+  uint64_t octree_depth() const { return options_.octree_depth; }
+  wire::SessionSettings settings() const { return scene_as_told().settings; }
 
  private:
   struct Peer {

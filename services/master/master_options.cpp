@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
@@ -23,95 +22,44 @@ using scene::Pipeline;
 constexpr const char* kWhatIsKept = "what a run keeps";
 constexpr const char* kWhoComes = "who takes part, and how much";
 
-// A row whose value is one of the names that name_of() has for `values`.
-template <class Enum, size_t n>
-options::Row named(options::Row row, Enum& value, const Enum (&values)[n]) {
-  options::Names names;
-  for (const Enum v : values) names.emplace_back(name_of(v));
-  row.limits = names;
-  row.value = options::Text{
-      .read =
-          [&value, names, all = std::vector<Enum>(std::begin(values), std::end(values))](const std::string& text) {
-            const auto found = std::find(names.begin(), names.end(), text);
-            if (found == names.end()) return Status(Error{fmt::format("is not one of {}", fmt::join(names, ", "))});
-            value = all[size_t(found - names.begin())];
-            return ok_status();
-          },
-      .write = [&value] { return std::string(name_of(value)); }};
-  return row;
-}
-
-// A setting of the session, which has `usual` unless it is given.
-options::Row setting(MasterOptions& o, const std::string& name, double usual, const char* help) {
-  return {.flag = "--" + name,
-          .value = &o.settings.try_emplace(name, usual).first->second,
-          .help = help,
-          .limits = options::Range{0.0, 1e12},
-          .fits = Kinds::of(Pipeline::kPoints)};
-}
-
-// A setting that the kind of scene decides unless it is given: then it is not among the settings.
-options::Row setting_by_kind(MasterOptions& o, const std::string& name, const char* help, const char* usual) {
-  options::Row row{.flag = "--" + name, .value = {}, .help = help, .limits = options::Range{0.0, 1e12}};
-  row.value = options::Text{.read =
-                                [&o, name](const std::string& text) {
-                                  double value = 0;
-                                  const auto [stop, error] =
-                                      std::from_chars(text.data(), text.data() + text.size(), value);
-                                  if (error != std::errc() || stop != text.data() + text.size())
-                                    return Status(Error{"is not a number"});
-                                  o.settings[name] = value;
-                                  return ok_status();
-                                },
-                            .write =
-                                [&o, name] {
-                                  const auto found = o.settings.find(name);
-                                  return found == o.settings.end() ? std::string() : fmt::format("{}", found->second);
-                                }};
-  row.fits = Kinds::of(Pipeline::kPoints);
-  row.default_text = usual;
-  return row;
-}
-
-// One of a few whole numbers.
-options::Row one_of_few(auto& value, const char* flag, const options::Names& values, const char* help) {
-  options::Row row{.flag = flag, .value = {}, .help = help, .limits = values};
-  row.value = options::Text{.read =
-                                [&value, values](const std::string& text) {
-                                  if (std::find(values.begin(), values.end(), text) == values.end())
-                                    return Status(Error{fmt::format("is not one of {}", fmt::join(values, ", "))});
-                                  value = std::stoi(text);
-                                  return ok_status();
-                                },
-                            .write = [&value] { return fmt::format("{}", value); }};
-  row.fits = Kinds::of(Pipeline::kPoints);
-  return row;
-}
-
-options::Table steering_table(MasterOptions& o) {
+options::Table steering_table(wire::SessionSettings& s) {
   const auto points = Kinds::of(Pipeline::kPoints);
-  const options::Names rays{"1", "4", "16"};
-  const auto setting_value = [&o](const char* name, double usual) -> double& {
-    return o.settings.try_emplace(name, usual).first->second;
+  return {
+      {.flag = "--steering",
+       .value = &s.steering,
+       .help = "on: before a view is sampled, the packer says which of its rays the model lacks, and only these are "
+               "cast",
+       .fits = points,
+       .on_off = true},
+      {.flag = "--view-cell",
+       .value = &s.view_cell_m,
+       .help = "metres of a head movement for which is sampled ahead what it would uncover; 0: nothing",
+       .limits = options::Range{0.0, 10.0},
+       .fits = points},
+      {.flag = "--validation",
+       .value = &s.validation,
+       .help = "each pixel that the model shows well is sampled again once in so many updates; 0: never",
+       .limits = options::Range{0.0, 4096.0},
+       .fits = points},
+      {.flag = "--still-rays",
+       .value = &s.still_rays,
+       .help = "rays a pixel everywhere while the head stands still, when it has stood long enough",
+       .limits = options::Names{"1", "4", "16"},
+       .fits = points}};
+}
+
+// A view arrives coarse first, or not.
+options::Row progressive_row(Progressive& value) {
+  const auto read = [&value](const std::string& text) {
+    for (const auto p : {Progressive::kAuto, Progressive::kOn, Progressive::kOff})
+      if (text == name_of(p)) value = p;
+    return ok_status();
   };
-  return {named({.flag = "--steering",
-                 .value = {},
-                 .help = "on: before a view is sampled, the packer says which of its rays the model lacks, and only "
-                         "these are cast; auto: where redundancy is eliminated",
-                 .fits = points},
-                o.steering, {Steering::kAuto, Steering::kOn, Steering::kOff}),
-          {.flag = "--view-cell,--sampling.view_cell_m",
-           .value = &o.settings.try_emplace("sampling.view_cell_m", 0.2).first->second,
-           .help = "metres of a head movement for which is sampled ahead what it would uncover; 0: nothing",
-           .limits = options::Range{0.0, 10.0},
-           .fits = points},
-          {.flag = "--validation,--sampling.validation",
-           .value = &o.settings.try_emplace("sampling.validation", 32).first->second,
-           .help = "each pixel that the model shows well is sampled again once in so many updates; 0: never",
-           .limits = options::Range{0.0, 4096.0},
-           .fits = points},
-          one_of_few(setting_value("sampling.still_rays", 16), "--still-rays,--sampling.still_rays", rays,
-                     "rays a pixel everywhere while the head stands still, when it has stood long enough")};
+  return {.flag = "--progressive",
+          .value = options::Text{.read = read, .write = [&value] { return std::string(name_of(value)); }},
+          .help = "on: a view arrives with every 4th pixel of every 4th row first; auto: of Julia sets",
+          .limits = options::Names{"auto", "on", "off"},
+          .fits = Kinds::of(Pipeline::kPoints)};
 }
 
 options::Table lease_table(MasterOptions& o) {
@@ -119,42 +67,17 @@ options::Table lease_table(MasterOptions& o) {
            .value = &o.schedule.tile_size,
            .help = "pixels a side of a tile",
            .limits = options::Range{16, wire::kMaxTileSide}},
-          {.flag = "--frames-in-flight",
-           .value = &o.schedule.frames_in_flight,
-           .help = "sampling frames begun and not complete",
-           .limits = options::Range{1, 16}},
-          {.flag = "--lease-timeout",
-           .value = &o.schedule.lease_timeout_s,
-           .help = "seconds before a lease goes to another sampler",
-           .limits = options::Range{0.05, 3600}},
-          {.flag = "--longest-fetch",
-           .value = &o.schedule.longest_fetch_s,
-           .help = "seconds that a sampler may have a lease that it asks to be extended, while it fetches data",
-           .limits = options::Range{1, 3600}},
-          {.flag = "--silent-after",
-           .value = &o.silent_after_s,
-           .help = "seconds after which a process that says nothing is taken for dead",
-           .limits = options::Range{2.0, 600.0}},
           {.flag = "--max-rate",
            .value = &o.schedule.max_rate_mbit,
            .help = "Mbit/s to each viewer at most, as near as updates can be measured out; 0: what its link carries",
            .limits = options::Range{0, 1e6}},
-          {.flag = "--lease-target",
-           .value = &o.schedule.lease_target_s,
-           .help = "seconds that a lease of a Julia set's rows should take",
-           .limits = options::Range{1e-4, 10},
-           .fits = Kinds::of(Pipeline::kPoints)},
-          named({.flag = "--progressive",
-                 .value = {},
-                 .help = "on: a view arrives with every 4th pixel of every 4th row first; auto: of Julia sets",
-                 .fits = Kinds::of(Pipeline::kPoints)},
-                o.progressive, {Progressive::kAuto, Progressive::kOn, Progressive::kOff}),
+          progressive_row(o.progressive),
           {.flag = "--octree-depth",
            .value = &o.octree_depth,
-           .help = "levels of the point model's octree; 0: 5",
-           .limits = options::Range{0, 10}},
-          {.flag = "--layers,--volume.layers",
-           .value = &o.settings.try_emplace("volume.layers", 16).first->second,
+           .help = "levels of the point model's octree",
+           .limits = options::Range{1, 10}},
+          {.flag = "--layers",
+           .value = &o.settings.layers,
            .help = "slice images that a frame of a volume has at most; more: better when the head moves",
            .limits = options::Range{1, double(volume::kMaxLayers)},
            .fits = Kinds::of(Pipeline::kSlices)}};
@@ -171,9 +94,7 @@ std::optional<double> number_or_fraction(const std::string& text) {
 }
 
 // How far from what was sampled points may be: -1 is auto, 0 off.
-options::Row error_row(MasterOptions& o, const std::string& flag, const std::string& name, double most, bool whole,
-                       const char* help) {
-  double& value = o.settings.try_emplace(name, -1).first->second;
+options::Row error_row(double& value, const char* flag, double most, bool whole, const char* help) {
   options::Row row{.flag = flag, .value = {}, .help = help, .fits = Kinds::of(Pipeline::kPoints)};
   row.value = options::Text{
       .read =
@@ -193,44 +114,62 @@ options::Row error_row(MasterOptions& o, const std::string& flag, const std::str
   return row;
 }
 
-options::Table error_table(MasterOptions& o) {
-  return {error_row(o, "--depth-error", "packing.depth_error", 1, false,
+options::Table error_table(wire::SessionSettings& s) {
+  return {error_row(s.depth_error, "--depth-error", 1, false,
                     "how far points may be from where they were sampled, in pixels' footprints at their depth; auto: "
                     "1/32 behind slow links, else off; what stands still becomes exact"),
-          error_row(o, "--normal-error", "packing.normal_error", 3, true,
+          error_row(s.normal_error, "--normal-error", 3, true,
                     "likewise normals, in codes; auto: 1 behind slow links (docs/links.md has degrees)"),
-          error_row(o, "--colour-error", "packing.colour_error", 15, true,
+          error_row(s.colour_error, "--colour-error", 15, true,
                     "likewise each channel of colours, of 255; auto: 1 behind slow links")};
 }
 
-// The numbers are what the wire and session.toml say: -1 auto, 0 eliminate, 1 keep.
-options::Row redundancy_row(MasterOptions& o) {
-  options::Row row = named(
-      {.flag = "--packing.redundancy,--packing.keep_redundant",
-       .value = {},
-       .help = "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches; "
-               "auto: eliminate",
-       .fits = Kinds::of(Pipeline::kPoints)},
-      o.redundancy, {Redundancy::kAuto, Redundancy::kEliminate, Redundancy::kKeep});
-  auto& value = std::get<options::Text>(row.value);
-  value.read = [read = value.read](const std::string& text) {
-    return read(text == "-1" ? "auto" : text == "0" ? "eliminate" : text == "1" ? "keep" : text);
-  };
-  row.limits = options::Names{"auto", "eliminate", "keep", "-1", "0", "1"};
-  return row;
-}
-
 // What pictures are like, where views come as pictures.
-options::Table image_table(MasterOptions& o) {
+options::Table image_table(wire::SessionSettings& s) {
   const auto points = Kinds::of(Pipeline::kPoints);
   return {
       {.flag = "--image-quality",
-       .value = &o.images.quality,
+       .value = &s.picture_quality,
        .help = "--coupling images: JPEG quality of pictures while the head moves; from 95 on colours keep all pixels",
        .limits = options::Range{1, 100},
        .fits = points},
-      one_of_few(o.images.samples, "--image-samples", {"1", "4", "16"},
-                 "--coupling images: rays a pixel while the head moves")};
+      {.flag = "--image-samples",
+       .value = &s.picture_samples,
+       .help = "--coupling images: rays a pixel while the head moves",
+       .limits = options::Names{"1", "4", "16"},
+       .fits = points}};
+}
+
+options::Row shading_row(wire::SessionSettings& s) {
+  const options::Names names(image::kShadingNames.begin(), image::kShadingNames.end());
+  const auto read = [&s, names](const std::string& text) {
+    s.pictures = true;
+    s.picture_shading = uint64_t(std::find(names.begin(), names.end(), text) - names.begin());
+    return ok_status();
+  };
+  const auto write = [&s, names] { return s.pictures ? names[size_t(s.picture_shading)] : std::string(); };
+  return {.flag = "--images",
+          .value = options::Text{.read = read, .write = write},
+          .help =
+              "views are drawn at the samplers and come as pictures, with this shading: lit, head or unlit; "
+              "telesplat run --coupling images asks for it",
+          .limits = names,
+          .fits = Kinds::of(Pipeline::kPoints),
+          .reach = options::Reach::kHere};
+}
+
+options::Row background_row(wire::SessionSettings& s) {
+  const auto read = [&s](const std::string& text) -> Status {
+    const auto background = image::parse_background(text);
+    if (!background) return background.error();
+    if (background->transparent) return Error{"pictures have no alpha"};
+    s.picture_background = background->colour;
+    return ok_status();
+  };
+  return {.flag = "--image-background",
+          .value = options::Text{.read = read, .write = [&s] { return fmt::format("#{:06x}", s.picture_background); }},
+          .help = "--images: colour behind the data, #rrggbb or a name",
+          .reach = options::Reach::kHere};
 }
 
 options::Row clip_row(MasterOptions& o) {
@@ -245,24 +184,36 @@ options::Row clip_row(MasterOptions& o) {
           })};
 }
 
-options::Table packing_table(MasterOptions& o) {
-  return {setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6"),
-          setting(o, "packing.obsolete_after_s", 0, "forget clusters not seen for so long; 0: never"),
-          setting(o, "packing.epsilon", 0.004, "redundancy threshold, relative to depth"),
-          setting(o, "packing.age_weight", 1,
-                  "patches that are kept: how fast one not drawn comes to be forgotten, per second"),
-          setting(o, "packing.rate_weight", 4,
-                  "patches that are kept: how much coarser ones come before finer ones, per halving"),
-          setting(o, "packing.patches_per_cluster", 6, "patches that are kept of a cluster at most; 0: no limit"),
-          redundancy_row(o)};
+options::Table packing_table(wire::SessionSettings& s) {
+  const auto points = Kinds::of(Pipeline::kPoints);
+  const auto read = [&s](const std::string& text) {
+    s.keep_redundant = text == "keep";
+    return ok_status();
+  };
+  return {{.flag = "--packing.max_points",
+           .value = &s.max_points,
+           .help = "points the model holds at most; 0: no limit",
+           .limits = options::Range{0.0, 1e12},
+           .fits = points},
+          {.flag = "--packing.obsolete_after_s",
+           .value = &s.obsolete_after_s,
+           .help = "forget clusters not seen for so long; 0: never",
+           .limits = options::Range{0.0, 1e12},
+           .fits = points},
+          {.flag = "--packing.redundancy",
+           .value = options::Text{.read = read, .write = [&s] { return s.keep_redundant ? "keep" : "eliminate"; }},
+           .help = "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches",
+           .limits = options::Names{"eliminate", "keep"},
+           .fits = points}};
 }
 
 }  // namespace
 
 options::Table session_table(MasterServiceOptions& o) {
-  return options::joined(options::joined(options::joined(lease_table(o.master), steering_table(o.master)),
-                                         options::joined(packing_table(o.master), error_table(o.master))),
-                         options::joined(image_table(o.master), {clip_row(o.master)}));
+  wire::SessionSettings& s = o.master.settings;
+  return options::joined(options::joined(options::joined(lease_table(o.master), steering_table(s)),
+                                         options::joined(packing_table(s), error_table(s))),
+                         options::joined(image_table(s), {clip_row(o.master)}));
 }
 
 options::Table limit_table(MasterServiceOptions& o) {
@@ -336,21 +287,8 @@ options::Table table(MasterServiceOptions& o) {
        .help = "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "
                "are separated by \";\"",
        .reach = options::Reach::kHere},
-      {.flag = "--images",
-       .value = &o.master.images.shading,
-       .help = "views are drawn at the samplers and come as pictures, with this shading: lit, head or unlit; telesplat "
-               "run --coupling images asks for it",
-       .limits = options::Names(image::kShadingNames.begin(), image::kShadingNames.end()),
-       .fits = Kinds::of(Pipeline::kPoints),
-       .reach = options::Reach::kHere},
-      {.flag = "--image-background",
-       .value = &o.master.images.background,
-       .help = "--images: colour behind the data, #rrggbb or a name",
-       .limits = options::Check([](const std::string& text) {
-         const auto background = image::parse_background(text);
-         return !background ? background.error().text : background->transparent ? "pictures have no alpha" : "";
-       }),
-       .reach = options::Reach::kHere}};
+      shading_row(o.master.settings),
+      background_row(o.master.settings)};
   return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own),
                          options::joined(options::joined(record_table(o), limit_table(o)), session_table(o)));
 }

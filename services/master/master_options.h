@@ -24,7 +24,7 @@ struct MasterServiceOptions {
 };
 
 /// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.) Rows
-/// point into `options`, whose settings get their default values here where they have none.
+/// point into `options`.
 options::Table session_table(MasterServiceOptions& options);
 /// What one process may ask of the master: --max-sampling-pixels and others, which `telesplat run` has too.
 options::Table limit_table(MasterServiceOptions& options);

@@ -33,7 +33,8 @@ std::string session_table(const MasterServiceOptions& o, const MasterCore& core)
       "octree_depth = {}\nprogressive = {}\nanimation = {}\n\n[settings]\n",
       s.tile_size, s.frames_in_flight, s.lease_timeout_s, s.lease_target_s, core.octree_depth(),
       quoted(core.progressive() ? "on" : "off"), quoted(core.animation()));
-  for (const auto& [key, value] : core.settings()) out += fmt::format("{} = {}\n", quoted(key), value);
+  for (const auto& [key, value] : wire::numbers_of(core.settings()))
+    out += fmt::format("{} = {}\n", quoted(key), value);
   return out;
 }
 

@@ -139,7 +139,7 @@ class MasterService {
                                .version = version(),
                                .begin = record_->begin(),
                                .end_unix_ns = metrics::begin_now().unix_ns,
-                               .settings = core_.settings(),
+                               .settings = wire::numbers_of(core_.settings()),
                                .label = options_.label};
     // It is among the files that finish() tells of.
     if (const Status s = record_->write_file("session.toml", session_text(options_, core_, about, processes)); !s)
@@ -286,50 +286,40 @@ class MasterService {
 
 }  // namespace
 
-int run(const MasterServiceOptions& o) {
-  log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
-  const auto fail = [](int code, const Error& e) {
-    log::error("{}", e.text);
-    return code;
-  };
-  // Without the log's date: the launcher passes it on.
-  const auto refuse = [](const Error& e) {
-    std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
-    return 2;
-  };
-  const auto access = net::access_of(o.service, {}, true);
-  if (!access) return refuse(access.error());
+Result<int> run(const MasterServiceOptions& o) {
+  const auto access = net::begin_service(o.service, {}, true);
+  if (!access) return access.error();
   const auto options = core_options(o);
-  if (!options) return fail(2, options.error());
-  if (o.overwrite && o.goes_on) return refuse({"--continue and --overwrite: the record goes on, or is replaced"});
+  if (!options) return options.error();
+  if (o.overwrite && o.goes_on) return Error{"--continue and --overwrite: the record goes on, or is replaced"};
   std::string run_id;
   std::error_code error;
   const bool was_there = std::filesystem::exists(o.out, error);
   const bool goes_on = o.goes_on && metrics::may_go_on(o.out);
   if (!o.out.empty()) {
-    if (const Status s = net::refuse_folder_in_use(o.out); !s) return refuse(s.error());
+    if (const Status s = net::refuse_folder_in_use(o.out); !s) return s.error();
     auto begun =
         goes_on ? metrics::go_on_in_folder(o.out) : metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
-    if (!begun) return refuse(begun.error());
+    if (!begun) return begun.error();
     run_id = *std::move(begun);
   }
   const auto bytes = [](double mb) { return uint64_t(mb * 1e6); };
   auto record = metrics::RunRecord::open(
       o.out, metrics::begin_now(),
       {.table_bytes = bytes(o.table_limit_mb), .trace_bytes = bytes(o.trace_limit_mb), .goes_on = goes_on});
-  if (!record) return refuse(record.error());
+  if (!record) return record.error();
   if (goes_on) log::info("{}: its record goes on; this is master {} of it", o.out, (*record)->lives());
   MasterService service(o, *options, *std::move(record), std::move(run_id), *access);
   Status opened = service.open_metrics();
   if (opened) opened = service.listen();
   if (!opened && !o.out.empty() && !goes_on) metrics::remove_record(o.out, !was_there);
-  if (!opened) return refuse(opened.error());
+  if (!opened) return opened.error();
   service.serve();
   service.say_goodbye();
   if (const Status s = service.write_record(); !s) {
     if (o.started_by != "hand") std::printf("record failed %s\n", s.error().text.c_str());  // the launcher reads it
-    return fail(1, s.error());
+    log::error("{}", s.error().text);
+    return 1;
   }
   return 0;
 }

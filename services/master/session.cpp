@@ -34,7 +34,7 @@ Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data,
   if (!data.box_room.empty())
     if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
   Plan& plan = plan_of(data);
-  if (options_.images.on() && &plan != plans_.at(scene::Pipeline::kPoints).get())
+  if (options_.settings.pictures && &plan != plans_.at(scene::Pipeline::kPoints).get())
     return Error{"views of a volume do not come as pictures (--coupling images): they come as slice images"};
   const auto adopted = plan.adopt(data, now_s);
   if (!adopted) return adopted.error();
@@ -103,8 +103,8 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   }
   if (to.hello.role == "packer") w.lease_key = signer_.key();
   if (to.coupling) {
-    w.settings["viewer.coupling"] = to.coupling->mode;
-    w.settings["viewer.buffers"] = to.coupling->buffers;
+    w.settings.coupling = to.coupling->mode;
+    w.settings.buffers = to.coupling->buffers;
   }
   return w;
 }
@@ -237,7 +237,7 @@ void MasterCore::on(const std::string& peer, const wire::OrderAnswer& m, double 
 
 // Of the viewers that are here; those that come later begin with their own.
 Result<std::string> MasterCore::order_coupling(const wire::Control& m, double now_s) {
-  if (options_.images.on())
+  if (options_.settings.pictures)
     return Error{
         "coupling: the views of this session come as pictures (--coupling images) from its beginning to its end"};
   const auto order = read_coupling(m);

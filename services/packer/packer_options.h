@@ -10,11 +10,8 @@ struct PackerOptions {
   std::string advertise_to_viewers;  ///< host for the sockets of viewers; empty: service.advertise
   int threads = 0;                   ///< for reference depth maps; 0: all cores
   std::string record_depth;          ///< folder for sampled depth images; empty: none are kept
-  int record_depth_frames = 50;
-  std::string record_plan;  ///< folder for pictures of plans; empty: none are kept
-  int record_plan_frames = 50;
-  double log_limit_mb = 512;    ///< events kept for late joiners
-  double answer_window_mb = 8;  ///< of these, under way to a viewer at most
+  double log_limit_mb = 512;         ///< events kept for late joiners
+  double answer_window_mb = 8;       ///< of these, under way to a viewer at most
 };
 
 /// A row a flag; they point into `options`.

@@ -24,6 +24,7 @@ namespace telesplat::packer {
 namespace {
 
 constexpr double kSpanFlush_s = 1;
+constexpr int kRecordedImages = 50;   // of --record-depth
 constexpr double kKeepFreed_s = 10;   // memory that was not needed for that long goes back to the system
 constexpr double kOnTheirWay_s = 30;  // messages of the data set before, after a change
 constexpr int kSampledAtOnce = 8;     // then control and viewers get their turn
@@ -82,14 +83,9 @@ class PackerService {
       hello.endpoints[key] = net::announced(*endpoint, host);
     }
     if (!options_.record_depth.empty()) {
-      auto recorder = DepthRecorder::open(options_.record_depth, options_.record_depth_frames);
+      auto recorder = DepthRecorder::open(options_.record_depth, kRecordedImages);
       if (!recorder) return recorder.error();
       recorder_ = std::move(*recorder);
-    }
-    if (!options_.record_plan.empty()) {
-      auto recorder = PlanRecorder::open(options_.record_plan, options_.record_plan_frames);
-      if (!recorder) return recorder.error();
-      plan_recorder_ = std::move(*recorder);
     }
     link_.emplace(context, options_.service.master, hello, options_.service.give_up_after_s);
     return ok_status();
@@ -214,8 +210,7 @@ class PackerService {
     const PointPacking::Options options{.threads = options_.threads,
                                         .max_log_bytes = uint64_t(options_.log_limit_mb * 1e6),
                                         .answers = {.window_bytes = uint64_t(options_.answer_window_mb * 1e6)},
-                                        .recorder = recorder_ ? &*recorder_ : nullptr,
-                                        .plans = plan_recorder_ ? &*plan_recorder_ : nullptr};
+                                        .recorder = recorder_ ? &*recorder_ : nullptr};
     return std::make_unique<PointPacking>(options, std::move(outlets), spans_);
   }
 
@@ -278,7 +273,6 @@ class PackerService {
   net::WorkShares work_;  // of viewers
   std::optional<net::MasterLink> link_;
   std::optional<DepthRecorder> recorder_;
-  std::optional<PlanRecorder> plan_recorder_;
   metrics::SpanRecorder spans_;
   std::unique_ptr<Packing> packing_;  // none before the session's kind is known
   std::optional<scene::Pipeline> pipeline_, before_;
@@ -292,21 +286,13 @@ class PackerService {
 
 }  // namespace
 
-int run(const PackerOptions& o) {
-  log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
+Result<int> run(const PackerOptions& o) {
+  const auto access = net::begin_service(o.service, {net::Role::kPacker}, true);
+  if (!access) return access.error();
   net::keep_freed_memory();
-  const auto access = net::access_of(o.service, {net::Role::kPacker}, true);
-  if (!access) {
-    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
-    return 2;
-  }
   net::Context context(*access);
   PackerService service(o, context);
-  if (const Status s = service.open(context); !s) {
-    log::error("{}", s.error().text);
-    return 2;
-  }
+  if (const Status s = service.open(context); !s) return s.error();
   return service.serve();
 }
 

@@ -6,6 +6,6 @@
 namespace telesplat::packer {
 
 /// Serves until told to stop. Exit code 0, or 2 if it cannot bind.
-int run(const PackerOptions& options);
+Result<int> run(const PackerOptions& options);
 
 }  // namespace telesplat::packer

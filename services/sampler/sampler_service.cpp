@@ -8,6 +8,7 @@
 #include "common/core/machine.h"
 #include "common/metrics/recorder.h"
 #include "common/net/master_link.h"
+#include "common/options/complain.h"
 #include "common/scene/session.h"
 #include "services/sampler/drain_guard.h"
 #include "services/sampler/mesh/sampler.h"
@@ -214,32 +215,21 @@ class SamplerService {
 
 }  // namespace
 
-int run(const SamplerOptions& given) {
+Result<int> run(const SamplerOptions& given) {
   SamplerOptions o = given;
   if (o.threads == 0) o.threads = usable_processors();
-  log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
+  const auto access = net::begin_service(o.service, {net::Role::kSampler});
+  if (!access) return access.error();
   net::keep_freed_memory();
-  const auto access = net::access_of(o.service, {net::Role::kSampler});
-  if (!access) {
-    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
-    return 2;
-  }
   std::unique_ptr<Sampler> sampler;
   std::unique_ptr<TileSource> replay;
   if (!o.replay.empty()) {
     auto file = read_replay(o.replay);
-    if (!file) {
-      log::error("{}", file.error().text);
-      return 2;
-    }
+    if (!file) return file.error();
     replay = std::make_unique<ReplayTiles>(std::move(*file), o.cost_scale);
   } else if (o.kind != "auto") {  // one that cannot be made should not wait for a session to say so
     auto made = make_sampler(o.kind, o.threads);
-    if (!made) {
-      log::error("{}", made.error().text);
-      return 1;
-    }
+    if (!made) return complain(made.error(), 1);
     sampler = std::move(*made);
   }
   const InstanceId instance = net::make_instance_id();

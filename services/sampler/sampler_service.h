@@ -9,6 +9,6 @@ namespace telesplat::sampler {
 /// Serves until told to finish. Told by SIGINT or SIGTERM it finishes what it holds, asks for no more, and is gone
 /// within 2 s; told by the master it ends at once. Exit code: 0; 1 if the sampler asked for cannot be made; 2 if the
 /// replay file cannot be read.
-int run(const SamplerOptions& options);
+Result<int> run(const SamplerOptions& options);
 
 }  // namespace telesplat::sampler

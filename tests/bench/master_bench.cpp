@@ -22,7 +22,7 @@ void master_leases(benchmark::State& state) {
   const auto samplers = size_t(state.range(0));
   const auto folder = std::filesystem::temp_directory_path() / "telesplat-master-bench";
   auto record = std::move(metrics::RunRecord::open(state.range(2) ? folder.string() : "")).value();
-  master::MasterCore core({.steering = master::Steering::kOff}, {1}, *record);
+  master::MasterCore core({.settings = {.steering = false}}, {1}, *record);
   const auto join = [&](const std::string& role, uint64_t instance) {
     wire::Hello h;
     h.role = role;
@@ -136,7 +136,7 @@ BENCHMARK(master_scatter)
 void master_slices(benchmark::State& state) {
   const auto samplers = uint64_t(state.range(0));
   auto record = std::move(metrics::RunRecord::open("")).value();
-  master::MasterCore core({.steering = master::Steering::kOff}, {1}, *record);
+  master::MasterCore core({.settings = {.steering = false}}, {1}, *record);
   const auto join = [&](const std::string& role, uint64_t instance) {
     wire::Hello h;
     h.role = role;

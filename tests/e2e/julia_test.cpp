@@ -195,7 +195,7 @@ TEST(JuliaUsage, MeshesTakeNoParametersAndHelpTellsThemAll) {
   EXPECT_EQ(help.wait(), 0);
   for (const char* part : {"--c.w", "--slice.turn-y", "1..4096", "trap-plane", "spectrum", "--animate"})
     EXPECT_NE(help.out().find(part), std::string::npos) << part;
-  Program list("telesplat", {"run", "julia", "--list-presets"}, folder / "list");
+  Program list("telesplat", {"presets"}, folder / "list");
   EXPECT_EQ(list.wait(), 0);
   EXPECT_NE(list.out().find("lantern"), std::string::npos);
 }

@@ -50,7 +50,7 @@ TEST(Manuals, BashCompletesARunsFlagsAndValues) {
   TemporaryFolder folder;
   std::ofstream(folder / "telesplat.bash") << output_of(folder, "telesplat", {"completion", "bash"});
   const auto offered = [&](const std::string& words, int last) {
-    std::ofstream(folder / "drive.sh") << "source " << folder / "telesplat.bash"
+    std::ofstream(folder / "drive.sh") << "PATH=" TELESPLAT_BIN ":$PATH\nsource " << folder / "telesplat.bash"
                                        << "\nCOMP_WORDS=(" << words << ")\nCOMP_CWORD=" << last
                                        << "\n_telesplat\necho \"${COMPREPLY[@]}\"\n";
     const std::string command = "bash " + (folder / "drive.sh") + " > " + (folder / "offered") + " 2>&1";

@@ -100,9 +100,9 @@ const Case kCases[] = {
     {"ViewersClock",
      {"telesplat-viewer", "--clock-from", "nan"},
      "telesplat-viewer: --clock-from nan: is not a finite number"},
-    {"MastersTimeout",
-     {"telesplat-master", "--lease-timeout", "nan"},
-     "telesplat-master: --lease-timeout nan: is not between 0.05 and 3600"},
+    {"MastersRate",
+     {"telesplat-master", "--max-rate", "nan"},
+     "telesplat-master: --max-rate nan: is not between 0 and 1000000"},
     {"MastersLimit",
      {"telesplat-master", "--packing.max_points", "nan"},
      "telesplat-master: --packing.max_points nan: is not between 0 and 1000000000000"},
@@ -134,6 +134,7 @@ TEST(UsageOfHelp, HelpNamesACommandOrOneOfItsOwn) {
   };
   EXPECT_EQ(said({"help"}), said({"--help"}));
   EXPECT_EQ(said({"help", "run"}), said({"run", "--help"}));
+  EXPECT_EQ(said({"help", "run", "all"}), said({"run", "--help", "all"}));
   EXPECT_EQ(said({"help", "ctl", "clip"}), said({"ctl", "clip", "--help"}));
   EXPECT_NE(said({"--help"}).find("telesplat help COMMAND"), std::string::npos) << "it is told";
   EXPECT_EQ(said({"help", "rnu"}, 2), "telesplat: rnu: no such command of telesplat; did you mean run?\n");

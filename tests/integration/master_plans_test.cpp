@@ -53,8 +53,7 @@ class MasterPlans : public testing::Test {
     options.service.bind = "ipc://" + (folder / "master").string();
     options.service.log_level = "off";
     options.started_by = "run";
-    master::table(options);  // settings get their usual values
-    thread = std::thread([this] { code = master::run(options); });
+    thread = std::thread([this] { code = master::run(options).value(); });
     data.emplace(context, "data", 1, options.service.bind);
     packer.emplace(context, "packer", 2, options.service.bind);
     sampler.emplace(context, "sampler", 3, options.service.bind);

@@ -29,7 +29,7 @@ class PackerServiceTest : public testing::Test {
     ASSERT_TRUE(bound);
     options.service.master = *bound;
     options.service.log_level = "off";
-    thread = std::thread([this] { code = packer::run(options); });
+    thread = std::thread([this] { code = packer::run(options).value(); });
     const auto message = next(master, wire::Hello::kName);
     ASSERT_TRUE(message);
     packer_peer = message->peer;
@@ -142,8 +142,8 @@ TEST_F(PackerServiceTest, FollowsASessionThatChangesFromPointsToSlicesAndBack) {
 // Another one must not notice, and memory must not grow.
 TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
   wire::Welcome session = mesh();
-  session.settings["packing.keep_redundant"] = 1;
-  session.settings["sampling.steering"] = 0;
+  session.settings.keep_redundant = 1;
+  session.settings.steering = 0;
   master.send(session, packer_peer);
   ASSERT_TRUE(ask_for_points());
   // Pixels of noise: 40 patches of some 300 KB.

@@ -263,12 +263,14 @@ TEST(ChangingSession, AVolumeMayBecomeAMeshToo) {
 }
 
 // The settings of a session that goes through all couplings, forth and back, after so many answers.
-std::map<uint64_t, std::map<std::string, double>> all_couplings() {
-  const auto told = [](double mode, double buffers) {
-    return std::map<std::string, double>{{"viewer.coupling", mode}, {"viewer.buffers", buffers}};
+std::map<uint64_t, wire::SessionSettings> all_couplings() {
+  using Order = wire::CouplingOrder;
+  const auto told = [](Order coupling, uint64_t buffers = 1) {
+    return wire::SessionSettings{.steering = false, .coupling = coupling, .buffers = buffers};
   };
-  return {{6, told(1, 1)},  {14, told(2, 3)}, {26, told(0, 0)}, {34, told(2, 8)},
-          {46, told(1, 1)}, {54, told(0, 0)}, {62, told(1, 1)}, {70, told(0, 0)}};
+  return {{6, told(Order::kSync)},      {14, told(Order::kLoose, 3)}, {26, told(Order::kAsync)},
+          {34, told(Order::kLoose, 8)}, {46, told(Order::kSync)},     {54, told(Order::kAsync)},
+          {62, told(Order::kSync)},     {70, told(Order::kAsync)}};
 }
 
 // Frames that waited show each another update, in the order of requests, none is left out, and none waited for long.
@@ -325,14 +327,6 @@ TEST(CouplingChange, WithEpochsNoFrameIsEmpty) {
     EXPECT_TRUE(std::is_sorted(s.epoch.begin(), s.epoch.end()));
     EXPECT_GE(s.epoch.back(), 5);
   }
-}
-
-TEST(CouplingChange, WhatIsNoCouplingChangesNothing) {
-  const Shown s =
-      show({.volume = false, .settings = {{"viewer.coupling", 2}, {"viewer.buffers", 99}}}, CouplingMode::kSync, 15);
-  expect_complete(s, 15);
-  expect_one_update_a_frame(s);
-  EXPECT_EQ(*std::max_element(s.buffers.begin(), s.buffers.end()), 1);
 }
 
 // A server that is silent for longer than the display waits: frames are drawn from what is there until it answers.

@@ -92,37 +92,23 @@ def version(tree):
 
 # ---- flags -----------------------------------------------------------------------------------------------------------
 
-# A string that is one flag, or several names of one: "--a", "!--a", "-o,--output", "--a,--b".
-_FLAG_STRING = re.compile(r'"(!?--?[A-Za-z](?:[\w.-]*\w)?(?:,!?--?[A-Za-z][\w.-]*)*)"')
-_LONG_FLAG = re.compile(r"--[a-z][\w.-]*")
-
-
 def _programs(tree):
     return (f for f in tree.sources() if not f.path.startswith("tests/"))
 
 
 def flags(tree):
-    """Every flag stands in docs/flags.md, and every flag there is one of a program."""
-    page = tree.file(tables.FLAGS_PAGE) if tree.exists(tables.FLAGS_PAGE) else None
-    documented = {}
-    if page:
-        for number, line in enumerate(page.lines, 1):
-            for name in re.findall(r"--[a-z](?:[\w.-]*\w)?", line):
-                documented.setdefault(name, number)
+    """Every flag that a page names is one of a program."""
     words = set()
     for file in _programs(tree):
-        for match in _FLAG_STRING.finditer(file.without_comments):
-            for name in _LONG_FLAG.findall(match[1]):
-                if name not in documented and name not in tables.FOREIGN_FLAGS:
-                    yield Finding(
-                        file.path, file.line_of(match.start()), "flags",
-                        f"{name} does not stand in {tables.FLAGS_PAGE}",
-                    )
         for text in re.findall(r'"((?:\\.|[^"\\\n])*)"', file.without_comments):
             words.update(word.lstrip("!-") for word in re.split(r"[,\s=:'|]+", text))
-    for name, number in documented.items():
-        if name[2:] not in words and name not in ("--help", "--version"):
-            yield Finding(tables.FLAGS_PAGE, number, "flags", f"no program has {name}")
+    for page in pages(tree):
+        if page.name == "CHANGELOG.md":
+            continue
+        for number, line in enumerate(page.lines, 1):
+            for name in re.findall(r"`--([a-z](?:[\w.-]*\w)?)", line):
+                if name not in words and name not in tables.FOREIGN_FLAGS:
+                    yield Finding(page.path, number, "flags", f"no program has --{name}")
 
 
 # ---- metric columns --------------------------------------------------------------------------------------------------

@@ -149,7 +149,6 @@ OUTSIDE_HEADERS = [
     (r"GLFW/.*", ["client/displays/window/window.cpp", "client/displays/window/panel/gui/gui.cpp"]),
     (r"(imgui|backends/imgui_impl_).*", ["client/displays/window/panel/gui", "tests/unit/window/panel"]),
     (r"GL/.*", []),
-    (r"CLI/.*", ["common/options/parser.cpp"]),
     (
         r"toml\+\+/.*",
         [
@@ -180,10 +179,11 @@ LONG_FUNCTIONS = {}
 MESSAGES = "common/wire/"  # files below it declare messages: kName = "..."
 PROTOCOL_PAGE = "docs/protocol.md"
 VERSION_FILE = "common/wire/limits.h"  # kProtocolVersion
-FLAGS_PAGE = "docs/flags.md"
 METRICS_PAGE = "docs/metrics.md"
-# Flags of programs that are not ours, which ours start.
-FOREIGN_FLAGS = ()
+# Flags that pages name of programs that are not ours, or of scripts.
+FOREIGN_FLAGS = (
+    "build-arg", "build-dir", "exit-code-from", "het-group", "profile", "resolve-image", "seeds",
+)
 # Columns whose names are data: the master passes them on.
 FOREIGN_COLUMNS = ("viewer", "transfer", "colouring", "clip")
 # Files that pages and comments name and that are not in the repository: other people's, or made by a run.

@@ -34,9 +34,9 @@ class FakeSession {
     uint64_t strange_after = 0;
     /// Of points: after N answers a mark tells of a model with other points than were published; 0: never.
     uint64_t other_digest_after = 0;
-    std::map<std::string, double> settings;  ///< of the welcome
+    wire::SessionSettings settings{.steering = false};  ///< of the welcome
     /// The same, instead of these, after so many answers.
-    std::map<uint64_t, std::map<std::string, double>> settings_after;
+    std::map<uint64_t, wire::SessionSettings> settings_after;
     /// After so many answers nobody answers for so many seconds.
     std::map<uint64_t, double> silent_after_s;
   };

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 #include <typeinfo>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct Filler {
   void operator()(const char*, std::map<std::string, double>& v, size_t = 0) {
     v = {{"points", 1e6}, {"small", -1e-9}};
   }
+  template <class E>
+  requires std::is_enum_v<E>
+  void operator()(const char*, E& v, size_t = 0) { v = E(1); }
   template <class Tag>
   void operator()(const char*, Id<Tag>& v, size_t = 0) {
     v.value = (uint64_t(1) << 40) + ++n_;
@@ -87,6 +91,10 @@ struct Filler {
       m.tiles = {64, 32, 100, 50, 700, 2, 0, 0, 64, 32, 2048, 0, 200, 100, 1, 1, 1, 1};
     if constexpr (std::is_same_v<M, wire::SwapReady>) m.number = 2, m.viewers = 4;
     if constexpr (requires { m.buffers; }) m.buffers = 3;
+    if constexpr (std::is_same_v<M, wire::SessionSettings>) {
+      m.validation = 33, m.still_rays = 4, m.layers = 8, m.least_sampling = 0.75, m.buffers = 2;
+      m.picture_quality = 35, m.picture_samples = 4, m.picture_shading = 2;
+    }
     if constexpr (requires { m.wall_viewers; }) m.wall_viewers = 4;
     if constexpr (requires { m.footprint; }) m.footprint = 0.00078125;
   }

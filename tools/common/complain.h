@@ -1,18 +1,10 @@
 // How a command line program tells its user what is wrong.
 #pragma once
 
-#include <cstdio>
-
-#include "common/core/result.h"
-#include "common/core/utf8.h"
+#include "common/options/complain.h"
 
 namespace telesplat::tools {
 
-/// One line on stderr, without what steers a terminal. Returns `code`, so that a command can end with it: 2 bad usage
-/// or input, 1 failed while running.
-inline int complain(const Error& error, int code = 2, const char* program = "telesplat") {
-  std::fprintf(stderr, "%s: %s\n", program, printable_lines(error.text).c_str());
-  return code;
-}
+using telesplat::complain;
 
 }  // namespace telesplat::tools

@@ -51,11 +51,12 @@ void put_flags_behind(const std::vector<Command>& commands, std::vector<std::str
   }
 }
 
-// `help ctl pick` means `ctl pick --help`.
+// `help ctl pick` means `ctl pick --help`, `help run all` means `run --help all`.
 void put_help_behind(std::vector<std::string>& arguments) {
   if (arguments.empty() || arguments.front() != "help") return;
   arguments.erase(arguments.begin());
-  arguments.emplace_back("--help");
+  const bool all = arguments.size() > 1 && arguments.back() == "all";
+  arguments.insert(arguments.end() - (all ? 1 : 0), "--help");
 }
 
 }  // namespace

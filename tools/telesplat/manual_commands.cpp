@@ -23,6 +23,7 @@ constexpr std::array kServices{"master", "data", "sampler", "packer", "viewer", 
 
 struct CompletionOptions {
   std::string shell;
+  std::vector<std::string> words;
 };
 struct ManOptions {
   std::vector<std::string> words;
@@ -33,8 +34,9 @@ options::Table completion_table(CompletionOptions& o) {
   return {{.flag = "shell",
            .value = &o.shell,
            .help = "prints a script for this shell; of bash: source <(telesplat completion bash)",
-           .limits = options::Names{"bash", "zsh", "fish"},
-           .required = true}};
+           .limits = options::Names{"bash", "zsh", "fish", "words"},
+           .required = true},
+          {.flag = "typed", .value = &o.words, .help = "what the scripts ask: words behind words --"}};
 }
 
 options::Table man_table(ManOptions& o) {
@@ -114,10 +116,11 @@ int man(const options::Manual& all, const ManOptions& o) {
   return 0;
 }
 
-int complete(const options::Manual& all, const std::string& shell) {
+int complete(const options::Manual& all, const CompletionOptions& o) {
   using options::Shell;
-  const Shell of = shell == "bash" ? Shell::kBash : shell == "zsh" ? Shell::kZsh : Shell::kFish;
-  std::fputs(options::completion(all, of).c_str(), stdout);
+  const Shell of = o.shell == "bash" ? Shell::kBash : o.shell == "zsh" ? Shell::kZsh : Shell::kFish;
+  std::fputs((o.shell == "words" ? options::candidates(all, o.words) : options::completion(all.name, of)).c_str(),
+             stdout);
   return 0;
 }
 
@@ -137,7 +140,7 @@ std::vector<Command> with_manuals(const std::string& about, std::vector<Command>
   // What the tables point to lives as long as what `commands` runs.
   const auto owned = std::make_shared<std::vector<Command>>(commands);
   commands[commands.size() - 2].run = [all, owned, o = completion_options](const options::Given&) {
-    return complete(all, o->shell);
+    return complete(all, *o);
   };
   commands.back().run = [all, owned, o = man_options](const options::Given&) { return man(all, *o); };
   return commands;

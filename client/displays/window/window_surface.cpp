@@ -408,7 +408,7 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
   }
   had_scene_ = had_scene_ || !facts.fact("scene").empty();
   auto& least = options_.sampling.least_sampling;
-  if (!options_.sampling_chosen) least = scene::SessionView(*session).setting("viewer.least_sampling", least);
+  if (!options_.sampling_chosen) least = session->settings.least_sampling;
 }
 
 void WindowSurface::save_transfer() {

@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "client/viewer/coupling/pipeline_depth.h"
 #include "common/core/check.h"
-#include "common/wire/limits.h"
 
 namespace telesplat::viewer {
 
@@ -34,11 +32,17 @@ std::string coupling_text(const CouplingState& s) {
   return fmt::format("loose, {} buffer{}", s.buffers, s.buffers == 1 ? "" : "s");
 }
 
-std::optional<CouplingState> coupling_told(double mode, double buffers) {
-  if (mode == 0) return coupling_state(CouplingMode::kAsync, 0);
-  if (mode == 1) return coupling_state(CouplingMode::kSync, 0);
-  if (mode != 2 || !(buffers >= 1 && buffers <= double(wire::kMaxBuffers)) || buffers != std::floor(buffers))
-    return std::nullopt;
+std::optional<CouplingState> coupling_told(wire::CouplingOrder order, uint64_t buffers) {
+  switch (order) {
+    case wire::CouplingOrder::kOwn:
+      return std::nullopt;
+    case wire::CouplingOrder::kAsync:
+      return coupling_state(CouplingMode::kAsync, 0);
+    case wire::CouplingOrder::kSync:
+      return coupling_state(CouplingMode::kSync, 0);
+    case wire::CouplingOrder::kLoose:
+      break;
+  }
   return coupling_state(CouplingMode::kLoose, int(buffers));
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/ids.h"
+#include "common/wire/session_messages.h"
 
 namespace telesplat::viewer {
 
@@ -34,9 +35,8 @@ struct CouplingState {
 CouplingState coupling_state(CouplingMode mode, int loose);
 /// "async", "sync", "loose, 3 buffers".
 std::string coupling_text(const CouplingState& state);
-/// As the session's settings "viewer.coupling" (0 async, 1 sync, 2 loose) and "viewer.buffers" name it. They come from
-/// outside. nullopt: no coupling.
-std::optional<CouplingState> coupling_told(double mode, double buffers);
+/// As the session's settings have it. nullopt: the viewer keeps its own.
+std::optional<CouplingState> coupling_told(wire::CouplingOrder order, uint64_t buffers);
 
 /// Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that
 /// shows its update has been displayed. Updates are displayed in the order of their requests, each in exactly one

@@ -21,7 +21,6 @@ struct RequestOptions {
   double min_scale_changing = 0.25;
   uint64_t buffers = 0;  ///< 0: asynchronous; else requests are paced by credits (coupling.h) and not by max_rate_hz
   tracking::Prediction prediction = tracking::Prediction::kKalman;
-  double horizon_s = 0;       ///< seconds that poses are predicted ahead; 0: the latency of updates, as it is measured
   std::string wall;           ///< wire::ViewRequest
   uint64_t wall_viewers = 0;  ///< likewise
   /// Views are pictures that the servers draw: they are asked for as the display sees them, of the head as it is, so

@@ -52,7 +52,6 @@ void ViewRequester::on_ask(double now_s, uint64_t ask, const geometry::Camera& c
 }
 
 double ViewRequester::horizon_s() const {
-  if (options_.horizon_s > 0) return options_.horizon_s;
   if (displayed_latency_s_ > 0) return displayed_latency_s_;
   return latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
 }

@@ -34,7 +34,7 @@ ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLin
                 cache_, fine_rays_, batches_, links.spans) {}
 
 Status ReceivedPoints::follow(const wire::Welcome& session) {
-  const bool keep = scene::SessionView(session).setting("packing.keep_redundant", 0) != 0;
+  const bool keep = session.settings.keep_redundant;
   const int depth = int(std::min<uint64_t>(session.octree_depth, std::numeric_limits<int>::max()));
   const points::ModelConfig config{session.box_room, depth, !keep};
   if (const Status s = points::validate(config); !s) return s;

@@ -22,8 +22,7 @@ constexpr double kForgiven_s = 10.0;                      // after which it fail
 }  // namespace
 
 SlabPlan::SlabPlan(const MasterOptions& options, const PlanLinks& links) : links_(links), schedule_(options.schedule) {
-  if (const auto layers = options.settings.find("volume.layers"); layers != options.settings.end())
-    schedule_.set_layers(int(layers->second));
+  schedule_.set_layers(int(options.settings.layers));
 }
 
 Result<Adopted> SlabPlan::adopt(const wire::Hello& data, double now_s) {
@@ -56,7 +55,7 @@ void SlabPlan::put_aside() {
 }
 
 void SlabPlan::describe(wire::Welcome& welcome) const {
-  welcome.settings["volume.layers"] = schedule_.layers();
+  welcome.settings.layers = uint64_t(schedule_.layers());
   if (!whole_) return;
   welcome.box_room = volume_.box_room();
   welcome.facts = volume_.facts();

@@ -22,11 +22,11 @@ Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
   out.changed |= colours_.adopt(data, problem);
   if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
   const auto kind = scene::kind_named(scene_.kind());
-  const bool pictures = options_.images.on();
+  const bool pictures = options_.settings.pictures;
   const Cut cut{.rows = scene_.is_julia() && !pictures,
                 .coarse = master::progressive(options_, kind),
                 .coarse_if_slow = options_.progressive == Progressive::kAuto && !pictures,
-                .steered = master::steers(options_, kind),
+                .steered = master::settings(options_, kind).steering,
                 .pictures = pictures};
   out.changed |= cut != schedule_.cut();
   schedule_.set_cut(cut);

@@ -464,7 +464,7 @@ std::vector<Event> PackerCore::tick(double now_s) {
   const Config& c = i.config;
   std::vector<Event> out;
   if (i.keeps()) {
-    const PatchLimits limits{c.obsolete_after_s, c.age_weight, c.rate_weight, c.patches_per_cluster, c.max_points};
+    const PatchLimits limits{c.obsolete_after_s, c.patches_per_cluster, c.max_points};
     i.forget_patches(i.patch_obsolescence.choose(limits, now_s), out);
     if (c.max_log_bytes > 0) i.forget_patches(i.patch_obsolescence.choose_events(i.model, i.log, c.max_log_bytes), out);
   } else {

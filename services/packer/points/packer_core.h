@@ -28,7 +28,7 @@ enum class Redundancy {
 struct Config {
   points::ModelConfig model;
   Redundancy redundancy = Redundancy::kEliminate;
-  float relative_epsilon = 0.005f;               ///< of T4.3.1, as a fraction of the depth
+  float relative_epsilon = 0.004f;               ///< of T4.3.1, as a fraction of the depth
   float nearest_sample = splat::kNearestSample;  ///< pixels: of splat::eliminate_redundancy
   /// Clusters that nobody drew for longer are forgotten; 0: never (T4.3.3).
   double obsolete_after_s = 0;
@@ -39,7 +39,6 @@ struct Config {
   uint64_t max_log_bytes = 0;
   // With kKeep single patches of clusters are forgotten instead, highest score first (patch_obsolescence.h); the three
   // limits above are then about patches.
-  double age_weight = 1, rate_weight = 4;
   uint32_t patches_per_cluster = 6;  ///< at most; 0: no limit
   int threads = 1;                   ///< for reference depth maps; 0: all cores
 };

@@ -5,6 +5,11 @@
 #include <tuple>
 
 namespace telesplat::packer {
+namespace {
+
+constexpr double kHalving_s = 4;  // a halving of the sampling rate below the cluster's best counts as this much age
+
+}  // namespace
 
 void PatchObsolescence::added(points::ClusterKey key, const points::Mosaic& mosaic, double now_s) {
   points_ += mosaic.count(0);
@@ -51,9 +56,9 @@ bool PatchObsolescence::Scored::goes_before(const Scored& other) const {
   return std::tie(other.score, first, key) < std::tie(score, other.first, other.key);
 }
 
-double PatchObsolescence::score(const Patch& p, float best_range, const PatchLimits& limits, double now_s) const {
+double PatchObsolescence::score(const Patch& p, float best_range, double now_s) const {
   const double halvings = std::log2(static_cast<double>(best_range) / static_cast<double>(p.pixel_range));
-  return limits.age_weight * (now_s - p.access_s) + limits.rate_weight * std::max(halvings, 0.0);
+  return now_s - p.access_s + kHalving_s * std::max(halvings, 0.0);
 }
 
 std::vector<PatchKey> PatchObsolescence::choose(const PatchLimits& limits, double now_s) const {
@@ -81,7 +86,7 @@ std::vector<PatchKey> PatchObsolescence::choose(const PatchLimits& limits, doubl
       }
     }
     for (size_t i = 0; i < patches.size(); ++i)
-      if (of_cluster[i].points > 0) of_cluster[i].score = score(patches[i], best_range, limits, now_s);
+      if (of_cluster[i].points > 0) of_cluster[i].score = score(patches[i], best_range, now_s);
     std::erase_if(of_cluster, [](const Scored& p) { return p.points == 0; });
     size_t first_left = 0;
     if (limits.patches_per_cluster > 0 && of_cluster.size() > limits.patches_per_cluster) {

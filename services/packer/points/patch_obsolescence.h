@@ -18,8 +18,6 @@ struct PatchKey {
 
 struct PatchLimits {
   double obsolete_after_s = 0;       ///< forget what was not drawn for longer; 0: never
-  double age_weight = 1;             ///< per second since it was drawn
-  double rate_weight = 4;            ///< per halving of the sampling rate below the cluster's best
   uint32_t patches_per_cluster = 0;  ///< at most; 0: no limit
   uint64_t max_points = 0;           ///< above it, forget until at most 90 % of it are left; 0: no limit
 };
@@ -37,8 +35,7 @@ class PatchObsolescence {
 
   /// What to forget, ascending: first the patches not drawn for longer than obsolete_after_s; then those by which a
   /// cluster has more than patches_per_cluster; then more while there are too many points. The order is that of falling
-  ///   score = age_weight * seconds since it was drawn
-  ///           + rate_weight * max(0, log2(best pixel range / its pixel range)),
+  ///   score = seconds since it was drawn + 4 * max(0, log2(best pixel range / its pixel range)),
   /// with the best pixel range of the cluster's patches that are not obsolete. At equal scores the older patch goes
   /// first, then the lower key.
   std::vector<PatchKey> choose(const PatchLimits& limits, double now_s) const;
@@ -61,7 +58,7 @@ class PatchObsolescence {
     uint32_t points;
     bool goes_before(const Scored& other) const;
   };
-  double score(const Patch& patch, float best_range, const PatchLimits& limits, double now_s) const;
+  double score(const Patch& patch, float best_range, double now_s) const;
 
   std::unordered_map<points::ClusterKey, std::vector<Patch>> clusters_;
   uint64_t points_ = 0;

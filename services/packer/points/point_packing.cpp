@@ -14,38 +14,26 @@ namespace telesplat::packer {
 namespace {
 
 Config config_of(const wire::Welcome& session, const PointPacking::Options& options) {
-  const scene::SessionView view(session);
+  const bool keep = session.settings.keep_redundant;
   Config c;
-  const bool keep = view.setting("packing.keep_redundant", 0) != 0;
   c.model = {session.box_room, int(session.octree_depth), !keep};
   c.redundancy = keep ? Redundancy::kKeep : Redundancy::kEliminate;
-  c.relative_epsilon = float(view.setting("packing.epsilon", c.relative_epsilon));
-  c.obsolete_after_s = view.setting("packing.obsolete_after_s", 0);
-  c.max_points = uint64_t(view.setting("packing.max_points", 0));
-  c.age_weight = view.setting("packing.age_weight", c.age_weight);
-  c.rate_weight = view.setting("packing.rate_weight", c.rate_weight);
-  c.patches_per_cluster =
-      uint32_t(std::clamp(view.setting("packing.patches_per_cluster", c.patches_per_cluster), 0.0, 1e9));
+  c.obsolete_after_s = session.settings.obsolete_after_s;
+  c.max_points = session.settings.max_points;
   c.max_log_bytes = options.max_log_bytes;
   c.threads = options.threads;
   return c;
 }
 
-PlanConfig plan_config_of(const wire::Welcome& session, const Config& packing) {
-  const scene::SessionView view(session);
-  const auto whole = [&](const std::string& name, int fallback, double most) {
-    return static_cast<int>(std::clamp(view.setting(name, fallback), 0.0, most));
-  };
-  PlanConfig c;
-  c.model = packing.model;
-  c.relative_epsilon = packing.relative_epsilon;
-  c.nearest_sample = packing.nearest_sample;
-  c.view_cell_m = std::clamp(view.setting("sampling.view_cell_m", c.view_cell_m), 0.0, 1e3);
-  c.validation = whole("sampling.validation", c.validation, BlueNoise::kMaxShare);
-  c.still_rays = whole("sampling.still_rays", c.still_rays, 16);
-  c.max_points = packing.max_points;
-  c.threads = packing.threads;
-  return c;
+PlanConfig plan_config_of(const wire::SessionSettings& settings, const Config& packing) {
+  return {.model = packing.model,
+          .relative_epsilon = packing.relative_epsilon,
+          .nearest_sample = packing.nearest_sample,
+          .view_cell_m = settings.view_cell_m,
+          .validation = int(settings.validation),
+          .still_rays = int(settings.still_rays),
+          .max_points = packing.max_points,
+          .threads = packing.threads};
 }
 
 // The block that a leased tile belongs to.
@@ -167,13 +155,10 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
     publish(*event);
     gatherer_.clear();
   }
-  const scene::SessionView view(session);
-  errors_ = {view.setting("packing.depth_error", -1), view.setting("packing.normal_error", -1),
-             view.setting("packing.colour_error", -1)};
+  const wire::SessionSettings& settings = session.settings;
+  errors_ = {settings.depth_error, settings.normal_error, settings.colour_error};
   choose_errors();
-  PlanConfig plan_config = plan_config_of(session, config);
-  plan_config.pictures = options_.plans != nullptr;
-  begin_planner(plan_config);
+  begin_planner(plan_config_of(settings, config));
 }
 
 // Another configuration means another planner, which knows what the model knows.
@@ -287,15 +272,6 @@ void PointPacking::end_frame(const wire::FrameEnd& end, double now_s) {
   publish(**event, moments);
 }
 
-void PointPacking::record_plan() {
-  if (!options_.plans) return;
-  const Status s = options_.plans->add(planner_->picture());
-  if (s) return;
-  ++records_failed_;
-  log::error("{}; plans are not recorded any more", s.error().text);
-  options_.plans = nullptr;
-}
-
 wire::Plan PointPacking::plan(const wire::PlanRequest& request, double now_s) {
   for (;;)
     if (auto plan = plan_piece(request, now_s)) return *std::move(plan);
@@ -321,7 +297,6 @@ std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& requ
   if (pixels > Planner::kMaxPixels && !std::exchange(told_of_size_, true))
     log::warn("views of {}x{} pixels are sampled whole: up to {} pixels are planned", request.camera.width,
               request.camera.height, Planner::kMaxPixels);
-  if (!request.extra && !plan.full) record_plan();
   if (request.extra || plan.full || !plan.tiles.empty()) return plan;
   const FramePart frame{.frame = request.frame,
                         .epoch = request.epoch,

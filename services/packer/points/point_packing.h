@@ -50,7 +50,6 @@ class PointPacking final : public Packing {
     uint64_t max_log_bytes = 0;         ///< Config::max_log_bytes
     StateAnswers::Limits answers = {};  ///< to viewers that join or have gaps
     DepthRecorder* recorder = nullptr;  ///< of sampled depth images; null: none are kept
-    PlanRecorder* plans = nullptr;      ///< of plans; null: none are kept
   };
   /// Keeps a reference to the spans, and the recorders' addresses.
   PointPacking(const Options& options, Outlets outlets, metrics::SpanRecorder& spans)
@@ -81,7 +80,6 @@ class PointPacking final : public Packing {
   };
   void begin(const Config& config, const wire::Welcome& session);
   void begin_planner(const PlanConfig& config);
-  void record_plan();
   void pack(const Received& received, double since_s, double now_s);
   void refuse(const Received& received, const std::string& why);
   /// A block whose every row is here. stream: of the whole block, if it came as one tile; else null.
@@ -126,7 +124,7 @@ class PointPacking final : public Packing {
   log::RateLimiter told_of_viewers_;
   Completions completions_;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0, refused_ = 0, unsealed_ = 0;
-  uint64_t records_failed_ = 0;  // of depth images and plans
+  uint64_t records_failed_ = 0;  // of depth images
   uint64_t plans_ = 0;
   FrameId planning_;           // whose extra rays were planned last,
   double planning_s_ = 0;      // and for how long so far

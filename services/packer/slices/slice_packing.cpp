@@ -25,7 +25,7 @@ bool SlicePacking::follow(const wire::Welcome& session, double now_s) {
   }
   lease_key_ = session.lease_key;
   gatherer_.set_scene(read->grid, session.epoch);
-  gatherer_.set_most(scene::SessionView(session).setting("packing.max_rate_mbit", 0) * 1e6 / 8);
+  gatherer_.set_most(session.settings.max_rate_mbit * 1e6 / 8);
   for (const auto& [received, bytes, since_s, user] : ahead_.take()) {
     if (is_ahead(received.images))
       ahead_.add(received, bytes, since_s, user);

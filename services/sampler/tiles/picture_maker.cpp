@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "common/image/jpeg.h"
-#include "common/scene/session.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -34,16 +33,11 @@ std::vector<uint32_t> averaged(const std::vector<uint32_t>& fine, int width, int
 }  // namespace
 
 void PictureMaker::follow(const wire::Welcome& session) {
-  const scene::SessionView view(session);
-  const auto whole = [&](const char* name, double fallback, double most) {
-    const double value = view.setting(name, fallback);
-    return value >= 0 ? int(std::min(value, most)) : 0;
-  };
-  quality_ = whole(scene::kPictureQuality, 0, 100);
-  samples_ = whole("picture.samples", 1, 16);
-  const auto& names = image::kShadingNames;
-  parameters_ = *image::shading_named(names[size_t(whole("picture.shading", 0, double(names.size() - 1)))]);
-  parameters_.background = uint32_t(whole("picture.background", 0, 0xffffff));
+  const wire::SessionSettings& s = session.settings;
+  quality_ = s.pictures ? int(s.picture_quality) : 0;
+  samples_ = int(s.picture_samples);
+  parameters_ = *image::shading_named(image::kShadingNames[size_t(s.picture_shading)]);
+  parameters_.background = uint32_t(s.picture_background);
   shading_.reset();
 }
 

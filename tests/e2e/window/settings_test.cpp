@@ -46,9 +46,8 @@ class SettingsTest : public testing::Test {
     display_.emplace();
     ASSERT_TRUE(display_->ready()) << "Xvfb did not start";
     write_plate(plate_);
-    run_.emplace(std::vector<std::string>{"view", plate_, "--size", "1000x740", "--trajectory", "still",
-                                          "--same-priority", "--samplers", "1", "--sampler-threads", "1", "--cache",
-                                          folder_ / "cache", "--up", "z"});
+    run_.emplace(std::vector<std::string>{"view", plate_, "--size", "1000x740", "--trajectory", "still", "--samplers",
+                                          "1", "--sampler-threads", "1", "--cache", folder_ / "cache", "--up", "z"});
     program_.emplace("telesplat", *run_, folder_ / "view");
     ASSERT_TRUE(wait_until([&] { return (window_ = display_->find(" fps, ").value_or(0)) != 0; }, 60))
         << program_->err();

@@ -121,7 +121,7 @@ class MasterPlay {
     o.schedule.tile_size = 64;
     o.schedule.frames_in_flight = 1 + int(dice.below(2));
     o.schedule.lease_timeout_s = 2;
-    o.steering = dice.chance(50) ? master::Steering::kAuto : master::Steering::kOff;
+    o.settings.steering = dice.chance(50);
     o.progressive = dice.chance(30) ? master::Progressive::kOn : master::Progressive::kAuto;
     return o;
   }

@@ -54,13 +54,12 @@ wire::Welcome welcome(Dice& dice, EpochId epoch, InstanceId master) {
   w.box_room = model.box_room;
   if (dice.chance(20)) w.box_room = {w.box_room.lo * 2.f, w.box_room.hi * 2.f};
   w.facts["kind"] = "mesh";
-  w.settings["packing.keep_redundant"] = dice.chance(30);
-  w.settings["packing.max_points"] = dice.chance(30) ? 1500 : 0;
-  w.settings["packing.obsolete_after_s"] = dice.chance(30) ? 5 : 0;
-  w.settings["packing.patches_per_cluster"] = double(dice.below(4));
-  w.settings["sampling.validation"] = double(dice.below(3));
-  w.settings["packing.depth_error"] = dice.chance(50) ? 1.0 / 8 : -1;
-  w.settings["packing.normal_error"] = double(dice.below(3)) - 1;
+  w.settings.keep_redundant = dice.chance(30);
+  w.settings.max_points = dice.chance(30) ? 1500 : 0;
+  w.settings.obsolete_after_s = dice.chance(30) ? 5 : 0;
+  w.settings.validation = dice.below(3);
+  w.settings.depth_error = dice.chance(50) ? 1.0 / 8 : -1;
+  w.settings.normal_error = double(dice.below(3)) - 1;
   return w;
 }
 
@@ -119,7 +118,7 @@ class PointsPlay {
   };
 
   points::ModelConfig config() const {
-    return {session_.box_room, int(session_.octree_depth), session_.settings.at("packing.keep_redundant") == 0};
+    return {session_.box_room, int(session_.octree_depth), !session_.settings.keep_redundant};
   }
 
   void start_packer() {

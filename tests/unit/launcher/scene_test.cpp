@@ -163,13 +163,13 @@ TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
 TEST_F(Scenes, EveryFlagOfAServiceReachesItsProcess) {
   RunOptions o;
   ASSERT_TRUE(settled(o, {file("mesh.ply"), "--up=z", "--least-detail=0.5", "--detail-budget=off", "--exr",
-                          "--packing.epsilon=0.01", "--packing.redundancy=keep", "--tile-size=64", "--sampler=raster",
+                          "--packing.max_points=5", "--packing.redundancy=keep", "--tile-size=64", "--sampler=raster",
                           "--sampler-threads=3", "--record-depth", "--out=" + file("run")})
                   .ok());
   EXPECT_TRUE(holds(data_arguments(o, 0), "--up=z"));
   for (const char* flag : {"--least-detail=0.5", "--detail-budget=off", "--exr"})
     EXPECT_TRUE(holds(viewer_arguments(o, 1, 0), flag)) << flag;
-  for (const char* flag : {"--packing.epsilon=0.01", "--packing.redundancy=keep", "--tile-size=64"})
+  for (const char* flag : {"--packing.max_points=5", "--packing.redundancy=keep", "--tile-size=64"})
     EXPECT_TRUE(holds(master_arguments(o), flag)) << flag;
   for (const char* flag : {"--sampler=raster", "--threads=3"}) EXPECT_TRUE(holds(sampler_arguments(o), flag)) << flag;
   EXPECT_TRUE(holds(packer_arguments(o), "--record-depth=" + file("run/depth")));

@@ -12,8 +12,8 @@ namespace {
 class Animation : public ::testing::Test {
  protected:
   explicit Animation(MasterOptions o = {.schedule = {.frames_in_flight = 2},
-                                        .progressive = Progressive::kOff,
-                                        .steering = Steering::kOff})
+                                        .settings = {.steering = false},
+                                        .progressive = Progressive::kOff})
       : options(std::move(o)), core(options, {42}, *record) {}
 
   static wire::Hello hello(const std::string& role, uint64_t instance) {
@@ -300,7 +300,7 @@ TEST_F(Animation, TheDataServersTimelineRuns) {
 
 class BadTimeline : public Animation {
  protected:
-  BadTimeline() : Animation({.steering = Steering::kOff, .animation = *julia::parse_timeline("c.y=0:99:1s")}) {}
+  BadTimeline() : Animation({.settings = {.steering = false}, .animation = *julia::parse_timeline("c.y=0:99:1s")}) {}
 };
 TEST_F(BadTimeline, OfTheCommandLineIsNotBegun) {
   join();
@@ -311,7 +311,7 @@ TEST_F(BadTimeline, OfTheCommandLineIsNotBegun) {
 
 class ProgressiveAnimation : public Animation {
  protected:
-  ProgressiveAnimation() : Animation({.steering = Steering::kOff}) {}
+  ProgressiveAnimation() : Animation({.settings = {.steering = false}}) {}
 };
 TEST_F(ProgressiveAnimation, CoarseAndFineShareAnEpoch) {
   join();
@@ -328,14 +328,13 @@ TEST_F(ProgressiveAnimation, CoarseAndFineShareAnEpoch) {
 
 TEST_F(ProgressiveAnimation, PackingEliminatesUnlessToldOtherwise) {
   MasterOptions o;
-  o.redundancy = Redundancy::kAuto;
   MasterCore other(o, {1}, *record);
   other.on("d", hello("data", 1), 0);
-  EXPECT_EQ(other.settings().at("packing.keep_redundant"), 0);
-  o.redundancy = Redundancy::kKeep;
+  EXPECT_FALSE(other.settings().keep_redundant);
+  o.settings.keep_redundant = true;
   MasterCore keeping(o, {1}, *record);
   keeping.on("d", hello("data", 1), 0);
-  EXPECT_EQ(keeping.settings().at("packing.keep_redundant"), 1);
+  EXPECT_TRUE(keeping.settings().keep_redundant);
 }
 
 }  // namespace

@@ -81,8 +81,7 @@ class Master : public ::testing::Test {
 
   std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
   MasterCore core{MasterOptions{.schedule = {.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2},
-                                .steering = Steering::kOff,
-                                .settings = {{"packing.max_points", 5}}},
+                                .settings = {.max_points = 5, .steering = false}},
                   {42},
                   *record};
   std::vector<Outgoing> outbox;
@@ -95,7 +94,7 @@ TEST_F(Master, WelcomesEveryoneAndAnnouncesNewEndpoints) {
   EXPECT_EQ(welcomes[0].hello_sent_s, 0.5);
   EXPECT_EQ(welcomes[0].master_s, 3);
   EXPECT_EQ(welcomes[0].master.value, 42u);
-  EXPECT_EQ(welcomes[0].settings.at("packing.max_points"), 5);
+  EXPECT_EQ(welcomes[0].settings.max_points, 5u);
   EXPECT_TRUE(welcomes[0].box_room.empty());
   core.on("d", hello("data", "data", 1), 4);
   core.on("p", hello("packer", "packer", 2), 4);
@@ -653,7 +652,7 @@ TEST_F(Master, AViewBeyondTheLimitIsSampledCoarser) {
   EXPECT_NEAR(camera.right - camera.left, r.camera.right - r.camera.left, 1e-3) << "all of the view";
   EXPECT_EQ(leases[0].footprint, 1e-4);
   EXPECT_EQ(status()["limits"]["views_coarser"], 1);
-  EXPECT_EQ(sent<wire::Welcome>("v").back().settings.at("sampling.max_pixels"), double(Limits{}.max_sampling_pixels))
+  EXPECT_EQ(sent<wire::Welcome>("v").back().settings.max_sampling_pixels, Limits{}.max_sampling_pixels)
       << "so that its viewer can tell";
 }
 

@@ -6,6 +6,8 @@
 namespace telesplat::master {
 namespace {
 
+using Mode = wire::CouplingOrder;
+
 class CouplingOrders : public testing::Test {
  protected:
   CouplingOrders() {
@@ -34,7 +36,7 @@ class CouplingOrders : public testing::Test {
 
   std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
   MasterCore core{MasterOptions{}, {42}, *record};
-  std::map<std::string, std::map<std::string, double>> told;  // settings, by viewer
+  std::map<std::string, wire::SessionSettings> told;  // settings, by viewer
 };
 
 TEST_F(CouplingOrders, AreToldToTheViewersThatAreHere) {
@@ -43,22 +45,21 @@ TEST_F(CouplingOrders, AreToldToTheViewersThatAreHere) {
   EXPECT_EQ(reply.text, "2 viewers: loose, 4 buffers");
   ASSERT_EQ(told.size(), 2u) << "nobody else's business";
   for (const auto& [viewer, settings] : told) {
-    EXPECT_EQ(settings.at("viewer.coupling"), 2) << viewer;
-    EXPECT_EQ(settings.at("viewer.buffers"), 4);
+    EXPECT_EQ(settings.coupling, Mode::kLoose) << viewer;
+    EXPECT_EQ(settings.buffers, 4u);
   }
   EXPECT_EQ(order({{"coupling", "sync"}, {"viewer", "viewer-2"}}).text, "viewer-2: sync");
   ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told["viewer-2"].at("viewer.coupling"), 1);
+  EXPECT_EQ(told["viewer-2"].coupling, Mode::kSync);
 
   // Whatever is announced later says it again, to each its own.
   core.on("ctl", wire::Control{"epoch", {}}, 2);
-  std::map<std::string, double> again;
+  std::map<std::string, Mode> again;
   for (const auto& out : core.take_outgoing())
-    if (out.type == wire::Welcome::kName) {
-      const auto settings = wire::decode<wire::Welcome>(std::as_bytes(std::span(out.body)))->settings;
-      again[out.peer] = settings.contains("viewer.coupling") ? settings.at("viewer.coupling") : -1;
-    }
-  EXPECT_EQ(again, (std::map<std::string, double>{{"viewer-1", 2}, {"viewer-2", 1}, {"sampler-1", -1}}));
+    if (out.type == wire::Welcome::kName)
+      again[out.peer] = wire::decode<wire::Welcome>(std::as_bytes(std::span(out.body)))->settings.coupling;
+  EXPECT_EQ(again, (std::map<std::string, Mode>{
+                       {"viewer-1", Mode::kLoose}, {"viewer-2", Mode::kSync}, {"sampler-1", Mode::kOwn}}));
 }
 
 TEST_F(CouplingOrders, AViewerThatComesLaterBeginsWithItsOwn) {
@@ -70,8 +71,7 @@ TEST_F(CouplingOrders, AViewerThatComesLaterBeginsWithItsOwn) {
   core.on("another", h, 2);
   for (const auto& out : core.take_outgoing())
     if (out.type == wire::Welcome::kName && out.peer == "another") {
-      EXPECT_FALSE(
-          wire::decode<wire::Welcome>(std::as_bytes(std::span(out.body)))->settings.contains("viewer.coupling"));
+      EXPECT_EQ(wire::decode<wire::Welcome>(std::as_bytes(std::span(out.body)))->settings.coupling, Mode::kOwn);
     }
 }
 

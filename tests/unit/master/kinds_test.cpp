@@ -101,7 +101,7 @@ class KindsOfScenes : public ::testing::Test {
 
   double now = 0;
   std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
-  MasterCore core{{.steering = Steering::kOff}, {42}, *record};
+  MasterCore core{{.settings = {.steering = false}}, {42}, *record};
   std::vector<Outgoing> outbox;
   std::map<std::string, wire::Welcome> last;
 };
@@ -295,41 +295,37 @@ TEST_F(KindsOfScenes, ARefusedServersEndpointsAreToldNobody) {
 
 TEST_F(KindsOfScenes, WhatWasNotGivenIsAsTheKindHasIt) {
   join();
-  const auto expect = [&](double points, double keep, double sampling, bool progressive) {
+  const auto expect = [&](bool steering, double sampling, bool progressive) {
     const auto s = told().settings;
-    EXPECT_EQ(s.at("packing.max_points"), points);
-    EXPECT_EQ(s.at("packing.keep_redundant"), keep);
-    EXPECT_EQ(s.at("viewer.least_sampling"), sampling);
+    EXPECT_EQ(s.steering, steering);
+    EXPECT_EQ(s.least_sampling, sampling);
     EXPECT_EQ(told().octree_depth, 5u);
     EXPECT_EQ(core.progressive(), progressive);
     EXPECT_EQ(core.settings(), s);
   };
-  expect(20e6, 0, 0.5, false);  // nothing is known yet
+  expect(true, 0.5, false);  // nothing is known yet
   hello(data(1, "julia"));
-  expect(20e6, 0, 0.4, true);
+  expect(true, 0.4, true);
   hello(data(2, "mesh"));
-  expect(20e6, 0, 0.5, false);
+  expect(true, 0.5, false);
   hello(volume_part(3, 12, 0, 1));
-  expect(20e6, 0, 0.5, false);
-  EXPECT_EQ(told().settings.at("volume.layers"), 16);
+  expect(false, 0.5, false);
+  EXPECT_EQ(told().settings.layers, 16u);
 }
 
 TEST(Settings, WhatWasGivenIsToldOfEveryKind) {
   MasterOptions o;
-  o.settings["packing.max_points"] = 5;
-  o.octree_depth = 7;
+  o.settings.max_points = 5;
   o.progressive = Progressive::kOff;
-  o.redundancy = Redundancy::kEliminate;
   for (const auto kind : scene::kKinds) {
-    EXPECT_EQ(settings(o, kind).at("packing.max_points"), 5);
-    EXPECT_EQ(settings(o, kind).at("packing.keep_redundant"), 0);
-    EXPECT_EQ(octree_depth(o, kind), 7u);
+    EXPECT_EQ(settings(o, kind).max_points, 5u);
+    EXPECT_FALSE(settings(o, kind).keep_redundant);
     EXPECT_FALSE(progressive(o, kind));
   }
   o.progressive = Progressive::kOn;
-  o.redundancy = Redundancy::kKeep;
+  o.settings.keep_redundant = true;
   for (const auto kind : scene::kKinds) {
-    EXPECT_EQ(settings(o, kind).at("packing.keep_redundant"), 1);
+    EXPECT_TRUE(settings(o, kind).keep_redundant);
     EXPECT_TRUE(progressive(o, kind));
   }
 }

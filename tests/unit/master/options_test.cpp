@@ -16,24 +16,11 @@ Status give(MasterServiceOptions& o, const std::string& flag, const std::string&
   return row ? options::set(*row, text) : Status(Error{"no such flag"});
 }
 
-TEST(MasterFlags, SettingsHaveTheirUsualValues) {
+TEST(MasterFlags, ChangeNothingUnlessTheyAreGiven) {
   MasterServiceOptions o;
   table(o);
-  EXPECT_EQ(o.master.settings, (std::map<std::string, double>{{"packing.age_weight", 1},
-                                                              {"packing.colour_error", -1},
-                                                              {"packing.depth_error", -1},
-                                                              {"packing.epsilon", 0.004},
-                                                              {"packing.normal_error", -1},
-                                                              {"packing.obsolete_after_s", 0},
-                                                              {"packing.patches_per_cluster", 6},
-                                                              {"packing.rate_weight", 4},
-                                                              {"sampling.still_rays", 16},
-                                                              {"sampling.validation", 32},
-                                                              {"sampling.view_cell_m", 0.2},
-                                                              {"volume.layers", 16}}));
+  EXPECT_EQ(o.master.settings, wire::SessionSettings{});
   EXPECT_EQ(o.master.progressive, Progressive::kAuto);
-  EXPECT_EQ(o.master.redundancy, Redundancy::kAuto);
-  EXPECT_EQ(o.master.steering, Steering::kAuto);
 }
 
 TEST(MasterFlags, ErrorsAreFractionsNumbersAutoOrOff) {
@@ -44,12 +31,12 @@ TEST(MasterFlags, ErrorsAreFractionsNumbersAutoOrOff) {
   };
   EXPECT_EQ(text("--depth-error"), "auto");
   EXPECT_TRUE(give(o, "--depth-error", "1/32"));
-  EXPECT_EQ(o.master.settings.at("packing.depth_error"), 1.0 / 32);
+  EXPECT_EQ(o.master.settings.depth_error, 1.0 / 32);
   EXPECT_EQ(text("--depth-error"), "0.03125") << "as children are told it";
   EXPECT_TRUE(give(o, "--depth-error", "off"));
-  EXPECT_EQ(o.master.settings.at("packing.depth_error"), 0);
+  EXPECT_EQ(o.master.settings.depth_error, 0);
   EXPECT_TRUE(give(o, "--depth-error", "auto"));
-  EXPECT_EQ(o.master.settings.at("packing.depth_error"), -1);
+  EXPECT_EQ(o.master.settings.depth_error, -1);
   EXPECT_TRUE(give(o, "--normal-error", "3"));
   EXPECT_TRUE(give(o, "--colour-error", "15"));
   for (const char* bad : {"-1", "1/0", "1/", "/32", "1/-32", "1.5", "nan", "inf", "1 /32", "", "on"})
@@ -58,28 +45,33 @@ TEST(MasterFlags, ErrorsAreFractionsNumbersAutoOrOff) {
   EXPECT_FALSE(give(o, "--colour-error", "16"));
 }
 
-TEST(MasterFlags, AreReadUnderBothTheirNames) {
+TEST(MasterFlags, AreRead) {
   MasterServiceOptions o;
   EXPECT_TRUE(give(o, "--layers", "4"));
-  EXPECT_EQ(o.master.settings.at("volume.layers"), 4);
-  EXPECT_TRUE(give(o, "--volume.layers", "8"));
-  EXPECT_EQ(o.master.settings.at("volume.layers"), 8) << "another table leaves what was given";
+  EXPECT_EQ(o.master.settings.layers, 4u);
   EXPECT_TRUE(give(o, "--packing.redundancy", "keep"));
-  EXPECT_EQ(o.master.redundancy, Redundancy::kKeep);
-  EXPECT_TRUE(give(o, "--packing.keep_redundant", "eliminate"));
-  EXPECT_EQ(o.master.redundancy, Redundancy::kEliminate);
+  EXPECT_TRUE(o.master.settings.keep_redundant);
+  EXPECT_TRUE(give(o, "--packing.redundancy", "eliminate"));
+  EXPECT_FALSE(o.master.settings.keep_redundant);
   EXPECT_TRUE(give(o, "--progressive", "off"));
   EXPECT_EQ(o.master.progressive, Progressive::kOff);
   EXPECT_TRUE(give(o, "--packing.max_points", "1e6"));
-  EXPECT_EQ(o.master.settings.at("packing.max_points"), 1e6);
+  EXPECT_EQ(o.master.settings.max_points, 1'000'000u);
   EXPECT_TRUE(give(o, "--steering", "off"));
-  EXPECT_EQ(o.master.steering, Steering::kOff);
+  EXPECT_FALSE(o.master.settings.steering);
   EXPECT_TRUE(give(o, "--view-cell", "0"));
   EXPECT_TRUE(give(o, "--validation", "64"));
-  EXPECT_TRUE(give(o, "--sampling.still_rays", "1"));
-  EXPECT_EQ(o.master.settings.at("sampling.view_cell_m"), 0);
-  EXPECT_EQ(o.master.settings.at("sampling.validation"), 64);
-  EXPECT_EQ(o.master.settings.at("sampling.still_rays"), 1);
+  EXPECT_TRUE(give(o, "--still-rays", "1"));
+  EXPECT_EQ(o.master.settings.view_cell_m, 0);
+  EXPECT_EQ(o.master.settings.validation, 64u);
+  EXPECT_EQ(o.master.settings.still_rays, 1u);
+  EXPECT_FALSE(o.master.settings.pictures);
+  EXPECT_TRUE(give(o, "--images", "head"));
+  EXPECT_TRUE(give(o, "--image-background", "#102030"));
+  EXPECT_TRUE(o.master.settings.pictures);
+  EXPECT_EQ(o.master.settings.picture_shading, 1u);
+  EXPECT_EQ(o.master.settings.picture_background, 0x102030u);
+  EXPECT_FALSE(give(o, "--image-background", "transparent"));
   EXPECT_TRUE(give(o, "--tile-size", "64"));
   EXPECT_EQ(o.master.schedule.tile_size, 64);
   EXPECT_TRUE(give(o, "--octree-depth", "6"));
@@ -89,16 +81,12 @@ TEST(MasterFlags, AreReadUnderBothTheirNames) {
 TEST(MasterFlags, HaveLimits) {
   MasterServiceOptions o;
   for (const auto& [flag, text] : std::vector<std::pair<std::string, std::string>>{{"--tile-size", "15"},
-                                                                                   {"--frames-in-flight", "17"},
-                                                                                   {"--lease-timeout", "0.01"},
-                                                                                   {"--lease-target", "11"},
                                                                                    {"--progressive", "maybe"},
                                                                                    {"--octree-depth", "11"},
                                                                                    {"--layers", "0"},
                                                                                    {"--packing.max_points", "-1"},
                                                                                    {"--packing.max_points", "nan"},
                                                                                    {"--packing.max_points", "many"},
-                                                                                   {"--packing.epsilon", "x"},
                                                                                    {"--steering", "1"},
                                                                                    {"--view-cell", "-0.1"},
                                                                                    {"--view-cell", "11"},
@@ -110,7 +98,7 @@ TEST(MasterFlags, HaveLimits) {
     ASSERT_FALSE(s) << flag << " " << text;
     EXPECT_NE(s.error().text.find(flag), std::string::npos) << s.error().text;
   }
-  EXPECT_FALSE(o.master.settings.contains("packing.max_points"));
+  EXPECT_EQ(o.master.settings, wire::SessionSettings{});
 }
 
 TEST(MasterFlags, OnlyWhatWasGivenIsHandedOn) {

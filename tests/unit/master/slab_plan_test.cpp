@@ -508,7 +508,7 @@ class VolumeMaster : public ::testing::Test {
   void begin(const std::string& folder = "") {
     record = std::move(metrics::RunRecord::open(folder)).value();
     core = std::make_unique<MasterCore>(
-        MasterOptions{.schedule = {.frames_in_flight = 2, .lease_timeout_s = 2}, .settings = {{"volume.layers", 8}}},
+        MasterOptions{.schedule = {.frames_in_flight = 2, .lease_timeout_s = 2}, .settings = {.layers = 8}},
         InstanceId{42}, *record);
   }
   void hello(const std::string& role, uint64_t instance) {
@@ -576,7 +576,7 @@ TEST_F(VolumeMaster, LeadsAVolumeFromHelloToFrame) {
   EXPECT_EQ(welcome.facts.at("kind"), "volume");
   EXPECT_EQ(welcome.facts.at("transfer"), volume::to_text(session().transfer));
   EXPECT_EQ(welcome.parameters.at("volume.step"), 0);
-  EXPECT_EQ(welcome.settings.at("volume.layers"), 8);
+  EXPECT_EQ(welcome.settings.layers, 8u);
   EXPECT_FALSE(welcome.endpoints.contains("voxels")) << "sheets have them";
   EXPECT_EQ(welcome.box_room, session().grid.box_room());
   view(1);
@@ -681,7 +681,7 @@ TEST_F(VolumeMaster, AnotherTransferFunctionIsAnotherEpoch) {
   EXPECT_FALSE(control("tf").ok);
   EXPECT_FALSE(control("set", {{"c.x", "1"}}).ok);
   EXPECT_TRUE(control("set", {{"volume.layers", "4"}}).ok);
-  EXPECT_EQ(sent<wire::Welcome>("viewer20").back().settings.at("volume.layers"), 4);
+  EXPECT_EQ(sent<wire::Welcome>("viewer20").back().settings.layers, 4u);
   ask(1);
   EXPECT_EQ(leased(1)->shear.layers.size(), 4u);
   EXPECT_FALSE(control("set", {{"volume.layers", "0"}}).ok);

@@ -675,7 +675,7 @@ class SteeredMaster : public testing::Test {
 TEST_F(SteeredMaster, AsksThePackerThoughNoSamplerIsIdle) {
   core.on("viewer", request(5, 1), now);
   const auto question = asked();
-  EXPECT_EQ(core.settings().at("sampling.steering"), 1);
+  EXPECT_TRUE(core.settings().steering);
   ASSERT_TRUE(core.on("viewer", plan_of(question, {}), now)) << "of a viewer: not heard";
   EXPECT_EQ(core.counters().at("frames_completed"), 0);
   ASSERT_TRUE(core.on("packer", plan_of(question, {}), now));
@@ -793,16 +793,14 @@ TEST_F(SteeredMaster, NothingIsRememberedOfViewersThatLeft) {
 
 TEST_F(SteeredMaster, TheSceneDecides) {
   MasterOptions o;
-  EXPECT_TRUE(steers(o, scene::Kind::kMesh));
-  EXPECT_FALSE(steers(o, scene::Kind::kVolume));
-  EXPECT_EQ(steers(o, scene::Kind::kJulia), !scene::policy_of(scene::Kind::kJulia).keep_redundant);
-  o.redundancy = Redundancy::kKeep;
-  EXPECT_FALSE(steers(o, scene::Kind::kMesh));
-  o.steering = Steering::kOn;
-  EXPECT_TRUE(steers(o, scene::Kind::kMesh));
-  EXPECT_FALSE(steers(o, scene::Kind::kVolume));
-  o.redundancy = Redundancy::kEliminate, o.steering = Steering::kOff;
-  EXPECT_FALSE(steers(o, scene::Kind::kJulia));
+  const auto steers = [&](scene::Kind kind) { return settings(o, kind).steering; };
+  EXPECT_TRUE(steers(scene::Kind::kMesh));
+  EXPECT_TRUE(steers(scene::Kind::kJulia));
+  EXPECT_FALSE(steers(scene::Kind::kVolume));
+  o.settings.keep_redundant = true;
+  EXPECT_FALSE(steers(scene::Kind::kMesh));
+  o.settings = {.steering = false};
+  EXPECT_FALSE(steers(scene::Kind::kJulia));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "common/options/parser.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -23,7 +24,7 @@ Table table(Settings& s) {
       {.flag = "!--no-cache", .value = &s.cache, .help = "keep no store"},
       {.flag = "--lighting", .value = &s.lit, .help = "shade", .on_off = true},
       {.flag = "--word", .value = &s.words, .help = "several"},
-      {.flag = "--list", .value = Action{[] { std::puts("one two"); }}, .help = "tell and end"},
+      {.flag = "--seldom", .value = &s.speed, .help = "what few need", .seldom = true},
   };
 }
 
@@ -67,7 +68,6 @@ TEST(Parser, WordsForLaterAreReadWithoutEnding) {
   EXPECT_EQ(wrong({"a.ply", "--speed"}), "--speed: its value is missing");
   EXPECT_NE(wrong({}).find("program run needs scene"), std::string::npos);
   EXPECT_EQ(wrong({"--help"}), "--help: is of program run alone");
-  EXPECT_EQ(wrong({"a.ply", "--list"}), "--list: tells something and ends program run");
 }
 
 TEST(Parser, TellsWhatWasGiven) {
@@ -134,9 +134,20 @@ TEST(ParserDeathTest, TellsItsVersion) {
   EXPECT_EXIT(parse({"a", "--versoin"}), testing::ExitedWithCode(2), "did you mean --version");
 }
 
-TEST(ParserDeathTest, ListsAndHelpEndWithZero) {
-  EXPECT_EXIT(parsed({"--list"}), testing::ExitedWithCode(0), "");
-  EXPECT_EXIT(parsed({"--help"}), testing::ExitedWithCode(0), "");
+TEST(ParserDeathTest, HelpEndsWithZeroAndShowsSeldomFlagsOnlyIfAllAreAskedFor) {
+  const auto zero = testing::ExitedWithCode(0);
+  EXPECT_EXIT((dup2(2, 1), parsed({"--help"})), zero, "metres a second.*1 more flags: program --help all");
+  EXPECT_EXIT((dup2(2, 1), parsed({"a", "--help", "all"})), zero, "--seldom number");
+}
+
+TEST(Parser, CountsMayHaveAnExponent) {
+  uint64_t points = 0;
+  Parser parser("about");
+  parser.add({{.flag = "--points", .value = &points, .help = ""}});
+  EXPECT_TRUE(parser.parse("program", {"--points=20e6"}));
+  EXPECT_EQ(points, 20'000'000u);
+  for (const char* wrong : {"1.5", "1e-1", "-1e3", "1e99", "e3"})
+    EXPECT_FALSE(parser.parse("program", {fmt::format("--points={}", wrong)})) << wrong;
 }
 
 TEST(Parser, SubCommandsHaveTheirOwnFlags) {

@@ -33,7 +33,7 @@ TEST(PackerOptions, ValuesBeyondTheirLimitsAreRefused) {
   PackerOptions options;
   const options::Table rows = table(options);
   for (const auto& [flag, value] :
-       {std::pair{"--threads", "1025"}, {"--record-depth-frames", "0"}, {"--log-limit-mb", "0.5"}})
+       {std::pair{"--threads", "1025"}, {"--answer-window-mb", "0"}, {"--log-limit-mb", "0.5"}})
     EXPECT_FALSE(options::set(*options::find(rows, flag), value).ok()) << flag;
   EXPECT_FALSE(options::refuse_misfits(rows, {"--record-depth"}, scene::Kind::kVolume, "a.nii").ok());
 }

@@ -53,16 +53,13 @@ TEST(PatchObsolescence, ScoresWeighAgeAndRate) {
   o.added(1, mosaic(2, 2, 4), 12);   // two halvings coarser, drawn now
   o.added(1, mosaic(3, 3, 16), 12);
   PatchLimits limits{.patches_per_cluster = 2};
-  limits.age_weight = 1, limits.rate_weight = 4;  // 2 against 8
-  EXPECT_EQ(o.choose(limits, 12), (Keys{{1, 2}}));
-  limits.rate_weight = 0.5;  // 2 against 1
-  EXPECT_EQ(o.choose(limits, 12), (Keys{{1, 1}}));
-  limits.age_weight = 0;
-  EXPECT_EQ(o.choose(limits, 12), (Keys{{1, 2}}));
+  EXPECT_EQ(o.choose(limits, 12), (Keys{{1, 2}})) << "8 against 2";
+  o.accessed({1, 2}, 20), o.accessed({1, 3}, 20);
+  EXPECT_EQ(o.choose(limits, 20), (Keys{{1, 1}})) << "8 against 10";
   limits.patches_per_cluster = 1;
-  EXPECT_EQ(o.choose(limits, 12), (Keys{{1, 1}, {1, 2}})) << "of equals the older one goes";
+  EXPECT_EQ(o.choose(limits, 20), (Keys{{1, 1}, {1, 2}}));
   limits.patches_per_cluster = 0;
-  EXPECT_EQ(o.choose(limits, 12), Keys{});
+  EXPECT_EQ(o.choose(limits, 20), Keys{});
 }
 
 TEST(PatchObsolescence, TheBestRangeIsThatOfWhatIsNotObsolete) {
@@ -85,8 +82,6 @@ TEST(PatchObsolescence, TooManyPointsAreForgottenDownToNineTenths) {
   limits.max_points = 1000;  // down to 900: 200 go
   // Ages at 20 s: 1 -> 19, 2 -> 18, 3 -> 17, and the coarse one 17 as well, which is newer: after 3.
   EXPECT_EQ(o.choose(limits, 20), (Keys{{1, 1}, {2, 1}, {3, 1}, {19, 2}}));
-  limits.rate_weight = 8;
-  EXPECT_EQ(o.choose(limits, 20), (Keys{{1, 1}, {2, 1}, {19, 2}}));
   limits.max_points = 1;
   EXPECT_EQ(o.choose(limits, 20).size(), 21u);
   // Equal scores and ages: by key.

@@ -5,7 +5,7 @@
 
 #include "common/codec/mask_stream.h"
 #include "common/wire/serial.h"
-#include "services/packer/points/plan/plan_picture.h"
+#include "services/packer/points/plan/ray_class.h"
 #include "services/packer/points/plan/ray_tiles.h"
 #include "services/packer/points/plan/view/view_map.h"
 #include "tests/support/files/own_folder.h"
@@ -270,27 +270,6 @@ TEST(RayTiles, ArePlansThatTheWireTakes) {
     EXPECT_EQ(*back, tiles[i].mask);
     word += words;
   }
-}
-
-TEST(PlanPicture, ShowsEachClassInItsColourAndIsWritten) {
-  PlanPicture picture;
-  picture.reset({7}, 70, 10);
-  picture.set(64, 3, 0x3f, RayClass::kEdge);
-  picture.set(0, 0, 1, RayClass::kNothing);
-  const image::View view = drawn(picture);
-  EXPECT_EQ(view.width, 70);
-  EXPECT_GT(view.height, 10) << "a legend";
-  EXPECT_EQ(view.colour[3 * 70 + 64], view.colour[3 * 70 + 69]);
-  EXPECT_NE(view.colour[3 * 70 + 64], view.colour[3 * 70 + 63]);
-  EXPECT_NE(view.colour[0], view.colour[3 * 70 + 64]);
-  const std::string folder = tests::own_folder() + "plans";
-  auto recorder = PlanRecorder::open(folder, 1);
-  ASSERT_TRUE(recorder.ok());
-  EXPECT_TRUE(recorder->add(picture));
-  EXPECT_TRUE(recorder->full());
-  EXPECT_TRUE(std::filesystem::exists(folder + "/plan-000007.png"));
-  std::filesystem::remove_all(folder);
-  EXPECT_FALSE(PlanRecorder::open("/dev/null/plans", 1).ok());
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ wire::Welcome welcome(EpochId epoch = test::kEpoch, InstanceId master = {1}) {
   w.octree_depth = uint64_t(model.depth);
   w.box_room = model.box_room;
   w.facts["kind"] = "mesh";
-  w.settings["packing.keep_redundant"] = 0;
+  w.settings.keep_redundant = 0;
   return w;
 }
 
@@ -115,9 +115,9 @@ class PointPackingTest : public testing::Test {
 
 TEST_F(PointPackingTest, ErrorsAreToldAndWhatStandsStillBecomesExact) {
   wire::Welcome session = welcome();
-  session.settings["packing.depth_error"] = 1.0 / 32;
-  session.settings["packing.normal_error"] = 1;
-  session.settings["packing.colour_error"] = 2;
+  session.settings.depth_error = 1.0 / 32;
+  session.settings.normal_error = 1;
+  session.settings.colour_error = 2;
   ASSERT_TRUE(packing.follow(session, 0));
   sample(tile(1, 0), 10);
   sample(tile(1, 1), 10);
@@ -194,7 +194,7 @@ TEST(StillHeads, AreThoseThatDoNotMove) {
 
 TEST_F(PointPackingTest, AViewThatNeedsNoRaysIsCompleteWithItsPlan) {
   wire::Welcome session = welcome();
-  session.settings["sampling.validation"] = 0;
+  session.settings.validation = 0;
   ASSERT_TRUE(packing.follow(session, 0));
   const wire::PlanRequest request{
       .frame = {1}, .epoch = test::kEpoch, .viewer = {77}, .request = {5}, .camera = kCamera};
@@ -387,7 +387,7 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
 // Else it would wait until it asked for the view again.
 TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
   wire::Welcome session = welcome();
-  session.settings["sampling.validation"] = 0;
+  session.settings.validation = 0;
   ASSERT_TRUE(packing.follow(session, 0));
   wire::PlanRequest request{.frame = {1}, .epoch = test::kEpoch, .viewer = {77}, .request = {5}, .camera = kCamera};
   ASSERT_TRUE(packing.plan(request, 1).full) << "nothing is known";
@@ -432,7 +432,7 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
 
 TEST_F(PointPackingTest, WhatCameOfAViewThatEndsEarlyIsKnown) {
   wire::Welcome session = welcome();
-  session.settings["sampling.validation"] = 0;
+  session.settings.validation = 0;
   ASSERT_TRUE(packing.follow(session, 0));
   wire::PlanRequest request{.frame = {1}, .epoch = test::kEpoch, .viewer = {77}, .request = {5}, .camera = kCamera};
   ASSERT_TRUE(packing.plan(request, 1).full) << "nothing is known";
@@ -555,7 +555,7 @@ class StateAnswersTest : public PointPackingTest {
   StateAnswersTest()
       : PointPackingTest({.answers = {.window_bytes = kWindow, .bytes_in_all = kAll, .bytes_at_once = kWindow / 2}}) {
     wire::Welcome session = welcome();
-    session.settings["packing.keep_redundant"] = 1;
+    session.settings.keep_redundant = 1;
     EXPECT_TRUE(packing.follow(session, 0));
     for (uint64_t frame = 1; frame <= kFrames; ++frame) publish(frame);
     packer = decoded<wire::Patch>(sent.front()).packer;

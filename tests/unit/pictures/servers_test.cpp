@@ -17,11 +17,11 @@ namespace {
 
 const geometry::Camera kCamera = geometry::make_camera(geometry::default_pose(), 90, 64, 48);
 
-wire::Welcome welcome(double quality = 80, EpochId epoch = {4}, InstanceId master = {1}) {
+wire::Welcome welcome(uint64_t quality = 80, EpochId epoch = {4}, InstanceId master = {1}) {
   wire::Welcome w;
   w.master = master, w.epoch = epoch, w.lease_key = test::lease_key();
   w.facts["kind"] = "mesh";
-  w.settings = {{scene::kPictureQuality, quality}, {"picture.background", double(0x141820)}};
+  w.settings.pictures = true, w.settings.picture_quality = quality;
   return w;
 }
 
@@ -57,14 +57,11 @@ TEST(PictureTiles, AreBandsOfWholeJpegBlocksThatCoverTheView) {
 
 TEST(PictureSettings, AreToldWhereViewsComeAsPicturesAndNothingIsSteered) {
   master::MasterOptions o;
-  EXPECT_FALSE(master::settings(o, scene::Kind::kMesh).contains(scene::kPictureQuality));
-  o.images = {.shading = "head", .background = "#102030", .quality = 35, .samples = 4};
+  EXPECT_FALSE(master::settings(o, scene::Kind::kMesh).pictures);
+  o.settings.pictures = true;
   const auto told = master::settings(o, scene::Kind::kMesh);
-  EXPECT_EQ(told.at(scene::kPictureQuality), 35);
-  EXPECT_EQ(told.at("picture.samples"), 4);
-  EXPECT_EQ(told.at("picture.shading"), 1);
-  EXPECT_EQ(told.at("picture.background"), double(0x102030));
-  EXPECT_EQ(told.at("sampling.steering"), 0);
+  EXPECT_TRUE(told.pictures);
+  EXPECT_FALSE(told.steering);
   EXPECT_FALSE(master::progressive(o, scene::Kind::kJulia));
   wire::Welcome w;
   w.settings = told;
@@ -127,17 +124,6 @@ TEST(PictureMaker, AViewThatIsAskedForAgainIsDrawnFiner) {
   wire::Lease next = lease(4, other);
   next.epoch = {5};
   EXPECT_EQ(maker.rays(next).quality, 50) << "of another epoch it is another view";
-}
-
-TEST(PictureMaker, WhateverAMasterSaysStaysWithinLimits) {
-  sampler::PictureMaker maker;
-  wire::Welcome w = welcome(1e9);
-  w.settings["picture.samples"] = -5, w.settings["picture.shading"] = 1e300, w.settings["picture.background"] = -1;
-  maker.follow(w);
-  const auto rays = maker.rays(lease(1));
-  EXPECT_EQ(rays.quality, 100);
-  EXPECT_EQ(rays.side, 1);
-  EXPECT_FALSE(maker.picture(lease(1), rays, sampled(1)).empty());
 }
 
 // ---- packer --------------------------------------------------------------------------------------------------------

@@ -11,8 +11,6 @@ TEST(SceneKind, NamesReadBack) {
   for (const Kind kind : kKinds) {
     EXPECT_EQ(kind_named(name_of(kind)), kind);
     EXPECT_FALSE(described(kind).empty());
-    EXPECT_GT(policy_of(kind).octree_depth, 0);
-    EXPECT_GT(policy_of(kind).max_points, 0);
   }
   EXPECT_EQ(kind_named("cloud"), std::nullopt);
   EXPECT_EQ(kind_named(""), std::nullopt);
@@ -33,12 +31,9 @@ TEST(SessionView, SaysWhatIsMissing) {
   EXPECT_EQ(view.kind(), std::nullopt);
   EXPECT_EQ(view.pipeline(), std::nullopt);
   EXPECT_EQ(view.endpoint("chunks"), "");
-  EXPECT_EQ(view.setting("viewer.least_sampling", 0.5), 0.5);
   session.facts["kind"] = "volume";
-  session.settings["viewer.least_sampling"] = 0.4;
   EXPECT_EQ(view.kind(), Kind::kVolume);
   EXPECT_EQ(view.pipeline(), Pipeline::kSlices);
-  EXPECT_EQ(view.setting("viewer.least_sampling", 0.5), 0.4);
   session.facts["kind"] = "something later";
   EXPECT_EQ(view.kind(), std::nullopt);
 }

@@ -27,7 +27,7 @@ TEST(ViewerFlags, ThoseOfPointsFitMeshesAndJuliaSetsAlone) {
   ViewerOptions o;
   const auto points = names_of(table(o), [](const options::Row& r) { return !r.fits.has(scene::Kind::kVolume); });
   EXPECT_EQ(points, (Texts{"--detail-budget", "--least-detail", "--speed-detail", "--splat", "--splat-scale",
-                           "--finish", "--still-samples", "--epoch-patience"}));
+                           "--finish", "--still-samples"}));
 }
 
 TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {

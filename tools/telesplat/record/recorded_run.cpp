@@ -139,7 +139,7 @@ Status read_display(const std::string& path, const toml::table& session, const t
   run.kernel = fact("splat").value_or(std::string("?"));
   run.sampling_size = fmt::format("{}x{}", number(fact("sampling_width"), 0), number(fact("sampling_height"), 0));
   run.octree_depth = int(std::clamp(number(session["session"]["octree_depth"], 6), 1.0, 10.0));
-  run.keeps_redundant = number(session["settings"]["packing.keep_redundant"], 0) != 0;
+  run.keeps_redundant = number(session["settings"]["keep_redundant"], 0) != 0;
   const std::string shading = session["display"]["shading"].value_or(std::string("lit"));
   const auto known = image::shading_named(shading);
   if (!known) return Error{fmt::format("{}: shading is \"{}\", not lit, head or unlit", path, shading)};

@@ -19,6 +19,7 @@ constexpr double kMasterPatience_s = 10, kRelayPatience_s = 5, kAskEvery_s = 0.1
 // From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view
 // meanwhile.
 constexpr double kWallLead_s = 1.5;
+constexpr int kServersNice = 10;  // servers must not take the processor from a display
 
 }  // namespace
 
@@ -38,7 +39,6 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
 
 Status Pipeline::start_servers() {
   const RunOptions& o = options_;
-  const int nice = o.background_servers ? 10 : 0;
   if (const Status s = group_.start_master(master_arguments(o), kMasterPatience_s); !s) return s;
   // The others would ask for ever where there is no loopback device.
   if (const Status s = net::check_loopback(); !s)
@@ -48,8 +48,10 @@ Status Pipeline::start_servers() {
                     group_.endpoint(), s.error().text)};
   if (const Status s = start_data(); !s) return s;
   // A headset's frames come first; else views are worth more than that they are drawn a little later.
-  Member packer{
-      .role = "packer", .name = "packer", .arguments = packer_arguments(o), .nice = o.viewer.xr ? nice : nice / 2};
+  Member packer{.role = "packer",
+                .name = "packer",
+                .arguments = packer_arguments(o),
+                .nice = o.viewer.xr ? kServersNice : kServersNice / 2};
   if (const Status s = group_.start(std::move(packer)); !s) return s;
   while (last_sampler_ < o.samplers)
     if (const Status s = start_sampler(++last_sampler_); !s) return s;
@@ -60,7 +62,7 @@ Status Pipeline::start_sampler(int number) {
   Member sampler{.role = "sampler",
                  .name = fmt::format("sampler-{}", number),
                  .arguments = sampler_arguments(options_),
-                 .nice = options_.background_servers ? 10 : 0};
+                 .nice = kServersNice};
   for (const auto place : {links::Place::kSampler, links::Place::kData})
     if (const Status s = put_link(place, place == links::Place::kData ? "data" : sampler.name, sampler); !s) return s;
   return group_.start(std::move(sampler));
@@ -85,10 +87,10 @@ Status Pipeline::set_samplers(int count) {
 // None where there is no data set yet.
 Status Pipeline::start_data() {
   const RunOptions& o = options_;
-  const int nice = o.background_servers ? 10 : 0;
   for (int i = 0; i < o.data_servers && !o.data.scene.empty(); ++i) {
     const std::string name = o.data_servers == 1 ? "data" : fmt::format("data-{}", i + 1);
-    if (const Status s = group_.start({.role = "data", .name = name, .arguments = data_arguments(o, i), .nice = nice});
+    if (const Status s =
+            group_.start({.role = "data", .name = name, .arguments = data_arguments(o, i), .nice = kServersNice});
         !s)
       return s;
   }

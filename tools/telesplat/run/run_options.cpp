@@ -21,12 +21,51 @@ using options::Table;
 constexpr double kWallHold_s = 2;
 
 constexpr const char* kWhatIsKept = "what a run keeps";
-// The limits that are the master's are everybody's who binds.
-void limit_peers(net::ServiceOptions& service, const RunOptions& o) {
-  const double messages = o.master.master.limits.max_messages;
-  service.max_connections = o.master.service.max_connections;
-  service.queue_limit_mb = o.master.service.queue_limit_mb;
-  if (messages != master::Limits{}.max_messages) service.max_messages = messages;
+
+// What a person looks for first: --help shows these, by what they are for, and --help all the others, too.
+struct Purpose {
+  const char* group;
+  std::vector<std::string_view> flags;
+};
+const std::vector<Purpose>& purposes() {
+  static const std::vector<Purpose> all{
+      {"Data",
+       {"--room-size", "--up", "--colour-by", "--colour-map", "--z-scale", "--texture", "--clip", "--iso", "--tf",
+        "--raw", "--preset", "--animate"}},
+      {"Looking", {"--trajectory", "--eye", "--look-at", "--duration", "--fov", "--poses"}},
+      {"Display", {"--size", "--fullscreen", "--panel", "--wall", "--stereo", "--xr", "--background", "--shading"}},
+      {"Quality", {"--target-fps", "--sampling-size", "--splat", "--renderer"}},
+      {"Processes and network", {"--samplers", "--sampler", "--viewers", "--master", "--keys", "--link", "--coupling"}},
+      {"Records", {"--out", "--record-every", "--verify", "--movie", "--report"}}};
+  return all;
+}
+
+// Where a row stands; sets its group, and whether --help shows it.
+size_t place_of(options::Row& row) {
+  const std::string name = options::name_of(row);
+  size_t place = 0;
+  if (!name.starts_with("-")) return place;
+  for (const Purpose& purpose : purposes())
+    for (const std::string_view flag : purpose.flags) {
+      ++place;
+      if (flag != name) continue;
+      row.group = purpose.group;
+      return place;
+    }
+  row.seldom = true;
+  if (row.group.empty()) row.group = "Others";
+  return place + 1;
+}
+
+Table by_purpose(const Table& table) {
+  std::multimap<size_t, options::Row> sorted;
+  for (options::Row row : table) {
+    const size_t place = place_of(row);
+    sorted.emplace(place, std::move(row));
+  }
+  Table out;
+  for (auto& [place, row] : sorted) out.push_back(std::move(row));
+  return out;
 }
 
 // Either `run`'s or `view`'s.
@@ -111,17 +150,9 @@ Table own_rows(RunOptions& o) {
                "50ms:100mbit, 20mbit, local; PLACE is viewer (default: between each viewer and the rest), sampler "
                "(each sampler and the rest) or data (samplers and data servers)",
        .not_in_scene = "through what network a session runs"},
-      {.flag = "!--same-priority",
-       .value = &o.background_servers,
-       .help = "run samplers, packer and data at the viewer's priority"},
       {.flag = "--record-depth",
        .value = &o.record_depth,
        .help = "keep the first 50 sampled depth images (telesplat inspect reads them)",
-       .fits = points,
-       .not_in_scene = kWhatIsKept},
-      {.flag = "--record-plan",
-       .value = &o.record_plan,
-       .help = "keep pictures of the first 50 plans: which rays of a view are cast, and why",
        .fits = points,
        .not_in_scene = kWhatIsKept},
       {.flag = "--report",
@@ -195,7 +226,6 @@ Status refuse_records_without_folder(const RunOptions& o) {
                                     {d.picture_every > 0, "--record-every"},
                                     {d.exr, "--exr"},
                                     {o.record_depth, "--record-depth"},
-                                    {o.record_plan, "--record-plan"},
                                     {!o.movie.file.empty(), "--movie"},
                                     {o.report, "--report"}})
     if (asked && o.out.empty())
@@ -276,9 +306,11 @@ Table table(RunOptions& o) {
   const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
   const Table launcher = joined(joined(own, sampler_rows(o)), {give_up_row(o)});
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
-  const Table limits = joined(master::limit_table(o.master), net::peer_limit_table(o.master.service));
+  // The limits of a service that others use; this session's processes are all the person's own.
+  const Table limits = without(joined(master::limit_table(o.master), net::peer_limit_table(o.master.service)),
+                               {"--max-peers", "--max-messages", "--queue-limit-mb"});
   const Table of_master = joined(joined(master::record_table(o.master), limits), master::session_table(o.master));
-  return joined(joined(launcher, services), of_master);
+  return by_purpose(joined(joined(launcher, services), of_master));
 }
 
 Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given) {
@@ -325,7 +357,7 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
 std::vector<std::string> data_arguments(const RunOptions& o, int part) {
   data::DataServiceOptions d = o.data;
   d.companions = "anywhere";  // the person's own files, for the person alone
-  limit_peers(d.service, o);
+  d.service.max_connections = o.master.service.max_connections;
   if (o.data_servers > 1) d.volume.part = fmt::format("{}/{}", part, o.data_servers);
   auto out = arguments(d);
   out.push_back("--report-progress");
@@ -334,9 +366,8 @@ std::vector<std::string> data_arguments(const RunOptions& o, int part) {
 
 std::vector<std::string> packer_arguments(const RunOptions& o) {
   packer::PackerOptions p = o.packer;
-  limit_peers(p.service, o);
+  p.service.max_connections = o.master.service.max_connections;
   if (o.record_depth) p.record_depth = o.out + "/depth";
-  if (o.record_plan) p.record_plan = o.out + "/plans";
   return arguments(p);
 }
 

@@ -34,10 +34,8 @@ struct RunOptions {
   std::string log_level = "info";             ///< of the processes
   std::vector<std::string> link_texts;        ///< --link as given
   std::map<links::Place, links::Link> links;  ///< what they come to: simulated, none of them local
-  int verify_samples = 16;         ///< rays a pixel of the pictures that displayed frames are verified against
-  bool record_plan = false;        ///< keep pictures of plans in OUT/plans
-  bool record_depth = false;       ///< keep sampled depth images in OUT/depth
-  bool background_servers = true;  ///< samplers, packer and data run at lower priority than the viewer
+  int verify_samples = 16;    ///< rays a pixel of the pictures that displayed frames are verified against
+  bool record_depth = false;  ///< keep sampled depth images in OUT/depth
 };
 
 /// What `telesplat view` does unless told otherwise: a window, until it is closed, with the camera in the person's

@@ -194,7 +194,7 @@ Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> argu
   const auto is_value = [&](const std::string& a) {
     const options::Row* before = &a == arguments.data() ? nullptr : options::find(table, *(&a - 1));
     const bool* const* flag = before ? std::get_if<bool*>(&before->value) : nullptr;
-    return before && (!flag || before->on_off) && !std::holds_alternative<options::Action>(before->value);
+    return before && (!flag || before->on_off);
   };
   const auto scene = std::find_if(arguments.begin(), arguments.end(), [&](const std::string& a) {
     return a.ends_with(".toml") && !a.starts_with("-") && !is_value(a);

@@ -21,7 +21,7 @@ std::string dashed(const std::string& flag) { return flag == kScene ? flag : "--
 
 Result<const options::Row*> row_of(const std::string& flag, const options::Table& flags) {
   const options::Row* row = options::find(flags, dashed(flag));
-  if (row && !std::holds_alternative<options::Action>(row->value)) return row;
+  if (row) return row;
   std::vector<std::string> known;
   for (const auto& r : flags) {
     const std::string name = options::name_of(r);

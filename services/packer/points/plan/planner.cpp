@@ -101,7 +101,6 @@ Planner::Impl::ViewClasses Planner::Impl::classify(Question& q, ViewerView& view
   known_empty.project(map.camera, map.depth_m, config.threads, may_hold);
   validation.mark_stale(map.camera, q.now_s, stale);
   std::array<uint64_t, kRayClasses> pixels{}, rays{};
-  if (config.pictures) picture.reset(q.request.frame, width, height), picture.ground = map.colour;
   const uint64_t picks = validation_sets(q, view);
   for (int y = 0; y < height; ++y) {
     uint64_t picked = 0, picked_empty = 0;
@@ -116,8 +115,6 @@ Planner::Impl::ViewClasses Planner::Impl::classify(Question& q, ViewerView& view
         const auto c = static_cast<size_t>(reason);
         members &= left;
         left &= ~members;
-        if (config.pictures)
-          picture.set(static_cast<int>(w) * 64, y, never_cast(reason) ? members : members & chosen, reason);
         pixels[c] += static_cast<uint64_t>(std::popcount(members));
         rays[c] += static_cast<uint64_t>(std::popcount(members & chosen));
         cast |= members & chosen;
@@ -140,7 +137,6 @@ Planner::Impl::ViewClasses Planner::Impl::classify(Question& q, ViewerView& view
       cast |= checked;
       take(RayClass::kKnownEmpty, ~covered, 0);
       take(RayClass::kGood, ~uint64_t{0}, 0);
-      if (config.pictures) picture.set(static_cast<int>(w) * 64, y, checked, RayClass::kValidation);
       out.cast.row(y)[w] = cast;
     }
   }
@@ -170,7 +166,6 @@ void Planner::Impl::put_off(uint64_t most_rays, ViewClasses& classes) {
     for (size_t w = 0; w < classes.cast.words_per_row(); ++w) {
       const uint64_t left = (classes.sparse.row(y)[w] | classes.edge.row(y)[w]) & ~classes.cast.row(y)[w];
       classes.put_off.row(y)[w] = left;
-      if (config.pictures) picture.set(static_cast<int>(w) * 64, y, left, RayClass::kGood);
     }
   classes.needed -= sparse + edge;
   classes.figures["rays.sparse"] -= static_cast<double>(sparse);
@@ -235,8 +230,6 @@ bool Planner::settle() { return impl_->settle(); }
 size_t Planner::frames() const { return impl_->shelf.frames().size(); }
 bool Planner::settles_soon() const { return tells_much(impl_->shelf); }
 bool Planner::view_under_way(double now_s) const { return packer::view_under_way(impl_->shelf, now_s); }
-
-const PlanPicture& Planner::picture() const { return impl_->picture; }
 
 std::vector<points::ClusterKey> Planner::disproved() { return impl_->validation.disproved(); }
 

@@ -12,21 +12,20 @@
 #include "common/wire/tile_messages.h"
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
-#include "services/packer/points/plan/plan_picture.h"
+#include "services/packer/points/plan/ray_class.h"
 #include "services/packer/points/sampled_tile.h"
 
 namespace telesplat::packer {
 
 struct PlanConfig {
   points::ModelConfig model;
-  float relative_epsilon = 0.005f;  ///< Config::relative_epsilon
+  float relative_epsilon = 0.004f;  ///< Config::relative_epsilon
   float nearest_sample = 0.6f;      ///< Config::nearest_sample
   double view_cell_m = 0.2;         ///< a head movement this long shall uncover nothing unknown; 0: no such rays
   int validation = 32;              ///< every good pixel is cast once in so many plans of a view; 0: never
   int still_rays = 16;              ///< rays a pixel everywhere while it stands still: 1, 4 or 16
   uint64_t max_points = 0;          ///< of the model: near it no extra rays are planned; 0: no limit
   int threads = 1;                  ///< 0: all cores
-  bool pictures = false;            ///< Planner::picture() is drawn
   bool operator==(const PlanConfig&) const = default;
 };
 
@@ -76,9 +75,6 @@ class Planner final : public ModelWatcher {
 
   /// A view was planned, or began to come, a moment ago, and is not complete.
   bool view_under_way(double now_s) const;
-
-  /// With PlanConfig::pictures: which rays of the newest view were planned, that was not full. Else empty.
-  const PlanPicture& picture() const;
 
   /// What the rays since the last call have disproved: clusters whose points are to be forgotten. Ascending.
   std::vector<points::ClusterKey> disproved();

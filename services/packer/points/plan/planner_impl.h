@@ -100,7 +100,6 @@ struct Planner::Impl {
   Validation validation;
   ViewerViews viewers;
   FrameShelf shelf;
-  PlanPicture picture;                         // config.pictures: of the newest view
   std::vector<std::shared_ptr<ViewMap>> maps;  // kept for their memory, some of them in use
   std::vector<float> clear_m, coarse_m;        // kept for their memory
   uint64_t changes = 0;                        // of the model: patches that brought nothing are none

@@ -18,7 +18,7 @@ inline constexpr int kPlanTileWidth = 256, kPlanTileHeight = 128;
 
 /// When a pixel counts as shown.
 struct PixelTest {
-  float relative_epsilon = 0.005f;  ///< points this close to the surface, as a fraction of depth, are of it
+  float relative_epsilon = 0.004f;  ///< points this close to the surface, as a fraction of depth, are of it
   /// A covered pixel lacks a sample if no point of its surface lies in it or within so many pixels of its centre (up to
   /// 1.5).
   float nearest = 0.6f;

@@ -1,0 +1,18 @@
+// How a program tells its user what is wrong.
+#pragma once
+
+#include <cstdio>
+
+#include "common/core/result.h"
+#include "common/core/utf8.h"
+
+namespace telesplat {
+
+/// One line on stderr, without what steers a terminal. Returns `code`, so that a command can end with it: 2 bad usage
+/// or input, 1 failed while running.
+inline int complain(const Error& error, int code = 2, const char* program = "telesplat") {
+  std::fprintf(stderr, "%s: %s\n", program, printable_lines(error.text).c_str());
+  return code;
+}
+
+}  // namespace telesplat
