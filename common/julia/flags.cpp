@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <glm/glm.hpp>
 
 namespace telesplat::julia {
 namespace {
