@@ -8,6 +8,10 @@ if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
 endif()
 
+# A first picture needs none of these (the preset first).
+option(TELESPLAT_IMPORT "Build telesplat-import, which reads what GDAL, GDCM and packers of glTF read" ON)
+option(TELESPLAT_DISPLAYS "Build telesplat-display: windows and headsets" ON)
+option(TELESPLAT_LAB "Build telesplat-lab" ON)
 option(TELESPLAT_TESTS "Build the tests and benchmarks" ON)
 option(TELESPLAT_PCH "Compile common headers once" ON)
 option(TELESPLAT_FUZZ "Build the libFuzzer targets (needs clang)" OFF)
