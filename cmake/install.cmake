@@ -1,11 +1,12 @@
 # cmake --install: the programs, and what they tell of themselves: manual pages and shell completion.
 include(GNUInstallDirs)
 
-install(TARGETS telesplat telesplat-data telesplat-health telesplat-import telesplat-master telesplat-packer
-  telesplat-sampler telesplat-viewer telesplat-wan-relay)
-if(TELESPLAT_DISPLAYS)
-  install(TARGETS telesplat-display)
-endif()
+foreach(program telesplat telesplat-data telesplat-display telesplat-health telesplat-import telesplat-master
+    telesplat-packer telesplat-sampler telesplat-viewer telesplat-wan-relay)
+  if(TARGET ${program})
+    install(TARGETS ${program})
+  endif()
+endforeach()
 
 set(manuals ${CMAKE_BINARY_DIR}/manuals)
 install(CODE "

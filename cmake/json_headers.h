@@ -1,5 +1,5 @@
-// JSON for the precompiled headers of sanitized builds, in which two hundred sources spend a second each on it: its
-// functions are compiled once (json_headers.cpp). Sources still include what they use.
+// JSON for precompiled headers: sources spend seconds each on it, so its functions are compiled once
+// (json_headers.cpp). Sources still include what they use.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -2,18 +2,19 @@
 # All code is position-independent in one way, so that libraries and programs share them.
 set(headers ${PROJECT_SOURCE_DIR}/cmake)
 add_library(telesplat_common_headers STATIC ${headers}/common_headers.cpp)
-set(common_kinds common)
-if(TELESPLAT_SANITIZE)  # the former, not optimised, and JSON
-  add_library(telesplat_cold_headers STATIC ${headers}/common_headers.cpp ${headers}/json_headers.cpp)
-  set_property(SOURCE ${headers}/json_headers.cpp PROPERTY SKIP_PRECOMPILE_HEADERS ON)
-  target_include_directories(telesplat_cold_headers PRIVATE ${PROJECT_SOURCE_DIR})
-  target_compile_options(telesplat_cold_headers PRIVATE -O0)
-  if(TELESPLAT_PCH)
-    target_precompile_headers(telesplat_cold_headers PRIVATE ${headers}/json_headers.h)
-  endif()
-  list(APPEND common_kinds cold)
+# The former, with JSON, for code whose speed no session feels: optimising it takes longer than it saves.
+set(TELESPLAT_COLD_FLAGS -O1)
+if(TELESPLAT_SANITIZE)
+  set(TELESPLAT_COLD_FLAGS -O0)
 endif()
-foreach(kind ${common_kinds})
+add_library(telesplat_cold_headers STATIC ${headers}/common_headers.cpp ${headers}/json_headers.cpp)
+set_property(SOURCE ${headers}/json_headers.cpp PROPERTY SKIP_PRECOMPILE_HEADERS ON)
+target_include_directories(telesplat_cold_headers PRIVATE ${PROJECT_SOURCE_DIR})
+target_compile_options(telesplat_cold_headers PRIVATE ${TELESPLAT_COLD_FLAGS})
+if(TELESPLAT_PCH)
+  target_precompile_headers(telesplat_cold_headers PRIVATE ${headers}/json_headers.h)
+endif()
+foreach(kind common cold)
   target_link_libraries(telesplat_${kind}_headers PUBLIC spdlog::spdlog fmt::fmt glm::glm)
   if(TELESPLAT_FUZZ)
     target_compile_options(telesplat_${kind}_headers PRIVATE -fsanitize=fuzzer-no-link)
@@ -36,18 +37,14 @@ if(TELESPLAT_TESTS)
 endif()
 
 # telesplat_headers(TARGET common|cold|test)   compiles TARGET with a precompiled header; all but tests for libFuzzer
-#   cold: sanitized builds do not optimise it, which takes half of a compiler's time
-#   In sanitized builds what cold and test have of JSON is compiled once.
+#   cold: what it does takes no time, so it is hardly optimised, which takes half of a compiler's time
+#   What cold, and in sanitized builds test, have of JSON is compiled once.
 function(telesplat_headers target which)
   target_link_libraries(${target} PRIVATE spdlog::spdlog fmt::fmt glm::glm)
   if(which STREQUAL cold)
-    if(TELESPLAT_SANITIZE)
-      target_compile_options(${target} PRIVATE -O0)
-    else()
-      set(which common)
-    endif()
+    target_compile_options(${target} PRIVATE ${TELESPLAT_COLD_FLAGS})
   endif()
-  if(TELESPLAT_SANITIZE AND NOT which STREQUAL common)
+  if(which STREQUAL cold OR (TELESPLAT_SANITIZE AND which STREQUAL test))
     target_link_libraries(${target} PRIVATE telesplat_cold_headers)
   endif()
   if(TELESPLAT_FUZZ AND NOT which STREQUAL test)
@@ -60,7 +57,7 @@ endfunction()
 
 # telesplat_library(NAME [COLD] sources... [DEPS targets...] [PRIVATE_DEPS targets...])
 #   static library telesplat_NAME, alias telesplat::NAME; headers are included from the repository's root.
-#   COLD: what it does takes no time, so that it need not be fast where sanitizers watch it.
+#   COLD: no session feels its speed.
 function(telesplat_library name)
   cmake_parse_arguments(ARG "COLD" "" "DEPS;PRIVATE_DEPS" ${ARGN})
   set(headers common)

@@ -35,27 +35,6 @@ Channels find_channels(const OIIO::ImageSpec& spec) {
   return c;
 }
 
-}  // namespace
-
-Result<std::string> encode_jpeg(const View& view, int quality) {
-  std::vector<uint8_t> bytes(view.colour.size() * 3);
-  for (size_t i = 0; i < view.colour.size(); ++i)
-    for (int c = 0; c < 3; ++c) bytes[3 * i + size_t(c)] = static_cast<uint8_t>(view.colour[i] >> (16 - 8 * c));
-  OIIO::ImageSpec spec(view.width, view.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("Compression", fmt::format("jpeg:{}", quality));
-  std::vector<unsigned char> encoded;
-  OIIO::Filesystem::IOVecOutput memory(encoded);
-  const auto output = OIIO::ImageOutput::create("picture.jpg", &memory);
-  if (!output || !output->supports("ioproxy"))
-    return Error{fmt::format("no JPEG can be made: {}", first_line(OIIO::geterror()))};
-  const bool written =
-      output->open("picture.jpg", spec) && output->write_image(OIIO::TypeDesc::UINT8, bytes.data()) && output->close();
-  if (!written) return Error{fmt::format("no JPEG can be made: {}", first_line(output->geterror()))};
-  return std::string(encoded.begin(), encoded.end());
-}
-
-namespace {
-
 // Of OpenImageIO's many readers those that are asked: what is hostile would choose among all of them.
 constexpr const char* kEndings[] = {"png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif",
                                     "tga", "exr", "hdr",  "ppm",  "pgm", "pbm",  "pnm"};
@@ -126,13 +105,6 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
 }
 
 }  // namespace
-
-Result<View> read_view(const std::string& path) {
-  if (const auto known = check_reader(path, path); !known) return known.error();
-  const auto input = OIIO::ImageInput::open(path);
-  if (!input) return Error{fmt::format("cannot read picture {}: {}", path, first_line(OIIO::geterror()))};
-  return read_pixels(*input, path, ~uint64_t{0});
-}
 
 Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels) {
   const std::string told = name_for_reader(bytes, name);

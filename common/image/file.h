@@ -1,4 +1,4 @@
-// Image files, through OpenImageIO.
+// Image files: our own through libpng and OpenEXR, those of others through OpenImageIO.
 #pragma once
 
 #include <cstddef>
@@ -30,12 +30,10 @@ Status write_png(const std::string& path, const View& view, Alpha alpha = Alpha:
 Status write_exr(const std::string& path, const View& view, Alpha alpha = Alpha::kNone);
 /// The same without alpha, with the normals in N.X, N.Y, N.Z, half floats; one a pixel.
 Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals);
-/// The bytes of a JPEG file of its colours. quality: 1 to 100.
-Result<std::string> encode_jpeg(const View& view, int quality);
-/// Reads a PNG, JPEG, WebP, TIFF, BMP, GIF, TGA, EXR, HDR or PNM file, as the ending of its name says; channel Z
-/// becomes depth_m. At most 16384 pixels a side.
+/// Reads a PNG or EXR file, as the ending of its name says: colours over black; channel Z becomes depth_m. At most
+/// 16384 pixels a side; not interlaced.
 Result<View> read_view(const std::string& path);
-/// Reads a picture of at most `most_pixels` from memory: its colours without its alpha, which changes nothing of them.
+/// Reads a PNG, JPEG, WebP, TIFF, BMP, GIF, TGA, EXR, HDR or PNM picture of at most `most_pixels` from memory: its colours without its alpha, which changes nothing of them.
 /// name: for error texts; its ending says what it is, unless its first bytes do.
 Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <glm/glm.hpp>
 
 namespace telesplat::julia {
 namespace {

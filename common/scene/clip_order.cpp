@@ -27,7 +27,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-std::optional<Number> number(std::string_view text) {
+std::optional<Number> scalar_or_percent(std::string_view text) {
   text = trimmed(text);
   Number out;
   if (text.ends_with('%')) out.percent = true, text.remove_suffix(1);
@@ -43,7 +43,7 @@ std::optional<std::vector<Number>> numbers(std::string_view text, size_t count) 
   std::vector<Number> out;
   for (;;) {
     const size_t comma = text.find(',');
-    const auto one = number(text.substr(0, comma));
+    const auto one = scalar_or_percent(text.substr(0, comma));
     if (!one || out.size() == count) return std::nullopt;
     out.push_back(*one);
     if (comma == text.npos) break;
@@ -69,7 +69,7 @@ bool read_plane(std::string_view text, ClipOrder& out) {
     std::string_view rest = trimmed(text.substr(1));
     const bool from = rest.starts_with(">=");
     if (!from && !rest.starts_with("<=")) return false;
-    const auto n = number(rest.substr(2));
+    const auto n = scalar_or_percent(rest.substr(2));
     if (n) out.planes.push_back(on_axis(int(axes.find(text[0])), from, *n));
     return n.has_value();
   }

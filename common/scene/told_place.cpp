@@ -15,9 +15,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json list(const glm::dvec3& v) { return {v.x + 0.0, v.y + 0.0, v.z + 0.0}; }
+Json coordinates(const glm::dvec3& v) { return {v.x + 0.0, v.y + 0.0, v.z + 0.0}; }
 
-std::optional<double> number(const Json& json, const char* key) {
+std::optional<double> number_of(const Json& json, const char* key) {
   const auto found = json.find(key);
   return found != json.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
 }
@@ -68,10 +68,10 @@ void refine(ToldPlace& place, const Probed& probed, const Placement& placement) 
 
 nlohmann::ordered_json to_json(const ToldPlace& p, const Placement& placement) {
   Json out{{"place", place_text(placement, p.data)},
-           {"room", list(p.room)},
-           {"data", list(p.data)},
+           {"room", coordinates(p.room)},
+           {"data", coordinates(p.data)},
            {"unit", placement.unit}};
-  if (glm::length(p.normal_data) > 0) out["normal"] = list(p.normal_data);
+  if (glm::length(p.normal_data) > 0) out["normal"] = coordinates(p.normal_data);
   if (p.error) out["error"] = *p.error;
   if (!p.estimate.empty()) out["estimate"] = p.estimate;
   if (!p.array.empty()) out["array"] = p.array;
@@ -86,10 +86,10 @@ std::optional<ToldPlace> told_place_from(const nlohmann::ordered_json& json, con
   if (!room) return std::nullopt;
   ToldPlace out{.room = *room, .data = vector(json, "data").value_or(placement.to_data(*room))};
   out.normal_data = vector(json, "normal").value_or(glm::dvec3(0));
-  out.error = number(json, "error");
+  out.error = number_of(json, "error");
   out.estimate = text(json, "estimate");
   out.array = text(json, "array"), out.array_unit = text(json, "array_unit");
-  out.value = number(json, "value"), out.value_error = number(json, "value_error");
+  out.value = number_of(json, "value"), out.value_error = number_of(json, "value_error");
   return out;
 }
 

@@ -2,10 +2,17 @@
 // quintic fade).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 namespace telesplat::terrain {
+
+/// Rises from 0 at `from` to 1 at `to`, with no slope at either.
+inline double smooth(double from, double to, double v) {
+  const double t = std::clamp((v - from) / (to - from), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
 
 class Noise {
  public:

@@ -13,11 +13,6 @@ constexpr int kSide = 560;  // 25 m: finer forms are noise (terrain.cpp)
 constexpr double kRimRadiusM = 3300, kFloorM = 1480, kRimM = 2330, kFootM = 1050;
 constexpr double kPi = 3.14159265358979323846;
 
-double smooth(double from, double to, double v) {
-  const double t = std::clamp((v - from) / (to - from), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
-
 // A cone with a crater, `radius` wide at its foot; 0 outside.
 double cone(double distance, double radius, double height) {
   if (distance >= radius) return 0;

@@ -13,10 +13,6 @@ namespace {
 
 using Rgb = glm::dvec3;
 
-double smooth(double from, double to, double v) {
-  const double t = std::clamp((v - from) / (to - from), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
 Rgb mix(const Rgb& a, const Rgb& b, double t) { return a + (b - a) * t; }
 
 // Columns, full rows of cells, and the triangles of the last, shorter row.

@@ -33,7 +33,7 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
       received_(received),
       budget_(options.detail_budget && options.target_fps > 0 ? kBudgetShare * 1e3 / options.target_fps : 0,
               options.least_detail),
-      half_size_(renderer_->halves() ? budget_.budget_ms() : 0),
+      half_size_(budget_.budget_ms()),
       supersampler_(*renderer_, still_side(options)) {}
 
 // Splats that soften their edges let the background through; which is known from drawing the same over another one.
@@ -123,15 +123,16 @@ void PointSource::measure(const FrameInput& input, double detail, const DrawnFra
   const double end_s = monotonic_s();
   const double threads_ms =
       out.project_cpu_ms + out.resolve_cpu_ms + out.fill_cpu_ms + out.smooth_cpu_ms + out.antialias_cpu_ms;
-  const double work_ms = out.prepare_ms + threads_ms / std::max(options_.threads, 1);
+  const double work_ms = out.prepare_ms + threads_ms / std::max(renderer_->threads(), 1);
   const double draw_ms = std::min((end_s - out.chosen_s) * 1e3, work_ms);
   budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, draw_ms, double(list_.points), detail);
-  if (out.halved == half_size_.on()) half_size_.frame_done(draw_ms, budget_.detail() <= options_.least_detail);
+  if (renderer_->halves() && out.halved == half_size_.on())
+    half_size_.frame_done(draw_ms, budget_.detail() <= options_.least_detail);
 }
 
 void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out) {
   const double detail = wanted_detail(input);
-  out.halved = half_size_.on() && !input.resting && !input.with_coverage;
+  out.halved = half_size_.on() && renderer_->halves() && !input.resting && !input.with_coverage;
   select(input, input.resting ? 1.0 : detail, out);
   if (list_.points > 0 || input.even_empty) draw_list(input, image::Shading(options_.shading, input.camera), view, out);
   if (!input.resting) measure(input, detail, out);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "client/viewer/render/renderer_trial.h"
 #include "common/core/result.h"
 #include "common/splat/cpu_splatter.h"
 
@@ -13,8 +14,10 @@ namespace telesplat::viewer {
 class Renderer {
  public:
   virtual ~Renderer() = default;
-  /// "cpu" or "gl".
+  /// "cpu" or "gl"; "auto": both are still timed.
   virtual const char* name() const = 0;
+  /// Threads that the times of stages are summed over.
+  virtual int threads() const { return 1; }
   /// What OpenGL calls the device that draws; empty: none does.
   virtual const std::string& device() const {
     static const std::string none;
@@ -40,7 +43,13 @@ class Renderer {
 std::unique_ptr<Renderer> make_cpu_renderer(int threads);
 /// EGL, off-screen (device or Mesa surfaceless platform), OpenGL 4.3 or later. Fails with what was tried.
 Result<std::unique_ptr<Renderer>> make_gl_renderer();
-/// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl".
-Result<std::unique_ptr<Renderer>> make_renderer(const std::string& kind, int threads);
+/// Draws with both by turns until `choice` says which is kept.
+std::unique_ptr<Renderer> try_renderers(std::unique_ptr<Renderer> cpu, std::unique_ptr<Renderer> gl,
+                                        std::shared_ptr<RendererChoice> choice,
+                                        std::function<double()> now_s = monotonic_s);
+/// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl".
+Result<std::unique_ptr<Renderer>> make_renderer(
+    const std::string& kind, int threads,
+    const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
 
 }  // namespace telesplat::viewer

@@ -23,7 +23,7 @@ const char* name_of(PlanRow::Outcome outcome) {
   return "late";
 }
 
-struct Line {
+struct PlanLine {
   const std::string& viewer;
   const PlanRow& row;
   double begin_s;  // of the run
@@ -43,39 +43,39 @@ struct Line {
 };
 std::string whole(uint64_t v) { return std::to_string(v); }
 
-constexpr Column<Line, std::string> kColumns[] = {
-    {"viewer", [](const Line& l) { return csv_quoted(l.viewer); }},
-    {"request", [](const Line& l) { return whole(l.row.asked.request.value); }},
-    {"frame", [](const Line& l) { return whole(l.row.asked.frame.value); }},
-    {"epoch", [](const Line& l) { return whole(l.row.asked.epoch.value); }},
-    {"extra", [](const Line& l) { return whole(l.row.asked.extra); }},
-    {"round", [](const Line& l) { return whole(l.row.asked.round); }},
-    {"still", [](const Line& l) { return whole(l.row.asked.still); }},
-    {"outcome", [](const Line& l) { return std::string(name_of(l.row.outcome)); }},
-    {"asked_s", [](const Line& l) { return l.moment(l.row.asked_s); }},
-    {"planned_s", [](const Line& l) { return l.moment(l.row.planned_s); }},
-    {"plan_ms", [](const Line& l) { return l.figure("plan_ms"); }},
-    {"wait_ms", [](const Line& l) { return l.wait_ms(); }},
-    {"tiles", [](const Line& l) { return whole(l.row.tiles); }},
-    {"mask_bytes", [](const Line& l) { return whole(l.row.mask_bytes); }},
-    {"rays_cast", [](const Line& l) { return whole(l.row.rays_cast()); }},
-    {"rays_full", [](const Line& l) { return whole(l.row.rays_full()); }},
-    {"rays_nothing", [](const Line& l) { return l.figure("rays.nothing"); }},
-    {"rays_sparse", [](const Line& l) { return l.figure("rays.sparse"); }},
-    {"rays_edge", [](const Line& l) { return l.figure("rays.edge"); }},
-    {"rays_stale", [](const Line& l) { return l.figure("rays.stale"); }},
-    {"rays_unproven", [](const Line& l) { return l.figure("rays.unproven"); }},
-    {"rays_validation", [](const Line& l) { return l.figure("rays.validation"); }},
-    {"rays_refinement", [](const Line& l) { return l.figure("rays.refinement"); }},
-    {"rays_cell", [](const Line& l) { return l.figure("rays.cell"); }},
-    {"rays_put_off", [](const Line& l) { return l.figure("rays.put_off"); }},
-    {"pixels_nothing", [](const Line& l) { return l.figure("pixels.nothing"); }},
-    {"pixels_sparse", [](const Line& l) { return l.figure("pixels.sparse"); }},
-    {"pixels_edge", [](const Line& l) { return l.figure("pixels.edge"); }},
-    {"pixels_stale", [](const Line& l) { return l.figure("pixels.stale"); }},
-    {"pixels_unproven", [](const Line& l) { return l.figure("pixels.unproven"); }},
-    {"pixels_good", [](const Line& l) { return l.figure("pixels.good"); }},
-    {"pixels_known_empty", [](const Line& l) { return l.figure("pixels.known_empty"); }},
+constexpr Column<PlanLine, std::string> kPlanColumns[] = {
+    {"viewer", [](const PlanLine& l) { return csv_quoted(l.viewer); }},
+    {"request", [](const PlanLine& l) { return whole(l.row.asked.request.value); }},
+    {"frame", [](const PlanLine& l) { return whole(l.row.asked.frame.value); }},
+    {"epoch", [](const PlanLine& l) { return whole(l.row.asked.epoch.value); }},
+    {"extra", [](const PlanLine& l) { return whole(l.row.asked.extra); }},
+    {"round", [](const PlanLine& l) { return whole(l.row.asked.round); }},
+    {"still", [](const PlanLine& l) { return whole(l.row.asked.still); }},
+    {"outcome", [](const PlanLine& l) { return std::string(name_of(l.row.outcome)); }},
+    {"asked_s", [](const PlanLine& l) { return l.moment(l.row.asked_s); }},
+    {"planned_s", [](const PlanLine& l) { return l.moment(l.row.planned_s); }},
+    {"plan_ms", [](const PlanLine& l) { return l.figure("plan_ms"); }},
+    {"wait_ms", [](const PlanLine& l) { return l.wait_ms(); }},
+    {"tiles", [](const PlanLine& l) { return whole(l.row.tiles); }},
+    {"mask_bytes", [](const PlanLine& l) { return whole(l.row.mask_bytes); }},
+    {"rays_cast", [](const PlanLine& l) { return whole(l.row.rays_cast()); }},
+    {"rays_full", [](const PlanLine& l) { return whole(l.row.rays_full()); }},
+    {"rays_nothing", [](const PlanLine& l) { return l.figure("rays.nothing"); }},
+    {"rays_sparse", [](const PlanLine& l) { return l.figure("rays.sparse"); }},
+    {"rays_edge", [](const PlanLine& l) { return l.figure("rays.edge"); }},
+    {"rays_stale", [](const PlanLine& l) { return l.figure("rays.stale"); }},
+    {"rays_unproven", [](const PlanLine& l) { return l.figure("rays.unproven"); }},
+    {"rays_validation", [](const PlanLine& l) { return l.figure("rays.validation"); }},
+    {"rays_refinement", [](const PlanLine& l) { return l.figure("rays.refinement"); }},
+    {"rays_cell", [](const PlanLine& l) { return l.figure("rays.cell"); }},
+    {"rays_put_off", [](const PlanLine& l) { return l.figure("rays.put_off"); }},
+    {"pixels_nothing", [](const PlanLine& l) { return l.figure("pixels.nothing"); }},
+    {"pixels_sparse", [](const PlanLine& l) { return l.figure("pixels.sparse"); }},
+    {"pixels_edge", [](const PlanLine& l) { return l.figure("pixels.edge"); }},
+    {"pixels_stale", [](const PlanLine& l) { return l.figure("pixels.stale"); }},
+    {"pixels_unproven", [](const PlanLine& l) { return l.figure("pixels.unproven"); }},
+    {"pixels_good", [](const PlanLine& l) { return l.figure("pixels.good"); }},
+    {"pixels_known_empty", [](const PlanLine& l) { return l.figure("pixels.known_empty"); }},
 };
 
 }  // namespace
@@ -103,10 +103,10 @@ PlanRow row_of(const wire::PlanRequest& asked, double asked_s, const wire::Plan&
   return out;
 }
 
-std::vector<std::string> plan_columns() { return names(kColumns); }
+std::vector<std::string> plan_columns() { return names(kPlanColumns); }
 
 std::vector<std::string> plan_cells(const std::string& viewer, const PlanRow& row, double begin_s) {
-  return values(kColumns, Line{viewer, row, begin_s});
+  return values(kPlanColumns, PlanLine{viewer, row, begin_s});
 }
 
 }  // namespace telesplat::metrics

@@ -19,7 +19,7 @@
 namespace telesplat::splat {
 namespace {
 
-constexpr int kTileWidth = 256, kTileHeight = 256;  // 256 KiB of depths
+constexpr int kSpanWidth = 256, kSpanHeight = 256;  // 256 KiB of depths
 
 // Its mosaics that may be seen: all of them, whole.
 void add_items(const points::Cluster& cluster, std::span<const points::Mosaic> mosaics, const glm::vec3& eye,
@@ -49,7 +49,7 @@ struct BinnedPoints {
   BinnedPoints(const std::vector<DrawItem>& all, const geometry::Camera& camera)
       : items(all),
         near_m(static_cast<float>(camera.near_m)),
-        grid{camera.width, camera.height, kTileWidth, kTileHeight} {
+        grid{camera.width, camera.height, kSpanWidth, kSpanHeight} {
     runs.build(items, camera);
     binning.build(grid, runs.transforms, near_m, 1.0f);
   }
@@ -168,7 +168,7 @@ void add_to_reference_depth(const points::PreparedPatch& patch, const points::Mo
   }
   if (items.empty()) return;
   const BinnedPoints points(items, camera);
-  std::vector<uint32_t> bits(static_cast<size_t>(kTileWidth) * kTileHeight);
+  std::vector<uint32_t> bits(static_cast<size_t>(kSpanWidth) * kSpanHeight);
   for (int index = 0; index < points.grid.count(); ++index) {
     if (points.binning.tile(index).empty()) continue;
     const geometry::Rect rect = points.grid.rect(index);

@@ -18,30 +18,30 @@
 namespace telesplat::splat {
 namespace {
 
-constexpr int kMargin = kMaxSplatSide, kReach = ViewKeys::kReach;
+constexpr int kKeyMargin = kMaxSplatSide, kReach = ViewKeys::kReach;
 constexpr size_t kMaxVectorPixels = 64;  // who reads rows by vectors reads so many beyond
 constexpr uint32_t kNothing = std::bit_cast<uint32_t>(std::numeric_limits<float>::infinity());
 
 // What one thread needs, kept from view to view. Keys are empty between tiles, except for the margin into which splats
 // hang over.
-struct Workspace {
+struct KeyWorkspace {
   hwy::AlignedFreeUniquePtr<uint64_t[]> keys;
   std::vector<uint32_t> depth_bits;
   int width = 0, height = 0;  // of a tile with its reach; 0: none yet
 
-  int stride() const { return width + 2 * kMargin; }
+  int stride() const { return width + 2 * kKeyMargin; }
   void resize(int tile_width, int tile_height) {
     const int w = tile_width + 2 * kReach, h = tile_height + 2 * kReach;
     if (w == width && h == height) return;
     width = w, height = h;
-    const size_t size = static_cast<size_t>(stride()) * (height + 2 * kMargin);
+    const size_t size = static_cast<size_t>(stride()) * (height + 2 * kKeyMargin);
     keys = hwy::AllocateAligned<uint64_t>(size);
     std::fill_n(keys.get(), size, static_cast<uint64_t>(kEmptyKey));
     depth_bits.resize(static_cast<size_t>(width) * height + kMaxVectorPixels);
   }
   void empty() {
     for (int y = 0; y < height; ++y)
-      std::fill_n(keys.get() + static_cast<size_t>(y + kMargin) * stride() + kMargin, width,
+      std::fill_n(keys.get() + static_cast<size_t>(y + kKeyMargin) * stride() + kKeyMargin, width,
                   static_cast<uint64_t>(kEmptyKey));
   }
 };
@@ -88,10 +88,10 @@ struct ViewKeys::Impl {
 
   void choose(const points::PointModel& model, const geometry::Camera& camera, bool rests);
   void bin(const geometry::Camera& camera);
-  void draw_tile(int index, Workspace& workspace, const std::function<void(const Tile&)>& visit);
+  void draw_tile(int index, KeyWorkspace& workspace, const std::function<void(const Tile&)>& visit);
 
   tbb::task_arena arena;
-  std::vector<Workspace> workspaces;
+  std::vector<KeyWorkspace> workspaces;
 
   // The view.
   TileGrid grid;
@@ -141,7 +141,7 @@ void ViewKeys::Impl::bin(const geometry::Camera& camera) {
   binning.list();
 }
 
-void ViewKeys::Impl::draw_tile(int index, Workspace& w, const std::function<void(const Tile&)>& visit) {
+void ViewKeys::Impl::draw_tile(int index, KeyWorkspace& w, const std::function<void(const Tile&)>& visit) {
   Tile tile{.index = index, .rect = grid.rect(index)};
   const auto entries = binning.tile(index);
   if (entries.empty()) return visit(tile);
@@ -149,12 +149,12 @@ void ViewKeys::Impl::draw_tile(int index, Workspace& w, const std::function<void
   const geometry::Rect around{r.x - kReach, r.y - kReach, r.width + 2 * kReach, r.height + 2 * kReach};
   const TileInput input{around,      r, near_m, entries, runs.runs.data(), runs.transforms.data(), runs.facing.data(),
                         items.data()};
-  splat_tile(input, styles.data(), {w.keys.get(), w.stride(), kMargin});
+  splat_tile(input, styles.data(), {w.keys.get(), w.stride(), kKeyMargin});
   std::fill_n(w.depth_bits.data(), static_cast<size_t>(around.width) * around.height, kNothing);
   depth_tile(input, w.depth_bits.data());
   tile.empty = false;
   tile.key_stride = w.stride();
-  tile.keys = w.keys.get() + static_cast<ptrdiff_t>(kMargin + kReach) * w.stride() + kMargin + kReach;
+  tile.keys = w.keys.get() + static_cast<ptrdiff_t>(kKeyMargin + kReach) * w.stride() + kKeyMargin + kReach;
   tile.depth_stride = around.width;
   tile.depth_bits = w.depth_bits.data() + static_cast<ptrdiff_t>(kReach) * around.width + kReach;
   visit(tile);
@@ -171,7 +171,7 @@ void ViewKeys::begin(const points::PointModel& model, const geometry::Camera& ca
   m.near_m = static_cast<float>(camera.near_m);
   m.choose(model, camera, rests);
   m.bin(camera);
-  for (Workspace& w : m.workspaces) w.resize(tile_width, tile_height);
+  for (KeyWorkspace& w : m.workspaces) w.resize(tile_width, tile_height);
 }
 
 const TileGrid& ViewKeys::grid() const { return impl_->grid; }
@@ -184,7 +184,7 @@ void ViewKeys::draw(std::span<const int> tiles, const std::function<void(const T
     in_parallel(
         tbb::blocked_range<size_t>(0, tiles.size(), 1),
         [&](const tbb::blocked_range<size_t>& range) {
-          Workspace& workspace = m.workspaces[static_cast<size_t>(thread_in_loop())];
+          KeyWorkspace& workspace = m.workspaces[static_cast<size_t>(thread_in_loop())];
           for (size_t i = range.begin(); i < range.end(); ++i) m.draw_tile(tiles[i], workspace, visit);
         },
         tbb::simple_partitioner());

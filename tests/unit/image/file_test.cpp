@@ -146,14 +146,30 @@ TEST_F(ImageFile, TruncatedFilesAreRefusedAtEveryLength) {
   }
 }
 
+// The headers of PNG files, which have no pixels.
 TEST_F(ImageFile, AHeaderThatClaimsTooMuchIsRefused) {
-  // A portable pixmap of 100,000 x 100,000 pixels with three bytes of them.
-  std::ofstream(path("huge.ppm"), std::ios::binary) << "P6\n100000 100000\n255\nabc";
-  const auto read = read_view(path("huge.ppm"));
-  ASSERT_FALSE(read.ok());
-  EXPECT_NE(read.error().text.find("16384"), std::string::npos) << read.error().text;
-  std::ofstream(path("large.ppm"), std::ios::binary) << "P6\n16384 16384\n255\nabc";  // within the limit, but not there
-  EXPECT_FALSE(read_view(path("large.ppm")).ok());
+  const std::string before("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16), after("\x08\x02\0\0\0", 5);
+  const auto header = [&](const char* name, const std::string& side, const std::string& check) {
+    std::ofstream(path(name), std::ios::binary) << before << side << side << after << check;
+    return read_view(path(name));
+  };
+  const auto huge = header("huge.png", std::string("\0\x01\x86\xa0", 4), "\x27\x30\x9c\x9f");  // 100,000 pixels a side
+  ASSERT_FALSE(huge.ok());
+  EXPECT_NE(huge.error().text.find(path("huge.png")), std::string::npos) << huge.error().text;
+  EXPECT_NE(huge.error().text.find("16384"), std::string::npos) << huge.error().text;
+  const auto large = header("large.png", std::string("\0\0\x40\0", 4), "\x26\xaa\x87\xd3");  // 16384 pixels a side
+  EXPECT_FALSE(large.ok());
+}
+
+// Colours over black, as those of pictures without alpha.
+TEST_F(ImageFile, PngWithAlphaIsReadOverBlack) {
+  View v{2, 1, {0xff806040, 0x80403020}, {}};
+  ASSERT_TRUE(write_png(path("a.png"), v, Alpha::kCoverage).ok());
+  const auto read = read_view(path("a.png"));
+  ASSERT_TRUE(read.ok()) << read.error().text;
+  EXPECT_EQ(read->colour[0], 0x806040u);
+  for (int shift : {0, 8, 16})
+    EXPECT_NEAR(int(read->colour[1] >> shift & 255), int(v.colour[1] >> shift & 255), 1) << shift;
 }
 
 }  // namespace

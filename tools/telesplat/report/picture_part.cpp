@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "common/image/file.h"
+#include "common/image/jpeg.h"
 #include "tools/telesplat/movie/contact_sheet.h"
 
 namespace telesplat::launcher {
@@ -86,13 +87,14 @@ class Gallery {
         ++left_out_;
         continue;
       }
-      const auto jpeg = image::encode_jpeg(small_picture(*view, width), kQuality);
-      if (!jpeg || jpeg->size() * 4 / 3 > bytes_left_) {
+      const image::View small = small_picture(*view, width);
+      const auto jpeg = image::encode_jpeg(small.colour, small.width, small.height, kQuality);
+      if (jpeg.size() * 4 / 3 > bytes_left_) {
         ++left_out_;
         continue;
       }
-      bytes_left_ -= jpeg->size() * 4 / 3;
-      ordered_json one{{"frame", p.frame}, {"src", "data:image/jpeg;base64," + base64(*jpeg)}};
+      bytes_left_ -= jpeg.size() * 4 / 3;
+      ordered_json one{{"frame", p.frame}, {"src", "data:image/jpeg;base64," + base64({reinterpret_cast<const char*>(jpeg.data()), jpeg.size()})}};
       if (!p.name.empty()) one["name"] = p.name;
       if (const auto at = moments_.find(p.frame); at != moments_.end()) one["t"] = std::round(at->second * 1e4) / 1e4;
       out.push_back(std::move(one));

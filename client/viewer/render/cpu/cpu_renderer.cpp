@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "client/viewer/render/renderer.h"
+#include "common/core/machine.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -9,8 +10,9 @@ constexpr double kSameFocal = 1e-6;
 
 class CpuRenderer final : public Renderer {
  public:
-  explicit CpuRenderer(int threads) : splatter_(threads) {}
+  explicit CpuRenderer(int threads) : splatter_(threads), threads_(threads > 0 ? threads : usable_processors()) {}
   const char* name() const override { return "cpu"; }
+  int threads() const override { return threads_; }
   bool halves() const override { return true; }
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                            const splat::RenderOptions& options, const image::Shading& shading,
@@ -28,6 +30,7 @@ class CpuRenderer final : public Renderer {
 
  private:
   splat::CpuSplatter splatter_;
+  int threads_;
 };
 
 }  // namespace

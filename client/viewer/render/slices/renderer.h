@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "client/viewer/render/renderer_trial.h"
 #include "common/core/result.h"
 #include "common/volume/warp/warper.h"
 
@@ -12,7 +13,7 @@ namespace telesplat::viewer {
 class VolumeRenderer {
  public:
   virtual ~VolumeRenderer() = default;
-  /// "cpu" or "gl".
+  /// "cpu" or "gl"; "auto": both are still timed.
   virtual const char* name() const = 0;
   /// As volume::Warper::render. Called from one thread, the one that made the renderer.
   virtual volume::WarpStats render(const volume::VolumeFrame* frame, const geometry::Camera& camera,
@@ -22,7 +23,9 @@ class VolumeRenderer {
 std::unique_ptr<VolumeRenderer> make_cpu_volume_renderer(int threads);
 /// EGL, off-screen. Fails with what was tried.
 Result<std::unique_ptr<VolumeRenderer>> make_gl_volume_renderer();
-/// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl".
-Result<std::unique_ptr<VolumeRenderer>> make_volume_renderer(const std::string& kind, int threads);
+/// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl".
+Result<std::unique_ptr<VolumeRenderer>> make_volume_renderer(
+    const std::string& kind, int threads,
+    const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
 
 }  // namespace telesplat::viewer

@@ -14,11 +14,11 @@ namespace {
 
 constexpr int kFirstBits = 2, kFirstSide = 1 << kFirstBits;  // pixels a side of the finest squares of the pyramid
 constexpr int kMostRays = 16;  // pixels a side: through larger nodes not every ray is looked at
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kFarthest = std::numeric_limits<float>::infinity();
 
 // Depths of some pixels: the least one, the greatest one of new rays.
 struct Range {
-  float lo = kInfinity, hi = 0;
+  float lo = kFarthest, hi = 0;
   void add(float v) {  // not a number counts as 0
     const float depth = std::abs(v);
     lo = std::min(lo, depth > 0 ? depth : 0.0f);

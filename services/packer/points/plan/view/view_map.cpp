@@ -14,7 +14,7 @@
 namespace telesplat::packer {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNothingMet = std::numeric_limits<float>::infinity();
 constexpr int kReach = splat::ViewKeys::kReach;
 
 // A pin-hole: so many of its eight neighbours are a nearer surface.
@@ -65,7 +65,7 @@ bool PixelJudge::has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
       const float there = point(x + dx, y + dy);
-      if (!(there < kInfinity)) continue;
+      if (!(there < kNothingMet)) continue;
       const uint32_t bits = std::bit_cast<uint32_t>(there);
       const float ox = float(dx) + (float(bits & kPlace) + 0.5f) * kUnit - 0.5f,
                   oy = float(dy) + (float(bits >> splat::kReferenceSubBits & kPlace) + 0.5f) * kUnit - 0.5f;
@@ -79,10 +79,10 @@ bool PixelJudge::has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y
 static void clear_planes(const geometry::Rect& r, ViewMap& map) {
   for (int y = r.y; y < r.y + r.height; ++y) {
     const size_t first = static_cast<size_t>(y) * map.covered.width() + r.x;
-    std::fill_n(map.depth_m.data() + first, r.width, kInfinity);
+    std::fill_n(map.depth_m.data() + first, r.width, kNothingMet);
     std::fill_n(map.colour.data() + first, r.width, 0u);
     std::fill_n(map.normal.data() + first, r.width, uint16_t{0});
-    std::fill_n(map.nearest_m.data() + first, r.width, kInfinity);
+    std::fill_n(map.nearest_m.data() + first, r.width, kNothingMet);
   }
 }
 
