@@ -8,7 +8,6 @@
 #include "common/colour/colour_map.h"
 #include "common/volume/transfer/function.h"
 #include "services/data/kinds.h"
-#include "services/data/mesh/active_array.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/volume/formats/header.h"
 
@@ -47,19 +46,22 @@ Table grouped(Table table, const std::string& group) {
   return table;
 }
 
+Table recorded(Table table) {
+  for (options::Row& row : table) row.reach = Reach::kRecorded;
+  return table;
+}
+
 Table placement_table(PlacementOptions& o) {
   return {
       {.flag = "--room-size",
        .value = &o.room_size_m,
        .help = "largest extent of the data set in room space, metres",
-       .limits = Range{1e-3, 1e3},
-       .reach = Reach::kRecorded},
+       .limits = Range{1e-3, 1e3}},
       {.flag = "--up",
        .value = &o.up,
        .help = "data axis that points up",
        .limits = Names{"auto", "x", "y", "z", "-x", "-y", "-z"},
-       .fits = kFiles,
-       .reach = Reach::kRecorded},
+       .fits = kFiles},
   };
 }
 
@@ -69,36 +71,31 @@ Table mesh_table(MeshOptions& o) {
        .value = &o.crease_deg,
        .help = "meshes without normals, but terrains and scans: edges are sharp from this angle on, degrees; 180: none",
        .limits = Range{0, 180},
-       .fits = kMeshes,
-       .reach = Reach::kRecorded},
+       .fits = kMeshes},
       {.flag = "--z-scale",
        .value = &o.elevation.z_scale,
        .help = "elevation rasters: heights times this; 0: 1 where the file says where it lies, else so that the relief "
                "is a seventh of its side",
        .limits = Range{-1e6, 1e6},
-       .fits = kMeshes,
-       .reach = Reach::kRecorded},
+       .fits = kMeshes},
       {.flag = "--texture",
        .value = &o.elevation.texture,
        .help = "elevation rasters: an image draped over them",
        .fits = kMeshes,
-       .reach = Reach::kRecorded,
        .is_file = true},
       {.flag = "--texture-detail",
        .value = &o.texture_detail,
        .help = "triangles, at most, that an OBJ or glTF is divided into so that its vertices carry its textures; 0: "
                "vertices as they are",
        .limits = Range{0, 1e8},
-       .fits = kMeshes,
-       .reach = Reach::kRecorded},
+       .fits = kMeshes},
       {.flag = "--colour-by",
        .value = &o.colouring.by,
        .help =
            "colour a mesh by an array of its PLY, VTP, VTU or VTK file: ARRAY[:MIN:MAX], ARRAY a vector's length or "
            "one of its components ARRAY.x .y .z ARRAY[0]; MIN and MAX: the ends of the colour map, default: those of "
            "the array; none: the file's own colours; default: the active scalars that a VTP, VTU or VTK file marks",
-       .fits = kMeshes,
-       .reach = Reach::kRecorded},
+       .fits = kMeshes},
       {.flag = "--colour-map",
        .value = &o.colouring.map,
        .help =
@@ -106,72 +103,66 @@ Table mesh_table(MeshOptions& o) {
                        "colour map",
                        fmt::join(colour::colour_map_names(), ", ")),
        .fits = kMeshes,
-       .reach = Reach::kRecorded,
        .is_file = true},
       {.flag = "--cache",
        .value = folder(o.cache_dir),
        .help = "folder of the chunk store, which meshes alone have; default: telesplat in the user's cache folder",
-       .reach = Reach::kRecorded,
        .not_in_scene = "where data sets are kept"},
-      {.flag = "!--no-cache", .value = &o.use_cache, .help = "keep no chunk store", .reach = Reach::kRecorded},
+      {.flag = "!--no-cache", .value = &o.use_cache, .help = "keep no chunk store"},
   };
 }
 
 Table volume_table(DataOptions& o) {
-  return grouped(
-      {
-          {.flag = "--raw",
-           .value = &o.volume.raw,
-           .help = fmt::format("layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING]"
-                               "[:skip=BYTES], TYPE one of {}",
-                               kRawTypes),
-           .fits = kVolumesAndTheirSurfaces,
-           .reach = Reach::kRecorded},
-          {.flag = "--series",
-           .value = &o.volume.series,
-           .help = "which series of a DICOM folder: its place in the list that telesplat inspect prints, or its UID; "
-                   "default: the one of most slices",
-           .fits = kVolumesAndTheirSurfaces,
-           .reach = Reach::kRecorded},
-          {.flag = "--spacing",
-           .value = &o.volume.spacing,
-           .help = "distances of a volume's voxels, X,Y,Z, instead of those that its files tell or lack (pictures)",
-           .fits = kVolumesAndTheirSurfaces,
-           .reach = Reach::kRecorded},
-          {.flag = "--array",
-           .value = &o.volume.array,
-           .help = "which array of a VTI or VTK volume file is shown, by its name (telesplat inspect lists them); "
-                   "default: the one that the file marks, else its first",
-           .fits = kVolumesAndTheirSurfaces,
-           .reach = Reach::kRecorded},
-          {.flag = "--iso",
-           .value = &o.mesh.iso,
-           .help = "show the surface where a volume has this value, as a mesh",
-           .fits = kVolumesAndTheirSurfaces,
-           .reach = Reach::kRecorded},
-          {.flag = "--tf",
-           .value = &o.volume.transfer,
-           .help = fmt::format("transfer function: a preset ({}), a ParaView colour map (.json), or points "
-                               "VALUE:#RRGGBB:OPACITY,... with values in the data's units or per cent of their range; "
-                               "default: a preset that fits",
-                               transfer_names()),
-           .fits = kVolumes,
-           .reach = Reach::kRecorded,
-           .is_file = true},
-          {.flag = "--lighting",
-           .value = &o.volume.lit,
-           .help = "on: a volume's voxels are shaded by their gradients",
-           .fits = kVolumes,
-           .reach = Reach::kRecorded,
-           .on_off = true},
-          {.flag = "--series-rate",
-           .value = &o.volume.steps_per_s,
-           .help = "steps a second of a numbered series; 0: it does not play; default: all steps in a second, at most "
-                   "12.5 a second",
-           .limits = Range{0, 1000},
-           .fits = kVolumes},
-      },
-      "Volumes");
+  return recorded({
+      {.flag = "--raw",
+       .value = &o.volume.raw,
+       .help = fmt::format("layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING]"
+                           "[:skip=BYTES], TYPE one of {}",
+                           kRawTypes),
+       .fits = kVolumesAndTheirSurfaces},
+      {.flag = "--series",
+       .value = &o.volume.series,
+       .help = "which series of a DICOM folder: its place in the list that telesplat inspect prints, or its UID; "
+               "default: the one of most slices",
+       .fits = kVolumesAndTheirSurfaces},
+      {.flag = "--spacing",
+       .value = &o.volume.spacing,
+       .help = "distances of a volume's voxels, X,Y,Z, instead of those that its files tell or lack (pictures)",
+       .fits = kVolumesAndTheirSurfaces},
+      {.flag = "--array",
+       .value = &o.volume.array,
+       .help = "which array of a VTI or VTK volume file is shown, by its name (telesplat inspect lists them); "
+               "default: the one that the file marks, else its first",
+       .fits = kVolumesAndTheirSurfaces},
+      {.flag = "--iso",
+       .value = &o.mesh.iso,
+       .help = "show the surface where a volume has this value, as a mesh",
+       .fits = kVolumesAndTheirSurfaces},
+      {.flag = "--tf",
+       .value = &o.volume.transfer,
+       .help = fmt::format("transfer function: a preset ({}), a ParaView colour map (.json), or points "
+                           "VALUE:#RRGGBB:OPACITY,... with values in the data's units or per cent of their range; "
+                           "default: a preset that fits",
+                           transfer_names()),
+       .fits = kVolumes,
+       .is_file = true},
+      {.flag = "--lighting",
+       .value = &o.volume.lit,
+       .help = "on: a volume's voxels are shaded by their gradients",
+       .fits = kVolumes,
+       .on_off = true},
+  });
+}
+
+Table series_table(VolumeOptions& o) {
+  return {
+      {.flag = "--series-rate",
+       .value = &o.steps_per_s,
+       .help = "steps a second of a numbered series; 0: it does not play; default: all steps in a second, at most "
+               "12.5 a second",
+       .limits = Range{0, 1000},
+       .fits = kVolumes},
+  };
 }
 
 }  // namespace
@@ -187,8 +178,9 @@ MeshOptions DataOptions::mesh_options() const {
 }
 
 Table scene_table(DataOptions& o) {
-  return joined(joined(placement_table(o.mesh), mesh_table(o.mesh)),
-                joined(volume_table(o), julia::scene_table(o.julia)));
+  return joined(
+      recorded(joined(placement_table(o.mesh), mesh_table(o.mesh))),
+      joined(grouped(joined(volume_table(o), series_table(o.volume)), "Volumes"), julia::scene_table(o.julia)));
 }
 
 Table server_table(DataOptions& o) {

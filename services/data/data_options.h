@@ -7,7 +7,7 @@
 #include "common/net/service.h"
 #include "common/options/table.h"
 #include "services/data/mesh/options.h"
-#include "services/data/volume/options.h"
+#include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 
@@ -18,7 +18,7 @@ struct DataOptions {
   julia::SceneOptions julia;
   std::string companions = "folder";  ///< where a data server reads files that others name: "folder" or "anywhere"
 
-  /// What open_mesh takes. Where nobody says what a mesh is coloured by, it is what its file marks (active_array.h).
+  /// What open_mesh takes. Where nobody says what a mesh is coloured by, it is what its file marks (active_array_of()).
   MeshOptions mesh_options() const;
 };
 

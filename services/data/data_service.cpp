@@ -12,7 +12,6 @@
 #include "common/net/connections/peer_rates.h"
 #include "common/net/master_link.h"
 #include "services/data/base/cut_off.h"
-#include "services/data/companions.h"
 #include "services/data/kinds.h"
 #include "services/data/record.h"
 

@@ -29,7 +29,7 @@ class Description {
   std::vector<std::pair<std::string, std::string>> rows_;
 };
 
-std::string bytes_text(uint64_t bytes);        ///< "812 bytes", "1.3 MB"
+std::string bytes_text(uint64_t bytes);  ///< "812 bytes", "1.3 MB"
 /// "0 .. 240": both ends with as many digits as tell them apart.
 std::string range_text(double lo, double hi);
 std::string vector_text(const glm::dvec3& v);  ///< "(1, 2.5, -3)"

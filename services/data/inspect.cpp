@@ -10,9 +10,9 @@
 #include <filesystem>
 
 #include "services/data/base/mapped_file.h"
+#include "services/data/kinds.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/store_file.h"
-#include "services/data/open_mesh.h"
 #include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
@@ -163,7 +163,7 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
 }
 
 Result<MeshFileFacts> inspect_store(const std::string& path) {
-  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return Error{fmt::format("{}: cannot be opened: {}", path, std::strerror(errno))};
   const auto content = read_store(descriptor, path);
   close(descriptor);

@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "services/data/inspect.h"
-#include "services/data/volume/formats/dicom_series.h"
+#include "services/data/volume/formats/dicom.h"
 #include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {

@@ -11,13 +11,56 @@
 #include "services/data/julia/served_julia.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/served_mesh.h"
-#include "services/data/open_mesh.h"
+#include "services/data/surface/isosurface.h"
+#include "services/data/volume/formats/header.h"
 #include "services/data/volume/formats/header_text.h"
 #include "services/data/volume/served_volume.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 namespace {
+
+namespace fs = std::filesystem;
+
+bool is_below(const fs::path& folder, const fs::path& file) {
+  return std::mismatch(folder.begin(), folder.end(), file.begin(), file.end()).first == folder.end();
+}
+
+Status check_named(const std::string& path, const std::string& named) {
+  std::error_code error;
+  const fs::path file = fs::canonical(named, error);
+  if (error) return ok_status();  // it is missing
+  const fs::path parent = fs::path(path).parent_path();
+  const fs::path folder = fs::canonical(parent.empty() ? fs::path(".") : parent, error);
+  if (!error && is_below(folder, file)) return ok_status();
+  return Error{
+      fmt::format("{}: names {}, which lies outside of its folder; --companions anywhere allows that", path, named)};
+}
+
+// The file's own voxels lie in itself, or in the file that its header names.
+Status check_volume(const DataOptions& o) {
+  const auto source = find_volume(o.scene, o.volume);
+  if (!source) return ok_status();
+  if (source->dicom) return ok_status();  // slices name nothing
+  for (const std::string& step : source->steps) {
+    const auto header = read_volume_header(step, o.volume.raw);
+    if (!header) continue;
+    std::vector<std::string> named = header->more_paths;
+    if (!header->data_path.empty() && header->data_path != step) named.push_back(header->data_path);
+    for (const std::string& file : named)
+      if (const Status s = check_named(step, file); !s) return s;
+  }
+  return ok_status();
+}
+
+Status check_mesh(const std::string& path) {
+  const auto file = MappedFile::open(path);
+  if (!file) return ok_status();
+  const std::string_view content = (*file)->text();
+  for (const std::string& named : companion_files(content, detect_format(content, path).format, path))
+    if (const Status s = check_named(path, named); !s) return s;
+  return ok_status();
+}
 
 using scene::Kind;
 using OpenServed = Result<std::unique_ptr<Served>>;
@@ -139,6 +182,68 @@ Status refuse_misfits(DataOptions o, Kind kind) {
 }
 
 }  // namespace
+
+Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const MeshOptions& options,
+                                             const Progress& user_progress) {
+  auto by = scene::parse_colour_by(options.colouring.by);
+  if (!by) return Error{fmt::format("--colour-by {}", by.error().text)};
+  auto store = open_mesh_by(path, options, by->array, user_progress);
+  if (!options.colouring.by_file || (store && scene::make_colouring((*store)->info().arrays, *by, {}))) return store;
+  return open_mesh_by(path, options, "", user_progress);
+}
+
+Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
+                                                const std::string& array, const Progress& user_progress) {
+  const Progress progress = user_progress ? user_progress : [](const char*, double) {};
+  if (const Status s = validate(options); !s) return s.error();
+  if (options.iso && !array.empty())
+    return Error{
+        fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};
+  if (options.iso) {
+    const auto surface = surface_source(path, options.volume, *options.iso, progress);
+    return surface ? MeshStore::make(path, *surface, options, progress) : surface.error();
+  }
+  const auto file = find_mesh_file(path);
+  if (!file) return file.error();
+  auto source = file_source(file->path, options.elevation, array, options.texture_detail, progress);
+  if (!source) return source.error();
+  if (file->steps > 1) {
+    source->variant += "-first";
+    source->read = [read = source->read, folder = path, file = *file](const ReadProgress& p) {
+      auto mesh = read(p);
+      if (mesh)
+        mesh->notes.push_back(fmt::format("its folder, {}, holds {} time steps; the first one is shown ({})", folder,
+                                          file.steps, std::filesystem::path(file.path).filename().string()));
+      return mesh;
+    };
+  }
+  return MeshStore::make(file->path, *source, options, progress);
+}
+
+Result<colour::ColourMap> colour_map_of(const MeshOptions& options) {
+  auto map = colour::resolve_colour_map(options.colouring.map);
+  if (!map) return Error{fmt::format("--colour-map: {}", map.error().text)};
+  return map;
+}
+
+Result<std::optional<scene::Colouring>> colouring_of(const MeshOptions& options, const MeshStoreInfo& mesh) {
+  const auto by = scene::parse_colour_by(options.colouring.by);
+  if (!by) return Error{fmt::format("--colour-by {}", by.error().text)};
+  auto map = colour_map_of(options);
+  if (!map) return map.error();
+  const bool left_out = options.colouring.by_file && mesh.array != by->array;
+  if (by->array.empty() || left_out) return std::optional<scene::Colouring>();
+  auto colouring = scene::make_colouring(mesh.arrays, *by, *std::move(map));
+  if (!colouring) return Error{fmt::format("{}: {}", mesh.source, colouring.error().text)};
+  return std::optional(*std::move(colouring));
+}
+
+Status check_companions(const DataOptions& o) {
+  if (o.companions == "anywhere") return ok_status();
+  const auto kind = kind_of(o);
+  if (!kind || *kind == scene::Kind::kJulia) return ok_status();
+  return *kind == scene::Kind::kVolume || o.mesh.iso ? check_volume(o) : check_mesh(o.scene);
+}
 
 std::string scene_help() {
   std::string out;

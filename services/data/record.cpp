@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "common/core/guarded.h"
+#include "services/data/base/numbered.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {
@@ -14,17 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPolite = 15;  // levels of nice
-
-std::vector<std::string> files_in(const std::string& folder) {
-  std::vector<std::string> out;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (entry->is_regular_file(error) && !name.starts_with('.')) out.push_back(entry->path().string());
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
 
 }  // namespace
 
@@ -55,8 +44,7 @@ std::vector<std::string> files_of(const DataOptions& o, scene::Kind kind) {
       out.push_back(path);
       continue;
     }
-    const auto inside = files_in(path);
-    out.insert(out.end(), inside.begin(), inside.end());
+    if (const auto inside = files_of_folder(path)) out.insert(out.end(), inside->begin(), inside->end());
   }
   return out;
 }

@@ -4,10 +4,9 @@
 #include <cstdlib>
 
 #include "common/volume/grid.h"
-#include "services/data/volume/formats/dicom_order.h"
+#include "services/data/volume/formats/dicom.h"
 #include "services/data/volume/formats/header.h"
-#include "services/data/volume/formats/tiff_pages.h"
-#include "services/data/vtk/image.h"
+#include "services/data/volume/formats/stack.h"
 #include "services/data/vtk/reader.h"
 
 namespace telesplat::data {

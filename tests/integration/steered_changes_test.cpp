@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "common/geometry/trajectory.h"
-#include "services/data/open_mesh.h"
+#include "services/data/kinds.h"
 #include "services/packer/points/plan/validation.h"
 #include "services/packer/points/plan/view/view_map.h"
 #include "tests/support/mesh_chunks.h"

@@ -36,7 +36,7 @@ struct TransferFunction {
 struct ValueRange {
   double lo = 0, hi = 1;  ///< smallest and largest value (finite ones)
   double typical_lo = 0,
-         typical_hi = 1;  ///< where most of what is not background lies: percentiles, services/data/volume/statistics.h
+         typical_hi = 1;  ///< where most of what is not background lies: percentiles, services/data/volume/slices.h
   bool hounsfield = false;  ///< a CT in Hounsfield units: presets then have absolute values
   bool operator==(const ValueRange&) const = default;
 };

@@ -6,10 +6,16 @@
 #include <string>
 #include <vector>
 
-#include "services/data/base/elevation_options.h"
 #include "services/data/base/mesh.h"
 
 namespace telesplat::data {
+
+/// Heights are multiplied by z_scale; 0: by 1 where the raster is georeferenced, else so that the relief is a seventh
+/// of the longer side.
+struct ElevationOptions {
+  double z_scale = 0;
+  std::string texture;  ///< an image draped over the raster (orthophoto), path; empty: coloured by height
+};
 
 inline constexpr int64_t kMaxRasterSamples = int64_t{1} << 26;  ///< vertices; larger rasters are read coarser
 

@@ -5,16 +5,20 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <xxhash.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+
+#include "services/data/base/mesh.h"
 
 namespace telesplat::data {
 
 Result<std::shared_ptr<const MappedFile>> MappedFile::map(int descriptor, const std::string& name) {
   struct stat status;
   if (fstat(descriptor, &status) != 0) return Error{fmt::format("{}: {}", name, std::strerror(errno))};
-  if (S_ISDIR(status.st_mode)) return Error{fmt::format("{}: is a directory, not a mesh file", name)};
+  if (S_ISDIR(status.st_mode)) return Error{fmt::format("{}: is a directory, not a file", name)};
   if (!S_ISREG(status.st_mode)) return Error{fmt::format("{}: is not a regular file", name)};
   if (status.st_size <= 0) return Error{fmt::format("{}: is empty (0 bytes)", name)};
   const auto size = static_cast<size_t>(status.st_size);
@@ -34,5 +38,35 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& pa
 }
 
 MappedFile::~MappedFile() { munmap(const_cast<std::byte*>(data_), size_); }
+
+Result<std::string_view> FolderCompanions::read(const std::string& named) {
+  auto& file = files_[named];
+  if (!file) {
+    auto opened = MappedFile::open((folder_ / named).string());
+    if (!opened) return opened.error();
+    file = std::move(*opened);
+  }
+  return file->text();
+}
+
+uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress) {
+  constexpr size_t kStep = 64 << 20;
+  XXH3_state_t* state = XXH3_createState();
+  XXH3_64bits_reset(state);
+  for (size_t n = 0; n < paths.size(); ++n) {
+    const auto file = MappedFile::open(paths[n]);
+    if (!file) continue;
+    const auto bytes = (*file)->bytes();
+    for (size_t at = 0; at < bytes.size(); at += kStep) {
+      const double of_file = static_cast<double>(at) / static_cast<double>(bytes.size());
+      progress(kIdentifying, (static_cast<double>(n) + of_file) / static_cast<double>(paths.size()));
+      XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
+    }
+  }
+  const uint64_t hash = XXH3_64bits_digest(state);
+  XXH3_freeState(state);
+  progress(kIdentifying, 1.0);
+  return hash;
+}
 
 }  // namespace telesplat::data

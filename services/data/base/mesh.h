@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
@@ -12,6 +13,7 @@
 #include "common/geometry/box.h"
 #include "common/scene/arrays.h"
 #include "common/scene/placement.h"
+#include "services/data/base/progress.h"
 
 namespace telesplat::data {
 
@@ -61,5 +63,17 @@ void colour_faces(Mesh& mesh, std::span<const uint32_t> of_triangles);
 
 /// 8-bit channels -> 0x00RRGGBB.
 constexpr uint32_t pack_rgb(uint32_t r, uint32_t g, uint32_t b) { return r << 16 | g << 8 | b; }
+
+struct MeshSource {
+  uint64_t hash = 0;    ///< of the content of all files that it is read from
+  std::string variant;  ///< what else decides what the mesh is, as part of a file name; often empty
+  /// Reads it; what comes passed validate_mesh.
+  std::function<Result<Mesh>(const ReadProgress&)> read;
+  std::string array;  ///< what colours it, as scene::choose_array() takes it; part of the variant; empty: nothing
+};
+
+/// The hash of the files' contents, in this order. Files that cannot be read are left out: reading them says why. Calls
+/// progress with stage kIdentifying.
+uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress);
 
 }  // namespace telesplat::data

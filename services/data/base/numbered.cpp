@@ -66,12 +66,14 @@ Error not_one_series(const std::vector<std::string>& paths, const std::string& f
 
 }  // namespace
 
-Result<std::vector<std::string>> files_of_folder(const std::string& folder) {
+Result<std::vector<std::string>> files_of_folder(const std::string& folder, int levels) {
   std::vector<std::string> paths;
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code unreadable;
+    if (entry->is_directory(unreadable) && entry.depth() + 1 >= levels) entry.disable_recursion_pending();
     const std::string path = entry->path().string();
-    if (entry->is_regular_file(error) && !file_name(path).starts_with('.')) paths.push_back(path);
+    if (entry->is_regular_file(unreadable) && !file_name(path).starts_with('.')) paths.push_back(path);
     if (paths.size() > kMostFiles) return Error{fmt::format("{}: holds more than {} files", folder, kMostFiles)};
   }
   if (error) return Error{fmt::format("{}: cannot be read: {}", folder, error.message())};

@@ -8,8 +8,9 @@
 
 namespace telesplat::data {
 
-/// Regular files of a folder that are not hidden, by name. Error: it cannot be read, or has more than 100,000.
-Result<std::vector<std::string>> files_of_folder(const std::string& folder);
+/// Regular files of a folder that are not hidden, by name; of `levels` of folders. Error: it cannot be read, or has
+/// more than 100,000.
+Result<std::vector<std::string>> files_of_folder(const std::string& folder, int levels = 1);
 
 /// The one numbered series that `paths` are, in order of the number in which their names differ; a lone file is one,
 /// too. Error, naming the folder: they are none; two have the same number.

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <string>
@@ -10,12 +9,26 @@
 
 #include "common/geometry/box.h"
 #include "common/scene/placement.h"
+#include "services/data/base/stored_type.h"
 
 namespace telesplat::data {
 
-enum class VoxelType { kU8, kI8, kU16, kI16, kF32 };
-size_t voxel_bytes(VoxelType type);
-const char* name_of(VoxelType type);  ///< "u8", "i8", "u16", "i16", "f32"
+struct VolumeLayout {
+  std::string raw;      ///< --raw: "256x256x256:u8[:sx,sy,sz][:skip=bytes]"; empty: files tell themselves
+  std::string series;   ///< --series: which of a DICOM folder's; empty: the one of most slices
+  std::string spacing;  ///< --spacing: "x,y,z" of voxels; empty: the files'
+  std::string array;    ///< --array: which of a file that names them; empty: the one that it marks, else the first
+
+  /// All in one, for names of stores; empty: nothing is said.
+  std::string text() const {
+    const std::string out = raw + "\n" + series + "\n" + spacing + "\n" + array;
+    return out == "\n\n\n" ? "" : out;
+  }
+};
+
+/// One of kU8, kI8, kU16, kI16 and kF32; readers make f32 of the others.
+using VoxelType = StoredType;
+inline size_t voxel_bytes(VoxelType type) { return stored_bytes(type); }
 
 struct Volume {
   std::array<int, 3> size{};

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "services/data/gltf/container.h"
-#include "services/data/gltf/meshopt.h"
+#include "services/data/gltf/packed.h"
 
 namespace telesplat::data::gltf {
 namespace {

@@ -2,8 +2,6 @@
 // Specification", sections 3.6 and 5.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cstddef>
 #include <map>
@@ -15,21 +13,14 @@
 #include <string_view>
 #include <vector>
 
-#include "services/data/base/companions.h"
+#include "services/data/base/mapped_file.h"
+#include "services/data/base/refusal.h"
 
 namespace telesplat::data::gltf {
 
 using Json = nlohmann::json;
 using Bytes = std::span<const std::byte>;
-
-/// Why a file is not read. Thrown in this folder alone; read_gltf() makes an Error of it.
-struct Refusal {
-  std::string text;  ///< without the file's name
-};
-template <class... Given>
-[[noreturn]] void refuse(fmt::format_string<Given...> format, Given&&... given) {
-  throw Refusal{fmt::format(format, std::forward<Given>(given)...)};
-}
+// Refusals in this folder do not name the file: read_gltf() does.
 
 // Members of JSON values, which may be of any type: what is absent or of another type is null, nothing, empty.
 const Json& member(const Json& of, const char* key);

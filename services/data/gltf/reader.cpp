@@ -7,9 +7,7 @@
 #include <unordered_map>
 
 #include "common/image/srgb.h"
-#include "services/data/gltf/materials.h"
-#include "services/data/gltf/primitive.h"
-#include "services/data/gltf/scene.h"
+#include "services/data/gltf/parts.h"
 
 namespace telesplat::data {
 namespace gltf {
@@ -246,7 +244,7 @@ Result<Mesh> read_gltf(std::string_view content, const std::string& name, Compan
                        uint64_t texture_detail) {
   try {
     return gltf::Reader(content, name, companions).read(texture_detail);
-  } catch (const gltf::Refusal& refusal) {
+  } catch (const Refusal& refusal) {
     return Error{fmt::format("{}: {}", name, refusal.text)};
   } catch (const nlohmann::json::exception& wrong) {
     return Error{fmt::format("{}: its glTF JSON is damaged: {}", name, wrong.what())};

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "services/data/base/companions.h"
+#include "services/data/base/mapped_file.h"
 #include "services/data/base/mesh.h"
 
 namespace telesplat::data {

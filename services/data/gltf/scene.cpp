@@ -1,4 +1,4 @@
-#include "services/data/gltf/scene.h"
+#include "services/data/gltf/parts.h"
 
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>

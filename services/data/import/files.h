@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "services/data/base/companions.h"
 #include "services/data/base/mapped_file.h"
 
 namespace telesplat::data {

@@ -1,19 +1,18 @@
 // Elevation rasters, read by GDAL: heights, where they lie on earth, and a texture draped over them.
 #include <fmt/format.h>
-#include <gdal.h>
 #include <ogr_srs_api.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include "common/core/utf8.h"
 #include "common/core/within.h"
+#include "services/data/base/refusal.h"
 #include "services/data/import/gdal.h"
-#include "services/data/import/gdal_files.h"
-#include "services/data/import/raster_facts.h"
 
 namespace telesplat::data {
 namespace {
@@ -73,30 +72,29 @@ struct HeightUnit {
 std::optional<double> metres_of(std::string name) {
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937;
-  constexpr std::pair<const char*, double> kUnits[] = {{"m", 1},
+  static const std::map<std::string, double> kUnits = {{"m", 1},
                                                        {"metre", 1},
                                                        {"metres", 1},
                                                        {"meter", 1},
                                                        {"meters", 1},
+                                                       {"mm", 0.001},
+                                                       {"cm", 0.01},
+                                                       {"centimetre", 0.01},
+                                                       {"dm", 0.1},
+                                                       {"decimetre", 0.1},
+                                                       {"km", 1000},
+                                                       {"kilometre", 1000},
                                                        {"ft", kFoot},
                                                        {"foot", kFoot},
                                                        {"feet", kFoot},
                                                        {"international foot", kFoot},
-                                                       {"cm", 0.01},
                                                        {"us survey foot", kSurveyFoot},
                                                        {"us_survey_foot", kSurveyFoot},
-                                                       {"mm", 0.001},
                                                        {"us-ft", kSurveyFoot},
                                                        {"ftus", kSurveyFoot},
-                                                       {"km", 1000},
-                                                       {"foot_us", kSurveyFoot},
-                                                       {"decimetre", 0.1},
-                                                       {"dm", 0.1},
-                                                       {"centimetre", 0.01},
-                                                       {"kilometre", 1000}};
-  for (const auto& [unit, metres] : kUnits)
-    if (name == unit) return metres;
-  return std::nullopt;
+                                                       {"foot_us", kSurveyFoot}};
+  const auto found = kUnits.find(name);
+  return found == kUnits.end() ? std::nullopt : std::optional(found->second);
 }
 
 // The band's own unit first, then that of a vertical reference system, then the plan's: surveys in feet have heights in
@@ -140,30 +138,29 @@ scene::Coordinates coordinates_of(GDALDatasetH dataset, const HeightUnit& height
 
 // The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the
 // raster.
-Status drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
+void drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
   auto opened = open_with_gdal(gdal_place_of(path), path, "an image", kPictureDrivers);
-  if (!opened) return opened.error();
-  const GDALDatasetH image = opened->get();
+  const GDALDatasetH image = opened.get();
   const int bands = GDALGetRasterCount(image), w = GDALGetRasterXSize(image), h = GDALGetRasterYSize(image);
   if (bands < 1 || w < 1 || h < 1 || w > kMaxSide || h > kMaxSide)
-    return Error{fmt::format("{}: {} bands of {} x {} pixels, limit {}", path, bands, w, h, kMaxSide)};
+    refuse("{}: {} bands of {} x {} pixels, limit {}", path, bands, w, h, kMaxSide);
   // No finer than the raster can show: at most twice its samples on each axis.
   const int tw = std::min(w, 2 * raster.width), th = std::min(h, 2 * raster.height);
   std::vector<uint8_t> texels(size_t(3) * size_t(tw) * size_t(th));
   for (int c = 0; c < 3; ++c) {
     const GDALRasterBandH band = GDALGetRasterBand(image, std::min(c, bands - 1) + 1);
     if (GDALGetRasterDataType(band) != GDT_Byte)
-      return Error{fmt::format("{}: has {} channels, only 8-bit ones can be draped", path,
-                               GDALGetDataTypeName(GDALGetRasterDataType(band)))};
+      refuse("{}: has {} channels, only 8-bit ones can be draped", path,
+             GDALGetDataTypeName(GDALGetRasterDataType(band)));
     if (GDALRasterIO(band, GF_Read, 0, 0, w, h, texels.data() + c, tw, th, GDT_Byte, 3, 3 * tw) != CE_None)
-      return Error{fmt::format("{}: cannot be read: {}", path, gdal_complaint())};
+      refuse("{}: cannot be read: {}", path, gdal_complaint());
   }
   const Placement of = placement_of(image);
   const bool by_place = of.georeferenced && at.georeferenced && of.degrees == at.degrees;
   const bool upside_down = (of.transform[5] > 0) != (at.transform[5] > 0);
   double inverse[6];
   if (by_place && !GDALInvGeoTransform(const_cast<double*>(of.transform), inverse))
-    return Error{fmt::format("{}: its place has no inverse", path)};
+    refuse("{}: its place has no inverse", path);
   raster.colours.resize(raster.heights.size());
   for (int y = 0; y < raster.height; ++y)
     for (int x = 0; x < raster.width; ++x) {
@@ -181,28 +178,25 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
       raster.colours[size_t(y) * size_t(raster.width) + size_t(x)] =
           inside ? pack_rgb(texel[0], texel[1], texel[2]) : kNeutralAlbedo;
     }
-  return ok_status();
 }
 
 // What is no elevation.
-Status refuse_picture(GDALDatasetH dataset, const std::string& path) {
+void refuse_picture(GDALDatasetH dataset, const std::string& path) {
   if (const int bands = GDALGetRasterCount(dataset); bands != 1)
-    return Error{fmt::format("{}: has {} bands: a picture, not an elevation raster, which has one", path, bands)};
+    refuse("{}: has {} bands: a picture, not an elevation raster, which has one", path, bands);
   const GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
-  if (GDALDataTypeIsComplex(GDALGetRasterDataType(band)))
-    return Error{fmt::format("{}: has complex samples, not heights", path)};
-  if (GDALGetRasterDataType(band) != GDT_Byte) return ok_status();
-  if (GDALGetRasterColorTable(band))
-    return Error{fmt::format("{}: has a palette: a picture, not an elevation raster", path)};
-  if (placement_of(dataset).georeferenced) return ok_status();
-  return Error{
-      fmt::format("{}: has samples of 8 bits and no place on earth: a picture, not an elevation raster; "
-                  "--texture drapes it over one",
-                  path)};
+  if (GDALDataTypeIsComplex(GDALGetRasterDataType(band))) refuse("{}: has complex samples, not heights", path);
+  if (GDALGetRasterDataType(band) != GDT_Byte) return;
+  if (GDALGetRasterColorTable(band)) refuse("{}: has a palette: a picture, not an elevation raster", path);
+  if (placement_of(dataset).georeferenced) return;
+  refuse(
+      "{}: has samples of 8 bits and no place on earth: a picture, not an elevation raster; "
+      "--texture drapes it over one",
+      path);
 }
 
 // Every step-th sample of every step-th row, in metres.
-Status read_heights(GDALRasterBandH band, const std::string& path, double metres, ElevationRaster& out) {
+void read_heights(GDALRasterBandH band, const std::string& path, double metres, ElevationRaster& out) {
   const int w = GDALGetRasterBandXSize(band), h = GDALGetRasterBandYSize(band);
   int has_none = 0, has_scale = 0, has_offset = 0;
   const double none = GDALGetRasterNoDataValue(band, &has_none);
@@ -216,7 +210,7 @@ Status read_heights(GDALRasterBandH band, const std::string& path, double metres
   for (int y = 0; y < out.height; ++y) {
     if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None ||
         (masked && GDALRasterIO(mask, GF_Read, 0, y * out.step, w, 1, shown.data(), w, 1, GDT_Byte, 0, 0) != CE_None))
-      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, gdal_complaint())};
+      refuse("{}: row {} of {} cannot be read: {}", path, y * out.step, h, gdal_complaint());
     for (int x = 0; x < out.width; ++x) {
       double v = row[size_t(x) * size_t(out.step)];
       // -32768 and -9999 are what void samples usually have, said or not.
@@ -227,20 +221,17 @@ Status read_heights(GDALRasterBandH band, const std::string& path, double metres
       out.heights.push_back(no_data ? std::numeric_limits<float>::quiet_NaN() : float(v * metres));
     }
   }
-  return ok_status();
 }
 
-}  // namespace
-
-Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture) {
-  if (const Status s = prepare_gdal(files); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
+ElevationRaster elevation_of(ImportFiles& files, const std::string& path, const std::string& texture) {
+  if (files.all().empty()) refuse("{}: no file arrived", path);
+  prepare_gdal(files);
   auto opened = open_with_gdal(gdal_place_of(path), path, "an elevation raster", kElevationDrivers);
-  if (!opened) return opened.error();
-  const GDALDatasetH dataset = opened->get();
+  const GDALDatasetH dataset = opened.get();
   const int w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
-  if (const Status s = refuse_picture(dataset, path); !s) return s.error();
+  refuse_picture(dataset, path);
   if (w < 2 || h < 2 || w > kMaxSide || h > kMaxSide)
-    return Error{fmt::format("{}: a raster of {} x {} samples, limits 2 and {}", path, w, h, kMaxSide)};
+    refuse("{}: a raster of {} x {} samples, limits 2 and {}", path, w, h, kMaxSide);
   const GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
   const Placement at = placement_of(dataset);
   const HeightUnit unit = height_unit(dataset, band, at);
@@ -249,7 +240,7 @@ Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& pa
   while (int64_t{(w + out.step - 1) / out.step} * ((h + out.step - 1) / out.step) > kMaxRasterSamples) ++out.step;
   out.width = (w + out.step - 1) / out.step;
   out.height = (h + out.step - 1) / out.step;
-  if (const Status s = read_heights(band, path, unit.metres, out); !s) return s.error();
+  read_heights(band, path, unit.metres, out);
   glm::dvec2 metres(at.metres);  // a unit of x and y
   if (at.degrees) {
     const double latitude = at.at(w / 2.0, h / 2.0).y * kPi / 180;
@@ -268,27 +259,24 @@ Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& pa
   if (!unit.from.empty() && unit.name != "m")
     out.notes.push_back(
         fmt::format("{}: heights are in {} ({}), {:.6g} m each", path, unit.name, unit.from, unit.metres));
-  if (!texture.empty())
-    if (const Status s = drape(texture, at, w, h, out); !s) return s.error();
+  if (!texture.empty()) drape(texture, at, w, h, out);
   return out;
 }
 
-Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& path) {
-  const auto raster = read_elevation(files, path, "");
-  if (!raster) return raster.error();
+RasterFacts facts_of(ImportFiles& files, const std::string& path) {
+  const ElevationRaster raster = elevation_of(files, path, "");
   auto opened = open_with_gdal(gdal_place_of(path), path, "an elevation raster", kElevationDrivers);
-  if (!opened) return opened.error();
-  const GDALDatasetH dataset = opened->get();
+  const GDALDatasetH dataset = opened.get();
   RasterFacts out;
   out.format = GDALGetDriverLongName(GDALGetDatasetDriver(dataset));
   out.type = GDALGetDataTypeName(GDALGetRasterDataType(GDALGetRasterBand(dataset, 1)));
   out.width = GDALGetRasterXSize(dataset), out.height = GDALGetRasterYSize(dataset);
-  out.step = raster->step;
+  out.step = raster.step;
   const Placement at = placement_of(dataset);
-  out.reference = raster->coordinates.reference;
+  out.reference = raster.coordinates.reference;
   out.unit = at.unit.empty() && at.georeferenced ? "units" : at.unit;
-  out.height_unit = raster->coordinates.height_unit;
-  out.height_m = raster->coordinates.lengths.z;
+  out.height_unit = raster.coordinates.height_unit;
+  out.height_m = raster.coordinates.lengths.z;
   glm::dvec2 lo(HUGE_VAL), hi(-HUGE_VAL);
   for (const int corner : {0, 1, 2, 3}) {
     const glm::dvec2 p = at.at(corner % 2 * out.width, corner / 2 * out.height);
@@ -296,16 +284,26 @@ Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& pat
   }
   out.west = lo.x, out.south = lo.y, out.east = hi.x, out.north = hi.y;
   out.sample_x = glm::length(at.at(1, 0) - at.at(0, 0)), out.sample_y = glm::length(at.at(0, 1) - at.at(0, 0));
-  out.sample_x_m = glm::length(raster->along_row) / raster->step;
-  out.sample_y_m = glm::length(raster->along_column) / raster->step;
+  out.sample_x_m = glm::length(raster.along_row) / raster.step;
+  out.sample_y_m = glm::length(raster.along_column) / raster.step;
   out.lo = HUGE_VAL, out.hi = -HUGE_VAL;
-  for (const float z : raster->heights)
+  for (const float z : raster.heights)
     if (std::isfinite(z))
       out.lo = std::min(out.lo, double(z)), out.hi = std::max(out.hi, double(z));
     else
       ++out.without_data;
-  if (out.lo > out.hi) return Error{fmt::format("{}: none of its samples has data", path)};
+  if (out.lo > out.hi) refuse("{}: none of its samples has data", path);
   return out;
+}
+
+}  // namespace
+
+Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture) {
+  return or_error([&] { return elevation_of(files, path, texture); });
+}
+
+Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& path) {
+  return or_error([&] { return facts_of(files, path); });
 }
 
 }  // namespace telesplat::data

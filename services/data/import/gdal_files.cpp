@@ -1,4 +1,4 @@
-#include "services/data/import/gdal_files.h"
+#include "services/data/import/gdal.h"
 
 #include <cpl_error.h>
 #include <cpl_vsi.h>
@@ -7,14 +7,59 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "services/data/base/refusal.h"
+#include "services/data/volume/formats/stack.h"
+
 namespace telesplat::data {
+namespace {
+
+GDALDataType type_of(StoredType type) {
+  // GDAL 3.6 tells signed bytes by a remark alone; their bits are the same.
+  constexpr GDALDataType kTypes[] = {GDT_Byte,  GDT_Byte,    GDT_UInt16,  GDT_Int16,   GDT_UInt32,
+                                     GDT_Int32, GDT_Float64, GDT_Float64, GDT_Float32, GDT_Float64};
+  return kTypes[size_t(type)];
+}
+
+std::vector<std::byte> stack_of(ImportFiles& files, const VolumeFileHeader& header, const ReadProgress& progress) {
+  prepare_gdal(files);
+  const int w = int(header.size[0]), h = int(header.size[1]);
+  const size_t page_bytes = size_t(w) * size_t(h) * stored_bytes(header.stored);
+  std::vector<std::byte> out;
+  out.reserve(header.voxel_bytes());
+  for (const ImportFile& file : files.all()) {
+    const auto content = need(files.content_of(file));
+    const auto pages = tiff_pages(content);
+    int64_t left = pages ? pages->pages : 1;
+    for (int page = 1; left > 0; ++page) {
+      const std::string place = gdal_place_of(file.path());
+      const auto picture = (open_with_gdal(pages ? fmt::format("GTIFF_DIR:{}:{}", page, place) : place, file.path(),
+                                           "a slice", kPictureDrivers));
+      if (GDALGetRasterXSize(picture.get()) != w || GDALGetRasterYSize(picture.get()) != h) {
+        if (pages) continue;  // a reduced copy
+        refuse("{}: is of another size than its header says", file.path());
+      }
+      if (out.size() + page_bytes > header.voxel_bytes())
+        refuse("{}: holds more pages than its header says", file.path());
+      out.resize(out.size() + page_bytes);
+      if (GDALRasterIO(GDALGetRasterBand(picture.get(), 1), GF_Read, 0, 0, w, h, out.data() + out.size() - page_bytes,
+                       w, h, type_of(header.stored), 0, 0) != CE_None)
+        refuse("{}: page {} cannot be read: {}", file.path(), page, gdal_complaint());
+      --left;
+      progress(double(out.size()) / double(header.voxel_bytes()));
+    }
+  }
+  if (out.size() != header.voxel_bytes()) throw Refusal{"fewer pages than their headers say"};
+  return out;
+}
+
+}  // namespace
 
 std::string gdal_place_of(const std::string& path) {
   return "/vsimem/" + std::filesystem::absolute(path).lexically_normal().relative_path().string();
 }
 
 // Other drivers go, so that no file of a VRT is read by one of them.
-Status prepare_gdal(ImportFiles& files) {
+void prepare_gdal(ImportFiles& files) {
   CPLSetErrorHandler(CPLQuietErrorHandler);
   GDALAllRegister();
   const auto listed = [](const char* name, const char* const* drivers) {
@@ -35,7 +80,6 @@ Status prepare_gdal(ImportFiles& files) {
     if (VSILFILE* memory = VSIFileFromMemBuffer(gdal_place_of(file.path()).c_str(), bytes, content->size(), FALSE))
       VSIFCloseL(memory);
   }
-  return files.all().empty() ? Status(Error{"no file arrived"}) : ok_status();
 }
 
 // What GDAL complained of last, in one line that names files as they are.
@@ -46,11 +90,16 @@ std::string gdal_complaint() {
   return why.empty() ? "GDAL does not know it" : why;
 }
 
-Result<Dataset> open_with_gdal(const std::string& place, const std::string& path, const char* what,
-                               const char* const* drivers) {
+Dataset open_with_gdal(const std::string& place, const std::string& path, const char* what,
+                       const char* const* drivers) {
   Dataset dataset(GDALOpenEx(place.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers, nullptr, nullptr));
-  if (dataset) return dataset;
-  return Error{fmt::format("{}: cannot be read as {}: {}", path, what, gdal_complaint())};
+  if (!dataset) refuse("{}: cannot be read as {}: {}", path, what, gdal_complaint());
+  return dataset;
+}
+
+Result<std::vector<std::byte>> read_stack(ImportFiles& files, const VolumeFileHeader& header,
+                                          const ReadProgress& progress) {
+  return or_error([&] { return stack_of(files, header, progress); });
 }
 
 }  // namespace telesplat::data

@@ -19,12 +19,10 @@
 #include "services/data/import/files.h"
 #include "services/data/import/gdal.h"
 #include "services/data/import/process.h"
-#include "services/data/import/raster_facts.h"
-#include "services/data/import/report.h"
-#include "services/data/import/stack.h"
 #include "services/data/mesh/formats/readers.h"
 #include "services/data/volume/formats/import_stream.h"
 
+namespace telesplat::data {
 namespace {
 
 // A hostile file must not keep us busy without end.
@@ -37,63 +35,61 @@ uint64_t memory_with(uint64_t more) {
   return pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + more;
 }
 
-telesplat::Result<telesplat::data::Mesh> import_elevation(telesplat::data::ImportFiles& files, const std::string& path,
-                                                          double z_scale, const std::string& texture) {
-  const auto raster = telesplat::data::read_elevation(files, path, texture);
+Result<Mesh> import_elevation(ImportFiles& files, const std::string& path, double z_scale, const std::string& texture) {
+  const auto raster = read_elevation(files, path, texture);
   if (!raster) return raster.error();
-  return telesplat::data::elevation_mesh(*raster, {z_scale, texture}, path);
+  return elevation_mesh(*raster, {z_scale, texture}, path);
 }
 
-telesplat::Result<telesplat::data::Mesh> import_mesh(telesplat::data::ImportFiles& files, const std::string& format,
-                                                     const std::string& path, uint64_t texture_detail,
-                                                     const std::string& array) {
+Result<Mesh> import_mesh(ImportFiles& files, const std::string& format, const std::string& path,
+                         uint64_t texture_detail, const std::string& array) {
   const auto content = files.content();
-  if (!content) return telesplat::Error{fmt::format("{}: {}", path, content.error().text)};
-  if (format == "obj") return telesplat::data::read_obj(*content, path, nullptr, files, texture_detail);
-  if (format == "ply") return telesplat::data::read_ply(*content, path, nullptr, files, array, texture_detail);
-  if (format == "gltf") return telesplat::data::read_gltf(*content, path, files, texture_detail);
-  return telesplat::Error{fmt::format("{}: {} is no format that is read here", path, format)};
+  if (!content) return Error{fmt::format("{}: {}", path, content.error().text)};
+  if (format == "obj") return read_obj(*content, path, nullptr, files, texture_detail);
+  if (format == "ply") return read_ply(*content, path, nullptr, files, array, texture_detail);
+  if (format == "gltf") return read_gltf(*content, path, files, texture_detail);
+  return Error{fmt::format("{}: {} is no format that is read here", path, format)};
 }
 
 // All frames of all files, one after the other, as one volume. bytes: of their pixels.
-bool import_dicom(int out, const telesplat::data::ImportFiles& files, uint64_t bytes) {
-  namespace data = telesplat::data;
+bool import_dicom(int out, const ImportFiles& files, uint64_t bytes) {
   limit_time(bytes / 4);
-  data::confine(memory_with(3 * bytes + 16 * files.bytes()));
-  data::VolumeFileHeader header;
+  confine(memory_with(3 * bytes + 16 * files.bytes()));
+  VolumeFileHeader header;
   std::vector<char> pixels;
-  for (const data::ImportFile& file : files.all()) {
+  for (const ImportFile& file : files.all()) {
     const auto mapped = file.map();
-    if (!mapped) return data::send_error(out, mapped.error().text);
-    const auto frames = data::decode_dicom((*mapped)->text(), file.path());
-    if (!frames) return data::send_error(out, frames.error().text);
-    const auto stored = frames->bytes == 1   ? data::StoredType::kU8
-                        : frames->bytes == 2 ? data::StoredType::kU16
-                                             : data::StoredType::kU32;
+    if (!mapped) return send_error(out, mapped.error().text);
+    const auto frames = decode_dicom((*mapped)->text(), file.path());
+    if (!frames) return send_error(out, frames.error().text);
+    const auto stored = frames->bytes == 1 ? StoredType::kU8 : frames->bytes == 2 ? StoredType::kU16 : StoredType::kU32;
     const bool first = header.size[2] == 0;
     if (!first && (frames->columns != header.size[0] || frames->rows != header.size[1] || stored != header.stored))
-      return data::send_error(out, file.path() + ": GDCM finds pixels of another size than in the files before");
+      return send_error(out, file.path() + ": GDCM finds pixels of another size than in the files before");
     header.size = {frames->columns, frames->rows, header.size[2] + frames->frames};
     header.stored = stored;
     pixels.insert(pixels.end(), frames->pixels.begin(), frames->pixels.end());
   }
-  return pixels.size() == header.voxel_bytes() && data::send_volume(out, header, pixels.data());
+  return pixels.size() == header.voxel_bytes() && send_volume(out, header, pixels.data());
 }
 
-bool import_stack(int out, telesplat::data::ImportFiles& files, const std::string& path, const std::string& layout) {
-  namespace data = telesplat::data;
-  const auto header = data::parse_raw_spec(layout, path);
-  if (!header) return data::send_error(out, header.error().text);
+bool import_stack(int out, ImportFiles& files, const std::string& path, const std::string& layout) {
+  const auto header = parse_raw_spec(layout, path);
+  if (!header) return send_error(out, header.error().text);
   limit_time(header->voxel_bytes());
-  data::confine(memory_with(2 * header->voxel_bytes() + 2 * files.bytes()));
-  const auto voxels = data::read_stack(files, *header, [&](double f) { data::send_progress(out, f); });
-  if (!voxels) return data::send_error(out, voxels.error().text);
-  return data::send_volume(out, *header, voxels->data());
+  confine(memory_with(2 * header->voxel_bytes() + 2 * files.bytes()));
+  const auto voxels = read_stack(files, *header, [&](double f) { send_progress(out, f); });
+  if (!voxels) return send_error(out, voxels.error().text);
+  return send_volume(out, *header, voxels->data());
 }
 
 }  // namespace
 
+}  // namespace telesplat::data
+
 int main(int argc, char** argv) {
+  using namespace telesplat;
+  using namespace telesplat::data;
   if (argc < 3 || argc > 5) {
     std::fputs(
         "usage: telesplat-import gltf|obj|ply FILE TEXTURE_DETAIL [ARRAY]   (standard input: files.h; output: "
@@ -108,10 +104,9 @@ int main(int argc, char** argv) {
   const std::string format = argv[1], path = argv[2];
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
   // The libraries of this program take a second to load and more; the parent may have died meanwhile.
-  if (const char* parent = std::getenv(telesplat::data::kParentVariable); parent && std::atoi(parent) != getppid())
-    return 1;
-  telesplat::data::end_at_cut_off_files(telesplat::data::kCutOffExit);
-  telesplat::data::ImportFiles files(STDIN_FILENO);
+  if (const char* parent = std::getenv(kParentVariable); parent && std::atoi(parent) != getppid()) return 1;
+  end_at_cut_off_files(kCutOffExit);
+  ImportFiles files(STDIN_FILENO);
   const uint64_t file_bytes = files.bytes();
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what libraries print must not get between
@@ -123,18 +118,17 @@ int main(int argc, char** argv) {
     const uint64_t texture_detail = !raster && argc > 3 ? std::strtoull(argv[3], nullptr, 10) : 0;
     // Pictures hold many texels a byte; baked triangles are divided into a copy.
     const uint64_t pictures = raster ? 0 : (uint64_t{3} << 30) + 300 * texture_detail;
-    telesplat::data::confine(memory_with(100 * file_bytes + pictures));
+    confine(memory_with(100 * file_bytes + pictures));
     if (format == "raster-facts") {
-      const auto facts = telesplat::data::read_raster_facts(files, path);
-      return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
+      const auto facts = read_raster_facts(files, path);
+      return write_import_report(out, facts ? Result(to_notes(*facts)) : facts.error()) ? 0 : 1;
     }
     const auto mesh = raster && argc == 5 ? import_elevation(files, path, std::atof(argv[3]), argv[4])
                                           : import_mesh(files, format, path, texture_detail, argc == 5 ? argv[4] : "");
-    return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
+    return write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
-    const telesplat::Error error{
-        fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};
-    return telesplat::data::write_import_report(out, error) ? 0 : 1;
+    const Error error{fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};
+    return write_import_report(out, error) ? 0 : 1;
   } catch (...) {
     return 1;
   }

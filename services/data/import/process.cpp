@@ -13,10 +13,10 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/core/descriptor.h"
 #include "common/core/log.h"
 #include "services/data/import/confine.h"
 #include "services/data/import/files.h"
-#include "services/data/import/report.h"
 
 extern char** environ;
 
@@ -39,8 +39,7 @@ std::vector<std::string> surroundings() {
   return out;
 }
 
-}  // namespace
-
+// Starts the program, which writes into `output`, and sends it the files (files.h).
 Result<pid_t> start_import(std::vector<std::string> words, const std::vector<std::string>& files, int output) {
   const std::string format = words[0], path = words[1];
   static const bool told = [] {
@@ -76,6 +75,7 @@ Result<pid_t> start_import(std::vector<std::string> words, const std::vector<std
   return child;
 }
 
+// Waits for its end. Error: it crashed, did not end, gave up, is missing.
 Status end_import(pid_t child, const std::string& reader, const std::string& format, const std::string& path) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
@@ -90,18 +90,36 @@ Status end_import(pid_t child, const std::string& reader, const std::string& for
   return ok_status();
 }
 
+}  // namespace
+
 Result<Mesh> import(const std::string& reader, std::vector<std::string> words, const std::vector<std::string>& files) {
   const std::string format = words[0], path = words[1];
-  const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
-  if (output < 0) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
-  auto result = [&]() -> Result<Mesh> {
-    const auto child = start_import(std::move(words), files, output);
-    if (!child) return child.error();
-    if (auto status = end_import(*child, reader, format, path); !status) return status.error();
-    return read_import_report(output, path, format);
-  }();
-  close(output);
-  return result;
+  const Descriptor output(memfd_create("telesplat-import", MFD_CLOEXEC));
+  if (!output.valid()) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
+  const auto child = start_import(std::move(words), files, output.get());
+  if (!child) return child.error();
+  if (const Status ended = end_import(*child, reader, format, path); !ended) return ended.error();
+  return read_import_report(output.get(), path, format);
+}
+
+Result<StreamedVolume> import_volume(const std::string& reader, std::vector<std::string> words,
+                                     const std::vector<std::string>& files, uint64_t most_bytes,
+                                     const ReadProgress& progress) {
+  const std::string format = words[0], path = words[1];
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    return Error{fmt::format("{}: no pipe for reading it: {}", path, std::strerror(errno))};
+  Descriptor from(ends[0]), into(ends[1]);
+  fcntl(into.get(), F_SETPIPE_SZ, 1 << 20);  // fewer turns between the two processes; smaller ones do as well
+  const auto child = start_import(std::move(words), files, into.get());
+  if (!child) return child.error();
+  into.close();
+  auto received = receive_volume(from.get(), most_bytes, path, progress);
+  from.close();  // if it still writes, that ends it
+  const auto ended = end_import(*child, reader, format, path);
+  if (received) return std::move(*received);  // what it said itself is better than how it ended
+  if (!ended) return ended.error();
+  return Error{fmt::format("{}: what {} gave of it is incomplete", path, kImportProgram)};
 }
 
 }  // namespace telesplat::data

@@ -1,12 +1,11 @@
 // Running the program telesplat-import, which reads with other people's libraries what may crash them.
 #pragma once
 
-#include <sys/types.h>
-
 #include <string>
 #include <vector>
 
 #include "services/data/base/mesh.h"
+#include "services/data/volume/formats/import_stream.h"
 
 namespace telesplat::data {
 
@@ -18,10 +17,18 @@ inline constexpr int kCutOffExit = 3;
 /// the file itself first. Error: what it says; it crashed, did not end, is missing.
 Result<Mesh> import(const std::string& reader, std::vector<std::string> words, const std::vector<std::string>& files);
 
-/// The two halves of import(), for what comes back otherwise: starts the program, which writes into `output`, and sends
-/// it the files (files.h) ...
-Result<pid_t> start_import(std::vector<std::string> words, const std::vector<std::string>& files, int output);
-/// ... and waits for its end. Error: it crashed, did not end, gave up, is missing.
-Status end_import(pid_t child, const std::string& reader, const std::string& format, const std::string& path);
+/// The same for a volume, which it streams. most_bytes: of voxels; more are an error.
+Result<StreamedVolume> import_volume(const std::string& reader, std::vector<std::string> words,
+                                     const std::vector<std::string>& files, uint64_t most_bytes,
+                                     const ReadProgress& progress);
+
+inline constexpr const char* kImportProgram = "telesplat-import";
+inline constexpr const char* kParentVariable = "TELESPLAT_IMPORT_PARENT";  ///< its process, which waits for the report
+
+/// Writes result into the descriptor from its current position on. Returns false if that fails (errno tells).
+bool write_import_report(int descriptor, const Result<Mesh>& result);
+
+/// Reads what write_import_report wrote, trusting no count in it. Errors name `path`.
+Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format);
 
 }  // namespace telesplat::data

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "common/core/result.h"
+#include "services/data/base/mesh.h"
 
 namespace telesplat::data {
 
@@ -29,7 +29,7 @@ struct RasterFacts {
 /// file.
 Result<RasterFacts> inspect_raster(const std::vector<std::string>& files);
 
-/// That program's part.
-bool write_raster_facts(int descriptor, const Result<RasterFacts>& facts);
+/// That program's part: what it hands back has them as notes.
+Mesh to_notes(const RasterFacts& facts);
 
 }  // namespace telesplat::data

@@ -1,13 +1,13 @@
-#include "services/data/import/report.h"
-
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
+#include <sstream>
 
 #include "services/data/base/mapped_file.h"
+#include "services/data/import/process.h"
+#include "services/data/import/raster_facts.h"
+#include "services/data/volume/formats/import_stream.h"
 
 namespace telesplat::data {
 namespace {
@@ -28,24 +28,21 @@ struct Report {
   uint64_t smooth = 0;             // Mesh::smooth
 };
 
-bool write_all(int descriptor, const void* data, size_t bytes) {
-  const char* p = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t n = write(descriptor, p, std::min(bytes, size_t{1} << 30));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    p += n, bytes -= static_cast<size_t>(n);
-  }
+template <class Array>
+bool take(std::span<const std::byte>& bytes, uint64_t count, Array& out) {
+  constexpr size_t kEach = sizeof(typename Array::value_type);
+  if (count > bytes.size() / kEach) return false;
+  out.resize(count);
+  if (count > 0) std::memcpy(out.data(), bytes.data(), count * kEach);
+  bytes = bytes.subspan(count * kEach);
   return true;
 }
 
-template <class T>
-bool take(std::span<const std::byte>& bytes, uint64_t count, std::vector<T>& out) {
-  if (count > bytes.size() / sizeof(T)) return false;
-  out.resize(count);
-  if (count > 0) std::memcpy(out.data(), bytes.data(), count * sizeof(T));
-  bytes = bytes.subspan(count * sizeof(T));
-  return true;
+// One line: what a file says of itself may hold anything.
+std::string line_of(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = ' ';
+  return text.substr(0, 300);
 }
 
 }  // namespace
@@ -105,26 +102,44 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
       });
   mesh.scalars_of_faces = report.of_faces != 0;
   mesh.smooth = report.smooth != 0;
-  std::vector<char> text;
-  if (!whole || report.arrays_bytes > scene::kMaxArraysText || !take(rest, report.arrays_bytes, text))
+  std::string arrays_text, notes, coordinates_text;
+  if (!whole || report.arrays_bytes > scene::kMaxArraysText || report.coordinates_bytes > kMaxCoordinates ||
+      !take(rest, report.arrays_bytes, arrays_text) || !take(rest, report.notes_bytes, notes) ||
+      !take(rest, report.coordinates_bytes, coordinates_text))
     return incomplete;
-  auto arrays = scene::arrays_from_text({text.data(), text.size()});
+  auto arrays = scene::arrays_from_text(arrays_text);
   if (!arrays) return Error{fmt::format("{}: {}", path, arrays.error().text)};
   mesh.arrays = *std::move(arrays);
-  std::vector<char> notes;
-  if (!take(rest, report.notes_bytes, notes)) return incomplete;
-  for (auto begin = notes.begin(); begin != notes.end();) {
-    const auto end = std::find(begin, notes.end(), '\n');
-    mesh.notes.emplace_back(begin, end);
-    begin = end == notes.end() ? end : end + 1;
-  }
-  std::vector<char> coordinates;
-  if (report.coordinates_bytes > kMaxCoordinates || !take(rest, report.coordinates_bytes, coordinates))
-    return incomplete;
-  auto read = scene::coordinates_from_text({coordinates.data(), coordinates.size()});
-  if (!read) return Error{fmt::format("{}: {}", path, read.error().text)};
-  mesh.coordinates = *std::move(read);
+  std::istringstream lines(notes);
+  for (std::string note; std::getline(lines, note);) mesh.notes.push_back(note);
+  auto coordinates = scene::coordinates_from_text(coordinates_text);
+  if (!coordinates) return Error{fmt::format("{}: {}", path, coordinates.error().text)};
+  mesh.coordinates = *std::move(coordinates);
   return mesh;
+}
+
+Mesh to_notes(const RasterFacts& f) {
+  Mesh out;
+  for (const std::string& text : {f.format, f.type, f.reference, f.unit, f.height_unit})
+    out.notes.push_back(line_of(text));
+  out.notes.push_back(fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", f.width, f.height, f.step, f.west,
+                                  f.south, f.east, f.north, f.sample_x, f.sample_y, f.sample_x_m, f.sample_y_m, f.lo,
+                                  f.hi, f.height_m, f.without_data));
+  return out;
+}
+
+Result<RasterFacts> inspect_raster(const std::vector<std::string>& files) {
+  const std::string& path = files[0];
+  auto mesh = import("GDAL's raster", {"raster-facts", path}, files);
+  if (!mesh) return mesh.error();
+  auto& notes = mesh->notes;
+  RasterFacts f;
+  std::istringstream in(notes.size() == 6 ? notes[5] : "");
+  in >> f.width >> f.height >> f.step >> f.west >> f.south >> f.east >> f.north >> f.sample_x >> f.sample_y >>
+      f.sample_x_m >> f.sample_y_m >> f.lo >> f.hi >> f.height_m >> f.without_data;
+  if (!in) return Error{fmt::format("{}: what {} left of it is incomplete", path, kImportProgram)};
+  f.format = notes[0], f.type = notes[1], f.reference = notes[2], f.unit = notes[3], f.height_unit = notes[4];
+  return f;
 }
 
 }  // namespace telesplat::data

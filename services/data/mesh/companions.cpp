@@ -1,11 +1,13 @@
-// Which other files a mesh file pulls in.
+// What a mesh file says beside its mesh: which other files it pulls in, and the array that it marks.
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <pugixml.hpp>
 
+#include "services/data/base/mapped_file.h"
 #include "services/data/gltf/container.h"
 #include "services/data/mesh/formats/obj_materials.h"
-#include "services/data/mesh/formats/ply_header.h"
+#include "services/data/mesh/formats/ply.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/vtk/reader.h"
 
@@ -36,6 +38,31 @@ void take_sources(const pugi::xml_node& node, std::vector<std::string>& names) {
   }
 }
 
+constexpr size_t kMostName = 200;
+constexpr size_t kNoMark = std::string_view::npos;
+
+// What the readers take for colours of the mesh.
+bool names_colours(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  for (const char* colours : {"rgb", "rgba", "color", "colors", "colours", "color_0"})
+    if (name == colours) return true;
+  return false;
+}
+
+// "SCALARS NAME TYPE" below "POINT_DATA N" or "CELL_DATA N"; the first one is active.
+std::string active_of_legacy(std::string_view text) {
+  for (const char* part : {"\nPOINT_DATA ", "\nCELL_DATA "}) {
+    const size_t from = text.find(part);
+    if (from == kNoMark) continue;
+    const std::string_view other = part[1] == 'P' ? "\nCELL_DATA " : "\nPOINT_DATA ";
+    const size_t at = text.find("\nSCALARS ", from);
+    if (at == kNoMark || at > text.find(other, from)) continue;
+    const size_t begin = at + 9, end = text.find_first_of(" \n\r", begin);
+    if (end != kNoMark && end - begin <= kMostName) return std::string(text.substr(begin, end - begin));
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<std::string> vrt_sources(std::string_view content) {
@@ -59,7 +86,7 @@ std::vector<std::string> companion_files(std::string_view content, const std::st
         names.push_back(material.texture);
   }
   if (format == "ply")
-    if (auto header = parse_ply_header(content, path)) names = std::move(header->textures);
+    if (auto header = or_error([&] { return parse_ply_header(content, path); })) names = std::move(header->textures);
   if (format == "gltf") names = gltf_files(content);
   if (vtk::is_mesh_kind(format)) {
     FolderCompanions companions(path);
@@ -71,6 +98,18 @@ std::vector<std::string> companion_files(std::string_view content, const std::st
   }
   for (std::string& name : names) name = (std::filesystem::path(path).parent_path() / name).string();
   return names;
+}
+
+std::string active_array(std::string_view text) {
+  const std::string name = text.starts_with("# vtk DataFile") ? active_of_legacy(text) : vtk::active_scalars(text);
+  return names_colours(name) || name.size() > kMostName ? std::string() : name;
+}
+
+std::string active_array_of(const std::string& path) {
+  const auto file = MappedFile::open(path);
+  if (!file) return {};
+  const auto text = (*file)->text();
+  return has_arrays(detect_format(text, path).format) ? active_array(text) : std::string();
 }
 
 }  // namespace telesplat::data

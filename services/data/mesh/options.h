@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "services/data/base/elevation_options.h"
+#include "services/data/base/elevation.h"
 #include "services/data/base/placement_options.h"
-#include "services/data/base/volume_layout.h"
+#include "services/data/base/volume.h"
 #include "services/data/texture/bake.h"
 
 namespace telesplat::data {

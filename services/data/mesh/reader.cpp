@@ -152,15 +152,6 @@ Result<Mesh> read_vtk(std::string_view content, const std::string& path, const R
   return vtk::read_mesh(content, path, companions, array);
 }
 
-Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const ReadProgress& progress) {
-  const auto file = MappedFile::open(path);
-  if (!file) return file.error();
-  if (!has_arrays(detect_format((*file)->text(), path).format)) return std::vector<scene::ArrayInfo>{};
-  auto mesh = read_mesh(path, progress);
-  if (!mesh) return mesh.error();
-  return std::move(mesh->arrays);
-}
-
 Result<MeshFile> find_mesh_file(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_directory(path, error)) return MeshFile{path};

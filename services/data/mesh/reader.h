@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "services/data/base/companions.h"
 #include "services/data/base/elevation.h"
+#include "services/data/base/mapped_file.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
 #include "services/data/mesh/formats/readers.h"
@@ -38,9 +38,6 @@ struct MeshFile {
 };
 Result<MeshFile> find_mesh_file(const std::string& path);
 
-/// What arrays of numbers a mesh file holds, with the ranges of their values. It is read for that, but kept nowhere.
-/// Empty: of a format that has none, or a file without. Errors name the file.
-Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const ReadProgress& progress = {});
 /// Whether files of this format can hold arrays.
 bool has_arrays(std::string_view format);
 /// Error: an array is named, but files of this format have none.
@@ -70,5 +67,18 @@ Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, c
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);
 /// Returns the files that a VRT is made of, as it names them.
 std::vector<std::string> vrt_sources(std::string_view content);
+
+/// The mesh file or raster at `path`, with its companions (material libraries, buffers, the texture); hashes them.
+/// Error, naming the file: it cannot be opened, is of no known format; elevation options are given for what is no
+/// raster, or an array where the format has none. array: what the mesh is coloured by; empty: nothing. texture_detail:
+/// of OBJ and glTF, bake_textures().
+Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
+                               uint64_t texture_detail, const Progress& progress);
+
+/// Name of the active scalars of a VTP, VTU or legacy VTK file: of its points, else of its cells. Read from the file's
+/// words alone, not its arrays. Empty: it marks none, or what it marks are colours.
+std::string active_array(std::string_view text);
+/// The same of the file at `path`; empty also where it cannot be read or is of another format.
+std::string active_array_of(const std::string& path);
 
 }  // namespace telesplat::data

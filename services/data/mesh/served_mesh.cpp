@@ -3,8 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
 #include <filesystem>
+#include <future>
 #include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
@@ -13,11 +21,103 @@
 #include "common/volume/histogram.h"
 #include "services/data/base/epochs.h"
 #include "services/data/base/placement_options.h"
-#include "services/data/mesh/array_stores.h"
 #include "services/data/mesh/cast.h"
 
 namespace telesplat::data {
 namespace {
+
+// The stores of one mesh, each with another of its arrays in the chunks: those that are open, and the one that is being
+// opened in a thread of its own.
+class ArrayStores {
+ public:
+  using Open = decltype(ServedColours::open);
+
+  ArrayStores(std::shared_ptr<const MeshStore> first, const std::string& array, Open open);
+  /// Gives up what is being opened, and waits until it is.
+  ~ArrayStores();
+
+  /// Null: it is not open.
+  const MeshStore* find(const std::string& array) const;
+  /// Opens it as soon as nothing else is being opened; only the one wanted last waits.
+  void want(const std::string& array);
+  bool busy() const { return opening_.valid(); }
+
+  /// What became of a store that was wanted, once.
+  struct Opened {
+    std::string array;
+    Status status;
+  };
+  std::optional<Opened> take_opened();
+
+ private:
+  using Made = Result<std::shared_ptr<MeshStore>>;
+  void begin(const std::string& array);
+
+  static constexpr size_t kKept = 4;  // the first one among them
+
+  std::map<std::string, std::shared_ptr<const MeshStore>> open_;
+  const std::string first_;
+  Open open_array_;
+  std::future<Made> opening_;
+  std::string opening_array_;
+  std::optional<std::string> next_;
+  std::atomic<bool> stop_{false};
+};
+
+struct GivenUp {};
+
+ArrayStores::ArrayStores(std::shared_ptr<const MeshStore> first, const std::string& array, Open open)
+    : first_(array), open_array_(std::move(open)) {
+  open_[array] = std::move(first);
+}
+
+ArrayStores::~ArrayStores() {
+  stop_ = true;
+  if (opening_.valid()) opening_.wait();
+}
+
+const MeshStore* ArrayStores::find(const std::string& array) const {
+  const auto found = open_.find(array);
+  return found == open_.end() ? nullptr : found->second.get();
+}
+
+void ArrayStores::begin(const std::string& array) {
+  opening_array_ = array;
+  opening_ = std::async(std::launch::async, [this, array]() -> Made {
+    try {
+      return open_array_(array, [this](const char*, double) {
+        if (stop_) throw GivenUp();
+      });
+    } catch (const GivenUp&) {
+      return Error{"given up: the data server ends"};
+    } catch (const std::exception& e) {
+      return Error{e.what()};
+    }
+  });
+}
+
+void ArrayStores::want(const std::string& array) {
+  if (find(array)) return;
+  if (!opening_.valid())
+    begin(array);
+  else if (opening_array_ != array)
+    next_ = array;
+  else
+    next_.reset();
+}
+
+std::optional<ArrayStores::Opened> ArrayStores::take_opened() {
+  if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
+  Made made = opening_.get();
+  Opened out{opening_array_, made ? ok_status() : Status(made.error())};
+  if (made) {
+    for (auto old = open_.begin(); open_.size() >= kKept && old != open_.end();)
+      old = old->first == first_ ? std::next(old) : open_.erase(old);
+    open_[opening_array_] = *std::move(made);
+  }
+  if (next_) begin(*std::exchange(next_, std::nullopt));
+  return out;
+}
 
 // Answers that wait for a peer: samplers ask for as many chunks at a time as fill their link, and for a list.
 constexpr int kAnswersWaiting = 16;

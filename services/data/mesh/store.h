@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/geometry/mesh_chunk.h"
-#include "services/data/base/mesh_source.h"
+#include "services/data/base/mesh.h"
 #include "services/data/mesh/options.h"
 
 namespace telesplat::data {

@@ -1,21 +1,78 @@
-#include "services/data/surface/flying_edges.h"
+#include "services/data/surface/isosurface.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <type_traits>
+#include <utility>
 
 #include "common/parallel/in_parallel.h"
-#include "services/data/surface/cube_cases.h"
 
 namespace telesplat::data {
+
 namespace {
+
+// A case of marching cubes: the triangles in a cube whose corners lie inside or outside. Corner c of a cube stands at
+// (c & 1, c >> 1 & 1, c >> 2). Edges 0..3 run along x from corners 0 2 4 6, 4..7 along y from 0 1 4 5, 8..11 along z
+// from 0 1 2 3.
+struct CubeCase {
+  int triangles = 0;
+  std::array<std::array<uint8_t, 3>, 12> edges{};  // of each triangle; their normal looks away from inside corners
+};
+
+// Corners of each face, counterclockwise as seen from outside.
+constexpr int kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+
+int edge_between(int a, int b) {
+  const int low = std::min(a, b), axis = (a ^ b) == 1 ? 0 : (a ^ b) == 2 ? 1 : 2;
+  return axis == 0 ? low >> 1 : axis == 1 ? 4 + ((low & 1) | (low >> 2) << 1) : 8 + low;
+}
+
+// Within each face lines go from where its outline leaves the inside to where it came in; they join to loops through
+// the cube's faces, which become fans.
+CubeCase make_case(int inside) {
+  std::array<int, 12> next;
+  next.fill(-1);
+  for (const auto& face : kFaces)
+    for (int i = 0; i < 4; ++i) {
+      const auto is_inside = [&](int k) { return (inside >> face[k & 3] & 1) != 0; };
+      if (!is_inside(i) || is_inside(i + 1)) continue;
+      int back = i;  // to the corner where this run of inside corners begins
+      while (is_inside(back + 3)) back += 3;
+      next[size_t(edge_between(face[back & 3], face[(back + 3) & 3]))] = edge_between(face[i], face[(i + 1) & 3]);
+    }
+  CubeCase out;
+  for (int start = 0; start < 12; ++start) {
+    std::array<uint8_t, 12> loop;
+    size_t length = 0;
+    for (int edge = start; next[size_t(edge)] >= 0;) {
+      loop[length++] = uint8_t(edge);
+      edge = std::exchange(next[size_t(edge)], -1);
+    }
+    for (size_t i = 2; i < length; ++i) out.edges[size_t(out.triangles++)] = {loop[0], loop[i - 1], loop[i]};
+  }
+  return out;
+}
+
+// By the bits of corners that are inside. Faces with two inside corners at a diagonal keep these apart, in either of
+// the cubes that share it, so that surfaces are closed.
+const std::array<CubeCase, 256>& cube_cases() {
+  static const auto cases = [] {
+    std::array<CubeCase, 256> out;
+    for (int inside = 0; inside < 256; ++inside) out[size_t(inside)] = make_case(inside);
+    return out;
+  }();
+  return cases;
+}
 
 constexpr int kSlices = 16;                      // in a slab: its border is looked at twice, its tables stay small
 constexpr uint32_t kOfNext = uint32_t{1} << 31;  // a vertex of the slab above, by its number there
@@ -234,22 +291,11 @@ Result<Mesh> surface_of(const Volume& volume, const T* values, double iso, const
 }  // namespace
 
 Result<Mesh> flying_edges(const Volume& volume, double iso, double below, const std::string& name) {
-  const auto in_place = [&]<class T>(T) {  // a vector's storage is aligned for anything
-    return surface_of(volume, reinterpret_cast<const T*>(volume.stored.data()), iso, name);
-  };
-  switch (volume.type) {
-    case VoxelType::kU8:
-      return in_place(uint8_t{});
-    case VoxelType::kI8:
-      return in_place(int8_t{});
-    case VoxelType::kU16:
-      return in_place(uint16_t{});
-    case VoxelType::kI16:
-      return in_place(int16_t{});
-    case VoxelType::kF32:
-      break;
-  }
-  if (volume.not_finite == 0) return in_place(float{});
+  if (volume.type != VoxelType::kF32 || volume.not_finite == 0)
+    return with_type(volume.type, [&](auto value) {  // a vector's storage is aligned for anything
+      using T = std::conditional_t<(sizeof value <= 2), decltype(value), float>;  // volumes have no others
+      return surface_of(volume, reinterpret_cast<const T*>(volume.stored.data()), iso, name);
+    });
   std::vector<float> finite(volume.stored.size() / sizeof(float));
   std::memcpy(finite.data(), volume.stored.data(), volume.stored.size());
   for (float& v : finite) v = std::isfinite(v) ? v : float(below);

@@ -7,9 +7,8 @@
 #include <cmath>
 
 #include "common/volume/histogram.h"
-#include "services/data/surface/flying_edges.h"
 #include "services/data/volume/formats/header.h"
-#include "services/data/volume/statistics.h"
+#include "services/data/volume/slices.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {

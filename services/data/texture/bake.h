@@ -8,7 +8,6 @@
 
 namespace telesplat::data {
 
-inline constexpr uint32_t kNoTexture = ~uint32_t{0};
 inline constexpr uint64_t kDefaultTextureDetail = 4'000'000;
 /// Texture coordinates beyond this are taken for damage: the vertex keeps its own colour.
 inline constexpr float kMaxUv = 1e4f;

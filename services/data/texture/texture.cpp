@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "common/image/srgb.h"
+#include "services/data/base/refusal.h"
 
 namespace telesplat::data {
 namespace {
@@ -67,6 +69,21 @@ glm::vec3 Texture::sample(glm::vec2 uv, int level) const {
 
 float Texture::texels(glm::vec2 from, glm::vec2 to) const {
   return std::hypot((to.x - from.x) * float(width()), (to.y - from.y) * float(height()));
+}
+
+uint32_t NamedTextures::number_of(const std::string& picture, Wrap wrap) {
+  const auto [entry, is_new] = numbers_.try_emplace({picture, wrap}, uint32_t(all_.size()));
+  if (!is_new) return entry->second;
+  const auto bytes = companions_.read(picture);
+  if (!bytes) {
+    notes_.push_back(fmt::format("{}: the texture {} is not there; the colours without it are shown", file_, picture));
+    return entry->second = kNoTexture;
+  }
+  auto view = image::read_picture(std::as_bytes(std::span(*bytes)), picture, room_);
+  if (!view) refuse("{}: {}", file_, view.error().text);
+  room_ -= view->colour.size();
+  all_.push_back(std::make_shared<Texture>(std::move(*view), wrap, wrap));
+  return entry->second;
 }
 
 }  // namespace telesplat::data

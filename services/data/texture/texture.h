@@ -5,17 +5,21 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/image/file.h"
+#include "services/data/base/mapped_file.h"
 
 namespace telesplat::data {
 
 /// What a texture shows outside of 0..1.
 enum class Wrap : uint8_t { kRepeat, kClamp, kMirror };
 
+inline constexpr uint32_t kNoTexture = ~uint32_t{0};
 inline constexpr size_t kMaxTexels = size_t{1} << 28;  ///< of all textures of a mesh
 
 /// Immutable, safe to read from any thread.
@@ -46,6 +50,28 @@ class Texture {
   std::vector<Level> levels_;
   std::array<Wrap, 2> wrap_;
   bool nearest_, plain_;
+};
+
+class NamedTextures {
+ public:
+  /// file: for notes and error texts.
+  NamedTextures(const std::string& file, Companions& companions) : file_(file), companions_(companions) {}
+
+  /// The number of a picture, as it is wrapped, among all(). A picture is read once for each way to wrap it.
+  /// kNoTexture: it cannot be opened; notes() tells that once. Throws Refusal: it is damaged, or exceeds kMaxTexels
+  /// with others.
+  uint32_t number_of(const std::string& picture, Wrap wrap);
+
+  const std::vector<std::shared_ptr<const Texture>>& all() const { return all_; }
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  const std::string& file_;
+  Companions& companions_;
+  std::map<std::pair<std::string, Wrap>, uint32_t> numbers_;
+  std::vector<std::shared_ptr<const Texture>> all_;
+  std::vector<std::string> notes_;
+  uint64_t room_ = kMaxTexels;
 };
 
 }  // namespace telesplat::data

@@ -1,4 +1,4 @@
-#include "services/data/volume/dicom_reader.h"
+#include "services/data/volume/volume.h"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,9 @@
 #include <set>
 
 #include "services/data/base/mapped_file.h"
-#include "services/data/volume/formats/import_stream.h"
-#include "services/data/volume/formats/payload.h"
+#include "services/data/base/refusal.h"
+#include "services/data/import/process.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 namespace {
@@ -24,8 +25,7 @@ constexpr size_t kLayersAtOnce = 64;
 bool needs_gdcm(const DicomSlice& s) { return s.compressed || s.components == 3; }
 
 // Slices that GDCM reads, all of one size: all frames of their files, by file.
-Result<std::map<std::string, Bytes>> decode(const std::map<std::string, const DicomSlice*>& files,
-                                            const std::string& path) {
+std::map<std::string, Bytes> decode(const std::map<std::string, const DicomSlice*>& files, const std::string& path) {
   std::map<std::string, Bytes> out;
   if (files.empty()) return out;
   const DicomSlice& any = *files.begin()->second;
@@ -36,14 +36,12 @@ Result<std::map<std::string, Bytes>> decode(const std::map<std::string, const Di
   for (const auto& [name, slice] : files) paths.push_back(name);
   const uint64_t unpacked = frames * frame_bytes;
   const std::vector<std::string> words{"dicom", path, std::to_string(unpacked * uint64_t(any.components))};
-  const auto received = import_volume(words, paths, unpacked, "GDCM's", nullptr);
-  if (!received) return received.error();
-  const VolumeFileHeader& h = received->header;
+  const auto received = need(import_volume("GDCM's", words, paths, unpacked, nullptr));
+  const VolumeFileHeader& h = received.header;
   if (h.size != std::array<int64_t, 3>{any.columns, any.rows, int64_t(frames)} || stored_bytes(h.stored) != bytes)
-    return Error{fmt::format("{}: GDCM finds {} x {} x {} pixels of {} bytes, the header says {} x {} x {} of {}", path,
-                             h.size[0], h.size[1], h.size[2], stored_bytes(h.stored), any.columns, any.rows, frames,
-                             bytes)};
-  const std::byte* from = received->bytes.data();
+    refuse("{}: GDCM finds {} x {} x {} pixels of {} bytes, the header says {} x {} x {} of {}", path, h.size[0],
+           h.size[1], h.size[2], stored_bytes(h.stored), any.columns, any.rows, frames, bytes);
+  const std::byte* from = received.bytes.data();
   for (const auto& [name, slice] : files) {
     const std::byte* end = from + size_t(slice->frames) * frame_bytes;
     out[name] = Bytes(from, end), from = end;
@@ -57,7 +55,7 @@ class Pixels {
   explicit Pixels(const std::string& path) : path_(path) {}
 
   // Reads all of these slices that GDCM has to read, in one run of the program.
-  Status prepare(const std::vector<const DicomSlice*>& slices) {
+  void prepare(const std::vector<const DicomSlice*>& slices) {
     std::map<std::string, const DicomSlice*> missing;
     std::set<std::string> needed;
     for (const DicomSlice* s : slices) {
@@ -67,28 +65,22 @@ class Pixels {
     }
     std::erase_if(decoded_, [&](const auto& d) { return !needed.contains(d.first); });
     auto more = decode(missing, path_);
-    if (!more) return more.error();
-    decoded_.merge(*more);
-    return ok_status();
+    decoded_.merge(more);
   }
 
-  Result<const std::byte*> of(const DicomSlice& s) {
+  const std::byte* of(const DicomSlice& s) {
     const size_t bytes = size_t(s.rows) * size_t(s.columns) * stored_bytes(stored_type(s));
     if (needs_gdcm(s)) return decoded_[s.path].data() + size_t(s.frame) * bytes;
     if (s.path != name_) {
-      auto file = MappedFile::open(s.path);
-      if (!file) return file.error();
-      file_ = std::move(*file);
+      file_ = need(MappedFile::open(s.path));
       if (s.deflated) {
-        auto inflated = inflate_dicom(file_->text(), s.path);
-        if (!inflated) return inflated.error();
-        inflated_ = std::move(*inflated);
+        inflated_ = need(inflate_dicom(file_->text(), s.path));
       }
       name_ = s.path;
     }
     const std::string_view content = s.deflated ? std::string_view(inflated_) : file_->text();
     if (s.data_at > content.size() || bytes > content.size() - s.data_at)
-      return Error{s.path + ": changed while it was read"};
+      refuse("{}: changed while it was read", s.path);
     return reinterpret_cast<const std::byte*>(content.data()) + s.data_at;
   }
 
@@ -183,21 +175,18 @@ void take_padding(const DicomSlice& s, Bytes& bytes, std::string& remark) {
                         padded, double(padding->first) * s.slope + s.intercept);
 }
 
-Status fill(const DicomSeries& series, size_t step, const std::string& path, const ReadProgress& progress,
-            Bytes& bytes) {
+void fill(const DicomSeries& series, size_t step, const std::string& path, const ReadProgress& progress, Bytes& bytes) {
   const VolumeFileHeader& h = series.header;
   const size_t pixels = size_t(h.size[0]) * size_t(h.size[1]), layer_bytes = pixels * stored_bytes(h.stored);
   const auto& layers = series.order.steps[step];
   const auto& slices = series.order.slices;
   Pixels source(path);
   // Slices as they are stored in the volume.
-  const auto read = [&](const DicomSlice& s, std::byte* to) -> Status {
+  const auto read = [&](const DicomSlice& s, std::byte* to) {
     const auto from = source.of(s);
-    if (!from) return from.error();
     const bool rescale =
         h.stored == StoredType::kF32 && (stored_type(s) != h.stored || h.scale != s.slope || h.offset != s.intercept);
-    with_type(stored_type(s), [&](auto zero) { unpack<decltype(zero)>(s, *from, pixels, to, rescale); });
-    return ok_status();
+    with_type(stored_type(s), [&](auto zero) { unpack<decltype(zero)>(s, from, pixels, to, rescale); });
   };
   Bytes below, above;
   for (size_t k = 0; k < layers.size(); ++k) {
@@ -205,21 +194,20 @@ Status fill(const DicomSeries& series, size_t step, const std::string& path, con
       std::vector<const DicomSlice*> next;
       for (size_t n = k; n < std::min(k + kLayersAtOnce, layers.size()); ++n)
         for (const size_t i : {layers[n].below, layers[n].above}) next.push_back(&slices[i]);
-      if (auto status = source.prepare(next); !status) return status;
+      source.prepare(next);
     }
     const DicomLayer& l = layers[k];
     std::byte* const to = bytes.data() + k * layer_bytes;
     if (l.share == 0) {
-      if (auto status = read(slices[l.below], to); !status) return status;
+      read(slices[l.below], to);
     } else {
       below.resize(layer_bytes), above.resize(layer_bytes);
-      if (auto status = read(slices[l.below], below.data()); !status) return status;
-      if (auto status = read(slices[l.above], above.data()); !status) return status;
+      read(slices[l.below], below.data());
+      read(slices[l.above], above.data());
       with_type(h.stored, [&](auto zero) { mix<decltype(zero)>(below, above, l.share, to); });
     }
     if (progress) progress(double(k + 1) / double(layers.size()));
   }
-  return ok_status();
 }
 
 }  // namespace
@@ -228,7 +216,8 @@ Result<Volume> read_dicom(const DicomSeries& series, size_t step, const std::str
                           const ReadProgress& progress) {
   const VolumeFileHeader& h = series.header;
   Bytes bytes(h.voxel_bytes());
-  if (auto status = fill(series, step, path, progress, bytes); !status) return status.error();
+  const Status filled = or_error([&] { fill(series, step, path, progress, bytes); });
+  if (!filled) return filled.error();
   std::string remark = series.order.remark;
   with_type(h.stored, [&](auto zero) { take_padding<decltype(zero)>(series.order.slices[0], bytes, remark); });
   auto volume = make_volume(h, std::move(bytes), path);

@@ -14,7 +14,6 @@
 #include "common/volume/session.h"
 #include "common/volume/voxels.h"
 #include "services/data/base/placement_options.h"
-#include "services/data/volume/options.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {

@@ -5,26 +5,10 @@
 #include <algorithm>
 
 namespace telesplat::data::vtk {
-namespace {
-
-template <class T, class Swap>
-void swap_all(std::vector<std::byte>& bytes, Swap swap) {
-  for (size_t at = 0; at + sizeof(T) <= bytes.size(); at += sizeof(T)) {
-    T v;
-    std::memcpy(&v, bytes.data() + at, sizeof v);
-    v = swap(v);
-    std::memcpy(bytes.data() + at, &v, sizeof v);
-  }
-}
-
-}  // namespace
 
 void Array::swap_bytes() {
-  const size_t size = stored_bytes(type);
-  if (owned.empty()) owned.assign(data, data + values * size), data = owned.data();
-  if (size == 2) swap_all<uint16_t>(owned, [](uint16_t v) { return __builtin_bswap16(v); });
-  if (size == 4) swap_all<uint32_t>(owned, [](uint32_t v) { return __builtin_bswap32(v); });
-  if (size == 8) swap_all<uint64_t>(owned, [](uint64_t v) { return __builtin_bswap64(v); });
+  if (owned.empty()) owned.assign(data, data + values * stored_bytes(type)), data = owned.data();
+  data::swap_bytes(owned, type);
 }
 
 std::vector<uint32_t> indices_of(const Array& array) {
@@ -80,28 +64,39 @@ glm::dvec3 DataSet::point(size_t i) const {
   return index_to_data * glm::dvec4(index, 1);
 }
 
-Status check_extent(const std::array<int64_t, 6>& extent, size_t file_bytes, const std::string& name) {
+void check_extent(const std::array<int64_t, 6>& extent, size_t file_bytes, const std::string& name) {
   double points = 1;
   for (size_t a = 0; a < 3; ++a) {
     const double side = double(extent[2 * a + 1]) - double(extent[2 * a]) + 1;
-    if (side < 1)
-      return Error{fmt::format("{}: its extent goes from {} to {}", name, extent[2 * a], extent[2 * a + 1])};
+    if (side < 1) refuse("{}: its extent goes from {} to {}", name, extent[2 * a], extent[2 * a + 1]);
     points *= side;
   }
   const double most = std::min(4294967294.0, 1032.0 * double(file_bytes));  // deflate's best packing
-  if (points <= most) return ok_status();
-  return Error{
-      fmt::format("{}: claims {:.0f} points, limit {:.0f} in a file of {} bytes", name, points, most, file_bytes)};
+  if (points <= most) return;
+  refuse("{}: claims {:.0f} points, limit {:.0f} in a file of {} bytes", name, points, most, file_bytes);
 }
 
-Status check_ids(std::span<const uint32_t> ids, size_t points, const std::string& name) {
+void check_ids(std::span<const uint32_t> ids, size_t points, const std::string& name) {
   const auto bad = std::find_if(ids.begin(), ids.end(), [&](uint32_t i) { return i >= points; });
-  if (bad == ids.end()) return ok_status();
-  return Error{*bad == ~uint32_t{0} ? fmt::format("{}: a cell has a point number that is negative or too large", name)
-                                    : fmt::format("{}: a cell names point {} of {}", name, *bad, points)};
+  if (bad == ids.end()) return;
+  if (*bad == ~uint32_t{0}) refuse("{}: a cell has a point number that is negative or too large", name);
+  refuse("{}: a cell names point {} of {}", name, *bad, points);
 }
 
-Result<Cells> make_cells(const Array& ids, const Array& ends, bool with_first, size_t points, const std::string& name) {
+void parse_numbers(TextScanner& in, size_t most, Array& out) {
+  with_type(out.type, [&](auto v) {
+    std::conditional_t<std::is_floating_point_v<decltype(v)>, double, int64_t> value{};
+    while (out.values < most && in.skip_space() && in.value(value)) {
+      v = static_cast<decltype(v)>(value);
+      const auto* bytes = reinterpret_cast<const std::byte*>(&v);
+      out.owned.insert(out.owned.end(), bytes, bytes + sizeof v);
+      ++out.values;
+    }
+  });
+  out.data = out.owned.data();
+}
+
+Cells make_cells(const Array& ids, const Array& ends, bool with_first, size_t points, const std::string& name) {
   Cells out;
   out.points = indices_of(ids);
   const auto offsets = indices_of(ends);
@@ -109,21 +104,20 @@ Result<Cells> make_cells(const Array& ids, const Array& ends, bool with_first, s
   out.begins.reserve(offsets.size() + 1);
   for (size_t i = first; i < offsets.size(); ++i) {
     if (offsets[i] < out.begins.back() || offsets[i] > out.points.size())
-      return Error{fmt::format("{}: cell {} ends at {} of {} point numbers, the one before at {}", name, i - first,
-                               offsets[i], out.points.size(), out.begins.back())};
+      refuse("{}: cell {} ends at {} of {} point numbers, the one before at {}", name, i - first, offsets[i],
+             out.points.size(), out.begins.back());
     out.begins.push_back(offsets[i]);
   }
-  if (const Status s = check_ids(out.points, points, name); !s) return s.error();
+  check_ids(out.points, points, name);
   return out;
 }
 
-Result<Cells> make_listed_cells(const Array& list, size_t count, const std::string& name) {
+Cells make_listed_cells(const Array& list, size_t count, const std::string& name) {
   Cells out;
   const auto words = indices_of(list);
   for (size_t at = 0; out.size() < count; at += words[at] + 1) {
     if (at >= words.size() || words[at] > words.size() - at - 1)
-      return Error{
-          fmt::format("{}: cell {} of {} goes beyond the {} numbers of all", name, out.size(), count, words.size())};
+      refuse("{}: cell {} of {} goes beyond the {} numbers of all", name, out.size(), count, words.size());
     out.points.insert(out.points.end(), words.begin() + ptrdiff_t(at + 1),
                       words.begin() + ptrdiff_t(at + 1 + words[at]));
     out.begins.push_back(out.points.size());
@@ -131,18 +125,16 @@ Result<Cells> make_listed_cells(const Array& list, size_t count, const std::stri
   return out;
 }
 
-Status add_face_stream(std::span<const uint32_t> stream, DataSet& set) {
-  const Error cut{fmt::format("{}: the faces of a polyhedron are cut off", set.name)};
-  if (stream.empty()) return cut;
+void add_face_stream(std::span<const uint32_t> stream, DataSet& set) {
   size_t at = 1;
-  for (uint32_t face = 0; face < stream[0]; ++face) {
-    if (at >= stream.size() || stream[at] > stream.size() - at - 1) return cut;
+  for (uint32_t face = 0; stream.empty() || face < stream[0]; ++face) {
+    if (at >= stream.size() || stream[at] > stream.size() - at - 1)
+      refuse("{}: the faces of a polyhedron are cut off", set.name);
     const auto corners = stream.subspan(at + 1, stream[at]);
     set.faces.points.insert(set.faces.points.end(), corners.begin(), corners.end());
     set.faces.begins.push_back(set.faces.points.size());
     at += stream[at] + 1;
   }
-  return ok_status();
 }
 
 }  // namespace telesplat::data::vtk

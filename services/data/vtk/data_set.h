@@ -10,8 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "common/core/result.h"
+#include "services/data/base/refusal.h"
 #include "services/data/base/stored_type.h"
+#include "services/data/base/text_scanner.h"
 
 namespace telesplat::data::vtk {
 
@@ -82,9 +83,13 @@ struct DataSet {
   glm::dvec3 point(size_t i) const;
 };
 
+// What follows throws a Refusal that begins with `name`.
+
 /// Checks an extent: sides of at least 1, points that 32 bits can number, and at most a thousand a byte of the file.
-/// `name` begins the error.
-Status check_extent(const std::array<int64_t, 6>& extent, size_t file_bytes, const std::string& name);
+void check_extent(const std::array<int64_t, 6>& extent, size_t file_bytes, const std::string& name);
+
+/// Reads numbers of the array's type from text, until `most` are there or a word is none. Memory grows with the text.
+void parse_numbers(TextScanner& in, size_t most, Array& out);
 
 /// Whole numbers as indices; one that is negative or too large becomes ~0.
 std::vector<uint32_t> indices_of(const Array& array);
@@ -93,18 +98,18 @@ std::vector<uint8_t> types_of(const Array& array);
 /// Adds cells of one type behind those of the data set.
 void append_cells(Cells cells, uint8_t type, DataSet& set);
 
-/// Makes cells of point numbers and of the ends of each cell's part of them. Error: ends that fall or lie behind
-/// the numbers, a number that is not below `points`.
-Result<Cells> make_cells(const Array& ids, const Array& ends, bool with_first, size_t points, const std::string& name);
+/// Makes cells of point numbers and of the ends of each cell's part of them. Refuses ends that fall or lie behind
+/// the numbers, and a number that is not below `points`.
+Cells make_cells(const Array& ids, const Array& ends, bool with_first, size_t points, const std::string& name);
 
 /// Makes cells of the older layout: each cell's count, then its point numbers. `count`: of cells, as claimed.
-Result<Cells> make_listed_cells(const Array& list, size_t count, const std::string& name);
+Cells make_listed_cells(const Array& list, size_t count, const std::string& name);
 
-/// Error: one of these point numbers is not below `points`.
-Status check_ids(std::span<const uint32_t> ids, size_t points, const std::string& name);
+/// Refuses a point number that is not below `points`.
+void check_ids(std::span<const uint32_t> ids, size_t points, const std::string& name);
 
 /// Adds the faces of a polyhedron as streams hold them: their number, then each one's count and points.
-/// Point numbers are not checked. Error: the stream is cut.
-Status add_face_stream(std::span<const uint32_t> stream, DataSet& set);
+/// Point numbers are not checked. Refuses a stream that is cut.
+void add_face_stream(std::span<const uint32_t> stream, DataSet& set);
 
 }  // namespace telesplat::data::vtk

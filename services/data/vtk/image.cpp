@@ -1,14 +1,13 @@
-#include "services/data/vtk/image.h"
+#include "services/data/vtk/reader.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
-#include "services/data/vtk/legacy_reader.h"
-#include "services/data/vtk/reader.h"
-#include "services/data/vtk/xml_reader.h"
+#include "services/data/vtk/files.h"
 
 namespace telesplat::data::vtk {
 namespace {
@@ -22,8 +21,8 @@ struct Row {
   bool text = false;
 };
 
-Status choose(const std::vector<Row>& rows, const std::string& wanted, const std::string (&active)[2], Image& out,
-              const std::string& path) {
+void choose(const std::vector<Row>& rows, const std::string& wanted, const std::string (&active)[2], Image& out,
+            const std::string& path) {
   for (const Row& row : rows) out.arrays.push_back(row.name);
   const Row* chosen = nullptr;
   const auto first = [&](auto&& fits) {
@@ -32,18 +31,16 @@ Status choose(const std::vector<Row>& rows, const std::string& wanted, const std
   };
   if (!wanted.empty()) {
     first([&](const Row& r) { return r.name == wanted; });
-    if (!chosen)
-      return Error{fmt::format("{}: has no array \"{}\"; it has: {}", path, wanted, fmt::join(out.arrays, ", "))};
+    if (!chosen) refuse("{}: has no array \"{}\"; it has: {}", path, wanted, fmt::join(out.arrays, ", "));
   }
   for (const bool cells : {false, true}) {
     first([&](const Row& r) { return r.of_cells == cells && r.name == active[cells] && r.components == 1; });
     first([&](const Row& r) { return r.of_cells == cells && r.components == 1; });
   }
   first([](const Row&) { return true; });
-  if (!chosen) return ok_status();
+  if (!chosen) return;
   out.array = chosen->name, out.of_cells = chosen->of_cells, out.type = chosen->type;
   out.components = chosen->components, out.text = chosen->text;
-  return ok_status();
 }
 
 std::vector<Row> rows_in(pugi::xml_node points, pugi::xml_node cells, const char* element) {
@@ -62,32 +59,28 @@ std::vector<Row> rows_in(pugi::xml_node points, pugi::xml_node cells, const char
   return out;
 }
 
-Result<Image> legacy_header(std::string_view content, const std::string& path, const std::string& array) {
+Image legacy_header(std::string_view content, const std::string& path, const std::string& array) {
   const auto set = read_legacy(content, path, false);
-  if (!set) return set.error();
   Image out;
-  out.extent = set->extent, out.index_to_data = set->index_to_data, out.bytes = content.size();
+  out.extent = set.extent, out.index_to_data = set.index_to_data, out.bytes = content.size();
   out.packed = true;  // or text: the parser has compared sizes with the file's
   std::vector<Row> rows;
   for (const bool cells : {false, true})
-    for (const Array& a : (cells ? set->cell_data : set->point_data).arrays)
+    for (const Array& a : (cells ? set.cell_data : set.point_data).arrays)
       rows.push_back({a.name, cells, a.type, a.components, false});
-  const Status chosen = choose(rows, array, {set->point_data.scalars, set->cell_data.scalars}, out, path);
-  return chosen ? Result<Image>(out) : chosen.error();
+  choose(rows, array, {set.point_data.scalars, set.cell_data.scalars}, out, path);
+  return out;
 }
-
-std::string folder_of(const std::string& path) { return std::filesystem::path(path).parent_path().string(); }
 
 // f(content, name) for the file and for those that it names.
 template <class F>
-Status each_file(std::string_view content, const std::string& path, Companions& companions, F&& f) {
+void each_file(std::string_view content, const std::string& path, Companions& companions, F&& f) {
   if (kind_of(content) != "pvti") return f(content, path);
   for (const std::string& named : named_files(content, path, companions)) {
     const auto one = companions.read(named);
-    if (!one) return Error{fmt::format("{}: needs a file that cannot be read: {}", path, one.error().text)};
-    if (const Status s = f(*one, (std::filesystem::path(folder_of(path)) / named).string()); !s) return s;
+    if (!one) refuse("{}: needs a file that cannot be read: {}", path, one.error().text);
+    f(*one, (std::filesystem::path(path).parent_path() / named).string());
   }
-  return ok_status();
 }
 
 std::array<int64_t, 3> sides_of(const std::array<int64_t, 6>& extent, bool cells) {
@@ -103,23 +96,23 @@ class Assembly {
  public:
   explicit Assembly(const Image& image) : image_(image), sides_(sides_of(image.extent, image.of_cells)) {}
 
-  Status add(Array array, const std::array<int64_t, 6>& extent, const std::string& name) {
+  void add(Array array, const std::array<int64_t, 6>& extent, const std::string& name) {
     if (array.type != image_.type || array.components != 1)
-      return Error{fmt::format("{}: array {} has {} components of {}, elsewhere 1 of {}", name, array.name,
-                               array.components, name_of(array.type), name_of(image_.type))};
+      refuse("{}: array {} has {} components of {}, elsewhere 1 of {}", name, array.name, array.components,
+             name_of(array.type), name_of(image_.type));
     const size_t size = stored_bytes(array.type);
     if (extent == image_.extent) {
       if (array.owned.empty()) array.owned.assign(array.data, array.data + array.values * size);
       out_ = std::move(array.owned), filled_ = out_.size() / size;
-      return ok_status();
+      return;
     }
     const size_t all = size_t(sides_[0]) * size_t(sides_[1]) * size_t(sides_[2]);
     out_.resize(all * size), there_.resize(all);
     const auto sides = sides_of(extent, image_.of_cells);
     for (size_t a = 0; a < 3; ++a)
       if (extent[2 * a] < image_.extent[2 * a] || extent[2 * a + 1] > image_.extent[2 * a + 1])
-        return Error{fmt::format("{}: the extent {} of a piece is not within {}", name, fmt::join(extent, " "),
-                                 fmt::join(image_.extent, " "))};
+        refuse("{}: the extent {} of a piece is not within {}", name, fmt::join(extent, " "),
+               fmt::join(image_.extent, " "));
     for (int64_t k = 0; k < sides[2]; ++k)
       for (int64_t j = 0; j < sides[1]; ++j) {
         const auto at = [&](size_t a, int64_t i) { return extent[2 * a] - image_.extent[2 * a] + i; };
@@ -128,14 +121,12 @@ class Assembly {
                     size_t(sides[0]) * size);
         for (size_t i = to; i < to + size_t(sides[0]); ++i) filled_ += !there_[i], there_[i] = true;
       }
-    return ok_status();
   }
 
-  Result<std::vector<std::byte>> finish(const std::string& path) {
+  std::vector<std::byte> finish(const std::string& path) {
     const size_t all = size_t(sides_[0] * sides_[1] * sides_[2]);
     if (filled_ == all) return std::move(out_);
-    return Error{
-        fmt::format("{}: has {} values for {} x {} x {} voxels", path, filled_, sides_[0], sides_[1], sides_[2])};
+    refuse("{}: has {} values for {} x {} x {} voxels", path, filled_, sides_[0], sides_[1], sides_[2]);
   }
 
  private:
@@ -146,24 +137,19 @@ class Assembly {
   size_t filled_ = 0;
 };
 
-}  // namespace
-
-Result<Image> read_image_header(std::string_view content, const std::string& path, Companions& companions,
-                                const std::string& array) {
-  if (legacy_kind(content) == "STRUCTURED_POINTS") return legacy_header(content, path, array);
-  const auto file = XmlFile::open(content, path);
-  if (!file) return Error{file.error().text + "; an image has a WholeExtent"};
-  const auto root = (*file)->root();
+Image xml_header(const XmlFile& file, std::string_view content, const std::string& path, Companions& companions,
+                 const std::string& array) {
+  const auto root = file.root();
   const auto image = root.child(root.attribute("type").value());
   Image out;
   const std::string_view extent = image.attribute("WholeExtent").value();
   if (!is_image(content) || !image.attribute("WholeExtent"))
-    return Error{path + ": is no VTK image: no ImageData with a WholeExtent"};
+    refuse("{}: is no VTK image: no ImageData with a WholeExtent", path);
   if (!parse_extent(extent, out.extent))
-    return Error{fmt::format("{}: its WholeExtent, {}, is no extent: six whole numbers", path, extent.substr(0, 80))};
+    refuse("{}: its WholeExtent, {}, is no extent: six whole numbers", path, extent.substr(0, 80));
   for (size_t a = 0; a < 6; ++a)
     if (std::abs(double(out.extent[a])) > 1e9 || (a % 2 == 1 && out.extent[a] < out.extent[a - 1]))
-      return Error{fmt::format("{}: claims the extent {}", path, extent.substr(0, 80))};
+      refuse("{}: claims the extent {}", path, extent.substr(0, 80));
   out.index_to_data = placement_of(image);
   out.packed = !std::string_view(root.attribute("compressor").value()).empty();
   const auto piece = image.child("Piece");
@@ -171,52 +157,50 @@ Result<Image> read_image_header(std::string_view content, const std::string& pat
   const auto points = parallel ? image.child("PPointData") : piece.child("PointData");
   const auto cells = parallel ? image.child("PCellData") : piece.child("CellData");
   const auto rows = rows_in(points, cells, parallel ? "PDataArray" : "DataArray");
-  const Status chosen =
-      choose(rows, array, {points.attribute("Scalars").value(), cells.attribute("Scalars").value()}, out, path);
-  if (!chosen) return chosen.error();
-  const Status summed = each_file(content, path, companions, [&](std::string_view one, const std::string&) {
-    out.bytes += one.size();
-    return ok_status();
-  });
-  if (!summed) return summed.error();
+  choose(rows, array, {points.attribute("Scalars").value(), cells.attribute("Scalars").value()}, out, path);
+  each_file(content, path, companions, [&](std::string_view one, const std::string&) { out.bytes += one.size(); });
   out.packed = out.packed || parallel, out.text = out.text && !parallel;  // its files may be either
   return out;
 }
 
-Result<std::vector<std::byte>> read_image(const Image& image, std::string_view content, const std::string& path,
-                                          Companions& companions) {
-  if (image.array.empty()) return Error{path + ": has no values that can be shown"};
-  if (image.components != 1)
-    return Error{fmt::format("{}: has {} components a voxel, supported is 1", path, image.components)};
+std::vector<std::byte> values_of(const Image& image, std::string_view content, const std::string& path,
+                                 Companions& companions) {
+  if (image.array.empty()) refuse("{}: has no values that can be shown", path);
+  if (image.components != 1) refuse("{}: has {} components a voxel, supported is 1", path, image.components);
   Assembly assembly(image);
   if (kind_of(content) == "vtk") {
     auto set = read_legacy(content, path);
-    if (!set) return set.error();
-    for (Array& array : (image.of_cells ? set->cell_data : set->point_data).arrays)
-      if (array.name == image.array)
-        if (const Status s = assembly.add(std::move(array), set->extent, path); !s) return s.error();
+    for (Array& array : (image.of_cells ? set.cell_data : set.point_data).arrays)
+      if (array.name == image.array) assembly.add(std::move(array), set.extent, path);
     return assembly.finish(path);
   }
-  const Status read =
-      each_file(content, path, companions, [&](std::string_view one, const std::string& name) -> Status {
-        const auto file = XmlFile::open(one, name);
-        if (!file) return file.error();
-        for (const auto piece : (*file)->root().child("ImageData").children("Piece")) {
-          std::array<int64_t, 6> extent;
-          if (!parse_extent(piece.attribute("Extent").value(), extent))
-            return Error{fmt::format("{}: the Extent of a piece is no six numbers", name)};
-          if (const Status s = check_extent(extent, one.size(), name); !s) return s;
-          const auto sides = sides_of(extent, image.of_cells);
-          const auto node = piece.child(image.of_cells ? "CellData" : "PointData")
-                                .find_child_by_attribute("DataArray", "Name", image.array.c_str());
-          auto array = (*file)->array(node, sides[0] * sides[1] * sides[2]);
-          if (!array) return array.error();
-          if (const Status s = assembly.add(std::move(*array), extent, name); !s) return s;
-        }
-        return ok_status();
-      });
-  if (!read) return read.error();
+  each_file(content, path, companions, [&](std::string_view one, const std::string& name) {
+    const XmlFile file(one, name);
+    for (const auto piece : file.root().child("ImageData").children("Piece")) {
+      const auto extent = piece_extent(file, piece.attribute("Extent").value());
+      const auto sides = sides_of(extent, image.of_cells);
+      const auto node = piece.child(image.of_cells ? "CellData" : "PointData")
+                            .find_child_by_attribute("DataArray", "Name", image.array.c_str());
+      assembly.add(file.array(node, sides[0] * sides[1] * sides[2]), extent, name);
+    }
+  });
   return assembly.finish(path);
+}
+
+}  // namespace
+
+Result<Image> read_image_header(std::string_view content, const std::string& path, Companions& companions,
+                                const std::string& array) {
+  if (legacy_kind(content) == "STRUCTURED_POINTS") return or_error([&] { return legacy_header(content, path, array); });
+  std::optional<XmlFile> file;
+  if (const auto opened = or_error([&] { file.emplace(content, path); }); !opened)
+    return Error{opened.error().text + "; an image has a WholeExtent"};
+  return or_error([&] { return xml_header(*file, content, path, companions, array); });
+}
+
+Result<std::vector<std::byte>> read_image(const Image& image, std::string_view content, const std::string& path,
+                                          Companions& companions) {
+  return or_error([&] { return values_of(image, content, path, companions); });
 }
 
 }  // namespace telesplat::data::vtk

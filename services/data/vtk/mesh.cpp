@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "common/scene/colouring.h"
+#include "services/data/vtk/cells.h"
 #include "services/data/vtk/reader.h"
-#include "services/data/vtk/surface.h"
 
 namespace telesplat::data::vtk {
 namespace {
@@ -62,18 +62,17 @@ class Collector {
   Collector(std::span<const DataSet> sets, std::span<const Surface> surfaces, Mesh& mesh)
       : sets_(sets), surfaces_(surfaces), mesh_(mesh) {}
 
-  Status collect(const std::string& path, const std::string& array) {
+  void collect(const std::string& path, const std::string& array) {
     size_t triangles = 0;
     for (const Surface& s : surfaces_) triangles += s.cells.size();
     mesh_.indices.reserve(3 * triangles);
     for (size_t s = 0; s < sets_.size(); ++s) add_points(s);
     if (mesh_.positions.size() > kMaxVertices || triangles > kMaxTriangles)
-      return Error{fmt::format("{}: its surface has {} triangles, limit {}", path, triangles, kMaxTriangles)};
+      refuse("{}: its surface has {} triangles, limit {}", path, triangles, kMaxTriangles);
     add_normals();
     list_arrays();
-    const Status taken = array.empty() ? ok_status() : take(path, array);
-    if (taken) add_colours();
-    return taken;
+    if (!array.empty()) take(path, array);
+    add_colours();
   }
 
  private:
@@ -160,9 +159,9 @@ class Collector {
       for (size_t c = 0; c < info->spans.size(); ++c) info->spans[c].add(value_of(array, i, int(c) - 1));
   }
 
-  Status take(const std::string& path, const std::string& wanted) {
+  void take(const std::string& path, const std::string& wanted) {
     const auto choice = scene::choose_array(mesh_.arrays, wanted);
-    if (!choice) return Error{fmt::format("{}: {}", path, choice.error().text)};
+    if (!choice) refuse("{}: {}", path, choice.error().text);
     const auto& info = mesh_.arrays[choice->index];
     const double origin = scene::scalar_origin(scene::span_of(mesh_.arrays, *choice));
     mesh_.scalars_of_faces = info.of_cells;
@@ -181,7 +180,6 @@ class Collector {
         mesh_.scalars.push_back(
             scene::stored_scalar(array ? value_of(*array, i, choice->component) : kNothing, origin));
     }
-    return ok_status();
   }
 
   std::span<const DataSet> sets_;
@@ -205,16 +203,16 @@ void tell(const SurfaceNotes& n, const std::string& path, std::vector<std::strin
 
 Result<Mesh> read_mesh(std::string_view content, const std::string& path, Companions& companions,
                        const std::string& array) {
-  Mesh mesh;
-  mesh.format = kind_of(content);
-  const auto sets = read_data_sets(content, path, companions, mesh.notes);
-  if (!sets) return sets.error();
-  SurfaceNotes notes;
-  const auto surfaces = surfaces_of(*sets, notes);
-  if (!surfaces) return surfaces.error();
-  if (const Status s = Collector(*sets, *surfaces, mesh).collect(path, array); !s) return s.error();
-  tell(notes, path, mesh.notes);
-  return mesh;
+  return or_error([&] {
+    Mesh mesh;
+    mesh.format = kind_of(content);
+    const auto sets = read_data_sets(content, path, companions, mesh.notes);
+    SurfaceNotes notes;
+    const auto surfaces = surfaces_of(sets, notes);
+    Collector(sets, surfaces, mesh).collect(path, array);
+    tell(notes, path, mesh.notes);
+    return mesh;
+  });
 }
 
 }  // namespace telesplat::data::vtk

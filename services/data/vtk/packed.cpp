@@ -1,4 +1,4 @@
-#include "services/data/vtk/packed.h"
+#include "services/data/vtk/files.h"
 
 #include <fmt/format.h>
 #include <lz4.h>
@@ -64,28 +64,26 @@ struct Blocks {
   std::vector<uint64_t> packed;  // of each block
 };
 
-Result<Blocks> read_blocks(EncodedBytes& in, Packing packing, size_t header_bytes, bool big_endian,
-                           const std::string& what) {
+Blocks read_blocks(EncodedBytes& in, Packing packing, size_t header_bytes, bool big_endian, const std::string& what) {
   Blocks out;
   const auto next = [&](uint64_t& number) { return read_number(in, header_bytes, big_endian, number); };
-  if (!next(out.count)) return Error{fmt::format("{} is cut off before its data", what)};
+  if (!next(out.count)) refuse("{} is cut off before its data", what);
   if (out.count == 0) return out;
   const uint64_t there = in.most_left();
   if (!next(out.bytes) || !next(out.last_bytes) || out.count > there / header_bytes)
-    return Error{fmt::format("{} claims {} blocks in {} bytes", what, out.count, there)};
+    refuse("{} claims {} blocks in {} bytes", what, out.count, there);
   if (out.last_bytes == 0) out.last_bytes = out.bytes;
   for (uint64_t i = 0; i < out.count; ++i) {
     uint64_t packed = 0;
     if (!next(packed) || packed > there || out.packed_total + packed > there)
-      return Error{fmt::format("{} is cut off: block {} of {} is not there", what, i, out.count)};
+      refuse("{} is cut off: block {} of {} is not there", what, i, out.count);
     out.packed.push_back(packed);
     out.packed_total += packed;
   }
   const uint64_t most = (out.packed_total + 64) * best_packing(packing);
   if (out.last_bytes > out.bytes || out.last_bytes > most ||
       (out.count > 1 && out.count - 1 > most / std::max<uint64_t>(out.bytes, 1)))
-    return Error{
-        fmt::format("{} claims {} blocks of {} bytes, packed to {}", what, out.count, out.bytes, out.packed_total)};
+    refuse("{} claims {} blocks of {} bytes, packed to {}", what, out.count, out.bytes, out.packed_total);
   out.total = (out.count - 1) * out.bytes + out.last_bytes;
   return out;
 }
@@ -147,50 +145,48 @@ std::optional<Packing> packing_of(std::string_view name) {
   return std::nullopt;
 }
 
-Result<Bytes> read_plain(EncodedBytes& in, size_t header_bytes, bool big_endian, const std::string& what) {
+Bytes read_plain(EncodedBytes& in, size_t header_bytes, bool big_endian, const std::string& what) {
   uint64_t count = 0;
   Bytes out;
-  if (!read_number(in, header_bytes, big_endian, count))
-    return Error{fmt::format("{} is cut off before its data", what)};
-  const Error cut{fmt::format("{} is cut off or damaged: it claims {} bytes", what, count)};
-  if (count > in.most_left()) return cut;
-  if (!in.base64()) {
-    const auto raw = in.in_place(count);
-    if (!raw) return cut;
+  if (!read_number(in, header_bytes, big_endian, count)) refuse("{} is cut off before its data", what);
+  bool there = count <= in.most_left();
+  if (there && in.base64()) {
+    out.owned.resize(count);
+    there = in.read(out.owned.data(), count);
+  } else if (const auto raw = in.in_place(count)) {
     out.in_file = *raw;
-    return out;
+  } else {
+    there = false;
   }
-  out.owned.resize(count);
-  if (!in.read(out.owned.data(), count)) return cut;
+  if (!there) refuse("{} is cut off or damaged: it claims {} bytes", what, count);
   return out;
 }
 
-Result<Bytes> unpack(EncodedBytes& in, Packing packing, size_t header_bytes, bool big_endian, const std::string& what) {
+Bytes unpack(EncodedBytes& in, Packing packing, size_t header_bytes, bool big_endian, const std::string& what) {
   const auto blocks = read_blocks(in, packing, header_bytes, big_endian, what);
-  if (!blocks) return blocks.error();
   Bytes out;
-  if (blocks->count == 0) return out;
+  if (blocks.count == 0) return out;
   std::vector<std::byte> decoded;
   std::span<const std::byte> packed;
   if (in.base64()) {
-    decoded.resize(blocks->packed_total);
-    if (!in.read(decoded.data(), decoded.size())) return Error{fmt::format("{} is cut off or no base64", what)};
+    decoded.resize(blocks.packed_total);
+    if (!in.read(decoded.data(), decoded.size())) refuse("{} is cut off or no base64", what);
     packed = decoded;
-  } else if (const auto raw = in.in_place(blocks->packed_total)) {
+  } else if (const auto raw = in.in_place(blocks.packed_total)) {
     packed = *raw;
   } else {
-    return Error{fmt::format("{} is cut off: {} packed bytes are not there", what, blocks->packed_total)};
+    refuse("{} is cut off: {} packed bytes are not there", what, blocks.packed_total);
   }
   std::vector<size_t> begins{0};
-  for (const uint64_t bytes : blocks->packed) begins.push_back(begins.back() + bytes);
-  out.owned.resize(blocks->total);
+  for (const uint64_t bytes : blocks.packed) begins.push_back(begins.back() + bytes);
+  out.owned.resize(blocks.total);
   std::atomic<bool> sound{true};
-  in_parallel(size_t{0}, size_t(blocks->count), [&](size_t i) {
-    const size_t bytes = i + 1 == blocks->count ? blocks->last_bytes : blocks->bytes;
-    const auto to = std::span(out.owned).subspan(i * blocks->bytes, bytes);
+  in_parallel(size_t{0}, size_t(blocks.count), [&](size_t i) {
+    const size_t bytes = i + 1 == blocks.count ? blocks.last_bytes : blocks.bytes;
+    const auto to = std::span(out.owned).subspan(i * blocks.bytes, bytes);
     if (sound && !unpack_block(packing, packed.subspan(begins[i], begins[i + 1] - begins[i]), to)) sound = false;
   });
-  if (!sound) return Error{fmt::format("{}: its compressed data are damaged", what)};
+  if (!sound) refuse("{}: its compressed data are damaged", what);
   return out;
 }
 

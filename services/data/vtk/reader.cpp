@@ -4,8 +4,7 @@
 
 #include <filesystem>
 
-#include "services/data/vtk/legacy_reader.h"
-#include "services/data/vtk/xml_reader.h"
+#include "services/data/vtk/files.h"
 
 namespace telesplat::data::vtk {
 namespace {
@@ -78,40 +77,33 @@ class Reader {
       : path_(path), companions_(companions), notes_(notes) {}
 
   // from: the folder of this file, as seen from the first one's.
-  Status read(std::string_view content, const std::string& name, const std::string& from, int level) {
+  void read(std::string_view content, const std::string& name, const std::string& from, int level) {
     const std::string kind = kind_of(content);
-    if (kind.empty()) return Error{fmt::format("{}: is no data set of VTK's that is known", name)};
+    if (kind.empty()) refuse("{}: is no data set of VTK's that is known", name);
     if (kind == "vtk") {
-      auto set = read_legacy(content, name);
-      if (!set) return set.error();
-      sets_.push_back(std::move(*set));
-      return ok_status();
+      sets_.push_back(read_legacy(content, name));
+      return;
     }
-    const auto file = XmlFile::open(content, name);
-    if (!file) return file.error();
+    const XmlFile file(content, name);
     if (!kind.starts_with('p') && kind != "vtm") {
-      auto pieces = read_pieces(**file);
-      if (!pieces) return pieces.error();
-      for (auto& piece : *pieces) sets_.push_back(std::move(piece));
-      return ok_status();
+      for (auto& piece : read_pieces(file)) sets_.push_back(std::move(piece));
+      return;
     }
-    if (level == kMostLevels) return Error{fmt::format("{}: files name files, {} deep", name, level)};
-    const Named named = files_in(**file, kind);
+    if (level == kMostLevels) refuse("{}: files name files, {} deep", name, level);
+    const Named named = files_in(file, kind);
     if (named.steps > 1)
       notes_.push_back(
           fmt::format("{}: holds {} time steps; the first one is shown ({})", name, named.steps, named.first_step));
-    for (const std::string& one : named.files)
-      if (const Status s = read_named(beside(from, one), level + 1); !s) return s;
-    return ok_status();
+    for (const std::string& one : named.files) read_named(beside(from, one), level + 1);
   }
 
   std::vector<DataSet> sets_;
 
  private:
-  Status read_named(const std::string& named, int level) {
-    if (++files_ > kMostFiles) return Error{fmt::format("{}: names more than {} files", path_, kMostFiles)};
+  void read_named(const std::string& named, int level) {
+    if (++files_ > kMostFiles) refuse("{}: names more than {} files", path_, kMostFiles);
     const auto content = companions_.read(named);
-    if (!content) return Error{fmt::format("{}: needs a file that cannot be read: {}", path_, content.error().text)};
+    if (!content) refuse("{}: needs a file that cannot be read: {}", path_, content.error().text);
     return read(*content, beside(folder_of(path_), named), folder_of(named), level);
   }
 
@@ -121,19 +113,19 @@ class Reader {
   size_t files_ = 0;
 };
 
+// Damaged files name none.
 void list_named(std::string_view content, const std::string& path, const std::string& from, Companions& companions,
-                int level, std::vector<std::string>& out) {
+                int level, std::vector<std::string>& out) try {
   const std::string kind = kind_of(content);
   if (level == kMostLevels || !(kind.starts_with('p') || kind == "vtm")) return;
-  const auto file = XmlFile::open(content, path);
-  if (!file) return;
-  for (const std::string& one : files_in(**file, kind).files) {
+  for (const std::string& one : files_in(XmlFile(content, path), kind).files) {
     if (out.size() == kMostFiles) return;
     const std::string named = beside(from, one);
     out.push_back(named);
     if (const auto inner = companions.read(named))
       list_named(*inner, path, folder_of(named), companions, level + 1, out);
   }
+} catch (const Refusal&) {
 }
 
 }  // namespace
@@ -160,14 +152,14 @@ bool is_mesh_kind(std::string_view kind) {
 
 std::string active_scalars(std::string_view content) {
   if (root_tag(content).empty()) return {};
-  const auto file = XmlFile::open(content, "");
-  if (!file) return {};
-  const auto data = (*file)->root().child((*file)->root().attribute("type").value());
-  const auto piece = data.child("Piece");
-  const auto scalars = [](pugi::xml_node element) { return std::string(element.attribute("Scalars").value()); };
-  for (const std::string& name : {scalars(piece.child("PointData")), scalars(data.child("PPointData")),
-                                  scalars(piece.child("CellData")), scalars(data.child("PCellData"))})
-    if (!name.empty()) return name;
+  try {
+    const XmlFile file(content, "");
+    const auto data = file.root().child(file.root().attribute("type").value()), piece = data.child("Piece");
+    for (const auto element :
+         {piece.child("PointData"), data.child("PPointData"), piece.child("CellData"), data.child("PCellData")})
+      if (const std::string name = element.attribute("Scalars").value(); !name.empty()) return name;
+  } catch (const Refusal&) {
+  }
   return {};
 }
 
@@ -177,10 +169,10 @@ std::vector<std::string> named_files(std::string_view content, const std::string
   return out;
 }
 
-Result<std::vector<DataSet>> read_data_sets(std::string_view content, const std::string& path, Companions& companions,
-                                            std::vector<std::string>& notes) {
+std::vector<DataSet> read_data_sets(std::string_view content, const std::string& path, Companions& companions,
+                                    std::vector<std::string>& notes) {
   Reader reader(path, companions, notes);
-  if (const Status s = reader.read(content, path, "", 0); !s) return s.error();
+  reader.read(content, path, "", 0);
   return std::move(reader.sets_);
 }
 

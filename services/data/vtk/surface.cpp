@@ -1,11 +1,8 @@
-#include "services/data/vtk/surface.h"
+#include "services/data/vtk/cells.h"
 
-#include <fmt/format.h>
 #include <algorithm>
 #include <bit>
 #include <glm/geometric.hpp>
-
-#include "services/data/vtk/cell_reader.h"
 
 namespace telesplat::data::vtk {
 namespace {
@@ -272,15 +269,15 @@ void note(const CellReader& cells, SurfaceNotes& notes) {
 
 }  // namespace
 
-Result<std::vector<Surface>> surfaces_of(std::span<const DataSet> sets, SurfaceNotes& notes) {
+std::vector<Surface> surfaces_of(std::span<const DataSet> sets, SurfaceNotes& notes) {
   std::vector<CellReader> cells;
   std::vector<std::vector<OuterFace>> faces;
   bool volumes = false;
   for (const DataSet& set : sets) {
     if (set.cell_count() >= ~uint32_t{0})
-      return Error{fmt::format("{}: has {} cells, limit {}", set.name, set.cell_count(), ~uint32_t{0} - 1)};
+      refuse("{}: has {} cells, limit {}", set.name, set.cell_count(), ~uint32_t{0} - 1);
     cells.emplace_back(set);
-    if (const Status s = cells.back().check(); !s) return s.error();
+    cells.back().check();
     note(cells.back(), notes);
     faces.push_back(OuterFaces(set, cells.back()).find());
     for (const OuterFace& f : faces.back()) volumes = volumes || f.of_volume;

@@ -1,12 +1,9 @@
-#include "services/data/vtk/xml_file.h"
+#include "services/data/vtk/files.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
-
-#include "services/data/base/text_scanner.h"
-#include "services/data/vtk/packed.h"
 
 namespace telesplat::data::vtk {
 namespace {
@@ -62,29 +59,6 @@ std::string skeleton_of(std::string_view content, size_t& appended) {
   return out;
 }
 
-template <class T>
-Status parse_all(std::string_view text, Array& out, size_t most, const std::string& what) {
-  TextScanner in(text);
-  constexpr bool kFloats = std::is_floating_point_v<T>;
-  out.owned.reserve(std::min(most, text.size() / 2 + 1) * sizeof(T));
-  while (out.values < most && in.skip_space()) {
-    std::conditional_t<kFloats, double, int64_t> value{};
-    const bool fits = [&] {
-      if constexpr (kFloats)
-        return in.number(value);
-      else
-        return in.integer(value);
-    }();
-    if (!fits) return Error{fmt::format("{}: value {} is no number of type {}", what, out.values, name_of(out.type))};
-    const T stored = static_cast<T>(value);
-    const auto* bytes = reinterpret_cast<const std::byte*>(&stored);
-    out.owned.insert(out.owned.end(), bytes, bytes + sizeof stored);
-    ++out.values;
-  }
-  out.data = out.owned.data();
-  return ok_status();
-}
-
 }  // namespace
 
 bool type_of(std::string_view text, StoredType& out) {
@@ -114,30 +88,25 @@ pugi::xml_document root_tag(std::string_view content) {
   }
 }
 
-Result<std::unique_ptr<const XmlFile>> XmlFile::open(std::string_view content, const std::string& name) {
-  auto out = std::make_unique<XmlFile>();
-  out->content_ = content;
-  out->name_ = name;
+XmlFile::XmlFile(std::string_view content, const std::string& name) : content_(content), name_(name) {
   size_t appended;
-  out->skeleton_ = skeleton_of(content, appended);
-  const auto parsed = out->tree_.load_buffer_inplace(out->skeleton_.data(), out->skeleton_.size(), pugi::parse_default,
-                                                     pugi::encoding_utf8);
-  if (!parsed || !out->root())
-    return Error{fmt::format("{}: is cut off or no XML file of VTK's: {}", name,
-                             parsed ? "it has no VTKFile element" : parsed.description())};
+  skeleton_ = skeleton_of(content, appended);
+  const auto parsed =
+      tree_.load_buffer_inplace(skeleton_.data(), skeleton_.size(), pugi::parse_default, pugi::encoding_utf8);
+  if (!parsed || !root())
+    refuse("{}: is cut off or no XML file of VTK's: {}", name,
+           parsed ? "it has no VTKFile element" : parsed.description());
   if (appended != kNone) {
     const size_t end = std::min(markup_end(content, appended), content.size());
     pugi::xml_document tag;
     tag.load_string((std::string(content.substr(appended, end - appended)) + "</AppendedData>").c_str());
-    out->appended_base64_ = std::string_view(tag.first_child().attribute("encoding").value()) == "base64";
+    appended_base64_ = std::string_view(tag.first_child().attribute("encoding").value()) == "base64";
     const size_t mark = content.find_first_not_of(" \t\r\n", end);
-    if (mark != kNone && content[mark] == '_') out->appended_ = content.substr(mark + 1);
+    if (mark != kNone && content[mark] == '_') appended_ = content.substr(mark + 1);
   }
-  const auto root = out->root();
-  out->big_endian_ = std::string_view(root.attribute("byte_order").value()) == "BigEndian";
-  out->header_bytes_ = std::string_view(root.attribute("header_type").value()) == "UInt64" ? 8 : 4;
-  out->compressor_ = root.attribute("compressor").value();
-  return std::unique_ptr<const XmlFile>(std::move(out));
+  big_endian_ = std::string_view(root().attribute("byte_order").value()) == "BigEndian";
+  header_bytes_ = std::string_view(root().attribute("header_type").value()) == "UInt64" ? 8 : 4;
+  compressor_ = root().attribute("compressor").value();
 }
 
 std::string_view XmlFile::text(pugi::xml_node element) const {
@@ -149,13 +118,13 @@ std::string_view XmlFile::text(pugi::xml_node element) const {
   return content_.substr(std::min(begin, content_.size()), size);
 }
 
-Result<Array> XmlFile::array(pugi::xml_node element, int64_t tuples) const {
-  if (!element) return Error{name_ + ": an array that its cells or points need is missing"};
+Array XmlFile::array(pugi::xml_node element, int64_t tuples) const {
+  if (!element) refuse("{}: an array that its cells or points need is missing", name_);
   Array out;
   out.name = element.attribute("Name").value();
   const std::string what = fmt::format("{}: array {}", name_, out.name);
   if (!type_of(element.attribute("type").value(), out.type))
-    return Error{fmt::format("{} is of type {}, not of numbers", what, element.attribute("type").value())};
+    refuse("{} is of type {}, not of numbers", what, element.attribute("type").value());
   out.components = std::clamp<size_t>(element.attribute("NumberOfComponents").as_uint(1), 1, 1 << 16);
   for (const auto key : element.children("InformationKey"))
     if (std::string_view(key.attribute("name").value()) == "UNITS_LABEL") out.unit = text(key);
@@ -165,35 +134,31 @@ Result<Array> XmlFile::array(pugi::xml_node element, int64_t tuples) const {
   if (appended || format == "binary") {
     std::string_view encoded = appended ? appended_ : text(element);
     const uint64_t offset = appended ? element.attribute("offset").as_ullong() : 0;
-    if (offset > encoded.size())
-      return Error{fmt::format("{} begins at byte {} of {} appended ones", what, offset, encoded.size())};
+    if (offset > encoded.size()) refuse("{} begins at byte {} of {} appended ones", what, offset, encoded.size());
     encoded.remove_prefix(offset);
     const bool nothing = !appended && encoded.empty();  // as some write arrays without values
-    auto decoded =
-        nothing ? Result<Array>(std::move(out)) : decode(std::move(out), encoded, !appended || appended_base64_, what);
-    if (!decoded) return decoded;
-    out = std::move(*decoded);
+    if (!nothing) out = decode(std::move(out), encoded, !appended || appended_base64_, what);
   } else {
-    const Status parsed =
-        with_type(out.type, [&](auto v) { return parse_all<decltype(v)>(text(element), out, most, what); });
-    if (!parsed) return parsed.error();
+    TextScanner in(text(element));
+    out.owned.reserve(std::min(most, text(element).size() / 2 + 1) * stored_bytes(out.type));
+    parse_numbers(in, most, out);
+    if (out.values < most && in.skip_space())
+      refuse("{}: value {} is no number of type {}", what, out.values, name_of(out.type));
   }
-  if (tuples >= 0 && out.values < most)
-    return Error{fmt::format("{} has {} values, {} are needed", what, out.values, most)};
+  if (tuples >= 0 && out.values < most) refuse("{} has {} values, {} are needed", what, out.values, most);
   if (tuples >= 0) out.values = most;
   return out;
 }
 
-Result<Array> XmlFile::decode(Array out, std::string_view encoded, bool base64, const std::string& what) const {
+Array XmlFile::decode(Array out, std::string_view encoded, bool base64, const std::string& what) const {
   EncodedBytes in(encoded, base64);
   const auto packing = packing_of(compressor_);
-  if (!packing) return Error{fmt::format("{}: is packed by {}, which is not known", name_, compressor_)};
+  if (!packing) refuse("{}: is packed by {}, which is not known", name_, compressor_);
   auto bytes = *packing == Packing::kNone ? read_plain(in, header_bytes_, big_endian_, what)
                                           : unpack(in, *packing, header_bytes_, big_endian_, what);
-  if (!bytes) return bytes.error();
-  out.owned = std::move(bytes->owned);
-  out.data = out.owned.empty() ? bytes->in_file.data() : out.owned.data();
-  out.values = (out.owned.empty() ? bytes->in_file.size() : out.owned.size()) / stored_bytes(out.type);
+  out.owned = std::move(bytes.owned);
+  out.data = out.owned.empty() ? bytes.in_file.data() : out.owned.data();
+  out.values = (out.owned.empty() ? bytes.in_file.size() : out.owned.size()) / stored_bytes(out.type);
   if (big_endian_) out.swap_bytes();
   return out;
 }

@@ -5,13 +5,12 @@
 
 #include "common/geometry/mesh_chunk.h"
 #include "services/data/gltf/reader.h"
-#include "services/data/import/report.h"
+#include "services/data/import/process.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/store_file.h"
 #include "services/data/volume/formats/import_stream.h"
-#include "services/data/volume/formats/payload.h"
+#include "services/data/volume/formats/header.h"
 #include "services/data/volume/volume.h"
-#include "services/data/vtk/image.h"
 #include "services/data/vtk/reader.h"
 #include "tests/support/files/memory_file.h"
 

@@ -16,7 +16,7 @@
 
 #include "common/image/normal.h"
 #include "services/data/base/mesh.h"
-#include "services/data/open_mesh.h"
+#include "services/data/kinds.h"
 
 namespace telesplat::data::test {
 

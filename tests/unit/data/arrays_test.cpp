@@ -12,6 +12,12 @@ namespace {
 
 using namespace std::string_literals;
 
+Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path) {
+  auto mesh = read_mesh(path, {});
+  if (!mesh) return mesh.error();
+  return std::move(mesh->arrays);
+}
+
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 
 // A square of two triangles with the properties heat (float, one of them NaN) and id (uint8) of vertices, area (double)

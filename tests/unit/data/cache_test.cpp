@@ -11,7 +11,7 @@
 #include <fstream>
 
 #include "common/core/descriptor.h"
-#include "services/data/open_mesh.h"
+#include "services/data/kinds.h"
 
 namespace telesplat::data {
 namespace {

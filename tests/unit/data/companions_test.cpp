@@ -1,5 +1,5 @@
 // Files that a data set's files name: a server reads those below their folder, and others only where it is told to.
-#include "services/data/companions.h"
+#include "services/data/kinds.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,6 @@
 #include <random>
 
 #include "common/image/normal.h"
-#include "services/data/mesh/placing/creases.h"
 #include "services/data/mesh/placing/placement.h"
 #include "tests/support/files/data_files.h"
 

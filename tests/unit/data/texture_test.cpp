@@ -10,7 +10,6 @@
 #include <set>
 
 #include "common/image/file.h"
-#include "services/data/mesh/file_source.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/texture/bake.h"
 #include "tests/support/files/data_files.h"

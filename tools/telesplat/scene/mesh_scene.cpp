@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "services/data/inspect.h"
-#include "services/data/open_mesh.h"
+#include "services/data/kinds.h"
 #include "services/sampler/mesh/sampler.h"
 
 namespace telesplat::launcher {

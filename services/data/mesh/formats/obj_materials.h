@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "services/data/base/companions.h"
+#include "services/data/base/mapped_file.h"
 
 namespace telesplat::data {
 

@@ -6,11 +6,12 @@
 #include <unordered_map>
 
 #include "services/data/base/polygons/polygon.h"
+#include "services/data/base/refusal.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/formats/readers.h"
-#include "services/data/texture/named_textures.h"
+#include "services/data/texture/texture.h"
 
 namespace telesplat::data {
 namespace {
@@ -29,25 +30,23 @@ class ObjReader {
         texture_detail_(texture_detail),
         scan_(content) {}
 
-  Result<Mesh> read() {
+  Mesh read() {
     read_materials();
     mesh_.format = "obj";
     for (size_t lines = 0; scan_.skip_space('#'); scan_.next_line(), ++lines) {
       const std::string_view word = scan_.word();
-      const Status status = word == "v"    ? read_vertex()
-                            : word == "vn" ? read_normal()
-                            : word == "vt" ? read_texture_coordinate()
-                            : word == "f"  ? read_face()
-                                           : ok_status();
-      if (!status.ok()) return status.error();
+      if (word == "v") read_vertex();
+      if (word == "vn") read_normal();
+      if (word == "vt") read_texture_coordinate();
+      if (word == "f") read_face();
       if (word == "usemtl") use_material();
       if (word == "l" || word == "p" || word == "curv" || word == "surf") ++others_;
       if ((lines & 0xffff) == 0 && progress_)
         progress_(static_cast<double>(scan_.offset()) / static_cast<double>(content_.size()));
     }
     if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0)
-      return Error{fmt::format("{}: holds no faces, only {} vertices and {} lines, points, curves and surfaces", name_,
-                               positions_.size(), others_)};
+      refuse("{}: holds no faces, only {} vertices and {} lines, points, curves and surfaces", name_, positions_.size(),
+             others_);
     if (others_ > 0)
       mesh_.notes.push_back(fmt::format("{}: its {} lines, points, curves and surfaces are left out", name_, others_));
     return finish();
@@ -77,7 +76,10 @@ class ObjReader {
           fmt::format("{}: the material library {} is not there; its colours are left out", name_, library));
   }
 
-  Error bad(const std::string& what) const { return Error{fmt::format("{}:{}: {}", name_, scan_.line_number(), what)}; }
+  template <class... Given>
+  [[noreturn]] void bad(fmt::format_string<Given...> what, Given&&... given) const {
+    refuse("{}:{}: {}", name_, scan_.line_number(), fmt::format(what, std::forward<Given>(given)...));
+  }
 
   // Whether the statement goes on: on the same line, or on the next one behind a backslash.
   bool more() {
@@ -88,34 +90,31 @@ class ObjReader {
     return false;
   }
 
-  Status read_vertex() {
+  void read_vertex() {
     double value[7];
     int count = 0;
     while (count < 7 && more() && scan_.number(value[count])) ++count;
-    if (count < 3) return bad("a vertex is not three numbers");
+    if (count < 3) bad("a vertex is not three numbers");
     positions_.emplace_back(value[0], value[1], value[2]);
     if (count >= 6) {  // x y z r g b, as MeshLab and others write it; x y z w r g b does not occur
       colours_.fill(positions_.size() - 1);
       colours_.add({value[3], value[4], value[5]});
     }
-    return ok_status();
   }
 
-  Status read_normal() {
+  void read_normal() {
     glm::dvec3 n;
     for (int a = 0; a < 3; ++a)
-      if (!more() || !scan_.number(n[a])) return bad("a normal is not three numbers");
+      if (!more() || !scan_.number(n[a])) bad("a normal is not three numbers");
     normals_.emplace_back(n);
-    return ok_status();
   }
 
   // u [v [w]]; v goes up from the picture's lower rim.
-  Status read_texture_coordinate() {
+  void read_texture_coordinate() {
     double u = 0, v = 0;
-    if (!more() || !scan_.number(u)) return bad("a texture coordinate is no number");
+    if (!more() || !scan_.number(u)) bad("a texture coordinate is no number");
     if (more()) scan_.number(v);
     places_.emplace_back(u, v);
-    return ok_status();
   }
 
   void use_material() {
@@ -132,21 +131,20 @@ class ObjReader {
   }
 
   // position[/[texture][/normal]]
-  Status read_corner(uint32_t& out) {
+  uint32_t read_corner() {
     int64_t index = 0;
     uint32_t position = 0, normal = kNone, place = kNone;
-    if (!scan_.integer(index)) return bad("a face's corner is no number");
+    if (!scan_.integer(index)) bad("a face's corner is no number");
     if (!resolve(index, positions_.size(), position))
-      return bad(fmt::format("a face names vertex {}, there are {} so far", index, positions_.size()));
+      bad("a face names vertex {}, there are {} so far", index, positions_.size());
     if (scan_.skip_char('/')) {
       if (scan_.integer(index) && !resolve(index, places_.size(), place))
-        return bad(fmt::format("a face names texture coordinate {}, there are {} so far", index, places_.size()));
+        bad("a face names texture coordinate {}, there are {} so far", index, places_.size());
       if (scan_.skip_char('/') && scan_.integer(index) && !resolve(index, normals_.size(), normal))
-        return bad(fmt::format("a face names normal {}, there are {} so far", index, normals_.size()));
+        bad("a face names normal {}, there are {} so far", index, normals_.size());
     }
     const bool textured = material_ != kNone && !materials_[material_].texture.empty();
-    out = variant_of(position, normal, textured ? place : kNone);
-    return ok_status();
+    return variant_of(position, normal, textured ? place : kNone);
   }
 
   uint32_t variant_of(uint32_t position, uint32_t normal, uint32_t place) {
@@ -159,17 +157,12 @@ class ObjReader {
     return first_variant_[position] = id;
   }
 
-  Status read_face() {
+  void read_face() {
     corners_.clear();
-    while (more()) {
-      uint32_t corner = 0;
-      if (auto status = read_corner(corner); !status) return status;
-      corners_.push_back(corner);
-    }
+    while (more()) corners_.push_back(read_corner());
     if (corners_.size() < 3) ++mesh_.degenerate_dropped;
     if (corners_.size() == 3) mesh_.indices.insert(mesh_.indices.end(), corners_.begin(), corners_.end());
     if (corners_.size() > 3) cut_face();
-    return ok_status();
   }
 
   void cut_face() {
@@ -186,11 +179,10 @@ class ObjReader {
     return !own_colours && kd ? *kd : vertex_colours_[v.vertex];
   }
 
-  Result<Mesh> finish() {
+  Mesh finish() {
     auto use = read_textures();
-    if (!use) return use.error();
     const bool own_colours = !colours_.empty();  // they win over materials
-    bool any_colour = own_colours || !use->textures.empty(), any_normal = false;
+    bool any_colour = own_colours || !use.textures.empty(), any_normal = false;
     for (const Variant& v : variants_)
       any_colour |= v.material != kNone && materials_[v.material].colour, any_normal |= v.normal != kNone;
     colours_.fill(positions_.size());
@@ -202,12 +194,12 @@ class ObjReader {
       if (any_colour) mesh_.colours.push_back(colour_of_variant(v, own_colours, texture != kNoTexture));
       if (any_normal)
         mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // without one: computed later
-      if (use->textures.empty()) continue;
-      use->texture.push_back(texture);
-      use->uv.push_back(texture == kNoTexture ? glm::vec2(0) : place_in_picture(v));
+      if (use.textures.empty()) continue;
+      use.texture.push_back(texture);
+      use.uv.push_back(texture == kNoTexture ? glm::vec2(0) : place_in_picture(v));
     }
-    if (!use->textures.empty() && drop_not_finite(mesh_, name_))
-      if (std::string note = bake_textures(mesh_, std::move(*use), texture_detail_); !note.empty())
+    if (!use.textures.empty() && drop_not_finite(mesh_, name_))
+      if (std::string note = bake_textures(mesh_, std::move(use), texture_detail_); !note.empty())
         mesh_.notes.push_back(name_ + ": " + note);
     return std::move(mesh_);
   }
@@ -219,7 +211,7 @@ class ObjReader {
   }
 
   // Those that faces use.
-  Result<TextureUse> read_textures() {
+  TextureUse read_textures() {
     NamedTextures textures(name_, companions_);
     textures_of_.assign(materials_.size(), kNoTexture);
     std::vector<bool> used(materials_.size(), false);
@@ -229,8 +221,7 @@ class ObjReader {
       const ObjMaterial& material = materials_[m];
       if (!used[m] || material.texture.empty()) continue;
       const auto number = textures.number_of(material.texture, material.clamp ? Wrap::kClamp : Wrap::kRepeat);
-      if (!number) return number.error();
-      textures_of_[m] = *number;
+      textures_of_[m] = number;
       if (!material.not_applied.empty())
         mesh_.notes.push_back(fmt::format("{}: the option {} of the texture {} is not applied", name_,
                                           material.not_applied, material.texture));
@@ -265,7 +256,7 @@ class ObjReader {
 
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
                       Companions& companions, uint64_t texture_detail) {
-  return ObjReader(content, name, progress, companions, texture_detail).read();
+  return or_error([&] { return ObjReader(content, name, progress, companions, texture_detail).read(); });
 }
 
 }  // namespace telesplat::data

@@ -1,11 +1,9 @@
 // OFF. Source: Geomview 1.9 manual, section "OFF Files" (http://www.geomview.org/docs/html/OFF.html).
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "services/data/base/polygons/polygon.h"
+#include "services/data/base/refusal.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/formats/readers.h"
@@ -20,48 +18,29 @@ class OffReader {
   OffReader(std::string_view content, const std::string& name, const ReadProgress& progress)
       : content_(content), name_(name), progress_(progress), scan_(content) {}
 
-  Result<Mesh> read() {
+  Mesh read() {
     mesh_.format = "off";
-    if (auto status = read_header(); !status) return status.error();
-    if (auto status = read_vertices(); !status) return status.error();
-    if (auto status = read_faces(); !status) return status.error();
+    read_header();
+    read_vertices();
+    read_faces();
     set_colours();
     return std::move(mesh_);
   }
 
  private:
-  Error bad(const std::string& what) const {
-    if (binary_) return Error{fmt::format("{}: {}", name_, what)};
-    return Error{fmt::format("{}:{}: {}", name_, scan_.line_number(), what)};
+  template <class... Given>
+  [[noreturn]] void bad(fmt::format_string<Given...> what, Given&&... given) const {
+    refuse("{}:{}: {}", name_, scan_.line_number(), fmt::format(what, std::forward<Given>(given)...));
   }
-  size_t offset() const { return binary_ ? at_ : scan_.offset(); }
   void tick(size_t done) {
-    if ((done & 0xffff) == 0 && progress_) progress_(double(offset()) / double(content_.size()));
+    if ((done & 0xffff) == 0 && progress_) progress_(double(scan_.offset()) / double(content_.size()));
   }
+  bool real(double& out) { return scan_.skip_space(kComment) && scan_.number(out); }
+  bool integer(double& out) { return real(out) && out == std::floor(out); }
+  bool reals(double (&out)[4]) { return real(out[0]) && real(out[1]) && real(out[2]); }
 
-  // Binary files hold four bytes a number, the highest first.
-  bool take(uint32_t& bits) {
-    if (content_.size() - at_ < 4) return false;
-    bits = 0;
-    for (int i = 0; i < 4; ++i) bits = bits << 8 | uint8_t(content_[at_++]);
-    return true;
-  }
-  bool real(double& out) {
-    uint32_t bits;
-    if (!binary_) return scan_.skip_space(kComment) && scan_.number(out);
-    return take(bits) && (out = double(std::bit_cast<float>(bits)), true);
-  }
-  bool integer(double& out) {
-    uint32_t bits;
-    if (!binary_) return real(out) && out == std::floor(out);
-    return take(bits) && (out = double(int32_t(bits)), true);
-  }
-  bool reals(std::initializer_list<double*> out) {
-    return std::all_of(out.begin(), out.end(), [&](double* x) { return real(*x); });
-  }
-
-  // OFF with prefixes [BINARY], which may be missing; then the numbers of vertices, faces and edges.
-  Status read_header() {
+  // OFF with prefixes, which may be missing; then the numbers of vertices, faces and edges.
+  void read_header() {
     scan_.skip_space(kComment);
     if (TextScanner first = scan_; !(first.number(counts_[0]) && first.word().empty())) {
       std::string_view word = scan_.word();
@@ -78,105 +57,87 @@ class OffReader {
              {std::pair("ST", &texture_), {"C", &colours_}, {"N", &normals_}, {"4", &other}, {"n", &other}})
           if (skip(prefix)) any = *has = true;
       }
-      if (other && word == "OFF")
-        return bad(fmt::format("{} has vertices of other than three coordinates, which are not shown", keyword));
-      if (word != "OFF") return bad(fmt::format("'{}' is not OFF, nor OFF with the prefixes ST, C, N", keyword));
-      TextScanner after = scan_;
-      if (after.skip_blanks(kComment) && after.word() == "BINARY") {
-        after.next_line();
-        at_ = after.offset(), binary_ = true;
-      }
+      if (other && word == "OFF") bad("{} has vertices of other than three coordinates, which are not shown", keyword);
+      if (word != "OFF") bad("'{}' is not OFF, nor OFF with the prefixes ST, C, N", keyword);
+      if (TextScanner after = scan_; after.skip_blanks(kComment) && after.word() == "BINARY")
+        bad("is binary, which is not read: save it as text");
     }
     bool one_line = true;
     for (int i = 0; i < 3; ++i) {
       const bool goes_on = scan_.skip_blanks(kComment);
       if (i == 1) one_line = goes_on;
-      if (i == 2 && one_line && !goes_on && !binary_) break;  // some leave out the number of edges
-      if (!integer(counts_[i]) || counts_[i] < 0)
-        return bad("after OFF stand the numbers of vertices, faces and edges");
+      if (i == 2 && one_line && !goes_on) break;  // some leave out the number of edges
+      if (!integer(counts_[i]) || counts_[i] < 0) bad("after OFF stand the numbers of vertices, faces and edges");
     }
     const size_t vertex_numbers = 3 + (normals_ ? 3 : 0);
-    if (auto status = check_count("vertices", counts_[0], vertex_numbers); !status) return status;
-    if (auto status = check_count("faces", counts_[1], 1); !status) return status;
+    check_count("vertices", counts_[0], vertex_numbers);
+    check_count("faces", counts_[1], 1);
     vertices_ = size_t(counts_[0]), faces_ = size_t(counts_[1]);
-    return ok_status();
   }
 
-  // Each number takes four bytes, or a digit and a separator, but for the last.
-  Status check_count(const char* what, double count, size_t numbers) const {
-    const auto most = double((content_.size() + 1) / ((binary_ ? 4 : 2) * numbers));
-    if (count <= most) return ok_status();
-    return bad(fmt::format("header claims {:.0f} {}, a file of {} bytes holds at most {:.0f}", count, what,
-                           content_.size(), most));
+  // Each number takes a digit and a separator, but for the last.
+  void check_count(const char* what, double count, size_t numbers) const {
+    const auto most = double((content_.size() + 1) / (2 * numbers));
+    if (count <= most) return;
+    bad("header claims {:.0f} {}, a file of {} bytes holds at most {:.0f}", count, what, content_.size(), most);
   }
 
-  Status read_vertices() {
+  void read_vertices() {
     mesh_.positions.reserve(vertices_);
     for (size_t v = 0; v < vertices_; ++v, tick(v)) {
-      double p[3], c[4], unused;
-      if (!reals({&p[0], &p[1], &p[2]}))
-        return bad(fmt::format("vertex {} of {} is missing or no number", v, vertices_));
+      double p[4], c[4];
+      if (!reals(p)) bad("vertex {} of {} is missing or no number", v, vertices_);
       mesh_.positions.emplace_back(p[0], p[1], p[2]);
       if (normals_) {
-        if (!reals({&p[0], &p[1], &p[2]})) return bad(fmt::format("normal of vertex {} is missing or no number", v));
+        if (!reals(p)) bad("normal of vertex {} is missing or no number", v);
         mesh_.normals.emplace_back(p[0], p[1], p[2]);
       }
       if (colours_) {
         const int channels = numbers_to_line_end(c);
-        if (channels < 3) return bad(fmt::format("vertex {} has {} colour channels instead of 3 or 4", v, channels));
+        if (channels < 3) bad("vertex {} has {} colour channels instead of 3 or 4", v, channels);
         vertex_colours_.add({c[0], c[1], c[2]});
       }
-      if (texture_ && !binary_) scan_.next_line();
-      if (texture_ && binary_ && !reals({&unused, &unused})) return bad(fmt::format("vertex {} lacks its place", v));
+      if (texture_) scan_.next_line();
     }
-    return ok_status();
   }
 
-  // At most four; of vertices in binary files always four.
+  // At most four.
   int numbers_to_line_end(double (&out)[4]) {
     int n = 0;
-    while (n < 4 && (binary_ || scan_.skip_blanks(kComment)) && (binary_ ? real(out[n]) : scan_.number(out[n]))) ++n;
+    while (n < 4 && scan_.skip_blanks(kComment) && scan_.number(out[n])) ++n;
     return n;
   }
 
-  Status read_faces() {
+  void read_faces() {
     mesh_.indices.reserve(std::min(3 * faces_, content_.size() / 2));
     std::vector<uint32_t> ring;
     for (size_t f = 0; f < faces_; ++f, tick(f)) {
       double corners;
       if (!integer(corners) || corners < 0)
-        return bad(fmt::format("face {} of {} is missing or does not start with its number of corners", f, faces_));
+        bad("face {} of {} is missing or does not start with its number of corners", f, faces_);
       ring.clear();
       for (double i = 0; i < corners; ++i) {  // a lying number ends where the file ends
         double index;
-        if (!integer(index)) return bad(fmt::format("face {} lacks corner {:.0f} of {:.0f}", f, i, corners));
+        if (!integer(index)) bad("face {} lacks corner {:.0f} of {:.0f}", f, i, corners);
         if (!(index >= 0 && index < double(vertices_)))
-          return bad(fmt::format("face {} names vertex {}, there are {}", f, index, vertices_));
+          bad("face {} names vertex {}, there are {}", f, index, vertices_);
         ring.push_back(uint32_t(index));
       }
       if (corners < 3) ++mesh_.degenerate_dropped;
       const size_t before = mesh_.indices.size() / 3;
       cut_polygon(ring, mesh_.positions, mesh_.indices);
-      if (!read_face_colour(before)) return bad(fmt::format("face {} has a colour that is no number", f));
+      read_face_colour(before);
     }
-    return ok_status();
   }
 
   // Nothing, one number (a place in Geomview's own colour map), or three or four of a colour: whole numbers to 255 or
   // fractions of 1.
-  bool read_face_colour(size_t first_triangle) {
-    double c[4], count = 0;
-    if (binary_) {
-      uint32_t bits;
-      if (!integer(count) || count < 0 || count > 4) return false;
-      for (int i = 0; i < int(count); ++i)
-        if (!(count == 1 ? take(bits) : real(c[i]))) return false;
-    } else {
-      count = numbers_to_line_end(c);
-      scan_.next_line();
-    }
+  void read_face_colour(size_t first_triangle) {
+    double c[4];
+    const int count = numbers_to_line_end(c);
+    scan_.next_line();
     by_map_ += count == 1;
-    if (count < 3) return true;
+    if (count < 3) return;
     uint32_t colour = kUndecided;  // 0 and 1 are both: the other faces tell
     const double largest = std::max({c[0], c[1], c[2]});
     const auto channel = [](double v) { return v > 0 ? uint32_t(std::min(v + 0.5, 255.0)) : 0; };
@@ -188,7 +149,6 @@ class OffReader {
       colour = pack_rgb(channel(255 * c[0]), channel(255 * c[1]), channel(255 * c[2]));
     face_colours_.resize(first_triangle, kNoColour);
     face_colours_.resize(mesh_.indices.size() / 3, colour);
-    return true;
   }
 
   void set_colours() {
@@ -209,8 +169,7 @@ class OffReader {
   const std::string& name_;
   const ReadProgress& progress_;
   TextScanner scan_;
-  size_t at_ = 0;  // of binary files
-  bool binary_ = false, colours_ = false, normals_ = false, texture_ = false;
+  bool colours_ = false, normals_ = false, texture_ = false;
   double counts_[3] = {};
   size_t vertices_ = 0, faces_ = 0;
   Mesh mesh_;
@@ -223,7 +182,7 @@ class OffReader {
 }  // namespace
 
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress) {
-  return OffReader(content, name, progress).read();
+  return or_error([&] { return OffReader(content, name, progress).read(); });
 }
 
 }  // namespace telesplat::data

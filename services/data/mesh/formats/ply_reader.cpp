@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <type_traits>
 
 #include "services/data/base/polygons/polygon.h"
-#include "services/data/mesh/formats/ply_arrays.h"
-#include "services/data/mesh/formats/ply_cursor.h"
-#include "services/data/mesh/formats/ply_header.h"
-#include "services/data/mesh/formats/ply_textures.h"
+#include "services/data/mesh/formats/ply.h"
 #include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/formats/readers.h"
 
@@ -63,7 +61,7 @@ struct Targets {
 
   std::vector<Target> of;
   bool has[size_t(Target::kCount)] = {};
-  PlyType colour_type = PlyType::kUint8;
+  StoredType colour_type = StoredType::kU8;
 };
 
 using Values = std::array<double, size_t(Target::kCount)>;
@@ -73,7 +71,7 @@ glm::vec3 colour_of(const Values& v) {
 }
 
 // Bytes go up to 255 whatever stands in them; wider integers at least.
-float least_full(PlyType type) { return kPlyTypeBytes[size_t(type)] <= 2 ? 255 : 1; }
+float least_full(StoredType type) { return stored_bytes(type) <= 2 ? 255 : 1; }
 
 template <class Cursor>
 class PlyBody {
@@ -94,10 +92,9 @@ class PlyBody {
   }
 
   /// array: what the mesh is coloured by; empty: nothing.
-  Result<Mesh> read(const std::string& array, Companions& companions, uint64_t texture_detail) {
+  Mesh read(const std::string& array, Companions& companions, uint64_t texture_detail) {
     mesh_.format = "ply";
-    if (!array.empty())
-      if (const Status s = arrays_.choose(array, name_); !s) return s.error();
+    if (!array.empty()) arrays_.choose(array, name_);
     const auto is_vertex = [](const PlyElement& e) { return e.name == "vertex"; };
     const auto vertices = std::find_if(header_.elements.begin(), header_.elements.end(), is_vertex);
     const bool faces_first = vertices != header_.elements.end() &&
@@ -105,45 +102,42 @@ class PlyBody {
                                          [](const PlyElement& e) { return e.name == "face" || e.name == "tristrips"; });
     if (faces_first) {
       const Cursor start = cursor_;
-      for (auto e = header_.elements.begin(); e != vertices; ++e)
-        if (const Status s = skip(*e); !s) return s.error();
-      if (const Status s = read_vertices(*vertices); !s) return s.error();
+      for (auto e = header_.elements.begin(); e != vertices; ++e) skip(*e);
+      read_vertices(*vertices);
       cursor_ = start;
     }
     for (const PlyElement& element : header_.elements) {
-      const Status status = is_vertex(element) && !(faces_first && &element == &*vertices) ? read_vertices(element)
-                            : element.name == "face"                                       ? read_faces(element, false)
-                            : element.name == "tristrips"                                  ? read_faces(element, true)
-                                                                                           : skip(element);
-      if (!status.ok()) return status.error();
+      if (is_vertex(element) && !(faces_first && &element == &*vertices))
+        read_vertices(element);
+      else if (element.name == "face" || element.name == "tristrips")
+        read_faces(element, element.name == "tristrips");
+      else
+        skip(element);
     }
-    if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0 && !mesh_.positions.empty()) return no_faces();
+    if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0 && !mesh_.positions.empty()) refuse_faceless();
     arrays_.finish(mesh_);
-    if (array.empty())
-      if (const Status s = colour_triangles(companions, texture_detail); !s) return s.error();
+    if (array.empty()) colour_triangles(companions, texture_detail);
     return std::move(mesh_);
   }
 
  private:
-  Error ended(const PlyElement& element, uint64_t at) const {
-    return Error{
-        fmt::format("{}: is truncated or damaged: {} {} of {} cannot be read", name_, element.name, at, element.count)};
+  [[noreturn]] void ended(const PlyElement& element, uint64_t at) const {
+    refuse("{}: is truncated or damaged: {} {} of {} cannot be read", name_, element.name, at, element.count);
   }
-  Error no_faces() const {
+  [[noreturn]] void refuse_faceless() const {
     const PlyElement* vertices = header_.find("vertex");
     const bool splats = vertices && (vertices->find("f_dc_0") >= 0 || vertices->find("packed_position") >= 0);
-    return Error{fmt::format("{}: holds {} {} and no triangles: {}", name_, mesh_.positions.size(),
-                             splats ? "Gaussian splats" : "points",
-                             splats ? "splats of other programs are not read" : "point clouds are not read yet")};
+    refuse("{}: holds {} {} and no triangles: {}", name_, mesh_.positions.size(), splats ? "Gaussian splats" : "points",
+           splats ? "splats of other programs are not read" : "point clouds are not read yet");
   }
   // Colours of triangles, or their pictures, which win.
-  Status colour_triangles(Companions& companions, uint64_t texture_detail) {
+  void colour_triangles(Companions& companions, uint64_t texture_detail) {
     const size_t triangles = mesh_.indices.size() / 3;
     if (textured_ && places_) return textures_.bake(mesh_, header_.textures, name_, companions, texture_detail);
-    if (face_colours_.empty()) return ok_status();
+    if (face_colours_.empty()) return;
     face_colours_.fill(triangles);
     colour_faces(mesh_, face_colours_.packed(kNoColour, face_colours_least_));
-    return ok_status();
+    return;
   }
   void tick() {
     if ((++done_ & 0x3ffff) == 0 && progress_) progress_(static_cast<double>(done_) / static_cast<double>(total_));
@@ -156,14 +150,13 @@ class PlyBody {
     return cursor_.read(property.type, static_cast<uint64_t>(count), list);
   }
 
-  Status read_vertices(const PlyElement& element) {
-    if (!mesh_.positions.empty()) return Error{name_ + ": has two elements 'vertex'"};
+  void read_vertices(const PlyElement& element) {
+    if (!mesh_.positions.empty()) refuse("{}: has two elements 'vertex'", name_);
     const Targets targets(element, textured_);
-    if (!targets.all({Target::kX, Target::kY, Target::kZ})) return Error{name_ + ": element 'vertex' lacks x, y or z"};
-    if (element.count > kMaxVertices)
-      return Error{fmt::format("{}: {} vertices, the limit is {}", name_, element.count, kMaxVertices)};
+    if (!targets.all({Target::kX, Target::kY, Target::kZ})) refuse("{}: element 'vertex' lacks x, y or z", name_);
+    if (element.count > kMaxVertices) refuse("{}: {} vertices, the limit is {}", name_, element.count, kMaxVertices);
     const bool normals = targets.all({Target::kNormalX, Target::kNormalY, Target::kNormalZ}),
-               colours = targets.colours(), bytes = targets.colour_type == PlyType::kUint8,
+               colours = targets.colours(), bytes = targets.colour_type == StoredType::kU8,
                places = targets.all({Target::kU, Target::kV});
     RawColours raw_colours;
     mesh_.positions.reserve(element.count);
@@ -175,8 +168,7 @@ class PlyBody {
     for (uint64_t v = 0; v < element.count; ++v, tick()) {
       for (size_t i = 0; i < targets.of.size(); ++i) {
         const PlyProperty& p = element.properties[i];
-        if (p.is_list ? !read_list(p, list_) : !cursor_.read(p.type, value[size_t(targets.of[i])]))
-          return ended(element, v);
+        if (p.is_list ? !read_list(p, list_) : !cursor_.read(p.type, value[size_t(targets.of[i])])) ended(element, v);
         if (arrays[i] >= 0) arrays_.take_vertex(arrays[i], at(Target::kNone));
       }
       mesh_.positions.emplace_back(at(Target::kX), at(Target::kY), at(Target::kZ));
@@ -190,20 +182,19 @@ class PlyBody {
     }
     if (!raw_colours.empty()) mesh_.colours = raw_colours.packed(kNeutralAlbedo, least_full(targets.colour_type));
     places_ |= places;
-    return ok_status();
   }
 
-  Status read_faces(const PlyElement& element, bool strips) {
+  void read_faces(const PlyElement& element, bool strips) {
     int corners = element.find("vertex_indices");
     if (corners < 0) corners = element.find("vertex_index");
     if (corners < 0 || !element.properties[corners].is_list)
-      return Error{fmt::format("{}: element '{}' lacks the list vertex_indices", name_, element.name)};
+      refuse("{}: element '{}' lacks the list vertex_indices", name_, element.name);
     const int places = textured_ ? element.find("texcoord") : -1, picture = textured_ ? element.find("texnumber") : -1;
     places_ |= places >= 0 && element.properties[places].is_list;
     const Targets targets(element, textured_);
     const bool colours = targets.colours(), corners_alone = element.properties.size() == 1;
     if (colours) face_colours_least_ = least_full(targets.colour_type);
-    const size_t item_bytes = kPlyTypeBytes[static_cast<int>(element.properties[corners].type)];
+    const size_t item_bytes = stored_bytes(element.properties[corners].type);
     mesh_.indices.reserve(mesh_.indices.size() + std::min<uint64_t>(3 * element.count, content_bytes_ / item_bytes));
     const std::vector<int>& arrays = arrays_.arrays_of(element);
     Values value{};
@@ -221,50 +212,45 @@ class PlyBody {
       return true;
     };
     for (uint64_t f = 0; f < element.count; ++f, tick()) {
-      if (corners_alone ? !read_list(element.properties[0], list_) : !read_face()) return ended(element, f);
+      if (corners_alone ? !read_list(element.properties[0], list_) : !read_face()) ended(element, f);
       const size_t before = mesh_.indices.size();
-      if (auto status = strips ? add_strip(element, f) : add_polygon(element, f); !status) return status;
-      if (mesh_.indices.size() > 3 * kMaxTriangles)
-        return Error{fmt::format("{}: more than {} triangles", name_, kMaxTriangles)};
+      strips ? add_strip(element, f) : add_polygon(element, f);
+      if (mesh_.indices.size() > 3 * kMaxTriangles) refuse("{}: more than {} triangles", name_, kMaxTriangles);
       arrays_.end_face(mesh_.indices.size() / 3);
       if (colours) face_colours_.fill(before / 3);
       for (size_t i = before; i < mesh_.indices.size() && colours; i += 3) face_colours_.add(colour_of(value));
       if (textured_) add_places(number_of_picture, before);
     }
-    return ok_status();
   }
 
   bool is_vertex(double index) const { return index >= 0 && index < double(mesh_.positions.size()); }
-  Error no_vertex(const PlyElement& element, uint64_t face, double index) const {
-    return Error{fmt::format("{}: {} {} names vertex {}, there are {}", name_, element.name, face, index,
-                             mesh_.positions.size())};
+  [[noreturn]] void no_vertex(const PlyElement& element, uint64_t face, double index) const {
+    refuse("{}: {} {} names vertex {}, there are {}", name_, element.name, face, index, mesh_.positions.size());
   }
 
   // The face in list_; cut_ and ring_ are right afterwards unless it is a triangle without a picture, which is usual.
-  Status add_polygon(const PlyElement& element, uint64_t face) {
+  void add_polygon(const PlyElement& element, uint64_t face) {
     const double* c = list_.data();
     if (list_.size() != 3 || textured_ || !is_vertex(c[0]) || !is_vertex(c[1]) || !is_vertex(c[2]))
       return cut_face(element, face);
     for (int k = 0; k < 3; ++k) mesh_.indices.push_back(uint32_t(c[k]));
-    return ok_status();
   }
 
-  Status cut_face(const PlyElement& element, uint64_t face) {
+  void cut_face(const PlyElement& element, uint64_t face) {
     for (const double index : list_)
-      if (!is_vertex(index)) return no_vertex(element, face, index);
+      if (!is_vertex(index)) no_vertex(element, face, index);
     if (list_.size() < 3) ++mesh_.degenerate_dropped;
     ring_.assign(list_.begin(), list_.end());
     cut_.clear();
     cut_corners(ring_, mesh_.positions, cut_);
     for (const uint32_t i : cut_) mesh_.indices.push_back(ring_[i]);
-    return ok_status();
   }
 
   // Corners of strips, one after the other, -1 between them.
-  Status add_strip(const PlyElement& element, uint64_t face) {
+  void add_strip(const PlyElement& element, uint64_t face) {
     ring_.clear(), cut_.clear();
     for (const double index : list_) {
-      if (!is_vertex(index) && index != -1) return no_vertex(element, face, index);
+      if (!is_vertex(index) && index != -1) no_vertex(element, face, index);
       ring_.push_back(index == -1 ? kBreak : uint32_t(index));
     }
     uint32_t start = 0;
@@ -276,7 +262,6 @@ class PlyBody {
         cut_.insert(cut_.end(), {i - 2, odd ? i : i - 1, odd ? i - 1 : i});
     }
     for (const uint32_t i : cut_) mesh_.indices.push_back(ring_[i]);
-    return ok_status();
   }
 
   // The places of the corners in cut_: a face's own, or those of its vertices.
@@ -290,13 +275,12 @@ class PlyBody {
     }
   }
 
-  Status skip(const PlyElement& element) {
+  void skip(const PlyElement& element) {
     for (uint64_t n = 0; n < element.count; ++n, tick())
       for (const PlyProperty& p : element.properties) {
         double ignored;
-        if (p.is_list ? !read_list(p, ignored_) : !cursor_.read(p.type, ignored)) return ended(element, n);
+        if (p.is_list ? !read_list(p, ignored_) : !cursor_.read(p.type, ignored)) ended(element, n);
       }
-    return ok_status();
   }
 
   const PlyHeader& header_;
@@ -323,19 +307,15 @@ class PlyBody {
 
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
                       Companions& companions, const std::string& array, uint64_t texture_detail) {
-  const auto header = parse_ply_header(content, name);
-  if (!header) return header.error();
-  constexpr bool kLittle = std::endian::native == std::endian::little;
-  const auto read = [&](auto body) { return body.read(array, companions, texture_detail); };
-  switch (header->encoding) {
-    case PlyEncoding::kAscii:
-      return read(PlyBody<AsciiCursor>(*header, content, name, progress));
-    case PlyEncoding::kLittleEndian:
-      return read(PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress));
-    case PlyEncoding::kBigEndian:
-      return read(PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress));
-  }
-  return Error{name + ": unknown PLY encoding"};
+  return or_error([&] {
+    const PlyHeader header = parse_ply_header(content, name);
+    const auto read = [&]<class Cursor>(std::type_identity<Cursor>) {
+      return PlyBody<Cursor>(header, content, name, progress).read(array, companions, texture_detail);
+    };
+    if (header.encoding == PlyEncoding::kAscii) return read(std::type_identity<AsciiCursor>());
+    const bool swap = (header.encoding == PlyEncoding::kLittleEndian) != (std::endian::native == std::endian::little);
+    return swap ? read(std::type_identity<BinaryCursor<true>>()) : read(std::type_identity<BinaryCursor<false>>());
+  });
 }
 
 }  // namespace telesplat::data

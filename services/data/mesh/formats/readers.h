@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "services/data/base/companions.h"
+#include "services/data/base/mapped_file.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
 #include "services/data/texture/bake.h"
@@ -19,8 +19,8 @@ namespace telesplat::data {
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
                       Companions& companions, const std::string& array = {},
                       uint64_t texture_detail = kDefaultTextureDetail);
-/// OFF, text and binary, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours of
-/// faces; comments; CRLF. Error: the prefixes 4 and n, whose vertices are not of three coordinates.
+/// OFF in text, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours of
+/// faces; comments; CRLF. Error: binary files; the prefixes 4 and n, whose vertices are not of three coordinates.
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
 /// STL, binary or ascii; colours of facets as VisCAM and Materialise write them. Corners at the same position become
 /// one vertex.

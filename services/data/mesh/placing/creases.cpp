@@ -1,4 +1,4 @@
-#include "services/data/mesh/placing/creases.h"
+#include "services/data/mesh/placing/placement.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,8 @@
-// From a file's own coordinates to room space (docs/architecture.md, "Room space").
+// From a file's own coordinates to room space (docs/architecture.md, "Room space"), with normals where there are none.
 #pragma once
 
+#include <cstdint>
+#include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
@@ -9,6 +11,25 @@
 #include "services/data/base/placement_options.h"
 
 namespace telesplat::data {
+
+struct SmoothNormals {
+  std::vector<glm::vec3> normals;  ///< one a vertex, then one for each copy; of any length
+  std::vector<uint32_t> copies;    ///< vertices to be copied; the copies come after all vertices, in this order
+};
+
+/// Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses
+/// it. triangle: its three indices.
+glm::dvec3 area_vector(const std::vector<glm::vec3>& positions, const uint32_t* triangle);
+
+/// Each vertex's mean of its triangles' normals, weighted by area. Triangles around a vertex that meet at an edge under
+/// less than crease_deg have one normal there; those that are parted by sharper edges, or meet in the vertex alone,
+/// have one each, and `indices` refers to copies of the vertex for them. 180: each vertex has one normal.
+///   The angle is that between the surfaces, however the triangles are wound; normals of turned ones are turned before
+///   they are added. A group has the sign of most of its area, so neighbours agree unless most triangles are turned.
+/// The split by edges is that of VTK's vtkPolyDataNormals.
+/// positions: of every vertex. indices: three a triangle; each triangle has an area.
+SmoothNormals smooth_normals(const std::vector<glm::vec3>& positions, double crease_deg,
+                             std::vector<uint32_t>& indices);
 
 /// A mesh in room space, ready to be split. Every triangle has three different corners and an area above zero.
 struct PlacedMesh {
@@ -47,9 +68,10 @@ bool is_isosurface(const Mesh& mesh);
 /// Centres the mesh's frame, or if it has none the box of the used vertices, at the origin, turns `up` ("auto":
 /// guess_up) to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision,
 /// rounded to float at the end. Drops degenerate triangles and counts them. Where the file has no normals it makes
-/// them, and copies of vertices that lie on sharp edges (creases.h), unless the mesh is smooth or an isosurface; where
-/// one of the file's has no direction it makes that one. Takes the mesh apart as it goes to save memory. Errors start
-/// with `name`: the box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh passed.
+/// them, and copies of vertices that lie on sharp edges (smooth_normals()), unless the mesh is smooth or an isosurface;
+/// where one of the file's has no direction it makes that one. Takes the mesh apart as it goes to save memory. Errors
+/// start with `name`: the box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh
+/// passed.
 Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name);
 
 }  // namespace telesplat::data

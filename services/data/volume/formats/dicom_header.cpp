@@ -1,7 +1,6 @@
-#include "services/data/volume/formats/dicom_header.h"
+#include "services/data/volume/formats/dicom.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 #include <iterator>
 
 #include "services/data/volume/formats/header_text.h"
+#include "services/data/volume/formats/inflater.h"
 
 namespace telesplat::data {
 namespace {
@@ -51,26 +51,22 @@ class Parser {
  public:
   Parser(std::string_view content, const std::string& path) : content_(content), path_(path) { base_.path = path; }
 
-  Result<std::vector<DicomSlice>> run() {
-    if (!is_dicom(content_)) return Error{path_ + ": is no DICOM file: no DICM at byte 128, and no elements before"};
-    if (auto begin = end_of_meta(); !begin) return begin.error();
+  std::vector<DicomSlice> run() {
+    if (!is_dicom(content_)) refuse("{}: is no DICOM file: no DICM at byte 128, and no elements before", path_);
+    end_of_meta();
     if (base_.syntax == kDeflated) {
-      auto inflated = inflate_dicom(content_, path_);
-      if (!inflated) return inflated.error();
-      inflated_ = std::move(*inflated);
+      inflated_ = need(inflate_dicom(content_, path_));
       content_ = inflated_, at_ = 0, base_.deflated = true;
     }
     choose_syntax();
-    while (!done_ && at_ + 8 <= content_.size())
-      if (auto status = element(0, false); !status) return status.error();
+    while (!done_ && at_ + 8 <= content_.size()) element(0, false);
     return slices();
   }
 
   // Where the elements behind the meta group begin: it is always explicit and little-endian.
-  Result<size_t> end_of_meta() {
+  size_t end_of_meta() {
     at_ = has_preamble(content_) ? 132 : 0;
-    while (at_ + 2 <= content_.size() && u16(at_) == 2)
-      if (auto status = element(0, false); !status) return status.error();
+    while (at_ + 2 <= content_.size() && u16(at_) == 2) element(0, false);
     return at_;
   }
 
@@ -89,9 +85,8 @@ class Parser {
     std::memcpy(&value, &bits, sizeof value);
     return std::isfinite(value) ? value : 0;
   }
-  Error cut() const {
-    return Error{fmt::format("{}: is cut or damaged: an element at byte {} does not fit its {} bytes", path_, at_,
-                             content_.size())};
+  [[noreturn]] void cut() const {
+    refuse("{}: is cut or damaged: an element at byte {} does not fit its {} bytes", path_, at_, content_.size());
   }
 
   // What the file says of types is not always so: the first element itself shows whether it has one.
@@ -102,8 +97,8 @@ class Parser {
   }
 
   // Tag, type and length; leaves at_ at the value.
-  Result<Element> begin_element() {
-    if (content_.size() - at_ < 8) return cut();
+  Element begin_element() {
+    if (content_.size() - at_ < 8) cut();
     Element e;
     e.tag = uint32_t(u16(at_)) << 16 | u16(at_ + 2);
     if (e.tag >> 16 == 0xfffe || !explicit_) {  // items have no type in any syntax
@@ -114,7 +109,7 @@ class Parser {
     e.vr = {content_[at_ + 4], content_[at_ + 5]};
     constexpr std::string_view kLong[] = {"OB", "OD", "OF", "OL", "OV", "OW", "SQ", "SV", "UC", "UN", "UR", "UT", "UV"};
     if (std::find(std::begin(kLong), std::end(kLong), std::string_view(e.vr.data(), 2)) != std::end(kLong)) {
-      if (content_.size() - at_ < 12) return cut();
+      if (content_.size() - at_ < 12) cut();
       e.length = u32(at_ + 8);
       at_ += 12;
     } else {
@@ -125,60 +120,53 @@ class Parser {
   }
 
   // inside: of functional groups, whose values are kept.
-  Status element(int depth, bool inside) {
-    const auto begun = begin_element();
-    if (!begun) return begun.error();
-    const Element e = *begun;
+  void element(int depth, bool inside) {
+    const Element e = begin_element();
     if (depth == 0 && (e.tag == kPixels || e.tag == kFloatPixels || e.tag == kDoublePixels)) return pixels(e);
     const bool group =
         (depth == 0 || inside) && std::find(std::begin(kGroups), std::end(kGroups), e.tag) != std::end(kGroups);
-    if (e.length != kUndefined && e.length > content_.size() - at_) return cut();
+    if (e.length != kUndefined && e.length > content_.size() - at_) cut();
     if (group || e.length == kUndefined) return sequence(e, depth, group);
     if (depth == 0 || inside) keep(e.tag, content_.substr(at_, e.length));
     at_ += e.length;
-    return ok_status();
   }
 
   // Goes through the items of a sequence.
-  Status sequence(const Element& e, int depth, bool group) {
-    if (depth >= kMostNesting) return Error{fmt::format("{}: has elements nested deeper than {}", path_, kMostNesting)};
+  void sequence(const Element& e, int depth, bool group) {
+    if (depth >= kMostNesting) refuse("{}: has elements nested deeper than {}", path_, kMostNesting);
     const bool was_explicit = explicit_;
     if (e.vr == std::array{'U', 'N'}) explicit_ = false;  // PS3.5 6.2.2 note 2
     const size_t end = e.length == kUndefined ? content_.size() : at_ + e.length;
-    auto status = ok_status();
-    while (status && (e.length == kUndefined || at_ < end)) {
+    while (e.length == kUndefined || at_ < end) {
       const auto begun = begin_element();
-      if (!begun) return begun.error();
-      if (begun->tag == kSequenceEnd) break;
-      if (begun->tag != kItem) return cut();
+      if (begun.tag == kSequenceEnd) break;
+      if (begun.tag != kItem) cut();
       if (e.tag == kPerFrame && depth == 0) {
-        if (frames_.size() == kMostFrames) return Error{fmt::format("{}: has more than {} frames", path_, kMostFrames)};
+        if (frames_.size() == kMostFrames) refuse("{}: has more than {} frames", path_, kMostFrames);
         frames_.push_back(base_);
         into_ = &frames_.back();
       }
-      status = item(begun->length, depth, group);
+      item(begun.length, depth, group);
     }
     if (depth == 0) into_ = &base_;
     explicit_ = was_explicit;
-    return status;
   }
 
-  Status item(uint32_t length, int depth, bool group) {
-    if (length != kUndefined && length > content_.size() - at_) return cut();
+  void item(uint32_t length, int depth, bool group) {
+    if (length != kUndefined && length > content_.size() - at_) cut();
     const size_t end = length == kUndefined ? content_.size() : at_ + length;
     if (length != kUndefined && !group) at_ = end;
     while (length == kUndefined || at_ < end) {
-      if (content_.size() - at_ < 8) return cut();
+      if (content_.size() - at_ < 8) cut();
       if (length == kUndefined && (uint32_t(u16(at_)) << 16 | u16(at_ + 2)) == kItemEnd) {
         at_ += 8;
         break;
       }
-      if (auto status = element(depth + 1, group); !status) return status;
+      element(depth + 1, group);
     }
-    return ok_status();
   }
 
-  Status pixels(const Element& e) {
+  void pixels(const Element& e) {
     constexpr std::string_view kBase = "1.2.840.10008.1.2";
     const std::string_view syntax = base_.syntax;
     const bool plain = syntax.empty() || syntax == kBase || syntax == "1.2.840.10008.1.2.1" || syntax == kDeflated ||
@@ -186,27 +174,25 @@ class Parser {
     base_.compressed = e.length == kUndefined;
     base_.is_float = e.tag != kPixels;
     if (!base_.compressed && !plain && syntax.starts_with(kBase))
-      return Error{fmt::format("{}: its transfer syntax is {}, a compressed one, but its pixels are not in fragments",
-                               path_, in_quotes(syntax))};
+      refuse("{}: its transfer syntax is {}, a compressed one, but its pixels are not in fragments", path_,
+             in_quotes(syntax));
     if (!base_.compressed && e.length > content_.size() - at_)
-      return Error{
-          fmt::format("{}: is cut: claims {} bytes of pixels, has {}", path_, e.length, content_.size() - at_)};
+      refuse("{}: is cut: claims {} bytes of pixels, has {}", path_, e.length, content_.size() - at_);
     base_.data_at = at_, base_.data_bytes = base_.compressed ? content_.size() - at_ : e.length;
     done_ = true;
-    return ok_status();
   }
 
   // A slice of each frame; a file without pixels has one, too.
-  Result<std::vector<DicomSlice>> slices() {
+  std::vector<DicomSlice> slices() {
     const size_t count = base_.data_bytes > 0 ? size_t(base_.frames) : 1;
-    if (count > kMostFrames) return Error{fmt::format("{}: has {} frames, limit {}", path_, count, kMostFrames)};
+    if (count > kMostFrames) refuse("{}: has {} frames, limit {}", path_, count, kMostFrames);
     const bool described = frames_.size() >= count && count > 0;
     if (!frames_.empty() && !described)
-      return Error{fmt::format("{}: has {} frames, and places {} of them", path_, count, frames_.size())};
+      refuse("{}: has {} frames, and places {} of them", path_, count, frames_.size());
     const uint64_t bytes = base_.pixel_bytes();
     if (count > 1 && (bytes == 0 || count > base_.data_bytes / (base_.compressed ? 1 : bytes)))
-      return Error{fmt::format("{}: claims {} frames of {} x {} pixels ({} bytes each), has {} bytes of them", path_,
-                               count, base_.columns, base_.rows, bytes, base_.data_bytes)};
+      refuse("{}: claims {} frames of {} x {} pixels ({} bytes each), has {} bytes of them", path_, count,
+             base_.columns, base_.rows, bytes, base_.data_bytes);
     if (!described) place_frames(count);
     frames_.resize(count);
     for (size_t f = 0; f < count; ++f) {
@@ -358,34 +344,22 @@ bool is_dicom(std::string_view content) {
 }
 
 Result<std::vector<DicomSlice>> parse_dicom(std::string_view content, const std::string& path) {
-  return Parser(content, path).run();
+  return or_error([&] { return Parser(content, path).run(); });
 }
 
 Result<std::string> inflate_dicom(std::string_view content, const std::string& path) {
-  const auto begin = Parser(content, path).end_of_meta();
-  if (!begin) return begin.error();
-  z_stream stream{};
-  if (inflateInit2(&stream, -15) != Z_OK) return Error{path + ": no memory for unpacking it"};
-  std::string out;
-  int status = Z_OK;
-  content.remove_prefix(*begin);
-  while (status == Z_OK && out.size() < kMostInflated) {
-    if (stream.avail_in == 0) {
-      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
-      stream.avail_in = uInt(std::min<size_t>(content.size(), 1 << 30));
-      content.remove_prefix(stream.avail_in);
+  return or_error([&] {
+    content.remove_prefix(Parser(content, path).end_of_meta());
+    std::string out;
+    Inflater inflater(content, path, true);
+    for (size_t had = 0, n = 1; n > 0 && had < kMostInflated; had += n) {
+      out.resize(had + std::clamp<size_t>(had, 1 << 16, 1 << 24));
+      n = inflater.read(out.data() + had, out.size() - had);
+      out.resize(had + n);
     }
-    const size_t had = out.size();
-    out.resize(had + std::clamp<size_t>(had, 1 << 16, 1 << 24));
-    stream.next_out = reinterpret_cast<Bytef*>(out.data() + had);
-    stream.avail_out = uInt(out.size() - had);
-    status = inflate(&stream, Z_NO_FLUSH);
-    out.resize(out.size() - stream.avail_out);
-  }
-  inflateEnd(&stream);
-  if (status != Z_STREAM_END)
-    return Error{fmt::format("{}: its deflated elements are damaged, cut or more than {} bytes", path, kMostInflated)};
-  return out;
+    if (!inflater.ended()) refuse("{}: its deflated elements are cut or more than {} bytes", path, kMostInflated);
+    return out;
+  });
 }
 
 }  // namespace telesplat::data

@@ -1,4 +1,4 @@
-#include "services/data/volume/formats/dicom_order.h"
+#include "services/data/volume/formats/dicom.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "services/data/volume/formats/dicom_series.h"
+#include "services/data/volume/formats/dicom.h"
 
 #include <fmt/format.h>
 
@@ -9,6 +9,8 @@
 
 #include "common/volume/grid.h"
 #include "services/data/base/mapped_file.h"
+#include "services/data/base/numbered.h"
+#include "services/data/base/refusal.h"
 #include "services/data/volume/formats/header_text.h"
 
 namespace telesplat::data {
@@ -16,29 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostFiles = 100'000;  // in a folder and below
 constexpr size_t kMostSlices = 200'000;
 constexpr int kDeepest = 8;
 
-std::string file_name(const std::string& path) { return fs::path(path).filename().string(); }
-
 using Slices = std::vector<DicomSlice>;
-
-// Regular files that are not hidden, by name; those of the folders below, too. take: false ends it.
-Status each_file(const std::string& folder, bool below, const std::function<bool(const std::string&)>& take) {
-  std::error_code error;
-  size_t files = 0;
-  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    std::error_code unreadable;
-    if (entry->is_directory(unreadable) && (!below || entry.depth() + 1 >= kDeepest)) entry.disable_recursion_pending();
-    const std::string path = entry->path().string();
-    if (!entry->is_regular_file(unreadable) || file_name(path).starts_with('.')) continue;
-    if (++files > kMostFiles) return Error{fmt::format("{}: holds more than {} files", folder, kMostFiles)};
-    if (!take(path)) return ok_status();
-  }
-  if (error) return Error{fmt::format("{}: cannot be read: {}", folder, error.message())};
-  return ok_status();
-}
 
 struct Found {
   std::map<std::string, Slices> series;
@@ -60,26 +43,19 @@ void scan(const std::string& path, Found& found) {
 }
 
 // All slices with pixels, a series each.
-Result<Found> read_slices(const std::string& folder) {
+Found read_slices(const std::string& folder) {
   std::error_code error;
   for (const bool below : {fs::exists(folder + "/DICOMDIR", error), true}) {
-    std::vector<std::string> paths;
-    const Status listed = each_file(folder, below, [&](const std::string& path) {
-      paths.push_back(path);
-      return true;
-    });
-    if (!listed) return listed.error();
-    std::sort(paths.begin(), paths.end());
     Found found;
-    for (const std::string& path : paths) {
+    for (const std::string& path : need(files_of_folder(folder, below ? kDeepest : 1))) {
       scan(path, found);
-      if (found.slices > kMostSlices) return Error{fmt::format("{}: holds more than {} slices", folder, kMostSlices)};
+      if (found.slices > kMostSlices) refuse("{}: holds more than {} slices", folder, kMostSlices);
     }
     if (!found.series.empty()) return found;
-    if (found.damaged > 0) return Error{found.damage};
+    if (found.damaged > 0) throw Refusal{found.damage};
     if (below) break;
   }
-  return Error{folder + ": holds no DICOM slices"};
+  refuse("{}: holds no DICOM slices", folder);
 }
 
 std::vector<DicomSeriesName> names_of(const std::vector<Slices>& all) {
@@ -100,40 +76,38 @@ std::string list_of(const std::vector<DicomSeriesName>& all) {
 }
 
 // The place of the series that was asked for.
-Result<size_t> choose(const std::vector<DicomSeriesName>& all, const std::string& which, const std::string& folder) {
+size_t choose(const std::vector<DicomSeriesName>& all, const std::string& which, const std::string& folder) {
   if (which.empty())
     return size_t(std::max_element(all.begin(), all.end(), [](auto& a, auto& b) { return a.slices < b.slices; }) -
                   all.begin());
   for (size_t i = 0; i < all.size(); ++i)
     if (which == all[i].uid || which == std::to_string(i + 1)) return i;
-  return Error{fmt::format("{}: --series {}: there is none of that place or UID; there are {}", folder,
-                           in_quotes(which), list_of(all))};
+  refuse("{}: --series {}: there is none of that place or UID; there are {}", folder, in_quotes(which), list_of(all));
 }
 
-Status check_slice(const DicomSlice& s) {
+void check_slice(const DicomSlice& s) {
   if (s.syntax.starts_with("1.2.840.10008.1.2.4.10"))
-    return Error{fmt::format("{}: is a film (transfer syntax {}), no volume", s.path, in_quotes(s.syntax))};
-  if (s.photometric == "PALETTE COLOR") return Error{s.path + ": has a palette of colours; supported are values"};
+    refuse("{}: is a film (transfer syntax {}), no volume", s.path, in_quotes(s.syntax));
+  if (s.photometric == "PALETTE COLOR") refuse("{}: has a palette of colours; supported are values", s.path);
   if (s.components != 1 && (s.components != 3 || s.bits_allocated != 8))
-    return Error{fmt::format("{}: has {} components of {} bits a pixel; supported are 1, and colours of 3 of 8 bits",
-                             s.path, s.components, s.bits_allocated)};
+    refuse("{}: has {} components of {} bits a pixel; supported are 1, and colours of 3 of 8 bits", s.path,
+           s.components, s.bits_allocated);
   const bool whole = s.bits_allocated == 8 || s.bits_allocated == 16 || s.bits_allocated == 32;
   const bool real = s.bits_allocated == 32 || s.bits_allocated == 64;
   if (!(s.is_float ? real : whole && s.bits_stored >= 1 && s.bits_stored <= s.bits_allocated))
-    return Error{fmt::format("{}: has {} bits a pixel in {}; supported are up to 8 in 8, 16 in 16 and 32 in 32", s.path,
-                             s.bits_stored, s.bits_allocated)};
+    refuse("{}: has {} bits a pixel in {}; supported are up to 8 in 8, 16 in 16 and 32 in 32", s.path, s.bits_stored,
+           s.bits_allocated);
   if (!s.is_float &&
       (s.high_bit.value_or(s.bits_stored - 1) < s.bits_stored - 1 || s.high_bit.value_or(0) >= s.bits_allocated))
-    return Error{fmt::format("{}: its highest bit is {}, with {} bits a pixel in {}", s.path, *s.high_bit,
-                             s.bits_stored, s.bits_allocated)};
+    refuse("{}: its highest bit is {}, with {} bits a pixel in {}", s.path, *s.high_bit, s.bits_stored,
+           s.bits_allocated);
   if (s.rows < 1 || s.columns < 1 || s.rows > volume::kMaxSide || s.columns > volume::kMaxSide)
-    return Error{fmt::format("{}: has {} x {} pixels, limits 1 and {}", s.path, s.columns, s.rows, volume::kMaxSide)};
+    refuse("{}: has {} x {} pixels, limits 1 and {}", s.path, s.columns, s.rows, volume::kMaxSide);
   if (!s.compressed && s.photometric != "YBR_FULL_422" && s.data_bytes < s.pixel_bytes())
-    return Error{fmt::format("{}: claims {} x {} pixels of {} bits ({} bytes), has {} bytes of them", s.path, s.columns,
-                             s.rows, s.bits_allocated, s.pixel_bytes(), s.data_bytes)};
+    refuse("{}: claims {} x {} pixels of {} bits ({} bytes), has {} bytes of them", s.path, s.columns, s.rows,
+           s.bits_allocated, s.pixel_bytes(), s.data_bytes);
   if (!std::isfinite(s.slope) || !std::isfinite(s.intercept) || s.slope == 0)
-    return Error{fmt::format("{}: its values are scaled by {} and shifted by {}", s.path, s.slope, s.intercept)};
-  return ok_status();
+    refuse("{}: its values are scaled by {} and shifted by {}", s.path, s.slope, s.intercept);
 }
 
 // Whether two slices have the same pixels, as far as their files tell it without unpacking.
@@ -176,19 +150,52 @@ void say_values(DicomSeries& series) {
     say(remark, "low values are bright in the file (MONOCHROME1); values are kept");
 }
 
+std::shared_ptr<const DicomSeries> series_at(const std::string& path, const std::string& which) {
+  std::error_code error;
+  std::string folder = path, wanted = which;
+  bool lone = false;
+  if (!fs::is_directory(path, error)) {
+    const auto file = need(MappedFile::open(path));
+    const auto slices = need(parse_dicom(file->text(), path));
+    const fs::path parent = fs::path(path).parent_path();
+    folder = parent.empty() ? "." : parent.string();
+    if (slices.front().data_bytes > 0) wanted = slices.front().series;
+    lone = slices.front().stacked;
+  }
+  auto found = read_slices(folder);
+  if (lone)  // a film of ultrasound: others of its series are other films
+    std::erase_if(found.series[wanted], [&](const DicomSlice& s) { return !fs::equivalent(s.path, path, error); });
+  std::vector<Slices> all;
+  for (auto& [uid, slices] : found.series)
+    if (!slices.empty()) all.push_back(std::move(slices));
+  std::stable_sort(all.begin(), all.end(),
+                   [](auto& a, auto& b) { return a.front().series_number < b.front().series_number; });
+  auto series = std::make_shared<DicomSeries>();
+  series->all = names_of(all);
+  if (all.empty()) refuse("{}: changed while it was read", path);
+  const size_t taken = series->taken = choose(series->all, wanted, folder);
+  std::string remark;
+  if (all.size() > 1)
+    remark = fmt::format("the folder holds {} series ({}); series {} was taken{}", all.size(), list_of(series->all),
+                         taken + 1, wanted.empty() ? ", which has the most slices; --series takes another" : "");
+  if (found.damaged > 0) say(remark, fmt::format("left out {} damaged files ({})", found.damaged, found.damage));
+  series->order = order_slices(std::move(all[taken]), same_pixels);
+  if (!series->order.remark.empty()) say(remark, series->order.remark);
+  series->order.remark = remark;
+  for (const DicomSlice& s : series->order.slices) check_slice(s);
+  say_values(*series);
+  series->header = header_of(series->order);
+  const VolumeFileHeader& h = series->header;
+  need(check_header(h, h.voxel_bytes(), folder));
+  return series;
+}
+
 }  // namespace
 
 StoredType stored_type(const DicomSlice& s) {
   if (s.is_float) return s.bits_allocated == 32 ? StoredType::kF32 : StoredType::kF64;
   if (s.components == 3) return StoredType::kU8;
-  switch (s.bits_allocated) {
-    case 8:
-      return s.is_signed ? StoredType::kI8 : StoredType::kU8;
-    case 16:
-      return s.is_signed ? StoredType::kI16 : StoredType::kU16;
-    default:
-      return s.is_signed ? StoredType::kI32 : StoredType::kU32;
-  }
+  return whole_type(s.bits_allocated > 16 ? 4 : size_t(s.bits_allocated) / 8, s.is_signed);
 }
 
 bool is_inverted(const DicomSlice& s) {
@@ -214,62 +221,20 @@ std::string text_of(const DicomSeriesName& series, size_t place) {
 }
 
 bool holds_dicom(const std::string& folder) {
-  bool found = false;
-  for (const bool below : {false, true}) {
-    const Status looked = each_file(folder, below, [&](const std::string& path) {
-      const auto file = MappedFile::open(path);
-      found = file && is_dicom((*file)->text());
-      return !found;
-    });
-    if (!looked || found) break;
+  const auto is_slice = [](const std::string& path) {
+    const auto file = MappedFile::open(path);
+    return file && is_dicom((*file)->text());
+  };
+  for (const int levels : {1, kDeepest}) {
+    const auto files = files_of_folder(folder, levels);
+    if (!files) return false;
+    if (std::any_of(files->begin(), files->end(), is_slice)) return true;
   }
-  return found;
+  return false;
 }
 
 Result<std::shared_ptr<const DicomSeries>> find_dicom_series(const std::string& path, const std::string& which) {
-  std::error_code error;
-  std::string folder = path, wanted = which;
-  bool lone = false;
-  if (!fs::is_directory(path, error)) {
-    const auto file = MappedFile::open(path);
-    if (!file) return file.error();
-    const auto slices = parse_dicom((*file)->text(), path);
-    if (!slices) return slices.error();
-    const fs::path parent = fs::path(path).parent_path();
-    folder = parent.empty() ? "." : parent.string();
-    if (slices->front().data_bytes > 0) wanted = slices->front().series;
-    lone = slices->front().stacked;
-  }
-  auto found = read_slices(folder);
-  if (!found) return found.error();
-  if (lone)  // a film of ultrasound: others of its series are other films
-    std::erase_if(found->series[wanted], [&](const DicomSlice& s) { return !fs::equivalent(s.path, path, error); });
-  std::vector<Slices> all;
-  for (auto& [uid, slices] : found->series)
-    if (!slices.empty()) all.push_back(std::move(slices));
-  std::stable_sort(all.begin(), all.end(),
-                   [](auto& a, auto& b) { return a.front().series_number < b.front().series_number; });
-  auto series = std::make_shared<DicomSeries>();
-  series->all = names_of(all);
-  if (all.empty()) return Error{path + ": changed while it was read"};
-  const auto taken = choose(series->all, wanted, folder);
-  if (!taken) return taken.error();
-  series->taken = *taken;
-  std::string remark;
-  if (all.size() > 1)
-    remark = fmt::format("the folder holds {} series ({}); series {} was taken{}", all.size(), list_of(series->all),
-                         *taken + 1, wanted.empty() ? ", which has the most slices; --series takes another" : "");
-  if (found->damaged > 0) say(remark, fmt::format("left out {} damaged files ({})", found->damaged, found->damage));
-  series->order = order_slices(std::move(all[*taken]), same_pixels);
-  if (!series->order.remark.empty()) say(remark, series->order.remark);
-  series->order.remark = remark;
-  for (const DicomSlice& s : series->order.slices)
-    if (auto status = check_slice(s); !status) return status.error();
-  say_values(*series);
-  series->header = header_of(series->order);
-  const VolumeFileHeader& h = series->header;
-  if (auto status = check_header(h, h.voxel_bytes(), folder); !status) return status.error();
-  return std::shared_ptr<const DicomSeries>(std::move(series));
+  return or_error([&] { return series_at(path, which); });
 }
 
 }  // namespace telesplat::data

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <string>
@@ -11,7 +12,9 @@
 
 #include "common/core/result.h"
 #include "common/scene/placement.h"
+#include "services/data/base/progress.h"
 #include "services/data/base/stored_type.h"
+#include "services/data/base/volume.h"
 
 namespace telesplat::data {
 
@@ -96,10 +99,23 @@ Result<FileStart> read_start(const std::string& path);
 /// What kind of volume file this is: "nrrd", "metaimage", "nifti", "vti", "vtk", "dicom"; "" if none. By content first,
 /// then by name.
 std::string volume_format(const FileStart& start, const std::string& path);
-/// Reads and checks the header of a volume file that is no DICOM slice (dicom_series.h). With `raw`: of a raw file that
+/// Reads and checks the header of a volume file that is no DICOM slice (dicom.h). With `raw`: of a raw file that
 /// is as it says. array: which one, of a file that has several; empty: the one that it marks, else its first. Error:
 /// cannot be read, is no volume, has no such array; those of the parsers and of check_header.
 Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw,
                                             const std::string& array = {});
+
+/// Reads the voxels that a checked header describes, as stored (type and byte order of the file; text: native order).
+/// Memory grows with what the file gives, never by the claim. Error: ends too early, damaged streams; text that is no
+/// numbers.
+Result<std::vector<std::byte>> read_payload(const VolumeFileHeader& header, const std::string& path,
+                                            const ReadProgress& progress);
+
+/// Makes a volume of stored voxels: byte order, narrower types (u32, i32, u64, i64, f64 become f32 where that keeps
+/// 1/4096 of their range; else an error), range, Hounsfield guess. `bytes`: header.voxel_bytes() of them.
+Result<Volume> make_volume(const VolumeFileHeader& header, std::vector<std::byte> bytes, const std::string& path);
+
+/// Refuses what this machine's free memory cannot hold.
+Status check_memory(uint64_t bytes, const std::string& path);
 
 }  // namespace telesplat::data

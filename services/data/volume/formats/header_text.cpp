@@ -9,6 +9,31 @@
 #include "services/data/base/text_scanner.h"
 
 namespace telesplat::data {
+namespace {
+
+std::vector<std::string> files_of_pattern(std::string_view text, const std::string& path) {
+  const size_t blank = std::min(text.find_first_of(" \t"), text.size()), percent = text.find('%');
+  const std::string_view name = text.substr(0, blank);
+  const auto range = numbers(text.substr(blank));
+  const auto bad = [&] { refuse("{}: {} is no pattern of files: NAME%03d FIRST LAST STEP", path, in_quotes(text)); };
+  const size_t end = percent < blank ? name.find_first_not_of("0123456789", percent + 1) : name.npos;
+  if (end == name.npos || name[end] != 'd' || !range || range->size() < 2 || name.find('%', end) != name.npos) bad();
+  const bool padded = name[percent + 1] == '0';
+  const auto width = size_t(number(name.substr(percent + 1, end - percent - 1)).value_or(0));
+  const double first = (*range)[0], last = (*range)[1], step = range->size() > 2 ? (*range)[2] : 1;
+  if (!(std::abs(first) < 1e9) || !(std::abs(last) < 1e9) || !(std::abs(step) >= 1) || width > 20 ||
+      (last - first) / step < 0 || (last - first) / step >= double(kMostFiles))
+    bad();
+  std::vector<std::string> out;
+  for (double n = first; step > 0 ? n <= last : n >= last; n += step)
+    out.push_back(
+        fmt::format("{}{}{}", name.substr(0, percent),
+                    padded ? fmt::format("{:0{}}", int64_t(n), width) : fmt::format("{:{}}", int64_t(n), width),
+                    name.substr(end + 1)));
+  return out;
+}
+
+}  // namespace
 
 std::string_view trim(std::string_view text) {
   while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
@@ -68,35 +93,30 @@ glm::dmat4 placement(const glm::dvec3& i, const glm::dvec3& j, const glm::dvec3&
   return {glm::dvec4(i, 0), glm::dvec4(j, 0), glm::dvec4(k, 0), glm::dvec4(origin, 1)};
 }
 
-Result<std::vector<std::string>> files_of_pattern(std::string_view text) {
-  const size_t blank = std::min(text.find_first_of(" \t"), text.size()), percent = text.find('%');
-  const std::string_view name = text.substr(0, blank);
-  const auto range = numbers(text.substr(blank));
-  const auto bad = [&] { return Error{in_quotes(text) + " is no pattern of files: NAME%03d FIRST LAST STEP"}; };
-  const size_t end = percent < blank ? name.find_first_not_of("0123456789", percent + 1) : name.npos;
-  if (end == name.npos || name[end] != 'd' || !range || range->size() < 2 || name.find('%', end) != name.npos)
-    return bad();
-  const bool padded = name[percent + 1] == '0';
-  const auto width = size_t(number(name.substr(percent + 1, end - percent - 1)).value_or(0));
-  const double first = (*range)[0], last = (*range)[1], step = range->size() > 2 ? (*range)[2] : 1;
-  if (!(std::abs(first) < 1e9) || !(std::abs(last) < 1e9) || !(std::abs(step) >= 1) || width > 20 ||
-      (last - first) / step < 0 || (last - first) / step >= double(kMostFiles))
-    return bad();
-  std::vector<std::string> out;
-  for (double n = first; step > 0 ? n <= last : n >= last; n += step)
-    out.push_back(
-        fmt::format("{}{}{}", name.substr(0, percent),
-                    padded ? fmt::format("{:0{}}", int64_t(n), width) : fmt::format("{:{}}", int64_t(n), width),
-                    name.substr(end + 1)));
-  return out;
+glm::dmat4 placement(const glm::dvec3& s) { return placement({s.x, 0, 0}, {0, s.y, 0}, {0, 0, s.z}, glm::dvec3(0)); }
+
+std::optional<glm::dvec3> spacing_of(std::string_view text) {
+  const auto s = numbers(text, true);
+  if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0)) return std::nullopt;
+  return glm::dvec3((*s)[0], (*s)[1], (*s)[2]);
 }
 
-Status take_files(const std::vector<std::string>& names, const std::string& path, VolumeFileHeader& h) {
-  if (names.empty() || names.size() > h.voxels() || h.voxels() % names.size() != 0)
-    return Error{fmt::format("{}: its {} voxels lie in {} files, not as many in each", path, h.voxels(), names.size())};
-  h.data_path = beside(path, names[0]);
-  for (size_t i = 1; i < names.size(); ++i) h.more_paths.push_back(beside(path, names[i]));
-  return ok_status();
+std::string_view field(const Fields& fields, std::initializer_list<const char*> names) {
+  for (const char* name : names)
+    if (const auto found = fields.find(name); found != fields.end()) return found->second;
+  return {};
+}
+
+bool take_files(std::string_view data, std::vector<std::string> listed, const std::string& path, VolumeFileHeader& h) {
+  if (!data.starts_with("LIST")) {
+    if (data.find('%') == data.npos) return false;
+    listed = files_of_pattern(data, path);
+  }
+  if (listed.empty() || listed.size() > h.voxels() || h.voxels() % listed.size() != 0)
+    refuse("{}: its {} voxels lie in {} files, not as many in each", path, h.voxels(), listed.size());
+  h.data_path = beside(path, listed[0]);
+  for (size_t i = 1; i < listed.size(); ++i) h.more_paths.push_back(beside(path, listed[i]));
+  return true;
 }
 
 }  // namespace telesplat::data

@@ -28,17 +28,6 @@ struct Placed {
 constexpr size_t kBlock = 256 << 10;
 constexpr size_t kMostText = 4096;
 
-bool write_all(int descriptor, const void* data, uint64_t bytes) {
-  const char* p = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t n = write(descriptor, p, std::min<uint64_t>(bytes, 1 << 30));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    p += n, bytes -= static_cast<uint64_t>(n);
-  }
-  return true;
-}
-
 bool read_all(int descriptor, void* to, size_t bytes) {
   char* p = static_cast<char*>(to);
   while (bytes > 0) {
@@ -50,9 +39,10 @@ bool read_all(int descriptor, void* to, size_t bytes) {
   return true;
 }
 
-bool send(int descriptor, Kind kind, const void* data, uint64_t bytes) {
+// bytes: of all that follows; data: the first of it.
+bool send(int descriptor, Kind kind, uint64_t bytes, const void* data, uint64_t data_bytes) {
   const Message message{kind, 0, bytes};
-  return write_all(descriptor, &message, sizeof message) && write_all(descriptor, data, bytes);
+  return write_all(descriptor, &message, sizeof message) && write_all(descriptor, data, data_bytes);
 }
 
 // The least of VTK's time goes by after its reader is done.
@@ -91,12 +81,24 @@ std::optional<Result<StreamedVolume>> receive_voxels(int descriptor, uint64_t me
 
 }  // namespace
 
+bool write_all(int descriptor, const void* data, uint64_t bytes) {
+  const char* p = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t n = write(descriptor, p, std::min<uint64_t>(bytes, 1 << 30));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    p += n, bytes -= static_cast<uint64_t>(n);
+  }
+  return true;
+}
+
 bool send_progress(int descriptor, double fraction) {
-  return send(descriptor, Kind::kProgress, &fraction, sizeof fraction);
+  return send(descriptor, Kind::kProgress, sizeof fraction, &fraction, sizeof fraction);
 }
 
 bool send_error(int descriptor, const std::string& text) {
-  return send(descriptor, Kind::kError, text.data(), std::min(text.size(), kMostText));
+  const size_t bytes = std::min(text.size(), kMostText);
+  return send(descriptor, Kind::kError, bytes, text.data(), bytes);
 }
 
 bool send_volume(int descriptor, const VolumeFileHeader& h, const void* voxels) {
@@ -106,8 +108,7 @@ bool send_volume(int descriptor, const VolumeFileHeader& h, const void* voxels) 
     for (int r = 0; r < 3; ++r) placed.columns[3 * c + r] = h.index_to_data[c][r];
   placed.scale = h.scale, placed.offset = h.offset;
   placed.stored = static_cast<uint32_t>(h.stored), placed.ct = h.ct;
-  const Message message{Kind::kVolume, 0, sizeof placed + h.voxel_bytes()};
-  return write_all(descriptor, &message, sizeof message) && write_all(descriptor, &placed, sizeof placed) &&
+  return send(descriptor, Kind::kVolume, sizeof placed + h.voxel_bytes(), &placed, sizeof placed) &&
          write_all(descriptor, voxels, h.voxel_bytes());
 }
 

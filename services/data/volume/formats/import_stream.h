@@ -18,6 +18,9 @@ struct StreamedVolume {
   std::vector<std::byte> bytes;
 };
 
+/// Writes all of it. False: that fails (errno tells).
+bool write_all(int descriptor, const void* data, uint64_t bytes);
+
 // In telesplat-import. They return false if nobody listens any more.
 bool send_progress(int descriptor, double fraction);
 bool send_error(int descriptor, const std::string& text);
@@ -28,10 +31,5 @@ bool send_volume(int descriptor, const VolumeFileHeader& header, const void* vox
 /// stream ended before, or is none of ours. Error: that which was sent; more bytes than `most_bytes`.
 std::optional<Result<StreamedVolume>> receive_volume(int descriptor, uint64_t most_bytes, const std::string& path,
                                                      const ReadProgress& progress);
-
-/// Runs telesplat-import, as start_import() does, and receives what it streams. reader: who reads, for error texts.
-/// Error: what it says; crashes and endless readings; receive_volume's.
-Result<StreamedVolume> import_volume(std::vector<std::string> words, const std::vector<std::string>& files,
-                                     uint64_t most_bytes, const std::string& reader, const ReadProgress& progress);
 
 }  // namespace telesplat::data

@@ -60,30 +60,13 @@ Values values_of(const Fields& f, size_t dim, size_t type, size_t pixdim, size_t
 }
 
 std::optional<StoredType> type_of(int code) {
-  switch (code) {
-    case 2:
-      return StoredType::kU8;
-    case 4:
-      return StoredType::kI16;
-    case 8:
-      return StoredType::kI32;
-    case 16:
-      return StoredType::kF32;
-    case 64:
-      return StoredType::kF64;
-    case 256:
-      return StoredType::kI8;
-    case 512:
-      return StoredType::kU16;
-    case 768:
-      return StoredType::kU32;
-    case 1024:
-      return StoredType::kI64;
-    case 1280:
-      return StoredType::kU64;
-    default:
-      return std::nullopt;
-  }
+  constexpr std::pair<int, StoredType> kTypes[] = {
+      {2, StoredType::kU8},     {4, StoredType::kI16},   {8, StoredType::kI32},   {16, StoredType::kF32},
+      {64, StoredType::kF64},   {256, StoredType::kI8},  {512, StoredType::kU16}, {768, StoredType::kU32},
+      {1024, StoredType::kI64}, {1280, StoredType::kU64}};
+  for (const auto& [known, type] : kTypes)
+    if (known == code) return type;
+  return std::nullopt;
 }
 
 bool usable(const glm::dmat4& m) {
@@ -116,26 +99,23 @@ glm::dmat4 placement_of(const Values& v) {
         placement(i * spacing.x, j * spacing.y, k * spacing.z * handed, {v.shift[0], v.shift[1], v.shift[2]});
     if (usable(m)) return m;
   }
-  return placement({spacing.x, 0, 0}, {0, spacing.y, 0}, {0, 0, spacing.z}, glm::dvec3(0));
+  return placement(spacing);
 }
 
-}  // namespace
-
-Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string& path) {
+VolumeFileHeader parse(std::string_view content, const std::string& path) {
   if (content.size() < kBytes1)
-    return Error{fmt::format("{}: ends within its header: {} bytes of at least {}", path, content.size(), kBytes1)};
+    refuse("{}: ends within its header: {} bytes of at least {}", path, content.size(), kBytes1);
   const int32_t size = Fields(content, false).at<int32_t>(0), swapped_size = Fields(content, true).at<int32_t>(0);
   const bool two = size == int32_t(kBytes2) || swapped_size == int32_t(kBytes2);
   const bool swapped = swapped_size == int32_t(kBytes1) || swapped_size == int32_t(kBytes2);
   if (!two && !swapped && size != int32_t(kBytes1))
-    return Error{
-        fmt::format("{}: is no NIfTI file: it begins with {} instead of {} or {}", path, size, kBytes1, kBytes2)};
+    refuse("{}: is no NIfTI file: it begins with {} instead of {} or {}", path, size, kBytes1, kBytes2);
   if (two && content.size() < kBytes2)
-    return Error{fmt::format("{}: ends within its header: {} bytes of {}", path, content.size(), kBytes2)};
+    refuse("{}: ends within its header: {} bytes of {}", path, content.size(), kBytes2);
   const std::string_view magic = content.substr(two ? 4 : 344, 3);
   const bool single = magic == (two ? "n+2" : "n+1");
   if (!single && magic != (two ? "ni2" : "ni1"))
-    return Error{fmt::format("{}: is no NIfTI file (an Analyze file?): its magic is {}", path, in_quotes(magic))};
+    refuse("{}: is no NIfTI file (an Analyze file?): its magic is {}", path, in_quotes(magic));
   const Fields f(content, swapped);
   Values v = two ? values_of<double, int64_t, int32_t>(f, 16, 12, 104, 176, 344, 348, 352, 400)
                  : values_of<float, int16_t, int16_t>(f, 40, 70, 76, 112, 252, 254, 256, 280);
@@ -144,27 +124,26 @@ Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string
   VolumeFileHeader h;
   h.format = "nifti";
   h.big_endian = swapped;
-  if (v.dim[0] < 3 || v.dim[0] > 7) return Error{fmt::format("{}: has {} axes; a volume has 3", path, v.dim[0])};
+  if (v.dim[0] < 3 || v.dim[0] > 7) refuse("{}: has {} axes; a volume has 3", path, v.dim[0]);
   for (int64_t a = 4; a <= v.dim[0]; ++a)
     if (v.dim[a] > 1)
-      return Error{fmt::format("{}: has {} {}; supported is one (a series is a folder of numbered files)", path,
-                               v.dim[a], a == 4 ? "time steps" : "components a voxel")};
+      refuse("{}: has {} {}; supported is one (a series is a folder of numbered files)", path, v.dim[a],
+             a == 4 ? "time steps" : "components a voxel");
   for (size_t a = 0; a < 3; ++a) h.size[a] = v.dim[a + 1];
   const auto stored = type_of(v.type);
   if (!stored)
-    return Error{fmt::format("{}: its voxels' type has code {} ({}); {}", path, v.type,
-                             v.type == 128 || v.type == 2304  ? "colours"
-                             : v.type == 32 || v.type == 1792 ? "complex"
-                                                              : "unknown",
-                             kSupportedTypes)};
+    refuse("{}: its voxels' type has code {} ({}); {}", path, v.type,
+           v.type == 128 || v.type == 2304  ? "colours"
+           : v.type == 32 || v.type == 1792 ? "complex"
+                                            : "unknown",
+           kSupportedTypes);
   h.stored = *stored;
   if (v.slope != 0 && std::isfinite(v.slope) && std::isfinite(v.intercept)) h.scale = v.slope, h.offset = v.intercept;
   h.index_to_data = placement_of(v);
   if (v.sform > 0 || v.qform > 0) h.space = scene::Space::kRas;
   const int units = (two ? f.at<int32_t>(500) : f.at<int8_t>(123)) & 7;  // xyzt_units: lengths in the lowest bits
   h.unit = units == 1 ? "m" : units == 2 ? "mm" : units == 3 ? "um" : "";
-  if (!(v.data_at >= 0 && v.data_at <= 1e15))
-    return Error{fmt::format("{}: its voxels begin at byte {}", path, v.data_at)};
+  if (!(v.data_at >= 0 && v.data_at <= 1e15)) refuse("{}: its voxels begin at byte {}", path, v.data_at);
   h.data_at = uint64_t(v.data_at);
   h.data_path = path;
   if (!single) {
@@ -177,6 +156,12 @@ Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string
     h.data_at = std::max<uint64_t>(h.data_at, two ? 544 : 352);  // 0 is written, and means just behind the header
   }
   return h;
+}
+
+}  // namespace
+
+Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string& path) {
+  return or_error([&] { return parse(content, path); });
 }
 
 }  // namespace telesplat::data

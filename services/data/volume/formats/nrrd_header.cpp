@@ -4,36 +4,28 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
 #include "services/data/volume/formats/header_text.h"
 
 namespace telesplat::data {
 namespace {
 
-using Fields = std::map<std::string, std::string_view>;
+constexpr TypeName kTypes[] = {
+    {"char", StoredType::kI8},      {"int8", StoredType::kI8},    {"uchar", StoredType::kU8},
+    {"uint8", StoredType::kU8},     {"short", StoredType::kI16},  {"int16", StoredType::kI16},
+    {"ushort", StoredType::kU16},   {"uint16", StoredType::kU16}, {"int", StoredType::kI32},
+    {"int32", StoredType::kI32},    {"uint", StoredType::kU32},   {"uint32", StoredType::kU32},
+    {"longlong", StoredType::kI64}, {"int64", StoredType::kI64},  {"ulonglong", StoredType::kU64},
+    {"uint64", StoredType::kU64},   {"float", StoredType::kF32},  {"double", StoredType::kF64}};
 
-std::optional<StoredType> type_named(const std::string& name) {
-  static const std::map<std::string, StoredType> kTypes = [] {
-    std::map<std::string, StoredType> all;
-    const auto add = [&](StoredType type, std::initializer_list<const char*> names) {
-      for (const char* n : names) all[n] = type;
-    };
-    add(StoredType::kI8, {"signed char", "int8", "int8_t"});
-    add(StoredType::kU8, {"uchar", "unsigned char", "uint8", "uint8_t"});
-    add(StoredType::kI16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"});
-    add(StoredType::kU16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"});
-    add(StoredType::kI32, {"int", "signed int", "int32", "int32_t"});
-    add(StoredType::kU32, {"uint", "unsigned int", "uint32", "uint32_t"});
-    add(StoredType::kI64,
-        {"longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"});
-    add(StoredType::kU64, {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"});
-    add(StoredType::kF32, {"float"});
-    add(StoredType::kF64, {"double"});
-    return all;
-  }();
-  const auto found = kTypes.find(name);
-  return found == kTypes.end() ? std::nullopt : std::optional(found->second);
+// "unsigned short int" is ushort, "signed char" char, "int8_t" int8.
+std::optional<StoredType> type_of(std::string name) {
+  if (name.ends_with(" int")) name.resize(name.size() - 4);
+  if (name.ends_with("_t")) name.resize(name.size() - 2);
+  if (name.starts_with("unsigned ")) name = "u" + name.substr(9);
+  if (name.starts_with("signed ")) name.erase(0, 7);
+  std::erase(name, ' ');
+  return type_named(name, kTypes);
 }
 
 // The fields, by lower-case names without blanks, and where the data begins: behind the first empty line.
@@ -76,12 +68,6 @@ Lines split(std::string_view content) {
     out.fields.emplace(std::move(name), trim(line.substr(colon + 1)));
   }
   return out;
-}
-
-std::string_view field(const Fields& fields, std::initializer_list<const char*> names) {
-  for (const char* name : names)
-    if (const auto found = fields.find(name); found != fields.end()) return found->second;
-  return {};
 }
 
 // A vector an axis, "(a,b,c)" or "none"; the latter have no numbers.
@@ -130,8 +116,8 @@ bool at_nodes(std::string_view centers, size_t axis) {
 }
 
 // Directions and origin of the three axes that are kept.
-Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>& axes,
-                                const std::vector<int64_t>& sizes, const std::string& path) {
+glm::dmat4 placement_of(const Fields& fields, const std::vector<size_t>& axes, const std::vector<int64_t>& sizes,
+                        const std::string& path) {
   const size_t dimension = sizes.size();
   std::array<glm::dvec3, 3> step{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
   glm::dvec3 origin(0);
@@ -139,15 +125,14 @@ Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>&
   if (const auto text = field(fields, {"spacedirections"}); !text.empty()) {
     const auto all = vectors(text);
     if (!all || all->size() != dimension)
-      return Error{fmt::format("{}: its space directions are {}, not {} vectors of 3 numbers", path, in_quotes(text),
-                               dimension)};
+      refuse("{}: its space directions are {}, not {} vectors of 3 numbers", path, in_quotes(text), dimension);
     for (size_t a = 0; a < 3; ++a)
       if (!(*all)[axes[a]].empty()) step[a] = to_vec((*all)[axes[a]]);
     placed = true;
   } else if (const auto spacings = field(fields, {"spacings"}); !spacings.empty()) {
     const auto all = numbers(spacings);
     if (!all || all->size() != dimension)
-      return Error{fmt::format("{}: its spacings are {}, not {} numbers", path, in_quotes(spacings), dimension)};
+      refuse("{}: its spacings are {}, not {} numbers", path, in_quotes(spacings), dimension);
     for (size_t a = 0; a < 3; ++a)
       if (const double s = (*all)[axes[a]]; !std::isnan(s)) step[a] *= s;
     placed = true;
@@ -165,7 +150,7 @@ Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>&
   if (const auto text = field(fields, {"spaceorigin"}); !text.empty()) {
     const auto all = vectors(text);
     if (!all || all->size() != 1 || all->front().empty())
-      return Error{fmt::format("{}: its space origin is {}, not a vector of 3 numbers", path, in_quotes(text))};
+      refuse("{}: its space origin is {}, not a vector of 3 numbers", path, in_quotes(text));
     origin = to_vec(all->front());
   }
   glm::dmat4 m = placement(step[0], step[1], step[2], origin);
@@ -175,7 +160,7 @@ Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>&
 }
 
 // The three axes that make the volume; one more may be there if it is one long.
-Result<std::vector<size_t>> choose_axes(const std::vector<int64_t>& sizes, const std::string& path) {
+std::vector<size_t> choose_axes(const std::vector<int64_t>& sizes, const std::string& path) {
   std::vector<size_t> axes;
   for (size_t a = 0; a < sizes.size(); ++a) axes.push_back(a);
   for (size_t a = sizes.size(); a-- > 0 && axes.size() > 3;)
@@ -183,15 +168,15 @@ Result<std::vector<size_t>> choose_axes(const std::vector<int64_t>& sizes, const
   if (axes.size() == 3) return axes;
   std::string text;
   for (const int64_t n : sizes) text += fmt::format("{}{}", text.empty() ? "" : " x ", n);
-  if (axes.size() < 3) return Error{fmt::format("{}: has {} axes ({}); a volume has 3", path, sizes.size(), text)};
-  return Error{
-      fmt::format("{}: has {} axes ({}): several components a voxel, or time steps; a volume has 3 axes and one "
-                  "component (a series is a folder of numbered files)",
-                  path, sizes.size(), text)};
+  if (axes.size() < 3) refuse("{}: has {} axes ({}); a volume has 3", path, sizes.size(), text);
+  refuse(
+      "{}: has {} axes ({}): several components a voxel, or time steps; a volume has 3 axes and one "
+      "component (a series is a folder of numbered files)",
+      path, sizes.size(), text);
 }
 
 // How the voxels are written.
-Status read_encoding(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
+void read_encoding(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
   const std::string encoding = lower(field(fields, {"encoding"}));
   if (encoding == "raw")
     h.encoding = Encoding::kRaw;
@@ -200,59 +185,48 @@ Status read_encoding(const Fields& fields, const std::string& path, VolumeFileHe
   else if (encoding == "text" || encoding == "txt" || encoding == "ascii")
     h.encoding = Encoding::kText;
   else
-    return Error{fmt::format("{}: its encoding is {}; supported are raw, gzip and text", path, in_quotes(encoding))};
+    refuse("{}: its encoding is {}; supported are raw, gzip and text", path, in_quotes(encoding));
   const std::string endian = lower(field(fields, {"endian"}));
   if (stored_bytes(h.stored) > 1 && h.encoding != Encoding::kText && endian != "little" && endian != "big")
-    return Error{fmt::format("{}: its endian is {}, neither little nor big", path, in_quotes(endian))};
+    refuse("{}: its endian is {}, neither little nor big", path, in_quotes(endian));
   h.big_endian = endian == "big";
-  return ok_status();
 }
 
 // Where they lie.
-Status find_data(const Lines& lines, const std::string& path, VolumeFileHeader& h) {
+void find_data(const Lines& lines, const std::string& path, VolumeFileHeader& h) {
   const Fields& fields = lines.fields;
   const std::string_view data = field(fields, {"datafile"});
-  if (data.empty() && !lines.ended)
-    return Error{fmt::format("{}: its header does not end (no empty line) and names no data file", path)};
-  if (data.starts_with("LIST") || data.find('%') != data.npos) {
-    // "LIST [DIM]" and names, or "PATTERN FIRST LAST STEP [DIM]"; DIM adds nothing: all have as many voxels.
-    const auto files = data.starts_with("LIST") ? Result(lines.files) : files_of_pattern(data);
-    if (!files) return Error{fmt::format("{}: {}", path, files.error().text)};
-    return take_files(*files, path, h);
-  }
+  if (data.empty() && !lines.ended) refuse("{}: its header does not end (no empty line) and names no data file", path);
+  // "LIST [DIM]" and names, or "PATTERN FIRST LAST STEP [DIM]"; DIM adds nothing: all have as many voxels.
+  if (take_files(data, lines.files, path, h)) return;
   h.data_path = data.empty() ? path : beside(path, data);
   h.data_at = data.empty() ? lines.data_at : 0;
-  return ok_status();
 }
 
 // What is left out at their beginning.
-Status read_skips(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
+void read_skips(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
   const auto skipped = [&](std::initializer_list<const char*> names) {
     const auto text = field(fields, names);
     return text.empty() ? std::optional(0.0) : number(text);
   };
   const auto line_skip = skipped({"lineskip"}), byte_skip = skipped({"byteskip"});
   if (!line_skip || !(*line_skip >= 0 && *line_skip <= 1e6) || *line_skip != std::floor(*line_skip))
-    return Error{
-        fmt::format("{}: skips {} lines of its data, limit 1e6", path, in_quotes(field(fields, {"lineskip"})))};
+    refuse("{}: skips {} lines of its data, limit 1e6", path, in_quotes(field(fields, {"lineskip"})));
   h.line_skip = uint32_t(*line_skip);
   if (!byte_skip || *byte_skip < -1 || *byte_skip > 1e15 || *byte_skip != std::floor(*byte_skip) ||
       (*byte_skip < 0 && h.encoding != Encoding::kRaw))
-    return Error{fmt::format("{}: skips {} bytes of its data", path, in_quotes(field(fields, {"byteskip"})))};
+    refuse("{}: skips {} bytes of its data", path, in_quotes(field(fields, {"byteskip"})));
   if (*byte_skip < 0)
     h.data_at_end = true;
   else
     (h.encoding == Encoding::kGzip ? h.skip_unpacked : h.data_at) += uint64_t(*byte_skip);
-  return ok_status();
 }
 
-}  // namespace
-
-Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path) {
+VolumeFileHeader parse(std::string_view content, const std::string& path) {
   if (content.size() < 9 || !content.starts_with("NRRD000"))
-    return Error{path + ": is no NRRD file: it does not begin with NRRD000"};
+    refuse("{}: is no NRRD file: it does not begin with NRRD000", path);
   if (content[7] < '1' || content[7] > '5')
-    return Error{fmt::format("{}: is NRRD version {}, known are 1 to 5", path, in_quotes(content.substr(4, 4)))};
+    refuse("{}: is NRRD version {}, known are 1 to 5", path, in_quotes(content.substr(4, 4)));
   const Lines lines = split(content);
   const Fields& fields = lines.fields;
   VolumeFileHeader h;
@@ -260,30 +234,33 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   h.ct = lines.ct;
 
   const std::string type = lower(field(fields, {"type"}));
-  const auto stored = type_named(type);
-  if (!stored) return Error{fmt::format("{}: its voxels' type is {}; {}", path, in_quotes(type), kSupportedTypes)};
+  const auto stored = type_of(type);
+  if (!stored) refuse("{}: its voxels' type is {}; {}", path, in_quotes(type), kSupportedTypes);
   h.stored = *stored;
 
   const auto dimension = number(field(fields, {"dimension"}));
   const auto sizes = whole_numbers(field(fields, {"sizes"}));
   if (!dimension || !sizes || double(sizes->size()) != *dimension || sizes->size() > 16)
-    return Error{fmt::format("{}: its sizes are {} with dimension {}", path, in_quotes(field(fields, {"sizes"})),
-                             in_quotes(field(fields, {"dimension"})))};
+    refuse("{}: its sizes are {} with dimension {}", path, in_quotes(field(fields, {"sizes"})),
+           in_quotes(field(fields, {"dimension"})));
   const auto axes = choose_axes(*sizes, path);
-  if (!axes) return axes.error();
-  for (size_t a = 0; a < 3; ++a) h.size[a] = (*sizes)[(*axes)[a]];
-  const auto m = placement_of(fields, *axes, *sizes, path);
-  if (!m) return m.error();
-  h.index_to_data = *m;
+  for (size_t a = 0; a < 3; ++a) h.size[a] = (*sizes)[axes[a]];
+  h.index_to_data = placement_of(fields, axes, *sizes, path);
   h.space = space_named(field(fields, {"space"}));
   // "mm" "mm" "mm": the first counts, as scanners' axes have one unit.
   if (const auto units = field(fields, {"spaceunits"}); units.starts_with('"'))
     h.unit = units.substr(1, std::min(units.find('"', 1) - 1, size_t{16}));
 
-  if (const Status s = read_encoding(fields, path, h); !s) return s.error();
-  if (const Status s = find_data(lines, path, h); !s) return s.error();
-  if (const Status s = read_skips(fields, path, h); !s) return s.error();
+  read_encoding(fields, path, h);
+  find_data(lines, path, h);
+  read_skips(fields, path, h);
   return h;
+}
+
+}  // namespace
+
+Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path) {
+  return or_error([&] { return parse(content, path); });
 }
 
 }  // namespace telesplat::data

@@ -1,241 +1,188 @@
-#include "services/data/volume/formats/payload.h"
-
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
-#include <zlib.h>
+#include "services/data/volume/formats/header.h"
 
 #include <algorithm>
-#include <cerrno>
+#include <bit>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <fstream>
-#include <memory>
+#include <limits>
+#include <type_traits>
 
+#include "services/data/base/mapped_file.h"
+#include "services/data/base/refusal.h"
 #include "services/data/volume/formats/header_text.h"
+#include "services/data/volume/formats/inflater.h"
 
 namespace telesplat::data {
 namespace {
 
 constexpr size_t kBlock = 256 << 10;  // stays in the second cache between being cleared and being filled
 
-// A file read from front to back.
-class Source {
- public:
-  static Result<std::unique_ptr<Source>> open(const std::string& path, uint32_t lines, uint64_t at, bool at_end,
-                                              uint64_t bytes) {
-    const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (descriptor < 0) return Error{fmt::format("{}: cannot be opened: {}", path, std::strerror(errno))};
-    auto source = std::unique_ptr<Source>(new Source(descriptor, path));
-    struct stat status {};
-    if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode))
-      return Error{fmt::format("{}: is not a regular file", path)};
-    const auto size = static_cast<uint64_t>(status.st_size);
-    if (at_end && bytes > size) return Error{fmt::format("{}: has {} bytes of {}", path, size, bytes)};
-    source->at_ = at_end ? size - bytes : at;
-    if (const Status s = source->skip_lines(lines); !s) return s.error();
-    posix_fadvise(descriptor, static_cast<off_t>(source->at_), 0, POSIX_FADV_SEQUENTIAL);
-    return source;
+// What of a file is voxels, packed or not.
+std::string_view behind_skips(std::string_view content, const VolumeFileHeader& h, const std::string& file) {
+  const uint64_t bytes = h.voxel_bytes() / h.parts();
+  if (h.data_at_end && bytes > content.size()) refuse("{}: has {} bytes of {}", file, content.size(), bytes);
+  const uint64_t at = h.data_at_end ? content.size() - bytes : h.data_at;
+  size_t lines = 0;  // bytes of those that are left out
+  for (uint32_t line = 0; line < h.line_skip; ++line) {
+    lines = content.find('\n', lines) + 1;
+    if (lines == 0) refuse("{}: ends within the lines to be left out", file);
   }
-  ~Source() { close(descriptor_); }
-  Source(const Source&) = delete;
-  Source& operator=(const Source&) = delete;
+  return content.substr(std::min<uint64_t>(at + lines, content.size()));
+}
 
-  /// As many bytes as there are, at most `bytes`; 0 at the end.
-  Result<size_t> read(void* to, size_t bytes) {
-    for (;;) {
-      const ssize_t n = pread(descriptor_, to, bytes, static_cast<off_t>(at_));
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) return Error{fmt::format("{}: cannot be read: {}", path_, std::strerror(errno))};
-      at_ += static_cast<uint64_t>(n);
-      return static_cast<size_t>(n);
-    }
-  }
-
- private:
-  // From at_ on, which moves behind them.
-  Status skip_lines(uint32_t lines) {
-    const uint64_t behind = at_;
-    at_ = 0;
-    std::string block(lines > 0 ? 4096 : 0, '\0');
-    for (uint64_t begin = 0; lines > 0; begin = at_) {
-      const auto n = read(block.data(), block.size());
-      if (!n) return n.error();
-      if (*n == 0) return Error{fmt::format("{}: ends within the lines to be left out", path_)};
-      size_t i = 0;
-      while (i < *n && lines > 0) lines -= block[i++] == '\n';
-      if (lines == 0) at_ = begin + i;
-    }
-    at_ += behind;
-    return ok_status();
-  }
-
-  Source(int descriptor, std::string path) : descriptor_(descriptor), path_(std::move(path)) {}
-  int descriptor_;
-  std::string path_;
-  uint64_t at_ = 0;
-};
-
-Error too_short(const VolumeFileHeader& h, const std::string& path, uint64_t got) {
-  return Error{fmt::format("{}: ends too early: {} bytes of voxels, of {} ({} x {} x {} of {})", path, got,
-                           h.voxel_bytes(), h.size[0], h.size[1], h.size[2], name_of(h.stored))};
+[[noreturn]] void refuse_short(const VolumeFileHeader& h, const std::string& path, uint64_t got) {
+  refuse("{}: ends too early: {} bytes of voxels, of {} ({} x {} x {} of {})", path, got, h.voxel_bytes(), h.size[0],
+         h.size[1], h.size[2], name_of(h.stored));
 }
 
 // Fills `out` by another file's share, block by block; `next(to, n)` gives up to n bytes, 0 at the end.
 template <class Next>
-Status fill(const VolumeFileHeader& h, const std::string& path, const ReadProgress& progress,
-            std::vector<std::byte>& out, Next&& next) {
+void fill(const VolumeFileHeader& h, const std::string& path, const ReadProgress& progress, std::vector<std::byte>& out,
+          Next&& next) {
   const uint64_t bytes = h.voxel_bytes(), until = out.size() + bytes / h.parts();
   for (uint64_t steps = 0; out.size() < until; ++steps) {
     const size_t begin = out.size(), want = std::min<uint64_t>(kBlock, until - begin);
     out.resize(begin + want);
     size_t have = 0;
     while (have < want) {
-      const Result<size_t> n = next(out.data() + begin + have, want - have);
-      if (!n) return n.error();
-      if (*n == 0) return too_short(h, path, begin + have);
-      have += *n;
+      const size_t n = next(out.data() + begin + have, want - have);
+      if (n == 0) refuse_short(h, path, begin + have);
+      have += n;
     }
     if (progress && steps % 16 == 0) progress(double(out.size()) / double(bytes));
   }
-  return ok_status();
-}
-
-class Inflater {
- public:
-  Inflater(Source& source, std::string path) : source_(source), path_(std::move(path)), packed_(kBlock) {
-    ready_ = inflateInit2(&stream_, 15 + 32) == Z_OK;  // gzip or zlib, as it says
-  }
-  ~Inflater() {
-    if (ready_) inflateEnd(&stream_);
-  }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-
-  Result<size_t> read(void* to, size_t bytes) {
-    if (!ready_) return Error{path_ + ": no memory for unpacking it"};
-    stream_.next_out = static_cast<Bytef*>(to);
-    stream_.avail_out = static_cast<uInt>(bytes);
-    while (stream_.avail_out == bytes && !ended_) {
-      if (stream_.avail_in == 0) {
-        const auto n = source_.read(packed_.data(), packed_.size());
-        if (!n) return n.error();
-        if (*n == 0) break;
-        stream_.next_in = packed_.data();
-        stream_.avail_in = static_cast<uInt>(*n);
-      }
-      const int status = inflate(&stream_, Z_NO_FLUSH);
-      if (status == Z_STREAM_END) {
-        // Another member may follow: gzip files may be joined.
-        ended_ = stream_.avail_in < 2 || stream_.next_in[0] != 0x1f || inflateReset(&stream_) != Z_OK;
-      } else if (status != Z_OK && status != Z_BUF_ERROR) {
-        return Error{
-            fmt::format("{}: its compressed data are damaged: {}", path_, stream_.msg ? stream_.msg : "zlib gave up")};
-      }
-    }
-    return bytes - stream_.avail_out;
-  }
-
- private:
-  Source& source_;
-  std::string path_;
-  std::vector<Bytef> packed_;
-  z_stream stream_{};
-  bool ready_ = false, ended_ = false;
-};
-
-template <class T>
-bool parse_value(std::string_view word, std::byte* to) {
-  T value{};
-  if (word.starts_with('+')) word.remove_prefix(1);
-  const auto parsed = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (parsed.ec != std::errc() || parsed.ptr != word.data() + word.size()) return false;
-  std::memcpy(to, &value, sizeof value);
-  return true;
 }
 
 bool parse_stored(StoredType type, std::string_view word, std::byte* to) {
-  switch (type) {
-    case StoredType::kU8:
-      return parse_value<uint8_t>(word, to);
-    case StoredType::kI8:
-      return parse_value<int8_t>(word, to);
-    case StoredType::kU16:
-      return parse_value<uint16_t>(word, to);
-    case StoredType::kI16:
-      return parse_value<int16_t>(word, to);
-    case StoredType::kU32:
-      return parse_value<uint32_t>(word, to);
-    case StoredType::kI32:
-      return parse_value<int32_t>(word, to);
-    case StoredType::kU64:
-      return parse_value<uint64_t>(word, to);
-    case StoredType::kI64:
-      return parse_value<int64_t>(word, to);
-    case StoredType::kF32:
-      return parse_value<float>(word, to);
-    case StoredType::kF64:
-      return parse_value<double>(word, to);
-  }
-  return false;
-}
-
-Status read_text(const VolumeFileHeader& h, Source& source, const std::string& path, const ReadProgress& progress,
-                 std::vector<std::byte>& out) {
-  std::string window;  // what is read and not parsed yet
-  size_t at = 0;
-  bool ended = false;
-  const size_t size = stored_bytes(h.stored);
-  return fill(h, path, progress, out, [&](std::byte* to, size_t bytes) -> Result<size_t> {
-    size_t have = 0;
-    while (have + size <= bytes) {
-      const auto blank = [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == ','; };
-      while (at < window.size() && blank(window[at])) ++at;
-      size_t end = at;
-      while (end < window.size() && !blank(window[end])) ++end;
-      if (end == window.size() && !ended) {  // a word may go on in what follows
-        window.erase(0, at), at = 0;
-        if (window.size() > 1000) return Error{fmt::format("{}: {} is no number", path, in_quotes(window))};
-        const size_t old = window.size();
-        window.resize(old + kBlock);
-        const auto n = source.read(window.data() + old, kBlock);
-        if (!n) return n.error();
-        window.resize(old + *n);
-        ended = *n == 0;
-        continue;
-      }
-      if (end == at) break;
-      const std::string_view word = std::string_view(window).substr(at, end - at);
-      if (!parse_stored(h.stored, word, to + have))
-        return Error{fmt::format("{}: {} is no number of type {}", path, in_quotes(word), name_of(h.stored))};
-      at = end, have += size;
-    }
-    return have;
+  if (word.starts_with('+')) word.remove_prefix(1);
+  return with_type(type, [&](auto value) {
+    const auto parsed = std::from_chars(word.data(), word.data() + word.size(), value);
+    std::memcpy(to, &value, sizeof value);
+    return parsed.ec == std::errc() && parsed.ptr == word.data() + word.size();
   });
 }
 
-Status read_part(const VolumeFileHeader& h, const std::string& file, const std::string& path,
-                 const ReadProgress& progress, std::vector<std::byte>& out) {
-  auto source = Source::open(file, h.line_skip, h.data_at, h.data_at_end, h.voxel_bytes() / h.parts());
-  if (!source) return source.error();
-  if (h.encoding == Encoding::kText) return read_text(h, **source, path, progress, out);
+// As many values as fit.
+size_t read_text(std::string_view& text, StoredType type, const std::string& path, std::byte* to, size_t bytes) {
+  const auto blank = [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == ','; };
+  const size_t size = stored_bytes(type);
+  size_t have = 0;
+  for (; have + size <= bytes; have += size) {
+    text.remove_prefix(size_t(std::find_if_not(text.begin(), text.end(), blank) - text.begin()));
+    const std::string_view word = text.substr(0, size_t(std::find_if(text.begin(), text.end(), blank) - text.begin()));
+    if (word.empty()) break;
+    if (!parse_stored(type, word, to + have))
+      refuse("{}: {} is no number of type {}", path, in_quotes(word), name_of(type));
+    text.remove_prefix(word.size());
+  }
+  return have;
+}
+
+void read_part(const VolumeFileHeader& h, const std::string& name, const std::string& path,
+               const ReadProgress& progress, std::vector<std::byte>& out) {
+  const auto file = need(MappedFile::open(name));
+  std::string_view rest = behind_skips(file->text(), h, name);
+  if (h.encoding == Encoding::kText)
+    return fill(h, path, progress, out,
+                [&](std::byte* to, size_t bytes) { return read_text(rest, h.stored, path, to, bytes); });
   if (h.encoding == Encoding::kRaw)
-    return fill(h, path, progress, out, [&](std::byte* to, size_t bytes) { return (*source)->read(to, bytes); });
-  Inflater inflater(**source, path);
+    return fill(h, path, progress, out, [&](std::byte* to, size_t bytes) {
+      const size_t n = rest.copy(reinterpret_cast<char*>(to), bytes);
+      rest.remove_prefix(n);
+      return n;
+    });
+  Inflater inflater(rest, path);
   std::vector<std::byte> left_out(std::min<uint64_t>(h.skip_unpacked, kBlock));
   for (uint64_t left = h.skip_unpacked; left > 0;) {
-    const auto n = inflater.read(left_out.data(), std::min<uint64_t>(left, left_out.size()));
-    if (!n) return n.error();
-    if (*n == 0) return too_short(h, path, 0);
-    left -= *n;
+    const size_t n = inflater.read(left_out.data(), std::min<uint64_t>(left, left_out.size()));
+    if (n == 0) refuse_short(h, path, 0);
+    left -= n;
   }
-  const Status filled =
-      fill(h, path, progress, out, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
+  fill(h, path, progress, out, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
   // Reading on brings the stream's checksum, if the voxels were all of it.
   std::byte more;
-  if (const auto n = inflater.read(&more, 1); filled && !n) return n.error();
-  return filled;
+  inflater.read(&more, 1);
+}
+
+struct Range {
+  double lo = std::numeric_limits<double>::infinity(), hi = -std::numeric_limits<double>::infinity();
+  uint64_t not_finite = 0;
+};
+
+template <class T>
+Range range_of(const std::byte* bytes, size_t count) {
+  const T* v = reinterpret_cast<const T*>(bytes);  // a vector's storage is aligned for anything
+  T lo = std::numeric_limits<T>::max(), hi = std::numeric_limits<T>::lowest();
+  uint64_t not_finite = 0;
+  if constexpr (std::is_integral_v<T>) {
+    for (size_t i = 0; i < count; ++i) lo = std::min(lo, v[i]), hi = std::max(hi, v[i]);
+  } else {
+    for (size_t i = 0; i < count; ++i) {
+      const bool finite = v[i] - v[i] == 0;  // neither NaN nor infinite
+      not_finite += !finite;
+      lo = finite && v[i] < lo ? v[i] : lo;
+      hi = finite && v[i] > hi ? v[i] : hi;
+    }
+  }
+  return not_finite == count ? Range{0, 0, not_finite} : Range{double(lo), double(hi), not_finite};
+}
+
+// In place: what is written never overtakes what is read. Values whose range has less than 4096 of the steps that f32
+// has there, or that f32 does not reach, become fractions of half that range around its middle: scale and offset.
+template <class T>
+void narrow(std::vector<std::byte>& bytes, const std::string& path, Volume& v) {
+  const size_t count = bytes.size() / sizeof(T);
+  const Range range = range_of<T>(bytes.data(), count);
+  const double largest = std::max(std::abs(range.lo), std::abs(range.hi));
+  const double steps = (range.hi - range.lo) / (largest * 0x1p-24);
+  const bool fraction = largest > double(std::numeric_limits<float>::max()) || (range.hi > range.lo && steps < 4096);
+  const double half = (range.hi - range.lo) / 2, middle = range.lo + half;
+  if (!std::isfinite(half))
+    refuse("{}: its values of type {} go from {} to {}, more than a number can tell", path, name_of(v.type), range.lo,
+           range.hi);
+  for (size_t i = 0; i < count; ++i) {
+    T wide;
+    std::memcpy(&wide, bytes.data() + i * sizeof(T), sizeof wide);
+    const auto value = fraction && half > 0 ? static_cast<float>((double(wide) - middle) / half)
+                       : fraction           ? 0.0f
+                                            : static_cast<float>(wide);
+    std::memcpy(bytes.data() + i * sizeof value, &value, sizeof value);
+  }
+  if (fraction) v.offset += middle * v.scale, v.scale *= half > 0 ? half : 1;
+  bytes.resize(count * sizeof(float));
+  if (sizeof(T) > sizeof(float)) bytes.shrink_to_fit();
+  v.type = VoxelType::kF32;
+}
+
+Volume volume_of(const VolumeFileHeader& h, std::vector<std::byte> bytes, const std::string& path) {
+  if (bytes.size() != h.voxel_bytes())
+    refuse("{}: {} bytes of voxels, its header says {}", path, bytes.size(), h.voxel_bytes());
+  if (h.big_endian == (std::endian::native == std::endian::little) && h.encoding != Encoding::kText)
+    swap_bytes(bytes, h.stored);
+  Volume v;
+  v.type = h.stored, v.scale = h.scale, v.offset = h.offset;
+  with_type(h.stored, [&](auto value) {
+    using T = decltype(value);
+    if constexpr (sizeof(T) > 2 && !std::is_same_v<T, float>) narrow<T>(bytes, path, v);
+  });
+  v.size = {int(h.size[0]), int(h.size[1]), int(h.size[2])};
+  v.index_to_data = h.index_to_data;
+  v.unit = h.unit;
+  v.space = h.space;
+  v.stored = std::move(bytes);
+  v.format = h.format;
+  v.array = h.array;
+  const Range range =
+      with_type(v.type, [&](auto value) { return range_of<decltype(value)>(v.stored.data(), h.voxels()); });
+  if (range.not_finite == h.voxels()) refuse("{}: none of its {} values is finite", path, h.voxels());
+  v.not_finite = range.not_finite;
+  v.lo = std::min(range.lo * v.scale, range.hi * v.scale) + v.offset;
+  v.hi = std::max(range.lo * v.scale, range.hi * v.scale) + v.offset;
+  // Air is -1000 and bone above 300; no other scale has integers on both sides that far.
+  v.hounsfield = h.ct || (v.type != VoxelType::kF32 && v.lo <= -500 && v.lo >= -32768 && v.hi >= 300);
+  return v;
 }
 
 }  // namespace
@@ -251,12 +198,17 @@ Status check_memory(uint64_t bytes, const std::string& path) {
 
 Result<std::vector<std::byte>> read_payload(const VolumeFileHeader& h, const std::string& path,
                                             const ReadProgress& progress) {
-  std::vector<std::byte> out;
-  out.reserve(h.voxel_bytes());  // address space; pages come with what is read
-  for (size_t i = 0; i < h.parts(); ++i)
-    if (const Status s = read_part(h, i == 0 ? h.data_path : h.more_paths[i - 1], path, progress, out); !s)
-      return s.error();
-  return out;
+  return or_error([&] {
+    std::vector<std::byte> out;
+    out.reserve(h.voxel_bytes());  // address space; pages come with what is read
+    for (size_t i = 0; i < h.parts(); ++i)
+      read_part(h, i == 0 ? h.data_path : h.more_paths[i - 1], path, progress, out);
+    return out;
+  });
+}
+
+Result<Volume> make_volume(const VolumeFileHeader& h, std::vector<std::byte> bytes, const std::string& path) {
+  return or_error([&] { return volume_of(h, std::move(bytes), path); });
 }
 
 }  // namespace telesplat::data

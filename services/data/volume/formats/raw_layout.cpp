@@ -13,12 +13,8 @@
 namespace telesplat::data {
 namespace {
 
-constexpr StoredType kTypes[] = {StoredType::kU8,  StoredType::kI8,  StoredType::kU16, StoredType::kI16,
-                                 StoredType::kU32, StoredType::kI32, StoredType::kU64, StoredType::kI64,
-                                 StoredType::kF32, StoredType::kF64};
-
 std::optional<StoredType> type_named(std::string_view name) {
-  for (const StoredType type : kTypes)
+  for (auto type = StoredType::kU8; type <= StoredType::kF64; type = StoredType(int(type) + 1))
     if (name == name_of(type)) return type;
   return std::nullopt;
 }
@@ -39,7 +35,7 @@ std::optional<std::array<int64_t, 3>> take_size(std::string_view& text) {
 
 // Words for types that file names have: "tooth_103x94x161_uint16.raw".
 std::optional<StoredType> type_in(std::string_view name) {
-  constexpr std::pair<std::string_view, StoredType> kWords[] = {
+  constexpr TypeName kWords[] = {
       {"uint8", StoredType::kU8},    {"uint16", StoredType::kU16}, {"uint32", StoredType::kU32},
       {"uchar", StoredType::kU8},    {"ushort", StoredType::kU16}, {"int8", StoredType::kI8},
       {"int16", StoredType::kI16},   {"int32", StoredType::kI32},  {"short", StoredType::kI16},
@@ -76,20 +72,17 @@ std::string guess_by_name(std::string_view name, uint64_t bytes) {
   return "";
 }
 
-}  // namespace
-
-Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path) {
+VolumeFileHeader parse(std::string_view spec, const std::string& path) {
   VolumeFileHeader h;
   h.format = "raw";
   h.data_path = path;
   const auto bad = [&](const std::string& what) {
-    return Error{fmt::format("{}: --raw {}: {}, as in 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2", path,
-                             in_quotes(spec), what)};
+    refuse("{}: --raw {}: {}, as in 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2", path, in_quotes(spec), what);
   };
   constexpr const char* kShape = "SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING][:skip=BYTES] is needed";
   std::string_view rest = spec;
   const auto size = spec.size() <= 200 ? take_size(rest) : std::nullopt;
-  if (!size || !rest.starts_with(':')) return bad(kShape);
+  if (!size || !rest.starts_with(':')) bad(kShape);
   h.size = *size;
   rest.remove_prefix(1);
   const size_t colon = std::min(rest.find(':'), rest.size());
@@ -97,24 +90,29 @@ Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string
   const std::string_view whole = type;
   if (type.ends_with("be")) h.big_endian = true, type.remove_suffix(2);
   const auto stored = type_named(type);
-  if (!stored) return bad(fmt::format("{} is no type; types are {}", in_quotes(whole), kRawTypes));
+  if (!stored) bad(fmt::format("{} is no type; types are {}", in_quotes(whole), kRawTypes));
   h.stored = *stored;
-  if (colon + 1 == rest.size()) return bad(kShape);
+  if (colon + 1 == rest.size()) bad(kShape);
   for (std::string_view parts = rest.substr(std::min(colon + 1, rest.size())); !parts.empty();) {
     const std::string_view part = parts.substr(0, parts.find(':'));
     parts.remove_prefix(std::min(part.size() + 1, parts.size()));
     if (part.starts_with("skip=")) {
       const auto skip = whole_numbers(part.substr(5));
-      if (!skip || skip->size() != 1) return bad(fmt::format("{} is no number of bytes from 0 on", in_quotes(part)));
+      if (!skip || skip->size() != 1) bad(fmt::format("{} is no number of bytes from 0 on", in_quotes(part)));
       h.data_at = uint64_t((*skip)[0]);
       continue;
     }
-    const auto s = numbers(part, true);
-    if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0))
-      return bad(fmt::format("{} is not three spacings above 0", in_quotes(part)));
-    h.index_to_data = placement({(*s)[0], 0, 0}, {0, (*s)[1], 0}, {0, 0, (*s)[2]}, glm::dvec3(0));
+    const auto spacing = spacing_of(part);
+    if (!spacing) bad(fmt::format("{} is not three spacings above 0", in_quotes(part)));
+    h.index_to_data = placement(*spacing);
   }
   return h;
+}
+
+}  // namespace
+
+Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path) {
+  return or_error([&] { return parse(spec, path); });
 }
 
 std::vector<std::string> raw_guesses(const std::string& path, uint64_t bytes) {

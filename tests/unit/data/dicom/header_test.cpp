@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "services/data/volume/formats/dicom_header.h"
+#include "services/data/volume/formats/dicom.h"
 #include "tests/support/volume/dicom_files.h"
 
 namespace telesplat::data {

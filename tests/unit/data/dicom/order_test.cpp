@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "services/data/volume/formats/dicom_order.h"
+#include "services/data/volume/formats/dicom.h"
 
 namespace telesplat::data {
 namespace {

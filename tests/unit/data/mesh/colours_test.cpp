@@ -114,22 +114,6 @@ TEST(FaceColours, OfOffAreWholeNumbersOrFractions) {
   EXPECT_NE(map.notes[0].find("1 faces name their colours in a colour map"), std::string::npos) << map.notes[0];
 }
 
-TEST(FaceColours, OfBinaryOffAreRead) {
-  const TempFolder folder;
-  std::string file = "CNOFF BINARY\n" + raw(4, true) + raw(2, true) + raw(0, true);
-  for (const auto& [x, y] : {std::pair{0.f, 0.f}, {1.f, 0.f}, {1.f, 1.f}, {0.f, 1.f}})
-    for (const float number : {x, y, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 1.f, 1.f}) file += raw(number, true);
-  for (const int number : {3, 0, 1, 2, 0, 3, 0, 2, 3, 3}) file += raw(number, true);
-  for (const float number : {1.f, 0.5f, 0.f}) file += raw(number, true);
-  const Mesh mesh = read(folder.write("binary.off", file));
-  EXPECT_EQ(mesh.indices.size(), 6u);
-  EXPECT_EQ(mesh.normals.at(0), glm::vec3(0, 0, 1));
-  EXPECT_EQ(colour_of(mesh, 0), 0x0000ffu);
-  EXPECT_EQ(colour_of(mesh, 1), 0xff8000u);
-  for (size_t length = 0; length < file.size(); ++length)
-    EXPECT_FALSE(read_off(std::string_view(file).substr(0, length), "cut", nullptr).ok()) << length;
-}
-
 TEST(Colours, AboveOneMeanZeroTo255ForAll) {
   const TempFolder folder;
   const Mesh obj = read(folder.write("a.obj", "v 0 0 0 128 128 128\nv 1 0 0 1 0 0\nv 0 1 0 0 0 255 1\nf 1 2 3\n"));

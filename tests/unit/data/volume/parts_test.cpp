@@ -1,5 +1,5 @@
 // Volumes whose voxels lie in several files or behind other data, and values that 32-bit numbers do not tell apart.
-#include "services/data/companions.h"
+#include "services/data/kinds.h"
 #include "tests/support/volume/files.h"
 
 namespace telesplat::data::test {

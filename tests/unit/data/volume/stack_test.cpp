@@ -4,7 +4,6 @@
 #include <zlib.h>
 
 #include "services/data/inspect.h"
-#include "services/data/volume/formats/tiff_pages.h"
 #include "tests/support/volume/files.h"
 
 namespace telesplat::data::test {

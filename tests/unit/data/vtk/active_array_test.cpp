@@ -1,11 +1,11 @@
 // A VTK file's active scalars are what a mesh is coloured by where nobody says otherwise.
-#include "services/data/mesh/active_array.h"
+#include "services/data/mesh/reader.h"
 
 #include <limits>
 
 #include "common/scene/colouring.h"
 #include "services/data/data_options.h"
-#include "services/data/open_mesh.h"
+#include "services/data/kinds.h"
 #include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {

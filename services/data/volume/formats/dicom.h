@@ -1,16 +1,19 @@
-// What one DICOM file says of its slices: one of a file, or all frames of a multi-frame file.
+// DICOM: what a file says of its slices, where the slices of a series lie, a series as one volume.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/core/result.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 
@@ -64,5 +67,60 @@ Result<std::vector<DicomSlice>> parse_dicom(std::string_view content, const std:
 
 /// The elements of a deflated file (transfer syntax 1.2.840.10008.1.2.1.99). Error: damaged; more than 2 GB.
 Result<std::string> inflate_dicom(std::string_view content, const std::string& path);
+
+/// A layer of a volume: a slice, or a mixture of two neighbours.
+struct DicomLayer {
+  size_t below = 0, above = 0;  ///< places in DicomOrder::slices
+  double share = 0;             ///< of the one above; 0: the one below alone
+};
+
+struct DicomOrder {
+  std::vector<DicomSlice> slices;              ///< those that are used
+  std::vector<std::vector<DicomLayer>> steps;  ///< time steps of equally many layers, along the slices' normal
+  glm::dvec3 origin{0}, step{0};               ///< mm: of layer 0, and from one to the next
+  std::string remark;                          ///< for people: what was left out, mixed or evened; often empty
+};
+
+/// Orders the slices of one series (at least one). Takes those that have the commonest size, spacing and orientation;
+/// localizers only if there is nothing else. Leaves out copies: the same SOP Instance UID and frame, or a place
+/// where same_pixels() finds no difference. Slices at one place become time steps if all places have equally many. A
+/// layer that is missing is mixed from its neighbours by their distance; slices at uneven distances are resampled.
+/// Slices without positions go by number.
+DicomOrder order_slices(std::vector<DicomSlice> slices,
+                        const std::function<bool(const DicomSlice&, const DicomSlice&)>& same_pixels);
+
+/// One of the series in a folder, for people to choose from.
+struct DicomSeriesName {
+  std::string uid, text, modality;
+  size_t slices = 0;
+  int columns = 0, rows = 0;
+};
+
+struct DicomSeries {
+  VolumeFileHeader header;  ///< of each step; checked; patient space (left, posterior, superior), mm
+  DicomOrder order;         ///< its remark tells all that was left out or evened, for people
+  /// All series of the folder, by Series Number, then by UID; and which of them this is.
+  std::vector<DicomSeriesName> all;
+  size_t taken = 0;
+  /// The files of its slices, by name.
+  std::vector<std::string> files() const;
+};
+
+/// "2: AXIAL T1, MR, 40 slices of 512 x 512": its place in the folder, from 1, and what it is.
+std::string text_of(const DicomSeriesName& series, size_t place);
+
+/// Whether a folder holds DICOM slices: in itself, or below where it holds none.
+bool holds_dicom(const std::string& folder);
+
+/// A series among the DICOM files of a folder; of the folders below, too, if it has a DICOMDIR or no slices of its own
+/// (100,000 files, 8 folders deep). `path`: the folder, its DICOMDIR, or one of its slices, whose series it is then.
+/// `which`: its place in the list, from 1, or its UID; empty: the one of most slices. Error: no slices, no such series;
+/// values that are not 8 to 64 bits wide; rescaling by 0. Files that are cut or damaged are left out with a remark.
+Result<std::shared_ptr<const DicomSeries>> find_dicom_series(const std::string& path, const std::string& which = "");
+
+/// How a slice's values are stored, before any are cleared of what lies beside their bits.
+StoredType stored_type(const DicomSlice& slice);
+/// Whether low values are bright, and have no scale to keep: they are turned round.
+bool is_inverted(const DicomSlice& slice);
 
 }  // namespace telesplat::data
