@@ -39,6 +39,10 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& pa
 
 MappedFile::~MappedFile() { munmap(const_cast<std::byte*>(data_), size_); }
 
+Result<image::View> Companions::picture(std::string_view, const std::string& name, uint64_t) {
+  return Error{fmt::format("picture {} can be decoded by telesplat-import alone", name)};
+}
+
 Result<std::string_view> FolderCompanions::read(const std::string& named) {
   auto& file = files_[named];
   if (!file) {

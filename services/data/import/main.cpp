@@ -10,8 +10,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <new>
+#include <span>
 #include <vector>
 
+#include "common/image/file.h"
 #include "services/data/base/cut_off.h"
 #include "services/data/gltf/reader.h"
 #include "services/data/import/confine.h"
@@ -24,6 +26,14 @@
 
 namespace telesplat::data {
 namespace {
+
+class PicturedFiles final : public ImportFiles {
+ public:
+  using ImportFiles::ImportFiles;
+  Result<image::View> picture(std::string_view bytes, const std::string& name, uint64_t most_pixels) override {
+    return image::read_picture(std::as_bytes(std::span(bytes)), name, most_pixels);
+  }
+};
 
 // A hostile file must not keep us busy without end.
 void limit_time(uint64_t bytes) { alarm(static_cast<unsigned>(60 + bytes / 1'000'000)); }
@@ -106,7 +116,7 @@ int main(int argc, char** argv) {
   // The libraries of this program take a second to load and more; the parent may have died meanwhile.
   if (const char* parent = std::getenv(kParentVariable); parent && std::atoi(parent) != getppid()) return 1;
   end_at_cut_off_files(kCutOffExit);
-  ImportFiles files(STDIN_FILENO);
+  PicturedFiles files(STDIN_FILENO);
   const uint64_t file_bytes = files.bytes();
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what libraries print must not get between

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 #include "common/image/srgb.h"
 #include "services/data/base/refusal.h"
@@ -79,7 +78,7 @@ uint32_t NamedTextures::number_of(const std::string& picture, Wrap wrap) {
     notes_.push_back(fmt::format("{}: the texture {} is not there; the colours without it are shown", file_, picture));
     return entry->second = kNoTexture;
   }
-  auto view = image::read_picture(std::as_bytes(std::span(*bytes)), picture, room_);
+  auto view = companions_.picture(*bytes, picture, room_);
   if (!view) refuse("{}: {}", file_, view.error().text);
   room_ -= view->colour.size();
   all_.push_back(std::make_shared<Texture>(std::move(*view), wrap, wrap));
