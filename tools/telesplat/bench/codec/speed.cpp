@@ -1,31 +1,12 @@
 #include "tools/telesplat/bench/codec/speed.h"
 
-#include <hwy/targets.h>
-
 #include <algorithm>
 
-#include "common/codec/dense/kernels.h"
 #include "common/core/clock.h"
 #include "common/net/service.h"
 
 namespace telesplat::launcher {
 namespace {
-
-// Highway chooses an instruction set for as long as this lives.
-class OnTarget {
- public:
-  // Where there is no code for `target`, that for the next slower one is used.
-  explicit OnTarget(int64_t target) { use(hwy::SupportedTargets() & ~(target - 1)); }
-  ~OnTarget() { use(0); }
-  OnTarget(const OnTarget&) = delete;
-  OnTarget& operator=(const OnTarget&) = delete;
-
- private:
-  static void use(int64_t targets) {
-    hwy::SetSupportedTargetsForTest(targets);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
 
 double megapixels_a_second(size_t pixels, double seconds, const std::function<void()>& work) {
   constexpr size_t kLeast = 3;
@@ -46,13 +27,7 @@ double megapixels_a_second(size_t pixels, double seconds, const std::function<vo
 
 std::vector<TargetSpeed> measure_speeds(size_t pixels, double seconds, const std::function<void()>& encode,
                                         const std::function<void()>& decode) {
-  std::vector<TargetSpeed> out;
-  for (const int64_t target : codec::detail::kernel_targets()) {
-    const OnTarget on(target);
-    out.push_back({hwy::TargetName(target), megapixels_a_second(pixels, seconds, encode),
-                   megapixels_a_second(pixels, seconds, decode)});
-  }
-  return out;
+  return {{"this machine", megapixels_a_second(pixels, seconds, encode), megapixels_a_second(pixels, seconds, decode)}};
 }
 
 }  // namespace telesplat::launcher
