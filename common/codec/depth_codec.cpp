@@ -1,31 +1,7 @@
 // The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), and dense tiles
-// (dense/): depth first (depth), normals by what depth says of them (normals, guided), colours by a palette and by
-// height (colours, height); residuals -> tokens by context -> words (symbols, tables, rans). Where few pixels are
+// (dense/): depth first (depth), normals by what depth says of them (normals, guided), colours by a palette or by
+// channels (colours); residuals -> tokens by context -> words (symbols, tables, rans). Where few pixels are
 // covered: prediction from coarse to fine (scatter), residuals -> bits by how far they spread (scatter_coder, spread).
-//
-// Bits a covered pixel of 256 x 256 tiles of frames of 1280 x 800, outlines, masks and sparse tiles included; LZW is
-// that of TIFF, with its predictor:
-//                        terrain 5.8M  terrain 2.9M  head 4.1M  bone 0.7M triangles
-//   LZW                  27.4          36.9          24.6       37.8
-//   the format before    18.0          24.0          13.1       17.6
-//   this one             14.0          19.4          11.7       16.3
-// Tried: Huffman codes, joint tokens of a normal's parts (the format before); normals before depth, 0.5 to 1.2 bits
-// more; contexts that never share tables, 0.1 to 0.2 more; least squares without a second look at what they miss, 0.3
-// bits more of normals.
-//
-// Sparse tiles as they were in version 3 of the stream (docs/codec-bench.md has later ones), of 4 frames of 1280 x 800
-// along a recorded walk: bits a covered pixel with its mask, in brackets how many times those of full tiles, and the
-// bits with the nearest pixel as prediction and Huffman codes.
-//                       terrain 5.8M       terrain 2.9M       head 4.1M          bone 0.7M triangles
-//   full tiles          17.8               24.1               12.6               17.9
-//   1 in 32, even       29.2 (1.6; 39.4)   36.5 (1.5; 45.8)   23.2 (1.8; 31.3)   34.1 (1.9; 37.3)
-//   1 in 10, random     28.7 (1.6; 32.8)   35.8 (1.5; 39.1)   23.4 (1.9; 26.8)   32.4 (1.8; 32.5)
-//   3 px around edges   24.0 (1.4; 26.1)   30.1 (1.3; 32.5)   29.0 (2.3; 28.7)   26.8 (1.5; 26.6)
-//   1 px at edges       28.9 (1.6; 31.2)   35.2 (1.5; 38.1)   33.7 (2.7; 33.5)   31.9 (1.8; 31.3)
-// 0.15 to 0.3 us a covered pixel each way on a 2.6 GHz Xeon, twice what they took before. A pixel 5.6 pixels away says
-// less than the one beside it, so that 1.3 times is out of reach at 1 in 32 even without the mask (2 bits). Tried: scan
-// order, +1 to 2 bits; weights of distance^-2 and ^-4, up to +0.6; a second fit without outliers, -0.4 (bone) to +0.4
-// (terrain); adaptive arithmetic codes, -0.9 (bone) to +0.3 at another half of the time.
 #include "common/codec/depth_codec.h"
 
 #include <fmt/format.h>
@@ -45,7 +21,7 @@ using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
 // after them. bounds = varint depth, u8 normal, u8 colour. flags: bounds follow; there is one tile, a sparse one.
-constexpr uint8_t kMagic = 0xD7, kVersion = 11, kBounded = 1, kOneTile = 2, kKnownFlags = kBounded | kOneTile;
+constexpr uint8_t kMagic = 0xD7, kVersion = 12, kBounded = 1, kOneTile = 2, kKnownFlags = kBounded | kOneTile;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
@@ -113,10 +89,6 @@ bool for_each_tile(const TileGrid& grid, F f) {
       if (!f(column, row)) return false;
   return true;
 }
-
-}  // namespace
-
-namespace {
 
 std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, DepthImage* decoded,
                             const RoomAxes* axes) {

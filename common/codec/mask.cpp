@@ -1,10 +1,10 @@
 #include "common/codec/mask.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <type_traits>
 
-#include "common/codec/dense/kernels.h"
 #include "common/codec/range_coder.h"
 
 namespace telesplat::codec::detail {
@@ -85,12 +85,6 @@ Scratch& scratch() {
   static thread_local Scratch s;
   return s;
 }
-
-}  // namespace
-
-void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) { kernels().covered_bits(depth, count, words); }
-
-namespace {
 
 void put_plain(std::vector<uint8_t>& out, const Mask& mask) {
   Scratch& s = scratch();

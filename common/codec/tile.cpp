@@ -2,22 +2,13 @@
 
 #include <algorithm>
 
-#include "common/codec/mask_edges.h"
 #include "common/codec/walk.h"
 #include "common/image/normal.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
-enum Kind : uint8_t {
-  kEmpty = 0,
-  kDense = 1,
-  kSparse = 2,
-  kPredictorBits = 3,
-  kMasked = 4,
-  kEdges = 8,
-  kKnownBits = 15
-};
+enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
 constexpr int kRamp = 8;  // beside a sparse tile's pole: a ramp's axis follows
 
 TileScratch& scratch() {
@@ -64,23 +55,6 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
   return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
-// By edges or by pixels, whichever takes fewer bytes. Returns whether it is by edges.
-bool put_shorter_mask(std::vector<uint8_t>& out, const Mask& mask, size_t covered) {
-  constexpr size_t kScattered = 4, kLong = 12;  // pixels a run: below and above these nothing needs to be tried
-  const size_t runs = mask.runs(), begin = out.size();
-  if (covered < kScattered * runs) return put_mask(out, mask), false;
-  put_edges(out, mask);
-  if (covered >= kLong * runs) return true;
-  const size_t size = out.size() - begin;
-  put_mask(out, mask);
-  const bool edges = out.size() - begin >= 2 * size;
-  if (edges)
-    out.resize(begin + size);
-  else
-    out.erase(out.begin() + static_cast<ptrdiff_t>(begin), out.begin() + static_cast<ptrdiff_t>(begin + size));
-  return edges;
-}
-
 // What is covered of a tile.
 void look_at(Mask& mask, const image::DepthImage& image, const TileRect& rect) {
   mask.reset(rect.width, rect.height);
@@ -103,23 +77,24 @@ int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& ma
   return exact && !canonical ? kRaw : choice.best();
 }
 
-// What a ramp says of a sparse tile's colours takes 17 bytes; of some pixels it is found as well as of all.
-std::optional<RampAxis> find_ramp(TileScratch& s, const image::DepthImage& image, const TileRect& rect,
+// Looks for a ramp that explains a sparse tile's colours, which takes 17 bytes. Some pixels find it as well as all.
+std::optional<RampAxis> find_ramp(const Mask& mask, const image::DepthImage& image, const TileRect& rect,
                                   const RoomAxes* axes) {
   constexpr size_t kMostSamples = 1024;
-  const size_t step = s.mask.count() / kMostSamples + 1;
+  if (axes == nullptr) return std::nullopt;
+  const size_t step = mask.count() / kMostSamples + 1;
   size_t left = 0;
-  s.samples.clear();
+  std::vector<RampSample> samples;
   for (int y = 0; y < rect.height; ++y)
-    for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
+    for_each_set(mask.row(y), mask.words_per_row(), [&](size_t x) {
       if (left-- > 0) return;
       left = step - 1;
       const size_t i = rect.index(static_cast<int>(x), y);
-      s.samples.push_back({static_cast<float>(static_cast<int>(x) - rect.width / 2),
-                           static_cast<float>(y - rect.height / 2), static_cast<float>(image.depth[i]),
-                           image.colour[i] & 0xFFFFFF});
+      samples.push_back({static_cast<double>(static_cast<int>(x) - rect.width / 2),
+                         static_cast<double>(y - rect.height / 2), static_cast<double>(image.depth[i]),
+                         image.colour[i] & 0xFFFFFF});
     });
-  return fit_ramp(axes, s.samples, rect.width, rect.height);
+  return fit_ramp(*axes, samples, rect.width, rect.height);
 }
 
 }  // namespace
@@ -174,7 +149,6 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   const bool full = covered == pixels,
              sparse = !full &&
                       (pixels > kMaxTilePixels || is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr));
-  const size_t kind = out.size();
   out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
 
   size_t first = rect.first;  // of the covered pixels
@@ -186,12 +160,12 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   Pixel base{image.depth[first], image.colour[first] & 0xFFFFFF, image.normal[first]};
   if (bounds.depth != nullptr) base.depth = bounds.depth->index(base.depth);
   put_base(out, base);
-  if (!full && put_shorter_mask(out, s.mask, covered)) out[kind] |= kEdges;
+  if (!full) put_mask(out, s.mask);
 
   if (sparse) {
     if (bounds.depth != nullptr) base.depth = bounds.depth->code(base.depth);
     const int pole = pole_of(image, rect, s.mask, bounds.normal == 0);
-    const auto ramp = find_ramp(s, image, rect, axes);
+    const auto ramp = find_ramp(s.mask, image, rect, axes);
     out.push_back(static_cast<uint8_t>(pole | (ramp ? kRamp : 0)));
     if (ramp) put_ramp(out, *ramp), s.ramp.start(*ramp, rect.width, rect.height);
     s.scatter_encoder.start(bounds, ramp ? &s.ramp : nullptr);
@@ -212,7 +186,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   if (!kind || *kind & ~kKnownBits) return std::nullopt;
   const int predictor = *kind & kPredictorBits;
   const bool full = !(*kind & kMasked), sparse = predictor == kSparse;
-  if ((!sparse && predictor != kDense) || (full && (sparse || (*kind & kEdges) != 0))) return std::nullopt;
+  if ((!sparse && predictor != kDense) || (full && sparse)) return std::nullopt;
 
   TileScratch& s = scratch();
   const auto base = get_base(in);
@@ -222,7 +196,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   size_t covered = pixels;
   if (!full) {
     s.mask.reset(rect.width, rect.height);
-    if (!((*kind & kEdges) != 0 ? get_edges(in, s.mask) : get_mask(in, s.mask))) return std::nullopt;
+    if (!get_mask(in, s.mask)) return std::nullopt;
     covered = s.mask.count();
     if (covered == 0) return std::nullopt;  // that is an empty tile
     if (sparse) clear(image, rect);
@@ -259,7 +233,7 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     Mask& mask = scratch().mask;
     mask.reset(rect.width, rect.height);
     const size_t before = in.left();
-    if (!((*kind & kEdges) != 0 ? get_edges(in, mask) : get_mask(in, mask))) return false;
+    if (!get_mask(in, mask)) return false;
     info.mask_bytes += before - in.left();
     covered = mask.count();
   }

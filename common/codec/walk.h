@@ -5,6 +5,7 @@
 
 #include "common/codec/dense/dense.h"
 #include "common/codec/mask.h"
+#include "common/codec/poles.h"
 #include "common/codec/sparse/ramp.h"
 #include "common/codec/sparse/scatter.h"
 #include "common/codec/sparse/scatter_coder.h"
@@ -18,7 +19,6 @@ struct TileScratch {
   ScatterWalk scatter_walk;
   ScatterPredictor predictor;
   Ramp ramp;
-  std::vector<HeightSample> samples;
   ScatterEncoder scatter_encoder;
   ScatterDecoder scatter_decoder;
   DenseCoder dense;

@@ -16,7 +16,7 @@
 
 namespace telesplat::codec::detail {
 
-/// What codes dense tiles. One a thread: it keeps its memory.
+/// Codes dense tiles. One a thread: it keeps its memory.
 class DenseCoder {
  public:
   /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them; its depth is an
@@ -26,7 +26,7 @@ class DenseCoder {
   /// Writes the covered pixels of `rect`; false where the stream is damaged.
   [[nodiscard]] bool get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask,
                          const Pixel& base, const TileBounds& bounds);
-  /// Adds the bytes of a tile with `covered` pixels to `info`; false where the stream is cut off.
+  /// Adds the bytes of a tile to `info`; false where the stream is cut off.
   [[nodiscard]] static bool skip(Reader& in, StreamInfo& info);
 
  private:
@@ -37,33 +37,25 @@ class DenseCoder {
     size_t word_bytes[kPartCount] = {};
   };
   static std::optional<Parts> get_parts(Reader& in);
-  void begin(const TileRect& rect, const Mask* mask);
-  void load_depth(const image::DepthImage& image, const TileRect& rect);
-  template <class T>
-  PixelRows<T> rows_of(const std::vector<T>& plane, const TileRect& rect, std::vector<T>& copy) const;
-  void put_words(std::vector<uint8_t>& out);
+  SymbolPlane& plane(size_t i);
+  size_t planes_until(size_t part) const;
+  void put_header(std::vector<uint8_t>& out, size_t part);
+  [[nodiscard]] bool put_words(std::vector<uint8_t>& out);
   void begin_part(const Parts& parts, size_t part);
   [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
                                const DepthLattice* lattice);
-  [[nodiscard]] bool get_normals(const Parts& parts, const Pixel& base, int reach);
-  [[nodiscard]] bool get_colours(const Parts& parts, int reach);
-  template <class Planes>
-  [[nodiscard]] bool get_symbols(size_t first, size_t count, Planes plane);
-  void get_values(image::DepthImage& image, const TileRect& rect, const Pixel& base);
+  [[nodiscard]] bool get_symbols(size_t part);
+  void get_values(image::DepthImage& image, const TileRect& rect);
   template <class T>
-  T* row_for(std::vector<T>& out, const TileRect& rect, size_t y, std::vector<T>& scratch) const;
-  template <class T>
-  void store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const;
+  void clear_gaps(size_t y, T* row) const;
 
   TileShape shape_;
-  Mask line_mask_;
   DepthPlane depth_;
   NormalPlanes normals_;
   ColourPlanes colours_;
-  std::vector<uint32_t> colour_rows_;
-  std::vector<uint16_t> normal_rows_;
-  PlaneEncoder encoders_[6];
-  PlaneDecoder decoders_[6];
+  static constexpr size_t kMostPlanes = 6;
+  PlaneEncoder encoders_[kMostPlanes];
+  PlaneDecoder decoders_[kMostPlanes];
   WordSource source_;
   BitWriter writer_;
   BitReader reader_;

@@ -8,27 +8,28 @@
 namespace telesplat::codec::detail {
 namespace {
 
-// What L and UL of a row's first pixel are: so it is predicted from the two above it.
+using image::kMaxDepthCode;
+
+// Sets L and UL of a row's first pixel to the pixel above it.
 void begin_row(Plane<uint32_t>& depth, size_t y) {
   const auto r = static_cast<ptrdiff_t>(y);
   depth.row(r)[-1] = depth.row(r)[-2] = depth.row(r - 1)[0];
 }
 
-// What UR of a row's last pixels is.
+// Sets UR of a row's last pixels.
 void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
   uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
   const uint32_t slope = width > 1 ? row[width - 1] - row[width - 2] : 0;
   row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
 }
 
-// Calls covered(begin, end) for the runs of row y, in order. Pixels that are not covered become L + U - UL: what U
-// differs by from the last one that is covered stays.
+// Calls covered(begin, end) for the runs of row y, in order. Pixels that are not covered become L + U - UL.
 template <class F>
 void with_holes(const uint32_t* above, const TileShape& shape, size_t y, uint32_t* row, F covered) {
   ptrdiff_t from = 0;
   const auto fill = [&](ptrdiff_t end) {
     const uint32_t off = row[from - 1] - above[from - 1];
-    for (ptrdiff_t x = from; x < end; ++x) row[x] = (above[x] + off) & image::kMaxDepthCode;
+    for (ptrdiff_t x = from; x < end; ++x) row[x] = (above[x] + off) & kMaxDepthCode;
   };
   shape.for_each_run(y, [&](size_t begin, size_t end) {
     const auto first = static_cast<ptrdiff_t>(begin), last = static_cast<ptrdiff_t>(end);
@@ -40,64 +41,68 @@ void with_holes(const uint32_t* above, const TileShape& shape, size_t y, uint32_
 }
 
 // Four times the mean of L + U - UL, 2 L - LL, 2 U - UU and L + UR - U, all but the terms of L and LL, and 2.
-uint32_t mean_terms(const uint32_t* above2, const uint32_t* above, size_t x) {
+uint32_t mean_terms(const uint32_t* above2, const uint32_t* above, ptrdiff_t x) {
   return 2 * above[x] - above[x - 1] - above2[x] + above[x + 1] + 2;
 }
 
 // The mean is rounded up from half. Where it was rounded down, a pixel lies rather above than below it: there signs are
 // turned, so that what is likelier has the smaller number.
-constexpr uint32_t kAbove = 3;
-
-void mean_residuals(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
-                    uint8_t* tokens) {
-  for (size_t x = 0; x < n; ++x) {
-    const uint32_t sum = 4 * row[x - 1] - row[x - 2] + mean_terms(above2, above, x);
-    const uint32_t turned = 0 - static_cast<uint32_t>((sum & 3) == kAbove);
-    const uint32_t off = (row[x] - static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2)) << 8;
-    const uint32_t v = (off ^ turned) - turned;
-    z[x] = ((v << 1) ^ static_cast<uint32_t>(static_cast<int32_t>(v) >> 31)) >> 8;
-    tokens[x] = static_cast<uint8_t>(token_of(z[x]));
-  }
-}
+uint32_t turn_if_rounded_down(uint32_t off, uint32_t sum) { return (sum & 3) == 3 ? 0 - off : off; }
+uint32_t mean_of(uint32_t sum) { return static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2); }
 
 }  // namespace
 
 void DepthPlane::reset(const TileShape& shape, uint32_t base) {
   depth.reset(shape.width, shape.height);
   depth.fill_row(-1, base), depth.fill_row(-2, base);
-  symbols.reset(shape, true);
-  in_steps = false;
 }
 
-void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
-  depth.fill_row(-1, base), depth.fill_row(-2, base);
+void DepthPlane::find_residuals(const TileShape& shape, size_t y, Way by) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  const uint32_t *const above2 = depth.row(r - 2), *const above = depth.row(r - 1), *const row = depth.row(r);
+  uint32_t* const z = symbols.z.row(r);
+  uint8_t* const tokens = symbols.tokens.row(r);
+  if (by == kPlanes) return plane_residuals(above2, above, row, shape.width, z, tokens);
+  if (by == kLinear) depth_residuals(above, row, shape.width, z);
+  if (by == kMean)
+    for (ptrdiff_t x = 0; x < static_cast<ptrdiff_t>(shape.width); ++x) {
+      const uint32_t sum = 4 * row[x - 1] - row[x - 2] + mean_terms(above2, above, x);
+      z[x] = fold24(turn_if_rounded_down(row[x] - mean_of(sum), sum));
+    }
+  tokens_of(z, shape.width, tokens);
+}
+
+// Of every sixteenth row.
+double DepthPlane::bits_by(const TileShape& shape, Way by) {
+  std::array<uint32_t, kSymbols> counts{};
+  uint64_t raw = 0;
+  for (size_t y = 2; y < shape.height; y += 16) {
+    find_residuals(shape, y, by);
+    const uint8_t* const tokens = symbols.tokens.row(static_cast<ptrdiff_t>(y));
+    const unsigned first = by == kPlanes ? kHits : 0;
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (; x < end; ++x) ++counts[tokens[x]], raw += tokens[x] < first ? 0 : (tokens[x] - first) >> 3;
+    });
+  }
+  return static_cast<double>(raw) + bits_of(counts, kSymbols);
+}
+
+void DepthPlane::encode(const TileShape& shape, bool may_mean) {
   for (size_t y = 0; y < shape.height; ++y) {
     begin_row(depth, y);
     with_holes(depth.row(static_cast<ptrdiff_t>(y) - 1), shape, y, depth.row(static_cast<ptrdiff_t>(y)),
                [](ptrdiff_t, ptrdiff_t) {});
     end_row(depth, y, shape.width);
   }
-  way = choose_way(shape, may_mean);
-  symbols.reset(shape, true, way == kPlanes ? kHits : 0);
-  for (size_t y = 0; y < shape.height; ++y) {
-    const auto r = static_cast<ptrdiff_t>(y);
-    const auto [begin, end] = shape.span(y);
-    const uint32_t *const above2 = depth.row(r - 2) + begin, *const above = depth.row(r - 1) + begin,
-                          *const row = depth.row(r) + begin;
-    uint32_t* const z = symbols.wide.row(r) + begin;
-    uint8_t* const tokens = symbols.tokens.row(r) + begin;
-    if (way == kMean)
-      mean_residuals(above2, above, row, end - begin, z, tokens);
-    else if (way == kPlanes)
-      kernels().plane_residuals(above2, above, row, end - begin, z, tokens);
-    else
-      kernels().depth_residuals(above, row, end - begin, z, tokens);
-    finish_tokens(symbols, shape, y);
-  }
+  symbols.reset(shape, false);
+  const double by_line = bits_by(shape, kLinear), by_planes = bits_by(shape, kPlanes);
+  way = by_planes < by_line ? kPlanes : kLinear;
+  if (may_mean && bits_by(shape, kMean) < std::min(by_line, by_planes)) way = kMean;
+  symbols.reset(shape, false, way == kPlanes ? kHits : 0);
+  for (size_t y = 0; y < shape.height; ++y) find_residuals(shape, y, way), finish_tokens(symbols, shape, y);
 }
 
 void DepthPlane::to_indices(const TileShape& shape, const DepthLattice& lattice) {
-  in_steps = true;
   for (size_t y = 0; y < shape.height; ++y) {
     uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
     for (size_t x = 0; x < shape.width; ++x) row[x] = lattice.index(row[x]);  // 0, nothing, is an index of its own
@@ -114,98 +119,56 @@ void DepthPlane::to_codes(const TileShape& shape, const DepthLattice& lattice) {
   }
 }
 
-// Tries every sixteenth row: which tokens take fewer bits.
-DepthPlane::Way DepthPlane::choose_way(const TileShape& shape, bool may_mean) {
-  symbols.reset(shape, true, kHits);
-  std::array<uint32_t, kSymbols> linear{}, planes{}, means{};
-  uint64_t linear_bits = 0, plane_bits = 0, mean_bits = 0;
-  for (size_t y = 2; y < shape.height; y += 16) {
-    const auto r = static_cast<ptrdiff_t>(y);
-    const uint32_t* const z = symbols.wide.row(r);
-    const uint8_t* const tokens = symbols.tokens.row(r);
-    kernels().plane_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
-                              symbols.tokens.row(r));
-    shape.for_each_run(y, [&](size_t x, size_t end) {
-      for (; x < end; ++x) {
-        const uint32_t token = token_of(z[x]);
-        ++linear[token], linear_bits += token >> 3;
-        ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
-      }
-    });
-    if (!may_mean) continue;
-    mean_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
-                   symbols.tokens.row(r));
-    shape.for_each_run(y, [&](size_t x, size_t end) {
-      for (; x < end; ++x) ++means[tokens[x]], mean_bits += tokens[x] >> 3;
-    });
-  }
-  const double by_line = static_cast<double>(linear_bits) + bits_of(linear, kSymbols),
-               by_planes = static_cast<double>(plane_bits) + bits_of(planes, kSymbols),
-               by_mean = static_cast<double>(mean_bits) + bits_of(means, kSymbols);
-  faceted = by_planes < by_line;
-  if (may_mean && by_mean < std::min(by_line, by_planes)) return kMean;
-  return faceted ? kPlanes : kLinear;
-}
-
-void DepthPlane::put_way(BitSink& bits, bool may_mean) const { bits.put(way, may_mean ? 2 : 1); }
-
-bool DepthPlane::begin_decoding(const TileShape& shape, bool may_mean, BitReader& bits) {
-  way = static_cast<Way>(bits.source.take(may_mean ? 2 : 1));
-  symbols.reset(shape, true, way == kPlanes ? kHits : 0);
+bool DepthPlane::begin_decoding(const TileShape& shape, BitReader& bits) {
+  way = static_cast<Way>(bits.source.take(kWayBits));
+  symbols.reset(shape, false, way == kPlanes ? kHits : 0);
   return way <= kMean;
 }
 
-void DepthPlane::decode_by_mean(const TileShape& shape, size_t y) {
+void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
   const auto r = static_cast<ptrdiff_t>(y);
-  uint32_t* const row = depth.row(r);
-  const uint32_t *const above = depth.row(r - 1), *const above2 = depth.row(r - 2);
-  const uint32_t* const z = symbols.wide.row(r);
   for (auto& terms : terms_)
-    if (terms.size() < shape.width + 64) terms.resize(shape.width + 64);
-  uint32_t *const terms = terms_[0].data(), *const offs = terms_[1].data();
-  for (size_t x = 0; x < shape.width; ++x)
-    terms[x] = mean_terms(above2, above, x), offs[x] = (z[x] >> 1) ^ (0 - (z[x] & 1));
-  with_holes(above, shape, y, row, [&](ptrdiff_t x, ptrdiff_t end) {
-    uint32_t past = row[x - 2], left = row[x - 1];
+    if (terms.size() < shape.width) terms.resize(shape.width);
+  uint32_t *const terms = terms_[0].data(), *const take_left = terms_[1].data(), *const take_slope = terms_[2].data();
+  plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.z.row(r), symbols.tokens.row(r), shape.width, terms,
+              take_left, take_slope);
+  uint32_t* const row = depth.row(r);
+  with_holes(depth.row(r - 1), shape, y, row, [&](ptrdiff_t x, ptrdiff_t end) {
+    uint32_t left = row[x - 1], slope = left - row[x - 2];
     for (; x < end; ++x) {
-      const uint32_t sum = 4 * left + (terms[x] - past);
-      const uint32_t off = (sum & 3) == kAbove ? 0 - offs[x] : offs[x];
-      past = left, left = (static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2) + off) & image::kMaxDepthCode;
-      row[x] = left;
+      const uint32_t next = terms[x] + (left & take_left[x]) + (slope & take_slope[x]);
+      slope = next - left, left = next;  // modulo 2^32, which is as good
+      row[x] = next & kMaxDepthCode;
     }
   });
-}
-
-void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
-  const size_t width = shape.width;
-  const auto r = static_cast<ptrdiff_t>(y);
-  for (auto& terms : terms_)
-    if (terms.size() < width + 64) terms.resize(width + 64);
-  uint32_t *const terms = terms_[0].data(), *const take_left = terms_[1].data(), *const take_slope = terms_[2].data();
-  kernels().plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.wide.row(r), symbols.tokens.row(r), shape.cover(y),
-                        width, terms, take_left, take_slope);
-  uint32_t* const row = depth.row(r);
-  uint32_t left = row[-1], slope = 0;
-  for (size_t x = 0; x < width; ++x) {
-    const uint32_t next = terms[x] + (left & take_left[x]) + (slope & take_slope[x]);
-    slope = next - left, left = next;  // modulo 2^32, which is as good
-    row[x] = next & image::kMaxDepthCode;
-  }
 }
 
 bool DepthPlane::decode_row(const TileShape& shape, size_t y, uint32_t most) {
   const auto r = static_cast<ptrdiff_t>(y);
   begin_row(depth, y);
   uint32_t* const row = depth.row(r);
-  if (way == kMean) {
-    decode_by_mean(shape, y);
-  } else if (way == kPlanes) {
+  const uint32_t *const above = depth.row(r - 1), *const above2 = depth.row(r - 2), *const z = symbols.z.row(r);
+  if (way == kPlanes)
     decode_by_planes(shape, y);
-  } else {
-    kernels().depth_rows(depth.row(r - 1), symbols.wide.row(r), shape.width, row);
-  }
+  else if (way == kLinear)
+    with_holes(above, shape, y, row, [&](ptrdiff_t x, ptrdiff_t end) {
+      for (uint32_t off = row[x - 1] - above[x - 1]; x < end; ++x)
+        off += static_cast<uint32_t>(unfold(z[x])), row[x] = (above[x] + off) & kMaxDepthCode;
+    });
+  else
+    with_holes(above, shape, y, row, [&](ptrdiff_t x, ptrdiff_t end) {
+      for (; x < end; ++x) {
+        const uint32_t sum = 4 * row[x - 1] - row[x - 2] + mean_terms(above2, above, x);
+        const uint32_t off = turn_if_rounded_down(static_cast<uint32_t>(unfold(z[x])), sum);
+        row[x] = (mean_of(sum) + off) & kMaxDepthCode;
+      }
+    });
   end_row(depth, y, shape.width);
-  return kernels().largest_less_one(shape.cover(y), row, shape.width) < most;  // 0 becomes the largest number
+  uint32_t largest = 0;  // less 1: 0 becomes the largest number
+  shape.for_each_run(y, [&](size_t x, size_t end) {
+    for (; x < end; ++x) largest = std::max(largest, row[x] - 1);
+  });
+  return largest < most;
 }
 
 void DepthPlane::extend(const TileShape& shape) {
@@ -214,12 +177,10 @@ void DepthPlane::extend(const TileShape& shape) {
   for (ptrdiff_t y = 0; y < h; ++y) {
     uint32_t* const row = depth.row(y);
     row[-1] = w > 1 ? 2 * row[0] - row[1] : row[0];
-    row[-2] = 2 * row[-1] - row[0];
     row[w] = w > 1 ? 2 * row[w - 1] - row[w - 2] : row[w - 1];
   }
-  for (ptrdiff_t x = -2; x < static_cast<ptrdiff_t>(w); ++x) {
+  for (ptrdiff_t x = -1; x <= static_cast<ptrdiff_t>(w); ++x) {
     depth.row(-1)[x] = h > 1 ? 2 * depth.row(0)[x] - depth.row(1)[x] : depth.row(0)[x];
-    depth.row(-2)[x] = 2 * depth.row(-1)[x] - depth.row(0)[x];
     depth.row(h)[x] = h > 1 ? 2 * depth.row(h - 1)[x] - depth.row(h - 2)[x] : depth.row(h - 1)[x];
   }
 }

@@ -17,30 +17,28 @@ struct DepthPlane {
   SymbolPlane symbols;
   enum Way : uint8_t { kLinear = 0, kPlanes = 1, kMean = 2 };
   Way way = kLinear;
-  bool faceted = false;   ///< of what was encoded: many pixels lie in planes of their neighbours
-  bool in_steps = false;  ///< codes are those of indices
 
   /// What lies above and to the left of the first pixel is `base`.
   void reset(const TileShape& shape, uint32_t base);
   /// depth -> symbols, once all rows were set. Gives pixels that are not covered their predictions.
   /// may_mean: kMean may be chosen.
-  void encode(const TileShape& shape, uint32_t base, bool may_mean);
-  void put_way(BitSink& bits, bool may_mean) const;
+  void encode(const TileShape& shape, bool may_mean);
   /// Before the first decode_row().
-  [[nodiscard]] bool begin_decoding(const TileShape& shape, bool may_mean, BitReader& bits);
+  [[nodiscard]] bool begin_decoding(const TileShape& shape, BitReader& bits);
+  static constexpr unsigned kWayBits = 2;
   /// Indices of `lattice` <-> the codes that they stand for, for all pixels, or those that are covered. What is coded
   /// within bounds are indices.
   void to_indices(const TileShape& shape, const DepthLattice& lattice);
   void to_codes(const TileShape& shape, const DepthLattice& lattice);
   /// The next row from its symbols. False where a covered depth would be 0, or above `most`.
   [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t most);
-  /// Continues slopes beyond the tile's edges, as geometry and flatness need it, once all rows are known.
+  /// Continues slopes beyond the tile's edges, as geometry needs it, once all rows are known.
   void extend(const TileShape& shape);
 
  private:
-  Way choose_way(const TileShape& shape, bool may_mean);
+  void find_residuals(const TileShape& shape, size_t y, Way by);
+  double bits_by(const TileShape& shape, Way by);
   void decode_by_planes(const TileShape& shape, size_t y);
-  void decode_by_mean(const TileShape& shape, size_t y);
   std::vector<uint32_t> terms_[3];
 };
 

@@ -1,16 +1,15 @@
-// Symbols <-> bits by asymmetric numeral systems (J. Duda, 2013, "range" variant, as in F. Giesen's interleaved coders,
-// 2014): 32 or 64 states that take turns, 11-bit frequencies, words of 16 bits.
+// Symbols <-> words of 16 bits by asymmetric numeral systems (J. Duda, 2013, "range" variant, as in F. Giesen's
+// interleaved coders, 2014): kStates states that take turns, 11-bit frequencies.
 //
 // A symbol is a token (eight a factor of two, as the hybrid integers of JPEG XL, ISO/IEC 18181-1, C.3.3) and its raw
 // bits. State x in [2^15, 2^31):
 //   token of frequency f that starts at s:  x -> x / f * 2048 + x % f + s
 //   k raw bits, k <= 15:                    x -> x * 2^k + bits
-// Before either, the lower 16 bits of a state that would become too large are written. Symbol i of a row belongs to
-// state i % 32 or 64. Decoding undoes this: it reads words from the last one backwards. Of 32 symbols it undoes the
-// tokens, then raw bits above the lowest 15, then the lowest 15; and each of these from their last state to the first.
+// Before either, the lower 16 bits of a state that would become too large are written. Decoding undoes this from the
+// last word to the first: it takes a symbol's token, its raw bits above the lowest 15, and then the lowest 15.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -20,61 +19,125 @@ namespace telesplat::codec::detail {
 
 inline constexpr unsigned kFrequencyBits = 11;
 inline constexpr uint32_t kFrequencyOne = 1u << kFrequencyBits;
-inline constexpr unsigned kStateBits = 31;  ///< of states, at most
-inline constexpr uint32_t kStateLow = 1u << 15;
-inline constexpr size_t kLanes = 32, kContexts = 16, kSymbols = 256;
-inline constexpr size_t kEnoughForMore = 32768;  // pixels
-inline constexpr size_t kMostStates = 2 * kLanes;
-
-/// How many states a tile has: with more, a processor need not wait for one group of symbols before it begins the next;
-/// but each takes four bytes.
-constexpr size_t states_of(size_t symbols) { return symbols < kEnoughForMore ? kLanes : kMostStates; }
-
-/// Division by a frequency as a product (R. Alverson, "Integer division using reciprocals", 1991). A state x is too
-/// large for it if x and the bits of 2048 - frequency, where they stand, add up to 2^31 or more.
-struct EncodeEntry {
-  uint32_t reciprocal = 0;
-  uint32_t packed = 0;  ///< bits 0-12: what is added, 13-16: shift, 20-30: 2048 - frequency
-
-  static constexpr unsigned kShiftAt = 13, kComplementAt = kStateBits - kFrequencyBits;
-  static constexpr uint32_t kAddMask = (1u << kShiftAt) - 1, kShiftMask = 15;
-
-  static EncodeEntry of(uint32_t start, uint32_t frequency) {
-    if (frequency == 0) return {};
-    if (frequency == 1) return {~0u, (start + kFrequencyOne - 1) | (kFrequencyOne - 1) << kComplementAt};
-    const unsigned bits = static_cast<unsigned>(std::bit_width(frequency - 1));
-    const uint64_t reciprocal = ((uint64_t{1} << (bits + 31)) + frequency - 1) / frequency;
-    return {static_cast<uint32_t>(reciprocal),
-            start | (bits - 1) << kShiftAt | (kFrequencyOne - frequency) << kComplementAt};
-  }
-  /// That of a token which starts so much later.
-  EncodeEntry from(uint32_t start) const { return {reciprocal, packed + start}; }
-};
-
-/// The symbols of a row that are to be put. Tokens below `first` have no raw bits; others are first + the token of z.
-struct SymbolRow {
-  const uint16_t* symbols = nullptr;  ///< contexts * kSymbols + tokens
-  const uint32_t* wide = nullptr;     ///< z; or
-  const uint8_t* narrow = nullptr;    ///< z below 256
-  size_t count = 0;
-  unsigned first = 0;
-  size_t states = kLanes;  ///< how many take turns: kLanes or twice that
-};
-
-/// Where the symbols of a row go: the same. z of a token below `first` is that of `first`.
-struct DecodedRow {
-  const uint8_t* contexts = nullptr;
-  uint8_t* tokens = nullptr;
-  uint32_t* wide = nullptr;
-  uint8_t* narrow = nullptr;
-  size_t count = 0;
-  unsigned first = 0;
-  size_t states = kLanes;
-  const uint8_t* readable = nullptr;  ///< where what may be read begins, if that is before the words; else null
-};
+inline constexpr uint32_t kStateLow = 1u << 15, kStateEnd = 1u << 31;
+inline constexpr size_t kStates = 8, kContexts = 16, kSymbols = 256;
+inline constexpr size_t kStateBytes = 4 * kStates;
+inline constexpr size_t kMostSymbolBytes = 6;
 
 /// Token of z < 2^24: eight a factor of two. The exponent and the first three bits after it, as a float has them.
-inline uint32_t token_of(uint32_t z) { return (std::bit_cast<uint32_t>(static_cast<float>(z + 8)) >> 20) - 1040; }
+inline uint32_t token_of(uint32_t z) {
+  return (std::bit_cast<uint32_t>(static_cast<float>(static_cast<int32_t>(z + 8))) >> 20) - 1040;
+}
 inline constexpr unsigned kNumberTokens = 169, kByteTokens = 41;
+
+/// A token's range of 2048.
+struct EncodeEntry {
+  uint16_t start = 0, frequency = 0;
+};
+
+/// Puts symbols, the last one first.
+class SymbolEncoder {
+ public:
+  /// symbols: how many follow. out: room for kMostSymbolBytes of each, and for two bytes.
+  void start(size_t symbols, uint8_t* out) {
+    std::fill_n(states_, kStates, kStateLow);
+    next_ = symbols, out_ = out;
+  }
+  /// bits: raw ones, of z + 8.
+  void put(EncodeEntry entry, uint32_t z, unsigned bits) {
+    uint32_t& x = states_[--next_ % kStates];
+    const uint32_t v = z + 8;
+    const unsigned low = std::min(bits, 15u), high = bits - low;
+    put_bits(x, v, low);
+    if (high != 0) put_bits(x, v >> 15, high);
+    put_word_if(x >= uint32_t{entry.frequency} << (31 - kFrequencyBits), x);
+    x = (x / entry.frequency << kFrequencyBits) + x % entry.frequency + entry.start;
+  }
+  uint8_t* end() const { return out_; }
+  /// After the last symbol: kStateBytes.
+  void put_states(uint8_t* to) const { std::memcpy(to, states_, kStateBytes); }
+  bool at_rest() const {
+    return std::all_of(states_, states_ + kStates, [](uint32_t x) { return x == kStateLow; });
+  }
+
+ private:
+  void put_word_if(bool full, uint32_t& x) {  // without a jump: nobody can foresee it
+    const auto word = static_cast<uint16_t>(x);
+    std::memcpy(out_, &word, 2);
+    out_ += full ? 2 : 0, x >>= full ? 16 : 0;
+  }
+  void put_bits(uint32_t& x, uint32_t bits, unsigned count) {
+    put_word_if(x >> (31 - count) != 0, x);
+    x = x << count | (bits & ((1u << count) - 1));
+  }
+  uint32_t states_[kStates];
+  size_t next_ = 0;
+  uint8_t* out_ = nullptr;
+};
+
+/// Takes symbols, the first one first, from words, the last one first.
+class SymbolDecoder {
+ public:
+  /// states: what put_states() wrote; null: they are at rest. False where one is out of range.
+  [[nodiscard]] bool start(const uint8_t* states) {
+    std::fill_n(states_, kStates, kStateLow);
+    if (states != nullptr) std::memcpy(states_, states, kStateBytes);
+    next_ = 0;
+    return std::all_of(states_, states_ + kStates, [](uint32_t x) { return x >= kStateLow && x < kStateEnd; });
+  }
+  bool at_rest() const {
+    return std::all_of(states_, states_ + kStates, [](uint32_t x) { return x == kStateLow; });
+  }
+  /// `count` symbols from the words [begin, end): table is that of make_decode_tables(), tokens below `first` have no
+  /// raw bits. Returns false if words are missing; `end` becomes the end of what is left.
+  [[nodiscard]] bool get(const uint32_t* table, const uint8_t* contexts, size_t count, unsigned first, uint8_t* tokens,
+                         uint32_t* z, const uint8_t* begin, const uint8_t*& end) {
+    const bool plenty = static_cast<size_t>(end - begin) >= kMostSymbolBytes * count;
+    return plenty ? take<false>(table, contexts, count, first, tokens, z, begin, end)
+                  : take<true>(table, contexts, count, first, tokens, z, begin, end);
+  }
+
+ private:
+  template <bool kChecked>
+  static bool refill(uint32_t& x, const uint8_t* begin, const uint8_t*& end) {
+    if (kChecked && end - begin < 2) return x >= kStateLow;
+    uint16_t word;
+    std::memcpy(&word, end - 2, 2);
+    const uint32_t low = x < kStateLow;  // without a jump: nobody can foresee it
+    x = low != 0 ? x << 16 | word : x;
+    end -= 2 * low;
+    return true;
+  }
+  template <bool kChecked>
+  bool take(const uint32_t* table, const uint8_t* contexts, size_t count, unsigned first, uint8_t* tokens, uint32_t* z,
+            const uint8_t* begin, const uint8_t*& end) {
+    const uint8_t* at = end;
+    bool good = true;
+    for (size_t i = 0; i < count; ++i) {
+      uint32_t& state = states_[next_++ % kStates];
+      const uint32_t entry = table[contexts[i] * kFrequencyOne + (state & (kFrequencyOne - 1))];
+      uint32_t x = ((entry >> 12 & 0xFFF) + 1) * (state >> kFrequencyBits) + (entry & 0xFFF);
+      good &= refill<kChecked>(x, begin, at);
+      const unsigned token = entry >> 24, over = token < first ? 0 : token - first;
+      unsigned bits = over >> 3;
+      uint32_t v = (8 + (over & 7)) << bits;
+      if (bits > 15) [[unlikely]] {
+        v += (x & ((1u << (bits - 15)) - 1)) << 15;
+        x >>= bits - 15, bits = 15;
+        good &= refill<kChecked>(x, begin, at);
+      }
+      v += x & ((1u << bits) - 1);
+      x >>= bits;
+      good &= refill<kChecked>(x, begin, at);
+      tokens[i] = static_cast<uint8_t>(token);
+      z[i] = v - 8;
+      state = x;
+    }
+    end = at;
+    return good;
+  }
+  uint32_t states_[kStates];
+  size_t next_ = 0;
+};
 
 }  // namespace telesplat::codec::detail

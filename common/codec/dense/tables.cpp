@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 
-#include "common/codec/dense/kernels.h"
 #include "common/codec/golomb.h"
 
 namespace telesplat::codec::detail {
@@ -247,35 +246,27 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
   out[last] = static_cast<uint16_t>(out[last] + free - given);  // where all weigh nothing
 }
 
-void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out, int merges) {
-  static const auto entries = [] {  // of tokens whose frequencies begin at 0
-    std::vector<EncodeEntry> all;
-    for (uint32_t f = 0; f <= kFrequencyOne; ++f) all.push_back(EncodeEntry::of(0, f));
-    return all;
-  }();
-  out.resize(kContexts * kSymbols);
+void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out) {
+  out.assign(kContexts * kSymbols, {});
   std::array<uint16_t, kSymbols> frequencies;
   for (size_t c = 0; c < kContexts; ++c) {
     frequencies_of(levels.of[c], levels.alphabet, frequencies);
-    uint32_t start = 0;
-    for (unsigned t = 0; t < levels.alphabet; start += frequencies[t++])
-      out[c * kSymbols + t] = entries[frequencies[t]].from(start);
+    uint16_t start = 0;
+    for (unsigned t = 0; t < levels.alphabet; start = static_cast<uint16_t>(start + frequencies[t++]))
+      out[c * kSymbols + t] = {start, frequencies[t]};
   }
-  if (merges == 0) return;
-  for (size_t c = kContexts - 1; c > 0; --c)
-    std::copy_n(out.begin() + static_cast<ptrdiff_t>((c >> merges) * kSymbols), levels.alphabet,
-                out.begin() + static_cast<ptrdiff_t>(c * kSymbols));
 }
 
 void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out, size_t contexts) {
-  out.resize(kContexts * kFrequencyOne + kMoreSlots);
+  out.resize(kContexts * kFrequencyOne);
   std::array<uint16_t, kSymbols> frequencies;
   for (size_t c = 0; c < contexts; ++c) {
     frequencies_of(levels.of[c], levels.alphabet, frequencies);
-    uint32_t* const at = out.data() + c * kFrequencyOne;
-    if (kernels().slots(frequencies.data(), levels.alphabet, at) != at) continue;
-    frequencies[0] = kFrequencyOne;  // a context without tokens
-    kernels().slots(frequencies.data(), 1, at);
+    uint32_t *at = out.data() + c * kFrequencyOne, *const begin = at;
+    for (uint32_t t = 0; t < levels.alphabet; ++t)
+      for (uint32_t i = 0, count = frequencies[t]; i < count; ++i) *at++ = (t << 24 | (count - 1) << 12) + i;
+    if (at == begin)  // a context without tokens
+      for (uint32_t i = 0; i < kFrequencyOne; ++i) at[i] = (kFrequencyOne - 1) << 12 | i;
   }
 }
 

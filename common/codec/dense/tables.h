@@ -43,8 +43,8 @@ inline constexpr size_t kMostLevelBits = kContexts * kSymbols * 64;
 void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphabet,
                     std::array<uint16_t, kSymbols>& out);
 
-/// kContexts x kSymbols entries. merges: of contexts to those of `levels`.
-void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out, int merges = 0);
+/// kContexts x kSymbols entries.
+void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out);
 /// kFrequencyOne entries for each of the first `contexts`: token << 24 | (frequency - 1) << 12 | offset. Contexts
 /// without tokens give token 0.
 void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out, size_t contexts = kContexts);

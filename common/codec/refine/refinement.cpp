@@ -1,7 +1,7 @@
 // What bounded streams leave out.
 //   refinement = magic, version, varint width, varint height; of each tile in which something is: u8 kind, and
 //     kSame: nothing, all pixels are as they are known
-//     kDense, kScattered: reach (varint depth, u8 pole + 8 * normal, u8 colour), and dense_refine.h or scattered pixels
+//     kScattered: reach (varint depth, u8 pole + 8 * normal, u8 colour), and scattered pixels
 //     kAnew: the tile as in a lossless stream
 //   scattered = of the pixels row by row: stored block of bits (depth), [block of bytes (normals)], [3 blocks of bytes
 //     (green, red, blue)]
@@ -13,7 +13,7 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/entropy.h"
-#include "common/codec/refine/dense_refine.h"
+#include "common/codec/poles.h"
 #include "common/codec/tile.h"
 #include "common/image/normal.h"
 
@@ -21,19 +21,35 @@ namespace telesplat::codec {
 namespace {
 
 using detail::Mask;
-using detail::Reach;
 using detail::Reader;
 using detail::TileBounds;
 using detail::TileGrid;
 using detail::TileRect;
 using image::DepthImage;
 
-constexpr uint8_t kMagic = 0xD8, kVersion = 10;
-enum Kind : uint8_t { kSame = 0, kDense = 1, kScattered = 2, kAnew = 3 };
-constexpr int kNarrow = 16;              // pixels: tiles that are not as wide are coded as scattered ones
+constexpr uint8_t kMagic = 0xD8, kVersion = 11;
+enum Kind : uint8_t { kSame = 0, kScattered = 1, kAnew = 2 };
 constexpr int kShifts[3] = {8, 16, 0};   // green, red, blue
 constexpr unsigned kMostDepthBits = 25;  // of a scattered pixel
-constexpr size_t kPlentyBits = 16;       // a pixel, from which on a tile is tried anew
+constexpr size_t kPlentyBits = 8;        // a pixel, from which on a tile is tried anew
+
+/// How far the exact pixels of a tile are from those that are known.
+struct Reach {
+  uint32_t depth = 0;  ///< a code c is known within floor(c * depth / 2^32)
+  int pole = 0;        ///< by which normals are turned: 0 to kPoles - 1
+  int normal = 0;      ///< of each coordinate on that map
+  int colour = 0;      ///< of each channel
+  bool none() const { return depth == 0 && normal == 0 && colour == 0; }
+
+  /// Between which codes the exact one lies.
+  struct Codes {
+    uint32_t low, high;
+  };
+  Codes around(uint32_t known) const {
+    const auto by = static_cast<uint32_t>(uint64_t{known} * depth >> 32);
+    return {known - std::min(by, known - 1), std::min(known + by, image::kMaxDepthCode)};
+  }
+};
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image refinement: {}", what)}; }
 
@@ -47,7 +63,6 @@ bool same_mask(const DepthImage& a, const DepthImage& b) {
 struct Scratch {
   Mask mask;
   size_t covered = 0;
-  detail::RefinementCoder dense;
   detail::BitWriter writer;
   detail::BitReader reader;
   std::vector<uint8_t> bytes;
@@ -74,10 +89,6 @@ void for_each_covered(const Scratch& s, const TileRect& rect, F f) {
   }
 }
 
-bool is_full(const Scratch& s, const TileRect& rect) {
-  return s.covered == static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
-}
-
 // How far two normals, both turned, are from each other.
 int distance(uint16_t p, uint16_t q) {
   return std::max(std::abs((p & 255) - (q & 255)), std::abs((p >> 8) - (q >> 8)));
@@ -101,16 +112,16 @@ bool reach_of_normals(const Scratch& s, const TileRect& rect, const DepthImage& 
     canonical &= image::canonical_normal16(a) == a;
     if (n++ % 16 == 0)
       for (int p = 0; p < detail::kPoles; ++p)
-        most[p] = std::max(most[p], distance(detail::turn_table(p)[a], detail::turn_table(p)[b]));
+        most[p] = std::max(most[p], distance(detail::turn_normal(a, p), detail::turn_normal(b, p)));
   });
   if (!canonical) return false;
   reach.pole = static_cast<int>(std::min_element(most, most + detail::kPoles) - most);
-  const uint16_t* const turned = detail::turn_table(reach.pole);
+  const auto turned = [&](uint16_t code) { return detail::turn_normal(code, reach.pole); };
   int largest = 0;
   for (int y = 0; y < rect.height; ++y) {
     const size_t row = rect.index(0, y);  // what is not covered is alike
     for (size_t x = 0; x < static_cast<size_t>(rect.width); ++x)
-      largest = std::max(largest, distance(turned[exact.normal[row + x]], turned[known.normal[row + x]]));
+      largest = std::max(largest, distance(turned(exact.normal[row + x]), turned(known.normal[row + x])));
   }
   reach.normal = largest;
   return largest <= ErrorBounds::kMostNormal;
@@ -235,18 +246,12 @@ void put_tile(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exact, co
     out.push_back(kSame);
     return;
   }
-  const bool full = is_full(s, rect);
-  const bool scattered =
-      rect.width < kNarrow || s.covered * 4 < static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
   const size_t begin = out.size();
-  out.push_back(scattered ? kScattered : kDense);
+  out.push_back(kScattered);
   detail::put_varint(out, reach.depth);
   out.push_back(static_cast<uint8_t>(reach.pole + 8 * reach.normal));
   out.push_back(static_cast<uint8_t>(reach.colour));
-  if (scattered)
-    put_scattered(s, out, exact, known, rect, reach);
-  else
-    s.dense.put(out, exact, known, rect, full ? nullptr : &s.mask, reach);
+  put_scattered(s, out, exact, known, rect, reach);
   // Wide bounds may leave so much that neighbours say more.
   if (8 * (out.size() - begin) <= kPlentyBits * s.covered) return;
   std::vector<uint8_t> anew{kAnew};
@@ -283,8 +288,7 @@ bool get_tile(Scratch& s, Reader& in, DepthImage& image, const TileRect& rect) {
   if (*kind == kAnew) return get_anew(s, in, image, rect);
   const auto reach = get_reach(in);
   if (!reach) return false;
-  if (*kind == kScattered) return get_scattered(s, in, image, rect, *reach);
-  return rect.width >= kNarrow && s.dense.get(in, image, rect, is_full(s, rect) ? nullptr : &s.mask, *reach);
+  return get_scattered(s, in, image, rect, *reach);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
+#include <utility>
 
 namespace telesplat::codec::detail {
 namespace {
@@ -39,37 +39,35 @@ double difference(uint32_t a, uint32_t b) {
   return sum;
 }
 
-// Gives each sample its colour's place among all colours. Returns a sample of each.
-std::vector<HeightSample> number_colours(std::vector<HeightSample>& samples) {
-  std::vector<uint32_t> order(samples.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
-    return samples[i].colour != samples[j].colour ? samples[i].colour < samples[j].colour : i < j;
-  });
-  std::vector<HeightSample> first;
-  for (const uint32_t i : order) {
-    if (first.empty() || first.back().colour != samples[i].colour) first.push_back(samples[i]);
-    samples[i].place = static_cast<uint32_t>(first.size() - 1);
-  }
-  return first;
+using Axis = std::array<double, 3>;
+
+double height_of(const Axis& axis, const RampSample& s) { return (axis[0] * s.x + axis[1] * s.y + axis[2]) / s.code; }
+
+// How much colours change from one height to the next; heights become those of the samples, from below.
+double roughness(const Axis& axis, const std::vector<RampSample>& samples,
+                 std::vector<std::pair<double, uint32_t>>& heights) {
+  heights.clear();
+  for (const RampSample& s : samples) heights.emplace_back(height_of(axis, s), s.colour);
+  std::sort(heights.begin(), heights.end());
+  double sum = 0;
+  for (size_t i = 1; i < heights.size(); ++i) sum += difference(heights[i].second, heights[i - 1].second);
+  return sum;
 }
 
 }  // namespace
 
-std::optional<RampAxis> fit_ramp(const RoomAxes* axes, std::vector<HeightSample>& samples, int width, int height) {
-  const std::vector<HeightSample> first = number_colours(samples);
-  double axis[3];
-  if (!find_axis({.axes = axes, .exact = true}, samples, first, axis)) return std::nullopt;
-  std::vector<std::pair<double, uint32_t>> by_height;
-  double by_row = 0, up = 0;
-  for (const HeightSample& s : samples) {
-    if (!by_height.empty()) by_row += difference(s.colour, by_height.back().second);
-    by_height.emplace_back((axis[0] * double{s.x} + axis[1] * double{s.y} + axis[2]) / double{s.code}, s.colour);
-  }
-  // Where nearly each pixel has a colour of its own, these can be sorted by any heights.
-  std::sort(by_height.begin(), by_height.end());
-  for (size_t i = 1; i < by_height.size(); ++i) up += difference(by_height[i].second, by_height[i - 1].second);
-  if (!(up < kMostOfRows * by_row)) return std::nullopt;
+std::optional<RampAxis> fit_ramp(const RoomAxes& axes, const std::vector<RampSample>& samples, int width, int height) {
+  constexpr size_t kLeastSamples = 128;
+  if (samples.size() < kLeastSamples) return std::nullopt;
+  double by_row = 0;
+  for (size_t i = 1; i < samples.size(); ++i) by_row += difference(samples[i].colour, samples[i - 1].colour);
+  std::vector<std::pair<double, uint32_t>> by_height, heights;
+  double least = kMostOfRows * by_row;
+  Axis axis{};
+  for (const Axis& candidate : axes)
+    if (const double rough = roughness(candidate, samples, heights); rough < least)
+      least = rough, axis = candidate, by_height = heights;
+  if (by_height.empty()) return std::nullopt;
   const double low = by_height.front().first, high = by_height.back().first;
   // As precise as 31 bits are, and as many steps as there are heights at most.
   const double largest = std::max({std::abs(axis[0]), std::abs(axis[1]), std::abs(axis[2])});

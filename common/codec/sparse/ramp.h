@@ -9,7 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include "common/codec/dense/height.h"
 #include "common/codec/entropy.h"
 #include "common/codec/room_axes.h"
 
@@ -30,9 +29,15 @@ struct RampAxis {
   }
 };
 
-/// The axis by which colours of samples change least; nothing where none explains them. axes: of the room, from the
-/// tile's centre, or null. samples: their places and indices are set. width, height: of the tile.
-std::optional<RampAxis> fit_ramp(const RoomAxes* axes, std::vector<HeightSample>& samples, int width, int height);
+/// A pixel of which depth and colour are known; x and y from the tile's centre.
+struct RampSample {
+  double x, y, code;
+  uint32_t colour;
+};
+
+/// The axis of the room, counted from the tile's centre, along which colours of samples change least; nothing where
+/// none explains them. width, height: of the tile.
+std::optional<RampAxis> fit_ramp(const RoomAxes& axes, const std::vector<RampSample>& samples, int width, int height);
 void put_ramp(std::vector<uint8_t>& out, const RampAxis& axis);
 /// Nothing where the stream is damaged. width, height: of the tile.
 std::optional<RampAxis> get_ramp(Reader& in, int width, int height);

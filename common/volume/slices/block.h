@@ -1,23 +1,22 @@
-// One block of a slice image: 64 x 64 pixels <-> bytes. Made for speed first: fixed shapes, no entropy coder,
-// everything in 128-bit vectors.
+// Blocks of a slice image, 64 x 64 pixels each, as symbols of the depth codec's coder (codec/dense/rans.h), whose
+// tables all blocks of an image share.
 //
-// Layout, little-endian: u8 predictor; u64 mask: bit g says that group g has anything in it; for each such group u16,
-// four bits a plane, its width w in bits, 0 to 8; then for each such group, plane after plane, 8 w bytes. A group is 16
-// x 4 pixels, groups lie in order of rows, four a row. What is coded are residuals, modulo 256 in every channel: each
-// channel minus its predictor (0: the pixel above; 1: that on the left; 2: above + left - above left; pixels outside
-// the block are 0), then red and blue (planes 2 and 0) minus green (plane 1), zigzag (0, -1, 1, -2 ...). Plane 3 is
-// alpha. The 64 bytes of a plane, four rows r0 to r3 of 16, are split into bits 0..3, bits of weight 4, 2 and 1 in turn
-// as w has them:
-//   four bits: r0 | r2 << 4, r1 | r3 << 4
-//   two bits:  r0 | r1 << 2 | r2 << 4 | r3 << 6
-//   one bit:   t = r0 | r1 << 1 | r2 << 2 | r3 << 3: first half of t | second half << 4
-// With w = 8 they stand as they are.
+// Tables of an image: for each plane (alpha, green, blue, red) bias (13 bits) and shift (4 bits) of its contexts, then
+// levels of its tokens (codec/dense/tables.h); little-endian, padded to a byte.
+// Block: u64 mask: bit g says that group g has anything in it; 8 u32, the coder's states; words of 16 bits. A group is
+// 16 x 4 pixels, groups lie in order of rows, four a row.
+//
+// Residuals are each channel minus (above + left - above left), modulo 256, pixels outside the block being 0; then red
+// and blue minus green, folded (0, -1, 1, -2 ...); of the groups in the mask alone, elsewhere they are 0. Symbols come
+// plane after plane, row after row. Context of a residual: clamp((sum - bias) >> shift, 0, 15), where sum weighs the
+// tokens above (3), above on both sides (2), two rows above (1), and of the plane before those here (4) and on both
+// sides (2); outside the block tokens are 0.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "common/core/result.h"
@@ -26,11 +25,39 @@ namespace telesplat::volume {
 
 inline constexpr int kBlockSide = 64;
 inline constexpr size_t kBlockPixels = size_t{kBlockSide} * kBlockSide;
-inline constexpr size_t kMaxBlockBytes = 1 + 8 + 64 * 2 + 4 * kBlockPixels;
 
-/// pixels: row after row. out: room for kMaxBlockBytes; returns how many were written.
-size_t encode_block(const uint32_t* pixels, uint8_t* out);
-/// The other way; bytes come from outside. Error: not exactly a block's bytes; pixels are undefined then.
-Status decode_block(std::span<const uint8_t> bytes, uint32_t* pixels);
+/// Codes all blocks of one image.
+class BlockCoder {
+ public:
+  BlockCoder();
+  ~BlockCoder();
+  /// Forgets all blocks.
+  void start();
+  /// pixels: row after row.
+  void add(const uint32_t* pixels);
+  /// After the last block: appends the tables, 65535 bytes at most.
+  void put_tables(std::vector<uint8_t>& out);
+  /// Appends block n, in the order of add(), once the tables are put: 65535 bytes at most.
+  void put(size_t n, std::vector<uint8_t>& out);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Decodes blocks that share tables. Bytes come from outside.
+class BlockDecoder {
+ public:
+  BlockDecoder();
+  ~BlockDecoder();
+  /// Error: they are not valid tables.
+  Status set_tables(std::span<const uint8_t> tables);
+  /// Error: not exactly a block's bytes; pixels are undefined then. Precondition: set_tables() succeeded.
+  Status decode(std::span<const uint8_t> bytes, uint32_t* pixels);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 }  // namespace telesplat::volume

@@ -8,13 +8,12 @@
 #include "common/volume/grid.h"
 #include "common/volume/shear.h"
 #include "common/volume/slices/block.h"
-#include "common/volume/slices/coded_block.h"
 
 namespace telesplat::volume {
 namespace {
 
 static_assert(kBlockSide == kSliceBlock);
-static_assert(kMaxRasterSide / kSliceBlock <= 256 && kMaxBlockBytes <= 0xffff);
+static_assert(kMaxRasterSide / kSliceBlock <= 256);
 constexpr size_t kSliceHead = 10, kBlockHead = 4;
 
 void put_u16(std::vector<uint8_t>& out, size_t value) {
@@ -66,41 +65,27 @@ void encode_slice(const SliceImage& image, std::vector<uint8_t>& out) {
   const auto& r = image.rect;
   struct Place {
     int x, y;
-    std::vector<uint8_t> bytes;
   };
   std::vector<Place> places;
   static thread_local BlockCoder coder;
   coder.start();
-  alignas(64) uint32_t block[kBlockPixels];
-  uint8_t packed[kMaxBlockBytes];
+  uint32_t block[kBlockPixels];
   for (int y = r.y / kSliceBlock; y < blocks_across(r.y + r.height); ++y)
     for (int x = r.x / kSliceBlock; x < blocks_across(r.x + r.width); ++x) {
       if (!cut_out(image, x, y, block)) continue;
-      places.push_back({x, y, {packed, packed + encode_block(block, packed)}});
+      places.push_back({x, y});
       coder.add(block);
     }
   if (places.empty()) return;
-  // Tables pay if what is coded with them is as much smaller.
-  std::vector<uint8_t> tables, coded;
+  std::vector<uint8_t> tables, blocks;
   coder.put_tables(tables);
-  size_t saved = 0;
-  std::vector<std::vector<uint8_t>> all(places.size());
-  for (size_t n = 0; n < places.size(); ++n) {
-    coder.put(n, all[n]);
-    if (all[n].size() < places[n].bytes.size()) saved += places[n].bytes.size() - all[n].size();
+  put_head(out, {image.layer, image.k_begin, image.k_end, tables, {}}, places.size());
+  for (size_t n = 0, begin = 0; n < places.size(); ++n, begin = blocks.size()) {
+    coder.put(n, blocks);
+    out.push_back(uint8_t(places[n].x)), out.push_back(uint8_t(places[n].y));
+    put_u16(out, blocks.size() - begin);
   }
-  EncodedSlice slice{image.layer, image.k_begin, image.k_end, {}, {}};
-  if (saved > tables.size() && tables.size() <= kMaxTableBytes) {
-    slice.tables = tables;
-    for (size_t n = 0; n < places.size(); ++n)
-      if (all[n].size() < places[n].bytes.size()) places[n].bytes = std::move(all[n]);
-  }
-  put_head(out, slice, places.size());
-  for (const auto& p : places) {
-    out.push_back(uint8_t(p.x)), out.push_back(uint8_t(p.y));
-    put_u16(out, p.bytes.size());
-  }
-  for (const auto& p : places) out.insert(out.end(), p.bytes.begin(), p.bytes.end());
+  out.insert(out.end(), blocks.begin(), blocks.end());
 }
 
 std::vector<uint8_t> encode_slice(const SliceImage& image) {
@@ -175,14 +160,12 @@ Status decode_slice_into(SliceImage& image, const EncodedSlice& slice, int raste
   image.rect = bounds(slice, raster_width, raster_height);
   const auto& r = image.rect;
   image.pixels.assign(size_t(r.width) * size_t(r.height), 0);
-  alignas(64) uint32_t block[kBlockPixels];
+  uint32_t block[kBlockPixels];
   static thread_local BlockDecoder decoder;
-  if (!slice.tables.empty())
-    if (const Status s = decoder.set_tables(slice.tables); !s)
-      return Error{fmt::format("layer {}: {}", slice.layer, s.error().text)};
+  if (const Status s = decoder.set_tables(slice.tables); !s)
+    return Error{fmt::format("layer {}: {}", slice.layer, s.error().text)};
   for (const auto& b : slice.blocks) {
-    const bool coded = !slice.tables.empty() && !b.bytes.empty() && b.bytes[0] == kCoded;
-    if (const Status s = coded ? decoder.decode(b.bytes, block) : decode_block(b.bytes, block); !s)
+    if (const Status s = decoder.decode(b.bytes, block); !s)
       return Error{fmt::format("layer {}, block {}, {}: {}", slice.layer, b.x, b.y, s.error().text)};
     const int x0 = b.x * kSliceBlock, y0 = b.y * kSliceBlock;
     const int width = std::min(kSliceBlock, raster_width - x0), height = std::min(kSliceBlock, raster_height - y0);

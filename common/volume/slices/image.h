@@ -29,7 +29,7 @@ struct EncodedBlock {
 /// An encoded image, taken apart without decoding. Spans point into what was parsed.
 struct EncodedSlice {
   int layer = 0, k_begin = 0, k_end = 0;
-  std::span<const uint8_t> tables;   ///< of coded blocks (coded_block.h); empty: all blocks are packed (block.h)
+  std::span<const uint8_t> tables;   ///< of all blocks (block.h)
   std::vector<EncodedBlock> blocks;  ///< those with anything in them, in order of rows
 };
 
@@ -38,11 +38,10 @@ struct EncodedSlice {
 /// Precondition: from parse_slices() with that raster, not empty.
 geometry::Rect bounds(const EncodedSlice& slice, int raster_width, int raster_height);
 
-/// Blocks that are wholly transparent are left out; of an image without any other nothing is left: no bytes. A block is
-/// coded as coded_block.h or block.h has it, whichever takes fewer bytes; before them stand u16 layer, k_begin, k_end,
-/// the number of blocks, and of the bytes of the tables; the tables; then of each block u8 column, u8 row, u16 bytes
-/// (little-endian). Precondition: rect lies in [0, kMaxRasterSide]^2, pixels has its
-/// size, k_begin < k_end <= kMaxSide.
+/// Blocks that are wholly transparent are left out; of an image without any other nothing is left: no bytes. Before the
+/// blocks (block.h) stand u16 layer, k_begin, k_end, the number of blocks, and of the bytes of the tables; the tables;
+/// then of each block u8 column, u8 row, u16 bytes (little-endian). Precondition: rect lies in [0, kMaxRasterSide]^2,
+/// pixels has its size, k_begin < k_end <= kMaxSide.
 std::vector<uint8_t> encode_slice(const SliceImage& image);
 /// The same, appended.
 void encode_slice(const SliceImage& image, std::vector<uint8_t>& out);

@@ -6,13 +6,11 @@
 #include <numbers>
 #include <random>
 
-#include "common/codec/dense/kernels.h"
 #include "common/codec/depth_codec.h"
 #include "common/image/normal.h"
 #include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/masks.h"
-#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec {
 namespace {
@@ -123,42 +121,6 @@ TEST(CodecBounds, DamageIsAnErrorOrACanonicalImage) {
     if (HasFatalFailure()) return;
   }
   EXPECT_GT(refused, 500u);
-}
-
-TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
-  const ErrorBounds bounds = error_bounds(1 / 32.0, 2 / 1280.0, 1, 1);
-  struct Made {
-    DepthImage image, bounded;
-    std::vector<uint8_t> bytes, refinement;
-  };
-  std::vector<Made> all;
-  for (int width = 1; width <= 70; ++width)
-    for (const double density : {0.05, 0.7, 1.0}) {
-      Made m{test::render({.width = width, .height = 11, .seed = static_cast<uint32_t>(width), .rough = true})};
-      test::keep_random(m.image, density, 5);
-      m.bytes = encode(m.image, bounds, &m.bounded);
-      m.refinement = encode_refinement(m.image, m.bounded);
-      all.push_back(std::move(m));
-    }
-  const DepthImage smooth = test::render({.width = 70, .height = 90, .constant_albedo = true});
-  const DepthImage bands = test::masked(test::facets(190, 180, 2), test::band_mask(190, 180, 30));
-  for (const DepthImage& image : {test::facets(70, 90, 1), bands, smooth}) {
-    Made m{image};
-    m.bytes = encode(m.image, bounds, &m.bounded);
-    m.refinement = encode_refinement(m.image, m.bounded);
-    all.push_back(std::move(m));
-  }
-  for (const int64_t target : detail::kernel_targets()) {
-    const testing::OnTarget on(target);
-    for (const Made& m : all) {
-      EXPECT_EQ(encode(m.image, bounds), m.bytes) << hwy::TargetName(target) << ", " << m.image.width;
-      EXPECT_TRUE(decode(m.bytes).value() == m.bounded) << hwy::TargetName(target) << ", " << m.image.width;
-      EXPECT_EQ(encode_refinement(m.image, m.bounded), m.refinement)
-          << hwy::TargetName(target) << ", " << m.image.width;
-      EXPECT_TRUE(decode_refinement(m.refinement, m.bounded).value() == m.image)
-          << hwy::TargetName(target) << ", " << m.image.width;
-    }
-  }
 }
 
 TEST(CodecBounds, SeveralTilesAndNarrowOnes) {

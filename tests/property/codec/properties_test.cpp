@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <random>
 
-#include "common/codec/dense/kernels.h"
 #include "common/codec/depth_codec.h"
 #include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/masks.h"
-#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec {
 namespace {
@@ -90,7 +88,7 @@ TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
   EXPECT_GT(accepted, 0u) << "the header is good";
 }
 
-TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
+TEST(CodecProperties, ImagesOfAllWidthsComeBack) {
   // Widths around vector lengths, all densities: heads, bodies and tails of every kernel.
   std::vector<DepthImage> all;
   for (int width = 1; width <= 70; ++width) {
@@ -101,17 +99,7 @@ TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
   }
   for (const int width : {63, 64, 70}) all.push_back(test::facets(width, 90, static_cast<uint32_t>(width)));
   all.push_back(test::masked(test::facets(190, 180, 2), test::band_mask(190, 180, 30)));
-  std::vector<std::vector<uint8_t>> reference;
-  for (const DepthImage& image : all) reference.push_back(encode(image));
-  const auto targets = detail::kernel_targets();
-  for (const int64_t target : targets) {
-    const testing::OnTarget on(target);
-    for (size_t i = 0; i < all.size(); ++i) {
-      EXPECT_EQ(encode(all[i]), reference[i]) << hwy::TargetName(target) << ", image " << i;
-      EXPECT_TRUE(decode(reference[i]).value() == all[i]) << hwy::TargetName(target) << ", image " << i;
-    }
-  }
-  EXPECT_GE(targets.size(), testing::kLeastTargets) << "the scalar one, and this machine's";
+  for (size_t i = 0; i < all.size(); ++i) EXPECT_TRUE(decode(encode(all[i])).value() == all[i]) << "image " << i;
 }
 
 }  // namespace

@@ -17,26 +17,26 @@ std::string refusal(const std::vector<uint8_t>& bytes, int width = 0, int height
 TEST(CodecBadInput, Headers) {
   EXPECT_NE(refusal({}).find("shorter than its header"), std::string::npos);
   EXPECT_NE(refusal({0xD7}).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal({0xD7, 11, 0, 5}).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 12, 0, 5}).find("shorter than its header"), std::string::npos);
   EXPECT_NE(refusal({'P', 'N', 'G', 0, 0}).find("begins with 0x50"), std::string::npos);
-  EXPECT_NE(refusal({0xD7, 99, 0, 1, 1, 0}).find("version 99, expected 11"), std::string::npos);
-  EXPECT_NE(refusal({0xD7, 11, 0, 0, 1, 0}).find("0 x 1 pixels"), std::string::npos);
-  EXPECT_NE(refusal({0xD7, 11, 0, 1, 0, 0}).find("1 x 0 pixels"), std::string::npos);
-  EXPECT_NE(refusal({0xD7, 11, 4, 1, 1, 0}).find("flags 0x04, known 0x03"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 99, 0, 1, 1, 0}).find("version 99, expected 12"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 12, 0, 0, 1, 0}).find("0 x 1 pixels"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 12, 0, 1, 0, 0}).find("1 x 0 pixels"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 12, 4, 1, 1, 0}).find("flags 0x04, known 0x03"), std::string::npos);
 }
 
 TEST(CodecBadInput, SizesBeyondTheLimit) {
   // 2^31 x 2^31, 4097 x 4096, and numbers that do not end.
-  EXPECT_NE(refusal({0xD7, 11, 0, 0x80, 0x80, 0x80, 0x80, 8, 0x80, 0x80, 0x80, 0x80, 8, 0}).find("limit 16777216"),
+  EXPECT_NE(refusal({0xD7, 12, 0, 0x80, 0x80, 0x80, 0x80, 8, 0x80, 0x80, 0x80, 0x80, 8, 0}).find("limit 16777216"),
             std::string::npos);
-  EXPECT_NE(refusal({0xD7, 11, 0, 0x81, 0x20, 0x80, 0x20, 0}).find("4097 x 4096"), std::string::npos);
-  EXPECT_NE(refusal({0xD7, 11, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1, 1}), "");
-  EXPECT_NE(refusal({0xD7, 11, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F, 1, 0}), "");
+  EXPECT_NE(refusal({0xD7, 12, 0, 0x81, 0x20, 0x80, 0x20, 0}).find("4097 x 4096"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1, 1}), "");
+  EXPECT_NE(refusal({0xD7, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F, 1, 0}), "");
 }
 
 TEST(CodecBadInput, SizesThatTheStreamCannotHold) {
   // 4096 x 4096 pixels are 256 tiles, which take 256 bytes at least.
-  std::vector<uint8_t> bytes{0xD7, 11, 0, 0x80, 0x20, 0x80, 0x20};
+  std::vector<uint8_t> bytes{0xD7, 12, 0, 0x80, 0x20, 0x80, 0x20};
   bytes.resize(7 + 255);
   EXPECT_NE(refusal(bytes).find("255 bytes left for 4096 x 4096 pixels, which take 256 or more"), std::string::npos);
   bytes.push_back(0);

@@ -119,8 +119,8 @@ std::string refusal(const std::vector<uint8_t>& bytes) {
 
 TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
   // 1 x 1 pixels, nothing in it. varint depth, u8 normal, u8 colour.
-  EXPECT_EQ(refusal({0xD7, 11, 1, 1, 1, 0, 1, 0, 0}), "");
-  EXPECT_EQ(refusal({0xD7, 11, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
+  EXPECT_EQ(refusal({0xD7, 12, 1, 1, 1, 0, 1, 0, 0}), "");
+  EXPECT_EQ(refusal({0xD7, 12, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
   for (const auto& bounds : {std::vector<uint8_t>{0, 0, 0},
                              {1, 0, 0},
                              {0xFF, 0x7F, 1, 1},
@@ -129,12 +129,12 @@ TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
                              {0, 4, 0},
                              {0, 0, 16},
                              {0, 255, 255}}) {
-    std::vector<uint8_t> bytes{0xD7, 11, 1, 1, 1};
+    std::vector<uint8_t> bytes{0xD7, 12, 1, 1, 1};
     bytes.insert(bytes.end(), bounds.begin(), bounds.end());
     bytes.push_back(0);
     EXPECT_NE(refusal(bytes).find("bounds of error that nobody writes"), std::string::npos) << int(bounds[0]);
   }
-  EXPECT_NE(refusal({0xD7, 11, 1, 1, 1, 0, 1}), "");
+  EXPECT_NE(refusal({0xD7, 12, 1, 1, 1, 0, 1}), "");
 }
 
 TEST(ErrorBounds, IndicesOfDepthBeyondTheLast) {
@@ -158,14 +158,14 @@ std::string refusal_of(const std::vector<uint8_t>& bytes, const DepthImage& boun
 TEST(Refinement, Headers) {
   const DepthImage nothing(30, 20);
   const auto bytes = encode_refinement(nothing, nothing);
-  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 10, 30, 20}));
+  EXPECT_EQ(bytes, (std::vector<uint8_t>{0xD8, 11, 30, 20}));
   EXPECT_EQ(refusal_of(bytes, nothing), "");
   EXPECT_NE(refusal_of({}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 10, 30}, nothing).find("shorter than its header"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD7, 11, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 10"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 10, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
-  EXPECT_NE(refusal_of({0xD8, 10, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 11, 30}, nothing).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD7, 12, 30, 20}, nothing).find("begins with 0xd7"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 4, 30, 20}, nothing).find("version 4, expected 11"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 11, 30, 21}, nothing).find("30 x 21 pixels, expected 30 x 20"), std::string::npos);
+  EXPECT_NE(refusal_of({0xD8, 11, 30, 20, 0}, nothing).find("1 bytes after its end"), std::string::npos);
 }
 
 TEST(Refinement, OfWhatIsExactTakesAByteATile) {
@@ -191,7 +191,7 @@ TEST(Refinement, EveryKindOfATile) {
   const DepthImage image = test::render({.width = 60, .height = 50});
   const DepthImage bounded = decode(encode(image, error_bounds(1 / 32.0, 2 / 1280.0, 1, 1))).value();
   auto bytes = encode_refinement(image, bounded);
-  ASSERT_EQ(bytes[4], 1) << "dense, after mark, version and size";
+  ASSERT_EQ(bytes[4], 1) << "scattered, after mark, version and size";
   for (int kind = 2; kind < 256; ++kind) {
     bytes[4] = static_cast<uint8_t>(kind);
     EXPECT_NE(refusal_of(bytes, bounded), "") << kind;
@@ -253,10 +253,10 @@ TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((150 + 2 * x) % 256 | (100 - y) << 8);
   }
-  expect_bytes(image, {215, 11,  1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
+  expect_bytes(image, {215, 12,  1,   9,  8,   179, 230, 12,  1,   1,   6,   87,  206, 0,  96,  80,
                        64,  150, 100, 16, 163, 15,  186, 98,  90,  36,  93,  192, 4,   69, 129, 254,
                        239, 53,  221, 2,  180, 57,  248, 197, 119, 198, 145, 198, 101, 32, 4},
-               {216, 10,  9,   8,  2, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
+               {216, 11,  9,   8,  1, 182, 162, 7,   16, 1, 25, 155, 38,  193, 151, 46, 0,   30, 17, 7,   21, 108,
                 110, 210, 128, 18, 0, 0,   111, 128, 18, 0, 25, 151, 242, 34,  0,   25, 143, 10, 10, 164, 39, 128});
 }
 
@@ -270,25 +270,18 @@ TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
   }
   expect_bytes(
       image,
-      {215, 11,  1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   48,  0,
+      {215, 12,  1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 5,   48,  0,
        128, 201, 39,  254, 148, 219, 0,   0,   0,   0,   0,   0,   0,   0,   240, 129, 15,  244, 159, 61,  124, 58,
        5,   183, 175, 3,   0,   0,   0,   0,   0,   0,   192, 199, 245, 245, 123, 0,   16,  232, 65,  163, 51,  170,
-       170, 170, 170, 25,  228, 1,   0,   64,  254, 161, 151, 12,  87,  21,  254, 78,  160, 92,  70,  84,  85,  5,
-       0,   64,  142, 170, 85,  85,  5,   30,  3,   248, 248, 227, 31,  135, 136, 65,  196, 32,  98,  3,   128, 224,
-       1,   255, 206, 229, 181, 199, 236, 214, 90,  107, 173, 181, 214, 90,  107, 13,  0,   0,   0,   17,  78,  56,
-       13,  22,  7,   211, 21,  0,   199, 19,  218, 2,   159, 98,  198, 4,   254, 78,  186, 5,   185, 157, 254, 0,
-       91,  178, 153, 0,   151, 50,  130, 0,   60,  191, 209, 6,   159, 128, 53,  0,   91,  178, 153, 0,   161, 218,
-       218, 2,   55,  166, 201, 6,   81,  73,  53,  0,   253, 154, 217, 2,   181, 45,  154, 0,   131, 199, 198, 9},
-      {216, 10,  17,  3,   1,   239, 207, 12,  16,  0,   134, 1,   226, 79,  9,   255, 146, 47,  0,   248, 196, 215,
-       174, 0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   128, 127, 201, 23,  190, 0,
-       0,   0,   0,   0,   0,   0,   0,   0,   248, 151, 44,  133, 127, 8,   0,   191, 18,  62,  14,  20,  30,  5,
-       128, 143, 50,  26,  141, 198, 70,  163, 209, 104, 52,  108, 0,   64,  231, 121, 0,   62,  206, 20,  0,   0,
-       0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   240, 111, 124, 37,  5,   0,
-       0,   0,   240, 134, 11,  255, 190, 227, 1,   240, 150, 199, 99,  0,   60,  232, 120, 0,   188, 231, 2,   240,
-       144, 211, 71,  0,   0,   0,   128, 203, 61,  112, 206, 57,  231, 28,  2,   17,  175, 153, 144, 20,  105, 175,
-       0,   0,   247, 135, 2,   0,   240, 98,  99,  0,   31,  223, 14,  0,   180, 106, 12,  0,   92,  62,  6,   0,
-       141, 106, 21,  0,   24,  169, 25,  0,   151, 117, 25,  0,   141, 106, 21,  0,   24,  169, 25,  0,   151, 117,
-       25,  0,   141, 106, 21,  0,   24,  169, 25,  0,   151, 117, 25,  0,   141, 106, 21,  0,   24,  169, 25,  0});
+       170, 170, 170, 25,  100, 0,   0,   200, 63,  244, 146, 225, 170, 194, 223, 9,   148, 203, 136, 170, 170, 0,
+       0,   200, 81,  181, 170, 170, 0,   30,  6,   248, 248, 227, 31,  135, 136, 65,  196, 32,  98,  1,   64,  240,
+       128, 127, 231, 242, 218, 99,  118, 107, 173, 181, 214, 90,  107, 173, 181, 6,   5,   0,   1,   18,  166, 149,
+       129, 94,  87,  33,  182, 8,   63,  126, 8,   30,  104, 39,  0,   189, 138, 249, 31,  145, 89,  97,  59,  1,
+       180, 0,   0,   169, 215, 0,   0,   55,  18,  34,  94,  129, 186, 136, 22,  255, 112, 3,   0},
+      {216, 11,  17,  3,   1,   239, 207, 12,  16,  0,   157, 1,   231, 99,  247, 231, 99,
+       123, 200, 123, 249, 40,  116, 127, 232, 58,  243, 201, 252, 63,  157, 235, 75,  102,
+       14,  157, 253, 245, 98,  35,  254, 229, 147, 171, 160, 134, 105, 160, 138, 59,  1,
+       62,  8,   8,   14,  242, 66,  142, 39,  152, 115, 42,  232, 238, 96,  146, 160});
 }
 
 }  // namespace

@@ -3,20 +3,16 @@
 #include "common/codec/dense/guided.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <random>
 
 #include "common/codec/dense/normals.h"
 #include "tests/support/masks.h"
-#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
 constexpr int kWidth = 70, kHeight = 9;
-
-using testing::OnTarget;
 
 // A plane with weights whose sizes add up to this, a guide and symbols. rough: they go anywhere; else weights cancel
 // each other, the constant is the middle, and no value comes near its bounds.
@@ -26,8 +22,8 @@ void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, in
   BitWriter writer;
   writer.start(GuidedPlane::kMostWeightBits);
   writer.sink.put(0, 1);
-  const int each = size / (kFarLeft - 1);
-  for (int i = 0; i < kFarLeft; ++i) {
+  const int each = size / (kGuidedTerms - 1);
+  for (int i = 0; i < kGuidedTerms; ++i) {
     const int weight = rough ? static_cast<int>(random() % static_cast<uint32_t>(each)) : i == 12 ? 0 : each;
     const bool negative = rough ? random() % 3 == 0 : i % 2 != 0;
     writer.sink.put(static_cast<uint16_t>(negative ? -weight : weight), 16);
@@ -43,12 +39,9 @@ void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, in
       const auto r = static_cast<ptrdiff_t>(y);
       plane.guide.row(r)[x] = static_cast<int16_t>(
           rough && random() % 9 == 0 ? random() % static_cast<uint32_t>(largest) : static_cast<uint32_t>(largest / 2));
-      const uint32_t far = fraction == GuidedPlane::kNormalBits ? 256 : 1 << 20;
+      const uint32_t far = fraction == GuidedPlane::kByteBits ? 256 : 1 << 20;
       const uint32_t z = random() % (rough ? random() % 20 == 0 ? far : 8 : random() % 8 == 0 ? 3 : 1);
-      if (fraction == GuidedPlane::kNormalBits)
-        plane.symbols.narrow.row(r)[x] = static_cast<uint8_t>(z);
-      else
-        plane.symbols.wide.row(r)[x] = z;
+      plane.symbols.z.row(r)[x] = z;
     }
   plane.begin(shape);
 }
@@ -56,7 +49,7 @@ void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, in
 // Values as the page has them, "Guided prediction". residual: of the plane before, as it is coded; null: none.
 std::vector<int> values_of(GuidedPlane& p, const TileShape& shape, const std::vector<int>* residual,
                            std::vector<int>& own_residual) {
-  const bool byte = p.bits == GuidedPlane::kNormalBits;
+  const bool byte = p.bits == GuidedPlane::kByteBits;
   const auto nearest = [&](int guide) { return std::clamp((guide + (1 << p.bits >> 1)) >> p.bits, 0, p.most); };
   const int w = static_cast<int>(shape.width), h = static_cast<int>(shape.height);
   std::vector<int> out(shape.width * shape.height);
@@ -71,7 +64,7 @@ std::vector<int> values_of(GuidedPlane& p, const TileShape& shape, const std::ve
     for (int x = 0; x < w; ++x) {
       if (!shape.at(static_cast<size_t>(x), static_cast<size_t>(y))) continue;
       const auto i = static_cast<size_t>(y * w + x);
-      const uint32_t z = byte ? p.symbols.narrow.row(y)[x] : p.symbols.wide.row(y)[x];
+      const uint32_t z = p.symbols.z.row(y)[x];
       int off = static_cast<int>(z >> 1) ^ -static_cast<int>(z & 1);
       if (!byte) off = static_cast<int16_t>(off * (1 << p.bits)) >> p.bits;  // what a plane can hold
       own_residual[i] = off;
@@ -98,11 +91,10 @@ void expect_values(const GuidedPlane& plane, const TileShape& shape, const std::
 }
 
 TEST(GuidedPlanes, DecodeToWhatThePageSays) {
-  for (const int64_t target : kernel_targets()) {
-    const OnTarget on(target);
+  {
     GuidedPlane a, b, index;
     for (uint32_t seed = 0; seed < 96; ++seed) {
-      SCOPED_TRACE(::testing::Message() << hwy::TargetName(target) << ", " << seed);
+      SCOPED_TRACE(seed);
       std::mt19937 random(seed);
       const Mask mask = test::random_mask(kWidth, kHeight, seed % 3 == 1 ? 0.6 : 0.98, seed);
       TileShape shape;
@@ -110,44 +102,33 @@ TEST(GuidedPlanes, DecodeToWhatThePageSays) {
       // Sums that stay far from 2^31, and such as do not; planes are used again.
       const bool rough = (seed >> 3 & 1) != 0;
       const auto size = [&](uint32_t bit) { return (seed >> bit & 1) != 0 ? 119000 : 9000; };
-      fill(a, shape, GuidedPlane::kNormalBits, 254, size(0), rough, random);
-      fill(b, shape, GuidedPlane::kNormalBits, 254, size(1), rough, random);
+      fill(a, shape, GuidedPlane::kByteBits, 254, size(0), rough, random);
+      fill(b, shape, GuidedPlane::kByteBits, 254, size(1), rough, random);
       fill(index, shape, GuidedPlane::kIndexBits, 1023, size(2), rough, random);
       std::vector<int> residual, other, third;
       const std::vector<int> x = values_of(a, shape, nullptr, residual), y = values_of(b, shape, &residual, other),
                              i = values_of(index, shape, nullptr, third);
       for (size_t row = 0; row < shape.height; ++row) {
         a.decode_sums(shape, row, nullptr), b.decode_sums(shape, row, &a), index.decode_sums(shape, row, nullptr);
-        decode_values(a, b, index, shape, row);
+        decode_values(a, b, shape, row), decode_values(index, shape, row);
       }
       expect_values(a, shape, x), expect_values(b, shape, y), expect_values(index, shape, i);
     }
   }
 }
 
-TEST(Normals, AreTurnedAsTablesSay) {
+TEST(Normals, RowsAreTurnedAsSingleCodes) {
   std::vector<uint16_t> codes(65536), back(65536);
   std::vector<int16_t> x(65536), y(65536);
   for (size_t i = 0; i < codes.size(); ++i) codes[i] = static_cast<uint16_t>(i);
-  const auto expect_turns = [&](const Kernels& kernels) {
-    for (int pole = 0; pole < kPoles; ++pole) {
-      kernels.turn_normals(codes.data(), codes.size(), pole, x.data(), y.data());
-      for (size_t i = 0; i < codes.size(); ++i)
-        ASSERT_EQ(x[i] / 64 | y[i] / 64 << 8, turn_normal(codes[i], pole)) << i << ", pole " << pole;
-      kernels.turn_normals_back(x.data(), y.data(), codes.size(), pole, back.data());
-      for (size_t i = 0; i < codes.size(); ++i)
-        ASSERT_EQ(back[i], turn_back(static_cast<uint16_t>(x[i] / 64 | y[i] / 64 << 8), pole)) << i << ", " << pole;
-      for (size_t i = 0; i < codes.size(); ++i) {  // what a stream may hold, too
-        x[i] = static_cast<int16_t>((codes[i] & 255) * 64), y[i] = static_cast<int16_t>((codes[i] >> 8) * 64);
-      }
-      kernels.turn_normals_back(x.data(), y.data(), codes.size(), pole, back.data());
-      for (size_t i = 0; i < codes.size(); ++i) ASSERT_EQ(back[i], turn_back(codes[i], pole)) << i << ", " << pole;
-    }
-  };
-  expect_turns(plain_kernels());
-  for (const int64_t target : kernel_targets()) {
-    const OnTarget on(target);
-    expect_turns(kernels());
+  for (int pole = 0; pole <= kRaw; ++pole) {
+    turn_normals(codes.data(), codes.size(), pole, x.data(), y.data());
+    for (size_t i = 0; i < codes.size(); ++i)
+      ASSERT_EQ(x[i] / 64 | y[i] / 64 << 8, turn_normal(codes[i], pole)) << i << ", pole " << pole;
+    for (size_t i = 0; i < codes.size(); ++i)  // what a stream may hold
+      x[i] = static_cast<int16_t>((codes[i] & 255) * 64), y[i] = static_cast<int16_t>((codes[i] >> 8) * 64);
+    turn_normals_back(x.data(), y.data(), codes.size(), pole, back.data());
+    for (size_t i = 0; i < codes.size(); ++i) ASSERT_EQ(back[i], turn_back(codes[i], pole)) << i << ", " << pole;
   }
 }
 

@@ -1,46 +1,29 @@
-// What vectors make of rows is what the plain loops make of them, on every instruction set, whatever the rows hold.
+// What the loops over rows make is what docs/codec.md says, whatever the rows hold.
 #include "common/codec/dense/kernels.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "common/codec/dense/fit.h"
 #include "common/codec/dense/plane.h"
-#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
-using testing::OnTarget;
-
 constexpr size_t kWidths[] = {1, 16, 31, 64, 65, 100, 200, 256, 331};
 
-std::string name_of(int64_t target, size_t width) { return hwy::TargetName(target) + (" " + std::to_string(width)); }
-
-// Calls check(kernels, width, random) for each instruction set and width; `random` starts alike for all sets.
+// Calls check(width, random) for each width.
 template <class Check>
-void on_every_set(Check check) {
-  for (const int64_t target : kernel_targets()) {
-    const OnTarget on(target);
-    std::mt19937 random(5);
-    for (const size_t width : kWidths) {
-      SCOPED_TRACE(name_of(target, width));
-      for (int round = 0; round < 20; ++round) ASSERT_NO_FATAL_FAILURE(check(kernels(), width, random));
-    }
+void for_each_width(Check check) {
+  std::mt19937 random(5);
+  for (const size_t width : kWidths) {
+    SCOPED_TRACE(width);
+    for (int round = 0; round < 20; ++round) ASSERT_NO_FATAL_FAILURE(check(width, random));
   }
-}
-
-// In sanitized builds as well: they are what decodes the streams of others.
-TEST(Kernels, EveryInstructionSetOfThisMachineIsTested) {
-  const std::vector<int64_t> all = kernel_targets();
-  for (const int64_t target : {int64_t{HWY_AVX2}, int64_t{HWY_AVX3}, int64_t{HWY_AVX3_DL}})
-    if (hwy::SupportedTargets() & target) {
-      EXPECT_EQ(std::count(all.begin(), all.end(), target), 1) << hwy::TargetName(target);
-    }
 }
 
 // Three rows of a plane and what is around them.
@@ -55,171 +38,91 @@ Plane<T> rows_of(size_t width, Value value) {
   return plane;
 }
 
-template <class T>
-std::vector<T> row_for(size_t width) {
-  return std::vector<T>(width + Plane<T>::kTail);
-}
-
-template <class T>
-void expect_same(const std::vector<T>& a, const std::vector<T>& b, size_t width) {
-  for (size_t x = 0; x < width; ++x) ASSERT_EQ(a[x], b[x]) << x;
+TEST(Kernels, FoldingComesBack) {
+  for (const int32_t v : {0, -1, 1, -2, 2, 8388607, -8388608}) EXPECT_EQ(unfold(fold(v)), v);
+  EXPECT_EQ(fold(-1), 1u);
+  EXPECT_EQ(fold(1), 2u);
+  EXPECT_EQ(fold24(0xFFFFFF), 1u) << "-1 modulo 2^24";
 }
 
 TEST(Kernels, ContextsAreThoseOfThePage) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+  for_each_width([](size_t width, std::mt19937& random) {
     const auto tokens = rows_of<uint8_t>(width, [&] { return random() % 4 == 0 ? random() % kNumberTokens : 3; });
     const ContextRows rows{tokens.row(0), tokens.row(-1), random() % 2 != 0 ? tokens.row(1) : nullptr};
     const ContextScale scale{static_cast<int>(random() % 900), static_cast<int>(random() % 15),
                              static_cast<int>(random() % 5)};
-    auto a = row_for<uint8_t>(width), b = a;
-    set.contexts(rows, width, scale, a.data());
-    plain_kernels().contexts(rows, width, scale, b.data());
-    expect_same(a, b, width);
-    auto c = row_for<uint16_t>(width);
-    set.join_bytes(tokens.row(0), a.data(), width, c.data());
-    for (size_t x = 0; x < width; ++x) ASSERT_EQ(c[x], tokens.row(0)[x] + 256 * a[x]);
+    std::vector<uint8_t> contexts(width);
+    make_contexts(rows, width, scale, contexts.data());
+    for (size_t x = 0; x < width; ++x)
+      ASSERT_EQ(contexts[x], std::clamp((rows.sum(x) - scale.bias) >> scale.shift, 0, 15) >> scale.merges) << x;
   });
 }
 
-// Values and a guide from 0 to `most`, residuals, and weights whose sizes add up to what is allowed.
-struct Guided {
-  Guided(size_t width, int bits, int largest, std::mt19937& random) : most(largest) {
-    const auto value = [&] { return (static_cast<int>(random() % static_cast<uint32_t>(most + 1))) << bits; };
-    own = rows_of<int16_t>(width, value);
-    guide = rows_of<int16_t>(width, [&] { return random() % static_cast<uint32_t>((most << bits) + 1); });
-    residual = rows_of<int16_t>(width, [&] { return static_cast<int>(random() % 256 - 128) * 64; });
-    flatness = rows_of<uint8_t>(width, [&] { return random() % kFlatnesses; });
-    for (auto& set : weights)
-      for (int16_t& w : set)
-        w = static_cast<int16_t>(static_cast<int>(random() % (kMostWeight / 8)) - kMostWeight / 16);
-    constant = static_cast<int32_t>(random() % (2 * kMostConstant)) - kMostConstant;
-  }
-  GuidedRows rows(int bits, bool flat, bool other) const {
-    return {.own = own.row(1),
-            .above = own.row(0),
-            .above2 = own.row(-1),
-            .guide = {guide.row(0), guide.row(1), guide.row(2)},
-            .residual = other ? residual.row(0) : nullptr,
-            .own_residual = nullptr,
-            .flatness = flat ? flatness.row(0) : nullptr,
-            .weights = weights,
-            .constant = constant,
-            .bits = bits,
-            .most = most};
-  }
-  int most;
-  Plane<int16_t> own, guide, residual;
-  Plane<uint8_t> flatness;
-  int16_t weights[kFlatnesses][kGuidedTerms];
-  int32_t constant;
-};
-
+// A prediction by weights whose sizes add up to what is allowed stays within 32 bits.
 TEST(Kernels, GuidedPredictionIsThatOfThePage) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const Guided guided(width, 6, 254, random);
-    for (const bool flat : {false, true})
-      for (const bool other : {false, true}) {
-        GuidedRows rows = guided.rows(6, flat, other);
-        auto z = row_for<uint8_t>(width), plain_z = z, tokens = z, plain_tokens = z;
-        auto off = row_for<int16_t>(width), plain_off = off;
-        set.guided_residuals(rows, width, z.data(), tokens.data(), off.data());
-        plain_kernels().guided_residuals(rows, width, plain_z.data(), plain_tokens.data(), plain_off.data());
-        expect_same(z, plain_z, width), expect_same(tokens, plain_tokens, width), expect_same(off, plain_off, width);
-        auto sums = row_for<int32_t>(width), plain_sums = sums;
-        for (const bool own : {false, true}) {
-          rows.own_residual = own ? guided.residual.row(2) : nullptr;
-          set.guided_sums(rows, width, sums.data(), false);
-          plain_kernels().guided_sums(rows, width, plain_sums.data(), false);
-          expect_same(sums, plain_sums, width);
-        }
-      }
+  for_each_width([](size_t width, std::mt19937& random) {
+    const int bits = random() % 2 != 0 ? 6 : 4, most = bits == 6 ? 255 : 1023;
+    const auto value = [&] { return static_cast<int>(random() % static_cast<uint32_t>(most + 1)) << bits; };
+    const auto own = rows_of<int16_t>(width, value), guide = rows_of<int16_t>(width, value),
+               other = rows_of<int16_t>(width, [&] { return static_cast<int>(random() % 256 - 128) * 64; });
+    int16_t weights[kGuidedTerms];
+    for (int16_t& w : weights)
+      w = static_cast<int16_t>(static_cast<int>(random() % (kMostWeight / 7)) - kMostWeight / 14);
+    const GuidedRows rows{.own = own.row(1),
+                          .above = own.row(0),
+                          .guide = {guide.row(0), guide.row(1), guide.row(2)},
+                          .residual = random() % 2 != 0 ? other.row(0) : nullptr,
+                          .weights = weights,
+                          .constant = static_cast<int32_t>(random() % (2 * kMostConstant)) - kMostConstant,
+                          .bits = bits,
+                          .most = most,
+                          .wraps = bits == 6};
+    std::vector<int32_t> sums(width);
+    std::vector<uint32_t> z(width);
+    guided_sums(rows, width, sums.data());
+    guided_residuals(rows, sums.data(), width, z.data());
+    for (size_t i = 0; i < width; ++i) {
+      const auto x = static_cast<ptrdiff_t>(i);
+      int64_t sum = rows.constant + (int64_t{1} << (bits + 12));
+      const int near[4] = {rows.own[x - 1], rows.above[x], rows.above[x - 1], rows.above[x + 1]};
+      for (int k = 0; k < 4; ++k) sum += int64_t{weights[k]} * near[k];
+      for (int k = 0; k < 9; ++k) sum += int64_t{weights[4 + k]} * rows.guide[k / 3][x + k % 3 - 1];
+      if (rows.residual != nullptr) sum += int64_t{weights[kOtherResidual]} * rows.residual[x];
+      int64_t off = (rows.own[x] >> bits) - std::clamp<int64_t>(sum >> (bits + 13), 0, most);
+      if (rows.wraps) off = static_cast<int8_t>(off);
+      ASSERT_EQ(unfold(z[i]), off) << i;
+    }
   });
 }
 
-TEST(Kernels, IndicesArePredictedAsThePageSays) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const Guided guided(width, 4, 1 + static_cast<int>(random() % 1023), random);
-    const GuidedRows rows = guided.rows(4, false, false);
-    auto z = row_for<uint32_t>(width), plain_z = z;
-    auto tokens = row_for<uint8_t>(width), plain_tokens = tokens;
-    auto off = row_for<int16_t>(width), plain_off = off, back = off;
-    set.guided_residuals_wide(rows, width, z.data(), tokens.data(), off.data());
-    plain_kernels().guided_residuals_wide(rows, width, plain_z.data(), plain_tokens.data(), plain_off.data());
-    expect_same(z, plain_z, width), expect_same(tokens, plain_tokens, width), expect_same(off, plain_off, width);
-    set.unfold_wide(z.data(), width, 4, back.data());
-    expect_same(back, off, width);
-  });
-}
-
-TEST(Kernels, DirectionsAreThoseOfThePage) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const uint32_t rough = random() % 25;
-    const auto depth = rows_of<uint32_t>(width, [&] { return (1u << 23) + random() % (1u << rough); });
+// The quotients' approximation is as good as the guide needs.
+TEST(Kernels, DirectionsAreThoseOfTheMatrix) {
+  for_each_width([](size_t width, std::mt19937& random) {
+    const auto depth = rows_of<uint32_t>(width, [&] { return (1u << 23) + random() % (1u << 12); });
     const uint32_t* const rows[3] = {depth.row(0), depth.row(1), depth.row(2)};
     GeometryModel model;
     for (auto& row : model.matrix)
       for (int16_t& e : row) e = static_cast<int16_t>(static_cast<int>(random() % 7000) - 3500);
-    if (random() % 9 == 0) model = {};
-    model.slope_shift = static_cast<int>(random() % 16), model.height_shift = static_cast<int>(random() % 16);
-    const int x0 = static_cast<int>(random() % (65536 - width)) - 32768, y = static_cast<int>(random() % 256) - 128;
-    auto gx = row_for<int16_t>(width), gy = gx, plain_gx = gx, plain_gy = gx;
-    set.geometry(rows, width, x0, y, model, gx.data(), gy.data());
-    plain_kernels().geometry(rows, width, x0, y, model, plain_gx.data(), plain_gy.data());
-    expect_same(gx, plain_gx, width), expect_same(gy, plain_gy, width);
-  });
-}
-
-TEST(Kernels, ActivityIsThatOfThePage) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const uint32_t rough = random() % 15;
-    const auto value = [&] {
-      return random() % 99 == 0 ? 254 * 64 : random() % ((1u << rough) - (rough == 14 ? 128 : 0));
-    };
-    const auto x = rows_of<int16_t>(width, value), y = rows_of<int16_t>(width, value);
-    const int16_t *const xs[3] = {x.row(0), x.row(1), x.row(2)}, *const ys[3] = {y.row(0), y.row(1), y.row(2)};
-    auto tokens = row_for<uint8_t>(width), plain = tokens;
-    set.activity(xs, ys, width, tokens.data());
-    plain_kernels().activity(xs, ys, width, plain.data());
-    expect_same(tokens, plain, width);
-  });
-}
-
-TEST(Kernels, SlotsAreThoseOfEachToken) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    std::vector<uint16_t> frequencies(std::min<size_t>(width, kSymbols));
-    uint32_t left = kFrequencyOne;
-    for (uint16_t& f : frequencies) {
-      f = static_cast<uint16_t>(random() % 3 == 0 ? 0 : random() % 9 == 0 ? random() % (left + 1) : std::min(left, 2u));
-      left -= f;
+    model.height_shift = 10;
+    std::vector<int16_t> gx(width), gy(width);
+    geometry(rows, width, -100, 7, model, gx.data(), gy.data());
+    for (size_t i = 0; i < width; ++i) {
+      const auto x = static_cast<ptrdiff_t>(i);
+      const double u = static_cast<int>(depth.row(1)[x + 1] - depth.row(1)[x - 1]),
+                   v = static_cast<int>(depth.row(2)[x] - depth.row(0)[x]),
+                   h = std::floor((2.0 * depth.row(1)[x] - (static_cast<double>(i) - 100) * u - 7 * v) / 1024);
+      double m[3], size = 0;
+      for (int k = 0; k < 3; ++k)
+        size += std::abs(m[k] = model.matrix[k][0] * u + model.matrix[k][1] * v + model.matrix[k][2] * h);
+      if (size < 1e6) continue;
+      double a = m[0] / size, b = m[1] / size;
+      if (m[2] < 0) {
+        const double c = (1 - std::abs(b)) * (a < 0 ? -1 : 1);
+        b = (1 - std::abs(a)) * (b < 0 ? -1 : 1), a = c;
+      }
+      ASSERT_NEAR(gx[i], 8128 * (1 + a), 24) << i;
+      ASSERT_NEAR(gy[i], 8128 * (1 + b), 24) << i;
     }
-    frequencies.back() = static_cast<uint16_t>(frequencies.back() + left);
-    std::vector<uint32_t> slots(kFrequencyOne + kMoreSlots);
-    ASSERT_EQ(set.slots(frequencies.data(), static_cast<unsigned>(frequencies.size()), slots.data()),
-              slots.data() + kFrequencyOne);
-    size_t at = 0;
-    for (uint32_t t = 0; t < frequencies.size(); ++t)
-      for (uint32_t i = 0; i < frequencies[t]; ++i, ++at)
-        ASSERT_EQ(slots[at], t << 24 | (frequencies[t] - 1u) << 12 | i) << at;
-  });
-}
-
-TEST(Kernels, HeightsAreThoseOfThePage) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const uint32_t least = random() % 3 == 0 ? 0 : 1u << random() % 24, rough = random() % 24;
-    const auto depth = rows_of<uint32_t>(width, [&] { return least + random() % (1u << rough); });
-    HeightModel model;
-    model.a = static_cast<int32_t>(random() >> random() % 24),
-    model.b = static_cast<int32_t>(random() >> random() % 24);
-    model.c = static_cast<int32_t>(random()), model.base = static_cast<int32_t>(random() % 3) - 1;
-    model.low = static_cast<int32_t>(random() % 65536) - 32768, model.scale = static_cast<int32_t>(random() % 65536);
-    for (int16_t& knot : model.knots) knot = static_cast<int16_t>(random() % 16384);
-    auto row = row_for<int16_t>(width), plain = row;
-    set.heights(depth.row(0), width, -100, 7, model, row.data());
-    plain_kernels().heights(depth.row(0), width, -100, 7, model, plain.data());
-    expect_same(row, plain, width);
-    set.knots(model, width, row.data());
-    plain_kernels().knots(model, width, plain.data());
-    expect_same(row, plain, width);
   });
 }
 
@@ -238,82 +141,20 @@ Plane<uint32_t> facets(size_t width, std::mt19937& random) {
   return depth;
 }
 
-TEST(Kernels, PlanesAreThoseOfThePage) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
+TEST(Kernels, PlanesComeBack) {
+  for_each_width([](size_t width, std::mt19937& random) {
     const auto depth = facets(width, random);
-    auto z = row_for<uint32_t>(width), plain_z = z;
-    auto tokens = row_for<uint8_t>(width), plain_tokens = tokens, cover = tokens;
-    set.plane_residuals(depth.row(-1), depth.row(0), depth.row(1), width, z.data(), tokens.data());
-    plain_kernels().plane_residuals(depth.row(-1), depth.row(0), depth.row(1), width, plain_z.data(),
-                                    plain_tokens.data());
-    expect_same(z, plain_z, width), expect_same(tokens, plain_tokens, width);
-    for (uint8_t& c : cover) c = random() % 3 == 0 ? 0 : 255;
-    const uint8_t* const covered = random() % 3 == 0 ? nullptr : cover.data();
-    auto terms = row_for<uint32_t>(width), left = terms, slope = terms, plain_terms = terms, plain_left = terms,
-         plain_slope = terms;
-    set.plane_terms(depth.row(-1), depth.row(0), z.data(), tokens.data(), covered, width, terms.data(), left.data(),
-                    slope.data());
-    plain_kernels().plane_terms(depth.row(-1), depth.row(0), z.data(), tokens.data(), covered, width,
-                                plain_terms.data(), plain_left.data(), plain_slope.data());
-    expect_same(terms, plain_terms, width), expect_same(left, plain_left, width);
-    expect_same(slope, plain_slope, width);
-  });
-}
-
-TEST(Kernels, PlanesContextsAreThoseOfTheTable) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const auto kinds = rows_of<uint8_t>(width, [&] { return random() % 16; });
-    const int merges = static_cast<int>(random() % 5);
-    auto contexts = row_for<uint8_t>(width);
-    set.plane_contexts(kinds.row(0), width, merges, contexts.data());
-    for (size_t x = 0; x < width; ++x)
-      ASSERT_EQ(contexts[x], kPlaneContexts[size_t{kinds.row(0)[x]} * 16 + kinds.row(0)[x + 1]] >> merges) << x;
-  });
-}
-
-// Runs of bits that are set, of `longest` at most, and of those that are not; none from `width` on.
-std::vector<uint64_t> runs_of_bits(size_t width, size_t longest, std::mt19937& random) {
-  std::vector<uint64_t> words(width / 64 + 1);
-  bool set = random() % 2 != 0;
-  for (size_t x = 0; x < width; set = !set)
-    for (size_t left = 1 + random() % longest; left > 0 && x < width; --left, ++x)
-      words[x / 64] |= uint64_t{set} << x % 64;
-  return words;
-}
-
-template <class T>
-void expect_packed(void (*pack)(const uint64_t*, const T*, size_t, T*), const std::vector<uint64_t>& words,
-                   const std::vector<T>& values, size_t width, std::vector<T>& packed) {
-  packed = row_for<T>(width);
-  pack(words.data(), values.data(), width, packed.data());
-  size_t n = 0;
-  for (size_t x = 0; x < width; ++x)
-    if (words[x / 64] >> x % 64 & 1) {
-      ASSERT_EQ(packed[n], values[x]) << x;
-      ++n;
-    }
-}
-
-TEST(Kernels, RowsWithHolesArePackedAndUnpacked) {
-  on_every_set([](const Kernels& set, size_t width, std::mt19937& random) {
-    const auto words = runs_of_bits(width, size_t{1} << random() % 9, random);
-    auto bytes = row_for<uint8_t>(width), cover = bytes, packed_bytes = bytes, bytes_back = bytes;
-    auto shorts = row_for<uint16_t>(width), packed_shorts = shorts;
-    auto wide = row_for<uint32_t>(width), packed_wide = wide;
-    for (uint8_t& v : bytes) v = static_cast<uint8_t>(random());
-    for (uint16_t& v : shorts) v = static_cast<uint16_t>(random());
-    for (uint32_t& v : wide) v = static_cast<uint32_t>(random());
-    set.cover_bytes(words.data(), width, cover.data());
-    ASSERT_NO_FATAL_FAILURE(expect_packed(set.pack_bytes, words, bytes, width, packed_bytes));
-    ASSERT_NO_FATAL_FAILURE(expect_packed(set.pack_shorts, words, shorts, width, packed_shorts));
-    ASSERT_NO_FATAL_FAILURE(expect_packed(set.pack_wide, words, wide, width, packed_wide));
-    std::vector<uint32_t> wide_back(width + Plane<uint32_t>::kTail, 7);
-    set.unpack_bytes(words.data(), packed_bytes.data(), width, bytes_back.data());
-    set.unpack_wide(words.data(), cover.data(), packed_wide.data(), width, wide_back.data());
-    for (size_t x = 0; x < width; ++x) {
-      const bool covered = (words[x / 64] >> x % 64 & 1) != 0;
-      ASSERT_TRUE(!covered || bytes_back[x] == bytes[x]) << x;
-      ASSERT_EQ(wide_back[x], covered ? wide[x] : 0) << x;
+    const uint32_t *const far = depth.row(-1), *const up = depth.row(0), *const row = depth.row(1);
+    std::vector<uint32_t> z(width), terms(width), left(width), slope(width);
+    std::vector<uint8_t> tokens(width), kinds(width);
+    plane_residuals(far, up, row, width, z.data(), tokens.data());
+    plane_terms(far, up, z.data(), tokens.data(), width, terms.data(), left.data(), slope.data());
+    plane_kinds(tokens.data(), width, kinds.data());
+    for (size_t i = 0; i < width; ++i) {
+      const auto x = static_cast<ptrdiff_t>(i);
+      const uint32_t next = terms[i] + (row[x - 1] & left[i]) + ((row[x - 1] - row[x - 2]) & slope[i]);
+      ASSERT_EQ(next & 0xFFFFFF, row[x]) << i;
+      ASSERT_EQ(kinds[i], tokens[i] < kHits ? tokens[i] / 5u : std::min(15u, 8 + (tokens[i] - kHits) / 16)) << i;
     }
   });
 }

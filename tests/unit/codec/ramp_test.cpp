@@ -71,7 +71,7 @@ TEST(Ramp, ColoursByHeightTakeFewBits) {
   EXPECT_EQ(encode(grey, {}, nullptr, axes_of_view()), none) << "one colour says nothing of heights";
   const auto bits = [&](const auto& bytes) { return 8.0 * static_cast<double>(bytes.size() - none.size()) / 2000; };
   EXPECT_LT(bits(with), 3);
-  EXPECT_LT(bits(without), 5) << "an axis is found all the same";
+  EXPECT_GT(bits(without), bits(with) + 1);
 }
 
 TEST(Ramp, WithinBoundsOfErrorToo) {
@@ -155,8 +155,8 @@ TEST(Ramp, TheBytesAreTheSameEverywhere) {
   };
   const image::DepthImage tinted =
       scattered([](double height, size_t i) { return tint(std::round(height * 4096) / 4096, i); });
-  EXPECT_EQ(digest(encode(tinted, {}, nullptr, axes_of_view())), 5756482663700664139u);
-  EXPECT_EQ(digest(encode(tinted)), 4449343430502178628u);
+  EXPECT_EQ(digest(encode(tinted, {}, nullptr, axes_of_view())), 3183573671440488936u);
+  EXPECT_EQ(digest(encode(tinted)), 12963383931042470156u);
 }
 
 }  // namespace

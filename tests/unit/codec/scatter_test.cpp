@@ -17,7 +17,7 @@ namespace {
 // A tile whose pixels `mask` covers, coded as a sparse one.
 std::vector<uint8_t> as_sparse(const image::DepthImage& image, const image::PixelMask& mask) {
   const detail::TileRect rect{0, static_cast<size_t>(image.width), image.width, image.height};
-  std::vector<uint8_t> out{0xD7, 11, 0, static_cast<uint8_t>(image.width), static_cast<uint8_t>(image.height), 2 | 4};
+  std::vector<uint8_t> out{0xD7, 12, 0, static_cast<uint8_t>(image.width), static_cast<uint8_t>(image.height), 2 | 4};
   out.resize(out.size() + 8);  // the first prediction: none
   out[6] = 1;
   detail::put_mask(out, mask);

@@ -1,4 +1,4 @@
-// Slice images come back as they were, on every instruction set, and nothing that comes instead of them does harm.
+// Slice images come back as they were, and nothing that comes instead of them does harm.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,11 +6,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
-#include "common/codec/dense/kernels.h"
 #include "common/volume/slices/block.h"
 #include "common/volume/slices/image.h"
 #include "common/volume/slices/view.h"
-#include "tests/support/simd_targets.h"
 
 namespace telesplat::volume {
 namespace {
@@ -53,62 +51,6 @@ void expect_same(const SliceImage& a, const SliceImage& b, int width, int height
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) wrong += at(a, x, y) != at(b, x, y);
   EXPECT_EQ(wrong, 0);
-}
-
-std::vector<uint32_t> random_block(Random& random, int kind) {
-  std::vector<uint32_t> out(kBlockPixels);
-  const int bits = 1 + int(random() % 8);
-  for (size_t i = 0; i < out.size(); ++i) {
-    if (kind == 0) out[i] = uint32_t(random());
-    if (kind == 1) out[i] = uint32_t(random()) & 0x01010101u * ((1u << bits) - 1);  // every width
-    if (kind == 2) out[i] = uint32_t(0x10203040 + 0x01010101 * (i % 64) + 0x02010302 * (i / 64));
-    if (kind == 3) out[i] = random() % 97 ? 0 : uint32_t(random());
-    if (kind == 4) out[i] = i == out.size() - 1 ? 0xffffffffu : 0;
-  }
-  return out;
-}
-
-TEST(SliceBlock, EveryTargetGivesTheSameBytesAndPixels) {
-  Random random(5);
-  const auto targets = testing::simd_targets();
-  for (int n = 0; n < 200; ++n) {
-    const auto block = random_block(random, n % 5);
-    std::vector<uint8_t> first;
-    for (const int64_t target : targets) {
-      const testing::OnTarget on(target);
-      std::vector<uint8_t> bytes(kMaxBlockBytes);
-      bytes.resize(encode_block(block.data(), bytes.data()));
-      if (first.empty()) first = bytes;
-      ASSERT_EQ(bytes, first) << hwy::TargetName(target) << ", block " << n;
-      std::vector<uint32_t> back(kBlockPixels, 0xdeadbeef);
-      ASSERT_TRUE(decode_block(bytes, back.data()).ok());
-      ASSERT_EQ(back, block) << hwy::TargetName(target) << ", block " << n;
-    }
-  }
-  EXPECT_GE(targets.size(), 1u);
-}
-
-TEST(SliceBlock, MutationsAreDecodedOrRefusedAlikeEverywhere) {
-  Random random(6);
-  const auto block = random_block(random, 1);
-  std::vector<uint8_t> bytes(kMaxBlockBytes);
-  bytes.resize(encode_block(block.data(), bytes.data()));
-  int refused = 0, taken = 0;
-  for (int n = 0; n < 400; ++n) {
-    auto bad = bytes;
-    for (int k = 0; k < 1 + n % 3; ++k)
-      bad[n % 2 ? random() % std::min<size_t>(bad.size(), 140) : random() % bad.size()] = uint8_t(random());
-    std::vector<std::vector<uint32_t>> results;
-    for (const int64_t target : testing::simd_targets()) {
-      const testing::OnTarget on(target);
-      std::vector<uint32_t> back(kBlockPixels);
-      if (decode_block(bad, back.data()).ok()) results.push_back(back);
-    }
-    (results.empty() ? refused : taken)++;
-    for (const auto& r : results) EXPECT_EQ(r, results[0]);
-  }
-  EXPECT_GT(refused, 20);
-  EXPECT_GT(taken, 20);
 }
 
 TEST(SliceCodec, ImagesComeBackWhereverTheyLie) {
@@ -235,55 +177,22 @@ SliceImage soft(Random& random) {
   return image;
 }
 
-TEST(SliceCodec, SoftImagesAreCodedAndNoiseIsPacked) {
+TEST(SliceCodec, SoftImagesTakeAFractionAndNoiseGrowsLittle) {
   Random random(9);
-  const auto image = soft(random);
-  const auto bytes = encode_slice(image);
-  const auto slices = parse_slices(bytes, 256, 192, 1);
-  ASSERT_TRUE(slices.ok());
-  EXPECT_FALSE(slices->front().tables.empty());
-  size_t packed = 0;
-  std::vector<uint8_t> room(kMaxBlockBytes);
-  for (int y = 0; y < 3; ++y)
-    for (int x = 0; x < 4; ++x) {
-      std::vector<uint32_t> block(kBlockPixels);
-      for (int i = 0; i < 64; ++i)
-        std::copy_n(&image.pixels[size_t(y * 64 + i) * 256 + size_t(x) * 64], 64, block.begin() + i * 64);
-      packed += encode_block(block.data(), room.data());
-    }
-  EXPECT_LT(double(bytes.size()), 0.8 * double(packed));
-  SliceImage noise = image;
-  for (auto& p : noise.pixels) p = uint32_t(random());
-  const auto of_noise = encode_slice(noise);
-  const auto again = parse_slices(of_noise, 256, 192, 1);
-  ASSERT_TRUE(again.ok());
-  EXPECT_TRUE(again->front().tables.empty()) << "they would only cost";
-  EXPECT_LE(of_noise.size(), 12 * kMaxBlockBytes + 64);
+  SliceImage image = soft(random);
+  EXPECT_LT(encode_slice(image).size(), image.pixels.size() * 4 / 5);
+  for (auto& p : image.pixels) p = uint32_t(random());
+  EXPECT_LT(double(encode_slice(image).size()), 4.2 * double(image.pixels.size()));
 }
 
-TEST(SliceCodec, EveryInstructionSetCodesAlike) {
-  Random random(10);
-  const auto image = soft(random);
-  const auto bytes = encode_slice(image);
-  for (const int64_t target : codec::detail::kernel_targets()) {
-    const testing::OnTarget on(target);
-    EXPECT_EQ(encode_slice(image), bytes);
-    const auto slices = parse_slices(bytes, 256, 192, 1);
-    ASSERT_TRUE(slices.ok());
-    const auto back = decode_slice(slices->front(), 256, 192);
-    ASSERT_TRUE(back.ok()) << back.error().text;
-    expect_same(image, *back, 256, 192);
-  }
-}
-
-TEST(SliceCodec, DamagedTablesAndCodedBlocksAreRefusedOrGiveAnImage) {
+TEST(SliceCodec, DamagedTablesAndBlocksAreRefusedOrGiveAnImage) {
   Random random(11);
   const auto bytes = encode_slice(soft(random));
   auto slices = parse_slices(bytes, 256, 192, 1);
   ASSERT_TRUE(slices.ok());
   EncodedSlice without = slices->front();
   without.tables = {};
-  EXPECT_FALSE(decode_slice(without, 256, 192).ok()) << "coded blocks need tables";
+  EXPECT_FALSE(decode_slice(without, 256, 192).ok()) << "blocks need tables";
   int refused = 0;
   for (int n = 0; n < 400; ++n) {
     auto bad = bytes;
