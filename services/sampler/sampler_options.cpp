@@ -4,34 +4,27 @@ namespace telesplat::sampler {
 
 options::Table table(SamplerOptions& o) {
   using options::Range;
-  return options::joined(
-      net::service_table(o.service, net::Ends::kConnects),
-      {{.flag = "--sampler",
-        .value = &o.kind,
-        .help = "of meshes: ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray",
-        .limits = options::Names{"auto", "ray", "raster"},
-        .fits = scene::Kinds::of(scene::Pipeline::kPoints)},
-       {.flag = "--threads",
-        .value = &o.threads,
-        .help = "threads to sample with; 0: one a core",
-        .limits = Range{0, 1024}},
-       {.flag = "--chunk-cache-mb",
-        .value = &o.chunk_cache_mb,
-        .help = "memory for chunks, MB",
-        .limits = Range{1, 1e6}},
-       {.flag = "--replay",
-        .value = &o.replay,
-        .help = "sample nothing: deliver this file's rows, after as long as they took"},
-       {.flag = "--repeat-views",
-        .value = &o.repeat_views,
-        .help =
-            "a view of a volume that was sampled this often is sent again instead, after as long as it took the thread "
-            "(with --threads 1): for studies with more samplers than processors; 0: never",
-        .limits = Range{0, 1000}},
-       {.flag = "--cost-scale",
-        .value = &o.cost_scale,
-        .help = "with --replay: a row takes this times as long",
-        .limits = Range{0, 1e6}}});
+  return options::joined(net::service_table(o.service, net::Ends::kConnects),
+                         {{.flag = "--sampler",
+                           .value = &o.kind,
+                           .help = "of meshes: ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray",
+                           .limits = options::Names{"auto", "ray", "raster"},
+                           .fits = scene::Kinds::of(scene::Pipeline::kPoints)},
+                          {.flag = "--threads",
+                           .value = &o.threads,
+                           .help = "threads to sample with; 0: one a core",
+                           .limits = Range{0, 1024}},
+                          {.flag = "--chunk-cache-mb",
+                           .value = &o.chunk_cache_mb,
+                           .help = "memory for chunks, MB",
+                           .limits = Range{1, 1e6}},
+                          {.flag = "--replay",
+                           .value = &o.replay,
+                           .help = "sample nothing: deliver this file's rows, after as long as they took"},
+                          {.flag = "--cost-scale",
+                           .value = &o.cost_scale,
+                           .help = "with --replay: a row takes this times as long",
+                           .limits = Range{0, 1e6}}});
 }
 
 }  // namespace telesplat::sampler

@@ -12,8 +12,6 @@ struct SamplerOptions {
   double chunk_cache_mb = 8192;  ///< of chunks or voxels held, unless one view needs more
   std::string replay;            ///< file of rows sampled before (tiles/replay_file.h); empty: samples itself
   double cost_scale = 1;         ///< a replayed lease takes this times what its rows took
-  /// A view of a volume that was sampled this often is sent again, after as long as that took; 0: never.
-  int repeat_views = 0;
 };
 
 /// A row a flag; they point into `options`.

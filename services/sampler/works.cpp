@@ -43,7 +43,7 @@ Made volume_work(const WorkTools& tools) {
                                   .to_master_s = [&link](double s) { return link.to_master_s(s); }};
   const SamplerOptions& o = tools.options;
   return Made(std::make_unique<VolumeWork>(make_shear_slabs(o.threads), o.threads, cache_bytes(o), o.service.name,
-                                           tools.context, master, tools.spans, o.repeat_views));
+                                           tools.context, master, tools.spans));
 }
 
 struct Row {

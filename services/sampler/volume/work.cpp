@@ -40,9 +40,8 @@ std::vector<uint8_t> encode(const std::vector<volume::SliceImage>& images) {
 }  // namespace
 
 VolumeWork::VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name,
-                       net::Context& context, Master master, metrics::SpanRecorder& spans, int repeat_after)
+                       net::Context& context, Master master, metrics::SpanRecorder& spans)
     : store_(std::move(make), cache_bytes),
-      repeated_(repeat_after),
       threads_(threads > 0 ? threads : tbb::task_arena::automatic),
       service_name_(std::move(service_name)),
       context_(context),
@@ -116,11 +115,7 @@ Readiness VolumeWork::readiness(const Held& held, double now_s) {
     return {State::kHopeless};
   }
   const SlabWant w = want(lease.epoch, e, int(lease.begin), int(lease.end));
-  if (store_.arranged(w) || store_.holds(w)) {
-    const auto* view = repeated_.find(lease);
-    if (!view || repeated_end_s(held, *view) <= now_s) return {};
-    return {State::kWaits, repeated_end_s(held, *view)};
-  }
+  if (store_.arranged(w) || store_.holds(w)) return {};
   return {State::kWaits};
 }
 
@@ -147,32 +142,19 @@ Delivery VolumeWork::sample_next() {
                .begin_s = monotonic_s(),
                .of = {.frame = double(lease.frame.value), .tile = double(lease.slab)}};
   wire::SliceImages m{.sampler = master_.instance, .lease = lease};
-  const auto send = [&](const std::vector<uint8_t>& bytes) {
-    wire::Moments& moments = m.lease.moments;
-    if (held.waits_since_s > 0) moments.fetch_s = out.begin_s - held.waits_since_s;
-    moments.sample_begin_s = master_.to_master_s(out.begin_s);
-    moments.sample_end_s = master_.to_master_s(out.sampled_s);
-    moments.encode_end_s = master_.to_master_s(out.encoded_s);
-    m.data = std::as_bytes(std::span(bytes));
-    out.body = wire::encode(m);
-    return out;
-  };
-  if (const auto* view = repeated_.find(lease)) {
-    out.encoded_s = repeated_end_s_ = repeated_end_s(held, *view);
-    out.sampled_s = out.encoded_s - view->encode_s;
-    out.begin_s = out.sampled_s - view->splat_s;
-    m.voxels = view->voxels;
-    return send(view->bytes);
-  }
-  const double begin_cpu_s = thread_cpu_s();
   const auto images = slab->splat(epoch.colours, lease.shear, int(lease.begin), int(lease.end), epoch.clip, m.voxels);
   out.sampled_s = monotonic_s();
-  const double sampled_cpu_s = thread_cpu_s();
   tbb::task_arena arena(threads_);
   const auto bytes = arena.execute([&] { return encode(images); });
   out.encoded_s = monotonic_s();
-  repeated_.add(lease, bytes, m.voxels, sampled_cpu_s - begin_cpu_s, thread_cpu_s() - sampled_cpu_s);
-  return send(bytes);
+  wire::Moments& moments = m.lease.moments;
+  if (held.waits_since_s > 0) moments.fetch_s = out.begin_s - held.waits_since_s;
+  moments.sample_begin_s = master_.to_master_s(out.begin_s);
+  moments.sample_end_s = master_.to_master_s(out.sampled_s);
+  moments.encode_end_s = master_.to_master_s(out.encoded_s);
+  m.data = std::as_bytes(std::span(bytes));
+  out.body = wire::encode(m);
+  return out;
 }
 
 // What the first lease lacks, then what the newest epoch lacks of the assigned slab, then what the steps after it do.

@@ -13,7 +13,6 @@
 #include "common/volume/session.h"
 #include "services/sampler/epoch_book.h"
 #include "services/sampler/retry_clock.h"
-#include "services/sampler/volume/repeated_views.h"
 #include "services/sampler/volume/slab_store.h"
 #include "services/sampler/work.h"
 
@@ -35,10 +34,9 @@ class VolumeWork final : public Work {
   };
 
   /// make: arranges slabs. threads: to encode with; 0: one a core. cache_bytes: of voxels. Keeps references to the
-  /// context and the spans. repeat_after: a view that was sampled this often is sent again, after as long as that took
-  /// (repeated_views.h); 0: never.
+  /// context and the spans.
   VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name, net::Context& context,
-             Master master, metrics::SpanRecorder& spans, int repeat_after = 0);
+             Master master, metrics::SpanRecorder& spans);
 
   const char* name() const override { return "volume"; }
   /// Remembers the epoch's transfer function and step. Bad ones are told once, and that epoch's leases are hopeless.
@@ -78,11 +76,6 @@ class VolumeWork final : public Work {
   };
 
   Readiness readiness(const Held& held, double now_s);
-  /// When the lease's cost has passed. It begins when the one before ended, or when it came: the instants that were
-  /// due, not those at which this process woke up.
-  double repeated_end_s(const Held& held, const RepeatedViews::View& view) const {
-    return std::max(held.received_s, repeated_end_s_) + view.cost_s();
-  }
   static SlabWant want(EpochId epoch, const Epoch& of, int begin, int end);
   std::optional<VoxelAsk> next_ask();
   void ask(double now_s);
@@ -93,8 +86,6 @@ class VolumeWork final : public Work {
   void forget_servers();
 
   SlabStore store_;
-  RepeatedViews repeated_;
-  double repeated_end_s_ = 0;  // of the view that was sent again last
   int threads_;
   std::string service_name_;
   net::Context& context_;
