@@ -184,7 +184,8 @@ class CacheBench {
       if (!*event || !(*event)->is_told()) continue;
       auto decoded = codec::decode(*(*event)->blob);
       if (!decoded) return decoded.error();
-      cache_.insert(points::prepare_patch(config_, (*event)->sequence, camera, rect, *decoded, FrameId{frames_}),
+      const packer::Event& patch = **event;
+      cache_.insert(points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, *decoded, patch.tag()),
                     EpochId{1});
       minute.insert_ms += (monotonic_s() - packed) * 1e3;
       minute.sent_points += double((*event)->kept);
