@@ -5,8 +5,6 @@
 
 #include <cmath>
 
-#include "tools/telesplat/sweep/page.h"
-
 namespace telesplat::launcher {
 namespace {
 
@@ -64,15 +62,6 @@ TEST(SweepCells, OfTwoRunsSayThatTheyAreFew) {
   }
   grid.repeat = 3;
   EXPECT_EQ(too_few(grid), "");
-}
-
-TEST(SweepCells, StandInThePage) {
-  const auto record = record_of({{16.7, 17.2, 16.9}, {20, 20, 20}, {16.8, 17.1, 17.0}});
-  const std::string page = to_html(record, begin_manifest(record.grid, "1.0", "/here"), "/tmp/sweep", 2);
-  EXPECT_NE(page.find("<h2>Differences from samplers=1</h2>"), page.npos);
-  EXPECT_NE(page.find("<td class=\"differs\">+3.1 (+2.4 to +3.7), p 0.0045</td>"), page.npos) << page;
-  EXPECT_NE(page.find("the first 2 s of each run are left out (--skip)"), page.npos);
-  EXPECT_NE(page.find("Time from one drawn frame to the next."), page.npos) << "what the figure says";
 }
 
 }  // namespace

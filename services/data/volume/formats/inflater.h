@@ -25,7 +25,7 @@ class Inflater {
   size_t read(void* to, size_t bytes) {
     stream_.next_out = static_cast<Bytef*>(to);
     stream_.avail_out = static_cast<uInt>(bytes);
-    while (stream_.avail_out == bytes && !ended_) {
+    while (bytes > 0 && stream_.avail_out == bytes && !ended_) {
       if (stream_.avail_in == 0) {
         if (rest_.empty()) break;
         stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(rest_.data()));

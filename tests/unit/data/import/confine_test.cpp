@@ -33,7 +33,7 @@ int in_confinement(const std::function<int()>& call) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-int opens(const std::string& path, int how) { return open(path.c_str(), how, 0600) < 0 ? 1 : 0; }
+int opens(const std::string& path, int how) { return ::open(path.c_str(), how, 0600) < 0 ? 1 : 0; }
 
 class Confined : public testing::Test {
  protected:
@@ -79,7 +79,7 @@ TEST_F(Confined, MemoryAndOutputEnd) {
 }
 
 TEST_F(Confined, ThreadsAndOpenFilesStillWork) {
-  const int file = open(folder.write("open", "content").c_str(), O_RDONLY);
+  const int file = ::open(folder.write("open", "content").c_str(), O_RDONLY);
   const int output = memfd_create("output", 0);
   EXPECT_EQ(in_confinement([&] {
               int good = 0;
