@@ -11,11 +11,6 @@ using options::Names;
 using options::Range;
 using options::Table;
 
-std::string complain_about_point(const std::string& text) {
-  const auto point = parse_point(text);
-  return point ? "" : point.error().text;
-}
-
 Status settle_poses(ViewerOptions& o) {
   const auto prediction = tracking::prediction_named(o.prediction);
   if (!prediction) return Error{fmt::format("--prediction {}: not none, velocity or kalman", o.prediction)};
@@ -44,6 +39,11 @@ Status settle_xr(ViewerOptions& o) {
 }
 
 }  // namespace
+
+std::string complain_about_point(const std::string& text) {
+  const auto point = parse_point(text);
+  return point ? "" : point.error().text;
+}
 
 Table head_source_table(ViewerOptions& o) {
   return {

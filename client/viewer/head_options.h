@@ -5,6 +5,8 @@
 
 namespace telesplat::viewer {
 
+/// What is wrong with "X,Y,Z"; empty: nothing.
+std::string complain_about_point(const std::string& text);
 /// Publishers of poses, prediction.
 options::Table head_source_table(ViewerOptions& options);
 /// What these flags and those of a headset come to. Error: names the flag that cannot be.

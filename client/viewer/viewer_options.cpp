@@ -39,11 +39,6 @@ std::string complain_about_background(const std::string& text) {
   return background ? "" : background.error().text;
 }
 
-std::string complain_about_point(const std::string& text) {
-  const auto point = parse_point(text);
-  return point ? "" : point.error().text;
-}
-
 Table sampling_table(ViewerOptions& o) {
   return {
       {.flag = "--size", .value = &o.size, .help = "display size in pixels, WxH", .reach = Reach::kRecorded},

@@ -15,11 +15,6 @@ constexpr double kAsk_s = 0.1;        // whether to stop
 constexpr double kSayAgain_s = 0.25;  // what may have been lost
 constexpr double kFarAway_s = 1;      // a moment to present that lies farther ahead is none
 
-void sleep_until(double t_s) {
-  const double wait_s = t_s - monotonic_s();
-  if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
-}
-
 }  // namespace
 
 WallPace::WallPace(net::Context& context, const Options& options, std::function<InstanceId()> viewer,

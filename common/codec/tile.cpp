@@ -11,7 +11,7 @@ namespace {
 enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
 constexpr int kRamp = 8;  // beside a sparse tile's pole: a ramp's axis follows
 
-TileScratch& scratch() {
+TileScratch& tile_scratch() {
   static thread_local TileScratch s;
   return s;
 }
@@ -123,7 +123,7 @@ TileRect TileGrid::rect(int column, int row) const {
 bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds) {
   const TileGrid grid(image.width, image.height);
   if (image.pixels() > kMostOfOne || grid.columns * grid.rows == 1) return false;
-  Mask& mask = scratch().mask;
+  Mask& mask = tile_scratch().mask;
   size_t total = 0, tiles = 0;
   for (int row = 0; row < grid.rows; ++row)
     for (int column = 0; column < grid.columns; ++column) {
@@ -139,7 +139,7 @@ bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds) {
 
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
                 const TileBounds& bounds, const RoomAxes* axes) {
-  TileScratch& s = scratch();
+  TileScratch& s = tile_scratch();
   look_at(s.mask, image, rect);
   const size_t pixels = pixels_of(rect), covered = s.mask.count();
   if (covered == 0) {
@@ -188,7 +188,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   const bool full = !(*kind & kMasked), sparse = predictor == kSparse;
   if ((!sparse && predictor != kDense) || (full && sparse)) return std::nullopt;
 
-  TileScratch& s = scratch();
+  TileScratch& s = tile_scratch();
   const auto base = get_base(in);
   if (!base) return std::nullopt;
   const size_t pixels = pixels_of(rect);
@@ -230,7 +230,7 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
   if (!kind || *kind & ~kKnownBits || !get_base(in)) return false;
   size_t covered = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
   if (*kind & kMasked) {
-    Mask& mask = scratch().mask;
+    Mask& mask = tile_scratch().mask;
     mask.reset(rect.width, rect.height);
     const size_t before = in.left();
     if (!get_mask(in, mask)) return false;

@@ -15,9 +15,9 @@ constexpr int kMaxParts = 1024;
 std::string placement_name(int row, int column) { return fmt::format("volume.m{}{}", row, column); }
 
 // Takes numbers out of the map by name; the first that is missing or beyond its limits is remembered.
-class Reader {
+class ParameterReader {
  public:
-  explicit Reader(const std::map<std::string, double>& parameters) : parameters_(parameters) {}
+  explicit ParameterReader(const std::map<std::string, double>& parameters) : parameters_(parameters) {}
 
   double number(const std::string& name, double least, double most) {
     const auto found = parameters_.find(name);
@@ -78,7 +78,7 @@ std::map<std::string, std::string> to_facts(const Session& s) {
 
 Result<Session> read_session(const std::map<std::string, double>& parameters,
                              const std::map<std::string, std::string>& facts) {
-  Reader in(parameters);
+  ParameterReader in(parameters);
   Session s;
   s.grid.size = {in.whole("volume.size.x", 1, kMaxSide), in.whole("volume.size.y", 1, kMaxSide),
                  in.whole("volume.size.z", 1, kMaxSide)};

@@ -24,7 +24,7 @@ namespace {
 
 using codec::detail::put_varint;
 using codec::detail::Reader;
-using Plane = std::vector<uint8_t>;
+using BytePlane = std::vector<uint8_t>;
 
 constexpr uint8_t kMark = 'V';
 constexpr uint8_t kLit = 1, kWide = 2;
@@ -77,7 +77,7 @@ class Predictor {
   bool at_start_ = true;
 };
 
-void put_sized_block(std::vector<uint8_t>& out, const Plane& plane) {
+void put_sized_block(std::vector<uint8_t>& out, const BytePlane& plane) {
   put_varint(out, uint32_t(plane.size()));
   put_zstd_block(out, plane);
 }
@@ -91,7 +91,7 @@ class GroupEncoder {
   void encode(size_t begin, size_t end, std::vector<uint8_t>& out) {
     const size_t first = voxels_.rows[begin], count = voxels_.rows[end] - first;
     counts_low_.clear(), counts_high_.clear(), gaps_.clear(), lengths_.clear();
-    for (Plane* plane : {&level_low_, &level_high_, &x_, &y_}) plane->resize(count);
+    for (BytePlane* plane : {&level_low_, &level_high_, &x_, &y_}) plane->resize(count);
     predictor_.begin_group();
     size_t n = first;
     for (size_t r = begin; r < end; ++r) {
@@ -135,7 +135,7 @@ class GroupEncoder {
   const Voxels& voxels_;
   const bool lit_, wide_;
   Predictor predictor_;
-  Plane counts_low_, counts_high_, gaps_, lengths_, level_low_, level_high_, x_, y_;
+  BytePlane counts_low_, counts_high_, gaps_, lengths_, level_low_, level_high_, x_, y_;
 };
 
 // Appends the rows of a group to a set. False: damaged.
@@ -160,7 +160,7 @@ class GroupDecoder {
     const size_t first = voxels_.i.size();
     if (first + voxels > kMaxVoxelsCoded || !place_runs(rows)) return false;
 
-    for (Plane* plane : {&level_low_, &level_high_, &x_, &y_}) plane->resize(size_t(voxels));
+    for (BytePlane* plane : {&level_low_, &level_high_, &x_, &y_}) plane->resize(size_t(voxels));
     if (!get_zstd_block(in, level_low_) || (wide_ && !get_zstd_block(in, level_high_))) return false;
     if (lit_ && (!get_zstd_block(in, x_) || !get_zstd_block(in, y_))) return false;
     voxels_.i.resize(first + size_t(voxels));
@@ -239,7 +239,7 @@ class GroupDecoder {
   const int level_count_;
   const bool lit_, wide_;
   Predictor predictor_;
-  Plane counts_low_, counts_high_, packed_, level_low_, level_high_, x_, y_;
+  BytePlane counts_low_, counts_high_, packed_, level_low_, level_high_, x_, y_;
   std::vector<uint16_t> gaps_, lengths_;
 };
 

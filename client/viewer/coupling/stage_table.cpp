@@ -5,23 +5,23 @@
 namespace telesplat::viewer {
 namespace {
 
-using U = const UpdateStages&;
+using Stages = const UpdateStages&;
 
 constexpr size_t kMostWaiting = 256;
 constexpr double kNotShown = -1;
 
 constexpr metrics::Column<UpdateStages> kBefore[] = {
-    {"request", [](U u) { return double(u.request.value); }},
-    {"frame", [](U u) { return double(u.frame.value); }},
-    {"tile", [](U u) { return double(u.tile); }},
-    {"requested_s", [](U u) { return u.requested_s; }},
-    {"complete_s", [](U u) { return u.complete_s; }},
+    {"request", [](Stages u) { return double(u.request.value); }},
+    {"frame", [](Stages u) { return double(u.frame.value); }},
+    {"tile", [](Stages u) { return double(u.tile); }},
+    {"requested_s", [](Stages u) { return u.requested_s; }},
+    {"complete_s", [](Stages u) { return u.complete_s; }},
 };
 // The stages come between.
 constexpr metrics::Column<UpdateStages> kAfter[] = {
-    {"latency_ms", [](U u) { return (u.complete_s - u.requested_s) * 1e3; }},
-    {"patches", [](U u) { return double(u.patches); }},
-    {"display_ms", [](U u) { return u.display_ms; }},
+    {"latency_ms", [](Stages u) { return (u.complete_s - u.requested_s) * 1e3; }},
+    {"patches", [](Stages u) { return double(u.patches); }},
+    {"display_ms", [](Stages u) { return u.display_ms; }},
 };
 
 template <class T>

@@ -24,11 +24,6 @@ bool told_to_stop(const ViewerWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
 }
 
-void sleep_until(double t_s) {
-  const double wait_s = t_s - monotonic_s();
-  if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
-}
-
 // Samples that are finer than what is drawn would come late and show nothing.
 geometry::Camera drawn_size(const geometry::Camera& camera, const DrawnFrame& drawn) {
   return drawn.halved ? geometry::half_size(camera) : camera;

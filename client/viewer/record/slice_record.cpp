@@ -11,7 +11,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr std::string_view kMagic = "TSSLICE1", kGrid = "grid";
+constexpr std::string_view kSliceMagic = "TSSLICE1", kGrid = "grid";
 
 struct GridBody {
   uint32_t size[3];
@@ -24,7 +24,7 @@ static_assert(sizeof(GridBody) == 144);
 
 bool SliceRecorder::ready() {
   if (file_ || error_) return file_.has_value();
-  auto file = RecordWriter::open(path_, kMagic, max_bytes_, "slice images");
+  auto file = RecordWriter::open(path_, kSliceMagic, max_bytes_, "slice images");
   error_ = file ? 0 : errno;
   if (file)
     file_ = std::move(*file);
@@ -51,7 +51,7 @@ void SliceRecorder::flush() {
 }
 
 Result<std::unique_ptr<SliceReplay>> SliceReplay::open(const std::string& path) {
-  auto file = RecordReader::open(path, {kMagic}, "a record of slice images");
+  auto file = RecordReader::open(path, {kSliceMagic}, "a record of slice images");
   if (!file) return file.error();
   return std::unique_ptr<SliceReplay>(new SliceReplay(std::move(*file)));
 }

@@ -24,7 +24,7 @@ constexpr double kMostCut = 1.2;
 // Samples closer than this, in sub-pixels, are as fine as sub-pixels.
 constexpr float kFinest = 1.5f;
 // Farther than what the view shows by this factor: about splat::kEdge steps of a depth code.
-constexpr float kBehind = 1.03f;
+constexpr float kBehindRays = 1.03f;
 
 geometry::Rect grown(const geometry::Rect& r, int by) {
   return {r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
@@ -167,7 +167,7 @@ void Supersampler::show_antialiased(const Scene& scene, const geometry::Camera& 
 // at the same depth hide what the finest say of it.
 void Supersampler::show_met(const Scene& scene, const geometry::Camera& around) {
   const auto behind = [&](const image::View& view, size_t i) {
-    return kBehind * view.depth_m[i] >= std::abs(met_m_[i]);
+    return kBehindRays * view.depth_m[i] >= std::abs(met_m_[i]);
   };
   const auto show = [&](const image::View& from, size_t i) {
     fine_.depth_m[i] = from.depth_m[i], fine_.colour[i] = from.colour[i];
@@ -204,7 +204,7 @@ void Supersampler::close_gaps(const geometry::Rect& rect, bool with_depths) {
       float far = 0;
       for (size_t j = 0; j < 3; ++j)
         for (size_t i = 0; i < 3; ++i) far = std::max(far, coarse_.depth_m[first + j * w + size_t(x) + i]);
-      farthest_[size_t(x)] = kBehind * far;
+      farthest_[size_t(x)] = kBehindRays * far;
     }
     const uint32_t* pixels = coarse_.colour.data() + first + w + 1;
     for (int j = 0; j < side_; ++j) {

@@ -7,14 +7,14 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kSteps = 16, kLast = 12 * kSteps;  // of the spread; the last one that the table tells
+constexpr int kSpreadSteps = 16, kLast = 12 * kSpreadSteps;  // of the spread; the last one that the table tells
 
 // The distribution function at 16ths of the spread, in 2^-16. None of these numbers, nor of those below, comes nearer
 // to a half than a thousandth, so that all machines round alike.
 const auto kBelow = [] {
   std::array<uint32_t, kLast + 2> out{};
   for (int i = 0; i <= kLast; ++i) {
-    const double x = static_cast<double>(i) / kSteps;
+    const double x = static_cast<double>(i) / kSpreadSteps;
     out[static_cast<size_t>(i)] =
         static_cast<uint32_t>(std::lround(65536 * (0.5 + (x / (1 + x * x) + std::atan(x)) / std::numbers::pi)));
   }

@@ -2,7 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <linux/tcp.h>  // has newer fields than netinet/tcp.h, and cannot stand beside it
+#include <linux/tcp.h>  // newer fields than netinet/tcp.h has
 #include <netinet/in.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>

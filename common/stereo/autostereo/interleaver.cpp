@@ -12,7 +12,7 @@
 namespace telesplat::stereo {
 namespace {
 
-constexpr int kRowsAtOnce = 16;
+constexpr int kRowsOfTask = 16;
 
 constexpr size_t kSpare = 48;  // pixels that rows.h writes beyond a row, and a cell that ends there
 
@@ -117,7 +117,7 @@ void Interleaver::compose(const Eyes& eyes, const image::View& left, const image
   out.width = panel_.width, out.height = panel_.height;
   out.colour.resize(width * size_t(panel_.height));
   out.depth_m.clear();
-  in_parallel(tbb::blocked_range<int>(0, panel_.height, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
+  in_parallel(tbb::blocked_range<int>(0, panel_.height, kRowsOfTask), [&](const tbb::blocked_range<int>& rows) {
     thread_local std::vector<uint32_t> buffer;
     const size_t room = width + kSpare;
     buffer.resize(4 * room);

@@ -10,7 +10,7 @@
 namespace telesplat::stereo {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kPanelDegree = 3.14159265358979323846 / 180;
 
 }  // namespace
 
@@ -67,7 +67,7 @@ std::array<int, 3> shifts_of(Subpixels subpixels) {
 
 PanelFigures figures_of(const Panel& p, double separation_m) {
   PanelFigures out;
-  const double depth_m = optical_depth_m(p.lines), pitch_x_m = p.lines.pitch_m / std::cos(p.lines.tilt_deg * kDegree);
+  const double depth_m = optical_depth_m(p.lines), pitch_x_m = p.lines.pitch_m / std::cos(p.lines.tilt_deg * kPanelDegree);
   // At distance z from the pixels eyes that are e apart see a place's lines e * depth / z apart: half a pitch is best.
   out.best_distance_m = separation_m * depth_m / (0.5 * pitch_x_m);
   out.repeat_m = pitch_x_m * p.distance_m / depth_m;

@@ -13,7 +13,7 @@ namespace telesplat::data::vtk {
 namespace {
 
 // An array as the file's words have it.
-struct Row {
+struct ArrayRow {
   std::string name;
   bool of_cells = false;
   StoredType type = StoredType::kU8;
@@ -21,34 +21,34 @@ struct Row {
   bool text = false;
 };
 
-void choose(const std::vector<Row>& rows, const std::string& wanted, const std::string (&active)[2], Image& out,
+void choose(const std::vector<ArrayRow>& rows, const std::string& wanted, const std::string (&active)[2], Image& out,
             const std::string& path) {
-  for (const Row& row : rows) out.arrays.push_back(row.name);
-  const Row* chosen = nullptr;
+  for (const ArrayRow& row : rows) out.arrays.push_back(row.name);
+  const ArrayRow* chosen = nullptr;
   const auto first = [&](auto&& fits) {
     const auto found = chosen ? rows.end() : std::find_if(rows.begin(), rows.end(), fits);
     if (found != rows.end()) chosen = &*found;
   };
   if (!wanted.empty()) {
-    first([&](const Row& r) { return r.name == wanted; });
+    first([&](const ArrayRow& r) { return r.name == wanted; });
     if (!chosen) refuse("{}: has no array \"{}\"; it has: {}", path, wanted, fmt::join(out.arrays, ", "));
   }
   for (const bool cells : {false, true}) {
-    first([&](const Row& r) { return r.of_cells == cells && r.name == active[cells] && r.components == 1; });
-    first([&](const Row& r) { return r.of_cells == cells && r.components == 1; });
+    first([&](const ArrayRow& r) { return r.of_cells == cells && r.name == active[cells] && r.components == 1; });
+    first([&](const ArrayRow& r) { return r.of_cells == cells && r.components == 1; });
   }
-  first([](const Row&) { return true; });
+  first([](const ArrayRow&) { return true; });
   if (!chosen) return;
   out.array = chosen->name, out.of_cells = chosen->of_cells, out.type = chosen->type;
   out.components = chosen->components, out.text = chosen->text;
 }
 
-std::vector<Row> rows_in(pugi::xml_node points, pugi::xml_node cells, const char* element) {
-  std::vector<Row> out;
+std::vector<ArrayRow> rows_in(pugi::xml_node points, pugi::xml_node cells, const char* element) {
+  std::vector<ArrayRow> out;
   for (const bool of_cells : {false, true})
     for (const auto node : (of_cells ? cells : points).children(element)) {
       const std::string_view format = node.attribute("format").value();
-      Row row{node.attribute("Name").value(),
+      ArrayRow row{node.attribute("Name").value(),
               of_cells,
               {},
               std::max(node.attribute("NumberOfComponents").as_uint(1), 1u),
@@ -64,7 +64,7 @@ Image legacy_header(std::string_view content, const std::string& path, const std
   Image out;
   out.extent = set.extent, out.index_to_data = set.index_to_data, out.bytes = content.size();
   out.packed = true;  // or text: the parser has compared sizes with the file's
-  std::vector<Row> rows;
+  std::vector<ArrayRow> rows;
   for (const bool cells : {false, true})
     for (const Array& a : (cells ? set.cell_data : set.point_data).arrays)
       rows.push_back({a.name, cells, a.type, a.components, false});

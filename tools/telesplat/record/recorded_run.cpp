@@ -16,7 +16,7 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr double kMaxPixels = 64 << 20;  // a comparison keeps some dozen bytes a pixel
+constexpr double kMaxFramePixels = 64 << 20;  // a comparison keeps some dozen bytes a pixel
 constexpr tools::CsvTable::Limits kFrames{.rows = 10'000'000, .line_bytes = 1 << 16};
 
 Result<toml::table> read_session(const std::string& path) {
@@ -65,9 +65,9 @@ Status read_size(const std::string& path, const toml::table& viewer, RecordedRun
     if (!(side >= 1 && side <= geometry::kMaxImageSide) || side != std::floor(side))
       return Error{fmt::format("{}: the viewer's display has {} x {} pixels, limits are 1..{}", path, width, height,
                                geometry::kMaxImageSide)};
-  if (width * height > kMaxPixels)
+  if (width * height > kMaxFramePixels)
     return Error{fmt::format("{}: the viewer's display has {} x {} pixels, at most {} are compared", path, width,
-                             height, kMaxPixels)};
+                             height, kMaxFramePixels)};
   run.width = int(width), run.height = int(height);
   return ok_status();
 }

@@ -27,7 +27,7 @@ json at(const json& s, const char* key) {
   return found == s.end() ? json() : *found;
 }
 
-std::string text(const json& s, const char* key) {
+std::string text_of(const json& s, const char* key) {
   const json v = at(s, key);
   return v.is_string() ? v.get<std::string>() : kNothing;
 }
@@ -52,23 +52,23 @@ std::string distribution(const json& s, const char* key, const char* unit) {
 
 std::string subject_of(const std::string& directory, const json& s) {
   const auto scene = recorded_scene(directory);
-  if (!scene) return text(s, "scene");
+  if (!scene) return text_of(s, "scene");
   const json primitives = at(s, "primitives");
-  return text(s, "scene") + (*scene)->summary(primitives.is_number() ? primitives.get<uint64_t>() : 0);
+  return text_of(s, "scene") + (*scene)->summary(primitives.is_number() ? primitives.get<uint64_t>() : 0);
 }
 
 // Whether the run was drawn from points, so that there are splats and points cached.
 bool has_points(const json& s) {
-  if (text(s, "coupling") == "images") return false;
-  const auto kind = scene::kind_named(text(s, "kind"));
+  if (text_of(s, "coupling") == "images") return false;
+  const auto kind = scene::kind_named(text_of(s, "kind"));
   return !kind || scene::pipeline_of(*kind) == scene::Pipeline::kPoints;
 }
 
 std::string head_of(const std::string& directory, const json& s) {
   std::string head =
       fmt::format("{}, display {}, sampling {}, {}, {} renderer", subject_of(directory, s), size(s, "size"),
-                  size(s, "sampling_size"), plural(s.at("samplers").get<int>(), "sampler"), text(s, "renderer"));
-  if (has_points(s)) head += ", " + text(s, "splat") + " splats";
+                  size(s, "sampling_size"), plural(s.at("samplers").get<int>(), "sampler"), text_of(s, "renderer"));
+  if (has_points(s)) head += ", " + text_of(s, "splat") + " splats";
   if (const int viewers = s.at("viewers").get<int>(); viewers > 1)
     head += fmt::format(", {} (figures of all)", plural(viewers, "viewer"));
   return head;
@@ -97,7 +97,7 @@ std::string beside_frames(const json& s) {
 }
 
 void add_display(const json& s, RunReport& out) {
-  const std::string coupling = text(s, "coupling");
+  const std::string coupling = text_of(s, "coupling");
   const json still = at(s, "frames_still");
   const uint64_t drawn = s.at("frames").get<uint64_t>() - (still.is_number() ? still.get<uint64_t>() : 0);
   out.line("display",

@@ -81,6 +81,9 @@ struct DicomOrder {
   std::string remark;                          ///< for people: what was left out, mixed or evened; often empty
 };
 
+/// Adds a part to a remark.
+inline void say(std::string& remark, const std::string& more) { remark += (remark.empty() ? "" : "; ") + more; }
+
 /// Orders the slices of one series (at least one). Takes those that have the commonest size, spacing and orientation;
 /// localizers only if there is nothing else. Leaves out copies: the same SOP Instance UID and frame, or a place
 /// where same_pixels() finds no difference. Slices at one place become time steps if all places have equally many. A

@@ -28,7 +28,6 @@ std::string name_of(const DicomSlice& s) {
 
 std::string counted(size_t n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-void say(std::string& remark, const std::string& more) { remark += (remark.empty() ? "" : "; ") + more; }
 
 glm::dvec3 normal_of(const DicomSlice& s) { return glm::cross(s.along_row, s.along_column); }
 

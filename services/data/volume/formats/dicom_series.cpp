@@ -139,7 +139,6 @@ VolumeFileHeader header_of(const DicomOrder& order) {
   return h;
 }
 
-void say(std::string& remark, const std::string& more) { remark += (remark.empty() ? "" : "; ") + more; }
 
 void say_values(DicomSeries& series) {
   const DicomSlice& first = series.order.slices.front();

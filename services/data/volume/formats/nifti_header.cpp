@@ -14,10 +14,10 @@ namespace {
 
 constexpr size_t kBytes1 = 348, kBytes2 = 540;
 
-// Fields at given offsets, in the file's byte order.
-class Fields {
+// NiftiFields at given offsets, in the file's byte order.
+class NiftiFields {
  public:
-  Fields(std::string_view content, bool swapped) : content_(content), swapped_(swapped) {}
+  NiftiFields(std::string_view content, bool swapped) : content_(content), swapped_(swapped) {}
   template <class T>
   T at(size_t offset) const {
     char bytes[sizeof(T)];
@@ -43,7 +43,7 @@ struct Values {
 };
 
 template <class Real, class Size, class Code>
-Values values_of(const Fields& f, size_t dim, size_t type, size_t pixdim, size_t slope, size_t qform, size_t sform,
+Values values_of(const NiftiFields& f, size_t dim, size_t type, size_t pixdim, size_t slope, size_t qform, size_t sform,
                  size_t quaternion, size_t rows) {
   Values v{};
   for (size_t a = 0; a < 8; ++a) v.dim[a] = f.at<Size>(dim + a * sizeof(Size));
@@ -105,7 +105,7 @@ glm::dmat4 placement_of(const Values& v) {
 VolumeFileHeader parse(std::string_view content, const std::string& path) {
   if (content.size() < kBytes1)
     refuse("{}: ends within its header: {} bytes of at least {}", path, content.size(), kBytes1);
-  const int32_t size = Fields(content, false).at<int32_t>(0), swapped_size = Fields(content, true).at<int32_t>(0);
+  const int32_t size = NiftiFields(content, false).at<int32_t>(0), swapped_size = NiftiFields(content, true).at<int32_t>(0);
   const bool two = size == int32_t(kBytes2) || swapped_size == int32_t(kBytes2);
   const bool swapped = swapped_size == int32_t(kBytes1) || swapped_size == int32_t(kBytes2);
   if (!two && !swapped && size != int32_t(kBytes1))
@@ -116,7 +116,7 @@ VolumeFileHeader parse(std::string_view content, const std::string& path) {
   const bool single = magic == (two ? "n+2" : "n+1");
   if (!single && magic != (two ? "ni2" : "ni1"))
     refuse("{}: is no NIfTI file (an Analyze file?): its magic is {}", path, in_quotes(magic));
-  const Fields f(content, swapped);
+  const NiftiFields f(content, swapped);
   Values v = two ? values_of<double, int64_t, int32_t>(f, 16, 12, 104, 176, 344, 348, 352, 400)
                  : values_of<float, int16_t, int16_t>(f, 40, 70, 76, 112, 252, 254, 256, 280);
   v.data_at = two ? double(f.at<int64_t>(168)) : double(f.at<float>(108));

@@ -10,7 +10,7 @@
 namespace telesplat::data {
 namespace {
 
-constexpr TypeName kTypes[] = {
+constexpr TypeName kNrrdTypes[] = {
     {"char", StoredType::kI8},      {"int8", StoredType::kI8},    {"uchar", StoredType::kU8},
     {"uint8", StoredType::kU8},     {"short", StoredType::kI16},  {"int16", StoredType::kI16},
     {"ushort", StoredType::kU16},   {"uint16", StoredType::kU16}, {"int", StoredType::kI32},
@@ -25,11 +25,11 @@ std::optional<StoredType> type_of(std::string name) {
   if (name.starts_with("unsigned ")) name = "u" + name.substr(9);
   if (name.starts_with("signed ")) name.erase(0, 7);
   std::erase(name, ' ');
-  return type_named(name, kTypes);
+  return type_named(name, kNrrdTypes);
 }
 
 // The fields, by lower-case names without blanks, and where the data begins: behind the first empty line.
-struct Lines {
+struct NrrdLines {
   Fields fields;
   std::vector<std::string> files;  // behind "data file: LIST"
   bool ct = false;
@@ -37,8 +37,8 @@ struct Lines {
   size_t data_at = 0;
 };
 
-Lines split(std::string_view content) {
-  Lines out;
+NrrdLines split(std::string_view content) {
+  NrrdLines out;
   bool listed = false;
   size_t at = content.find('\n');
   while (at != content.npos && at + 1 < content.size()) {
@@ -193,7 +193,7 @@ void read_encoding(const Fields& fields, const std::string& path, VolumeFileHead
 }
 
 // Where they lie.
-void find_data(const Lines& lines, const std::string& path, VolumeFileHeader& h) {
+void find_data(const NrrdLines& lines, const std::string& path, VolumeFileHeader& h) {
   const Fields& fields = lines.fields;
   const std::string_view data = field(fields, {"datafile"});
   if (data.empty() && !lines.ended) refuse("{}: its header does not end (no empty line) and names no data file", path);
@@ -222,12 +222,12 @@ void read_skips(const Fields& fields, const std::string& path, VolumeFileHeader&
     (h.encoding == Encoding::kGzip ? h.skip_unpacked : h.data_at) += uint64_t(*byte_skip);
 }
 
-VolumeFileHeader parse(std::string_view content, const std::string& path) {
+VolumeFileHeader parse_nrrd(std::string_view content, const std::string& path) {
   if (content.size() < 9 || !content.starts_with("NRRD000"))
     refuse("{}: is no NRRD file: it does not begin with NRRD000", path);
   if (content[7] < '1' || content[7] > '5')
     refuse("{}: is NRRD version {}, known are 1 to 5", path, in_quotes(content.substr(4, 4)));
-  const Lines lines = split(content);
+  const NrrdLines lines = split(content);
   const Fields& fields = lines.fields;
   VolumeFileHeader h;
   h.format = "nrrd";
@@ -260,7 +260,7 @@ VolumeFileHeader parse(std::string_view content, const std::string& path) {
 }  // namespace
 
 Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path) {
-  return or_error([&] { return parse(content, path); });
+  return or_error([&] { return parse_nrrd(content, path); });
 }
 
 }  // namespace telesplat::data

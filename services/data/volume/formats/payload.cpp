@@ -17,7 +17,7 @@
 namespace telesplat::data {
 namespace {
 
-constexpr size_t kBlock = 256 << 10;  // stays in the second cache between being cleared and being filled
+constexpr size_t kCachedBytes = 256 << 10;  // stays in the second cache between being cleared and being filled
 
 // What of a file is voxels, packed or not.
 std::string_view behind_skips(std::string_view content, const VolumeFileHeader& h, const std::string& file) {
@@ -43,7 +43,7 @@ void fill(const VolumeFileHeader& h, const std::string& path, const ReadProgress
           Next&& next) {
   const uint64_t bytes = h.voxel_bytes(), until = out.size() + bytes / h.parts();
   for (uint64_t steps = 0; out.size() < until; ++steps) {
-    const size_t begin = out.size(), want = std::min<uint64_t>(kBlock, until - begin);
+    const size_t begin = out.size(), want = std::min<uint64_t>(kCachedBytes, until - begin);
     out.resize(begin + want);
     size_t have = 0;
     while (have < want) {
@@ -94,7 +94,7 @@ void read_part(const VolumeFileHeader& h, const std::string& name, const std::st
       return n;
     });
   Inflater inflater(rest, path);
-  std::vector<std::byte> left_out(std::min<uint64_t>(h.skip_unpacked, kBlock));
+  std::vector<std::byte> left_out(std::min<uint64_t>(h.skip_unpacked, kCachedBytes));
   for (uint64_t left = h.skip_unpacked; left > 0;) {
     const size_t n = inflater.read(left_out.data(), std::min<uint64_t>(left, left_out.size()));
     if (n == 0) refuse_short(h, path, 0);
