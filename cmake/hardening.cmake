@@ -14,8 +14,7 @@ if(TELESPLAT_SANITIZE)
     # Functions of very many accesses check them by calls, so that none takes minutes to compile.
     add_compile_options("SHELL:-mllvm -asan-instrumentation-with-call-threshold=300")
   endif()
-  # One instruction set: the others are the same source, and take most of the time of the kernels' sources. The codec
-  # has all of them.
+  # One instruction set: the others are the same source, and take most of the time of the kernels' sources.
   # Sources that must know: a sanitizer maps terabytes of shadow, and is slow.
   add_compile_definitions(HWY_COMPILE_ONLY_STATIC TELESPLAT_SANITIZED)
 elseif(TELESPLAT_HARDEN)

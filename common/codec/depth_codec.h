@@ -42,8 +42,8 @@ Status decode_into(image::DepthImage& image, std::span<const uint8_t> bytes, int
 std::vector<uint8_t> encode_refinement(const image::DepthImage& exact, const image::DepthImage& bounded);
 
 /// The exact image. Any other bytes give an error or some canonical image that covers the same pixels, with the same
-/// promises as decode(). A refinement of another image is not always told from that of `bounded`: whoever sends both
-/// says what belongs together.
+/// promises as decode(). A refinement of another image is not always told from that of `bounded`: the sender of both
+/// names the image.
 Result<image::DepthImage> decode_refinement(std::span<const uint8_t> bytes, const image::DepthImage& bounded);
 
 /// For `telesplat inspect`: size and parts of a stream without decoding its pixels.

@@ -16,7 +16,7 @@ class Reader {
  public:
   explicit Reader(std::span<const uint8_t> bytes) : rest_(bytes) {}
   std::optional<uint8_t> u8();
-  int peek() const { return rest_.empty() ? -1 : rest_[0]; }  ///< the next byte; -1: there is none
+  int peek() const { return rest_.empty() ? -1 : rest_[0]; }  ///< the next byte; -1 at the end
   std::optional<uint32_t> varint();                           ///< LEB128 of at most 32 bits
   std::optional<std::span<const uint8_t>> bytes(size_t count);
   size_t left() const { return rest_.size(); }

@@ -35,7 +35,7 @@ class DepthLattice {
   uint32_t index(uint32_t code) const {
     const Line& line = lines_[place(code)];
     const uint32_t* end = ends_.data() + line.index + (uint64_t{code - line.code} * line.slope >> 32);
-    end += *end < code;  // the line lies below, by less than 2 nearly always: two steps that nobody has to guess
+    end += *end < code;  // the line lies below, by less than 2 nearly always: two steps without branches
     end += *end < code;
     while (*end < code) ++end;
     while (end != ends_.data() && end[-1] >= code) --end;

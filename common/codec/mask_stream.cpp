@@ -33,7 +33,7 @@ Result<image::PixelMask> decode_mask(std::span<const uint32_t> words, int width,
   // What fills the last word is no part of the mask.
   if (!detail::get_mask(in, mask) || in.left() > 3)
     return Error{
-        fmt::format("the mask of a tile of {} x {} pixels: {} words that are none", width, height, words.size())};
+        fmt::format("the mask of a tile of {} x {} pixels: {} words are no mask", width, height, words.size())};
   return mask;
 }
 

@@ -98,7 +98,7 @@ class RangeEncoder {
   size_t held_ = 0;
 };
 
-/// Reads zeros past the end of its bytes, for ever: whoever reads bounds how many bits there are.
+/// Reads zeros past the end of its bytes, for ever: its callers bound the number of bits.
 class RangeDecoder {
  public:
   explicit RangeDecoder(std::span<const uint8_t> bytes = {}) : bytes_(bytes) {

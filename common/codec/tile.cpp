@@ -38,11 +38,11 @@ void clear(image::DepthImage& image, const TileRect& rect) {
   }
 }
 
-// No other tile is coded as a sparse one: so nobody makes a decoder take that time for all pixels.
+// Only such tiles are coded as sparse ones, which bounds the time that a stream costs its decoder.
 bool may_be_sparse(size_t covered, size_t pixels) { return covered * 4 < pixels; }
 
-// Of the image that is one tile: how large it may be, since its walk keeps two bytes a pixel and thread, and how many
-// pixels a walk tells apart.
+// Limits of an image that is one tile: its pixels, since its walk keeps two bytes a pixel and thread, and the covered
+// ones, as a walk numbers them.
 constexpr size_t kMostOfOne = size_t{1} << 22, kMostScattered = 65535;
 
 constexpr size_t kFewWithinBounds = 4000;  // bench codec on whole views: 2700 to 8000 are alike

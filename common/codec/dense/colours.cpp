@@ -56,7 +56,7 @@ void for_each_colour(std::vector<uint32_t>& palette, Code code) {
 }
 
 // The knots of a ramp, each as what it is off from the line through the two before it: code(difference, context) ->
-// difference. False where one is none.
+// difference. Returns false if one is out of range.
 template <class Code>
 bool for_each_knot(std::array<int16_t, kKnots>& knots, Code code) {
   GolombContext context;

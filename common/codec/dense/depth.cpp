@@ -72,7 +72,7 @@ void DepthPlane::find_residuals(const TileShape& shape, size_t y, Way by) {
   tokens_of(z, shape.width, tokens);
 }
 
-// Of every sixteenth row.
+// Estimates from every sixteenth row.
 double DepthPlane::bits_by(const TileShape& shape, Way by) {
   std::array<uint32_t, kSymbols> counts{};
   uint64_t raw = 0;

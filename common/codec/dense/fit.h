@@ -27,7 +27,7 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
 struct GuidedSamples {
   const Samples& samples;
   const Plane<int16_t>&values, &guide;
-  const Plane<int16_t>* residuals;  ///< of another plane; null: there is none
+  const Plane<int16_t>* residuals;  ///< of another plane, or null
   int bits;                         ///< of the values' fraction
 };
 

@@ -19,7 +19,7 @@ struct ContextScale {
 struct ContextRows {
   const uint8_t* above;   ///< of the same plane
   const uint8_t* above2;  ///< the row above that
-  const uint8_t* other;   ///< the same row of a plane that is already known; null: there is none
+  const uint8_t* other;   ///< the same row of a plane that is already known, or null
   int sum(size_t x) const {
     const int own = 3 * above[x] + 2 * above[x - 1] + 2 * above[x + 1] + above2[x];
     return other == nullptr ? own : own + 4 * other[x] + 2 * other[x - 1] + 2 * other[x + 1];
@@ -52,7 +52,7 @@ inline constexpr int kGuidedTerms = 14, kGuideHere = 8, kOtherResidual = 13;
 struct GuidedRows {
   const int16_t *own, *above;  ///< the plane's row, of which what is to the left is used, and that above
   const int16_t* guide[3];     ///< the guide's rows above, here, below
-  const int16_t* residual;     ///< the same row of another plane's residuals; null: there is none
+  const int16_t* residual;     ///< the same row of another plane's residuals, or null
   const int16_t* weights;      ///< of kGuidedTerms, in 2^-13
   int32_t constant;            ///< in 2^-13 of the plane's unit
   int bits;                    ///< of a value's fraction

@@ -12,7 +12,7 @@ namespace {
 constexpr double kSmooth = 3.0;  // mean tokens of both coordinates, added up
 
 // Makes the matrix that turns slopes and height into normals, which look towards the eye, turned by `pole`: -1 times
-// the inverse of the axes' transpose. Returns false where there is none.
+// the inverse of the axes' transpose. Returns false if there is no inverse.
 bool normals_of(const RoomAxes& axes, int pole, double out[9]) {
   RoomAxes cofactors;
   double determinant = 0;

@@ -61,7 +61,7 @@ class SymbolEncoder {
   }
 
  private:
-  void put_word_if(bool full, uint32_t& x) {  // without a jump: nobody can foresee it
+  void put_word_if(bool full, uint32_t& x) {  // without a branch: it would be mispredicted
     const auto word = static_cast<uint16_t>(x);
     std::memcpy(out_, &word, 2);
     out_ += full ? 2 : 0, x >>= full ? 16 : 0;
@@ -103,7 +103,7 @@ class SymbolDecoder {
     if (kChecked && end - begin < 2) return x >= kStateLow;
     uint16_t word;
     std::memcpy(&word, end - 2, 2);
-    const uint32_t low = x < kStateLow;  // without a jump: nobody can foresee it
+    const uint32_t low = x < kStateLow;  // without a branch: it would be mispredicted
     x = low != 0 ? x << 16 | word : x;
     end -= 2 * low;
     return true;

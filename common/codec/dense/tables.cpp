@@ -80,7 +80,7 @@ bool for_each_level(TokenLevels& levels, Code code) {
 }
 
 constexpr unsigned kMostOfNone = 12;  // the largest level of a token that never comes
-constexpr uint32_t kMany = 70;        // of so many a level that is not ideal costs more than it saves
+constexpr uint32_t kMany = 70;        // tokens from which on only the ideal level pays
 
 // Bits of a level that is `steps` from what is expected.
 constexpr int kMostStepsThatCost = 6;

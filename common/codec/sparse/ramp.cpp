@@ -9,7 +9,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-// Of how much colours change from pixel to pixel along rows, what they may change from one height to the next.
+// The share of colours' changes along rows that their changes from one height to the next may reach.
 constexpr double kMostOfRows = 0.5;
 
 void put_i32(std::vector<uint8_t>& out, int32_t value) {

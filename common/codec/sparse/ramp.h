@@ -57,7 +57,7 @@ class Ramp {
   static constexpr uint32_t kNothing = 11;
   struct Said {
     uint32_t colour = 0;
-    /// How far in heights those lie apart that say so, in bits; kNothing: there is none.
+    /// Bits of the distance in heights between the two colours that were used; kNothing: no colour is known.
     uint32_t gap = kNothing;
   };
   /// What is between those below and above.

@@ -84,7 +84,7 @@ void ScatterWalk::start(const Mask& mask) {
     });
 }
 
-// Without branches, which nobody could predict.
+// Has no branches: processors would mispredict them.
 void ScatterWalk::add_ring(int level, Place p) {
   const size_t stride = grids_[static_cast<size_t>(level)].stride;
   const uint16_t* row = &cell(level, p) - stride - 1;

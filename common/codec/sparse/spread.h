@@ -21,7 +21,7 @@ constexpr int log8(uint32_t v) {
   return 8 * exponent + static_cast<int>((v << 3 >> exponent) & 7);
 }
 
-/// Of an error in 16ths: log8() of its size and a half.
+/// Returns log8() of an error's size and a half; the error is in 16ths.
 constexpr int error_log(int64_t sixteenths) {
   constexpr int64_t kMost = (1 << 28) - 8;
   return log8(static_cast<uint32_t>(std::min(sixteenths < 0 ? -sixteenths : sixteenths, kMost) + 8));
@@ -62,7 +62,7 @@ class SpreadShares {
   int scale_, rounding_, reach_;
 };
 
-/// Of one kind of numbers of one tile.
+/// Codes one kind of numbers of one tile.
 class SpreadModel {
  public:
   static constexpr int kMostScale = 232;
