@@ -1,8 +1,10 @@
 #include "common/core/clock.h"
 
+#include <chrono>
 #include <ctime>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 namespace telesplat {
 namespace {
@@ -37,6 +39,10 @@ const std::string& clock_id() {
   return id;
 }
 double monotonic_s() { return read_s(CLOCK_MONOTONIC); }
+void sleep_until(double t_s) {
+  const double wait_s = t_s - monotonic_s();
+  if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
+}
 double thread_cpu_s() { return read_s(CLOCK_THREAD_CPUTIME_ID); }
 
 }  // namespace telesplat

@@ -12,6 +12,9 @@ double monotonic_s();
 /// cannot be told here.
 const std::string& clock_id();
 
+/// Returns at once if monotonic_s() is t_s or later.
+void sleep_until(double t_s);
+
 /// CPU seconds used by the calling thread.
 double thread_cpu_s();
 
