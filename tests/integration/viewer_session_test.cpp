@@ -52,7 +52,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   Shown out;
   {
     ViewerWorker worker(context, options, gate, table, spans);
-    const SourceMaker make = [&](Received& received) {
+    const SourceMaker make = [&](Received& received, double) {
       auto made = received.make_source(display, *renderers);
       out.sources.push_back((*made)->drawn_name());
       return made;
