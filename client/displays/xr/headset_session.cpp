@@ -15,7 +15,7 @@ const glm::dvec3 kBeforeHead(0, -0.35, -0.75);  // where the space begins at the
 constexpr double kFar_m = 100;                  // of depth as layers have it; nothing is farther than that
 constexpr double kMostDepthStep_m = 1.5e-3;     // at a metre: coarser ones are seen in pictures that are moved by depth
 constexpr XrPosef kNoOffset{{0, 0, 0, 1}, {0, 0, 0}};
-constexpr XrSpaceLocationFlags kLocated =
+constexpr XrSpaceLocationFlags kHeadLocated =
     XR_SPACE_LOCATION_POSITION_VALID_BIT | XR_SPACE_LOCATION_ORIENTATION_VALID_BIT;
 constexpr XrViewStateFlags kSeen = XR_VIEW_STATE_POSITION_VALID_BIT | XR_VIEW_STATE_ORIENTATION_VALID_BIT;
 
@@ -213,7 +213,7 @@ std::optional<HeadsetSession::Eyes> HeadsetSession::locate_eyes(XrTime time) {
 
 std::optional<geometry::Pose> HeadsetSession::locate_head(XrTime time) const {
   XrSpaceLocation location{XR_TYPE_SPACE_LOCATION};
-  if (XR_FAILED(xrLocateSpace(head_, stage_, time, &location)) || (location.locationFlags & kLocated) != kLocated)
+  if (XR_FAILED(xrLocateSpace(head_, stage_, time, &location)) || (location.locationFlags & kHeadLocated) != kHeadLocated)
     return std::nullopt;
   return room_pose(location.pose, origin_);
 }

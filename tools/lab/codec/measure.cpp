@@ -13,8 +13,8 @@
 namespace telesplat::lab {
 namespace {
 
-constexpr int kTile = 256;  // as the master cuts frames
-constexpr int kPasses = 3;
+constexpr int kCodecTile = 256;  // as the master cuts frames
+constexpr int kCodecPasses = 3;
 
 size_t covered_pixels(const image::DepthImage& image) {
   return image.pixels() - size_t(std::count(image.depth.begin(), image.depth.end(), 0u));
@@ -32,7 +32,7 @@ size_t zstd_bits(const auto& values, int value_bytes) {
 
 double fastest_s(const auto& work) {
   double out = 1e9;
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (int pass = 0; pass < kCodecPasses; ++pass) {
     const double begin_s = thread_cpu_s();
     work();
     out = std::min(out, thread_cpu_s() - begin_s);
@@ -59,9 +59,9 @@ Status add_tile(const image::DepthImage& tile, CodecFigures& to) {
 
 Status add(const image::DepthImage& image, CodecFigures& to) {
   ++to.images;
-  for (int y = 0; y < image.height; y += kTile)
-    for (int x = 0; x < image.width; x += kTile) {
-      const auto tile = cut(image, {x, y, std::min(kTile, image.width - x), std::min(kTile, image.height - y)});
+  for (int y = 0; y < image.height; y += kCodecTile)
+    for (int x = 0; x < image.width; x += kCodecTile) {
+      const auto tile = cut(image, {x, y, std::min(kCodecTile, image.width - x), std::min(kCodecTile, image.height - y)});
       if (covered_pixels(tile) == 0) continue;
       if (const Status s = add_tile(tile, to); !s) return s;
     }

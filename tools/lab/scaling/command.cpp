@@ -27,7 +27,7 @@ namespace {
 
 constexpr double kRoom_m = 0.8, kFov_deg = 90;  // as `telesplat run` has them
 constexpr double kCheap = 20;                   // the second series' rows are so many times cheaper
-constexpr int kPasses = 5;                      // over the rows, when their costs are measured
+constexpr int kScalingPasses = 5;                      // over the rows, when their costs are measured
 constexpr int kComputedFrames = 20;
 
 struct ScalingOptions {
@@ -67,7 +67,7 @@ class Study {
 
   Status measure() {
     auto replay = measure_rows(
-        scene_, kRoom_m, camera_, kPasses,
+        scene_, kRoom_m, camera_, kScalingPasses,
         [&](int done, int of) { progress_.show(fmt::format("measuring rows: {} of {}", done, of)); },
         net::stop_requested);
     if (!replay) return replay.error();

@@ -14,7 +14,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr uint32_t kGround = 0xa0101418, kInk = 0xfff0f0f0, kRim = 0xff101418;
+constexpr uint32_t kMarkGround = 0xa0101418, kMarkInk = 0xfff0f0f0, kMarkRim = 0xff101418;
 // Told apart by people who do not see red or green, too (Okabe and Ito 2008: vermillion, bluish green, sky blue).
 constexpr uint32_t kAxes[3] = {0xffd55e00, 0xff009e73, 0xff56b4e9};
 constexpr int kPadding = 4;  // dots of a letter
@@ -42,7 +42,7 @@ void draw_line(image::View& view, glm::dvec2 a, glm::dvec2 b, double thickness, 
 }
 
 image::View axes_picture(const geometry::Camera& camera, const SceneTerms& terms, int side) {
-  image::Canvas canvas(side, side, kGround);
+  image::Canvas canvas(side, side, kMarkGround);
   image::View out = canvas.view();
   const glm::dmat3 to_camera(glm::mat3_cast(glm::conjugate(camera.pose.orientation)));
   std::array<glm::dvec3, 3> seen;
@@ -56,10 +56,10 @@ image::View axes_picture(const geometry::Camera& camera, const SceneTerms& terms
   for (const int axis : order) {
     const glm::dvec3& d = seen[size_t(axis)];
     const glm::dvec2 end = middle + reach * glm::dvec2(d.x, -d.y);
-    draw_line(out, middle, end, side / 16.0 + 2, kRim);
+    draw_line(out, middle, end, side / 16.0 + 2, kMarkRim);
     draw_line(out, middle, end, side / 16.0, kAxes[axis]);
     image::Canvas letter(image::kGlyphWidth * scale, image::kGlyphHeight * scale, 0);
-    letter.text(0, 0, std::string(1, scene::axis_letters(terms.placement.coordinates.space)[axis]), kInk, scale);
+    letter.text(0, 0, std::string(1, scene::axis_letters(terms.placement.coordinates.space)[axis]), kMarkInk, scale);
     const glm::dvec2 at = middle + (reach + side * 0.08) * glm::dvec2(d.x, -d.y);
     image::blend(out, letter.view(), int(at.x) - image::kGlyphWidth * scale / 2,
                  int(at.y) - image::kGlyphHeight * scale / 2);
@@ -88,12 +88,12 @@ std::optional<ScaleBar> scale_bar(const geometry::Camera& camera, const SceneTer
 image::View scale_picture(const ScaleBar& bar, int scale) {
   const int padding = kPadding * scale, text = image::text_width(bar.text, scale);
   const int width = std::max(int(std::ceil(bar.pixels)), text) + 2 * padding;
-  image::Canvas canvas(width, image::kGlyphHeight * scale + 3 * padding + 2 * scale, kGround);
-  canvas.text((width - text) / 2, padding, bar.text, kInk, scale);
+  image::Canvas canvas(width, image::kGlyphHeight * scale + 3 * padding + 2 * scale, kMarkGround);
+  canvas.text((width - text) / 2, padding, bar.text, kMarkInk, scale);
   image::View out = canvas.view();
   const double y = out.height - padding - scale, left = (width - bar.pixels) / 2, right = (width + bar.pixels) / 2;
-  draw_line(out, {left, y}, {right, y}, scale, kInk);
-  for (const double x : {left, right}) draw_line(out, {x, y - 2 * scale}, {x, y + scale}, scale, kInk);
+  draw_line(out, {left, y}, {right, y}, scale, kMarkInk);
+  for (const double x : {left, right}) draw_line(out, {x, y - 2 * scale}, {x, y + scale}, scale, kMarkInk);
   return out;
 }
 

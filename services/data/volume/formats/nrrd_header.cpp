@@ -222,7 +222,7 @@ void read_skips(const Fields& fields, const std::string& path, VolumeFileHeader&
     (h.encoding == Encoding::kGzip ? h.skip_unpacked : h.data_at) += uint64_t(*byte_skip);
 }
 
-VolumeFileHeader parse_nrrd(std::string_view content, const std::string& path) {
+VolumeFileHeader parse_lines(std::string_view content, const std::string& path) {
   if (content.size() < 9 || !content.starts_with("NRRD000"))
     refuse("{}: is no NRRD file: it does not begin with NRRD000", path);
   if (content[7] < '1' || content[7] > '5')
@@ -260,7 +260,7 @@ VolumeFileHeader parse_nrrd(std::string_view content, const std::string& path) {
 }  // namespace
 
 Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path) {
-  return or_error([&] { return parse_nrrd(content, path); });
+  return or_error([&] { return parse_lines(content, path); });
 }
 
 }  // namespace telesplat::data
