@@ -27,8 +27,8 @@ elseif(TELESPLAT_HARDEN)
   add_link_options($<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-pie>)
 endif()
 
-# The instruction sets of vector kernels. all: each machine uses the newest that it has. one: AVX2 where this machine has
-# it, and the oldest, which compile in a third of the time.
+# The instruction sets of vector kernels. all: each machine uses the newest that it has. one: AVX2 where this machine
+# has it, and the oldest, which compile in a third of the time.
 set(TELESPLAT_SIMD all CACHE STRING "Instruction sets of vector kernels: all or one")
 set_property(CACHE TELESPLAT_SIMD PROPERTY STRINGS all one)
 if(TELESPLAT_SIMD STREQUAL "one" AND EXISTS /proc/cpuinfo)
@@ -39,8 +39,8 @@ if(TELESPLAT_SIMD STREQUAL "one" AND EXISTS /proc/cpuinfo)
 endif()
 
 # telesplat_kernels(sources...)   gives those of these sources that are vector kernels their instruction sets
-#   In sanitized builds, SSE4.2 alone: compiled for the oldest x86 alone, Highway emulates vectors by loops, and a kernel
-#   took 200 s to compile, now 5 s.
+#   In sanitized builds, SSE4.2 alone: compiled for the oldest x86 alone, Highway emulates vectors by loops, and a
+#   kernel took 200 s to compile, now 5 s.
 function(telesplat_kernels)
   foreach(source ${ARGN})
     cmake_path(ABSOLUTE_PATH source OUTPUT_VARIABLE path)

@@ -95,11 +95,12 @@ function(telesplat_tests_of label program)
   add_dependencies(tests_${label} ${program})
 endfunction()
 
-# telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds] [SERIAL])
+# telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds] [SERIAL] [APART])
 #   one GoogleTest executable, each of its cases a CTest test with LABEL. Its working directory is the repository's
 #   root. SERIAL: its cases measure time or need the whole machine, so no other test runs beside them.
+#   APART: its sources have helpers of the same names, so each is compiled by itself.
 function(telesplat_test label name)
-  cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "APART;SERIAL" "TIMEOUT" "DEPS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
@@ -115,6 +116,9 @@ function(telesplat_test label name)
   target_link_libraries(${name} PRIVATE ${ARG_DEPS} GTest::gtest GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${TELESPLAT_TEST_FLAGS})
   telesplat_headers(${name} test)
+  if(ARG_APART)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
+  endif()
   gtest_discover_tests(${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS ${label} TIMEOUT ${ARG_TIMEOUT} ${serial})
 endfunction()

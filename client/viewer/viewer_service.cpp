@@ -61,13 +61,6 @@ Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const Dis
   return std::unique_ptr<DisplaySurface>(std::move(made));
 }
 
-Result<Renderers> open_renderers(ViewerOptions& o) {
-  auto renderers = Renderers::make(o.renderer, o.threads);
-  if (renderers && std::string_view(renderers->name()) == "cpu")
-    o.display.threads = o.threads > 0 ? o.threads : usable_processors();
-  return renderers;
-}
-
 Result<std::unique_ptr<SessionRecord>> open_record(const ViewerOptions& o) {
   return SessionRecord::open(
       {.out = o.out, .join = o.join_record, .name = o.service.name, .received_mb = o.record_points_mb});
@@ -167,6 +160,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const std::share
                                       .received = {.in_step = in_step(o)},
                                       .record = &record,
                                       .poses = poses,
+                                      .renderer = renderers.choice(),
                                       .started_s = o.started_s};
   ViewerWorker worker(context, options, gate, frames, spans);
   DisplayOptions paced = o.display;
@@ -238,7 +232,7 @@ Result<int> run(ViewerOptions o, const Displays& displays) {
   // Before the renderers, whose contexts may depend on the window's.
   auto surface = open_surface(o, displays, {*asking, *poses, tell});
   if (!surface) return surface.error();
-  auto renderers = open_renderers(o);
+  auto renderers = Renderers::make(o.renderer, o.threads);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
   if (!record) return record.error();

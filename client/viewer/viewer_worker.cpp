@@ -108,7 +108,8 @@ FrameFigures ViewerWorker::figures() const {
           .bytes_received = bytes_received_,
           .epochs_shown = epochs_shown_,
           .sampled_width = sampled_width_,
-          .sampled_height = sampled_height_};
+          .sampled_height = sampled_height_,
+          .renderer = options_.renderer->get()};
 }
 
 std::shared_ptr<const wire::Welcome> ViewerWorker::session() const {
@@ -461,6 +462,11 @@ void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
   values["coupling"] = double(coupling.mode);
   values["buffers"] = double(coupling.buffers);
   values["waits_s"] = waits_s_;
+  if (const auto renderer = options_.renderer->get(); renderer.gl_ms > 0) {
+    values["renderer_gl"] = renderer.kept == "gl";
+    values["renderer_cpu_ms"] = renderer.cpu_ms;
+    values["renderer_gl_ms"] = renderer.gl_ms;
+  }
   values["longest_gap_ms"] = longest_gap_ms_;
 }
 

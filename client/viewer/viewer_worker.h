@@ -35,6 +35,7 @@ class ViewerWorker {
     ReceivedOptions received;                  ///< its recorders are the record's
     SessionRecord* record = nullptr;           ///< null: nothing is kept. Outlives the worker
     std::shared_ptr<const PoseFeed> poses;     ///< moves the head; null: nobody does. Its figures are reported
+    std::shared_ptr<const RendererChoice> renderer = std::make_shared<RendererChoice>();  ///< of the display
     double started_s = 0;                      ///< when the session was started, on the monotonic clock; 0: now
   };
 

@@ -33,8 +33,9 @@ Status write_exr(const std::string& path, const View& view, std::span<const glm:
 /// Reads a PNG or EXR file, as the ending of its name says: colours over black; channel Z becomes depth_m. At most
 /// 16384 pixels a side; not interlaced.
 Result<View> read_view(const std::string& path);
-/// Reads a PNG, JPEG, WebP, TIFF, BMP, GIF, TGA, EXR, HDR or PNM picture of at most `most_pixels` from memory: its colours without its alpha, which changes nothing of them.
-/// name: for error texts; its ending says what it is, unless its first bytes do.
+/// Reads a PNG, JPEG, WebP, TIFF, BMP, GIF, TGA, EXR, HDR or PNM picture of at most `most_pixels` from memory: its
+/// colours without its alpha, which changes nothing of them. name: for error texts; its ending says what it is, unless
+/// its first bytes do.
 Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels);
 
 }  // namespace telesplat::image

@@ -119,6 +119,21 @@ ordered_json links_of(const std::vector<Process>& processes) {
   return out.empty() ? ordered_json() : out;
 }
 
+/// "auto" becomes the renderer that a viewer kept after it timed both.
+ordered_json renderer_of(const Roster& roster) {
+  const auto kept = roster.each("viewer", "renderer_gl");
+  const std::string told = roster.fact("viewer", "renderer");
+  if (told != "auto" || kept.empty()) return or_null(told);
+  return kept.front() > 0 ? "gl" : "cpu";
+}
+
+/// Median milliseconds a frame of both, which it was chosen by; null: there was no choice.
+ordered_json renderer_times(const Roster& roster) {
+  const auto cpu = roster.each("viewer", "renderer_cpu_ms"), gl = roster.each("viewer", "renderer_gl_ms");
+  if (cpu.empty() || gl.empty()) return nullptr;
+  return {{"cpu", hundredths(cpu.front())}, {"gl", hundredths(gl.front())}};
+}
+
 ordered_json what_was_shown(const std::vector<Process>& processes, const Roster& roster) {
   const auto viewer = [&](const char* key) { return or_null(roster.fact("viewer", key)); };
   const auto size = [&](const char* width, const char* height) -> ordered_json {
@@ -135,7 +150,8 @@ ordered_json what_was_shown(const std::vector<Process>& processes, const Roster&
           {"viewers", roster.count("viewer")},
           {"coupling", viewer("coupling")},
           {"buffers", if_measured(!viewer("buffers").is_null(), whole(roster.number("viewer", "buffers")))},
-          {"renderer", viewer("renderer")},
+          {"renderer", renderer_of(roster)},
+          {"renderer_ms", renderer_times(roster)},
           {"splat", viewer("splat")},
           {"finish", viewer("finish")},
           {"shading", viewer("shading")},

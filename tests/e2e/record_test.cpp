@@ -43,6 +43,7 @@ TEST(Record, EveryFileIsThereAndTrue) {
                           "coupling",
                           "buffers",
                           "renderer",
+                          "renderer_ms",
                           "splat",
                           "size",
                           "sampling_size",

@@ -18,7 +18,6 @@ struct DisplayOptions {
   WallTile wall;
   StereoOptions stereo;       ///< two eyes; the field of view is that of each eye's picture
   double target_fps = 60;     ///< frames are paced to this; 0: as fast as possible
-  int threads = 1;            ///< that the renderer's stage times are summed over
   bool detail_budget = true;  ///< lower detail where a view takes longer to construct than target_fps leaves time for
   /// The budget lowers detail no further. Fewer, larger splats save little (bench lod_detail: discs at 2560x1600 take
   /// as long at 0.7 as at 1) and cost much: along walk-around-a.csv a head had 31.3 dB with 0.5 and 32.2 to 32.8 with

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "client/viewer/coupling/coupling.h"
+#include "client/viewer/render/renderer_trial.h"
 
 namespace telesplat::viewer {
 
@@ -26,6 +27,7 @@ struct FrameFigures {
   int sampled_width = 0, sampled_height = 0;  ///< of the newest view request; 0: there was none
   /// Of the object on display so much is holes, as its picture looks; NaN: not known.
   double hole_share = std::numeric_limits<double>::quiet_NaN();
+  RendererChoice::Figures renderer;
 };
 
 }  // namespace telesplat::viewer

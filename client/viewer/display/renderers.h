@@ -13,25 +13,28 @@ namespace telesplat::viewer {
 /// destroyed first.
 class Renderers {
  public:
-  /// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl". Makes the first one of points at once, so that what
-  /// cannot be is found out before the session begins. Error: what was tried.
+  /// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl". Makes the first one of points
+  /// at once, so that what cannot be is found out before the session begins. Error: what was tried.
   static Result<Renderers> make(const std::string& kind, int threads);
 
-  /// What draws points: "cpu" or "gl".
+  /// What draws points: "cpu" or "gl"; "auto": both are timed on the session's first frames.
   const char* name() const { return name_; }
   /// What OpenGL calls the device that draws; empty: the processor does.
   const std::string& device() const { return device_; }
+  /// What is kept after that, and why.
+  std::shared_ptr<const RendererChoice> choice() const { return choice_; }
   Result<std::unique_ptr<Renderer>> for_points();
   Result<std::unique_ptr<VolumeRenderer>> for_slices();
 
  private:
-  Renderers(std::string kind, int threads, std::unique_ptr<Renderer> first);
+  Renderers(std::string kind, int threads, std::unique_ptr<Renderer> first, std::shared_ptr<RendererChoice> choice);
 
   std::string kind_;
   int threads_;
   const char* name_;
   std::string device_;
   std::unique_ptr<Renderer> first_;  // until somebody needs one
+  std::shared_ptr<RendererChoice> choice_;
 };
 
 }  // namespace telesplat::viewer

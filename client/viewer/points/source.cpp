@@ -51,8 +51,7 @@ void PointSource::find_coverage(const FrameInput& input, const geometry::Camera&
 void PointSource::count_same(const FrameInput& input) {
   const uint64_t cut_before = cut_.version;
   cut_ = received_.cut();
-  const bool same =
-      !input.resting && input.camera == camera_ && input.look == look_ && cut_.version == cut_before;
+  const bool same = !input.resting && input.camera == camera_ && input.look == look_ && cut_.version == cut_before;
   same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
   camera_ = input.camera;
   look_ = input.look;

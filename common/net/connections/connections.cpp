@@ -2,7 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <linux/tcp.h>  // newer fields than netinet/tcp.h has
+#include <linux/tcp.h>  // has newer fields than the C library
 #include <netinet/in.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>

@@ -45,7 +45,7 @@ class Companions {
   /// The content of a file, by its name as it stands in the data file: relative to that file's folder. It stays valid
   /// as long as this object. Error: there is no such file, or it may not be read; the text names it.
   virtual Result<std::string_view> read(const std::string& named) = 0;
-  /// The picture in `bytes`, as image::read_picture() has it. Only telesplat-import decodes pictures: an error elsewhere.
+  /// The picture in `bytes`, as image::read_picture() has it. Error: only telesplat-import decodes it.
   virtual Result<image::View> picture(std::string_view bytes, const std::string& name, uint64_t most_pixels);
 };
 

@@ -66,6 +66,11 @@ class AnyMessage {
   void operator()(const char*, uint64_t& v, size_t = 0) { v = whole(); }
   void operator()(const char*, double& v, size_t = 0) { v = real(); }
   void operator()(const char* name, std::string& v, size_t = 0) { v = text(name); }
+  template <class E>
+    requires std::is_enum_v<E>
+  void operator()(const char*, E& v, uint64_t values) {
+    v = E(dice_.below(values));
+  }
   template <class Tag>
   void operator()(const char*, Id<Tag>& v, size_t = 0) {
     v.value = id();

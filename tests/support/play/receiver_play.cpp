@@ -10,9 +10,9 @@
 namespace telesplat::test {
 namespace {
 
-constexpr size_t kMostSteps = 400;
+constexpr size_t kMostMessages = 400;
 constexpr InstanceId kViewer{5}, kHonest{999};
-constexpr int kWidth = 48, kHeight = 32;
+constexpr int kPlayWidth = 48, kPlayHeight = 32;
 
 // A few tiles as packers publish them.
 struct Tiles {
@@ -25,7 +25,7 @@ struct Tiles {
   std::vector<Tile> all;
   Tiles() {
     for (const glm::dvec3 eye : {glm::dvec3(0, 0.3, 0.8), glm::dvec3(0.5, 0.2, 0.5)}) {
-      const auto camera = scene_camera(eye, kWidth, kHeight);
+      const auto camera = scene_camera(eye, kPlayWidth, kPlayHeight);
       for (const geometry::Rect rect :
            {geometry::Rect{0, 0, 24, 32}, geometry::Rect{24, 0, 24, 32}, geometry::Rect{8, 8, 16, 16}})
         add(camera, rect);
@@ -58,7 +58,7 @@ class ReceiverPlay {
   }
 
   Complaint run() {
-    for (size_t step = 0; step < kMostSteps && !dice_.over(); ++step) act();
+    for (size_t step = 0; step < kMostMessages && !dice_.over(); ++step) act();
     return in_the_end();
   }
 
@@ -125,7 +125,7 @@ class ReceiverPlay {
     p.image = std::as_bytes(std::span(stream));
     if (p.refinable) refinable_ = {p.sequence, &tile};
     if (dice_.chance(15)) {
-      p.missed_rect = {0, 0, int(1 + dice_.below(kWidth)), int(1 + dice_.below(kHeight))};
+      p.missed_rect = {0, 0, int(1 + dice_.below(kPlayWidth)), int(1 + dice_.below(kPlayHeight))};
       for (uint64_t n = 1 + dice_.below(6); n-- > 0;) p.missed.push_back(uint32_t(dice_.below(256)) * 0x01010101u);
     }
     send(over_the_wire(p));

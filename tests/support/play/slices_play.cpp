@@ -13,7 +13,7 @@
 namespace telesplat::test {
 namespace {
 
-constexpr size_t kMostSteps = 300;
+constexpr size_t kMostSlices = 300;
 constexpr uint64_t kSlices = 24;
 
 volume::Session scene() {
@@ -70,7 +70,7 @@ class SlicesPlay {
   }
 
   Complaint run() {
-    for (size_t step = 0; step < kMostSteps && !dice_.over() && !complaint_; ++step) {
+    for (size_t step = 0; step < kMostSlices && !dice_.over() && !complaint_; ++step) {
       now_s_ += 0.01 * double(dice_.below(20));
       act();
     }

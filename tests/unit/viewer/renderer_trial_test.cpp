@@ -10,7 +10,7 @@ namespace {
 
 constexpr size_t kPixels = 1280 * 800;
 
-// Draws frames at 50 a second until the trial ends; renderer 0 takes ms[0]. Returns how many frames it took, at most 500.
+// Draws frames at 50 a second until the trial ends; renderer 0 takes ms[0]. Returns how many it took, at most 500.
 size_t frames_of_trial(RendererTrial& trial, std::array<double, 2> ms) {
   size_t frames = 0;
   for (; !trial.quicker() && frames < 500; ++frames) trial.add(kPixels, ms[trial.next()], 10 + 0.02 * double(frames));

@@ -213,7 +213,6 @@ class StillSource : public testing::Test {
     config_.compact = true;
     received_.cache().begin_replica(config_, EpochId{1});
     options_.target_fps = 30;
-    options_.threads = 2;
     source_ = std::make_unique<PointSource>(options_, std::make_unique<CountingRenderer>(renders_), received_);
     insert(1);
   }

@@ -61,7 +61,7 @@ def report(options, verdicts, interrupted):
                 shown = f'<img src="data:image/png;base64,{base64.b64encode(file.read()).decode()}" width="100%">'
         except ImportError:
             shown = "<p>No picture: python3-matplotlib is not installed (tools/setup --developer installs it).</p>"
-            print("soak: no picture: python3-matplotlib is not installed (tools/setup --developer installs it)", file=sys.stderr)
+            print("soak: no picture: tools/setup --developer installs python3-matplotlib", file=sys.stderr)
         rows = "".join("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in r) + "</tr>" for r in table(v))
         events = "\n".join(f"{t:8.1f} s  {what}" for t, what in v["events"])
         problems = "".join(f"<li>{html.escape(p)}</li>" for p in v["problems"])

@@ -186,7 +186,9 @@ ordered_json facts_json(const ordered_json& s) {
   add("viewers", text(s, "viewers"));
   const std::string coupling = text(s, "coupling");
   add("coupling", coupling == "loose" ? with(coupling, ", buffers: ", text(s, "buffers")) : coupling);
-  add("renderer", text(s, "renderer"));
+  const std::string gl_ms = text(s, "renderer_ms.gl");
+  add("renderer", with(text(s, "renderer"), ", a frame in ms: OpenGL ",
+                       gl_ms.empty() ? gl_ms : gl_ms + ", processor " + text(s, "renderer_ms.cpu")));
   add("splats", with(text(s, "splat"), ", finish ", text(s, "finish")));
   add("shading", text(s, "shading"));
   add("walk", with(text(s, "trajectory.name"), ", ", text(s, "trajectory.file")));

@@ -94,7 +94,9 @@ class Gallery {
         continue;
       }
       bytes_left_ -= jpeg.size() * 4 / 3;
-      ordered_json one{{"frame", p.frame}, {"src", "data:image/jpeg;base64," + base64({reinterpret_cast<const char*>(jpeg.data()), jpeg.size()})}};
+      ordered_json one{
+          {"frame", p.frame},
+          {"src", "data:image/jpeg;base64," + base64({reinterpret_cast<const char*>(jpeg.data()), jpeg.size()})}};
       if (!p.name.empty()) one["name"] = p.name;
       if (const auto at = moments_.find(p.frame); at != moments_.end()) one["t"] = std::round(at->second * 1e4) / 1e4;
       out.push_back(std::move(one));

@@ -67,6 +67,9 @@ void show_figures(const Panel& panel, double now_s) {
   else
     text(
         fmt::format("{:.1f} frames a second, {:.2f} M cached", panel.frames_a_second(), double(f.points_cached) / 1e6));
+  if (f.renderer.gl_ms > 0)
+    text(fmt::format("{} draws: a frame took {:.1f} ms on the processor, {:.1f} ms by OpenGL", f.renderer.kept,
+                     f.renderer.cpu_ms, f.renderer.gl_ms));
   for (const auto& plot : panel.plots()) {
     if (panel.means_something(plot)) show_plot(plot, now_s);
   }
