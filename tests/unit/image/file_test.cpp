@@ -150,7 +150,8 @@ TEST_F(ImageFile, TruncatedFilesAreRefusedAtEveryLength) {
 TEST_F(ImageFile, AHeaderThatClaimsTooMuchIsRefused) {
   const std::string before("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16), after("\x08\x02\0\0\0", 5);
   const auto header = [&](const char* name, const std::string& side, const std::string& check) {
-    std::ofstream(path(name), std::ios::binary) << before << side << side << after << check;
+    std::ofstream(path(name), std::ios::binary)
+        << before << side << side << after << check << std::string("\0\0\0\3IDAT", 8);
     return read_view(path(name));
   };
   const auto huge = header("huge.png", std::string("\0\x01\x86\xa0", 4), "\x27\x30\x9c\x9f");  // 100,000 pixels a side

@@ -295,22 +295,29 @@ TEST_F(KindsOfScenes, ARefusedServersEndpointsAreToldNobody) {
 
 TEST_F(KindsOfScenes, WhatWasNotGivenIsAsTheKindHasIt) {
   join();
-  const auto expect = [&](bool steering, double sampling, bool progressive) {
+  const auto expect = [&](double sampling, bool progressive) {
     const auto s = told().settings;
-    EXPECT_EQ(s.steering, steering);
     EXPECT_EQ(s.least_sampling, sampling);
     EXPECT_EQ(told().octree_depth, 5u);
     EXPECT_EQ(core.progressive(), progressive);
     EXPECT_EQ(core.settings(), s);
   };
-  expect(true, 0.5, false);  // nothing is known yet
+  expect(0.5, false);  // nothing is known yet
   hello(data(1, "julia"));
-  expect(true, 0.4, true);
+  expect(0.4, true);
   hello(data(2, "mesh"));
-  expect(true, 0.5, false);
+  expect(0.5, false);
   hello(volume_part(3, 12, 0, 1));
-  expect(false, 0.5, false);
+  expect(0.5, false);
   EXPECT_EQ(told().settings.layers, 16u);
+}
+
+// Volumes have no rays that a plan could choose; pictures and models that keep everything need all.
+TEST(Settings, RaysArePlannedForPointsUnlessAllAreNeeded) {
+  for (const auto kind : scene::kKinds) EXPECT_EQ(settings({}, kind).steering, kind != scene::Kind::kVolume);
+  EXPECT_FALSE(settings({.settings = {.keep_redundant = true}}, scene::Kind::kMesh).steering);
+  EXPECT_FALSE(settings({.settings = {.pictures = true}}, scene::Kind::kMesh).steering);
+  EXPECT_FALSE(settings({.settings = {.steering = false}}, scene::Kind::kMesh).steering);
 }
 
 TEST(Settings, WhatWasGivenIsToldOfEveryKind) {

@@ -211,7 +211,9 @@ TEST_F(PicturePackingTest, EpochsComeInOrderAndLeasesAreSealed) {
   ASSERT_TRUE(packing_.follow(welcome(80, {5}), 2));
   ASSERT_EQ(sent_.size(), 1u);
   EXPECT_EQ(sent_[0].frame, 3u);
-  EXPECT_FALSE(packing_.follow(welcome(0), 3)) << "views come as points there";
+  wire::Welcome points = welcome();
+  points.settings.pictures = false;
+  EXPECT_FALSE(packing_.follow(points, 3)) << "views come as points there";
 }
 
 }  // namespace

@@ -21,8 +21,9 @@ class Inflater {
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
-  /// Unpacks at most `bytes`; returns how many, 0 at the end. Refuses damaged data.
+  /// Unpacks at most `bytes`; returns how many, 0 at the end. Refuses damaged data, by the next call if some were whole.
   size_t read(void* to, size_t bytes) {
+    if (damaged_) refuse("{}: its compressed data are damaged: {}", name_, stream_.msg ? stream_.msg : "zlib gave up");
     stream_.next_out = static_cast<Bytef*>(to);
     stream_.avail_out = static_cast<uInt>(bytes);
     while (bytes > 0 && stream_.avail_out == bytes && !ended_) {
@@ -36,10 +37,12 @@ class Inflater {
       if (status == Z_STREAM_END) {
         // Another member may follow: gzip files may be joined.
         ended_ = stream_.avail_in < 2 || stream_.next_in[0] != 0x1f || inflateReset(&stream_) != Z_OK;
-      } else if (status != Z_OK && status != Z_BUF_ERROR && stream_.avail_out == bytes) {
-        refuse("{}: its compressed data are damaged: {}", name_, stream_.msg ? stream_.msg : "zlib gave up");
+      } else if (status != Z_OK && status != Z_BUF_ERROR) {
+        damaged_ = true;
+        break;
       }
     }
+    if (damaged_ && stream_.avail_out == bytes) return read(to, bytes);  // refuses
     return bytes - stream_.avail_out;
   }
   /// Whether the stream's own end was reached.
@@ -49,7 +52,7 @@ class Inflater {
   std::string_view rest_;
   std::string name_;
   z_stream stream_{};
-  bool ended_ = false;
+  bool ended_ = false, damaged_ = false;
 };
 
 }  // namespace telesplat::data
