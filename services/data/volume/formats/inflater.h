@@ -21,7 +21,7 @@ class Inflater {
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
-  /// Unpacks at most `bytes`; returns how many, 0 at the end. Refuses damaged data, by the next call if some were whole.
+  /// Unpacks at most `bytes`; returns how many, 0 at the end. Refuses damaged data, after those that are whole.
   size_t read(void* to, size_t bytes) {
     if (damaged_) refuse("{}: its compressed data are damaged: {}", name_, stream_.msg ? stream_.msg : "zlib gave up");
     stream_.next_out = static_cast<Bytef*>(to);
