@@ -242,7 +242,11 @@ class Page:
     def _end_background(self, signal_number):
         """Sends a signal, or none where they were told to stop; all must end with exit code 0."""
         if signal_number:
-            for _, process, _ in self._background:
+            for _, process, output in self._background:
+                # A program that has said nothing may not yet hear signals.
+                until_s = time.monotonic() + 20
+                while process.poll() is None and not os.fstat(output.fileno()).st_size and time.monotonic() < until_s:
+                    time.sleep(0.05)
                 if process.poll() is None:
                     process.send_signal(signal_number)
         for text, process, output in self._background:

@@ -191,7 +191,7 @@ TEST(JuliaUsage, MeshesTakeNoParametersAndHelpTellsThemAll) {
     EXPECT_NE(run.program().err().find("terrain.ply"), std::string::npos) << run.program().err();
   }
   TemporaryFolder folder;
-  Program help("telesplat", {"run", "julia", "--help"}, folder / "help");
+  Program help("telesplat", {"run", "julia", "--help", "all"}, folder / "help");
   EXPECT_EQ(help.wait(), 0);
   for (const char* part : {"--c.w", "--slice.turn-y", "1..4096", "trap-plane", "spectrum", "--animate"})
     EXPECT_NE(help.out().find(part), std::string::npos) << part;
