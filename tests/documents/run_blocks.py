@@ -185,6 +185,8 @@ class Page:
             self._files.make_those_in(self._beside)
             self._start(shortened(self._beside, 0))
             self._wait_for_session(where)
+        elif any(t.startswith("telesplat-viewer") for t, _, _ in self._background):
+            self._wait_for_session(where)  # else the session may be stopped before its viewer has joined
         self._foreground(where, text)
         if re.search(r"\bctl stop\b", text):
             self._end_background(None)
