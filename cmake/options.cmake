@@ -24,7 +24,8 @@ option(TELESPLAT_HARDEN "What compiler and linker can do against what is exploit
 # GCC 12 warns of std::string's own code in these ways (GCC bugs 105329, 105651, 105562), and of names of one source
 # where several are compiled together; clang checks the same.
 add_compile_options(-Wall -Wextra -Wno-missing-field-initializers
-  "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-maybe-uninitialized;-Wno-subobject-linkage>"
+  "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-maybe-uninitialized>"
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>
   -ffp-contract=off -fno-math-errno)
 include(cmake/hardening.cmake)
 if(TELESPLAT_FUZZ AND NOT CMAKE_CXX_COMPILER_ID MATCHES Clang)
