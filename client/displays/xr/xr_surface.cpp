@@ -102,7 +102,7 @@ bool XrSurface::ready() {
   return false;
 }
 
-// Waits for the runtime. A frame without eyes, or that nobody sees, is ended at once.
+// Waits for the runtime. Ends a frame at once that has no eyes or is not shown.
 bool XrSurface::begin() {
   const gl::EglContext::Current current(*context_);
   const auto begun = session_->begin_frame();

@@ -138,7 +138,7 @@ class DisplayLoop {
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
-  // Whether a frame can be shown now. Nobody waits for a headset that nobody wears.
+  // Whether a frame can be shown now. A headset that is not worn makes no frame wait.
   bool ready() {
     const bool ready = surface_.ready();
     if (!ready) refuse_orders();
@@ -251,7 +251,7 @@ class DisplayLoop {
     if (const auto head = surface_.expected(now_s + worker_.horizon_s())) worker_.on_expected(head->at_s, head->pose);
   }
 
-  // Frames that nobody sees end the display, too, if a little later.
+  // A display whose frames are not shown ends, too, kUnseen_s later.
   void see_whether_over() {
     if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
     last_ = last_ || (start_s_ > 0 && o_.duration_s > 0 && monotonic_s() > start_s_ + o_.duration_s + kUnseen_s);

@@ -1,6 +1,6 @@
-// Where the display's cameras come from and where its frames go: a recorded head and nobody (headless), a person at a
-// window, or a headset. Each kind of display is one implementation; client/displays holds those that need libraries of
-// window systems and headsets.
+// Where the display's cameras come from and where its frames go: a recorded head without a person (headless), a person
+// at a window, or a headset. Each kind of display is one implementation; client/displays holds those that need
+// libraries of window systems and headsets.
 #pragma once
 
 #include <array>

@@ -25,7 +25,7 @@ struct FrameFigures {
   CouplingState coupling;
   double detail = 1;                          ///< splat::SelectionOptions::detail of the frame
   int sampled_width = 0, sampled_height = 0;  ///< of the newest view request; 0: there was none
-  /// Of the object on display so much is holes, as its picture looks; NaN: not known.
+  /// Share of the object's picture that is holes; NaN: not known.
   double hole_share = std::numeric_limits<double>::quiet_NaN();
   RendererChoice::Figures renderer;
 };

@@ -124,7 +124,8 @@ namespace {
 // Features of a sample: 13 differences from the guide at the pixel, the residual, 1, and the value that is wanted.
 constexpr int kUnknown = 14, kWanted = 14, kLeft = 0, kUp = 1, kCorner = 2;
 constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual};  // of weights
-constexpr int kRounds = 3, kRoughRounds = 1;  // of which the first, and the step before, take half of the samples
+// The rough rounds, and the step before them, take half of the samples.
+constexpr int kRounds = 3, kRoughRounds = 1;
 
 struct Features {
   float of[kFeatures];

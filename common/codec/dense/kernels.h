@@ -44,13 +44,13 @@ inline constexpr auto kPlaneContexts = [] {
 }();
 
 inline constexpr int kFeatures = 16;  ///< of what least squares sum up
-/// Terms of guided prediction: L, U, UL, UR; the guide's 3 x 3, of which the fifth is the pixel's own; the residual of
+/// Terms of guided prediction: L, U, UL, UR; the guide's 3 x 3, the fifth at the pixel's own place; the residual of
 /// another plane.
 inline constexpr int kGuidedTerms = 14, kGuideHere = 8, kOtherResidual = 13;
 
 /// What predicts a row of a plane of fixed-point values.
 struct GuidedRows {
-  const int16_t *own, *above;  ///< the plane's row, of which what is to the left is used, and that above
+  const int16_t *own, *above;  ///< the plane's row, used to the left of the pixel, and the one above
   const int16_t* guide[3];     ///< the guide's rows above, here, below
   const int16_t* residual;     ///< the same row of another plane's residuals, or null
   const int16_t* weights;      ///< of kGuidedTerms, in 2^-13

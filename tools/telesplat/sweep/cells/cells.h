@@ -10,8 +10,6 @@
 
 namespace telesplat::launcher {
 
-inline constexpr double kDiffers = 0.05;  ///< the largest p, after Holm, of what is called a difference
-
 /// A main figure of a configuration.
 struct Cell {
   size_t configuration;
@@ -21,8 +19,6 @@ struct Cell {
   /// Nothing: it is the first, or one of the two has fewer than two runs.
   std::optional<tools::Difference> difference;
   double p_holm = 1;
-
-  bool differs() const { return difference && p_holm < kDiffers; }
 };
 /// Figure after figure, those alone that some run has.
 std::vector<Cell> cells_of(const SweepRecord& record);
