@@ -28,15 +28,19 @@ class GroupModel {
     for (int y = 0; y < mask.height(); ++y) {
       auto* const row = mask.row(y);
       uint32_t left = 0;
+      bool quiet = false;  // the rows above are empty around this word
       for (size_t group = 0; group < groups; ++group) {
+        if (group % 8 == 0) quiet = is_empty_around(above, group / 8, words) && above_that[group / 8] == 0;
         const int pixels = group + 1 == groups ? last : 8;
-        // The rows' groups that are known: of those beside the mask no pixel is covered.
-        const uint32_t up_left = group == 0 ? 0 : byte(above, group - 1), up = byte(above, group),
-                       up_right = group + 1 == groups ? 0 : byte(above, group + 1);
         const uint32_t all = (1u << pixels) - 1;
-        uint32_t here = byte(row, group);
+        uint32_t here = byte(row, group), up_left = 0, up = 0, up_right = 0;
+        // The rows' groups that are known: of those beside the mask no pixel is covered.
+        if (!quiet) {
+          up_left = group == 0 ? 0 : byte(above, group - 1), up = byte(above, group);
+          up_right = group + 1 == groups ? 0 : byte(above, group + 1);
+        }
         auto& any = any_[(left != 0) | (up != 0) << 1 | (up_right != 0) << 2 | (up_left != 0) << 3 |
-                         (byte(above_that, group) != 0) << 4];
+                         (!quiet && byte(above_that, group) != 0) << 4];
         if (coder(here != 0, any) == 0) {
           left = 0;
           continue;
@@ -54,6 +58,9 @@ class GroupModel {
   }
 
  private:
+  static bool is_empty_around(const uint64_t* row, size_t word, size_t words) {
+    return (row[word] | (word == 0 ? 0 : row[word - 1] >> 56) | (word + 1 == words ? 0 : row[word + 1] << 56)) == 0;
+  }
   static uint32_t byte(const uint64_t* row, size_t group) {
     return static_cast<uint32_t>(row[group / 8] >> group % 8 * 8) & 255;
   }

@@ -16,18 +16,20 @@ class AdaptiveBit {
  public:
   uint32_t zero() const { return (uint32_t{fast_} + slow_) >> 5; }  ///< in 2^-12, 2 to 4093
   void learn(uint32_t bit) {
+    if (bit == 0 && fast_ == kMost && slow_ >= kSettled) return;  // one 0 more changes nothing
     const int target = bit == 0 ? 65535 : 0;
     const auto towards = [&](uint16_t from, int most) {
       const int step = (target - from) * kShare[static_cast<size_t>(std::min(most, seen_ + 2))] >> 16;
-      return static_cast<uint16_t>(std::clamp(from + step, 32, 65503));
+      return static_cast<uint16_t>(std::clamp(from + step, 65535 - kMost, kMost));
     };
     fast_ = towards(fast_, 20), slow_ = towards(slow_, kLongest);
     seen_ = static_cast<uint16_t>(seen_ + (seen_ < kLongest));
   }
 
  private:
-  static constexpr int kLongest = 128;
-  static constexpr auto kShare = [] {  // 2^16 / n
+  static constexpr int kLongest = 128, kMost = 65503;
+  static constexpr int kSettled = 65536 - 65536 / 512;  // the slow rate's steps from here on round to 0
+  static constexpr auto kShare = [] {                   // 2^16 / n
     std::array<int, kLongest + 1> out{};
     for (int n = 2; n <= kLongest; ++n) out[static_cast<size_t>(n)] = 65536 / n;
     return out;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/codec/walk.h"
+#include "common/codec/poles.h"
 #include "common/image/normal.h"
 
 namespace telesplat::codec::detail {
@@ -97,6 +97,21 @@ std::optional<RampAxis> find_ramp(const Mask& mask, const image::DepthImage& ima
   return fit_ramp(*axes, samples, rect.width, rect.height);
 }
 
+// Fills pixels covered by s.mask from s.scatter_decoder, which was started; others are left alone (they are zero).
+// Returns false if the stream is damaged.
+bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole) {
+  s.predictor.start({base.depth, base.colour, turn_normal(base.normal, pole)});
+  return s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
+    Magnitudes size;
+    const auto pixel = s.scatter_decoder.get(x, y, s.predictor.predict(x, y, neighbours), size);
+    if (!pixel) return false;
+    const size_t i = rect.index(x, y);
+    image.depth[i] = pixel->depth, image.colour[i] = pixel->colour, image.normal[i] = turn_back(pixel->normal, pole);
+    s.predictor.add(x, y, *pixel, size);
+    return true;
+  });
+}
+
 }  // namespace
 
 TileGrid::TileGrid(int width, int height, bool one)
@@ -118,6 +133,17 @@ TileRect TileGrid::rect(int column, int row) const {
   const int x = column * tile_width, y = row * tile_height;
   return {static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x), static_cast<size_t>(width),
           std::min(tile_width, width - x), std::min(tile_height, height - y)};
+}
+
+void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole) {
+  s.predictor.start({base.depth, base.colour, turn_normal(base.normal, pole)});
+  s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
+    const size_t i = rect.index(x, y);
+    Pixel pixel{image.depth[i], image.colour[i], turn_normal(image.normal[i], pole)};
+    const Magnitudes size = s.scatter_encoder.put(x, y, pixel, s.predictor.predict(x, y, neighbours));
+    s.predictor.add(x, y, pixel, size);
+    return true;
+  });
 }
 
 bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds) {

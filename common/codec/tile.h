@@ -10,10 +10,14 @@
 #include <span>
 #include <vector>
 
+#include "common/codec/dense/dense.h"
 #include "common/codec/depth_codec.h"
 #include "common/codec/entropy.h"
+#include "common/codec/mask.h"
 #include "common/codec/room_axes.h"
-#include "common/codec/walk.h"
+#include "common/codec/sparse/ramp.h"
+#include "common/codec/sparse/scatter.h"
+#include "common/codec/sparse/scatter_coder.h"
 #include "common/image/depth_image.h"
 
 namespace telesplat::codec::detail {
@@ -29,6 +33,21 @@ struct TileGrid {
   TileRect rect(int column, int row) const;
   int width, height, tile_width, tile_height, columns, rows;
 };
+
+/// Buffers that one thread keeps: a tile is too small to allocate them anew.
+struct TileScratch {
+  Mask mask;
+  ScatterWalk scatter_walk;
+  ScatterPredictor predictor;
+  Ramp ramp;
+  ScatterEncoder scatter_encoder;
+  ScatterDecoder scatter_decoder;
+  DenseCoder dense;
+};
+
+/// Puts the pixels of a sparse tile that s.mask covers into s.scatter_encoder, which was started. base: what predicts
+/// the first pixel. pole: by which normals are turned; kRaw: they are coded as they are.
+void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole);
 
 /// Whether an image is coded as one tile: what it covers lies in several sparse tiles, for which
 /// one takes fewer bytes nearly always.

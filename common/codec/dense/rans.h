@@ -10,6 +10,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -35,6 +36,14 @@ struct EncodeEntry {
   uint16_t start = 0, frequency = 0;
 };
 
+/// 2^42 / f, rounded up. The product with x < 2^20 f fits 64 bits, and its bits from the 42nd on are x / f exactly:
+/// the error, below (f - 1) x / f < 2^31 units of 2^-42, does not reach 1 / f.
+inline constexpr auto kReciprocals = [] {
+  std::array<uint64_t, kFrequencyOne + 1> out{};
+  for (uint64_t f = 1; f <= kFrequencyOne; ++f) out[f] = ((uint64_t{1} << 42) + f - 1) / f;
+  return out;
+}();
+
 /// Puts symbols, the last one first.
 class SymbolEncoder {
  public:
@@ -51,7 +60,8 @@ class SymbolEncoder {
     put_bits(x, v, low);
     if (high != 0) put_bits(x, v >> 15, high);
     put_word_if(x >= uint32_t{entry.frequency} << (31 - kFrequencyBits), x);
-    x = (x / entry.frequency << kFrequencyBits) + x % entry.frequency + entry.start;
+    const auto quotient = static_cast<uint32_t>(x * kReciprocals[entry.frequency] >> 42);
+    x += quotient * (kFrequencyOne - entry.frequency) + entry.start;
   }
   uint8_t* end() const { return out_; }
   /// After the last symbol: kStateBytes.
@@ -61,10 +71,10 @@ class SymbolEncoder {
   }
 
  private:
-  void put_word_if(bool full, uint32_t& x) {  // without a branch: it would be mispredicted
+  void put_word_if(uint32_t full, uint32_t& x) {  // full: 0 or 1, as a number: a branch would be mispredicted
     const auto word = static_cast<uint16_t>(x);
     std::memcpy(out_, &word, 2);
-    out_ += full ? 2 : 0, x >>= full ? 16 : 0;
+    out_ += 2 * full, x >>= 16 * full;
   }
   void put_bits(uint32_t& x, uint32_t bits, unsigned count) {
     put_word_if(x >> (31 - count) != 0, x);
@@ -118,7 +128,7 @@ class SymbolDecoder {
       const uint32_t entry = table[contexts[i] * kFrequencyOne + (state & (kFrequencyOne - 1))];
       uint32_t x = ((entry >> 12 & 0xFFF) + 1) * (state >> kFrequencyBits) + (entry & 0xFFF);
       good &= refill<kChecked>(x, begin, at);
-      const unsigned token = entry >> 24, over = token < first ? 0 : token - first;
+      const unsigned token = entry >> 24, over = std::max(token, first) - first;
       unsigned bits = over >> 3;
       uint32_t v = (8 + (over & 7)) << bits;
       if (bits > 15) [[unlikely]] {

@@ -133,12 +133,15 @@ void PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, siz
   const auto r = static_cast<ptrdiff_t>(y);
   const uint8_t *const tokens = plane.tokens.row(r), *const contexts = plane.contexts.row(r);
   const uint32_t* const z = plane.z.row(r);
+  const unsigned first = plane.first;
+  SymbolEncoder coder = out;  // a copy, which the bytes that it writes cannot alias
   shape.for_each_run_back(y, [&](size_t begin, size_t x) {
     while (x-- > begin) {
-      const unsigned token = tokens[x], bits = token < plane.first ? 0 : (token - plane.first) >> 3;
-      out.put(tables_[(size_t{contexts[x]} >> plane.scale.merges) * kSymbols + token], z[x], bits);
+      const unsigned token = tokens[x], bits = (std::max(token, first) - first) >> 3;
+      coder.put(tables_[(size_t{contexts[x]} >> plane.scale.merges) * kSymbols + token], z[x], bits);
     }
   });
+  out = coder;
 }
 
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {

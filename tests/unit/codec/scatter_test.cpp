@@ -6,7 +6,8 @@
 #include <random>
 
 #include "common/codec/depth_codec.h"
-#include "common/codec/walk.h"
+#include "common/codec/poles.h"
+#include "common/codec/tile.h"
 #include "common/image/normal.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/masks.h"
