@@ -40,7 +40,7 @@ SKIPPED = {
 SERVICES = {f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay")}
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
-SECONDS, SIZE = 3, "320x240"  # of a run that does not say
+SECONDS, SIZE = 1.5, "320x240"  # of a run that does not say
 
 
 def shortened(text, seconds=SECONDS):
