@@ -31,7 +31,7 @@ Status write_exr(const std::string& path, const View& view, Alpha alpha = Alpha:
 /// The same without alpha, with the normals in N.X, N.Y, N.Z, half floats; one a pixel.
 Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals);
 /// Reads a PNG or EXR file, as the ending of its name says: colours over black; channel Z becomes depth_m. At most
-/// 16384 pixels a side; not interlaced.
+/// 16384 pixels a side.
 Result<View> read_view(const std::string& path);
 /// Reads a PNG, JPEG, WebP, TIFF, BMP, GIF, TGA, EXR, HDR or PNM picture of at most `most_pixels` from memory: its
 /// colours without its alpha, which changes nothing of them. name: for error texts; its ending says what it is, unless

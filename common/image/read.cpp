@@ -8,11 +8,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <csetjmp>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
+#include <memory>
 
 #include "common/geometry/camera.h"
 #include "common/image/file.h"
@@ -21,7 +18,7 @@
 namespace telesplat::image {
 namespace {
 
-// Rows that are read at once: memory follows what a file holds, not what its header claims.
+// Rows of an EXR file that are read at once: memory follows what a file holds, not what its header claims.
 constexpr int kRowsAtOnce = 16;
 
 std::string size_error(int64_t width, int64_t height) {
@@ -30,81 +27,25 @@ std::string size_error(int64_t width, int64_t height) {
               : fmt::format("it has {}x{} pixels, limits are 1..{} a side", width, height, geometry::kMaxImageSide);
 }
 
-// libpng leaves a function only by a long jump, which no object with a destructor may see: these outlive it.
-struct PngInput {
-  explicit PngInput(const std::string& path) : file(std::fopen(path.c_str(), "rb")) {
-    if (!file) {
-      error = std::strerror(errno);
-      return;
-    }
-    png = png_create_read_struct(
-        PNG_LIBPNG_VER_STRING, &error,
-        [](png_structp png, png_const_charp text) {
-          *static_cast<std::string*>(png_get_error_ptr(png)) = text;
-          png_longjmp(png, 1);
-        },
-        [](png_structp, png_const_charp) {});
-    if (png) info = png_create_info_struct(png);
-    if (!info) error = "out of memory";
-  }
-  ~PngInput() {
-    png_destroy_read_struct(&png, &info, nullptr);
-    if (file) std::fclose(file);
-  }
-  PngInput(const PngInput&) = delete;
-
-  std::FILE* file;
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-  std::string error;
-  std::vector<uint8_t> row;  // RGBA
-  View view;
-};
-
-// False: the input's error says why.
-bool read_header(PngInput& from) {
-  if (setjmp(png_jmpbuf(from.png))) return false;
-  png_init_io(from.png, from.file);
-  png_read_info(from.png, from.info);
-  png_set_expand(from.png);
-  png_set_strip_16(from.png);
-  png_set_gray_to_rgb(from.png);
-  png_set_add_alpha(from.png, 0xff, PNG_FILLER_AFTER);
-  if (png_get_interlace_type(from.png, from.info) != PNG_INTERLACE_NONE) png_error(from.png, "it is interlaced");
-  png_read_update_info(from.png, from.info);
-  return true;
-}
-
-bool read_row(PngInput& from) {
-  if (setjmp(png_jmpbuf(from.png))) return false;
-  png_read_row(from.png, from.row.data(), nullptr);
-  return true;
-}
-
-bool read_end(PngInput& from) {
-  if (setjmp(png_jmpbuf(from.png))) return false;
-  png_read_end(from.png, nullptr);
-  return true;
-}
-
 // A channel over black.
 uint32_t covered(uint8_t channel, uint8_t alpha) { return (uint32_t(channel) * alpha + 127) / 255; }
 
 std::string read_png(const std::string& path, View& view) {
-  PngInput from(path);
-  if (!from.info || !read_header(from)) return from.error;
-  const int64_t width = png_get_image_width(from.png, from.info), height = png_get_image_height(from.png, from.info);
-  if (std::string wrong = size_error(width, height); !wrong.empty()) return wrong;
-  from.row.resize(size_t(width) * 4);
-  for (int64_t y = 0; y < height; ++y) {
-    if (!read_row(from)) return fmt::format("row {}: {}", y, from.error);
-    for (size_t x = 0; x < size_t(width); ++x) {
-      const uint8_t* const p = &from.row[4 * x];
-      view.colour.push_back(covered(p[0], p[3]) << 16 | covered(p[1], p[3]) << 8 | covered(p[2], p[3]));
-    }
+  png_image picture{};
+  picture.version = PNG_IMAGE_VERSION;
+  if (!png_image_begin_read_from_file(&picture, path.c_str())) return picture.message;
+  const std::unique_ptr<png_image, decltype(&png_image_free)> freed(&picture, &png_image_free);
+  if (std::string wrong = size_error(picture.width, picture.height); !wrong.empty()) return wrong;
+  picture.format = PNG_FORMAT_RGBA;
+  const size_t count = size_t(picture.width) * picture.height;
+  const std::unique_ptr<uint8_t[]> rows(new uint8_t[4 * count]);  // pages come with what is read
+  if (!png_image_finish_read(&picture, nullptr, rows.get(), 0, nullptr)) return picture.message;
+  view.colour.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    const uint8_t* const p = &rows[4 * i];
+    view.colour[i] = covered(p[0], p[3]) << 16 | covered(p[1], p[3]) << 8 | covered(p[2], p[3]);
   }
-  if (!read_end(from)) return from.error;
-  view.width = int(width), view.height = int(height);
+  view.width = int(picture.width), view.height = int(picture.height);
   return {};
 }
 

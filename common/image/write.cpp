@@ -7,12 +7,8 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include <cerrno>
-#include <csetjmp>
 #include <cstdio>
-#include <cstring>
 #include <functional>
-#include <memory>
 
 #include "common/core/check.h"
 #include "common/core/whole_file.h"
@@ -36,60 +32,15 @@ Status write_picture(const std::string& path, const std::function<std::string(co
   return Error{fmt::format("cannot write {}: {}", path, why)};
 }
 
-struct PngError {
-  std::string text;
-};
-
-// libpng leaves a function only by a long jump, which no object with a destructor may see: these outlive it.
-struct PngFile {
-  explicit PngFile(const std::string& path) : file(std::fopen(path.c_str(), "wb")) {
-    if (!file) {
-      error.text = std::strerror(errno);
-      return;
-    }
-    png = png_create_write_struct(
-        PNG_LIBPNG_VER_STRING, &error,
-        [](png_structp png, png_const_charp text) {
-          static_cast<PngError*>(png_get_error_ptr(png))->text = text;
-          png_longjmp(png, 1);
-        },
-        [](png_structp, png_const_charp) {});
-    if (png) info = png_create_info_struct(png);
-    if (!info) error.text = "out of memory";
-  }
-  ~PngFile() {
-    png_destroy_write_struct(&png, &info);
-    if (file) std::fclose(file);
-  }
-  PngFile(const PngFile&) = delete;
-
-  std::FILE* file;
-  png_structp png = nullptr;
-  png_infop info = nullptr;
-  PngError error;
-};
-
-// False: the file's error says why.
-bool write_rows(PngFile& to, int width, int height, int channels, const uint8_t* bytes) {
-  if (setjmp(png_jmpbuf(to.png))) return false;
-  png_init_io(to.png, to.file);
-  png_set_IHDR(to.png, to.info, png_uint_32(width), png_uint_32(height), 8,
-               channels == 4 ? PNG_COLOR_TYPE_RGB_ALPHA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  // Pictures are recorded while the viewer runs: 117 ms instead of 255 at level 6 (2560x1600), 16 % larger.
-  png_set_compression_level(to.png, 2);
-  png_set_filter(to.png, 0, PNG_NO_FILTERS);
-  png_write_info(to.png, to.info);
-  for (int y = 0; y < height; ++y) png_write_row(to.png, bytes + size_t(y) * size_t(width) * size_t(channels));
-  png_write_end(to.png, nullptr);
-  return true;
-}
-
+// channels: 3 or 4 of a pixel, 8 bits each. Pictures are recorded while the viewer runs: without filters, and packed
+// lightly, one of 2560x1600 takes half the time, and is 16 % larger.
 std::string write_png_file(const std::string& path, const View& view, int channels, const uint8_t* bytes) {
-  PngFile to(path);
-  if (!to.info || !write_rows(to, view.width, view.height, channels, bytes)) return to.error.text;
-  const bool closed = std::fclose(std::exchange(to.file, nullptr)) == 0;  // what a full disk says last
-  return closed ? std::string() : std::strerror(errno);
+  png_image picture{};
+  picture.version = PNG_IMAGE_VERSION;
+  picture.width = png_uint_32(view.width), picture.height = png_uint_32(view.height);
+  picture.format = channels == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+  picture.flags = PNG_IMAGE_FLAG_FAST;
+  return png_image_write_to_file(&picture, path.c_str(), 0, bytes, 0, nullptr) ? "" : picture.message;
 }
 
 // Channels of an EXR file: half floats, `names.size()` a pixel beside each other, and Z.
