@@ -59,18 +59,10 @@ Frustum::Frustum(const Camera& c) {
   for (int i = 0; i < 5; ++i) planes_[i] = glm::vec4(planes[i] / glm::length(glm::dvec3(planes[i])));
 }
 
-bool Frustum::may_contain(const Box& b) const {
+bool Frustum::on_inner_sides(const Box& b, bool wholly) const {
   for (const glm::vec4& p : planes_) {
-    const float x = p.x > 0 ? b.hi.x : b.lo.x, y = p.y > 0 ? b.hi.y : b.lo.y, z = p.z > 0 ? b.hi.z : b.lo.z;
-    if (p.x * x + p.y * y + p.z * z + p.w < 0) return false;
-  }
-  return true;
-}
-
-bool Frustum::contains(const Box& b) const {
-  for (const glm::vec4& p : planes_) {
-    const float x = p.x > 0 ? b.lo.x : b.hi.x, y = p.y > 0 ? b.lo.y : b.hi.y, z = p.z > 0 ? b.lo.z : b.hi.z;
-    if (p.x * x + p.y * y + p.z * z + p.w < 0) return false;
+    const auto corner = [&](int axis) { return (p[axis] > 0) != wholly ? b.hi[axis] : b.lo[axis]; };
+    if (p.x * corner(0) + p.y * corner(1) + p.z * corner(2) + p.w < 0) return false;
   }
   return true;
 }
@@ -107,6 +99,17 @@ Camera subsample(const Camera& c, int step) {
   out.right = out.left + out.width * step * du;
   out.top = c.top - first * dv;
   out.bottom = out.top - out.height * step * dv;
+  return out;
+}
+
+std::array<std::array<double, 3>, 3> ray_axes(const Camera& camera, const Rect& rect) {
+  const double du = (camera.right - camera.left) / camera.width, dv = (camera.top - camera.bottom) / camera.height;
+  const double u0 = camera.left + (rect.x + 0.5) * du, v0 = camera.top - (rect.y + 0.5) * dv;
+  const glm::dvec3 by_column = camera.pose.orientation * glm::dvec3(du, 0, 0),
+                   by_row = camera.pose.orientation * glm::dvec3(0, -dv, 0),
+                   first = camera.pose.orientation * glm::dvec3(u0, v0, -1);
+  std::array<std::array<double, 3>, 3> out;
+  for (int i = 0; i < 3; ++i) out[static_cast<size_t>(i)] = {by_column[i], by_row[i], first[i]};
   return out;
 }
 

@@ -1,6 +1,7 @@
 // The pinhole camera that makes and shows every image: position, orientation, off-axis frustum, pixel grid.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
@@ -77,11 +78,12 @@ class Frustum {
  public:
   explicit Frustum(const Camera& camera);
   /// False only if the box is wholly outside one plane (conservative: true does not promise visibility).
-  bool may_contain(const Box& box) const;
+  bool may_contain(const Box& box) const { return on_inner_sides(box, false); }
   /// True only if all of the box is inside.
-  bool contains(const Box& box) const;
+  bool contains(const Box& box) const { return on_inner_sides(box, true); }
 
  private:
+  bool on_inner_sides(const Box& box, bool wholly) const;
   glm::vec4 planes_[5];
 };
 
@@ -96,5 +98,10 @@ Camera subsample(const Camera& camera, int step);
 /// The camera whose pixel (i, j) covers the pixels (2 i, 2 j) to (2 i + 1, 2 j + 1) of `camera`: half its size, rounded
 /// up, so the last ones may lie partly outside camera's image.
 Camera half_size(const Camera& camera);
+
+/// Where the pixels of the part `rect` of a camera's image look in the room, as the depth-image codec wants it
+/// (codec::RoomAxes): row i . (x, y, 1) times a pixel's depth in metres is coordinate i, of room space, of what its
+/// centre shows, from the eye; x and y are its column and row in the part.
+std::array<std::array<double, 3>, 3> ray_axes(const Camera& camera, const Rect& rect);
 
 }  // namespace telesplat::geometry

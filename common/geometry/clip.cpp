@@ -58,6 +58,16 @@ Clip::Part Clip::part_of(const Box& box_room) const {
   return out;
 }
 
+Clip::Stretch Clip::Stretch::within(const DBox& box, const glm::dvec3& origin, const glm::dvec3& direction) const {
+  Stretch out = *this;
+  for (int a = 0; a < 3; ++a) {
+    const double lo = box.lo[a] - origin[a], hi = box.hi[a] - origin[a], on = direction[a];
+    if (on == 0 && (lo > 0 || hi < 0)) return {1, 0};
+    if (on != 0) out = {std::max(out.begin, std::min(lo / on, hi / on)), std::min(out.end, std::max(lo / on, hi / on))};
+  }
+  return out;
+}
+
 Clip::Stretch Clip::stretch(const glm::dvec3& origin_room, const glm::dvec3& direction) const {
   Stretch out{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   const double length = glm::length(direction);

@@ -41,6 +41,9 @@ struct Clip {
   /// The stretch of a line that is kept, in units of its direction; empty where begin > end.
   struct Stretch {
     double begin, end;
+    bool empty() const { return begin > end; }
+    /// What of it lies in a box as well.
+    Stretch within(const DBox& box, const glm::dvec3& origin, const glm::dvec3& direction) const;
   };
   Stretch stretch(const glm::dvec3& origin_room, const glm::dvec3& direction) const;
 };

@@ -55,16 +55,6 @@ Camera camera_through(const Screen& screen, const glm::dvec3& eye_room, int widt
           height};
 }
 
-std::array<Camera, 2> eye_cameras(const Camera& head, double separation_m, double screen_m) {
-  std::array<Camera, 2> eyes{head, head};
-  for (const auto& [eye, aside_m] : {std::pair{&eyes[0], -0.5 * separation_m}, {&eyes[1], 0.5 * separation_m}}) {
-    eye->pose.position_room += head.pose.orientation * glm::dvec3(aside_m, 0, 0);
-    eye->left -= aside_m / screen_m;
-    eye->right -= aside_m / screen_m;
-  }
-  return eyes;
-}
-
 Camera enclosing_camera(const std::array<Camera, 2>& eyes) {
   const Camera &a = eyes[0], &b = eyes[1];
   const glm::dvec3 to_b =

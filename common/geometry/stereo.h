@@ -24,12 +24,6 @@ Screen screen_before(const Camera& camera, double distance_m);
 /// the screen (z of seen_from > 0).
 Camera camera_through(const Screen& screen, const glm::dvec3& eye_room, int width, int height, double near_m);
 
-/// The cameras of both eyes, left then right, `separation_m` apart along the head's x axis, both looking along its -z.
-/// Each has an off-axis frustum, so that both see the same window `screen_m` before the head: what lies there is in the
-/// same place of both pictures. Infinity: each has the head camera's frustum. Precondition: screen_m > 0.
-std::array<Camera, 2> eye_cameras(const Camera& head, double separation_m,
-                                  double screen_m = std::numeric_limits<double>::infinity());
-
 /// One camera whose frustum holds those of both, as tightly as a frustum can: it lies behind the eyes. Its pixels are
 /// the first one's in number; it says what is in sight, not how large. Precondition: both have one orientation.
 Camera enclosing_camera(const std::array<Camera, 2>& eyes);

@@ -15,7 +15,6 @@
 
 #include "common/core/utf8.h"
 #include "common/core/whole_file.h"
-#include "common/geometry/trajectory_file.h"
 
 namespace telesplat::geometry {
 namespace {

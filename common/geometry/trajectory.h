@@ -46,6 +46,9 @@ class Trajectory {
   glm::dvec3 orbit_centre_{0.0};
 };
 
+/// What Trajectory::read_csv reads, with the file's times. Errors as there.
+Result<std::vector<Trajectory::Sample>> read_samples(const std::string& path);
+
 /// The same as a CSV file that Trajectory::read_csv reads.
 Status write_trajectory(const std::string& path, const std::vector<Trajectory::Sample>& samples);
 

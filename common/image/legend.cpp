@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
+#include "common/geometry/number_text.h"
 #include "common/image/glyphs.h"
 
 namespace telesplat::image {
@@ -148,21 +148,6 @@ double place_on_bar(const Legend& legend, double value) {
   return std::clamp((value / 2 - legend.lo / 2) / (legend.hi / 2 - legend.lo / 2), 0.0, 1.0);
 }
 
-template <class T>
-std::optional<T> number(std::string_view text) {
-  T value{};
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (read.ec != std::errc{} || read.ptr != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
-std::string_view take_until(std::string_view& text, char end) {
-  const size_t at = std::min(text.find(end), text.size());
-  const std::string_view out = text.substr(0, at);
-  text.remove_prefix(std::min(at + 1, text.size()));
-  return out;
-}
-
 }  // namespace
 
 std::string to_text(const Legend& legend) {
@@ -179,7 +164,7 @@ Result<Legend> legend_from_text(std::string_view text) {
     return Error{fmt::format("a legend of {} bytes, limit {}", text.size(), kMaxLegendText)};
   Legend out;
   out.title = take_until(text, '\n');
-  const auto lo = number<double>(take_until(text, '\n')), hi = number<double>(take_until(text, '\n'));
+  const auto lo = number_from<double>(take_until(text, '\n')), hi = number_from<double>(take_until(text, '\n'));
   if (!lo || !hi || *lo > *hi) return Error{"a legend's range is not two numbers that ascend"};
   out.lo = *lo;
   out.hi = *hi;
@@ -187,7 +172,7 @@ Result<Legend> legend_from_text(std::string_view text) {
   if (!map) return map.error();
   out.map = std::move(*map);
   while (!text.empty()) {
-    const auto opacity = number<float>(take_until(text, ' '));
+    const auto opacity = number_from<float>(take_until(text, ' '));
     if (!opacity || *opacity < 0 || *opacity > 1 || out.opacity.size() == kMaxLegendOpacities)
       return Error{fmt::format("a legend's opacities are not at most {} numbers from 0 to 1", kMaxLegendOpacities)};
     out.opacity.push_back(*opacity);

@@ -8,6 +8,14 @@
 
 namespace telesplat::image {
 
+/// How many bits are set: std::popcount(), which is a call where a processor's own instruction may not be taken for
+/// granted.
+inline uint32_t set_bits(uint64_t word) {
+  word -= word >> 1 & 0x5555555555555555;
+  word = (word & 0x3333333333333333) + (word >> 2 & 0x3333333333333333);
+  return static_cast<uint32_t>(((word + (word >> 4)) & 0x0F0F0F0F0F0F0F0F) * 0x0101010101010101 >> 56);
+}
+
 /// One bit a pixel, rows padded to whole 64-bit words with zeros, pixel x of a row at bit x % 64 of word x / 64.
 class PixelMask {
  public:
@@ -26,9 +34,21 @@ class PixelMask {
   bool at(int x, int y) const { return (row(y)[x >> 6] >> (x & 63) & 1) != 0; }
   void set(int x, int y) { row(y)[x >> 6] |= uint64_t{1} << (x & 63); }
   void clear(int x, int y) { row(y)[x >> 6] &= ~(uint64_t{1} << (x & 63)); }
-  size_t count() const;
+  size_t count() const {
+    size_t n = 0;
+    for (const uint64_t word : words_) n += set_bits(word);
+    return n;
+  }
   /// Number of maximal runs of covered pixels within rows.
-  size_t runs() const;
+  size_t runs() const {
+    size_t n = 0;
+    for (int y = 0; y < height_; ++y)
+      for (size_t w = 0; w < words_per_row_; ++w) {
+        const uint64_t word = row(y)[w], last = w == 0 ? 0 : row(y)[w - 1] >> 63;
+        n += set_bits(word & ~(word << 1 | last));
+      }
+    return n;
+  }
 
   bool operator==(const PixelMask&) const = default;
 
@@ -37,14 +57,6 @@ class PixelMask {
   size_t words_per_row_ = 0;
   std::vector<uint64_t> words_;
 };
-
-/// How many bits are set: std::popcount(), which is a call where a processor's own instruction may not be taken for
-/// granted.
-inline uint32_t set_bits(uint64_t word) {
-  word -= word >> 1 & 0x5555555555555555;
-  word = (word & 0x3333333333333333) + (word >> 2 & 0x3333333333333333);
-  return static_cast<uint32_t>(((word + (word >> 4)) & 0x0F0F0F0F0F0F0F0F) * 0x0101010101010101 >> 56);
-}
 
 /// Calls f(x) for every set bit of one row, in order.
 template <class F>

@@ -97,8 +97,6 @@ glm::dvec3 Placement::to_data(const glm::dvec3& room) const {
   return glm::inverse(glm::dmat3(data_to_room)) * (room - glm::dvec3(data_to_room[3]));
 }
 
-glm::dvec3 Placement::to_room(const glm::dvec3& data) const { return glm::dvec3(data_to_room * glm::dvec4(data, 1)); }
-
 // Normals are turned by the transpose of what turns points from the data to the room; told they are in lengths.
 glm::dvec3 Placement::direction_to_data(const glm::dvec3& room) const {
   const glm::dvec3 out = glm::transpose(glm::dmat3(data_to_room)) * room / coordinates.lengths;

@@ -49,7 +49,6 @@ struct Placement {
 
   bool operator==(const Placement&) const = default;
   glm::dvec3 to_data(const glm::dvec3& room) const;
-  glm::dvec3 to_room(const glm::dvec3& data) const;
   /// Of a normal: unit length again.
   glm::dvec3 direction_to_data(const glm::dvec3& room) const;
   /// From one place to another, in `unit`, along x, y and z; of longitudes and latitudes on WGS 84's ellipsoid, to a

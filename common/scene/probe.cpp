@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "common/core/utf8.h"
+#include "common/geometry/number_text.h"
 #include "common/scene/arrays.h"
 #include "common/scene/session.h"
 
@@ -20,13 +21,11 @@ constexpr double kFarthest_m = 1e9;
 
 // Numbers that commas separate.
 bool read_numbers(std::string_view text, double* out, int count) {
+  if (std::count(text.begin(), text.end(), ',') != count - 1) return false;
   for (int i = 0; i < count; ++i) {
-    const size_t end = i + 1 < count ? text.find(',') : text.size();
-    if (end == text.npos) return false;
-    const auto read = std::from_chars(text.data(), text.data() + end, out[i]);
-    if (end == 0 || read.ec != std::errc() || read.ptr != text.data() + end || !(std::abs(out[i]) <= kFarthest_m))
-      return false;
-    text.remove_prefix(std::min(end + 1, text.size()));
+    const auto read = number_from<double>(take_until(text, ','));
+    if (!read || std::abs(*read) > kFarthest_m) return false;
+    out[i] = *read;
   }
   return true;
 }

@@ -20,6 +20,7 @@
 #include "common/splat/cpu_splatter.h"
 #include "common/splat/reference/reference_depth.h"
 #include "common/splat/select/view_selection.h"
+#include "tests/support/eye_cameras.h"
 
 namespace telesplat {
 namespace {

@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "common/volume/slices/image.h"
+#include "tests/support/volume/slices.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace telesplat::volume;

@@ -12,6 +12,7 @@
 #include "services/sampler/volume/work.h"
 #include "tests/support/keys/lease_key.h"
 #include "tests/support/patience.h"
+#include "tests/support/volume/slices.h"
 
 namespace telesplat {
 namespace {

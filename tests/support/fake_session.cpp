@@ -8,6 +8,7 @@
 #include "common/volume/session.h"
 #include "tests/support/points_scenes.h"
 #include "tests/support/volume/frames.h"
+#include "tests/support/volume/slices.h"
 
 namespace telesplat::test {
 namespace {

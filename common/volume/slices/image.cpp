@@ -61,7 +61,8 @@ geometry::Rect bounds(const EncodedSlice& slice, int raster_width, int raster_he
   return {x0, y0, x1 - x0, std::min((slice.blocks.back().y + 1) * kSliceBlock, raster_height) - y0};
 }
 
-void encode_slice(const SliceImage& image, std::vector<uint8_t>& out) {
+std::vector<uint8_t> encode_slice(const SliceImage& image) {
+  std::vector<uint8_t> out;
   const auto& r = image.rect;
   struct Place {
     int x, y;
@@ -76,7 +77,7 @@ void encode_slice(const SliceImage& image, std::vector<uint8_t>& out) {
       places.push_back({x, y});
       coder.add(block);
     }
-  if (places.empty()) return;
+  if (places.empty()) return out;
   std::vector<uint8_t> tables, blocks;
   coder.put_tables(tables);
   put_head(out, {image.layer, image.k_begin, image.k_end, tables, {}}, places.size());
@@ -86,11 +87,6 @@ void encode_slice(const SliceImage& image, std::vector<uint8_t>& out) {
     put_u16(out, blocks.size() - begin);
   }
   out.insert(out.end(), blocks.begin(), blocks.end());
-}
-
-std::vector<uint8_t> encode_slice(const SliceImage& image) {
-  std::vector<uint8_t> out;
-  encode_slice(image, out);
   return out;
 }
 
@@ -174,12 +170,6 @@ Status decode_slice_into(SliceImage& image, const EncodedSlice& slice, int raste
                   block + size_t(y) * kSliceBlock, size_t(width) * 4);
   }
   return ok_status();
-}
-
-Result<SliceImage> decode_slice(const EncodedSlice& slice, int raster_width, int raster_height) {
-  SliceImage image;
-  if (const Status s = decode_slice_into(image, slice, raster_width, raster_height); !s) return s.error();
-  return image;
 }
 
 }  // namespace telesplat::volume

@@ -33,7 +33,7 @@ struct EncodedSlice {
   std::vector<EncodedBlock> blocks;  ///< those with anything in them, in order of rows
 };
 
-/// The smallest rectangle that holds all blocks, clipped to the raster: of the image that decode_slice gives. Who
+/// The smallest rectangle that holds all blocks, clipped to the raster: of the image as it is decoded. Who
 /// decodes what comes from outside should add these up first: two blocks in opposite corners claim a whole raster.
 /// Precondition: from parse_slices() with that raster, not empty.
 geometry::Rect bounds(const EncodedSlice& slice, int raster_width, int raster_height);
@@ -43,18 +43,14 @@ geometry::Rect bounds(const EncodedSlice& slice, int raster_width, int raster_he
 /// then of each block u8 column, u8 row, u16 bytes (little-endian). Precondition: rect lies in [0, kMaxRasterSide]^2,
 /// pixels has its size, k_begin < k_end <= kMaxSide.
 std::vector<uint8_t> encode_slice(const SliceImage& image);
-/// The same, appended.
-void encode_slice(const SliceImage& image, std::vector<uint8_t>& out);
 /// Encoded images one after the other -> slices, none of them empty. raster: width and height, layers: how many; what
-/// does not fit them is refused. Bytes come from outside; blocks' insides are looked at by decode_slice() only.
+/// does not fit them is refused. Bytes come from outside; blocks' insides are looked at by decode_slice_into() only.
 Result<std::vector<EncodedSlice>> parse_slices(std::span<const uint8_t> bytes, int raster_width, int raster_height,
                                                int layers);
 /// The other way; slices without blocks are left out.
 std::vector<uint8_t> join_slices(std::span<const EncodedSlice> slices);
-/// Decodes all blocks; the image's rectangle is bounds(). Error: a block that is no such block. Precondition: as
-/// bounds().
-Result<SliceImage> decode_slice(const EncodedSlice& slice, int raster_width, int raster_height);
-/// The same into an image that was used before, for its memory; what it holds after an error is undefined.
+/// Decodes all blocks; the image's rectangle is bounds(). The image may have been used before, for its memory; what it
+/// holds after an error is undefined. Error: a block that is no such block. Precondition: as bounds().
 Status decode_slice_into(SliceImage& image, const EncodedSlice& slice, int raster_width, int raster_height);
 
 inline constexpr size_t kMaxSlices = size_t{64} << 10;  ///< in one go: layers times slabs

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "common/colour/paraview_json.h"
-#include "common/volume/transfer/text.h"
+#include "common/geometry/number_text.h"
 
 namespace telesplat::volume {
 namespace {
@@ -19,22 +19,6 @@ std::string_view trimmed(std::string_view text) {
   const size_t begin = text.find_first_not_of(kBlank);
   if (begin == text.npos) return {};
   return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
-}
-
-template <class T>
-std::optional<T> number(std::string_view text) {
-  T value{};
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (read.ec != std::errc{} || read.ptr != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
-// What follows up to `separator`, without blanks around it; takes it off `rest`.
-std::string_view next(std::string_view& rest, char separator) {
-  const size_t end = std::min(rest.find(separator), rest.size());
-  const std::string_view part = trimmed(rest.substr(0, end));
-  rest.remove_prefix(std::min(end + 1, rest.size()));
-  return part;
 }
 
 // "#rrggbb" or "r/g/b", each 0 to 1.
@@ -49,7 +33,7 @@ bool read_colour(std::string_view text, TransferFunction::Point& point) {
   }
   if (std::count(text.begin(), text.end(), '/') != 2) return false;
   for (float* const channel : channels) {
-    const auto value = number<float>(next(text, '/'));
+    const auto value = number_from<float>(trimmed(take_until(text, '/')));
     if (!value) return false;
     *channel = *value;
   }
@@ -65,13 +49,14 @@ Result<TransferFunction::Point> read_point(std::string_view text, const ValueRan
     return Error{fmt::format("transfer function: \"{}\" is no point value:colour:opacity", text.substr(0, 80))};
   std::string_view rest = text;
   TransferFunction::Point point;
-  const std::string_view at = next(rest, ':'), colour = next(rest, ':'), opacity = next(rest, ':');
+  const std::string_view at = trimmed(take_until(rest, ':')), colour = trimmed(take_until(rest, ':')),
+                         opacity = trimmed(take_until(rest, ':'));
   const bool percent = at.ends_with('%');
-  const auto value = number<double>(percent ? trimmed(at.substr(0, at.size() - 1)) : at);
+  const auto value = number_from<double>(percent ? trimmed(at.substr(0, at.size() - 1)) : at);
   if (!value) return refuse("value", at, "a number or a percentage");
   point.value = percent ? range.lo + (range.hi - range.lo) * (*value / 100) : *value;
   if (!read_colour(colour, point)) return refuse("colour", colour, "#rrggbb or three numbers r/g/b");
-  const auto alpha = number<float>(opacity);
+  const auto alpha = number_from<float>(opacity);
   if (!alpha) return refuse("opacity", opacity, "a number");
   point.opacity = *alpha;
   return point;
@@ -158,7 +143,7 @@ Result<TransferFunction> parse_transfer(std::string_view text, const ValueRange&
   std::string_view rest = trimmed(text);
   if (rest.empty()) return Error{"transfer function: an empty text, no point value:colour:opacity"};
   while (!rest.empty()) {
-    const auto point = read_point(next(rest, ','), range);
+    const auto point = read_point(trimmed(take_until(rest, ',')), range);
     if (!point) return point.error();
     out.points.push_back(*point);
   }

@@ -36,7 +36,7 @@ struct TransferFunction {
 struct ValueRange {
   double lo = 0, hi = 1;  ///< smallest and largest value (finite ones)
   double typical_lo = 0,
-         typical_hi = 1;  ///< where most of what is not background lies: percentiles, services/data/volume/slices.h
+         typical_hi = 1;    ///< where most of what is not background lies: percentiles, services/data/volume/slices.h
   bool hounsfield = false;  ///< a CT in Hounsfield units: presets then have absolute values
   bool operator==(const ValueRange&) const = default;
 };
@@ -63,6 +63,9 @@ std::string to_text(const TransferFunction& transfer);
 /// if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
 Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name, const ValueRange& range,
                                              std::string_view wanted = {});
+/// As many of the points as a text of `max_bytes` holds, chosen so that the function changes least; all of them if they
+/// fit.
+TransferFunction shortened(const TransferFunction& transfer, size_t max_bytes);
 /// ParaView's JSON of it, one colour map called `name` with Points and RGBPoints, which ParaView and
 /// parse_paraview_json read.
 std::string to_paraview_json(const TransferFunction& transfer, std::string_view name);

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/colour/paraview_json.h"
-#include "common/volume/transfer/text.h"
+#include "common/volume/transfer/function.h"
 
 namespace telesplat::volume {
 namespace {

@@ -1,4 +1,4 @@
-// The warp of one pixel, plainly: what every instruction set's kernel (warp-inl.h) gives, bit for bit, and what
+// The warp of one pixel, plainly: what every instruction set's kernel (kernels.cpp) gives, bit for bit, and what
 // machines without any of those use.
 #pragma once
 

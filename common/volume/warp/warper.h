@@ -59,7 +59,7 @@ struct WarpStats {
 /// pixels.
 ///
 /// A pixel's colour, all channels premultiplied: C = sum over layers of c_i T_i + background T, T_i = product of 1 -
-/// a_j over the layers in front, in 1/128ths of 8-bit steps (warp-inl.h has each rounding). Where T falls below 0.5 /
+/// a_j over the layers in front, in 1/128ths of 8-bit steps (kernels.cpp has each rounding). Where T falls below 0.5 /
 /// 255 it is taken for 0.
 class Warper {
  public:

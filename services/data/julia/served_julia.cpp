@@ -23,18 +23,13 @@ constexpr double kQuiet_s = 2;  // what takes longer tells how far it is
 std::optional<scene::Probed> cast(const julia::Parameters& parameters, const julia::Placement& placement,
                                   const geometry::Clip& clip, const scene::Probe& probe) {
   constexpr int kMost = 200'000;
-  const auto kept = clip.stretch(probe.origin_room, probe.direction_room);
-  double at = std::max(kept.begin, 0.0), end = kept.end;
-  const glm::dvec3 lo(placement.box_room.lo), hi(placement.box_room.hi);
-  for (int a = 0; a < 3; ++a) {
-    const double on = probe.direction_room[a], near = (lo[a] - probe.origin_room[a]) / on,
-                 far = (hi[a] - probe.origin_room[a]) / on;
-    if (on == 0 && (probe.origin_room[a] < lo[a] || probe.origin_room[a] > hi[a])) return std::nullopt;
-    if (on != 0) at = std::max(at, std::min(near, far)), end = std::min(end, std::max(near, far));
-  }
-  const double least_m = 1e-6 * glm::length(hi - lo);
+  const geometry::DBox box{glm::dvec3(placement.box_room.lo), glm::dvec3(placement.box_room.hi)};
+  const auto kept =
+      clip.stretch(probe.origin_room, probe.direction_room).within(box, probe.origin_room, probe.direction_room);
+  const double least_m = 1e-6 * glm::length(box.size());
   const julia::Slice slice = julia::slice(parameters);
-  for (int n = 0; n < kMost && at <= end; ++n) {
+  double at = std::max(kept.begin, 0.0);
+  for (int n = 0; n < kMost && at <= kept.end; ++n) {
     const glm::dvec3 room = probe.origin_room + at * probe.direction_room;
     const double distance =
         julia::distance_estimate(parameters, slice, room / placement.scale + placement.centre) * placement.scale;

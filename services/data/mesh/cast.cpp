@@ -18,24 +18,15 @@ constexpr double kRound = 0x1p-24;  // of a float: half of what its last bit is 
 
 struct Ray {
   glm::dvec3 origin, direction;
-  double begin, end;  // metres along it
+  geometry::Clip::Stretch kept;  // metres along it
 };
 
 // Where the ray enters a box; infinity: it does not.
 double entry(const Ray& ray, const geometry::Box& box) {
-  double begin = ray.begin, end = ray.end;
-  for (int a = 0; a < 3; ++a) {
-    double lo = double{box.lo[a]} - ray.origin[a], hi = double{box.hi[a]} - ray.origin[a];
-    const double slack = 1e-9 * (std::abs(lo) + std::abs(hi));  // a plane's box has no thickness
-    lo -= slack, hi += slack;
-    if (ray.direction[a] == 0) {
-      if (lo > 0 || hi < 0) return kInfinity;
-      continue;
-    }
-    const double near = lo / ray.direction[a], far = hi / ray.direction[a];
-    begin = std::max(begin, std::min(near, far)), end = std::min(end, std::max(near, far));
-  }
-  return begin <= end ? begin : kInfinity;
+  const glm::dvec3 lo(box.lo), hi(box.hi);
+  const glm::dvec3 slack = 1e-9 * (glm::abs(lo - ray.origin) + glm::abs(hi - ray.origin));  // planes' boxes are flat
+  const auto within = ray.kept.within({lo - slack, hi + slack}, ray.origin, ray.direction);
+  return within.empty() ? kInfinity : within.begin;
 }
 
 using Corners = std::array<glm::dvec3, 3>;
@@ -64,7 +55,7 @@ void intersect(const Ray& ray, const Corners& t, size_t triangle, Hit& best) {
   const double u = glm::dot(from, across) / determinant, v = glm::dot(ray.direction, turned) / determinant;
   if (!(u >= -kSeam && v >= -kSeam && u + v <= 1 + kSeam)) return;
   const double at = glm::dot(ac, turned) / determinant;
-  if (at >= ray.begin && at <= ray.end && at < best.at) best = {at, triangle, {1 - u - v, u, v}};
+  if (at >= ray.kept.begin && at <= ray.kept.end && at < best.at) best = {at, triangle, {1 - u - v, u, v}};
 }
 
 double value_at(const geometry::MeshChunkView& chunk, uint32_t vertex) {
@@ -163,8 +154,8 @@ scene::Probed describe(const geometry::MeshChunkView& chunk, const Ray& ray, con
 
 std::optional<scene::Probed> cast(const MeshStore& store, const scene::Probe& probe, const geometry::Clip& clip,
                                   double scalar_origin, bool of_cells) {
-  const auto kept = clip.stretch(probe.origin_room, probe.direction_room);
-  Ray ray{probe.origin_room, probe.direction_room, std::max(kept.begin, 0.0), kept.end};
+  Ray ray{probe.origin_room, probe.direction_room, clip.stretch(probe.origin_room, probe.direction_room)};
+  ray.kept.begin = std::max(ray.kept.begin, 0.0);
   struct Met {
     double at;
     ChunkId chunk;

@@ -105,16 +105,10 @@ Result<scene::Probed> cast(const volume::Session& session, int begin, int end, c
   const glm::dmat4 to_index = session.grid.room_to_index();
   const glm::dvec3 from(to_index * glm::dvec4(probe.origin_room, 1)),
       on(to_index * glm::dvec4(probe.direction_room, 0));
-  const auto kept = clip.stretch(probe.origin_room, probe.direction_room);
-  double first = std::max(kept.begin, 0.0), last = kept.end;
-  for (int a = 0; a < 3; ++a) {
-    const double lo = -0.5 - from[a], hi = session.grid.size[size_t(a)] - 0.5 - from[a];
-    if (on[a] == 0) {
-      if (lo > 0 || hi < 0) last = -kInfinity;
-      continue;
-    }
-    first = std::max(first, std::min(lo / on[a], hi / on[a])), last = std::min(last, std::max(lo / on[a], hi / on[a]));
-  }
+  const glm::dvec3 size(session.grid.size[0], session.grid.size[1], session.grid.size[2]);
+  const auto [begins, last] =
+      clip.stretch(probe.origin_room, probe.direction_room).within({glm::dvec3(-0.5), size - 0.5}, from, on);
+  const double first = std::max(begins, 0.0);
   if (!(first < last)) return Error{"probe: the ray does not meet the volume"};
 
   const double voxel_m = 1 / std::max({std::abs(on.x), std::abs(on.y), std::abs(on.z)}),

@@ -4,13 +4,13 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <future>
 #include <glm/matrix.hpp>
 #include <list>
 
 #include "common/core/utf8.h"
+#include "common/geometry/number_text.h"
 #include "services/data/volume/cast.h"
 #include "services/data/volume/slices.h"
 
@@ -25,20 +25,15 @@ struct Part {
 };
 
 Result<Part> read_part(const std::string& text, int slices) {
-  Part part;
-  if (text.empty()) return part;
-  const char* const end = text.data() + text.size();
-  const auto index = std::from_chars(text.data(), end, part.index);
-  if (index.ec == std::errc{} && index.ptr != end && *index.ptr == '/') {
-    const auto of = std::from_chars(index.ptr + 1, end, part.of);
-    const int most = std::min(kMaxParts, slices);
-    if (of.ec == std::errc{} && of.ptr == end && part.of >= 1 && part.of <= most && part.index >= 0 &&
-        part.index < part.of)
-      return part;
-    if (of.ec == std::errc{} && of.ptr == end && part.of > most)
-      return Error{fmt::format("part \"{}\": at most {} parts of {} slices", text.substr(0, 40), most, slices)};
-  }
-  return Error{fmt::format("part \"{}\" is not I/N, with I from 0 to N - 1", text.substr(0, 40))};
+  if (text.empty()) return Part{};
+  std::string_view rest = text;
+  const auto index = number_from<int>(take_until(rest, '/')), of = number_from<int>(rest);
+  const int most = std::min(kMaxParts, slices);
+  if (index && of && *of > most)
+    return Error{fmt::format("part \"{}\": at most {} parts of {} slices", text.substr(0, 40), most, slices)};
+  if (!index || !of || *index < 0 || *index >= *of)
+    return Error{fmt::format("part \"{}\" is not I/N, with I from 0 to N - 1", text.substr(0, 40))};
+  return Part{*index, *of};
 }
 
 // As a mesh's: the box centred, `up` turned to +y, the largest extent the room's size.

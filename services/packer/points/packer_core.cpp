@@ -12,7 +12,7 @@
 #include "common/codec/depth_codec.h"
 #include "common/codec/mask_stream.h"
 #include "common/codec/room_axes.h"
-#include "common/geometry/ray_axes.h"
+#include "common/geometry/camera.h"
 #include "common/refinement/bounded_patches.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/frame_book.h"

@@ -4,7 +4,7 @@
 #include "common/codec/mask_stream.h"
 #include "common/codec/room_axes.h"
 #include "common/core/log.h"
-#include "common/geometry/ray_axes.h"
+#include "common/geometry/camera.h"
 #include "common/net/dispatch.h"
 
 namespace telesplat::sampler {

@@ -5,7 +5,7 @@
 #include "common/colour/paraview_json.h"
 #include "common/core/utf8.h"
 #include "common/geometry/clip.h"
-#include "common/geometry/trajectory_file.h"
+#include "common/geometry/trajectory.h"
 #include "common/image/background.h"
 #include "common/julia/flags.h"
 #include "common/julia/timeline.h"

@@ -9,6 +9,7 @@
 #include "tests/support/keys/lease_key.h"
 #include "tests/support/play/any_message.h"
 #include "tests/support/play/play.h"
+#include "tests/support/volume/slices.h"
 
 namespace telesplat::test {
 namespace {

@@ -5,7 +5,6 @@
 #include <random>
 
 #include "common/geometry/camera.h"
-#include "common/geometry/ray_axes.h"
 
 namespace telesplat::geometry {
 namespace {

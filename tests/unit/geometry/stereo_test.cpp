@@ -5,6 +5,7 @@
 
 #include "common/geometry/stereo.h"
 #include "common/geometry/trajectory.h"
+#include "tests/support/eye_cameras.h"
 
 namespace telesplat::geometry {
 namespace {

@@ -10,6 +10,7 @@
 #include "common/volume/session.h"
 #include "services/packer/slices/slice_packing.h"
 #include "tests/support/keys/lease_key.h"
+#include "tests/support/volume/slices.h"
 
 namespace telesplat::packer {
 namespace {

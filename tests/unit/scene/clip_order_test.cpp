@@ -41,7 +41,8 @@ TEST(ClipOrder, IsMeantInTheDatasOwnCoordinates) {
     const geometry::Clip clip = placed(c.text);
     for (int i = 0; i < 500; ++i) {
       const glm::dvec3 p(10 + 40 * unit(random), 20 + 20 * unit(random), 30 + 30 * unit(random));
-      EXPECT_EQ(clip.keeps(kShelf.to_room(p)), c.keeps(p)) << c.text << " at " << p.x << " " << p.y << " " << p.z;
+      EXPECT_EQ(clip.keeps(glm::dvec3(kShelf.data_to_room * glm::dvec4(p, 1))), c.keeps(p))
+          << c.text << " at " << p.x << " " << p.y << " " << p.z;
     }
   }
 }

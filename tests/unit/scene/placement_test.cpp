@@ -24,7 +24,7 @@ TEST(Placement, IsUndone) {
   EXPECT_NEAR(corner.x, 501000, 1e-3);
   EXPECT_NEAR(corner.y, 4000500, 1e-3);
   EXPECT_NEAR(corner.z, 1300, 1e-3);
-  const glm::dvec3 back = p.to_room(corner);
+  const glm::dvec3 back = glm::dvec3(p.data_to_room * glm::dvec4(corner, 1));
   EXPECT_NEAR(glm::distance(back, glm::dvec3(0.4, 0.04, -0.2)), 0, 1e-9);
   const glm::dvec3 up = p.direction_to_data({0, 1, 0});
   EXPECT_NEAR(up.z, 1, 1e-12);
@@ -66,7 +66,7 @@ TEST(Placement, CoordinatesAreTheFilesOwnWhateverIsShown) {
   EXPECT_NEAR(p.box_data.hi.y, 47, 1e-12);
   EXPECT_NEAR(p.box_data.hi.z, 4400, 1e-9);
   const glm::dvec3 peak(7.65861, 45.97639 + 0.5, 4478);
-  const glm::dvec3 back = p.to_data(p.to_room(peak));
+  const glm::dvec3 back = p.to_data(glm::dvec3(p.data_to_room * glm::dvec4(peak, 1)));
   EXPECT_NEAR(back.x, peak.x, 1e-9);
   EXPECT_NEAR(back.z, peak.z, 1e-6);
   EXPECT_EQ(place_text(p, peak), "lon 7.6586100, lat 46.4763900, height 4478.000 m (EPSG:4326 WGS 84)");

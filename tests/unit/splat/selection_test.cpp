@@ -8,6 +8,7 @@
 #include "common/geometry/stereo.h"
 #include "common/geometry/trajectory.h"
 #include "common/splat/select/view_selection.h"
+#include "tests/support/eye_cameras.h"
 #include "tests/support/splat_scene.h"
 
 namespace telesplat {

@@ -8,6 +8,7 @@
 #include "client/viewer/stereo_flags.h"
 #include "client/viewer/viewer_options.h"
 #include "common/geometry/stereo.h"
+#include "tests/support/eye_cameras.h"
 #include "tests/support/files/own_folder.h"
 
 namespace telesplat::viewer {

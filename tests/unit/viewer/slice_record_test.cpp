@@ -11,6 +11,7 @@
 #include "client/viewer/slices/receiver.h"
 #include "common/wire/serial.h"
 #include "tests/support/volume/frames.h"
+#include "tests/support/volume/slices.h"
 
 namespace telesplat::viewer {
 namespace {

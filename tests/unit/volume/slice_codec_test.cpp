@@ -9,6 +9,7 @@
 #include "common/volume/slices/block.h"
 #include "common/volume/slices/image.h"
 #include "common/volume/slices/view.h"
+#include "tests/support/volume/slices.h"
 
 namespace telesplat::volume {
 namespace {

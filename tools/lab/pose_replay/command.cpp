@@ -5,7 +5,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
-#include "common/geometry/trajectory_file.h"
+#include "common/geometry/trajectory.h"
 #include "common/net/plain/plain_socket.h"
 #include "common/net/service.h"
 #include "common/wire/head_pose.h"
