@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdint>
 #include <limits>
@@ -86,12 +87,23 @@ class TextScanner {
   const char* begin_;
 };
 
+/// Without white space around it.
+inline std::string_view trim(std::string_view text) {
+  while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
+  while (!text.empty() && static_cast<unsigned char>(text.back()) <= ' ') text.remove_suffix(1);
+  return text;
+}
+
 /// The rest of a line as a name: without blanks around it.
 inline std::string rest_of_line(std::string_view content, size_t offset) {
-  std::string_view name = content.substr(offset, content.find('\n', offset) - offset);
-  while (!name.empty() && static_cast<unsigned char>(name.front()) <= ' ') name.remove_prefix(1);
-  while (!name.empty() && static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
-  return std::string(name);
+  return std::string(trim(content.substr(offset, content.find('\n', offset) - offset)));
+}
+
+/// In small letters, as far as they are ASCII's.
+inline std::string lower(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return out;
 }
 
 }  // namespace telesplat::data

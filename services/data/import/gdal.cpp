@@ -6,12 +6,12 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <map>
 #include <optional>
 
 #include "common/core/utf8.h"
 #include "common/core/within.h"
 #include "services/data/base/refusal.h"
+#include "services/data/base/text_scanner.h"
 #include "services/data/import/gdal.h"
 
 namespace telesplat::data {
@@ -69,32 +69,19 @@ struct HeightUnit {
   std::string from;  // what says so
 };
 
-std::optional<double> metres_of(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+std::optional<double> metres_of(const std::string& name) {
   constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937;
-  static const std::map<std::string, double> kUnits = {{"m", 1},
-                                                       {"metre", 1},
-                                                       {"metres", 1},
-                                                       {"meter", 1},
-                                                       {"meters", 1},
-                                                       {"mm", 0.001},
-                                                       {"cm", 0.01},
-                                                       {"centimetre", 0.01},
-                                                       {"dm", 0.1},
-                                                       {"decimetre", 0.1},
-                                                       {"km", 1000},
-                                                       {"kilometre", 1000},
-                                                       {"ft", kFoot},
-                                                       {"foot", kFoot},
-                                                       {"feet", kFoot},
-                                                       {"international foot", kFoot},
-                                                       {"us survey foot", kSurveyFoot},
-                                                       {"us_survey_foot", kSurveyFoot},
-                                                       {"us-ft", kSurveyFoot},
-                                                       {"ftus", kSurveyFoot},
-                                                       {"foot_us", kSurveyFoot}};
-  const auto found = kUnits.find(name);
-  return found == kUnits.end() ? std::nullopt : std::optional(found->second);
+  constexpr std::pair<std::string_view, double> kUnits[] = {
+      {"|m|metre|metres|meter|meters|", 1},
+      {"|mm|", 0.001},
+      {"|cm|centimetre|", 0.01},
+      {"|dm|decimetre|", 0.1},
+      {"|km|kilometre|", 1000},
+      {"|ft|foot|feet|international foot|", kFoot},
+      {"|us survey foot|us_survey_foot|us-ft|ftus|foot_us|", kSurveyFoot}};
+  for (const auto& [names, metres] : kUnits)
+    if (names.find('|' + lower(name) + '|') != names.npos) return metres;
+  return std::nullopt;
 }
 
 // The band's own unit first, then that of a vertical reference system, then the plan's: surveys in feet have heights in

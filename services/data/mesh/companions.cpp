@@ -5,6 +5,7 @@
 #include <pugixml.hpp>
 
 #include "services/data/base/mapped_file.h"
+#include "services/data/base/text_scanner.h"
 #include "services/data/gltf/container.h"
 #include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/formats/ply.h"
@@ -42,8 +43,8 @@ constexpr size_t kMostName = 200;
 constexpr size_t kNoMark = std::string_view::npos;
 
 // What the readers take for colours of the mesh.
-bool names_colours(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+bool names_colours(std::string_view text) {
+  const std::string name = lower(text);
   for (const char* colours : {"rgb", "rgba", "color", "colors", "colours", "color_0"})
     if (name == colours) return true;
   return false;

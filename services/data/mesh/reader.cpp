@@ -1,6 +1,7 @@
 #include "services/data/mesh/reader.h"
 
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +9,10 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/base/numbered.h"
+#include "services/data/base/text_scanner.h"
 #include "services/data/gltf/container.h"
+#include "services/data/import/process.h"
+#include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
@@ -19,12 +23,7 @@ constexpr const char* kSupported =
     "and "
     "XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, raw voxels with --raw)";
 
-std::string extension_of(const std::string& path) {
-  std::string out = std::filesystem::path(path).extension().string();
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
-}
+std::string extension_of(const std::string& path) { return lower(std::filesystem::path(path).extension().string()); }
 
 bool is_one_of(const std::string& word, std::initializer_list<const char*> words) {
   return std::any_of(words.begin(), words.end(), [&](const char* w) { return word == w; });
@@ -111,6 +110,62 @@ bool looks_like_obj(std::string_view content) {
   return false;
 }
 
+// Error: an array is named, but files of this format have none.
+Status check_array(const std::string& array, const std::string& format, const std::string& path) {
+  if (array.empty() || has_arrays(format)) return ok_status();
+  if (format == "raster")
+    return Error{
+        fmt::format("--colour-by {}: {} is an elevation raster, which is coloured by its heights", array, path)};
+  return Error{fmt::format("--colour-by {}: {} is a file of format {}, which has no arrays; PLY, VTP, VTU and VTK have",
+                           array, path, format)};
+}
+
+// Files that it names are read from its folder.
+Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
+                      const std::string& array) {
+  if (progress) progress(0.0);
+  FolderCompanions companions(path);
+  return vtk::read_mesh(content, path, companions, array);
+}
+
+// As read_gltf() (gltf/reader.h), in the program telesplat-import: a crash on a hostile file does not reach us.
+Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
+                                uint64_t texture_detail) {
+  if (progress) progress(0.0);
+  std::vector<std::string> files = companion_files(content, "gltf", path);
+  files.insert(files.begin(), path);
+  return import("the glTF", {"gltf", path, std::to_string(texture_detail)}, files);
+}
+
+// An OBJ or PLY that pictures cover, read in telesplat-import: decoders of pictures are foreign, too. None: it is of
+// another format, or names no picture.
+std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::string& format, const std::string& path,
+                                          const ReadProgress& progress, const std::string& array,
+                                          uint64_t texture_detail) {
+  if (format != "obj" && format != "ply") return std::nullopt;
+  std::vector<std::string> files = companion_files(content, format, path);
+  FolderCompanions folder(path);
+  const size_t libraries = format == "obj" ? obj_material_libraries(content, folder).size() : 0;
+  if (files.size() <= libraries) return std::nullopt;
+  if (progress) progress(0.0);
+  files.insert(files.begin(), path);
+  return import("the " + format, {format, path, std::to_string(texture_detail), array}, files);
+}
+
+// An elevation raster, through GDAL, in telesplat-import; coloured and triangulated: elevation.h.
+Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
+                            const ReadProgress& progress) {
+  if (progress) progress(0.0);
+  std::error_code error;
+  for (const std::string& name : vrt_sources(content))
+    if (!std::filesystem::exists(std::filesystem::path(path).parent_path() / name, error))
+      return Error{fmt::format("{}: is made of {}, which is missing", path, name)};
+  std::vector<std::string> files = companion_files(content, "raster", path);
+  files.insert(files.begin(), path);
+  if (!options.texture.empty()) files.push_back(options.texture);
+  return import("GDAL's raster", {"raster", path, fmt::format("{}", options.z_scale), options.texture}, files);
+}
+
 }  // namespace
 
 DetectedFormat detect_format(std::string_view content, const std::string& path) {
@@ -135,22 +190,6 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
 }
 
 bool has_arrays(std::string_view format) { return format == "ply" || vtk::is_mesh_kind(format); }
-
-Status check_array(const std::string& array, const std::string& format, const std::string& path) {
-  if (array.empty() || has_arrays(format)) return ok_status();
-  if (format == "raster")
-    return Error{
-        fmt::format("--colour-by {}: {} is an elevation raster, which is coloured by its heights", array, path)};
-  return Error{fmt::format("--colour-by {}: {} is a file of format {}, which has no arrays; PLY, VTP, VTU and VTK have",
-                           array, path, format)};
-}
-
-Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
-                      const std::string& array) {
-  if (progress) progress(0.0);
-  FolderCompanions companions(path);
-  return vtk::read_mesh(content, path, companions, array);
-}
 
 Result<MeshFile> find_mesh_file(const std::string& path) {
   std::error_code error;
@@ -194,6 +233,31 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
   } catch (const std::bad_alloc&) {
     return Error{fmt::format("{}: this machine's memory does not suffice to read its {} bytes", path, content.size())};
   }
+}
+
+Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
+                               uint64_t texture_detail, const Progress& progress) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const DetectedFormat detected = detect_format((*file)->text(), path);
+  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
+  std::vector<std::string> files{path};
+  for (auto& companion : companion_files((*file)->text(), detected.format, path)) files.push_back(std::move(companion));
+  const bool raster = detected.format == "raster";
+  if (!raster && (elevation.z_scale != 0 || !elevation.texture.empty()))
+    return Error{fmt::format("{}: is no elevation raster, but --z-scale or --texture is given", path)};
+  if (!elevation.texture.empty()) {
+    const auto texture = MappedFile::open(elevation.texture);
+    if (!texture) return texture.error();
+    files.push_back(elevation.texture);
+  }
+  if (const Status s = check_array(array, detected.format, path); !s) return s.error();
+  std::string variant = raster ? fmt::format("-z{}", elevation.z_scale) : "";
+  if (!array.empty()) variant += fmt::format("-by{:016x}", XXH3_64bits(array.data(), array.size()));
+  const bool textured = detected.format == "obj" || detected.format == "gltf";
+  if (textured && texture_detail != kDefaultTextureDetail) variant += fmt::format("-t{}", texture_detail);
+  return MeshSource{hash_files(files, progress), variant,
+                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array, texture_detail); }, array};
 }
 
 }  // namespace telesplat::data

@@ -1,7 +1,6 @@
 // Reading mesh files: one function a format, and one that finds out which.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -40,28 +39,6 @@ Result<MeshFile> find_mesh_file(const std::string& path);
 
 /// Whether files of this format can hold arrays.
 bool has_arrays(std::string_view format);
-/// Error: an array is named, but files of this format have none.
-Status check_array(const std::string& array, const std::string& format, const std::string& path);
-
-/// VTK's files: vtk/reader.h. Files that it names are read from its folder.
-Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
-                      const std::string& array = {});
-/// glTF, as read_gltf() (gltf/reader.h), in the program telesplat-import, which must lie beside this process's own
-/// program or in $PATH: a crash on a hostile file does not reach us.
-Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
-                                uint64_t texture_detail);
-
-/// An OBJ or PLY that pictures cover, read by the readers above in telesplat-import: decoders of pictures are foreign,
-/// too. None: it is of another format, or names no picture.
-std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::string& format, const std::string& path,
-                                          const ReadProgress& progress, const std::string& array,
-                                          uint64_t texture_detail);
-
-/// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
-/// elevation.h.
-Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
-                            const ReadProgress& progress);
-
 /// Other files that `path` pulls in (material libraries of an OBJ and their textures, pictures of a PLY, buffers and
 /// images of a glTF, files of a VRT, what says beside a raster where it lies), as paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);

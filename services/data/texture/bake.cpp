@@ -3,73 +3,24 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <glm/geometric.hpp>
-#include <unordered_map>
 #include <vector>
 
 #include "common/image/srgb.h"
 #include "common/parallel/in_parallel.h"
+#include "services/data/base/numbering.h"
 
 namespace telesplat::data {
 
-/// Open addressing: millions of edges a pass.
-class EdgeMap {
- public:
-  static constexpr uint32_t kNone = ~uint32_t{0};
-
-  EdgeMap() { clear(); }
-  void clear() {
-    keys_.assign(1024, kEmpty);
-    values_.assign(1024, kNone);
-    size_ = 0;
-  }
-  size_t size() const { return size_; }
-
-  uint32_t find(uint32_t a, uint32_t b) const { return values_[slot(key(a, b))]; }
-  /// The value of this edge; `value` from now on if it had none.
-  uint32_t insert(uint32_t a, uint32_t b, uint32_t value) {
-    if (2 * (size_ + 1) > keys_.size()) grow();
-    const size_t at = slot(key(a, b));
-    if (keys_[at] == kEmpty) {
-      keys_[at] = key(a, b);
-      values_[at] = value;
-      ++size_;
-    }
-    return values_[at];
-  }
-
- private:
-  static constexpr uint64_t kEmpty = ~uint64_t{0};
-  static uint64_t key(uint32_t a, uint32_t b) { return a < b ? uint64_t{a} << 32 | b : uint64_t{b} << 32 | a; }
-  size_t slot(uint64_t key) const {
-    const size_t mask = keys_.size() - 1;
-    size_t at = size_t((key * 0x9e3779b97f4a7c15ull) >> 20) & mask;
-    while (keys_[at] != kEmpty && keys_[at] != key) at = (at + 1) & mask;
-    return at;
-  }
-  void grow() {
-    std::vector<uint64_t> keys(keys_.size() * 2, kEmpty);
-    std::vector<uint32_t> values(keys.size(), kNone);
-    keys.swap(keys_);
-    values.swap(values_);
-    for (size_t i = 0; i < keys.size(); ++i) {
-      if (keys[i] == kEmpty) continue;
-      const size_t at = slot(keys[i]);
-      keys_[at] = keys[i];
-      values_[at] = values[i];
-    }
-  }
-
-  std::vector<uint64_t> keys_;
-  std::vector<uint32_t> values_;
-  size_t size_ = 0;
-};
-
 namespace {
+
+struct Edge {
+  uint32_t low, high;
+  Edge(uint32_t a, uint32_t b) : low(std::min(a, b)), high(std::max(a, b)) {}
+};
+constexpr uint32_t kNone = Numbering<Edge>::kNone;
 
 constexpr float kShortestEdge = 1.5f;         // texels: longer ones may be halved
 constexpr float kShortestNearestEdge = 0.5f;  // of textures whose texels have sharp rims
@@ -85,11 +36,6 @@ glm::vec3 codes(glm::vec3 linear) {
   return out;
 }
 
-glm::vec3 linear_of(uint32_t rgb) {
-  const auto& table = image::linear_of_srgb();
-  return {table[rgb >> 16 & 255], table[rgb >> 8 & 255], table[rgb & 255]};
-}
-
 uint32_t mean_colour(uint32_t a, uint32_t b) {
   uint32_t out = 0;
   for (const int shift : {16, 8, 0}) out = out << 8 | ((a >> shift & 255) + (b >> shift & 255) + 1) / 2;
@@ -98,18 +44,10 @@ uint32_t mean_colour(uint32_t a, uint32_t b) {
 
 // Vertices at the same position have the same number, so that edges are halved on both sides of a seam.
 std::vector<uint32_t> number_positions(const std::vector<glm::dvec3>& positions) {
-  struct Hash {
-    size_t operator()(const glm::dvec3& p) const {
-      uint64_t h = 0;
-      for (int a = 0; a < 3; ++a)
-        h = std::rotl((h ^ std::bit_cast<uint64_t>(p[a] + 0.0)) * 0x9e3779b97f4a7c15ull, 29);  // -0 is 0
-      return size_t(h);
-    }
-  };
-  std::unordered_map<glm::dvec3, uint32_t, Hash> numbers;
-  numbers.reserve(positions.size());
-  std::vector<uint32_t> out(positions.size());
-  for (size_t v = 0; v < positions.size(); ++v) out[v] = numbers.emplace(positions[v], uint32_t(v)).first->second;
+  Numbering<glm::dvec3> numbers(positions.size());
+  std::vector<uint32_t> out;
+  out.reserve(positions.size());
+  for (const glm::dvec3& p : positions) out.push_back(numbers(p + glm::dvec3(0.0)));  // -0 is 0
   return out;
 }
 
@@ -232,15 +170,12 @@ class Baker {
       if (room < 16 || room < wanted.size() / 64) return leave_out(wanted);
       wanted.resize(room);
     }
-    marked_.clear();
+    marked_ = Numbering<Edge>();
     for (const auto& [size, t] : wanted)
       for (int k = 0; k < 3; ++k)
-        if (wish[t] >> k & 1) {
-          const uint32_t next = places_ + uint32_t(marked_.size());
-          marked_.insert(place_[corner(t, k)], place_[corner(t, (k + 1) % 3)], next);
-        }
-    places_ += uint32_t(marked_.size());
+        if (wish[t] >> k & 1) marked_({place_[corner(t, k)], place_[corner(t, (k + 1) % 3)]});
     divide_all(triangles);
+    places_ += uint32_t(marked_.keys().size());
     return true;
   }
 
@@ -251,15 +186,16 @@ class Baker {
   }
 
   void divide_all(size_t triangles) {
-    middles_.clear();
+    middles_ = Numbering<Edge>();
+    first_middle_ = uint32_t(mesh_.positions.size());
     for (size_t t = 0; t < triangles; ++t) {
       uint32_t middle[3];
       bool any = false;
       for (int k = 0; k < 3; ++k) {
         const uint32_t a = corner(t, k), b = corner(t, (k + 1) % 3);
-        const uint32_t place = marked_.find(place_[a], place_[b]);
-        middle[k] = place == EdgeMap::kNone ? EdgeMap::kNone : middle_of(a, b, place);
-        any |= place != EdgeMap::kNone;
+        const uint32_t number = marked_.find({place_[a], place_[b]});
+        middle[k] = number == kNone ? kNone : middle_of(a, b, places_ + number);
+        any |= number != kNone;
       }
       if (any) divide(t, middle);
     }
@@ -267,7 +203,7 @@ class Baker {
 
   uint32_t middle_of(uint32_t a, uint32_t b, uint32_t place) {
     const auto next = uint32_t(mesh_.positions.size());
-    const uint32_t v = middles_.insert(a, b, next);
+    const uint32_t v = first_middle_ + middles_({a, b});
     if (v != next) return v;
     mesh_.positions.push_back((mesh_.positions[a] + mesh_.positions[b]) * 0.5);
     const auto unit = [](glm::vec3 n) { return glm::dot(n, n) > 0 ? glm::normalize(n) : n; };
@@ -281,7 +217,6 @@ class Baker {
 
   // The first piece takes the triangle's place; all turn the same way round as it did.
   void divide(size_t t, const uint32_t (&middle)[3]) {
-    constexpr uint32_t kNone = EdgeMap::kNone;
     const uint32_t c[3] = {corner(t, 0), corner(t, 1), corner(t, 2)};
     const int count = (middle[0] != kNone) + (middle[1] != kNone) + (middle[2] != kNone);
     if (count == 3) {
@@ -343,8 +278,10 @@ class Baker {
   std::vector<uint32_t> place_;  // of each vertex: the number of its position
   uint32_t places_ = 0;
   std::vector<bool> settled_;  // of each triangle: nothing more is to be seen in it
-  EdgeMap marked_, middles_;   // by positions: edges to halve; by vertices: the vertices in their middles
-  float longest_left_ = 0;     // texels of an edge that should have been halved
+  /// By positions: edges to halve; by vertices: those in whose middles the vertices from first_middle_ on are.
+  Numbering<Edge> marked_, middles_;
+  uint32_t first_middle_ = 0;
+  float longest_left_ = 0;  // texels of an edge that should have been halved
 };
 
 }  // namespace

@@ -16,12 +16,12 @@ int64_t wrapped(int64_t i, int64_t size, Wrap wrap) {
   return at < size ? at : period - 1 - at;
 }
 
-glm::vec3 linear(uint32_t rgb) {
+}  // namespace
+
+glm::vec3 linear_of(uint32_t rgb) {
   const auto& table = image::linear_of_srgb();
   return {table[rgb >> 16 & 255], table[rgb >> 8 & 255], table[rgb & 255]};
 }
-
-}  // namespace
 
 Texture::Texture(image::View picture, Wrap wrap_u, Wrap wrap_v, bool nearest)
     : wrap_{wrap_u, wrap_v}, nearest_(nearest) {
@@ -40,7 +40,7 @@ Texture::Texture(image::View picture, Wrap wrap_u, Wrap wrap_v, bool nearest)
         const int x0 = int(int64_t{x} * from.width / to.width), x1 = int((int64_t{x} + 1) * from.width / to.width);
         const int y0 = int(int64_t{y} * from.height / to.height), y1 = int((int64_t{y} + 1) * from.height / to.height);
         for (int v = y0; v < y1; ++v)
-          for (int u = x0; u < x1; ++u) sum += linear(from.texels[size_t(v) * size_t(from.width) + size_t(u)]);
+          for (int u = x0; u < x1; ++u) sum += linear_of(from.texels[size_t(v) * size_t(from.width) + size_t(u)]);
         sum /= float((x1 - x0) * (y1 - y0));
         to.texels.push_back(image::srgb_of_linear(sum.r) << 16 | image::srgb_of_linear(sum.g) << 8 |
                             image::srgb_of_linear(sum.b));
@@ -50,8 +50,8 @@ Texture::Texture(image::View picture, Wrap wrap_u, Wrap wrap_v, bool nearest)
 }
 
 glm::vec3 Texture::texel(const Level& level, int64_t x, int64_t y) const {
-  return linear(level.texels[size_t(wrapped(y, level.height, wrap_[1])) * size_t(level.width) +
-                             size_t(wrapped(x, level.width, wrap_[0]))]);
+  return linear_of(level.texels[size_t(wrapped(y, level.height, wrap_[1])) * size_t(level.width) +
+                                size_t(wrapped(x, level.width, wrap_[0]))]);
 }
 
 glm::vec3 Texture::sample(glm::vec2 uv, int level) const {

@@ -22,6 +22,8 @@ enum class Wrap : uint8_t { kRepeat, kClamp, kMirror };
 inline constexpr uint32_t kNoTexture = ~uint32_t{0};
 inline constexpr size_t kMaxTexels = size_t{1} << 28;  ///< of all textures of a mesh
 
+glm::vec3 linear_of(uint32_t rgb);  ///< linear light of sRGB codes
+
 /// Immutable, safe to read from any thread.
 class Texture {
  public:

@@ -20,38 +20,6 @@ constexpr double kMaxValue = volume::kMaxTransferValue;
 
 bool is_byte(VoxelType type) { return type == VoxelType::kU8 || type == VoxelType::kI8; }
 
-// Calls body(level of voxel n, n) for n in [begin, end).
-template <class Body>
-class LevelOf {
- public:
-  LevelOf(const Volume& volume, const volume::Levels& levels, const std::vector<uint16_t>& table)
-      : volume_(volume), levels_(levels), table_(table) {}
-
-  void each(size_t begin, size_t end, const Body& body) const {
-    const std::byte* const stored = volume_.stored.data();
-    if (volume_.type == VoxelType::kF32) {
-      for (size_t n = begin; n < end; ++n) {
-        float value;
-        std::memcpy(&value, stored + n * sizeof value, sizeof value);
-        body(std::isfinite(value) ? levels_.level(double(value) * volume_.scale + volume_.offset) : uint16_t(0), n);
-      }
-    } else if (is_byte(volume_.type)) {
-      for (size_t n = begin; n < end; ++n) body(table_[std::to_integer<uint8_t>(stored[n])], n);
-    } else {
-      for (size_t n = begin; n < end; ++n) {
-        uint16_t bits;
-        std::memcpy(&bits, stored + n * sizeof bits, sizeof bits);
-        body(table_[bits], n);
-      }
-    }
-  }
-
- private:
-  const Volume& volume_;
-  const volume::Levels& levels_;
-  const std::vector<uint16_t>& table_;
-};
-
 // The levels of all bit patterns of an integer type; empty for floats.
 std::vector<uint16_t> level_table(const Volume& volume, const volume::Levels& levels) {
   if (volume.type == VoxelType::kF32) return {};
@@ -66,10 +34,26 @@ std::vector<uint16_t> level_table(const Volume& volume, const volume::Levels& le
   return out;
 }
 
+// Calls body(level of voxel n, n) for n in [begin, end).
 template <class Body>
 void each_level(const Volume& volume, const volume::Levels& levels, const std::vector<uint16_t>& table, size_t begin,
                 size_t end, const Body& body) {
-  LevelOf<Body>(volume, levels, table).each(begin, end, body);
+  const std::byte* const stored = volume.stored.data();
+  if (volume.type == VoxelType::kF32) {
+    for (size_t n = begin; n < end; ++n) {
+      float value;
+      std::memcpy(&value, stored + n * sizeof value, sizeof value);
+      body(std::isfinite(value) ? levels.level(double(value) * volume.scale + volume.offset) : uint16_t(0), n);
+    }
+  } else if (is_byte(volume.type)) {
+    for (size_t n = begin; n < end; ++n) body(table[std::to_integer<uint8_t>(stored[n])], n);
+  } else {
+    for (size_t n = begin; n < end; ++n) {
+      uint16_t bits;
+      std::memcpy(&bits, stored + n * sizeof bits, sizeof bits);
+      body(table[bits], n);
+    }
+  }
 }
 
 size_t voxels_a_slice(const Volume& volume) { return size_t(volume.size[0]) * size_t(volume.size[1]); }

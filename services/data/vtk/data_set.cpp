@@ -118,9 +118,7 @@ Cells make_listed_cells(const Array& list, size_t count, const std::string& name
   for (size_t at = 0; out.size() < count; at += words[at] + 1) {
     if (at >= words.size() || words[at] > words.size() - at - 1)
       refuse("{}: cell {} of {} goes beyond the {} numbers of all", name, out.size(), count, words.size());
-    out.points.insert(out.points.end(), words.begin() + ptrdiff_t(at + 1),
-                      words.begin() + ptrdiff_t(at + 1 + words[at]));
-    out.begins.push_back(out.points.size());
+    out.add(std::span(words).subspan(at + 1, words[at]));
   }
   return out;
 }
@@ -130,9 +128,7 @@ void add_face_stream(std::span<const uint32_t> stream, DataSet& set) {
   for (uint32_t face = 0; stream.empty() || face < stream[0]; ++face) {
     if (at >= stream.size() || stream[at] > stream.size() - at - 1)
       refuse("{}: the faces of a polyhedron are cut off", set.name);
-    const auto corners = stream.subspan(at + 1, stream[at]);
-    set.faces.points.insert(set.faces.points.end(), corners.begin(), corners.end());
-    set.faces.begins.push_back(set.faces.points.size());
+    set.faces.add(stream.subspan(at + 1, stream[at]));
     at += stream[at] + 1;
   }
 }

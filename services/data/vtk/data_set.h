@@ -56,6 +56,10 @@ struct Cells {
   std::vector<uint32_t> points;
 
   size_t size() const { return begins.size() - 1; }
+  void add(std::span<const uint32_t> corners) {
+    points.insert(points.end(), corners.begin(), corners.end());
+    begins.push_back(points.size());
+  }
   std::span<const uint32_t> operator[](size_t i) const {
     return std::span(points).subspan(begins[i], begins[i + 1] - begins[i]);
   }

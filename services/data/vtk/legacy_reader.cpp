@@ -112,22 +112,23 @@ class Parser {
   }
 
   bool type_of(const std::string& name, StoredType& out) const {
-    constexpr TypeName kTypes[] = {{"CHAR", StoredType::kI8},
-                                   {"SIGNED_CHAR", StoredType::kI8},
-                                   {"UNSIGNED_CHAR", StoredType::kU8},
-                                   {"SHORT", StoredType::kI16},
-                                   {"UNSIGNED_SHORT", StoredType::kU16},
-                                   {"INT", StoredType::kI32},
-                                   {"UNSIGNED_INT", StoredType::kU32},
-                                   {"LONG", StoredType::kI64},
-                                   {"UNSIGNED_LONG", StoredType::kU64},
-                                   {"LONG_LONG", StoredType::kI64},
-                                   {"UNSIGNED_LONG_LONG", StoredType::kU64},
-                                   {"VTKTYPEINT64", StoredType::kI64},
-                                   {"VTKTYPEUINT64", StoredType::kU64},
-                                   {"VTKIDTYPE", StoredType::kI32},
-                                   {"FLOAT", StoredType::kF32},
-                                   {"DOUBLE", StoredType::kF64}};
+    using enum StoredType;
+    constexpr TypeName kTypes[] = {{"CHAR", kI8},
+                                   {"SIGNED_CHAR", kI8},
+                                   {"UNSIGNED_CHAR", kU8},
+                                   {"SHORT", kI16},
+                                   {"UNSIGNED_SHORT", kU16},
+                                   {"INT", kI32},
+                                   {"UNSIGNED_INT", kU32},
+                                   {"LONG", kI64},
+                                   {"UNSIGNED_LONG", kU64},
+                                   {"LONG_LONG", kI64},
+                                   {"UNSIGNED_LONG_LONG", kU64},
+                                   {"VTKTYPEINT64", kI64},
+                                   {"VTKTYPEUINT64", kU64},
+                                   {"VTKIDTYPE", kI32},
+                                   {"FLOAT", kF32},
+                                   {"DOUBLE", kF64}};
     const auto found = type_named(name, kTypes);
     out = found.value_or(out);
     return found.has_value();
@@ -372,12 +373,9 @@ class Parser {
     Cells kept;
     set_.face_begins.assign(1, 0);
     for (size_t cell = 0; cell < set_.types.size(); ++cell) {
-      const auto points = set_.cells[cell];
-      if (set_.types[cell] != kPolyhedron)
-        kept.points.insert(kept.points.end(), points.begin(), points.end());
-      else
-        add_face_stream(points, set_);
-      kept.begins.push_back(kept.points.size());
+      const bool polyhedron = set_.types[cell] == kPolyhedron;
+      if (polyhedron) add_face_stream(set_.cells[cell], set_);
+      kept.add(polyhedron ? std::span<const uint32_t>() : set_.cells[cell]);
       set_.face_begins.push_back(set_.faces.size());
     }
     set_.cells = std::move(kept);

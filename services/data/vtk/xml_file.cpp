@@ -10,12 +10,6 @@ namespace {
 
 constexpr size_t kNone = std::string_view::npos;
 
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
-  while (!text.empty() && static_cast<unsigned char>(text.back()) <= ' ') text.remove_suffix(1);
-  return text;
-}
-
 // The end of the markup that begins at `at`, behind its '>'; npos: it has none.
 size_t markup_end(std::string_view text, size_t at) {
   const auto behind = [&](std::string_view mark) {

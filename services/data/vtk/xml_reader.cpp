@@ -76,9 +76,7 @@ void read_listed_faces(Piece& piece, pugi::xml_node cells) {
   for (const uint32_t face : faces.points) {
     if (set.faces.points.size() > 4 * all.points.size())  // two cells may share a face
       refuse("{}: its polyhedra have more than four times the faces that there are", set.name);
-    const auto corners = all[face];
-    set.faces.points.insert(set.faces.points.end(), corners.begin(), corners.end());
-    set.faces.begins.push_back(set.faces.points.size());
+    set.faces.add(all[face]);
   }
 }
 

@@ -16,13 +16,11 @@ namespace {
 
 constexpr size_t kMaxHeaderBytes = 1 << 20, kMaxElements = 64, kMaxProperties = 256, kMaxTextures = 1024;
 
-constexpr TypeName kTypes[] = {
-    {"char", StoredType::kI8},     {"int8", StoredType::kI8},    {"uchar", StoredType::kU8},
-    {"uint8", StoredType::kU8},    {"short", StoredType::kI16},  {"int16", StoredType::kI16},
-    {"ushort", StoredType::kU16},  {"uint16", StoredType::kU16}, {"int", StoredType::kI32},
-    {"int32", StoredType::kI32},   {"uint", StoredType::kU32},   {"uint32", StoredType::kU32},
-    {"int64", StoredType::kI64},   {"uint64", StoredType::kU64}, {"float", StoredType::kF32},
-    {"float32", StoredType::kF32}, {"double", StoredType::kF64}, {"float64", StoredType::kF64}};
+using enum StoredType;
+constexpr TypeName kTypes[] = {{"char", kI8},     {"int8", kI8},    {"uchar", kU8},   {"uint8", kU8},   {"short", kI16},
+                               {"int16", kI16},   {"ushort", kU16}, {"uint16", kU16}, {"int", kI32},    {"int32", kI32},
+                               {"uint", kU32},    {"uint32", kU32}, {"int64", kI64},  {"uint64", kU64}, {"float", kF32},
+                               {"float32", kF32}, {"double", kF64}, {"float64", kF64}};
 
 // The words of one header line, at most six.
 std::vector<std::string_view> split(TextScanner& scan) {

@@ -19,29 +19,22 @@ enum class Target : uint8_t { kNone, kX, kY, kZ, kNormalX, kNormalY, kNormalZ, k
 
 // textured: the file names a picture, so that numbers with these names are places in it.
 Target target_of(std::string_view name, bool textured) {
-  constexpr std::pair<std::string_view, Target> kTargets[] = {{"x", Target::kX},
-                                                              {"y", Target::kY},
-                                                              {"z", Target::kZ},
-                                                              {"nx", Target::kNormalX},
-                                                              {"ny", Target::kNormalY},
-                                                              {"nz", Target::kNormalZ},
-                                                              {"red", Target::kRed},
-                                                              {"green", Target::kGreen},
-                                                              {"blue", Target::kBlue},
-                                                              {"r", Target::kRed},
-                                                              {"g", Target::kGreen},
-                                                              {"b", Target::kBlue},
-                                                              {"diffuse_red", Target::kRed},
-                                                              {"diffuse_green", Target::kGreen},
-                                                              {"diffuse_blue", Target::kBlue},
-                                                              {"s", Target::kU},
-                                                              {"t", Target::kV},
-                                                              {"u", Target::kU},
-                                                              {"v", Target::kV},
-                                                              {"texture_u", Target::kU},
-                                                              {"texture_v", Target::kV}};
-  for (const auto& [word, target] : kTargets)
-    if (word == name) return target < Target::kU || textured ? target : Target::kNone;
+  constexpr std::string_view kNames[] = {"",
+                                         "|x|",
+                                         "|y|",
+                                         "|z|",
+                                         "|nx|",
+                                         "|ny|",
+                                         "|nz|",
+                                         "|red|r|diffuse_red|",
+                                         "|green|g|diffuse_green|",
+                                         "|blue|b|diffuse_blue|",
+                                         "|s|u|texture_u|",
+                                         "|t|v|texture_v|"};
+  static_assert(std::size(kNames) == size_t(Target::kCount));
+  const std::string word = '|' + std::string(name) + '|';
+  for (size_t i = 1; i < (textured ? std::size(kNames) : size_t(Target::kU)); ++i)
+    if (kNames[i].find(word) != word.npos) return Target(i);
   return Target::kNone;
 }
 

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 
+#include "services/data/base/numbering.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/readers.h"
 
@@ -14,44 +14,14 @@ namespace {
 
 constexpr size_t kBinaryHeader = 84, kBinaryTriangle = 50;
 
-// Joins corners that lie at exactly the same place: an open hash table from positions to vertex numbers that grows with
-// them.
+// Joins corners that lie at exactly the same place.
 class Welder {
  public:
-  explicit Welder(std::vector<glm::dvec3>& positions) : positions_(positions), table_(1024, kFree) {}
-
-  uint32_t operator()(glm::dvec3 p) {
-    p += glm::dvec3(0.0);  // -0 and 0 are the same place
-    if (2 * positions_.size() >= table_.size()) grow();
-    uint32_t& slot = find(p);
-    if (slot == kFree) {
-      slot = static_cast<uint32_t>(positions_.size());
-      positions_.push_back(p);
-    }
-    return slot;
-  }
+  uint32_t operator()(const glm::dvec3& p) { return places_(p + glm::dvec3(0.0)); }  // -0 and 0 are the same place
+  std::vector<glm::dvec3> positions() { return places_.take_keys(); }
 
  private:
-  static constexpr uint32_t kFree = ~uint32_t{0};
-
-  static uint64_t hash(const glm::dvec3& p) {
-    uint64_t h = 0;
-    for (int a = 0; a < 3; ++a) h = (std::rotl(h, 23) ^ std::bit_cast<uint64_t>(p[a])) * 0x9e3779b97f4a7c15;
-    return h ^ h >> 32;
-  }
-  uint32_t& find(const glm::dvec3& p) {
-    const size_t mask = table_.size() - 1;
-    size_t slot = hash(p) & mask;
-    while (table_[slot] != kFree && std::memcmp(&positions_[table_[slot]], &p, sizeof p) != 0) slot = (slot + 1) & mask;
-    return table_[slot];
-  }
-  void grow() {
-    table_.assign(2 * table_.size(), kFree);
-    for (size_t i = 0; i < positions_.size(); ++i) find(positions_[i]) = static_cast<uint32_t>(i);
-  }
-
-  std::vector<glm::dvec3>& positions_;
-  std::vector<uint32_t> table_;
+  Numbering<glm::dvec3> places_;
 };
 
 // Case is ignored, as programs write it both ways.
@@ -100,7 +70,7 @@ Result<Mesh> read_binary(std::string_view content, const std::string& name, cons
   Mesh mesh;
   mesh.format = "stl";
   mesh.indices.reserve(3 * size_t{triangles});
-  Welder weld(mesh.positions);
+  Welder weld;
   std::vector<uint16_t> bits(triangles);
   for (uint32_t t = 0; t < triangles; ++t) {
     float corner[9];
@@ -110,6 +80,7 @@ Result<Mesh> read_binary(std::string_view content, const std::string& name, cons
     for (int k = 0; k < 3; ++k) mesh.indices.push_back(weld({corner[3 * k], corner[3 * k + 1], corner[3 * k + 2]}));
     if ((t & 0xffff) == 0 && progress) progress(static_cast<double>(t) / triangles);
   }
+  mesh.positions = weld.positions();
   if (const auto colours = facet_colours(content.substr(0, 80), bits); !colours.empty()) colour_faces(mesh, colours);
   return mesh;
 }
@@ -118,7 +89,7 @@ Result<Mesh> read_binary(std::string_view content, const std::string& name, cons
 Result<Mesh> read_ascii(std::string_view content, const std::string& name, const ReadProgress& progress) {
   Mesh mesh;
   mesh.format = "stl";
-  Welder weld(mesh.positions);
+  Welder weld;
   TextScanner scan(content);
   bool ended = false;
   for (size_t lines = 0; scan.skip_space(); ++lines) {
@@ -141,6 +112,7 @@ Result<Mesh> read_ascii(std::string_view content, const std::string& name, const
   }
   if (!ended || mesh.indices.size() % 3 != 0)
     return Error{fmt::format("{}: is truncated: no 'endsolid' at its end", name)};
+  mesh.positions = weld.positions();
   return mesh;
 }
 

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <filesystem>
 
-#include "services/data/base/text_scanner.h"
-
 namespace telesplat::data {
 namespace {
 
@@ -34,18 +32,6 @@ std::vector<std::string> files_of_pattern(std::string_view text, const std::stri
 }
 
 }  // namespace
-
-std::string_view trim(std::string_view text) {
-  while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
-  while (!text.empty() && static_cast<unsigned char>(text.back()) <= ' ') text.remove_suffix(1);
-  return text;
-}
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return out;
-}
 
 std::optional<std::vector<double>> numbers(std::string_view text, bool loose) {
   std::string plain(text.substr(0, 4096));  // no header has that many numbers in a line

@@ -10,12 +10,11 @@
 #include <vector>
 
 #include "services/data/base/refusal.h"
+#include "services/data/base/text_scanner.h"
 #include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 
-std::string_view trim(std::string_view text);
-std::string lower(std::string_view text);
 /// Numbers between blanks (and commas, parentheses if `loose`); none if anything else is among them.
 std::optional<std::vector<double>> numbers(std::string_view text, bool loose = false);
 /// All of the text as one number.

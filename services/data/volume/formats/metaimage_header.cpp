@@ -9,11 +9,11 @@
 namespace telesplat::data {
 namespace {
 
-constexpr TypeName kTypes[] = {
-    {"MET_CHAR", StoredType::kI8},    {"MET_UCHAR", StoredType::kU8},   {"MET_SHORT", StoredType::kI16},
-    {"MET_USHORT", StoredType::kU16}, {"MET_INT", StoredType::kI32},    {"MET_UINT", StoredType::kU32},
-    {"MET_LONG", StoredType::kI32},   {"MET_ULONG", StoredType::kU32},  {"MET_LONG_LONG", StoredType::kI64},
-    {"MET_FLOAT", StoredType::kF32},  {"MET_DOUBLE", StoredType::kF64}, {"MET_ULONG_LONG", StoredType::kU64}};
+using enum StoredType;
+constexpr TypeName kTypes[] = {{"MET_CHAR", kI8},    {"MET_UCHAR", kU8},   {"MET_SHORT", kI16},
+                               {"MET_USHORT", kU16}, {"MET_INT", kI32},    {"MET_UINT", kU32},
+                               {"MET_LONG", kI32},   {"MET_ULONG", kU32},  {"MET_LONG_LONG", kI64},
+                               {"MET_FLOAT", kF32},  {"MET_DOUBLE", kF64}, {"MET_ULONG_LONG", kU64}};
 
 bool is_true(std::string_view text) { return !text.empty() && (text[0] == 'T' || text[0] == 't' || text[0] == '1'); }
 

@@ -60,10 +60,9 @@ Values values_of(const NiftiFields& f, size_t dim, size_t type, size_t pixdim, s
 }
 
 std::optional<StoredType> type_of(int code) {
-  constexpr std::pair<int, StoredType> kTypes[] = {
-      {2, StoredType::kU8},     {4, StoredType::kI16},   {8, StoredType::kI32},   {16, StoredType::kF32},
-      {64, StoredType::kF64},   {256, StoredType::kI8},  {512, StoredType::kU16}, {768, StoredType::kU32},
-      {1024, StoredType::kI64}, {1280, StoredType::kU64}};
+  using enum StoredType;
+  constexpr std::pair<int, StoredType> kTypes[] = {{2, kU8},   {4, kI16},   {8, kI32},   {16, kF32},   {64, kF64},
+                                                   {256, kI8}, {512, kU16}, {768, kU32}, {1024, kI64}, {1280, kU64}};
   for (const auto& [known, type] : kTypes)
     if (known == code) return type;
   return std::nullopt;
@@ -105,7 +104,8 @@ glm::dmat4 placement_of(const Values& v) {
 VolumeFileHeader parse(std::string_view content, const std::string& path) {
   if (content.size() < kBytes1)
     refuse("{}: ends within its header: {} bytes of at least {}", path, content.size(), kBytes1);
-  const int32_t size = NiftiFields(content, false).at<int32_t>(0), swapped_size = NiftiFields(content, true).at<int32_t>(0);
+  const int32_t size = NiftiFields(content, false).at<int32_t>(0),
+                swapped_size = NiftiFields(content, true).at<int32_t>(0);
   const bool two = size == int32_t(kBytes2) || swapped_size == int32_t(kBytes2);
   const bool swapped = swapped_size == int32_t(kBytes1) || swapped_size == int32_t(kBytes2);
   if (!two && !swapped && size != int32_t(kBytes1))

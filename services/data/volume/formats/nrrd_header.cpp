@@ -10,13 +10,11 @@
 namespace telesplat::data {
 namespace {
 
+using enum StoredType;
 constexpr TypeName kNrrdTypes[] = {
-    {"char", StoredType::kI8},      {"int8", StoredType::kI8},    {"uchar", StoredType::kU8},
-    {"uint8", StoredType::kU8},     {"short", StoredType::kI16},  {"int16", StoredType::kI16},
-    {"ushort", StoredType::kU16},   {"uint16", StoredType::kU16}, {"int", StoredType::kI32},
-    {"int32", StoredType::kI32},    {"uint", StoredType::kU32},   {"uint32", StoredType::kU32},
-    {"longlong", StoredType::kI64}, {"int64", StoredType::kI64},  {"ulonglong", StoredType::kU64},
-    {"uint64", StoredType::kU64},   {"float", StoredType::kF32},  {"double", StoredType::kF64}};
+    {"char", kI8},      {"int8", kI8},    {"uchar", kU8},      {"uint8", kU8},   {"short", kI16}, {"int16", kI16},
+    {"ushort", kU16},   {"uint16", kU16}, {"int", kI32},       {"int32", kI32},  {"uint", kU32},  {"uint32", kU32},
+    {"longlong", kI64}, {"int64", kI64},  {"ulonglong", kU64}, {"uint64", kU64}, {"float", kF32}, {"double", kF64}};
 
 // "unsigned short int" is ushort, "signed char" char, "int8_t" int8.
 std::optional<StoredType> type_of(std::string name) {

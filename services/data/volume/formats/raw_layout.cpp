@@ -35,11 +35,10 @@ std::optional<std::array<int64_t, 3>> take_size(std::string_view& text) {
 
 // Words for types that file names have: "tooth_103x94x161_uint16.raw".
 std::optional<StoredType> type_in(std::string_view name) {
-  constexpr TypeName kWords[] = {
-      {"uint8", StoredType::kU8},    {"uint16", StoredType::kU16}, {"uint32", StoredType::kU32},
-      {"uchar", StoredType::kU8},    {"ushort", StoredType::kU16}, {"int8", StoredType::kI8},
-      {"int16", StoredType::kI16},   {"int32", StoredType::kI32},  {"short", StoredType::kI16},
-      {"float64", StoredType::kF64}, {"double", StoredType::kF64}, {"float", StoredType::kF32}};
+  using enum StoredType;
+  constexpr TypeName kWords[] = {{"uint8", kU8},   {"uint16", kU16},  {"uint32", kU32}, {"uchar", kU8},
+                                 {"ushort", kU16}, {"int8", kI8},     {"int16", kI16},  {"int32", kI32},
+                                 {"short", kI16},  {"float64", kF64}, {"double", kF64}, {"float", kF32}};
   for (const auto& [word, type] : kWords)
     if (name.find(word) != name.npos) return type;
   return std::nullopt;

@@ -69,23 +69,6 @@ constexpr int64_t kMostSide = 1 << 16;
 constexpr int64_t kMostPages = 100'000;
 constexpr uint64_t kMostEntries = 10'000'000;
 
-enum Tag : uint16_t {
-  kSubfile = 254,
-  kWidth = 256,
-  kHeight = 257,
-  kBits = 258,
-  kCompression = 259,
-  kDescription = 270,
-  kStrips = 273,
-  kSamples = 277,
-  kXResolution = 282,
-  kYResolution = 283,
-  kResolutionUnit = 296,
-  kSampleFormat = 339,
-  kPixelScale = 33550,
-  kGeoKeys = 34735,
-};
-
 class Walker {
  public:
   explicit Walker(std::string_view content) : content_(content) {}
@@ -109,11 +92,15 @@ class Walker {
  private:
   struct Page {
     uint64_t subfile = 0, width = 0, height = 0, bits = 1, compression = 1, strip = 0, samples = 1, format = 1;
-    uint64_t unit = 2;
     double x_resolution = 0, y_resolution = 0;
     bool placed = false;
     std::string_view description;
   };
+
+  // TIFF's tags, by number.
+  static constexpr std::pair<uint64_t, uint64_t Page::*> kNumbers[] = {
+      {254, &Page::subfile},     {256, &Page::width}, {257, &Page::height},  {258, &Page::bits},
+      {259, &Page::compression}, {273, &Page::strip}, {277, &Page::samples}, {339, &Page::format}};
 
   bool inside(uint64_t at, uint64_t bytes) const { return at <= content_.size() && bytes <= content_.size() - at; }
 
@@ -139,50 +126,12 @@ class Walker {
     if (!inside(value_at, each * count)) return;
     const uint64_t value = number(value_at, each);
     const double ratio = type == 5 ? double(number(value_at, 4)) / double(number(value_at + 4, 4)) : 0;
-    switch (tag) {
-      case kSubfile:
-        page.subfile = value;
-        break;
-      case kWidth:
-        page.width = value;
-        break;
-      case kHeight:
-        page.height = value;
-        break;
-      case kBits:
-        page.bits = value;
-        break;
-      case kCompression:
-        page.compression = value;
-        break;
-      case kDescription:
-        page.description = content_.substr(value_at, count);
-        break;
-      case kStrips:
-        page.strip = value;
-        break;
-      case kSamples:
-        page.samples = value;
-        break;
-      case kXResolution:
-        page.x_resolution = ratio;
-        break;
-      case kYResolution:
-        page.y_resolution = ratio;
-        break;
-      case kResolutionUnit:
-        page.unit = value;
-        break;
-      case kSampleFormat:
-        page.format = value;
-        break;
-      case kPixelScale:
-      case kGeoKeys:
-        page.placed = true;
-        break;
-      default:
-        break;
-    }
+    for (const auto& [known, to] : kNumbers)
+      if (tag == known) page.*to = value;
+    if (tag == 270) page.description = content_.substr(value_at, count);
+    if (tag == 282) page.x_resolution = ratio;
+    if (tag == 283) page.y_resolution = ratio;
+    if (tag == 33550 || tag == 34735) page.placed = true;  // GeoTIFF's pixel scale and keys
   }
 
   // Reads the directory at `at`, which becomes the place of the next one.
