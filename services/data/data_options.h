@@ -6,7 +6,7 @@
 #include "common/julia/flags.h"
 #include "common/net/service.h"
 #include "common/options/table.h"
-#include "services/data/mesh/options.h"
+#include "services/data/mesh/store.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {

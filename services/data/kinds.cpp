@@ -195,7 +195,6 @@ Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const Mesh
 Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
                                                 const std::string& array, const Progress& user_progress) {
   const Progress progress = user_progress ? user_progress : [](const char*, double) {};
-  if (const Status s = validate(options); !s) return s.error();
   if (options.iso && !array.empty())
     return Error{
         fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};

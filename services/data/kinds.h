@@ -9,7 +9,6 @@
 #include "common/scene/kind.h"
 #include "services/data/base/progress.h"
 #include "services/data/data_options.h"
-#include "services/data/mesh/options.h"
 #include "services/data/mesh/store.h"
 
 namespace telesplat::data {

@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "common/geometry/mesh_chunk.h"
-#include "services/data/mesh/chunker.h"
+#include "services/data/mesh/store_file.h"
 #include "services/data/mesh/reader.h"
 
 namespace telesplat::data {

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "common/geometry/mesh_chunk.h"
-#include "services/data/mesh/chunker.h"
+#include "services/data/mesh/store_file.h"
 #include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {

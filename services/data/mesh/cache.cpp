@@ -154,17 +154,8 @@ void note_use(const std::string& stem, const std::string& source, const std::str
 }
 
 Result<Removal> clear_cache(const std::string& folder) {
-  const auto stores = cached_stores(folder);
-  if (!stores) return stores.error();
-  Removal out;
-  for (const CachedStore& store : *stores) {
-    if (!remove_store(store.stem)) {
-      ++out.in_use;
-      continue;
-    }
-    ++out.stores;
-    out.bytes += store.bytes;
-  }
+  auto out = bound_cache(folder, std::nullopt);
+  if (!out) return out;
   // Locks and notes whose store is gone already.
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
@@ -172,14 +163,14 @@ Result<Removal> clear_cache(const std::string& folder) {
   return out;
 }
 
-Result<Removal> bound_cache(const std::string& folder, uint64_t limit) {
+Result<Removal> bound_cache(const std::string& folder, std::optional<uint64_t> limit) {
   const auto stores = cached_stores(folder);
   if (!stores) return stores.error();
   uint64_t bytes = 0;
   for (const CachedStore& store : *stores) bytes += store.bytes;
   Removal out;
   for (const CachedStore& store : *stores) {
-    if (bytes <= limit) break;
+    if (limit && bytes <= *limit) break;
     if (!remove_store(store.stem)) {
       ++out.in_use;
       continue;

@@ -46,8 +46,9 @@ struct Removal {
 };
 /// Removes every store that nobody uses. The limit stays.
 Result<Removal> clear_cache(const std::string& folder);
-/// Removes stores that nobody uses, those unused for longest first, until the rest has at most `limit` bytes.
-Result<Removal> bound_cache(const std::string& folder, uint64_t limit);
+/// Removes stores that nobody uses, those unused for longest first, until the rest has at most `limit` bytes; without a
+/// limit all.
+Result<Removal> bound_cache(const std::string& folder, std::optional<uint64_t> limit);
 
 /// Bytes; empty: there is none.
 std::optional<uint64_t> cache_limit(const std::string& folder);

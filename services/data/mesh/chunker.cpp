@@ -1,10 +1,10 @@
-#include "services/data/mesh/chunker.h"
+#include "services/data/mesh/store_file.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "common/geometry/mesh_chunk.h"
 #include "common/parallel/in_parallel.h"
+#include "services/data/base/numbering.h"
 
 namespace telesplat::data {
 namespace {
@@ -78,31 +78,6 @@ std::vector<uint32_t> morton_order(const PlacedMesh& mesh, std::span<const uint3
 // A vertex of the whole mesh in one of its colours: it has several where faces are coloured.
 struct Corner {
   uint32_t vertex, colour;
-  bool operator==(const Corner&) const = default;
-};
-
-// Gives each corner of the whole mesh a number within the chunk, in the order of first use. An open hash table.
-class Renumbering {
- public:
-  explicit Renumbering(size_t triangles) : table_(std::bit_ceil(std::max<size_t>(6 * triangles, 16)), kFree) {}
-
-  uint32_t operator()(const Corner& corner) {
-    const size_t mask = table_.size() - 1;
-    const uint64_t hash = (corner.vertex + uint64_t{corner.colour} * 0xbf58476d) * 0x9e3779b97f4a7c15;
-    for (size_t slot = (hash >> 20) & mask;; slot = (slot + 1) & mask) {
-      if (table_[slot] == kFree) {
-        table_[slot] = static_cast<uint32_t>(used_.size());
-        used_.push_back(corner);
-      }
-      if (used_[table_[slot]] == corner) return table_[slot];
-    }
-  }
-  const std::vector<Corner>& used() const { return used_; }  ///< the corner of the whole mesh behind each number
-
- private:
-  static constexpr uint32_t kFree = ~uint32_t{0};
-  std::vector<uint32_t> table_;
-  std::vector<Corner> used_;
 };
 
 }  // namespace
@@ -125,7 +100,7 @@ ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most) {
 }
 
 std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32_t> triangles) {
-  Renumbering number(triangles.size());
+  Numbering<Corner> number(3 * triangles.size());
   std::vector<uint32_t> indices;
   indices.reserve(3 * triangles.size());
   for (uint32_t t : morton_order(mesh, triangles))
@@ -133,7 +108,7 @@ std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32
       const uint32_t vertex = mesh.indices[3 * size_t{t} + k];
       indices.push_back(number({vertex, mesh.face_colours.empty() ? mesh.colours[vertex] : mesh.face_colours[t]}));
     }
-  const std::vector<Corner>& used = number.used();
+  const std::vector<Corner>& used = number.keys();
   std::vector<float> positions;
   positions.reserve(3 * used.size());
   std::vector<uint32_t> normals, colours;

@@ -169,16 +169,6 @@ Descriptor lock_making(const std::string& stem, const Progress& progress) {
 
 }  // namespace
 
-Status validate(const StoreOptions& options) {
-  if (!(options.room_size_m >= 1e-3 && options.room_size_m <= 1e4))
-    return Error{fmt::format("room size {} m is outside [0.001, 10000]", options.room_size_m)};
-  if (!(options.crease_deg >= 0 && options.crease_deg <= 180))
-    return Error{fmt::format("crease angle {} is outside [0, 180] degrees", options.crease_deg)};
-  if (options.up != "auto")
-    if (const auto rotation = rotation_for_up(options.up); !rotation) return rotation.error();
-  return ok_status();
-}
-
 Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, const MeshSource& source,
                                                    const StoreOptions& options, const Progress& progress) {
   if (!options.use_cache) return open_unnamed(path, options, source, progress);

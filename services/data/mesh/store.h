@@ -2,33 +2,59 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/geometry/mesh_chunk.h"
+#include "services/data/base/elevation.h"
 #include "services/data/base/mesh.h"
-#include "services/data/mesh/options.h"
+#include "services/data/base/placement_options.h"
+#include "services/data/base/volume.h"
+#include "services/data/texture/bake.h"
 
 namespace telesplat::data {
 
-/// Error: a room size or an axis that nothing can be placed with.
-Status validate(const StoreOptions& options);
+/// What the store of a mesh depends on beside the mesh.
+struct StoreOptions : PlacementOptions {
+  std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
+  bool use_cache = true;
+};
 
-struct MeshStoreInfo {
-  std::string source;  ///< path of the file it was made from
-  std::string format;  ///< "ply", "obj", ...
+/// What a mesh is coloured by, as people give it.
+struct ColouringOptions {
+  std::string by;               ///< scene::parse_colour_by(); empty: the file's own colours
+  bool by_file = false;         ///< `by` is what the file marks: its own colours count where that is no good
+  std::string map = "viridis";  ///< colour::resolve_colour_map()
+};
+
+struct MeshOptions : StoreOptions {
+  ElevationOptions elevation;                       ///< of elevation rasters alone
+  uint64_t texture_detail = kDefaultTextureDetail;  ///< triangles, at most, of a mesh whose textures are baked
+  ColouringOptions colouring;
+  std::optional<double> iso;  ///< of volumes alone: the surface where they have this value
+  VolumeLayout volume;        ///< with iso
+};
+
+/// What the store's file has as it is in memory.
+struct MeshFigures {
+  uint64_t content_hash = 0;
   uint64_t triangles = 0, vertices = 0;
   uint64_t degenerate_dropped = 0;
-  bool had_normals = false, had_colours = false;
+  uint32_t had_normals = 0, had_colours = 0;  ///< 1: the file has them
+  geometry::DBox box_data;                    ///< as it is shown: the file's coordinates times coordinates.shown
+  geometry::Box box_room;
+};
+
+struct MeshStoreInfo : MeshFigures {
+  std::string source;                    ///< path of the file it was made from
+  std::string format;                    ///< "ply", "obj", ...
   std::vector<scene::ArrayInfo> arrays;  ///< that the file holds
   std::string array;                     ///< of which chunks have the values in place of colours; empty: none
-  geometry::DBox box_data;               ///< as it is shown: the file's coordinates times coordinates.shown
   scene::Coordinates coordinates;
-  geometry::Box box_room;
   std::string up;         ///< the axis chosen
   std::string up_reason;  ///< why, in a few words
   bool from_cache = false;
-  uint64_t content_hash = 0;
   std::vector<std::string> notes;  ///< Mesh::notes; what else people should know of the store
 };
 
@@ -36,7 +62,8 @@ struct MeshStoreInfo {
 class MeshStore {
  public:
   /// Opens the store of `source`, making it first if the cache has none. path: of the file that the source reads, for
-  /// errors and info(). Errors (exit code 2 for a user) name it. Precondition: validate(options).
+  /// errors and info(). Errors (exit code 2 for a user) name it. Precondition: options are
+  /// within the limits of their flags.
   static Result<std::shared_ptr<MeshStore>> make(const std::string& path, const MeshSource& source,
                                                  const StoreOptions& options, const Progress& progress);
   virtual ~MeshStore() = default;

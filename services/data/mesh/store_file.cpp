@@ -22,23 +22,16 @@ struct StoreHeader {
   uint32_t version = kStoreVersion;
   uint32_t chunks = 0;
   uint64_t file_bytes = 0;
-  uint64_t content_hash = 0;
-  uint64_t triangles = 0, vertices = 0, degenerate_dropped = 0;
-  uint32_t had_normals = 0, had_colours = 0;
-  double data_lo[3] = {}, data_hi[3] = {};
-  float room_lo[3] = {}, room_hi[3] = {};
-  char format[16] = {}, up[8] = {}, up_reason[64] = {};
-  char array[512] = {};
-  char coordinates[1600] = {};  ///< scene::to_text()
+  MeshFigures figures;
   uint64_t arrays_offset = 0, arrays_bytes = 0;
-  uint64_t notes_bytes = 0;  ///< behind the arrays: lines
+  uint64_t lines_bytes = 0;  ///< behind the arrays
   uint64_t checksum = 0;     ///< of all the above and the table of contents
 };
 static_assert(sizeof(StoreHeader) <= kPage);
 
 struct StoreEntry {
   uint64_t offset = 0, bytes = 0, triangles = 0, checksum = 0;
-  float lo[3] = {}, hi[3] = {};
+  geometry::Box box_room;
 };
 
 uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries, std::string_view texts) {
@@ -57,40 +50,6 @@ int write_at(int descriptor, const void* data, size_t bytes, size_t offset) {
     p += n, offset += static_cast<size_t>(n), bytes -= static_cast<size_t>(n);
   }
   return 0;
-}
-
-template <class Vec, class T>
-void put(const Vec& v, T (&out)[3]) {
-  for (int a = 0; a < 3; ++a) out[a] = v[a];
-}
-
-StoreHeader make_header(const MeshStoreInfo& info) {
-  StoreHeader h;
-  h.content_hash = info.content_hash;
-  h.triangles = info.triangles, h.vertices = info.vertices, h.degenerate_dropped = info.degenerate_dropped;
-  h.had_normals = info.had_normals, h.had_colours = info.had_colours;
-  put(info.box_data.lo, h.data_lo), put(info.box_data.hi, h.data_hi);
-  put(info.box_room.lo, h.room_lo), put(info.box_room.hi, h.room_hi);
-  std::strncpy(h.format, info.format.c_str(), sizeof h.format - 1);
-  std::strncpy(h.up, info.up.c_str(), sizeof h.up - 1);
-  std::strncpy(h.up_reason, info.up_reason.c_str(), sizeof h.up_reason - 1);
-  std::strncpy(h.array, info.array.c_str(), sizeof h.array - 1);
-  std::strncpy(h.coordinates, scene::to_text(info.coordinates).c_str(), sizeof h.coordinates - 1);
-  return h;
-}
-
-MeshStoreInfo info_of(const StoreHeader& h) {
-  MeshStoreInfo info;
-  info.content_hash = h.content_hash;
-  info.triangles = h.triangles, info.vertices = h.vertices, info.degenerate_dropped = h.degenerate_dropped;
-  info.had_normals = h.had_normals != 0, info.had_colours = h.had_colours != 0;
-  info.box_data = {{h.data_lo[0], h.data_lo[1], h.data_lo[2]}, {h.data_hi[0], h.data_hi[1], h.data_hi[2]}};
-  info.box_room = {{h.room_lo[0], h.room_lo[1], h.room_lo[2]}, {h.room_hi[0], h.room_hi[1], h.room_hi[2]}};
-  info.format = std::string(h.format, strnlen(h.format, sizeof h.format));
-  info.up = std::string(h.up, strnlen(h.up, sizeof h.up));
-  info.up_reason = std::string(h.up_reason, strnlen(h.up_reason, sizeof h.up_reason));
-  info.array = std::string(h.array, strnlen(h.array, sizeof h.array));
-  return info;
 }
 
 }  // namespace
@@ -115,7 +74,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
       const auto triangles = std::span(plan.order).subspan(plan.begin[i], plan.begin[i + 1] - plan.begin[i]);
       const std::vector<std::byte> bytes = make_chunk(mesh, triangles);
       StoreEntry& entry = entries[i];
-      std::memcpy(entry.lo, bytes.data() + offsetof(geometry::ChunkHeader, lo), sizeof entry.lo + sizeof entry.hi);
+      std::memcpy(&entry.box_room, bytes.data() + offsetof(geometry::ChunkHeader, lo), sizeof entry.box_room);
       entry.bytes = bytes.size();
       entry.triangles = triangles.size();
       entry.checksum = XXH3_64bits(bytes.data(), bytes.size());
@@ -124,12 +83,13 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
     });
   }
 
-  StoreHeader header = make_header(info);
-  header.chunks = static_cast<uint32_t>(entries.size());
+  StoreHeader header{.chunks = static_cast<uint32_t>(entries.size()), .figures = info};
   std::string texts = scene::to_text(info.arrays);
   header.arrays_offset = end, header.arrays_bytes = texts.size();
+  for (const std::string& line : {info.format, info.up, info.up_reason, info.array, scene::to_text(info.coordinates)})
+    texts += line + "\n";
   for (const std::string& note : info.notes) texts += note + "\n";
-  header.notes_bytes = texts.size() - header.arrays_bytes;
+  header.lines_bytes = texts.size() - header.arrays_bytes;
   header.file_bytes = end + round_up(texts.size());
   header.checksum = checksum_of(header, entries, texts);
   if (failure == 0 && ftruncate(descriptor, static_cast<off_t>(header.file_bytes)) != 0) failure = errno;
@@ -160,28 +120,29 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
     return Error{fmt::format("{}: chunk store claims {} chunks in {} bytes", name, header.chunks, bytes.size())};
   const std::span entries(reinterpret_cast<const StoreEntry*>(bytes.data() + kPage), header.chunks);
   const uint64_t behind = header.arrays_offset <= bytes.size() ? bytes.size() - header.arrays_offset : 0;
-  const bool inside = header.arrays_bytes <= behind && header.notes_bytes <= behind - header.arrays_bytes;
+  const bool inside = header.arrays_bytes <= behind && header.lines_bytes <= behind - header.arrays_bytes;
   const std::string_view texts =
-      inside ? (*mapped)->text().substr(header.arrays_offset, header.arrays_bytes + header.notes_bytes) : "";
+      inside ? (*mapped)->text().substr(header.arrays_offset, header.arrays_bytes + header.lines_bytes) : "";
   if (!inside || checksum_of(header, entries, texts) != header.checksum)
     return Error{fmt::format("{}: chunk store's table of contents is damaged", name)};
   auto arrays = scene::arrays_from_text(texts.substr(0, header.arrays_bytes));
   if (!arrays) return Error{fmt::format("{}: {}", name, arrays.error().text)};
 
-  StoreContent out{*mapped, info_of(header), {}, {}};
+  StoreContent out{*mapped, {header.figures}, {}, {}};
   out.info.arrays = *std::move(arrays);
-  std::istringstream notes{std::string(texts.substr(header.arrays_bytes))};
-  for (std::string note; std::getline(notes, note);) out.info.notes.push_back(note);
-  auto coordinates =
-      scene::coordinates_from_text({header.coordinates, strnlen(header.coordinates, sizeof header.coordinates)});
+  std::istringstream lines{std::string(texts.substr(header.arrays_bytes))};
+  std::string coordinates_text;
+  for (std::string* line : {&out.info.format, &out.info.up, &out.info.up_reason, &out.info.array, &coordinates_text})
+    std::getline(lines, *line);
+  for (std::string note; std::getline(lines, note);) out.info.notes.push_back(note);
+  auto coordinates = scene::coordinates_from_text(coordinates_text);
   if (!coordinates) return Error{fmt::format("{}: {}", name, coordinates.error().text)};
   out.info.coordinates = *std::move(coordinates);
   for (size_t i = 0; i < entries.size(); ++i) {
     const StoreEntry& e = entries[i];
     if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)
       return Error{fmt::format("{}: chunk {} lies outside its store", name, i)};
-    out.chunks.push_back(
-        {ChunkId{i}, {{e.lo[0], e.lo[1], e.lo[2]}, {e.hi[0], e.hi[1], e.hi[2]}}, e.triangles, e.bytes});
+    out.chunks.push_back({ChunkId{i}, e.box_room, e.triangles, e.bytes});
     out.offsets.push_back(e.offset);
   }
   std::atomic<size_t> damaged = entries.size();

@@ -3,26 +3,47 @@
 //   offset 0      StoreHeader, padded to 4096
 //   4096          StoreEntry[chunks], padded to a multiple of 4096
 //   then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order they were made
-//   then          what the file's arrays are: scene::to_text(); remarks on the file, lines without its name
+//   then          what the file's arrays are: scene::to_text(); then lines: the format, the axis that points up, why,
+//                 the array of the chunks' values, the coordinates, and remarks on the file, without its name
 //
 // Native byte order: the file is a cache and never travels.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "common/geometry/mesh_chunk.h"
 #include "services/data/base/mapped_file.h"
-#include "services/data/mesh/chunker.h"
+#include "services/data/mesh/placing/placement.h"
 #include "services/data/mesh/store.h"
 
 namespace telesplat::data {
 
+inline constexpr size_t kTrianglesPerChunk = 1 << 16;
+
+/// An assignment of triangles to chunks: chunk i has the triangles order[begin[i] .. begin[i + 1]).
+struct ChunkPlan {
+  std::vector<uint32_t> order;  ///< every triangle once
+  std::vector<size_t> begin;    ///< one more than there are chunks
+  size_t chunks() const { return begin.size() - 1; }
+};
+
+/// Splits at medians of triangle centroids across the longest axis (a balanced k-d tree) until no part has more than
+/// `most` triangles; parts hold more than most / 2 (but for a mesh that is smaller). Neighbouring chunks are neighbours
+/// in space. Deterministic, parallel (TBB). Precondition: the mesh has triangles; most >= 1.
+ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most = kTrianglesPerChunk);
+
+/// Lays out one chunk (geometry::build_chunk) of these triangles: vertices are renumbered in the order of their first
+/// use, and doubled where faces of other colours meet, triangles follow a Morton curve through their centroids, so that
+/// neighbours in memory are neighbours in space.
+std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32_t> triangles);
+
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// Goes up whenever readers, placement or layout would make another file of the same mesh.
-inline constexpr uint32_t kStoreVersion = 7;
+inline constexpr uint32_t kStoreVersion = 8;
 
 /// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
 /// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages
