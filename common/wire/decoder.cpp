@@ -65,13 +65,15 @@ bool has_more(Bytes body, size_t max_elements) {
   return counter.too_many;
 }
 
-// A body that is one msgpack map, of any version.
+}  // namespace
+
 std::optional<Error> read_any(Bytes body, size_t max_elements,
                               const std::function<std::optional<Error>(const msgpack::object&)>& read) {
   try {
     if (has_more(body, max_elements)) return Error{fmt::format("has more than {} elements", max_elements)};
     // Strings and binaries are referenced in place. What lists and maps claim is limited before memory is taken for it.
-    const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, 0, kMaxDepth);
+    const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, kMaxString,
+                                      kMaxDepth);
     size_t offset = 0;
     const msgpack::object_handle handle = msgpack::unpack(
         reinterpret_cast<const char*>(body.data()), body.size(), offset,
@@ -84,8 +86,6 @@ std::optional<Error> read_any(Bytes body, size_t max_elements,
     return Error{e.what()};
   }
 }
-
-}  // namespace
 
 std::optional<Error> read_map(Bytes body, size_t max_elements,
                               const std::function<std::optional<Error>(Decoder&)>& read) {
@@ -105,6 +105,8 @@ std::optional<uint64_t> version_of(Bytes body) {
   });
   return out;
 }
+
+bool Decoder::has(std::string_view name) const { return find(map_, name) != nullptr; }
 
 const msgpack::object* Decoder::enter(const char* name, size_t limit) {
   if (error_) return nullptr;

@@ -1,6 +1,7 @@
 // Reads messages from msgpack maps, every value against its limits. Private to this library.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <msgpack/object_fwd.hpp>
@@ -25,6 +26,9 @@ class Decoder {
 
   /// Names the field and what is wrong with it.
   const std::optional<Error>& error() const { return error_; }
+
+  /// Whether a field of this name is there.
+  bool has(std::string_view name) const;
 
   template <class T>
   void operator()(const char* name, T& value, size_t limit = 0) {
@@ -66,6 +70,10 @@ class Decoder {
   void get(const msgpack::object& o, Bytes& v);
   void get(const msgpack::object& o, std::vector<uint32_t>& v);
   void get(const msgpack::object& o, std::vector<double>& v);
+  template <size_t N>
+  void get(const msgpack::object& o, std::array<double, N>& v) {
+    numbers(o, v);
+  }
   void get(const msgpack::object& o, geometry::Box& b);
   void get(const msgpack::object& o, geometry::Rect& r);
   void get(const msgpack::object& o, geometry::Pose& p);
@@ -98,6 +106,11 @@ class Decoder {
   size_t limit_ = 0;
   std::optional<Error> error_;
 };
+
+/// Calls `read` with a body that is one msgpack map, of any version or none. Error: it is not, or its lists and maps
+/// have more than max_elements elements.
+std::optional<Error> read_any(Bytes body, size_t max_elements,
+                              const std::function<std::optional<Error>(const msgpack::object&)>& read);
 
 /// The version of a body, if it is a map that has one.
 std::optional<uint64_t> version_of(Bytes body);

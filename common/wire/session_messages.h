@@ -49,7 +49,7 @@ enum class CouplingOrder : uint8_t {
 };
 inline constexpr uint64_t kCouplingOrders = 4;
 
-/// How a session runs. The defaults of all of it stand here; checks.cpp has the limits.
+/// How a session runs. The defaults of all of it stand here; serial.cpp has the limits.
 struct SessionSettings {
   // The point model, and how it travels.
   bool keep_redundant = false;        ///< packs what the model shows already, too (T7.3)
