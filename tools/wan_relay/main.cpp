@@ -5,8 +5,8 @@
 #include "common/core/log.h"
 #include "common/core/version.h"
 #include "common/net/service.h"
+#include "common/options/complain.h"
 #include "common/options/parser.h"
-#include "tools/common/complain.h"
 #include "tools/wan_relay/relay.h"
 
 using namespace telesplat;
@@ -16,11 +16,11 @@ namespace {
 constexpr const char* kProgram = "telesplat-wan-relay";
 
 int relay(wan_relay::Options o) {
-  if (const Status s = wan_relay::settle(o); !s) return tools::complain(s.error(), 2, kProgram);
+  if (const Status s = wan_relay::settle(o); !s) return complain(s.error(), 2, kProgram);
   log::initialise(o.name, o.log_level);
   std::signal(SIGPIPE, SIG_IGN);
   const auto opened = wan_relay::Relay::open(o);
-  if (!opened) return tools::complain(opened.error(), 2, kProgram);
+  if (!opened) return complain(opened.error(), 2, kProgram);
   for (const auto& address : (*opened)->addresses()) std::printf("listening on %s\n", address.c_str());
   std::fflush(stdout);
   (*opened)->run([](const std::string& statistics) { log::info("{}", statistics); });

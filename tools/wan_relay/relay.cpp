@@ -163,6 +163,8 @@ struct Relay::Impl {
   const Options& options;
   const double from_s;
   Context context{1};
+  // The launcher may send a signal twice: until this is gone, none ends the process before it has told what passed.
+  boost::asio::signal_set ends{context, SIGINT, SIGTERM}, asks{context, SIGUSR1};
   Way to_far, to_near;
   std::deque<OpenDoor> doors;
   uint64_t taken = 0, now_open = 0, failed = 0;
@@ -195,17 +197,16 @@ std::string Relay::statistics() const {
 }
 
 void Relay::run(const std::function<void(const std::string&)>& tell) {
-  Context& context = impl_->context;
-  boost::asio::signal_set ends(context, SIGINT, SIGTERM), asks(context, SIGUSR1);
-  ends.async_wait([&](const error_code&, int) { context.stop(); });
+  Impl& r = *impl_;
+  r.ends.async_wait([&](const error_code&, int) { r.context.stop(); });
   const std::function<void(const error_code&, int)> answer = [&](const error_code& error, int) {
     if (error) return;
     tell(statistics());
-    asks.async_wait(answer);
+    r.asks.async_wait(answer);
   };
-  asks.async_wait(answer);
-  for (auto& d : impl_->doors) impl_->accept(d);
-  context.run();
+  r.asks.async_wait(answer);
+  for (auto& d : r.doors) r.accept(d);
+  r.context.run();
 }
 
 }  // namespace telesplat::wan_relay

@@ -1,15 +1,59 @@
-// One direction of the link, which all connections of a relay share: who may put bytes on it, in turn.
+// One direction of the link, which all connections of a relay share: what it does to bytes, and who may put some on it,
+// in turn.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <random>
 
-#include "common/links/shaper.h"
+#include "common/links/link.h"
 
 namespace telesplat::wan_relay {
+
+/// One direction of a simulated link, without bytes, sockets and clocks: numbers of bytes and times come in, times come
+/// out.
+/// Bytes wait in a queue of limited length, pass the bottleneck at the link's rate one after the other, and are then
+/// under way for half a round trip and what jitter adds. Calls come with times that never fall.
+class Shaper {
+ public:
+  /// from_s: stalls are counted from then; the first begins one period later. seed: of the jitter.
+  Shaper(const links::Link& link, double from_s, uint32_t seed);
+
+  /// Bytes that the queue has room for. Without a rate, what a link of 100 Gbit/s would be given at once.
+  size_t room(double now_s);
+  /// When there is room again, if there is none now.
+  double room_at_s() const { return queue_.empty() ? 0 : queue_.front().end_s; }
+  /// Bytes arrive at the link: when the last of them comes out at its other end; no earlier than what came before.
+  /// Precondition: bytes <= room(now_s). 0 bytes: an end of stream, which keeps its place.
+  double pass(double now_s, size_t bytes);
+  /// The largest piece that should pass as one: what the bottleneck lets through in about a millisecond.
+  size_t piece() const { return piece_; }
+  /// Bytes that wait before the bottleneck or are passing it.
+  size_t queued(double now_s);
+
+ private:
+  struct Waiting {
+    double end_s;  // when it has passed the bottleneck
+    size_t bytes;
+  };
+  double passed(double from_s, double duration_s) const;
+  double end_of_stall(double t_s) const;
+  double jitter(double now_s);
+  void drop_passed(double now_s);
+
+  links::Link link_;
+  double from_s_;
+  size_t piece_, capacity_;
+  std::deque<Waiting> queue_;
+  size_t queued_ = 0;
+  double free_s_ = 0, last_out_s_ = 0;  // bottleneck; far end
+  std::minstd_rand random_;
+  double jitter_from_s_ = -1e18, jitter_before_s_ = 0, jitter_after_s_ = 0;
+};
 
 using Context = boost::asio::io_context;
 using Timer = boost::asio::steady_timer;
@@ -29,7 +73,7 @@ class Way {
  public:
   Way(Context& context, const links::Link& link, double from_s, uint32_t seed);
 
-  links::Shaper& shaper() { return shaper_; }
+  Shaper& shaper() { return shaper_; }
   /// `sender` has bytes: it is called at once if there is room and nobody waits for it, else in its turn.
   void join(const std::shared_ptr<Sender>& sender);
   /// Bytes are put on the link; when they come out at its end.
@@ -41,7 +85,7 @@ class Way {
  private:
   void let_in();
 
-  links::Shaper shaper_;
+  Shaper shaper_;
   Timer timer_;
   std::deque<std::weak_ptr<Sender>> waiting_;
   bool timing_ = false;

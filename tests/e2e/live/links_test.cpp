@@ -137,6 +137,17 @@ TEST(Relay, DelaysLimitsAndKeepsEveryByte) {
   EXPECT_NE(relay.program().err().find("to the near side 2.500 MB"), std::string::npos) << relay.program().err();
 }
 
+// The launcher sends the signal twice, and the second may come when the relay has left its loop.
+TEST(Relay, TellsWhatPassedHoweverOftenItIsToldToEnd) {
+  TemporaryFolder folder;
+  for (int i = 0; i < 10; ++i) {
+    RelayProgram relay(folder, {"--socks", "127.0.0.1:*"});
+    for (int times = 0; times < 2; ++times) relay.program().signal(SIGTERM);
+    relay.program().wait();
+    EXPECT_NE(relay.program().err().find("to the near side"), std::string::npos) << relay.program().err();
+  }
+}
+
 TEST(Relay, ADeadTargetEndsTheConnectionAlone) {
   TemporaryFolder folder;
   std::string nowhere;

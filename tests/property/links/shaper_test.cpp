@@ -7,10 +7,12 @@
 #include <random>
 #include <vector>
 
-#include "common/links/shaper.h"
+#include "tools/wan_relay/way.h"
 
-namespace telesplat::links {
+namespace telesplat::wan_relay {
 namespace {
+
+using links::Link;
 
 Link any_link(std::mt19937& random) {
   const auto between = [&](double lo, double hi) { return std::uniform_real_distribution(lo, hi)(random); };
@@ -101,4 +103,4 @@ TEST(BusyLink, CarriesItsRate) {
 }
 
 }  // namespace
-}  // namespace telesplat::links
+}  // namespace telesplat::wan_relay

@@ -1,9 +1,11 @@
-#include "common/links/shaper.h"
+#include "tools/wan_relay/way.h"
 
 #include <gtest/gtest.h>
 
-namespace telesplat::links {
+namespace telesplat::wan_relay {
 namespace {
+
+using links::Link;
 
 TEST(Shaper, DelayAloneIsHalfARoundTrip) {
   Shaper s({.rtt_s = 0.04}, 0, 1);
@@ -52,4 +54,4 @@ TEST(Shaper, PiecesTakeAboutAMillisecond) {
 }
 
 }  // namespace
-}  // namespace telesplat::links
+}  // namespace telesplat::wan_relay
