@@ -60,25 +60,9 @@ class Noise {
   double gradient(int64_t ix, int64_t iy, double u, double v) const {
     const uint64_t h =
         mix(seed_ + static_cast<uint64_t>(ix) * 0x9e3779b97f4a7c15 + static_cast<uint64_t>(iy) * 0xd1b54a32d192ed03);
-    constexpr double kD = 0.70710678118654752;
-    switch (h >> 61) {
-      case 0:
-        return u;
-      case 1:
-        return -u;
-      case 2:
-        return v;
-      case 3:
-        return -v;
-      case 4:
-        return kD * (u + v);
-      case 5:
-        return kD * (u - v);
-      case 6:
-        return kD * (v - u);
-      default:
-        return -kD * (u + v);
-    }
+    constexpr double kAlongX[8] = {1, -1, 0, 0, 1, 1, -1, -1}, kAlongY[8] = {0, 0, 1, -1, 1, -1, 1, -1};
+    const double along = kAlongX[h >> 61] * u + kAlongY[h >> 61] * v;
+    return h >> 61 < 4 ? along : 0.70710678118654752 * along;
   }
   uint64_t seed_;
 };

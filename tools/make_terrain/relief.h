@@ -29,12 +29,4 @@ double caldera_radius(double x_m, double y_m, uint64_t seed);
 /// makes the same land.
 HeightMap make_relief(uint64_t seed, const std::function<void(double fraction)>& progress);
 
-/// Cuts valleys: each step routes water over the filled surface to the lowest neighbour, and lowers the ground by the
-/// stream-power law dh/dt = -k A^m S, implicitly; then slopes steeper than `talus` slide. Cells of `fixed` and the
-/// border keep their height. Source: Braun and Willett, "A very efficient O(n), implicit and parallel method to solve
-/// the stream power equation", Geomorphology 180, 2013; Barnes et al., "Priority-flood", Computers & Geosciences 62,
-/// 2014.
-void erode(HeightMap& map, const std::vector<uint8_t>& fixed, int steps, double k,
-           const std::function<void(double fraction)>& progress);
-
 }  // namespace telesplat::terrain
