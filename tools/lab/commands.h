@@ -5,8 +5,6 @@
 
 namespace telesplat::lab {
 
-launcher::Command cache_command();
-launcher::Command codec_command();
 launcher::Command pose_replay_command();
 launcher::Command scaling_command();
 

@@ -7,9 +7,8 @@ int main(int argc, char** argv) {
   using namespace telesplat;
   return net::guarded_main([&] {
     data::end_at_cut_off_files(2);
-    return launcher::run_commands(
-        "telesplat-lab", "telesplat-lab: measures parts of Telesplat, and plays recorded heads to it",
-        {lab::scaling_command(), lab::cache_command(), lab::codec_command(), lab::pose_replay_command()},
-        {argv + 1, argv + argc});
+    return launcher::run_commands("telesplat-lab",
+                                  "telesplat-lab: measures parts of Telesplat, and plays recorded heads to it",
+                                  {lab::scaling_command(), lab::pose_replay_command()}, {argv + 1, argv + argc});
   });
 }

@@ -1,4 +1,4 @@
-// `telesplat-lab scaling` with real processes, and `telesplat-lab cache` along a short walk.
+// `telesplat-lab scaling` with real processes.
 #include <gtest/gtest.h>
 
 #include "tests/support/pipeline_run.h"
@@ -31,18 +31,6 @@ TEST(Scaling, EveryPictureIsSampledWhole) {
   }
   EXPECT_EQ(rows, 2u);
   EXPECT_GE(computed, 1u);
-}
-
-TEST(Cache, TellsWhatTheModelCostsAfterAWalk) {
-  TemporaryFolder folder;
-  write_terrain(folder / "terrain.ply", 40);
-  Program cache("telesplat-lab",
-                {"cache", folder / "terrain.ply", "--minutes", "0.1", "--size", "320x200", "--cache", folder / "store",
-                 "--out", folder / "pictures"},
-                folder / "cache-run");
-  ASSERT_EQ(cache.wait(120), 0) << cache.err();
-  EXPECT_NE(cache.out().find("PSNR dB"), std::string::npos) << cache.out();
-  EXPECT_NE(cache.out().find("a viewer that joins now is sent"), std::string::npos) << cache.out();
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "common/core/version.h"
+#include "common/options/complain.h"
 #include "common/options/parser.h"
-#include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/lab/make_volume/tree.h"
 
@@ -53,5 +53,5 @@ int main(int argc, char** argv) {
   parser.version(version());
   parser.parse_or_exit("make-volume", {argv + 1, argv + argc});
   const Status made = make(o);
-  return made.ok() ? 0 : tools::complain(made.error(), 1, "make-volume");
+  return made.ok() ? 0 : complain(made.error(), 1, "make-volume");
 }

@@ -8,8 +8,8 @@
 #include "common/geometry/trajectory.h"
 #include "common/net/plain/plain_socket.h"
 #include "common/net/service.h"
+#include "common/options/complain.h"
 #include "common/wire/head_pose.h"
-#include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/lab/commands.h"
 #include "tools/lab/pose_replay/schedule.h"
@@ -71,9 +71,9 @@ void wait_for_listener(net::PlainPublisher& publisher) {
 int replay(ReplayOptions o, const options::Given&) {
   log::initialise("pose-replay", "info");
   auto samples = geometry::read_samples(o.file);
-  if (!samples) return tools::complain(samples.error());
+  if (!samples) return complain(samples.error());
   auto publisher = net::PlainPublisher::bind(o.bind, o.insecure);
-  if (!publisher) return tools::complain({"--bind: " + publisher.error().text});
+  if (!publisher) return complain({"--bind: " + publisher.error().text});
   net::install_signal_handlers();
   std::printf("poses at %s\n", (*publisher)->endpoint().c_str());
   std::fflush(stdout);

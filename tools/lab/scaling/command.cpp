@@ -4,22 +4,34 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "client/viewer/display/size_text.h"
+#include "common/codec/depth_codec.h"
+#include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
+#include "common/core/result.h"
+#include "common/core/whole_file.h"
+#include "common/geometry/camera.h"
 #include "common/geometry/trajectory.h"
+#include "common/julia/flags.h"
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
+#include "common/options/table.h"
+#include "services/sampler/julia/sampler.h"
+#include "services/sampler/tiles/replay_file.h"
 #include "tools/common/progress_line.h"
 #include "tools/lab/commands.h"
-#include "tools/lab/scaling/number_list.h"
-#include "tools/lab/scaling/report.h"
-#include "tools/lab/scaling/rows.h"
 #include "tools/lab/scaling/session.h"
 
 namespace telesplat::lab {
@@ -27,8 +39,80 @@ namespace {
 
 constexpr double kRoom_m = 0.8, kFov_deg = 90;  // as `telesplat run` has them
 constexpr double kCheap = 20;                   // the second series' rows are so many times cheaper
-constexpr int kScalingPasses = 5;                      // over the rows, when their costs are measured
+constexpr int kScalingPasses = 5;               // over the rows, when their costs are measured
 constexpr int kComputedFrames = 20;
+
+/// One number of nodes in one series.
+struct ScalingPoint {
+  int nodes = 0, frames = 0;
+  double time_s = 0;  ///< median, from request to the frame's last patch at the viewer
+};
+
+/// One way to pay for rows.
+struct ScalingSeries {
+  std::string name;  ///< "thesis rows", ...
+  bool simulated = false;
+  double row_seconds = 0;  ///< what all rows of the frame cost together, on one node
+  std::vector<ScalingPoint> points;
+  /// T(1) / T(N) and T(1) / (N T(N)); none without a measured T(1).
+  std::optional<double> speed_up(const ScalingPoint& p) const {
+    for (const auto& one : points)
+      if (one.nodes == 1) return one.time_s / p.time_s;
+    return std::nullopt;
+  }
+  std::optional<double> efficiency(const ScalingPoint& p) const {
+    const auto s = speed_up(p);
+    return s ? std::optional(*s / p.nodes) : std::nullopt;
+  }
+};
+
+constexpr double kThesisSingle_s = 69.3;
+// Table 7.2 of the thesis: seconds on this many nodes; none for numbers it does not have.
+std::optional<double> thesis_time_s(int nodes) {
+  static const std::map<int, double> table{{1, kThesisSingle_s}, {2, 34.8},  {4, 17.3}, {8, 8.7},
+                                           {16, 4.36},           {32, 2.19}, {40, 1.76}};
+  const auto it = table.find(nodes);
+  return it == table.end() ? std::nullopt : std::optional(it->second);
+}
+
+std::string number(const std::optional<double>& v, int decimals) {
+  return v ? fmt::format("{:.{}f}", *v, decimals) : std::string("-");
+}
+std::optional<double> thesis_efficiency(int nodes) {
+  const auto t = thesis_time_s(nodes);
+  if (!t) return std::nullopt;
+  return kThesisSingle_s / (nodes * *t);
+}
+std::optional<double> percent(const std::optional<double>& v) { return v ? std::optional(*v * 100) : std::nullopt; }
+
+std::string to_text(const ScalingSeries& s, int cores) {
+  std::string out = fmt::format("{}: rows of {:.3f} s a frame in all\n", s.name, s.row_seconds);
+  if (s.simulated)
+    out += fmt::format(
+        "  simulated: the samplers are real processes, all on {} cores; each row waits its measured cost x scale, then "
+        "the row as sampled before is encoded and sent\n",
+        cores);
+  else
+    out += fmt::format("  computed: the samplers sample every frame anew, one thread each, on {} cores\n", cores);
+  out += "  nodes    time s  speed-up  efficiency   thesis s  efficiency\n";
+  for (const auto& p : s.points)
+    out += fmt::format("  {:5} {:9.4f} {:>9} {:>9} % {:>10} {:>9} %\n", p.nodes, p.time_s, number(s.speed_up(p), 2),
+                       number(percent(s.efficiency(p)), 1), number(thesis_time_s(p.nodes), 2),
+                       number(percent(thesis_efficiency(p.nodes)), 1));
+  return out;
+}
+
+// Writes scaling.csv.
+Status write_report(const std::vector<ScalingSeries>& all, const std::string& directory) {
+  std::string csv = "series,simulated,row_seconds,nodes,frames,time_s,speed_up,efficiency,thesis_s,thesis_efficiency\n";
+  const auto value = [](const std::optional<double>& v) { return v ? fmt::format("{:.6f}", *v) : std::string(); };
+  for (const auto& s : all)
+    for (const auto& p : s.points)
+      csv += fmt::format("{},{},{:.6f},{},{},{:.6f},{},{},{},{}\n", s.name, int(s.simulated), s.row_seconds, p.nodes,
+                         p.frames, p.time_s, value(s.speed_up(p)), value(s.efficiency(p)),
+                         value(thesis_time_s(p.nodes)), value(thesis_efficiency(p.nodes)));
+  return write_whole(directory + "/scaling.csv", csv);
+}
 
 struct ScalingOptions {
   std::vector<int> nodes{1, 2, 4, 8, 16, 32, 40};
@@ -39,6 +123,38 @@ struct ScalingOptions {
   std::string out = "scaling";
   bool computed = true;
 };
+
+// Samples and encodes each row of `camera`'s frame `passes` times on one thread, as a sampler does a lease of one row.
+// A row's cost is the median. Error: the scene's slice is empty. progress(rows done, of); true from `stop` ends it
+// early, with an error.
+Result<sampler::Replay> measure_rows(const julia::Scene& scene, double room_size_m, const geometry::Camera& camera,
+                                     int passes, const std::function<void(int, int)>& progress,
+                                     const std::function<bool()>& stop) {
+  const auto placement = julia::place(scene, room_size_m);
+  if (!placement) return placement.error();
+  const sampler::JuliaScene set(scene.parameters, *placement);
+  sampler::JuliaSampler sampler(1);
+  sampler::Replay out{{camera.width, camera.height}, {}};
+  std::vector<std::vector<double>> costs(camera.height);
+  for (int pass = 0; pass < passes; ++pass)
+    for (int y = 0; y < camera.height; ++y) {
+      if (stop()) return Error{"interrupted"};
+      const double begin_s = monotonic_s();
+      const auto row = sampler.sample(set, camera, {0, y, camera.width, 1}, 1);
+      const auto stream = codec::encode(row);
+      costs[y].push_back(monotonic_s() - begin_s);
+      const size_t at = size_t(y) * camera.width;
+      std::copy(row.depth.begin(), row.depth.end(), out.frame.depth.begin() + at);
+      std::copy(row.colour.begin(), row.colour.end(), out.frame.colour.begin() + at);
+      std::copy(row.normal.begin(), row.normal.end(), out.frame.normal.begin() + at);
+      progress(pass * camera.height + y + 1, passes * camera.height);
+    }
+  for (auto& c : costs) {
+    std::nth_element(c.begin(), c.begin() + c.size() / 2, c.end());
+    out.row_cost_s.push_back(c[c.size() / 2]);
+  }
+  return out;
+}
 
 class Study {
  public:
@@ -164,6 +280,24 @@ class Study {
   tools::ProgressLine progress_;
 };
 
+// A flag that takes several numbers, "1,2,4", each within least..most.
+options::Text number_list(std::vector<int>& value, int least, int most) {
+  const auto read = [&value, least, most](const std::string& text) -> Status {
+    value.clear();
+    for (size_t begin = 0; begin <= text.size();) {
+      const size_t comma = std::min(text.find(',', begin), text.size());
+      int n = 0;
+      const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + comma, n);
+      if (error != std::errc() || stop != text.data() + comma || n < least || n > most)
+        return Error{fmt::format("\"{}\" is not in {}..{}", text.substr(begin, comma - begin), least, most)};
+      value.push_back(n);
+      begin = comma + 1;
+    }
+    return ok_status();
+  };
+  return {.read = read, .write = [&value] { return fmt::format("{}", fmt::join(value, ",")); }};
+}
+
 std::string complain_about_cost(const std::string& v) {
   if (v == "thesis" || v == "cheap" || v == "both" || v == "measured") return {};
   char* end = nullptr;
@@ -195,16 +329,16 @@ options::Table table(ScalingOptions& o) {
 int scaling(ScalingOptions o, const options::Given&) {
   log::initialise("telesplat-lab", "warn");
   const auto size = viewer::parse_size(o.size, "--size");
-  if (!size) return tools::complain(size.error());
+  if (!size) return complain(size.error());
   auto scene = julia::read_scene(o.scene);
-  if (!scene) return tools::complain(scene.error());
-  if (!scene->timeline.empty()) return tools::complain({"--animate: the scaling study is of one frame"});
+  if (!scene) return complain(scene.error());
+  if (!scene->timeline.empty()) return complain({"--animate: the scaling study is of one frame"});
   std::error_code error;
   std::filesystem::create_directories(o.out, error);
-  if (error) return tools::complain({fmt::format("{}: cannot be made: {}", o.out, error.message())});
+  if (error) return complain({fmt::format("{}: cannot be made: {}", o.out, error.message())});
   net::install_signal_handlers();
   const auto camera = geometry::make_camera(geometry::default_pose(), kFov_deg, size->first, size->second);
-  if (const Status s = Study(o, std::move(*scene), camera).run(); !s) return tools::complain(s.error(), 1);
+  if (const Status s = Study(o, std::move(*scene), camera).run(); !s) return complain(s.error(), 1);
   std::printf("\nrecord: %s\n", o.out.c_str());
   return 0;
 }

@@ -78,12 +78,11 @@ Status Session::alive() {
 }
 
 int Session::count_joined(const std::string& role) {
-  const auto answer = control_->ask("status", 2);
-  const auto status = answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
-  if (!status.is_object()) return 0;
+  const auto status = control_->status(2);
+  if (!status) return 0;
   int n = 0;
   // Values come with the first report, after the welcome.
-  for (const auto& p : status.value("processes", nlohmann::json::array()))
+  for (const auto& p : status->value("processes", nlohmann::json::array()))
     n += p.value("role", "") == role && p.value("alive", false) && p.contains("values");
   return n;
 }
