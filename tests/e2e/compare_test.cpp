@@ -84,9 +84,6 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
   const std::string out = run.out() + "/compare";
   {
-    Program other("telesplat", {"compare", run.out(), "--iso", "40", "--no-cache"}, run.folder() / "other");
-    EXPECT_EQ(other.wait(60), 2);
-    EXPECT_NE(other.err().find("--iso: " + run.out() + " is a run folder"), std::string::npos) << other.err();
     Program compare("telesplat", {"compare", run.out(), "--poses", "2", "--repeat", "2"}, run.folder() / "compare");
     ASSERT_EQ(compare.wait(120), 0) << compare.err();
     EXPECT_NE(compare.out().find("ellipse"), std::string::npos) << compare.out();
@@ -175,31 +172,6 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
     EXPECT_NE(entry.path().extension(), ".part") << entry.path();
 }
 
-TEST(Compare, AStillCameraNeedsNoRun) {
-  TemporaryFolder folder;
-  write_terrain(folder / "terrain.ply", 60);
-  const auto still = [&](const std::string& name, const std::vector<std::string>& more) {
-    std::vector<std::string> a{
-        "compare", folder / "terrain.ply", "--still",     "--cache", folder / "cache", "--size", "480x300",
-        "--out",   folder / name,          "--renderers", "cpu",     "--repeat",       "1"};
-    a.insert(a.end(), more.begin(), more.end());
-    Program compare("telesplat", a, folder / (name + "-log"));
-    EXPECT_EQ(compare.wait(60), 0) << compare.err();
-    return read_csv(folder / (name + "/compare.csv"));
-  };
-  const auto same = still("same", {}), twice = still("twice", {"--magnify", "2"});
-  ASSERT_EQ(same.size(), 4u);
-  ASSERT_EQ(twice.size(), 4u);
-  for (size_t i = 0; i < 4; ++i) {
-    expect_plausible(same[i]);
-    expect_plausible(twice[i]);
-    EXPECT_GT(number(same[i], "psnr_db"), number(twice[i], "psnr_db")) << "half the samples cannot be better";
-    EXPECT_LT(number(same[i], "hole_fraction"), 0.01);
-    EXPECT_NEAR(number(same[i], "points_cached") / number(twice[i], "points_cached"), 4, 0.2);
-  }
-  EXPECT_TRUE(fs::exists(folder / "same/contact-sheet.png"));
-}
-
 // A run folder of one frame, made by hand.
 struct Refusal {
   std::string name, file, content;     // what is written over one of its files; content "GONE": it is removed
@@ -247,7 +219,7 @@ TEST_P(CompareRefuses, WithCodeTwoAndOneLine) {
 const std::string kHeader = "viewer,frame,t_s,points_drawn,sequence,px,py,pz,qw,qx,qy,qz\n";
 const Refusal kRefusals[] = {
     {"MissingFolder", "", "", {"MISSING"}, "MISSING: no such file"},
-    {"AFile", "", "", {"terrain.ply"}, "--still"},
+    {"AFile", "", "", {"terrain.ply"}, "is not a run folder"},
     {"NoEvents", "run/points.events", "GONE", {}, "points.events"},
     {"NoSession", "run/session.toml", "GONE", {}, "session.toml"},
     {"BrokenSession", "run/session.toml", "[session\n", {}, "session.toml:1"},
@@ -280,10 +252,7 @@ const Refusal kRefusals[] = {
     {"UnknownKernel", "", "", {"--kernels", "square,star"}, "star"},
     {"UnknownFinish", "", "", {"--finish", "fill,polish"}, "polish"},
     {"BadSamples", "", "", {"--samples", "10"}, "--samples: 10 rays a pixel"},
-    {"MagnifyARun", "", "", {"--magnify", "2"}, "--still"},
-    {"NoPoses", "", "", {"--poses", "0"}, "--poses"},
-    {"FramesOfAScene", "", "", {"terrain.ply", "--still", "--frames", "3"}, "--frames"},
-    {"BadSize", "", "", {"terrain.ply", "--still", "--size", "12"}, "--size"}};
+    {"NoPoses", "", "", {"--poses", "0"}, "--poses"}};
 
 INSTANTIATE_TEST_SUITE_P(All, CompareRefuses, testing::ValuesIn(kRefusals),
                          [](const auto& info) { return info.param.name; });

@@ -30,15 +30,4 @@ std::optional<Difference> difference(std::span<const double> a, std::span<const 
 /// say (Holm 1979).
 std::vector<double> holm(const std::vector<double>& p);
 
-inline constexpr size_t kLeastForBlocks = 40;  ///< values
-
-/// Of percentiles (shares, 0..1) of values in the order of time, which depend on those before them, as frames do: the
-/// circular block bootstrap (Politis and Romano 1992), with blocks of block_length(). One interval a share; none: there
-/// are fewer than kLeastForBlocks values. The same values give the same intervals.
-std::vector<Interval> block_intervals(std::span<const double> values, std::span<const double> shares);
-
-/// (sqrt(6) r / (1 - r^2))^(2/3) n^(1/3) of a correlation r of neighbours (Carlstein 1986, eq. 1.3), at least n^(1/3),
-/// at most n / 4.
-size_t block_length(std::span<const double> values);
-
 }  // namespace telesplat::tools

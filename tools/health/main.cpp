@@ -7,8 +7,8 @@
 #include "common/net/control.h"
 #include "common/net/master_address.h"
 #include "common/net/service.h"
+#include "common/options/complain.h"
 #include "common/options/parser.h"
-#include "tools/common/complain.h"
 
 using namespace telesplat;
 
@@ -56,19 +56,19 @@ Result<wire::ControlReply> ask(const net::Access& access, const std::string& mas
 int check(const Options& o) {
   log::initialise("health", "error");
   const auto master = net::find_master(o.master);
-  if (master.address.empty()) return tools::complain({master.problem}, master.exit_code(), "telesplat-health");
+  if (master.address.empty()) return complain({master.problem}, master.exit_code(), "telesplat-health");
   const auto access = net::Access::open({}, o.keys.empty() ? master.keys : o.keys, net::any_role());
-  if (!access) return tools::complain(access.error(), 2, "telesplat-health");
+  if (!access) return complain(access.error(), 2, "telesplat-health");
   std::map<std::string, std::string> about;
   if (!o.role.empty()) about["role"] = o.role;
   if (!o.name.empty()) about["name"] = o.name;
   if (o.this_host) about["host"] = net::host_name();
   const auto well = ask(*access, master.address, "health", o.timeout_s, about);
-  if (!well) return o.may_be_away ? 0 : tools::complain(well.error(), 1, "telesplat-health");
+  if (!well) return o.may_be_away ? 0 : complain(well.error(), 1, "telesplat-health");
   if (o.show)
     if (const auto status = ask(*access, master.address, "status", o.timeout_s); status)
       std::printf("%s\n", status->text.c_str());
-  return well->ok ? 0 : tools::complain({well->text}, 1, "telesplat-health");
+  return well->ok ? 0 : complain({well->text}, 1, "telesplat-health");
 }
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "common/core/version.h"
+#include "common/options/complain.h"
 #include "common/options/parser.h"
-#include "tools/common/complain.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -64,7 +64,7 @@ void put_help_behind(std::vector<std::string>& arguments) {
 int run_commands(const std::string& program, const std::string& about, const std::vector<Command>& commands,
                  std::vector<std::string> arguments) {
   put_help_behind(arguments);
-  if (const Status s = expand(commands, arguments); !s) return tools::complain(s.error());
+  if (const Status s = expand(commands, arguments); !s) return complain(s.error());
   put_flags_behind(commands, arguments);
   options::Parser parser(about);
   parser.version(version());

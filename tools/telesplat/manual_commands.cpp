@@ -8,9 +8,9 @@
 #include <memory>
 
 #include "common/core/version.h"
+#include "common/options/complain.h"
 #include "common/options/manual.h"
 #include "common/options/suggest.h"
-#include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/run/process_group.h"
 
@@ -106,12 +106,11 @@ void show(const std::string& page) {
 int man(const options::Manual& all, const ManOptions& o) {
   if (!o.out.empty()) {
     const Status s = write_pages(all, o.out);
-    return s ? 0 : tools::complain(s.error());
+    return s ? 0 : complain(s.error());
   }
-  if (o.words.size() > 1)
-    return tools::complain({fmt::format("man: one command, not {} and {}", o.words[0], o.words[1])});
+  if (o.words.size() > 1) return complain({fmt::format("man: one command, not {} and {}", o.words[0], o.words[1])});
   const auto page = page_of(all, o.words.empty() ? "" : o.words.front());
-  if (!page) return tools::complain(page.error());
+  if (!page) return complain(page.error());
   show(*page);
   return 0;
 }

@@ -78,8 +78,6 @@ TEST_F(Sweeps, GoOnWhereTheyWereInterrupted) {
     // A run may draw the frame that it began when its number was reached.
     EXPECT_GE(*table->number(row, *table->column("frames")), 8);
     EXPECT_GT(*table->number(row, *table->column("inter_frame_delay_ms.median")), 0);
-    EXPECT_GT(*table->number(row, *table->column("own_cpu")), 0);
-    EXPECT_LE(*table->number(row, *table->column("others_cpu")), 1);
   }
 
   // A larger grid goes on with what is there; one that lacks something is another.

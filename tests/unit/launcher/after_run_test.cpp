@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "tools/telesplat/run/after_run.h"
-#include "tools/telesplat/run/children/processor_wait.h"
+#include "tools/telesplat/run/live_figures.h"
 
 namespace telesplat::launcher {
 namespace {

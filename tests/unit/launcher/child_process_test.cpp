@@ -9,7 +9,7 @@
 
 #include "common/core/clock.h"
 #include "tools/telesplat/run/child_process.h"
-#include "tools/telesplat/run/children/log_limit.h"
+#include "tools/telesplat/run/process_group.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -10,9 +10,8 @@
 
 #include "common/image/normal.h"
 #include "services/packer/points/depth_recorder.h"
-#include "tools/telesplat/inspect/npy.h"
 #include "tools/telesplat/inspect/pictures.h"
-#include "tools/telesplat/inspect/run_folder.h"
+#include "tools/telesplat/run/run_report.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -9,7 +9,6 @@
 #include <fstream>
 
 #include "tools/telesplat/movie/contact_sheet.h"
-#include "tools/telesplat/movie/encoder.h"
 #include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/movie/movie_target.h"
 
@@ -210,13 +209,6 @@ TEST(ContactSheets, HaveTheirPicturesInRowsAndColumns) {
   EXPECT_EQ(count(0xff0000), 2 * 6);
   EXPECT_EQ(count(0x0000ff), 2 * 20);
   EXPECT_GT(count(0xe8e8e8), 0) << "the row's label";
-}
-
-TEST(ShellWords, AreQuotedWhereTheyNeedIt) {
-  EXPECT_EQ(shell_quoted("runs/a-b_1.mp4"), "runs/a-b_1.mp4");
-  EXPECT_EQ(shell_quoted("a b"), "'a b'");
-  EXPECT_EQ(shell_quoted("it's"), "'it'\\''s'");
-  EXPECT_EQ(shell_quoted(""), "''");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // --overwrite removes neither what the run is to read nor what another session writes.
-#include "tools/telesplat/run/overwrite.h"
+#include "tools/telesplat/run/run_options.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,7 +11,6 @@
 
 #include "common/net/session_file.h"
 #include "tests/support/files/own_folder.h"
-#include "tools/telesplat/record/dated_folder.h"
 
 namespace telesplat::launcher {
 namespace {

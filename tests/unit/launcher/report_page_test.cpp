@@ -10,7 +10,7 @@
 #include "common/image/file.h"
 #include "tools/telesplat/movie/contact_sheet.h"
 #include "tools/telesplat/report/page.h"
-#include "tools/telesplat/report/picture_part.h"
+#include "tools/telesplat/report/parts.h"
 #include "tools/telesplat/report/report.h"
 
 namespace telesplat::launcher {
@@ -136,24 +136,10 @@ TEST(ReportRun, FramesOfAPictureThatStandsAreNoDelays) {
   EXPECT_EQ(run.at("spreads").at("motion_to_photon_ms").at("n"), 3);
   EXPECT_EQ(run.at("series").at("motion_to_photon_ms")[0].at("v").dump(), "[9.0,12.0,30.0]");
   EXPECT_NEAR(run.at("figures").at("fps").get<double>(), 2 / 0.06, 0.01);
-  EXPECT_TRUE(run.at("intervals").empty()) << "too few frames";
   run = run_json(folder.path(), "r", 1, {}, 0.03);
   EXPECT_EQ(run.at("spreads").at("inter_frame_ms").at("mean"), 40) << "the beginning is left out";
   EXPECT_EQ(run.at("series").at("motion_to_photon_ms")[0].at("t").dump(), "[0.04]");
   EXPECT_NE(run.at("notes").dump().find("the first 0.03 s are left out"), std::string::npos);
-}
-
-TEST(ReportRun, FiguresHaveIntervals) {
-  const TemporaryFolder folder;
-  std::string frames = "viewer,frame,begin_s,inter_frame_ms,motion_to_photon_ms\n";
-  for (int i = 0; i < 200; ++i)
-    frames += "viewer-1," + std::to_string(i) + "," + std::to_string(i / 50.0) + ",20," + std::to_string(i % 20) + "\n";
-  write(folder / "frames.csv", frames);
-  const auto run = run_json(folder.path(), "r", 1);
-  EXPECT_EQ(run.at("intervals").at("delay_median").dump(), "[20.0,20.0]");
-  const auto interval = run.at("intervals").at("m2p_median");
-  EXPECT_LT(interval[0].get<double>(), 9.5);
-  EXPECT_GT(interval[1].get<double>(), 9.5);
 }
 
 TEST(ReportNames, AreLabelsBeforeFolders) {

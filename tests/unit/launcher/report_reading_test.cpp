@@ -6,9 +6,8 @@
 #include <fstream>
 
 #include "common/core/utf8.h"
-#include "tools/telesplat/report/reading/loose_table.h"
+#include "tools/telesplat/report/reading/run_tables.h"
 #include "tools/telesplat/report/reading/thinning.h"
-#include "tools/telesplat/report/reading/update_stages.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "tools/telesplat/command.h"
-#include "tools/telesplat/control/wishes.h"
+#include "tools/telesplat/control/client.h"
 #include "tools/telesplat/run/run_options.h"
 
 namespace telesplat::launcher {

@@ -7,7 +7,7 @@
 
 #include "common/metrics/run_record.h"
 #include "tests/support/files/own_folder.h"
-#include "tools/telesplat/inspect/run_folder.h"
+#include "tools/telesplat/run/run_report.h"
 
 namespace telesplat::launcher {
 namespace {

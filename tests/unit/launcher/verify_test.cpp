@@ -11,7 +11,6 @@
 
 #include "client/viewer/record/frame_spool.h"
 #include "tests/support/files/data_files.h"
-#include "tools/telesplat/run/quality_record.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -38,9 +37,7 @@ class HalfAPicture : public DirectScene {
       }
     return out;
   }
-  Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override { return Error{"is not sampled"}; }
   bool has_surface() const override { return surface_; }
-  geometry::Box box_room() const override { return {}; }
   std::string size() const override { return "half a picture"; }
 
  private:

@@ -1,5 +1,5 @@
 // Configurations against the first one.
-#include "tools/telesplat/sweep/cells/cells.h"
+#include "tools/telesplat/sweep/tables.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,8 @@
 #include <set>
 
 #include "tools/telesplat/run/run_options.h"
-#include "tools/telesplat/sweep/check.h"
-#include "tools/telesplat/sweep/grid.h"
+#include "tools/telesplat/sweep/manifest.h"
+#include "tools/telesplat/sweep/sweep.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -22,7 +22,7 @@ Grid small() {
 }
 
 RunOutcome done_in(double wall_s) {
-  return {.done = true, .attempts = 1, .exit_code = 0, .reason = {}, .begin = "now", .wall_s = wall_s, .load = {}};
+  return {.done = true, .attempts = 1, .exit_code = 0, .reason = {}, .begin = "now", .wall_s = wall_s};
 }
 
 class SweepManifest : public ::testing::Test {
@@ -49,7 +49,7 @@ TEST_F(SweepManifest, ComesBackAsItWasWritten) {
   Manifest m = begin_manifest(small(), "1.0", "/here");
   m.grid.shuffle = 5;
   m.outcomes[{"coupling-sync_samplers-1", 2}] = {
-      false, 2, 130, "exit code 130: \"quoted\", and\nmore", "2026-01-01T00:00:00+0000", 12.5, {0.5, 1.5, 0.75, 0.125}};
+      false, 2, 130, "exit code 130: \"quoted\", and\nmore", "2026-01-01T00:00:00+0000", 12.5};
   ASSERT_TRUE(write_manifest(m, folder));
   const auto read = read_manifest(folder);
   ASSERT_TRUE(read && *read);
@@ -63,7 +63,7 @@ TEST_F(SweepManifest, ComesBackAsItWasWritten) {
   EXPECT_EQ(key, (RunKey{"coupling-sync_samplers-1", 2}));
   EXPECT_FALSE(o.done);
   EXPECT_EQ(o.reason, "exit code 130: \"quoted\", and\nmore");
-  EXPECT_EQ(o.load.others_cpu, 0.125);
+  EXPECT_EQ(o.wall_s, 12.5);
   EXPECT_FALSE(fs::exists(folder + "/sweep.json.part"));
 }
 

@@ -8,8 +8,7 @@
 
 #include "tests/support/patience.h"
 #include "tools/common/csv_table.h"
-#include "tools/telesplat/sweep/load.h"
-#include "tools/telesplat/sweep/one_run.h"
+#include "tools/telesplat/sweep/sweep.h"
 #include "tools/telesplat/sweep/tables.h"
 
 namespace telesplat::launcher {
@@ -140,24 +139,6 @@ TEST(SweepFailures, NameRunAndReason) {
   auto record = record_of({20, 20});
   record.runs[1].outcome = RunOutcome{.attempts = 2, .exit_code = 1, .reason = "exit code 1: no disk"};
   EXPECT_EQ(failures(record), std::vector<std::string>{"samplers=1, run 2: exit code 1: no disk"});
-}
-
-TEST(SweepLoad, IsReadFromTheSystemsFiles) {
-  EXPECT_DOUBLE_EQ(busy_seconds("cpu  100 20 30 4000 50 6 7 8 90 0\ncpu0 1 2 3 4\n", 100).value(), 1.71);
-  EXPECT_FALSE(busy_seconds("", 100));
-  EXPECT_FALSE(busy_seconds("intr 5 4 3 2 1", 100));
-  EXPECT_FALSE(busy_seconds("cpu 1 2 x", 100));
-  EXPECT_DOUBLE_EQ(mean_load("1.25 0.75 0.5 2/300 12345\n").value(), 1.25);
-  EXPECT_FALSE(mean_load(""));
-}
-
-TEST(SweepLoad, OthersAreWhatIsLeft) {
-  EXPECT_DOUBLE_EQ(others_share(15, 5, 10, 2), 0.5);
-  EXPECT_DOUBLE_EQ(others_share(5, 6, 10, 2), 0) << "clocks that differ a little";
-  EXPECT_DOUBLE_EQ(others_share(5, 0, 0, 2), 0);
-  const Load load = LoadMeter().measured();
-  EXPECT_GE(load.others_cpu, 0);
-  EXPECT_LE(load.others_cpu, 1);
 }
 
 TEST(SweepRun, SaysWhyItFailed) {

@@ -39,47 +39,5 @@ TEST(Inference, SeveralComparisonsRaiseTheirP) {
   EXPECT_EQ(holm({0.9, 0.8}), (Values{1, 1}));
 }
 
-// x(i) = r x(i - 1) + noise: its median is 0.
-Values series(size_t n, double r, uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> noise;
-  Values out{noise(random)};
-  while (out.size() < n) out.push_back(r * out.back() + noise(random));
-  return out;
-}
-
-TEST(Inference, BlocksAreAsLongAsValuesDependOnEachOther) {
-  EXPECT_EQ(block_length(Values(1000, 5.0)), 10u) << "the cube root";
-  // sqrt(6) 0.9 / (1 - 0.81) = 11.6; its 2/3rd power is 5.13.
-  EXPECT_NEAR(double(block_length(series(8000, 0.9, 1))), 20 * 5.13, 15);
-  Values rises;
-  for (int i = 0; i < 100; ++i) rises.push_back(i);
-  EXPECT_EQ(block_length(rises), 25u) << "a quarter at most";
-}
-
-TEST(Inference, BlocksCoverTheTruthWhereNeighboursDepend) {
-  const std::array shares{0.5, 0.95};
-  int covered = 0, covered_alone = 0;
-  constexpr int kSeries = 60;
-  for (int i = 0; i < kSeries; ++i) {
-    Values values = series(600, 0.8, uint64_t(i) + 1);
-    const auto blocks = block_intervals(values, shares);
-    ASSERT_EQ(blocks.size(), 2u);
-    covered += blocks[0].low <= 0 && 0 <= blocks[0].high;
-    std::shuffle(values.begin(), values.end(), std::mt19937_64(uint64_t(i)));  // as if they did not depend
-    const auto alone = block_intervals(values, shares)[0];
-    covered_alone += alone.low <= 0 && 0 <= alone.high;
-  }
-  EXPECT_GE(covered, kSeries * 82 / 100) << "95 % is what they promise of long series";
-  EXPECT_LE(covered_alone, kSeries * 75 / 100) << "else blocks would not be needed";
-}
-
-TEST(Inference, FewValuesHaveNoBlocks) {
-  EXPECT_TRUE(block_intervals(Values(kLeastForBlocks - 1, 1.0), std::array{0.5}).empty());
-  const auto same = block_intervals(Values(kLeastForBlocks, 7.0), std::array{0.5});
-  EXPECT_EQ(same[0].low, 7);
-  EXPECT_EQ(same[0].high, 7);
-}
-
 }  // namespace
 }  // namespace telesplat::tools

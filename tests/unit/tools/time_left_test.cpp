@@ -1,4 +1,4 @@
-#include "tools/common/time_left.h"
+#include "tools/common/progress_line.h"
 
 #include <gtest/gtest.h>
 

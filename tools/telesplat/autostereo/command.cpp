@@ -8,11 +8,11 @@
 #include <optional>
 
 #include "client/viewer/input/head_movement.h"
+#include "common/options/complain.h"
 #include "common/stereo/autostereo/interleaver.h"
 #include "common/stereo/autostereo/panel_file.h"
 #include "common/stereo/autostereo/sight.h"
 #include "common/stereo/pattern.h"
-#include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
 
 namespace telesplat::launcher {
@@ -96,15 +96,15 @@ Result<std::optional<std::array<image::View, 2>>> pictures(const AutostereoOptio
 
 int autostereo(AutostereoOptions o, const options::Given&) {
   const auto panel = stereo::read_panel(o.panel);
-  if (!panel) return tools::complain(panel.error());
+  if (!panel) return complain(panel.error());
   const auto eyes = eyes_of(o, *panel);
-  if (!eyes) return tools::complain(eyes.error());
+  if (!eyes) return complain(eyes.error());
   const auto both = pictures(o, *panel);
-  if (!both) return tools::complain(both.error());
+  if (!both) return complain(both.error());
   const bool makes = both->has_value() || !o.see.empty();
   if (makes == o.out.empty())
-    return tools::complain({makes ? "--out is needed: where to write the picture"
-                                  : "--out needs --pattern, --left and --right, or --see: what to write"});
+    return complain({makes ? "--out is needed: where to write the picture"
+                           : "--out needs --pattern, --left and --right, or --see: what to write"});
   if (!makes) {
     print(*panel, o.eye_separation_m);
     return 0;
@@ -114,13 +114,13 @@ int autostereo(AutostereoOptions o, const options::Given&) {
     stereo::Interleaver(*panel).compose(*eyes, (**both)[0], (**both)[1], picture);
   } else {
     auto shown = image::read_view(o.see);
-    if (!shown) return tools::complain(shown.error());
+    if (!shown) return complain(shown.error());
     if (shown->width != panel->width || shown->height != panel->height)
-      return tools::complain({fmt::format("--see {}: has {}x{} pixels, the display {}x{}", o.see, shown->width,
-                                          shown->height, panel->width, panel->height)});
+      return complain({fmt::format("--see {}: has {}x{} pixels, the display {}x{}", o.see, shown->width, shown->height,
+                                   panel->width, panel->height)});
     picture = stereo::seen_by(*panel, (*eyes)[o.eye == "left" ? 0 : 1], *shown);
   }
-  if (const Status s = image::write_png(o.out, picture); !s) return tools::complain(s.error(), 1);
+  if (const Status s = image::write_png(o.out, picture); !s) return complain(s.error(), 1);
   std::printf("%s: %d x %d pixels%s\n", o.out.c_str(), picture.width, picture.height,
               both->has_value() ? "" : ", simulated");
   return 0;

@@ -6,8 +6,8 @@
 #include <cstdio>
 
 #include "common/core/utf8.h"
+#include "common/options/complain.h"
 #include "services/data/mesh/cache.h"
-#include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
 
 namespace telesplat::launcher {
@@ -56,34 +56,34 @@ std::string limit_text(const std::string& folder) {
 
 std::string count_text(size_t stores) { return fmt::format("{} store{}", stores, stores == 1 ? "" : "s"); }
 
-void print(const std::string& text) { std::fputs((text + "\n").c_str(), stdout); }
+void say(const std::string& text) { std::fputs((text + "\n").c_str(), stdout); }
 
 int list(CacheOptions o, const options::Given&) {
   const std::string folder = folder_of(o);
   auto stores = data::cached_stores(folder);
-  if (!stores) return tools::complain(stores.error());
+  if (!stores) return complain(stores.error());
   std::reverse(stores->begin(), stores->end());
   uint64_t bytes = 0;
   for (const auto& s : *stores) {
-    if (bytes == 0) print(fmt::format("{:>9}  {:<15}  {}", "size", "last used", "made of"));
+    if (bytes == 0) say(fmt::format("{:>9}  {:<15}  {}", "size", "last used", "made of"));
     bytes += s.bytes;
     std::string what = s.source.empty() ? "a file that is not known" : to_utf8(data::short_path(s.source));
     if (!s.content.empty()) what += fmt::format(" ({})", to_utf8(s.content));
     if (!s.finished) what += s.in_use ? " (is being made)" : " (unfinished)";
-    print(fmt::format("{:>9}  {:<15}  {}", data::size_text(s.bytes),
-                      s.in_use ? "in use" : ago(std::max(0.0, now_s() - s.used_s)), what));
+    say(fmt::format("{:>9}  {:<15}  {}", data::size_text(s.bytes),
+                    s.in_use ? "in use" : ago(std::max(0.0, now_s() - s.used_s)), what));
   }
-  print(fmt::format("{}, {}, in {}; {}", count_text(stores->size()), data::size_text(bytes), data::short_path(folder),
-                    limit_text(folder)));
+  say(fmt::format("{}, {}, in {}; {}", count_text(stores->size()), data::size_text(bytes), data::short_path(folder),
+                  limit_text(folder)));
   return 0;
 }
 
 int tell(const Result<data::Removal>& removed, const std::string& folder) {
-  if (!removed) return tools::complain(removed.error());
+  if (!removed) return complain(removed.error());
   std::string text = fmt::format("{} removed from {}, {} free", count_text(removed->stores), data::short_path(folder),
                                  data::size_text(removed->bytes));
   if (removed->in_use > 0) text += fmt::format("; {} in use left", count_text(removed->in_use));
-  print(text);
+  say(text);
   return 0;
 }
 
@@ -92,17 +92,17 @@ int clear(CacheOptions o, const options::Given&) { return tell(data::clear_cache
 int limit(CacheOptions o, const options::Given&) {
   const std::string folder = folder_of(o);
   if (o.limit.empty()) {
-    print(limit_text(folder));
+    say(limit_text(folder));
     return 0;
   }
   std::optional<uint64_t> bytes;
   if (o.limit != "none") {
     const auto size = data::parse_size(o.limit);
-    if (!size) return tools::complain({fmt::format("size {}: {}", o.limit.substr(0, 80), size.error().text)});
+    if (!size) return complain({fmt::format("size {}: {}", o.limit.substr(0, 80), size.error().text)});
     bytes = *size;
   }
-  if (const Status s = data::set_cache_limit(folder, bytes); !s) return tools::complain(s.error());
-  print(limit_text(folder));
+  if (const Status s = data::set_cache_limit(folder, bytes); !s) return complain(s.error());
+  say(limit_text(folder));
   return bytes ? tell(data::bound_cache(folder, *bytes), folder) : 0;
 }
 

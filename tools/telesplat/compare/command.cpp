@@ -9,13 +9,12 @@
 #include "client/viewer/viewer_service.h"
 #include "common/core/log.h"
 #include "common/core/whole_file.h"
-#include "common/geometry/fit.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/compare/report.h"
-#include "tools/telesplat/compare/sheet.h"
 #include "tools/telesplat/compare/subject.h"
+#include "tools/telesplat/record/frame_replay.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -34,7 +33,7 @@ Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
   }
   const auto gl = viewer::make_renderer("gl", o.threads);
   if (!gl) {
-    tools::complain({"without the gl renderer: " + gl.error().text});
+    complain({"without the gl renderer: " + gl.error().text});
     return std::vector<std::string>{"cpu"};
   }
   return std::vector<std::string>{"cpu", "gl"};
@@ -53,11 +52,7 @@ class Comparison {
     });
     if (!scene) return scene.error();
     scene_ = std::move(*scene);
-    if (subject_.first_view) {
-      auto& camera = subject_.frames.front().camera;
-      camera.pose = geometry::fitted_view(scene_->box_room(), camera);
-    }
-    auto models = PoseModels::open(subject_, options_.magnify, *scene_);
+    auto models = ModelReplay::open(subject_.events, false);
     if (!models) return models.error();
     models_ = std::move(*models);
     return ok_status();
@@ -113,21 +108,30 @@ class Comparison {
     return {{"schema", 1},
             {"scene", subject_.name()},
             {"primitives", scene_->primitives()},
-            {"mode", subject_.events.empty() ? "still" : "run"},
+            {"mode", "run"},
             {"size", {c.width, c.height}},
             {"sampling", subject_.sampling},
-            {"magnify", options_.magnify},
             {"finish", splat::finish_name(finish_)},
             {"samples", options_.samples},
             {"pixels_per_degree", options_.pixels_per_degree},
             {"repeat", options_.repeat}};
   }
 
+  // To the model that the frame displayed.
+  Status replay_to(const DisplayedFrame& frame) {
+    const auto there = models_->advance(frame);
+    if (!there) return there.error();
+    if (*there) return ok_status();
+    return Error{fmt::format(
+        "{}: ends at event {}, frame {} displayed event {}; --frames chooses earlier frames, and telesplat run "
+        "--record-points keeps more",
+        subject_.events, models_->applied().value, frame.number, frame.sequence.value)};
+  }
+
   Status compare_pose(const DisplayedFrame& frame) {
     const std::string where = fmt::format("pose {} of {}", poses_.size() + 1, subject_.frames.size());
     progress_.show(where + ": direct rendering");
-    const auto model = models_->of(frame);
-    if (!model) return model.error();
+    if (const Status s = replay_to(frame); !s) return s;
     const auto drawn = scene_->draw_reference(frame.camera, subject_.shading, frame.epoch, options_.samples);
     if (!drawn) return drawn.error();
     const image::Reference& reference = *drawn;
@@ -136,8 +140,8 @@ class Comparison {
       return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name())};
     const image::Flip flip(reference.view, options_.pixels_per_degree);
 
-    ComparedPose pose{frame, (*model)->points(), {}};
-    const auto complete = measure_cells(**model, reference, flip, where, pose);
+    ComparedPose pose{frame, models_->model()->points(), {}};
+    const auto complete = measure_cells(*models_->model(), reference, flip, where, pose);
     if (!complete) return complete.error();
     return *complete ? keep(reference.view, std::move(pose)) : ok_status();
   }
@@ -182,8 +186,7 @@ class Comparison {
         subject_.name(),
         fmt::format("{}, drawn directly: {} a pixel", scene_->size(),
                     options_.samples == 1 ? "one ray" : fmt::format("{} rays", options_.samples)),
-        subject_.events.empty() ? std::string("still camera")
-                                : fmt::format("frame {} at {:.2f} s, event {}", f.number, f.t_s, f.sequence.value),
+        fmt::format("frame {} at {:.2f} s, event {}", f.number, f.t_s, f.sequence.value),
         fmt::format("display {}x{}", f.camera.width, f.camera.height),
         "sampled " + subject_.sampling,
         fmt::format("{} points cached", pose.points_cached),
@@ -201,9 +204,7 @@ class Comparison {
         if (const Status s = image::write_png(cell_name + "-flip.png", errors); !s) return s;
       }
     }
-    columns_.push_back(pose_column(
-        reference, pose.cells,
-        subject_.events.empty() ? std::string("still camera") : fmt::format("frame {} at {:.2f} s", f.number, f.t_s)));
+    columns_.push_back(pose_column(reference, pose.cells, fmt::format("frame {} at {:.2f} s", f.number, f.t_s)));
     for (Cell& c : pose.cells) c.view = {}, c.flip_map = {};
     poses_.push_back(std::move(pose));
     return ok_status();
@@ -215,44 +216,29 @@ class Comparison {
   const std::vector<std::string>& renderers_;
   tools::ProgressLine progress_;
   std::unique_ptr<DirectScene> scene_;
-  std::unique_ptr<PoseModels> models_;
+  std::unique_ptr<ModelReplay> models_;
   std::vector<ComparedPose> poses_;
   std::vector<std::vector<SheetCell>> columns_;  // of the run's sheet
 };
 
-// What is drawn of a run is what it has recorded.
-Status refuse_data_flags(const CompareOptions& o, const options::Given& given) {
-  std::error_code error;
-  if (!fs::is_directory(o.path, error)) return ok_status();
-  data::DataOptions any;
-  const options::Table flags = data::scene_table(any);
-  for (const std::string& flag : given)
-    if (options::find(flags, flag) && flag != "--cache" && flag != "--no-cache")
-      return Error{fmt::format("{}: {} is a run folder, whose data are drawn as they were recorded", flag, o.path)};
-  return ok_status();
-}
-
-int compare(CompareOptions o, const options::Given& given) {
+int compare(CompareOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
-  if (const Status s = image::validate_samples(o.samples); !s) return tools::complain({"--samples: " + s.error().text});
+  if (const Status s = image::validate_samples(o.samples); !s) return complain({"--samples: " + s.error().text});
   const auto finish = splat::finish_named(o.finish);
-  if (!finish)
-    return tools::complain({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
-  if (const Status s = refuse_data_flags(o, given); !s) return tools::complain(s.error());
+  if (!finish) return complain({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
   auto subject = find_subject(o);
-  if (!subject) return tools::complain(subject.error());
+  if (!subject) return complain(subject.error());
   const auto renderers = choose_renderers(o);
-  if (!renderers) return tools::complain(renderers.error());
+  if (!renderers) return complain(renderers.error());
 
   Comparison comparison(o, *subject, *finish, *renderers);
-  if (const Status s = comparison.open(); !s) return tools::complain(s.error());
-  if (const Status s = comparison.compare_poses(); !s) return tools::complain(s.error());
-  if (const Status s = comparison.write(); !s) return tools::complain(s.error(), 1);
+  if (const Status s = comparison.open(); !s) return complain(s.error());
+  if (const Status s = comparison.compare_poses(); !s) return complain(s.error());
+  if (const Status s = comparison.write(); !s) return complain(s.error(), 1);
   if (comparison.compared() > 0) comparison.print();
   if (comparison.compared() == subject->frames.size()) return 0;
-  return tools::complain(
-      {fmt::format("told to stop after {} of {} poses", comparison.compared(), subject->frames.size())}, 1);
+  return complain({fmt::format("told to stop after {} of {} poses", comparison.compared(), subject->frames.size())}, 1);
 }
 
 }  // namespace

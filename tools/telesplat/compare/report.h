@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/telesplat/compare/measure.h"
+#include "tools/telesplat/movie/contact_sheet.h"
 #include "tools/telesplat/record/recorded_run.h"
 
 namespace telesplat::launcher {
@@ -26,5 +27,15 @@ std::string comparison_table(const std::vector<ComparedPose>& poses);
 
 /// Medians over poses of cell `i`'s figures, in a line.
 std::string median_label(const std::vector<ComparedPose>& poses, size_t i);
+
+/// One pose: the reference, then a row for each cell with its picture, its FLIP map, the square where it differs most,
+/// 4 times as large, and the same square of the reference.
+image::View pose_sheet(const image::View& reference, const std::vector<Cell>& cells,
+                       const std::vector<std::string>& captions);
+
+/// What the sheet of a whole run has of a pose, the reference and then the cells in their order: small pictures with
+/// their error maps, and the square in which the cells together differ most from the reference.
+std::vector<SheetCell> pose_column(const image::View& reference, const std::vector<Cell>& cells,
+                                   const std::string& pose_name);
 
 }  // namespace telesplat::launcher

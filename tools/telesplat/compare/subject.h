@@ -1,53 +1,50 @@
-// What is compared: which poses, of which data, and the point model that each of them shows.
+// What `telesplat compare` is told, and what is compared: which poses, of which data.
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
-#include "tools/telesplat/compare/compare_options.h"
-#include "tools/telesplat/record/frame_replay.h"
-#include "tools/telesplat/scene/scene.h"
+#include "common/image/measures/flip.h"
+#include "common/splat/kernel_traits.h"
+#include "tools/telesplat/record/recorded_run.h"
 
 namespace telesplat::launcher {
+
+struct CompareOptions {
+  std::string path;   ///< a run folder
+  std::string moved;  ///< the data file, where it is not where the run found it
+  std::string out;
+  int poses = 4;
+  std::vector<uint64_t> frames;
+  std::vector<std::string> kernels = splat::kernel_names();
+  std::vector<std::string> renderers;  ///< empty: cpu, and gl where there is OpenGL
+  std::string finish = "on";
+  double splat_scale = 0;  ///< 0: what suits the kernel
+  int samples = 16;        ///< rays a pixel of direct rendering
+  int repeat = 5;
+  double pixels_per_degree = image::kFlipPixelsPerDegree;
+  int threads = 0;
+  bool pictures = false;
+  data::DataOptions data;  ///< the cache alone
+};
+
+/// A row a flag; they point into `options`.
+options::Table table(CompareOptions& options);
 
 /// The poses to compare, before any data is read.
 struct CompareSubject {
   std::unique_ptr<Scene> scene;
   std::string out;
-  std::string events;                ///< record of point-model events; empty: poses are sampled
+  std::string events;                ///< record of point-model events
   std::string sampling;              ///< how the points were sampled, for captions
   image::ShadingParameters shading;  ///< as it was displayed
   bool best_patch_only = false;      ///< the run's packing kept redundant patches
-  int octree_depth = 6;
   std::vector<DisplayedFrame> frames;
-  bool first_view = false;  ///< the pose of the only frame is fitted to the data's box, once that is known
   std::string name() const { return scene->name(); }  ///< for captions
 };
 
 /// Error texts are for a user: exit code 2.
 Result<CompareSubject> find_subject(const CompareOptions& options);
-
-/// The point models of a subject's poses, one after the other.
-class PoseModels {
- public:
-  /// Opens the record, if the subject has one. `scene` must outlive this.
-  static Result<std::unique_ptr<PoseModels>> open(const CompareSubject& subject, int magnify, DirectScene& scene);
-
-  /// What the frame displayed, or what one sampling frame of its pose gives. Frames come in order of display.
-  /// The model holds until the next call.
-  Result<const points::PointModel*> of(const DisplayedFrame& frame);
-  Sequence applied() const { return applied_; }
-
- private:
-  PoseModels(const CompareSubject& subject, int magnify, DirectScene& scene)
-      : subject_(subject), magnify_(magnify), scene_(scene) {}
-  Result<const points::PointModel*> replay(const DisplayedFrame& frame);
-
-  const CompareSubject& subject_;
-  int magnify_;
-  DirectScene& scene_;
-  std::unique_ptr<ModelReplay> events_;
-  std::unique_ptr<points::PointModel> sampled_;
-  Sequence applied_;
-};
 
 }  // namespace telesplat::launcher

@@ -1,9 +1,15 @@
 #include "tools/telesplat/control/client.h"
 
+#include <algorithm>
+#include <cstdio>
 #include <utility>
 
 #include "common/core/utf8.h"
 #include "common/net/control.h"
+#include "common/net/master_address.h"
+#include "common/net/service.h"
+#include "common/options/complain.h"
+#include "tools/telesplat/control/json_fields.h"
 
 namespace telesplat::launcher {
 
@@ -43,6 +49,14 @@ Result<std::string> ControlClient::ask(const std::string& command, double timeou
   return std::move(reply->text);
 }
 
+Result<nlohmann::ordered_json> ControlClient::status(double timeout_s) {
+  const auto answer = ask("status", timeout_s);
+  if (!answer) return answer.error();
+  auto json = nlohmann::ordered_json::parse(*answer, nullptr, false);
+  if (!json.is_object()) return Error{"the master's answer is not a status"};
+  return json;
+}
+
 Result<wire::ControlReply> ControlClient::order(const std::string& command, double timeout_s,
                                                 const std::map<std::string, std::string>& arguments) {
   if (line_ && line_->due > 0) line_.reset();
@@ -58,10 +72,6 @@ Result<wire::ControlReply> ControlClient::order(const std::string& command, doub
     line_.reset();
   }
   return reply;
-}
-
-void ControlClient::request_status() {
-  if (line().socket.send(wire::Control{"status", {}})) ++line_->due;
 }
 
 void ControlClient::tell(const std::string& command, const std::map<std::string, std::string>& arguments) {
@@ -83,6 +93,59 @@ std::optional<nlohmann::json> ControlClient::poll_status() {
     nobody_there_ = false;
   }
   return out;
+}
+
+std::vector<Wish> wishes_of(const nlohmann::json& status) {
+  using Json = nlohmann::ordered_json;
+  const Json told = status;
+  const Json* session = field(told, "session");
+  std::vector<Wish> out;
+  for (const Json& w : array(told, "wishes")) {
+    const Json* arguments = field(w, "arguments");
+    Wish wish{count(w, "number"), session ? count(*session, "pid") : 0, text(w, "command"),
+              arguments ? text(*arguments, "value") : std::string()};
+    if (wish.number > 0 && !wish.order.empty()) out.push_back(std::move(wish));
+  }
+  return out;
+}
+
+options::Table session_rows(SessionChoice& c) {
+  return {{.flag = "--master",
+           .value = &c.master,
+           .help = "address of the session's master; default: the one session of yours that runs on this machine",
+           .environment = net::kMasterVariable},
+          {.flag = "--session",
+           .value = &c.session,
+           .help = "of several sessions on this machine: its PID, scene or run folder, as telesplat ctl list tells"},
+          net::keys_row(c.keys)};
+}
+
+std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Given& given, int& exit_code,
+                                     const std::vector<net::Role>& roles) {
+  const bool is_told = std::find(given.begin(), given.end(), "--master") != given.end();
+  const std::string environment = net::master_from_environment();
+  if (!c.session.empty() && is_told && c.master != environment) {
+    exit_code = complain({"--master and --session both say which session is meant: give one of them"});
+    return nullptr;
+  }
+  const auto search = net::find_master(c.session.empty() ? c.master : std::string(), c.session);
+  if (search.address.empty()) {
+    exit_code = complain({search.problem}, search.exit_code());
+    return nullptr;
+  }
+  const auto access = net::Access::open({}, c.keys.empty() ? search.keys : c.keys, roles);
+  if (!access) {
+    exit_code = complain(access.error());
+    return nullptr;
+  }
+  return std::make_unique<ControlClient>(search.address, *access);
+}
+
+int tell_answer(const Result<wire::ControlReply>& reply, const std::string& done) {
+  if (!reply) return complain(reply.error(), 1);
+  if (!reply->ok) return complain({reply->text});
+  std::printf("%s\n", reply->text == "{}" && !done.empty() ? done.c_str() : reply->text.c_str());
+  return 0;
 }
 
 }  // namespace telesplat::launcher

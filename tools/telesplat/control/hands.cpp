@@ -10,10 +10,9 @@
 #include "common/core/utf8.h"
 #include "common/core/whole_file.h"
 #include "common/notes/shelf.h"
+#include "common/options/complain.h"
 #include "common/scene/settings.h"
-#include "tools/common/complain.h"
-#include "tools/telesplat/control/choice.h"
-#include "tools/telesplat/control/commands.h"
+#include "tools/telesplat/control/client.h"
 #include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/control/orders.h"
 #include "tools/telesplat/control/pick.h"
@@ -61,7 +60,7 @@ int pick(PickOptions o, const options::Given& given) {
   if (!client) return exit_code;
   if (o.opacity) o.question.opacity = fmt::format("{}", *o.opacity);
   const auto answer = ask_pick(*client, o.question);
-  if (!answer) return tools::complain(answer.error(), client->unanswered() ? 1 : 2);
+  if (!answer) return complain(answer.error(), client->unanswered() ? 1 : 2);
   if (o.json)
     std::printf("%s\n", answer->dump(2, ' ', false, Json::error_handler_t::replace).c_str());
   else
@@ -101,7 +100,7 @@ int measure(MeasureOptions o, const options::Given& given) {
                                       o.words.end());
   const bool alone = what == "list" || what == "clear", one = what == "remove" || what == "save";
   if (!(alone && more.empty()) && !(one && more.size() == 1) && !(what == "add" && !more.empty()))
-    return tools::complain({"ctl measure: needs list, add X,Y ..., remove NUMBER, clear or save FILE.csv"});
+    return complain({"ctl measure: needs list, add X,Y ..., remove NUMBER, clear or save FILE.csv"});
   int exit_code = 0;
   const auto client = reach(o.session, given, exit_code);
   if (!client) return exit_code;
@@ -111,10 +110,10 @@ int measure(MeasureOptions o, const options::Given& given) {
   if (o.opacity) arguments["opacity"] = fmt::format("{}", *o.opacity);
   if (!o.viewer.empty()) arguments["viewer"] = o.viewer;
   const auto answer = client->ask("measure", kPatience_s, arguments);
-  if (!answer) return tools::complain(answer.error(), client->unanswered() ? 1 : 2);
+  if (!answer) return complain(answer.error(), client->unanswered() ? 1 : 2);
   const Json json = Json::parse(*answer, nullptr, false);
   if (what == "save") {
-    if (const Status s = write_whole(more.front(), text(json, "csv")); !s) return tools::complain(s.error());
+    if (const Status s = write_whole(more.front(), text(json, "csv")); !s) return complain(s.error());
     std::printf("%s\n", more.front().c_str());
   } else if (o.json) {
     std::printf("%s\n", json.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
@@ -167,13 +166,12 @@ class Subject {
     std::string file = o_.data, scene;
     if (file.empty()) {
       if (!client(exit_code)) return Error{};
-      const auto answer = client_->ask("status", kPatience_s);
-      if (!answer) {
+      const auto status = client_->status(kPatience_s);
+      if (!status) {
         exit_code = 1;
-        return answer.error();
+        return status.error();
       }
-      const Json status = Json::parse(*answer, nullptr, false);
-      for (const Json& p : array(status, "processes"))
+      for (const Json& p : array(*status, "processes"))
         if (const auto* facts = field(p, "facts"); text(p, "role") == "data" && facts) {
           file = text(*facts, "data_file");
           scene = text(*facts, "scene");
@@ -207,14 +205,12 @@ std::string rest(const std::vector<std::string>& words) {
                      fmt::join(words.begin() + std::min<ptrdiff_t>(1, ptrdiff_t(words.size())), words.end(), " "));
 }
 
-int said(const Error& error, int exit_code) {
-  return error.text.empty() ? exit_code : tools::complain(error, exit_code);
-}
+int said(const Error& error, int exit_code) { return error.text.empty() ? exit_code : complain(error, exit_code); }
 
 int print_book(const notes::Shelf& shelf, bool json, bool bookmarks) {
   std::string path;
   const auto book = notes::read_book(shelf, &path);
-  if (!book) return tools::complain(book.error());
+  if (!book) return complain(book.error());
   if (json) {
     Json out = Json::parse(notes::to_json(*book));
     out["file"] = path;
@@ -240,7 +236,7 @@ int print_book(const notes::Shelf& shelf, bool json, bool bookmarks) {
 // Changes the book and tells where it lies. Refusals of what a person wished are their fault: exit code 2.
 int change(const notes::Shelf& shelf, const std::string& done, const std::function<Status(notes::Book&)>& how) {
   std::string path;
-  if (const Status s = notes::change_book(shelf, how, &path); !s) return tools::complain(s.error());
+  if (const Status s = notes::change_book(shelf, how, &path); !s) return complain(s.error());
   std::printf("%s in %s\n", done.c_str(), path.c_str());
   return 0;
 }
@@ -259,9 +255,9 @@ Result<notes::Bookmark> view_of(ControlClient& client, const std::map<std::strin
 
 int go(Subject& subject, const notes::Shelf& shelf, const std::string& name) {
   const auto book = notes::read_book(shelf);
-  if (!book) return tools::complain(book.error());
+  if (!book) return complain(book.error());
   const notes::Bookmark* bookmark = book->find(name);
-  if (!bookmark) return tools::complain({fmt::format("there is no bookmark \"{}\"", name.substr(0, notes::kMaxName))});
+  if (!bookmark) return complain({fmt::format("there is no bookmark \"{}\"", name.substr(0, notes::kMaxName))});
   int exit_code = 0;
   ControlClient* client = subject.client(exit_code);
   if (!client) return exit_code;
@@ -276,7 +272,7 @@ int bookmark(KeptOptions o, const options::Given& given) {
   const std::string what = o.words.empty() ? "list" : o.words.front(), name = rest(o.words);
   const bool named = what == "add" || what == "go" || what == "remove";
   if ((!named && what != "list") || named == name.empty())
-    return tools::complain({"ctl bookmark: needs list, add NAME, go NAME or remove NAME"});
+    return complain({"ctl bookmark: needs list, add NAME, go NAME or remove NAME"});
   Subject subject(o, given);
   int exit_code = 0;
   const auto shelf = subject.shelf(exit_code);
@@ -287,7 +283,7 @@ int bookmark(KeptOptions o, const options::Given& given) {
   ControlClient* client = subject.client(exit_code);
   if (!client) return exit_code;
   auto view = view_of(*client, subject.viewer());
-  if (!view) return tools::complain(view.error(), client->unanswered() ? 1 : 2);
+  if (!view) return complain(view.error(), client->unanswered() ? 1 : 2);
   view->name = name;
   return change(*shelf, "kept", [&](notes::Book& book) { return book.keep(*view); });
 }
@@ -308,7 +304,7 @@ int keep_notes(KeptOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
   const std::string what = o.words.empty() ? "list" : o.words.front(), text = rest(o.words);
   if ((what != "list" && what != "add" && what != "remove") || (what == "list") != text.empty())
-    return tools::complain({"ctl notes: needs list, add TEXT or remove NUMBER"});
+    return complain({"ctl notes: needs list, add TEXT or remove NUMBER"});
   Subject subject(o, given);
   int exit_code = 0;
   const auto shelf = subject.shelf(exit_code);
@@ -318,15 +314,14 @@ int keep_notes(KeptOptions o, const options::Given& given) {
     uint64_t number = 0;
     const auto read = std::from_chars(text.data(), text.data() + text.size(), number);
     if (read.ec != std::errc() || read.ptr != text.data() + text.size())
-      return tools::complain({fmt::format("ctl notes remove: \"{}\" is no note's number", text.substr(0, 40))});
+      return complain({fmt::format("ctl notes remove: \"{}\" is no note's number", text.substr(0, 40))});
     return change(*shelf, "removed", [&](notes::Book& book) { return book.remove_note(number); });
   }
   notes::Note note{.text = text, .made_at = now_text()};
   if (!o.at.empty()) {
     ControlClient* client = subject.client(exit_code);
     if (!client) return exit_code;
-    if (const Status s = find_place(*client, o, note); !s)
-      return tools::complain(s.error(), client->unanswered() ? 1 : 2);
+    if (const Status s = find_place(*client, o, note); !s) return complain(s.error(), client->unanswered() ? 1 : 2);
   }
   return change(*shelf, "kept", [&](notes::Book& book) -> Status {
     const auto number = book.add(note);

@@ -10,15 +10,17 @@
 
 namespace telesplat::launcher {
 
-inline const nlohmann::ordered_json* field(const nlohmann::ordered_json& object, const char* key) {
+template <class Json>
+const Json* field(const Json& object, const char* key) {
   if (!object.is_object()) return nullptr;
   const auto it = object.find(key);
   return it == object.end() ? nullptr : &*it;
 }
 
-inline std::string text(const nlohmann::ordered_json& object, const char* key) {
+template <class Json>
+std::string text(const Json& object, const char* key) {
   const auto* value = field(object, key);
-  return value && value->is_string() ? value->get<std::string>() : std::string();
+  return value && value->is_string() ? value->template get<std::string>() : std::string();
 }
 
 inline std::optional<double> number(const nlohmann::ordered_json& object, const char* key) {

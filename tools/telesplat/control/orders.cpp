@@ -56,12 +56,11 @@ Result<std::string> read_map(const std::string& word, ControlClient& client) {
   const std::string name = path.size() < word.size() ? word.substr(path.size() + 1) : "";
   const auto content = read_whole(path, kMaxMapBytes);
   if (!content) return content.error();
-  const auto answer = client.ask("status", kPatience_s);
-  if (!answer) return answer.error();
-  const auto status = nlohmann::json::parse(*answer, nullptr, false);
+  const auto status = client.status(kPatience_s);
+  if (!status) return status.error();
   std::map<std::string, double> parameters;
-  if (status.is_object() && status.contains("parameters"))
-    for (const auto& [name, value] : status["parameters"].items())
+  if (status->contains("parameters"))
+    for (const auto& [name, value] : (*status)["parameters"].items())
       if (value.is_number()) parameters[name] = value.get<double>();
   const volume::TransferFunction any{{{}}};
   const auto session = volume::read_session(parameters, {{"transfer", volume::to_text(any)}});

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/telesplat/command.h"
 #include "tools/telesplat/control/client.h"
 
 namespace telesplat::launcher {
@@ -25,5 +26,15 @@ const std::vector<Order>& orders();
 
 /// How long a master may take to answer.
 inline constexpr double kPatience_s = 5;
+
+/// The sessions of this user on this machine.
+Command list_command();
+/// How displays and server wait for each other, while a session runs.
+Command coupling_command();
+/// pick, measure, bookmark, notes: what people point at, and what they keep about it.
+std::vector<Command> hands_commands();
+/// One for each order of scene::settings() that a viewer or the launcher keeps, and `settings`, which lists all that
+/// can be changed.
+std::vector<Command> setting_commands();
 
 }  // namespace telesplat::launcher

@@ -6,11 +6,11 @@
 
 #include "client/viewer/viewer_options.h"
 #include "common/julia/flags.h"
+#include "common/options/complain.h"
 #include "common/scene/settings.h"
+#include "common/wire/limits.h"
 #include "services/data/data_options.h"
-#include "tools/common/complain.h"
-#include "tools/telesplat/control/choice.h"
-#include "tools/telesplat/control/commands.h"
+#include "tools/telesplat/control/client.h"
 #include "tools/telesplat/control/orders.h"
 
 namespace telesplat::launcher {
@@ -60,7 +60,7 @@ int change(ChangeOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
   const Row flag = value_row(o);
   if (!is_switch(flag))
-    if (const Status s = options::check(flag, o.value); !s) return tools::complain(s.error());
+    if (const Status s = options::check(flag, o.value); !s) return complain(s.error());
   // The launcher may stand in another folder.
   if (o.setting->order == "open" && o.value != julia::kSceneWord) {
     std::error_code error;
@@ -75,19 +75,54 @@ int change(ChangeOptions o, const options::Given& given) {
   return tell_answer(client->order(order, kPatience_s, arguments), fmt::format("{} {}", order, o.value));
 }
 
-struct ListOptions {};
+struct NoOptions {};
 
-int list(ListOptions, const options::Given&) {
+int list(NoOptions, const options::Given&) {
   std::fputs(scene::settings_page().c_str(), stdout);
   return 0;
+}
+
+struct CouplingOptions {
+  SessionChoice session;
+  std::string coupling, viewer;
+  std::optional<int> buffers;
+};
+
+options::Table table(CouplingOptions& o) {
+  return joined({{.flag = "coupling",
+                  .value = &o.coupling,
+                  .help = "async: the display never waits; sync: each frame waits for its own view update; loose: for "
+                          "the next of --buffers; images: of a session from its beginning alone",
+                  .limits = options::Names{"async", "sync", "loose", "images"},
+                  .required = true},
+                 {.flag = "--buffers",
+                  .value = &o.buffers,
+                  .help = "of loose: view updates that are on their way or complete and not displayed, at most",
+                  .limits = options::Range{1, double(wire::kMaxBuffers)},
+                  .default_text = "3"},
+                 {.flag = "--viewer", .value = &o.viewer, .help = "name of the viewer; default: all that are here"}},
+                session_rows(o.session));
+}
+
+int order(CouplingOptions o, const options::Given& given) {
+  log::initialise("ctl", "warn");
+  if (o.buffers && o.coupling != "loose")
+    return complain({"--buffers is of loose coupling; " + o.coupling + " has none"});
+  int exit_code = 0;
+  const auto client = reach(o.session, given, exit_code);
+  if (!client) return exit_code;
+  std::map<std::string, std::string> arguments{{"coupling", o.coupling}};
+  if (o.buffers) arguments["buffers"] = std::to_string(*o.buffers);
+  if (!o.viewer.empty()) arguments["viewer"] = o.viewer;
+  return tell_answer(client->order("coupling", kPatience_s, arguments));
 }
 
 }  // namespace
 
 std::vector<Command> setting_commands() {
-  std::vector<Command> out{make_command<ListOptions>(
+  std::vector<Command> out{make_command<NoOptions>(
       "settings", "what can be changed while a session runs, by which order and widget of a window's panel",
-      [](ListOptions&) { return options::Table{}; }, list)};
+      [](NoOptions&) { return options::Table{}; }, list)};
   std::set<std::string_view> made;
   for (const auto& setting : scene::settings()) {
     const bool here = setting.keeper == scene::Keeper::kViewer || setting.keeper == scene::Keeper::kLauncher;
@@ -99,5 +134,7 @@ std::vector<Command> setting_commands() {
   }
   return out;
 }
+
+Command coupling_command() { return make_command("coupling", scene::help_of_order("coupling"), table, order); }
 
 }  // namespace telesplat::launcher

@@ -7,14 +7,14 @@
 #include <filesystem>
 
 #include "common/core/log.h"
+#include "common/options/complain.h"
 #include "services/data/inspect.h"
 #include "services/data/kinds.h"
 #include "services/data/volume/volume.h"
-#include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/inspect/pictures.h"
-#include "tools/telesplat/inspect/run_folder.h"
+#include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -60,7 +60,7 @@ options::Table table(InspectOptions& o) {
 }
 
 // What lies at the path, as far as flags decide on it.
-enum class Subject { kData, kRun, kPicture, kDepthImage, kStore };
+enum class Inspected { kData, kRun, kPicture, kDepthImage, kStore };
 
 std::string lower_extension(const std::string& path) {
   std::string out = fs::path(path).extension().string();
@@ -68,34 +68,34 @@ std::string lower_extension(const std::string& path) {
   return out;
 }
 
-Subject subject_of(const data::DataOptions& o) {
+Inspected subject_of(const data::DataOptions& o) {
   std::error_code error;
   const std::string& path = o.scene;
-  if (path == julia::kSceneWord || !o.volume.raw.empty()) return Subject::kData;
+  if (path == julia::kSceneWord || !o.volume.raw.empty()) return Inspected::kData;
   // A folder is a run's, unless it holds a volume and no run.
   if (fs::is_directory(path, error))
     return fs::exists(path + "/summary.json", error) || !(data::looks_like_volume(path) || data::is_mesh_file(path))
-               ? Subject::kRun
-               : Subject::kData;
+               ? Inspected::kRun
+               : Inspected::kData;
   const std::string extension = lower_extension(path);
-  if (extension == ".depth") return Subject::kDepthImage;
-  if (extension == ".mesh") return Subject::kStore;
+  if (extension == ".depth") return Inspected::kDepthImage;
+  if (extension == ".mesh") return Inspected::kStore;
   const bool picture = extension == ".exr" || extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-  if (extension == ".frame" || (picture && !data::is_mesh_file(path))) return Subject::kPicture;
-  return Subject::kData;
+  if (extension == ".frame" || (picture && !data::is_mesh_file(path))) return Inspected::kPicture;
+  return Inspected::kData;
 }
 
 // Flags that say nothing of what lies there.
-Status refuse_misfits(const InspectOptions& o, const options::Given& given, Subject subject) {
+Status refuse_misfits(const InspectOptions& o, const options::Given& given, Inspected subject) {
   constexpr const char* kWords[] = {"a data set", "a run folder", "a picture", "a depth image", "a chunk store"};
   InspectOptions any;
   const options::Table own = own_table(any), data = data::scene_table(any.data);
   for (const std::string& flag : given) {
-    const bool deep = subject == Subject::kPicture || subject == Subject::kDepthImage;
-    const bool fits = options::find(data, flag) ? subject == Subject::kData
+    const bool deep = subject == Inspected::kPicture || subject == Inspected::kDepthImage;
+    const bool fits = options::find(data, flag) ? subject == Inspected::kData
                       : flag == "--out"         ? deep
-                      : flag == "--near"        ? subject == Subject::kDepthImage
-                      : flag == "--skip"        ? subject == Subject::kRun
+                      : flag == "--near"        ? subject == Inspected::kDepthImage
+                      : flag == "--skip"        ? subject == Inspected::kRun
                                                 : true;
     if (!fits)
       return Error{fmt::format("{}: {} is {}, which has no {}", flag, o.data.scene, kWords[size_t(subject)], flag)};
@@ -110,9 +110,9 @@ Result<data::Description> inspect_data(const data::DataOptions& options) {
   return (*scene)->describe_data([&](const char* what, double fraction) { progress.show(what, fraction); });
 }
 
-Result<data::Description> inspect_with_depth(const InspectOptions& o, Subject subject) {
+Result<data::Description> inspect_with_depth(const InspectOptions& o, Inspected subject) {
   const std::string& path = o.data.scene;
-  auto picture = subject == Subject::kPicture ? inspect_picture(path) : inspect_depth_image(path, o.near_m);
+  auto picture = subject == Inspected::kPicture ? inspect_picture(path) : inspect_depth_image(path, o.near_m);
   if (!picture) return picture.error();
   if (o.out.empty()) return std::move(picture->description);
   if (const Status s = write_depth(o.out, *picture, path); !s) return s.error();
@@ -131,18 +131,17 @@ int inspect(InspectOptions o, const options::Given& given) {
   log::initialise("telesplat", "warn");  // to stderr: stdout may be JSON
   const std::string& path = o.data.scene;
   std::error_code error;
-  if (path != julia::kSceneWord && !fs::exists(path, error))
-    return tools::complain({fmt::format("{}: no such file", path)});
-  const Subject subject = subject_of(o.data);
+  if (path != julia::kSceneWord && !fs::exists(path, error)) return complain({fmt::format("{}: no such file", path)});
+  const Inspected subject = subject_of(o.data);
   // A folder of anything else, whatever the flags.
-  if (subject == Subject::kRun && !fs::exists(path + "/summary.json", error))
-    return tools::complain(inspect_run(path).error());
-  if (const Status s = refuse_misfits(o, given, subject); !s) return tools::complain(s.error());
-  const auto told = subject == Subject::kData    ? inspect_data(o.data)
-                    : subject == Subject::kRun   ? inspect_run(path, o.skip_s)
-                    : subject == Subject::kStore ? inspect_store(path)
-                                                 : inspect_with_depth(o, subject);
-  if (!told) return tools::complain(told.error());
+  if (subject == Inspected::kRun && !fs::exists(path + "/summary.json", error))
+    return complain(inspect_run(path).error());
+  if (const Status s = refuse_misfits(o, given, subject); !s) return complain(s.error());
+  const auto told = subject == Inspected::kData    ? inspect_data(o.data)
+                    : subject == Inspected::kRun   ? inspect_run(path, o.skip_s)
+                    : subject == Inspected::kStore ? inspect_store(path)
+                                                   : inspect_with_depth(o, subject);
+  if (!told) return complain(told.error());
   std::printf("%s", (o.json ? told->to_json() + "\n" : told->table()).c_str());
   return 0;
 }

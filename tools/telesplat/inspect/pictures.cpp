@@ -3,17 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 
 #include "client/viewer/record/frame_spool.h"
 #include "common/codec/depth_codec.h"
+#include "common/core/check.h"
 #include "common/core/whole_file.h"
 #include "common/image/normal.h"
 #include "services/data/inspect.h"
-#include "tools/telesplat/inspect/npy.h"
-#include "tools/telesplat/record/depth_camera.h"
+#include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -92,6 +94,56 @@ void describe_codes(const image::DepthImage& image, data::Description& out) {
   out.json["depth_codes"] = {{"min", lowest}, {"max", highest}, {"limit", image::kMaxDepthCode}};
 }
 
+namespace fs = std::filesystem;
+
+constexpr tools::CsvTable::Limits kCameras{.rows = 1'000'000, .line_bytes = 4096};
+
+// "frame-000012.depth" -> 12
+std::optional<uint64_t> number_of(const std::string& path) {
+  const std::string stem = fs::path(path).stem().string();
+  const size_t dash = stem.rfind('-');
+  uint64_t out = 0;
+  if (dash == stem.npos) return std::nullopt;
+  const auto parsed = std::from_chars(stem.data() + dash + 1, stem.data() + stem.size(), out);
+  return parsed.ec == std::errc() && parsed.ptr == stem.data() + stem.size() ? std::optional(out) : std::nullopt;
+}
+
+Result<geometry::Camera> camera_in(const tools::CsvTable& table, size_t index) {
+  tools::CsvRow row(table, index);
+  geometry::Camera c;
+  c.pose = {{row.number("px"), row.number("py"), row.number("pz")},
+            {row.number("qw"), row.number("qx"), row.number("qy"), row.number("qz")}};
+  for (const auto& [name, to] :
+       {std::pair{"left", &c.left}, {"right", &c.right}, {"bottom", &c.bottom}, {"top", &c.top}, {"near_m", &c.near_m}})
+    *to = row.number(name);
+  c.width = int(std::clamp(row.number("width"), 0.0, 1e6));
+  c.height = int(std::clamp(row.number("height"), 0.0, 1e6));
+  if (const Status s = row.status(); !s) return s.error();
+  if (const Status s = geometry::validate(c); !s) return table.wrong(index, s.error().text);
+  return c;
+}
+
+// What cameras.csv beside a .depth file says of its camera; nothing if it is not there or has no such frame. path ends
+// in the frame's number: "frame-000012.depth". Error: it is no such table; names file and line.
+Result<std::optional<geometry::Camera>> recorded_camera(const std::string& path) {
+  const std::string cameras = (fs::path(path).parent_path() / "cameras.csv").string();
+  const auto number = number_of(path);
+  std::error_code error;
+  if (!number || !fs::exists(cameras, error)) return std::optional<geometry::Camera>();
+  const auto table = tools::CsvTable::read(cameras, kCameras);
+  if (!table) return table.error();
+  const auto frame = table->column("frame");
+  if (!frame) return frame.error();
+  for (size_t row = 0; row < table->rows(); ++row) {
+    const auto id = table->count(row, *frame);
+    if (!id) return id.error();
+    if (*id != *number) continue;
+    const auto camera = camera_in(*table, row);
+    return camera ? Result<std::optional<geometry::Camera>>(*camera) : camera.error();
+  }
+  return std::optional<geometry::Camera>();
+}
+
 }  // namespace
 
 Result<Picture> inspect_picture(const std::string& path) {
@@ -161,6 +213,20 @@ Status write_depth(const std::string& path, const Picture& picture, const std::s
                      : fmt::format("--out: {} has no depth", name)};
   if (extension == ".npy") return write_npy(path, view.depth_m, view.height, view.width);
   return picture.normals.empty() ? image::write_exr(path, view) : image::write_exr(path, view, picture.normals);
+}
+
+Status write_npy(const std::string& path, std::span<const float> values, int rows, int columns) {
+  static_assert(std::endian::native == std::endian::little, "floats are written as they lie in memory");
+  CHECK(values.size() == size_t(rows) * size_t(columns));
+  constexpr size_t kAlign = 64, kPrefix = 10;  // magic, version, length of what follows
+  std::string header = fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", rows, columns);
+  header.append(kAlign - 1 - (kPrefix + header.size()) % kAlign, ' ');
+  header += '\n';
+  const std::string prefix{'\x93', 'N', 'U', 'M', 'P', 'Y', 1, 0, char(header.size() & 255), char(header.size() >> 8)};
+
+  std::string all = prefix + header;
+  all.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+  return write_whole(path, all);
 }
 
 }  // namespace telesplat::launcher

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "common/core/result.h"
 #include "common/geometry/camera.h"
 #include "common/image/file.h"
 #include "services/data/description.h"
@@ -29,5 +31,9 @@ Result<Picture> inspect_depth_image(const std::string& path, std::optional<doubl
 /// Writes its depth: .npy (float32 metres, rows from the top), or .exr (Z in metres, R, G, B, and N where it has
 /// normals). Infinity where nothing is. Error: another extension, no depth in it, not writable.
 Status write_depth(const std::string& path, const Picture& picture, const std::string& name);
+
+/// Writes `values`, rows x columns of them row by row, as little-endian float32 (numpy.load reads it). The file appears
+/// whole or not at all. Errors name the path. Source: NEP 1, "A Simple File Format for NumPy Arrays", version 1.0.
+Status write_npy(const std::string& path, std::span<const float> values, int rows, int columns);
 
 }  // namespace telesplat::launcher

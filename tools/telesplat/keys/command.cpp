@@ -9,7 +9,7 @@
 
 #include "common/net/keys/key_files.h"
 #include "common/net/keys/key_maker.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/command.h"
 
@@ -111,9 +111,9 @@ Status revoke(const KeysOptions& o, net::KeyMaker& maker) {
 }
 
 int keys(KeysOptions o, const options::Given& given) {
-  if (const Status s = check(o, given); !s) return tools::complain(s.error());
+  if (const Status s = check(o, given); !s) return complain(s.error());
   auto maker = net::KeyMaker::open(o.folder);
-  if (!maker) return tools::complain(maker.error());
+  if (!maker) return complain(maker.error());
   Status done = ok_status();
   if (!o.bundled.empty())
     done = hand_out(o, maker->allowed());
@@ -121,7 +121,7 @@ int keys(KeysOptions o, const options::Given& given) {
     done = revoke(o, *maker);
   else if (!o.list)
     done = make(o, *maker);
-  if (!done) return tools::complain(done.error());
+  if (!done) return complain(done.error());
   if (o.bundled.empty() && o.revoked.empty()) tell(o.folder, maker->allowed());
   return 0;
 }

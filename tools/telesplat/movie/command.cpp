@@ -6,7 +6,7 @@
 
 #include "common/core/log.h"
 #include "common/net/service.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/movie/movie.h"
 
@@ -34,16 +34,14 @@ int movie(MovieCommandOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
   std::error_code error;
-  if (!std::filesystem::is_directory(o.run, error))
-    return tools::complain({fmt::format("{}: is no run folder", o.run)});
+  if (!std::filesystem::is_directory(o.run, error)) return complain({fmt::format("{}: is no run folder", o.run)});
   const auto plan = plan_movie(o.movie, "--size");
-  if (!plan) return tools::complain(plan.error());
+  if (!plan) return complain(plan.error());
   tools::ProgressLine progress;
   const auto report = make_movie(o.run, *plan, progress, net::stop_requested);
-  if (!report) return tools::complain(report.error());
-  if (report->interrupted)
-    return tools::complain({fmt::format("interrupted; {} was not made", o.movie.file)}, kInterrupted);
-  if (!report->written) return tools::complain(report->written.error(), 1);
+  if (!report) return complain(report.error());
+  if (report->interrupted) return complain({fmt::format("interrupted; {} was not made", o.movie.file)}, kInterrupted);
+  if (!report->written) return complain(report->written.error(), 1);
   for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
   return report->instead ? 1 : 0;
 }

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "tools/common/text_table.h"
+#include "common/core/machine.h"
 #include "tools/telesplat/movie/contact_sheet.h"
-#include "tools/telesplat/movie/encoder.h"
-#include "tools/telesplat/movie/epoch_captions.h"
+#include "tools/telesplat/movie/movie_target.h"
 #include "tools/telesplat/movie/screen.h"
 
 namespace telesplat::launcher {
@@ -18,7 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr double kMostFrames = 1e7;
 constexpr int kSmallWidth = 400;  // of a picture of a contact sheet
-constexpr size_t kMostLetters = 60;
 
 std::string cut_short(const Screen& screen, double t_s) {
   return fmt::format(
@@ -30,10 +28,9 @@ std::string cut_short(const Screen& screen, double t_s) {
 
 // How to make a movie of pictures: a line for a shell.
 std::string advice(const MovieTarget& target, double fps) {
-  std::string command = fmt::format("ffmpeg -framerate {} -i {}", fps, shell_quoted(target.pattern()));
-  for (const char* word : {"-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-vf",
-                           "crop=trunc(iw/2)*2:trunc(ih/2)*2", target.wanted_video.c_str()})
-    command += " " + shell_quoted(word);
+  const std::string command =
+      shell_line({"ffmpeg", "-framerate", fmt::format("{}", fps), "-i", target.pattern(), "-c:v", "libx264", "-crf",
+                  "18", "-pix_fmt", "yuv420p", "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2", target.wanted_video});
   return fmt::format(
       "ffmpeg is not installed, so there are pictures instead of {}; where it is, this makes the movie of them:\n  {}",
       target.wanted_video, command);
@@ -175,7 +172,6 @@ std::vector<SheetRow> in_rows(const std::vector<SheetCell>& cells) {
 Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::ProgressLine& line,
                                const tools::ShouldStop& should_stop) {
   const int count = plan.options.pictures;
-  auto epochs = epoch_captions(screen.run().directory);
   std::vector<SheetCell> cells;
   MovieReport report;
   for (int i = 0; i < count; ++i) {
@@ -191,8 +187,6 @@ Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::Pro
     const DisplayedFrame& frame = screen.frame();
     cells.push_back(
         {{small_picture(screen.view(), kSmallWidth)}, {fmt::format("{:.2f} s  frame {}", frame.t_s, frame.number)}});
-    if (const std::string& text = epochs[frame.epoch.value]; !text.empty())
-      cells.back().texts.push_back(tools::shortened(text, kMostLetters));
     line.show("making the contact sheet", double(i + 1) / count);
   }
   const std::string& path = plan.target.path;

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "tools/common/progress_line.h"
-#include "tools/telesplat/movie/movie_options.h"
 #include "tools/telesplat/movie/movie_target.h"
 
 namespace telesplat::launcher {

@@ -1,11 +1,32 @@
-// Where a movie goes: what its name asks for, whether it can be made there, and with what.
+// What is asked of a movie, and where it goes: whether it can be made there, and with what.
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/core/result.h"
+#include "common/options/table.h"
+#include "tools/common/progress_line.h"
 
 namespace telesplat::launcher {
+
+/// Flags of `telesplat run` and `view`, and of `telesplat movie`.
+struct MovieOptions {
+  std::string file;   ///< what to make (movie_target()); empty: nothing
+  double fps = 30;    ///< frames a second of the movie
+  std::string size;   ///< "WxH"; empty: the display's
+  int pictures = 12;  ///< of a contact sheet
+  int threads = 0;    ///< to draw with; 0: one a core
+};
+
+/// --movie and what begins with it: of a command that runs something.
+options::Table movie_rows(MovieOptions& options);
+/// The flags of `telesplat movie` beside the run and the file.
+options::Table movie_table(MovieOptions& options);
+
+/// The size asked for; {0, 0}: the display's. Error: names the flag. flag: "--size".
+Result<std::pair<int, int>> movie_size(const MovieOptions& options, const char* flag);
 
 struct MovieTarget {
   enum class Kind { kVideo, kPictures, kSheet };
@@ -33,7 +54,26 @@ Result<MovieTarget> movie_target(const std::string& name);
 /// A program in PATH; empty: there is none. Relative folders of PATH are passed over.
 std::string find_program(const std::string& name);
 
-/// As it is typed at a shell's prompt.
-std::string shell_quoted(const std::string& text);
+/// How a kind of video file is made: what ffmpeg calls its format, the encoders to try, in this order, with what each
+/// is told.
+struct Container {
+  struct Encoder {
+    std::string name;
+    std::vector<std::string> arguments;
+  };
+  std::string extension, format;
+  std::vector<Encoder> encoders;
+  bool even_sides = true;  ///< pictures have even sides; of odd ones the last row or column is left out
+};
+/// By the file's extension; null: no video's.
+const Container* container_of(const std::string& path);
+/// ".mp4, .mov, ..."
+std::string container_names();
+
+/// Makes a video of the pictures folder/000000.png, 000001.png, ..., fps of them a second. Returns the encoder's name,
+/// "libx264". The file appears under its name when all is done; until then it is PATH.part. Error: ffmpeg cannot be
+/// started, has none of the encoders or fails (its last line), or should_stop says so; no file is left.
+Result<std::string> encode_video(const std::string& ffmpeg, const std::string& folder, const std::string& path,
+                                 double fps, const tools::ShouldStop& should_stop);
 
 }  // namespace telesplat::launcher

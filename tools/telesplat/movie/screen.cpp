@@ -6,7 +6,9 @@
 #include <filesystem>
 
 #include "common/image/canvas.h"
+#include "common/scene/legend.h"
 #include "common/wall/unrolled.h"
+#include "tools/telesplat/scene/epochs.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -26,11 +28,8 @@ Result<Screen> Screen::open(const std::string& directory, int width, int height,
   }
   if (const Status s = out.choose_size(width, height, size_flag); !s) return s.error();
   if (const Status s = out.open_replays(threads); !s) return s.error();
-  if (out.run().legend && !out.run().stereo.on()) {
-    auto legends = EpochLegends::read(directory);
-    if (!legends) return legends.error();
-    out.legends_ = std::move(*legends);
-  }
+  if (out.run().legend && !out.run().stereo.on())
+    if (const Status s = out.read_legends(directory); !s) return s.error();
   out.find_times();
   return out;
 }
@@ -84,6 +83,24 @@ Status Screen::open_replays(int threads) {
   return ok_status();
 }
 
+// Epochs that told the same share a legend.
+Status Screen::read_legends(const std::string& directory) {
+  std::map<std::string, std::string> told;
+  std::shared_ptr<const image::Legend> legend;
+  return read_epochs(directory, {"epoch"}, [&](uint64_t epoch, tools::CsvRow& row) {
+    std::map<std::string, std::string> facts;
+    for (const char* name : {scene::kColouringFact, "transfer"})
+      if (std::string text = row.text(name); !text.empty()) facts[name] = std::move(text);
+    if (facts != told) {
+      const auto read = scene::legend_of(facts, row.numbers());
+      legend = read ? std::make_shared<const image::Legend>(*read) : nullptr;
+      told = std::move(facts);
+    }
+    if (legend) legends_[EpochId{epoch}] = legend;
+    return ok_status();
+  });
+}
+
 // A wall's tiles have one clock.
 void Screen::find_times() {
   double end_s = run().frames.back().shown_s;
@@ -112,7 +129,8 @@ Result<Screen::Shown> Screen::show(double t_s) {
   if (!changed) return Shown::kSame;
   ++drawn_;
   compose();
-  if (const image::Legend* legend = legends_.at(frame().epoch)) image::draw_legend(view_, *legend);
+  if (const auto legend = legends_.find(frame().epoch); legend != legends_.end())
+    image::draw_legend(view_, *legend->second);
   return Shown::kNew;
 }
 

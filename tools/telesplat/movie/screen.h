@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/viewer/display/eyes/eye_rig.h"
-#include "tools/telesplat/record/epoch_legends.h"
+#include "common/image/legend.h"
 #include "tools/telesplat/record/frame_replay.h"
 
 namespace telesplat::launcher {
@@ -50,15 +50,16 @@ class Screen {
   Status choose_size(int width, int height, const char* size_flag);
   Status choose_size_of_description(int width, int height, const char* size_flag);
   Status open_replays(int threads);
+  Status read_legends(const std::string& directory);
   void find_times();
   Result<bool> draw(Tile& tile);
   Result<bool> draw_pair(Tile& tile, const DisplayedFrame& frame, const geometry::Camera& camera);
   void compose();
 
   std::vector<Tile> tiles_;
-  EpochLegends legends_;
-  int width_ = 0, height_ = 0;          // of the whole
-  std::vector<geometry::Rect> places_;  // of the tiles in it
+  std::map<EpochId, std::shared_ptr<const image::Legend>> legends_;  // where there was something to tell
+  int width_ = 0, height_ = 0;                                       // of the whole
+  std::vector<geometry::Rect> places_;                               // of the tiles in it
   double begin_s_ = 0, duration_s_ = 0;
   uint64_t drawn_ = 0;
   image::View view_;

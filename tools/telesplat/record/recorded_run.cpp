@@ -11,7 +11,7 @@
 #include "common/core/whole_file.h"
 #include "common/image/background.h"
 #include "tools/common/csv_table.h"
-#include "tools/telesplat/scene/toml_file.h"
+#include "tools/telesplat/scene/scene_keys.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/telesplat/report/about_part.h"
+#include "tools/telesplat/report/parts.h"
 
 #include <fmt/format.h>
 
@@ -26,7 +26,7 @@ ordered_json at(const ordered_json& s, std::string_view path) {
   return *here;
 }
 
-std::string text(const ordered_json& s, const char* path) {
+std::string text_at(const ordered_json& s, const char* path) {
   const auto v = at(s, path);
   if (v.is_string()) return v.get<std::string>();
   if (v.is_number_integer()) return fmt::format("{}", v.get<int64_t>());
@@ -46,7 +46,7 @@ std::string with(const std::string& a, const char* between, const std::string& b
 }
 
 std::string primitives(const ordered_json& s) {
-  const std::string kind = text(s, "kind"), n = text(s, "primitives");
+  const std::string kind = text_at(s, "kind"), n = text_at(s, "primitives");
   if (n.empty()) return kind;
   return fmt::format("{} of {} {}", kind, n, kind == "mesh" ? "triangles" : kind == "volume" ? "voxels" : "primitives");
 }
@@ -56,8 +56,8 @@ std::string machines(const ordered_json& s) {
   const auto all = at(s, "machines");
   if (!all.is_array()) return out;
   for (const auto& m : all)
-    out += fmt::format("{}{}: {}, {} cores{}{}", out.empty() ? "" : "; ", text(m, "host"), text(m, "processor"),
-                       text(m, "cores"), text(m, "gpu").empty() ? "" : ", ", text(m, "gpu"));
+    out += fmt::format("{}{}: {}, {} cores{}{}", out.empty() ? "" : "; ", text_at(m, "host"), text_at(m, "processor"),
+                       text_at(m, "cores"), text_at(m, "gpu").empty() ? "" : ", ", text_at(m, "gpu"));
   return out;
 }
 
@@ -178,24 +178,24 @@ ordered_json facts_json(const ordered_json& s) {
     if (!how.empty()) out.push_back({what, how});
   };
   if (!s.is_object()) return out;
-  add("scene", text(s, "scene"));
+  add("scene", text_at(s, "scene"));
   add("kind", primitives(s));
   add("display", size(s, "size"));
-  add("sampled", with(size(s, "sampling_size"), ", ", text(s, "sampling")));
-  add("samplers", text(s, "samplers"));
-  add("viewers", text(s, "viewers"));
-  const std::string coupling = text(s, "coupling");
-  add("coupling", coupling == "loose" ? with(coupling, ", buffers: ", text(s, "buffers")) : coupling);
-  const std::string gl_ms = text(s, "renderer_ms.gl");
-  add("renderer", with(text(s, "renderer"), ", a frame in ms: OpenGL ",
-                       gl_ms.empty() ? gl_ms : gl_ms + ", processor " + text(s, "renderer_ms.cpu")));
-  add("splats", with(text(s, "splat"), ", finish ", text(s, "finish")));
-  add("shading", text(s, "shading"));
-  add("walk", with(text(s, "trajectory.name"), ", ", text(s, "trajectory.file")));
-  add("version", text(s, "version"));
-  add("began", text(s, "begin").substr(0, 19));
+  add("sampled", with(size(s, "sampling_size"), ", ", text_at(s, "sampling")));
+  add("samplers", text_at(s, "samplers"));
+  add("viewers", text_at(s, "viewers"));
+  const std::string coupling = text_at(s, "coupling");
+  add("coupling", coupling == "loose" ? with(coupling, ", buffers: ", text_at(s, "buffers")) : coupling);
+  const std::string gl_ms = text_at(s, "renderer_ms.gl");
+  add("renderer", with(text_at(s, "renderer"), ", a frame in ms: OpenGL ",
+                       gl_ms.empty() ? gl_ms : gl_ms + ", processor " + text_at(s, "renderer_ms.cpu")));
+  add("splats", with(text_at(s, "splat"), ", finish ", text_at(s, "finish")));
+  add("shading", text_at(s, "shading"));
+  add("walk", with(text_at(s, "trajectory.name"), ", ", text_at(s, "trajectory.file")));
+  add("version", text_at(s, "version"));
+  add("began", text_at(s, "begin").substr(0, 19));
   add("machines", machines(s));
-  add("data", text(s, "data.file"));
+  add("data", text_at(s, "data.file"));
   for (const ordered_json& remark : at(s, "data.remarks"))
     if (remark.is_string()) add("remark", remark.get<std::string>());
   const auto command = at(s, "command");

@@ -3,7 +3,7 @@
 
 #include "common/core/log.h"
 #include "common/net/service.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/report/report.h"
@@ -34,12 +34,12 @@ int report(ReportOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
   const auto settled = settle_report(std::move(o));
-  if (!settled) return tools::complain(settled.error());
+  if (!settled) return complain(settled.error());
   tools::ProgressLine progress(1);
   const auto made = make_report(*settled, progress, net::stop_requested);
   progress.close();
-  if (!made) return tools::complain(made.error(), 1);
-  if (made->interrupted) return tools::complain({"interrupted; no report was made"}, kInterrupted);
+  if (!made) return complain(made.error(), 1);
+  if (made->interrupted) return complain({"interrupted; no report was made"}, kInterrupted);
   std::printf("%s\n", line_of(*made).c_str());
   return 0;
 }

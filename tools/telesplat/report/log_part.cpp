@@ -6,8 +6,7 @@
 #include <fstream>
 
 #include "common/core/utf8.h"
-#include "tools/common/line_reader.h"
-#include "tools/telesplat/report/about_part.h"
+#include "tools/telesplat/report/parts.h"
 #include "tools/telesplat/report/reading/run_tables.h"
 
 namespace telesplat::launcher {
@@ -30,8 +29,28 @@ std::string_view word(std::string_view line, int place) {
   return line.substr(0, line.find(' '));
 }
 
+/// A line of a file that may be anything: no line takes more memory than kLongestLine.
+struct Line {
+  std::string text;
+  uint64_t left_out = 0;  ///< bytes behind the text
+};
+// False: the file is over.
+bool next_line(std::istream& in, Line& out) {
+  out.text.resize(kLongestLine + 1);
+  in.getline(out.text.data(), std::streamsize(out.text.size()));
+  const auto bytes = size_t(in.gcount());
+  const bool longer = in.fail() && bytes > 0;
+  out.text.resize(in.good() ? bytes - 1 : bytes);  // without its end
+  out.left_out = 0;
+  if (!longer) return bytes > 0;
+  in.clear();
+  in.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  out.left_out = uint64_t(in.gcount()) - (in.eof() ? 0 : 1);
+  return true;
+}
+
 // What is too long ends with how much more there was.
-std::string shown(const tools::LineReader::Line& line) {
+std::string shown(const Line& line) {
   const std::string text = to_utf8(line.text.substr(0, kShownOfALine));
   const uint64_t more = line.left_out + line.text.size() - std::min(line.text.size(), kShownOfALine);
   return more == 0 ? text : fmt::format("{} ... ({} bytes more)", text, more);
@@ -39,20 +58,19 @@ std::string shown(const tools::LineReader::Line& line) {
 
 ordered_json log_json(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
-  tools::LineReader reader(in, kLongestLine);
+  Line line;
+  uint64_t bytes = 0;
   size_t warnings = 0, errors = 0;
   ordered_json lines = ordered_json::array();
-  while (reader.bytes() < kMostBytes) {
-    const auto line = reader.next();
-    if (!line) break;
-    const auto level = word(line->text, 2);
+  for (; bytes < kMostBytes && next_line(in, line); bytes += line.text.size() + line.left_out + 1) {
+    const auto level = word(line.text, 2);
     const bool warning = level == "warning", error = level == "error" || level == "critical";
     warnings += warning, errors += error;
-    if ((warning || error) && lines.size() < kMostLines) lines.push_back(shown(*line));
+    if ((warning || error) && lines.size() < kMostLines) lines.push_back(shown(line));
   }
   ordered_json out{
       {"process", to_utf8(path.stem().string())}, {"warnings", warnings}, {"errors", errors}, {"lines", lines}};
-  if (reader.bytes() >= kMostBytes) out["read_mb"] = kMostBytes >> 20;
+  if (bytes >= kMostBytes) out["read_mb"] = kMostBytes >> 20;
   return out;
 }
 

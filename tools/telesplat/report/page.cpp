@@ -6,7 +6,6 @@
 
 #include "common/core/check.h"
 #include "common/core/utf8.h"
-#include "tools/telesplat/report/page_files.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -23,26 +22,13 @@ std::string code() {
 }  // namespace
 
 std::string html_escaped(std::string_view text) {
+  constexpr std::string_view kSigns = "&<>\"'";
+  constexpr const char* kNames[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
   std::string out;
-  for (const char c : to_utf8(text)) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
+  for (const char c : to_utf8(text)) {
+    const size_t sign = kSigns.find(c);
+    out += sign == kSigns.npos ? std::string(1, c) : kNames[sign];
+  }
   return out;
 }
 

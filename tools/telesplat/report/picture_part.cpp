@@ -1,4 +1,4 @@
-#include "tools/telesplat/report/picture_part.h"
+#include "tools/telesplat/report/parts.h"
 
 #include <fmt/format.h>
 

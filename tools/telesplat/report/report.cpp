@@ -10,12 +10,10 @@
 #include "common/core/version.h"
 #include "common/core/whole_file.h"
 #include "common/metrics/run_folder.h"
+#include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/record/skip.h"
-#include "tools/telesplat/report/about_part.h"
 #include "tools/telesplat/report/page.h"
-#include "tools/telesplat/report/picture_part.h"
-#include "tools/telesplat/report/sweep_part.h"
-#include "tools/telesplat/report/time_part.h"
+#include "tools/telesplat/report/parts.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -43,9 +41,7 @@ fs::path without_slash(const std::string& directory) {
 
 // What the run was called when it began, else its folder; of "latest" and of "." what they stand for.
 std::string name_of(const std::string& run) {
-  if (const auto s = read_summary(run); s.is_object())
-    if (const auto label = s.find("label"); label != s.end() && label->is_string() && !label->empty())
-      if (const auto text = label->get<std::string>(); !text.empty()) return text;
+  if (const std::string label = text(read_summary(run), "label"); !label.empty()) return label;
   std::error_code error;
   const fs::path real = fs::canonical(run, error);
   return (error ? without_slash(run) : real).filename().string();
@@ -99,12 +95,6 @@ std::string from_page(const std::string& page, const fs::path& file) {
   return to_utf8(file.lexically_relative(fs::absolute(page, error).lexically_normal().parent_path()).string());
 }
 
-std::string kind_of(const ordered_json& summary) {
-  if (!summary.is_object()) return {};
-  const auto found = summary.find("kind");
-  return found != summary.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
 }  // namespace
 
 Result<ReportOptions> settle_report(ReportOptions o) {
@@ -135,7 +125,7 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   ordered_json summary = read_summary(directory);
   if (summary.is_object())
     if (auto later = summary_without_beginning(directory, skip_s)) summary = *std::move(later);
-  RunTables tables = read_run_tables(directory, kind_of(summary), skip_s);
+  RunTables tables = read_run_tables(directory, text(summary, "kind"), skip_s);
   if (skip_s > 0)
     tables.notes.push_back(
         fmt::format("the first {} s are left out (--skip); memory, errors and points cached are of "
@@ -154,7 +144,6 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   out["duration_s"] = tables.duration_s();
   out["spreads"] = spreads(tables);
   out["figures"] = figures_json(summary, out["spreads"], tables);
-  out["intervals"] = intervals_json(tables);
   PageLimits own = limits;
   own.buckets = std::max(std::min(limits.buckets, kLeastBuckets), limits.buckets / runs);
   out["series"] = time_series(tables, own);

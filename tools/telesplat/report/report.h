@@ -39,4 +39,10 @@ Result<ReportMade> make_report(const ReportOptions& options, tools::ProgressLine
 /// What was made, for people.
 std::string line_of(const ReportMade& made);
 
+bool is_sweep(const std::string& directory);
+
+/// Puts into `options` what a page shows of a sweep, and as runs the first that is done of each configuration, named
+/// by the flags that vary. Error: sweep.csv is none, or no run is done.
+Status take_sweep(const std::string& directory, ReportOptions& options);
+
 }  // namespace telesplat::launcher

@@ -1,4 +1,4 @@
-#include "tools/telesplat/report/sweep_part.h"
+#include "tools/telesplat/report/report.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include "common/core/utf8.h"
 #include "tools/common/csv_table.h"
 #include "tools/telesplat/record/skip.h"
-#include "tools/telesplat/report/about_part.h"
+#include "tools/telesplat/report/parts.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -9,9 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "client/viewer/record/frame_spool.h"
+#include "common/core/machine.h"
 #include "common/metrics/run_folder.h"
 #include "common/net/service.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/common/json_file.h"
 #include "tools/telesplat/report/report.h"
 #include "tools/telesplat/run/run_report.h"
@@ -77,7 +78,7 @@ int AfterRun::tell_unseen(bool stopped) const {
   const std::string names =
       fmt::format("{}{}", fmt::join(unseen.begin(), unseen.begin() + std::min(kNamed, unseen.size()), ", "),
                   unseen.size() > kNamed ? ", ..." : "");
-  tools::complain({fmt::format(
+  complain({fmt::format(
       "{}; it takes more time (--duration), or fewer viewers and pixels",
       none ? "no frame shows the data: the run ended before a view was complete"
            : fmt::format("{} of {} viewers never showed a complete view: {}", unseen.size(), viewers.size(), names))});
@@ -93,23 +94,23 @@ int AfterRun::verify(bool stopped) {
   }
   if (stopped) progress_.line("what was displayed is verified; Ctrl-C leaves that out");
   // The scene as it was opened, with what the record tells of its epochs: session.toml cannot tell every file's name.
-  if (const Status s = scene_->read_record(o_.out); !s) return tools::complain(s.error());
+  if (const Status s = scene_->read_record(o_.out); !s) return complain(s.error());
   auto direct = scene_->open_direct(0, [](const char*, double) {});
-  if (!direct) return tools::complain(direct.error());
+  if (!direct) return complain(direct.error());
   const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };
   const VerifyOptions options{o_.viewer.display.shading, o_.verify_samples};
   const Status verified = verify_run(o_.out, **direct, options, tell, net::stop_requested);
   progress_.close();
-  return verified ? 0 : tools::complain(verified.error(), 1);
+  return verified ? 0 : complain(verified.error(), 1);
 }
 
 // The wall's picture, and the moments its tiles are of. A run that was stopped need not have one of each tile.
 int AfterRun::stitch(bool stopped) const {
-  if (const Status s = keep_barrier(o_.out, o_.viewer.stereo.panel_file); !s) return tools::complain(s.error(), 1);
+  if (const Status s = keep_barrier(o_.out, o_.viewer.stereo.panel_file); !s) return complain(s.error(), 1);
   if (o_.viewer.wall.empty()) return 0;
-  if (const Status s = keep_description(o_.out, o_.viewer.wall); !s) return tools::complain(s.error(), 1);
+  if (const Status s = keep_description(o_.out, o_.viewer.wall); !s) return complain(s.error(), 1);
   const auto tiles = stitch_wall(o_.out, o_.viewer.display.wall);
-  if (!tiles) return tools::complain(tiles.error(), stopped ? 0 : 1);
+  if (!tiles) return complain(tiles.error(), stopped ? 0 : 1);
   std::string moments;
   for (const auto& t : *tiles)
     moments += fmt::format("{}{} frame {} at {:.2f} s", moments.empty() ? "" : ", ", t.viewer, t.frame, t.t_s);
@@ -121,15 +122,14 @@ int AfterRun::stitch(bool stopped) const {
 int AfterRun::make_the_movie(bool stopped) {
   if (!movie_) return 0;
   const std::string& file = movie_->options.file;
-  const std::string later =
-      fmt::format("telesplat movie {} {} makes it of the record", shell_quoted(o_.out), shell_quoted(file));
+  const std::string later = fmt::format("telesplat movie {} makes it of the record", shell_line({o_.out, file}));
   if (stopped || net::stop_requested()) {
     progress_.line(fmt::format("{} was not made; {}", file, later));
     return 0;
   }
   const auto report = make_movie(o_.out, *movie_, progress_, net::stop_requested);
-  if (!report) return tools::complain(report.error(), 1);
-  if (!report->written) return tools::complain(report->written.error(), 1);
+  if (!report) return complain(report.error(), 1);
+  if (!report->written) return complain(report->written.error(), 1);
   for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
   if (report->interrupted) progress_.line(fmt::format("interrupted: {} was not made; {}", file, later));
   return report->interrupted ? kInterrupted : report->instead ? 1 : 0;
@@ -137,7 +137,7 @@ int AfterRun::make_the_movie(bool stopped) {
 
 int AfterRun::make_the_report(bool stopped) {
   if (!o_.report) return 0;
-  const std::string later = fmt::format("telesplat report {} makes it", shell_quoted(o_.out));
+  const std::string later = fmt::format("telesplat report {} makes it", shell_line({o_.out}));
   if (stopped || net::stop_requested()) {
     progress_.line(fmt::format("the report was not made; {}", later));
     return 0;
@@ -145,10 +145,10 @@ int AfterRun::make_the_report(bool stopped) {
   ReportOptions options;
   options.runs = {o_.out};
   const auto settled = settle_report(std::move(options));
-  if (!settled) return tools::complain(settled.error(), 1);
+  if (!settled) return complain(settled.error(), 1);
   const auto made = make_report(*settled, progress_, net::stop_requested);
   progress_.close();
-  if (!made) return tools::complain(made.error(), 1);
+  if (!made) return complain(made.error(), 1);
   if (made->interrupted) {
     progress_.line(fmt::format("interrupted: the report was not made; {}", later));
     return kInterrupted;

@@ -24,18 +24,14 @@ namespace telesplat::launcher {
 Result<ChildProcess> ChildProcess::start(const std::string& name, const std::string& program,
                                          const std::vector<std::string>& arguments, const std::string& log_path,
                                          int nice_value, bool told) {
-  int out[2];
-  const int log = ::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, kPrivate);
-  if (log < 0) return Error{fmt::format("{}: {}", log_path, std::strerror(errno))};
-  if (pipe2(out, O_CLOEXEC) != 0) {
-    ::close(log);
-    return Error{fmt::format("{}: no pipe: {}", name, std::strerror(errno))};
-  }
-  int in[2] = {-1, -1};  // ours, the child's
-  if (told && socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) {
-    for (const int fd : {log, out[0], out[1]}) ::close(fd);
+  const Descriptor log(::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, kPrivate));
+  if (!log.valid()) return Error{fmt::format("{}: {}", log_path, std::strerror(errno))};
+  int out[2], in[2] = {-1, -1};
+  if (pipe2(out, O_CLOEXEC) != 0) return Error{fmt::format("{}: no pipe: {}", name, std::strerror(errno))};
+  Descriptor from_child(out[0]), child_out(out[1]);
+  if (told && socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0)
     return Error{fmt::format("{}: no pair of sockets: {}", name, std::strerror(errno))};
-  }
+  Descriptor to_child(in[0]), child_in(in[1]);
   std::vector<char*> argv;
   argv.push_back(const_cast<char*>(program.c_str()));
   for (const auto& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
@@ -48,27 +44,20 @@ Result<ChildProcess> ChildProcess::start(const std::string& name, const std::str
     if (getppid() != launcher) _exit(1);  // the launcher died in between
     if (nice_value) setpriority(PRIO_PROCESS, 0, nice_value);
     const int null = ::open("/dev/null", O_RDONLY);
-    dup2(told ? in[1] : null, 0);
-    dup2(out[1], 1);
-    dup2(log, 2);
+    dup2(told ? child_in.get() : null, 0);
+    dup2(child_out.get(), 1);
+    dup2(log.get(), 2);
     execv(program.c_str(), argv.data());
     dprintf(2, "telesplat: cannot start %s: %s\n", program.c_str(), std::strerror(errno));
     _exit(127);
   }
-  ::close(out[1]);
-  ::close(log);
-  if (told) ::close(in[1]);
-  if (pid < 0) {
-    ::close(out[0]);
-    if (told) ::close(in[0]);
-    return Error{fmt::format("{}: cannot fork: {}", name, std::strerror(errno))};
-  }
-  fcntl(out[0], F_SETFL, O_NONBLOCK);
+  if (pid < 0) return Error{fmt::format("{}: cannot fork: {}", name, std::strerror(errno))};
+  fcntl(from_child.get(), F_SETFL, O_NONBLOCK);
   ChildProcess child;
   child.name_ = name;
   child.pid_ = pid;
-  child.stdout_fd_ = out[0];
-  child.stdin_fd_ = in[0];
+  child.stdout_ = std::move(from_child);
+  child.stdin_ = std::move(to_child);
   return child;
 }
 
@@ -77,8 +66,8 @@ ChildProcess::ChildProcess(ChildProcess&& o) noexcept { *this = std::move(o); }
 ChildProcess& ChildProcess::operator=(ChildProcess&& o) noexcept {
   std::swap(name_, o.name_);
   std::swap(pid_, o.pid_);
-  std::swap(stdout_fd_, o.stdout_fd_);
-  std::swap(stdin_fd_, o.stdin_fd_);
+  std::swap(stdout_, o.stdout_);
+  std::swap(stdin_, o.stdin_);
   std::swap(partial_line_, o.partial_line_);
   std::swap(exit_code_, o.exit_code_);
   return *this;
@@ -89,21 +78,19 @@ ChildProcess::~ChildProcess() {
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
-  for (const int fd : {stdout_fd_, stdin_fd_})
-    if (fd >= 0) ::close(fd);
 }
 
 void ChildProcess::tell(const std::string& line) {
-  if (stdin_fd_ < 0) return;
+  if (!stdin_.valid()) return;
   const std::string whole = line + '\n';
-  [[maybe_unused]] const ssize_t sent = ::send(stdin_fd_, whole.data(), whole.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  [[maybe_unused]] const ssize_t sent = ::send(stdin_.get(), whole.data(), whole.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
 std::vector<std::string> ChildProcess::read_lines() {
   std::vector<std::string> lines;
   char buffer[4096];
   ssize_t n = 0;
-  while ((n = ::read(stdout_fd_, buffer, sizeof buffer)) > 0) {
+  while ((n = ::read(stdout_.get(), buffer, sizeof buffer)) > 0) {
     for (ssize_t i = 0; i < n; ++i) {
       if (buffer[i] == '\n')
         lines.push_back(std::exchange(partial_line_, {}));

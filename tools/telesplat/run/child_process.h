@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/descriptor.h"
 #include "common/core/result.h"
 
 namespace telesplat::launcher {
@@ -42,7 +43,7 @@ class ChildProcess {
   ChildProcess() = default;
   std::string name_;
   pid_t pid_ = -1;
-  int stdout_fd_ = -1, stdin_fd_ = -1;
+  Descriptor stdout_, stdin_;
   std::string partial_line_;
   std::optional<int> exit_code_;
 };

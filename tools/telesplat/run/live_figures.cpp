@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 
 namespace telesplat::launcher {
 namespace {
@@ -76,6 +77,13 @@ std::vector<std::string> viewer_results(const nlohmann::json& status, const std:
     out.push_back(line + fmt::format(", {:.1f} MB received", values.value("bytes_received", 0.0) / 1e6));
   }
   return out;
+}
+
+void ProcessorWait::look(pid_t process, double now_s) {
+  double ran_ns = 0, waited_ns = 0;
+  if (!(std::ifstream(fmt::format("/proc/{}/schedstat", process)) >> ran_ns >> waited_ns)) return;
+  last_s_ = now_s, last_waited_s_ = waited_ns * 1e-9;
+  if (first_s_ == 0) first_s_ = last_s_, first_waited_s_ = last_waited_s_;
 }
 
 }  // namespace telesplat::launcher

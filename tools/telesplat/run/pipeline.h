@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/links/link.h"
-#include "tools/common/time_left.h"
+#include "tools/common/progress_line.h"
 #include "tools/telesplat/control/client.h"
 #include "tools/telesplat/run/process_group.h"
 #include "tools/telesplat/run/run_options.h"

@@ -15,12 +15,12 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/machine.h"
 #include "common/core/utf8.h"
 #include "common/core/whole_file.h"
 #include "common/net/control.h"
 #include "common/net/service.h"
 #include "tools/telesplat/control/client.h"
-#include "tools/telesplat/run/children/log_limit.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -42,10 +42,7 @@ std::string program_directory() {
 std::string output_of(const std::string& program, const std::string& argument) {
   const std::string path = program_directory() + "/" + program;
   if (access(path.c_str(), X_OK) != 0) return {};
-  std::string quoted;
-  for (const char c : path) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(fmt::format("'{}' {}", quoted, argument).c_str(), "r"),
-                                                   pclose);
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(shell_line({path, argument}).c_str(), "r"), pclose);
   std::string out;
   std::array<char, 4096> part;
   while (pipe)
@@ -165,6 +162,17 @@ void ProcessGroup::finish() {
   }
   // Those whom the master could not tell, because it is dead or they had not said hello yet.
   end([](const Member&) { return true; }, kFarewell_s);
+}
+
+void limit_log(const std::string& path, uint64_t most) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::symlink_status(path, error).type() != fs::file_type::regular) return;
+  if (const auto bytes = fs::file_size(path, error); error || bytes <= most) return;
+  const std::string before = fs::path(path).replace_extension(".before.log").string();
+  fs::remove(before, error);  // a link, not what it leads to
+  if (!fs::copy_file(path, before, error)) fs::remove(before, error);
+  fs::resize_file(path, 0, error);
 }
 
 }  // namespace telesplat::launcher

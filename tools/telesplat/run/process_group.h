@@ -1,6 +1,8 @@
 // Processes of one session on this machine: started with what each must be told, ended together.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
@@ -9,9 +11,40 @@
 
 #include "common/net/keys/access.h"
 #include "tools/telesplat/run/child_process.h"
-#include "tools/telesplat/run/children/restarts.h"
 
 namespace telesplat::launcher {
+
+/// How often a process may die before its session gives it up, and how long it waits before it is started again. Times
+/// come in.
+class Restarts {
+ public:
+  /// A process that dies more often than this in this time is not started again.
+  static constexpr int kMost = 5;
+  static constexpr double kWithin_s = 60;
+  /// The first in that time is followed at once, the next after this time, the one after that after twice this time,
+  /// and so on.
+  static constexpr double kWait_s = 0.25, kLongestWait_s = 4;
+
+  /// How often it was started again in the time before now_s.
+  int lately(double now_s) {
+    while (!deaths_.empty() && deaths_.front() < now_s - kWithin_s) deaths_.pop_front();
+    return static_cast<int>(deaths_.size());
+  }
+  /// It died, and is to be started again. Returns when.
+  double died(double now_s) {
+    const int before = lately(now_s);
+    deaths_.push_back(now_s);
+    ++all_;
+    if (before == 0) return now_s;
+    return now_s + std::min(kWait_s * static_cast<double>(1u << std::min(before - 1, 20)), kLongestWait_s);
+  }
+  /// In the whole session.
+  int all() const { return all_; }
+
+ private:
+  std::deque<double> deaths_;
+  int all_ = 0;
+};
 
 /// Folder of the program that runs: the others lie beside it.
 std::string program_directory();
@@ -84,5 +117,14 @@ class ProcessGroup {
   std::deque<Member> members_;
   double looked_at_logs_s_ = -1e9;
 };
+
+/// Bytes after which a log begins anew. What was before is kept once, so that a process has twice as much at most, and
+/// what it writes between two looks.
+inline constexpr uint64_t kMostLogBytes = 64u << 20;
+
+/// NAME.log becomes NAME.before.log, in place of an older one, if it has more than `most` bytes. The process that
+/// appends to it goes on with an empty NAME.log; a line that it writes at that moment may be lost. What cannot be
+/// copied, since the disk is full, is dropped. Links stay as they are.
+void limit_log(const std::string& path, uint64_t most = kMostLogBytes);
 
 }  // namespace telesplat::launcher

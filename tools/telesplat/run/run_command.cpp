@@ -20,19 +20,16 @@
 #include "common/metrics/run_folder.h"
 #include "common/net/master_address.h"
 #include "common/net/session_file.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/client.h"
-#include "tools/telesplat/control/wishes.h"
-#include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/after_run.h"
-#include "tools/telesplat/run/children/processor_wait.h"
 #include "tools/telesplat/run/joined/joined_session.h"
 #include "tools/telesplat/run/live_figures.h"
-#include "tools/telesplat/run/overwrite.h"
 #include "tools/telesplat/run/pipeline.h"
 #include "tools/telesplat/run/run_keys.h"
+#include "tools/telesplat/run/run_options.h"
 #include "tools/telesplat/scene/scene_file.h"
 
 namespace telesplat::launcher {
@@ -42,7 +39,7 @@ namespace fs = std::filesystem;
 
 using State = Pipeline::State;
 
-constexpr double kAskEvery_s = 0.5;  // the master for its status
+constexpr double kAskStatusEvery_s = 0.5;  // the master for its status
 constexpr double kResultPatience_s = 2;
 
 // Whether the viewer could show its window here: nothing is started for one that cannot.
@@ -96,7 +93,7 @@ class Run {
       : o_(std::move(options)), scene_(std::move(scene)), movie_(std::move(movie)) {}
 
   int go() {
-    if (const Status s = prepare(); !s) return tools::complain(s.error());
+    if (const Status s = prepare(); !s) return complain(s.error());
     auto pipeline = Pipeline::start(o_);
     if (!pipeline) return not_started(pipeline.error());
     if (o_.join_master.empty())
@@ -151,7 +148,7 @@ class Run {
       for (const auto& n : news) progress_.line("telesplat: " + n);
       for (const auto& n : pipeline.take_notes()) progress_.line(n);
       for (const auto& wish : pipeline.take_wishes()) open(pipeline, wish);
-      if (monotonic_s() - asked_s > kAskEvery_s) {
+      if (monotonic_s() - asked_s > kAskStatusEvery_s) {
         control.request_status();
         if (const pid_t display = pipeline.display()) busy_.look(display, monotonic_s());
         asked_s = monotonic_s();
@@ -179,13 +176,13 @@ class Run {
   void open(Pipeline& pipeline, const std::string& wish) {
     Status opened = try_open(pipeline, wish);
     if (opened) opened = open_due();
-    if (!opened) complain(pipeline, opened.error());
+    if (!opened) tell_problem(pipeline, opened.error());
   }
   Status open_due() {
     const auto due = std::exchange(due_, nullptr);
     return due ? due() : ok_status();
   }
-  void complain(Pipeline& pipeline, const Error& error) {
+  void tell_problem(Pipeline& pipeline, const Error& error) {
     pipeline.tell_viewers("problem " + error.text);
     progress_.line("telesplat: " + error.text);
   }
@@ -199,7 +196,7 @@ class Run {
                             {"ok", done ? "true" : "false"},
                             {"text", done ? *done : done.error().text}});
       // The person has the answer; the data server that goes may take some seconds.
-      if (const Status s = open_due(); !s) complain(pipeline, s.error());
+      if (const Status s = open_due(); !s) tell_problem(pipeline, s.error());
     }
   }
 
@@ -265,9 +262,8 @@ class Run {
   }
 
   void ask_for_results(Pipeline& pipeline) try {
-    const auto answer = ControlClient(pipeline.master_endpoint(), pipeline.access()).ask("status", kResultPatience_s);
-    const auto status = answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
-    if (status.is_object()) results_ = viewer_results(status, pipeline.viewers());
+    const auto status = ControlClient(pipeline.master_endpoint(), pipeline.access()).status(kResultPatience_s);
+    if (status) results_ = viewer_results(*status, pipeline.viewers());
   } catch (const nlohmann::json::exception&) {
     results_.clear();
   }
@@ -285,13 +281,13 @@ class Run {
     if (after_.displayed())
       metrics::forget_replaced(o_.out);
     else if (fs::exists(before, error))
-      tools::complain({"the record that was to be replaced is in " + before});
+      complain({"the record that was to be replaced is in " + before});
   }
 
   int not_started(const Error& error) {
     if (net::stop_requested()) return nothing_displayed(true);
     remove_record();
-    return tools::complain(error, 1);
+    return complain(error, 1);
   }
 
   int clear_up(State state) {
@@ -300,7 +296,7 @@ class Run {
       return 2;
     }
     settle_replaced();
-    if (!logs_.path().empty()) tools::complain({"the logs are in " + logs_.path()});
+    if (!logs_.path().empty()) complain({"the logs are in " + logs_.path()});
     logs_.keep();
     return 1;
   }
@@ -309,13 +305,13 @@ class Run {
   int nothing_displayed(bool stopped) {
     remove_record();
     if (o_.viewer.window) return 0;
-    tools::complain({stopped ? "interrupted before the first frame; nothing is recorded"
-                             : "the session ended before the first frame; nothing is recorded"});
+    complain({stopped ? "interrupted before the first frame; nothing is recorded"
+                      : "the session ended before the first frame; nothing is recorded"});
     return stopped ? kInterrupted : 1;
   }
 
   int tell_failures() const {
-    for (const auto& failure : record_failures_) tools::complain({failure});
+    for (const auto& failure : record_failures_) complain({failure});
     return 1;
   }
 
@@ -323,8 +319,8 @@ class Run {
     after_.drop_spools();
     std::error_code error;
     const bool complete = !o_.join_master.empty() || fs::exists(o_.out + "/summary.json", error);
-    tools::complain({fmt::format("interrupted; the record in {} {}", o_.out,
-                                 complete ? "lacks what is made after the run" : "is not complete")});
+    complain({fmt::format("interrupted; the record in {} {}", o_.out,
+                          complete ? "lacks what is made after the run" : "is not complete")});
     return o_.viewer.window ? 0 : kInterrupted;
   }
 
@@ -340,7 +336,7 @@ class Run {
     if (!net::stop_requested() || code == 0) after_.drop_spools();
     if (code != 0) return code;
     if (!record_failures_.empty()) return tell_failures();
-    if (viewer_died_) return tools::complain({"a viewer died before the end; the record has what it told"}, 1);
+    if (viewer_died_) return complain({"a viewer died before the end; the record has what it told"}, 1);
     if (busy_.share() > ProcessorWait::kMuch)
       progress_.line(
           fmt::format("telesplat: this machine was too busy: the display waited for a processor {:.0f} % of the time, "
@@ -374,7 +370,7 @@ class Run {
 int find_session(RunOptions& o) {
   if (o.join_master.empty()) return 0;
   const auto search = net::find_master(o.join_master);
-  if (search.address.empty()) return tools::complain({search.problem}, search.exit_code());
+  if (search.address.empty()) return complain({search.problem}, search.exit_code());
   o.join_master = search.address;
   if (o.keys.empty() || o.keys == kKeysAuto) o.keys = search.keys;
   return 0;
@@ -385,17 +381,17 @@ int run(RunOptions o, const options::Given& given) {
   setenv(kLaunchedByVariable, command_line().c_str(), 1);
   if (o.out.empty() && !o.viewer.window) o.out = dated_folder();
   auto scene = settle(o, given);
-  if (!scene) return tools::complain(scene.error());
+  if (!scene) return complain(scene.error());
   if (const int code = find_session(o)) return code;
   const auto passing_keys = settle_keys(o);
-  if (!passing_keys) return tools::complain(passing_keys.error());
-  if (const Status s = check_display(o); !s) return tools::complain(s.error());
+  if (!passing_keys) return complain(passing_keys.error());
+  if (const Status s = check_display(o); !s) return complain(s.error());
   if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())
     std::fprintf(stderr, "%s\n", end.c_str());
   std::optional<MoviePlan> movie;
   if (!o.movie.file.empty()) {
     auto plan = plan_movie(o.movie, "--movie-size");
-    if (!plan) return tools::complain(plan.error());
+    if (!plan) return complain(plan.error());
     movie = std::move(*plan);
   }
   net::install_signal_handlers();

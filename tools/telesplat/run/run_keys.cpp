@@ -13,7 +13,7 @@
 #include "common/net/keys/access.h"
 #include "common/net/runtime_folder.h"
 #include "common/net/session_file.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -70,7 +70,7 @@ Result<std::unique_ptr<PassingKeys>> settle_keys(RunOptions& o) {
   const bool joins = !o.join_master.empty();
   if (o.keys == net::kNoKeys) {
     o.keys.clear();
-    if (!joins) tools::complain({"--keys none: everybody on this machine can watch and end this session"});
+    if (!joins) complain({"--keys none: everybody on this machine can watch and end this session"});
   }
   if (o.keys.empty()) return out;
   if (o.keys == kKeysAuto) {

@@ -1,13 +1,17 @@
 #include "tools/telesplat/run/run_options.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "common/core/machine.h"
 #include "common/image/measures/reference.h"
+#include "common/metrics/run_folder.h"
 #include "common/net/master_address.h"
 #include "common/net/service.h"
+#include "common/net/session_file.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -236,6 +240,13 @@ Status refuse_records_without_folder(const RunOptions& o) {
 // A viewer that joins is told by its session.
 bool shows_pictures(const RunOptions& o) { return o.viewer.coupling == "images" && o.join_master.empty(); }
 
+namespace fs = std::filesystem;
+
+// Whether `file` is this path, or lies in the folder of this path.
+bool is_or_holds(const fs::path& path, const fs::path& file) {
+  return std::mismatch(path.begin(), path.end(), file.begin(), file.end()).first == path.end();
+}
+
 }  // namespace
 
 Status check_pictures(const RunOptions& o, const Scene* scene) {
@@ -389,6 +400,32 @@ std::vector<std::string> viewer_arguments(const RunOptions& o, int number, doubl
   if (!v.wall.empty()) v.wall_tile = number - 1;
   v.display.clock_from_s = clock_from_s;
   return arguments(v);
+}
+
+std::string dated_folder(const std::string& prefix) {
+  const std::string first = fmt::format("runs/{}{:%Y%m%d-%H%M%S}", prefix, fmt::localtime(std::time(nullptr)));
+  std::string folder = first;
+  std::error_code error;
+  for (int n = 2; fs::exists(folder, error) && n < 1000; ++n) folder = fmt::format("{}-{}", first, n);
+  return folder;
+}
+
+Status check_overwrite(const RunOptions& o) {
+  if (const Status s = net::refuse_folder_in_use(o.out); !s) return s;
+  const auto record = metrics::recorded_files(o.out);
+  std::error_code error;
+  const fs::path folder = fs::canonical(o.out, error);
+  for (const std::string& input : {o.data.scene, o.viewer.trajectory, o.data.mesh.elevation.texture,
+                                   o.data.volume.transfer, o.data.mesh.colouring.map}) {
+    const fs::path path = input.empty() ? fs::path() : fs::canonical(input, error);
+    if (path.empty() || is_or_holds(path, folder)) continue;
+    if (std::any_of(record.begin(), record.end(), [&](const auto& f) { return is_or_holds(path, folder / f); }))
+      return Error{
+          fmt::format("{}: is part of the record that --overwrite would remove; copy it elsewhere first, or "
+                      "give another --out",
+                      input)};
+  }
+  return ok_status();
 }
 
 }  // namespace telesplat::launcher

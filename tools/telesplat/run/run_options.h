@@ -10,7 +10,7 @@
 #include "services/master/master_options.h"
 #include "services/packer/packer_options.h"
 #include "services/sampler/sampler_options.h"
-#include "tools/telesplat/movie/movie_options.h"
+#include "tools/telesplat/movie/movie_target.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -63,5 +63,12 @@ std::vector<std::string> sampler_arguments(const RunOptions& options);
 /// number: 1 to options.viewers. Only the first one's frames are verified. clock_from_s: when the trajectory of a wall
 /// begins, on the monotonic clock; 0: each viewer's begins with its first frame.
 std::vector<std::string> viewer_arguments(const RunOptions& options, int number, double clock_from_s);
+
+/// "runs/PREFIX20260131-142500", by this machine's clock; with "-2", "-3" ... where that is there already.
+std::string dated_folder(const std::string& prefix = "");
+
+/// Before the record in options.out is removed. Error: a session that runs records into it, or a file that the run is
+/// to read is part of it.
+Status check_overwrite(const RunOptions& options);
 
 }  // namespace telesplat::launcher

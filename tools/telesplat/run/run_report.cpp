@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
-#include "tools/telesplat/movie/movie_target.h"
+#include "common/core/machine.h"
 #include "tools/telesplat/record/skip.h"
 #include "tools/telesplat/scene/scene.h"
 
@@ -17,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr const char* kNothing = "-";  // in place of what was not measured
+constexpr const char* kNotMeasured = "-";  // in place of what was not measured
 
 std::string plural(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
@@ -29,23 +31,23 @@ json at(const json& s, const char* key) {
 
 std::string text_of(const json& s, const char* key) {
   const json v = at(s, key);
-  return v.is_string() ? v.get<std::string>() : kNothing;
+  return v.is_string() ? v.get<std::string>() : kNotMeasured;
 }
 
 // As `format` has it, times `scale`.
 std::string number(const json& value, const char* format, double scale = 1) {
-  return value.is_number() ? fmt::format(fmt::runtime(format), value.get<double>() * scale) : kNothing;
+  return value.is_number() ? fmt::format(fmt::runtime(format), value.get<double>() * scale) : kNotMeasured;
 }
 
 std::string size(const json& s, const char* key) {
   const json v = at(s, key);
-  if (!v.is_array() || v.size() != 2) return kNothing;
+  if (!v.is_array() || v.size() != 2) return kNotMeasured;
   return fmt::format("{}x{}", v[0].get<int>(), v[1].get<int>());
 }
 
 std::string distribution(const json& s, const char* key, const char* unit) {
   const json d = at(s, key);
-  if (!d.is_object()) return kNothing;
+  if (!d.is_object()) return kNotMeasured;
   return fmt::format("median {}  p95 {}  max {} {}", number(at(d, "median"), "{:.1f}"), number(at(d, "p95"), "{:.1f}"),
                      number(at(d, "max"), "{:.1f}"), unit);
 }
@@ -110,7 +112,7 @@ void add_display(const json& s, RunReport& out) {
 }
 
 std::string sent(const json& s) {
-  if (at(s, "bytes_raw").is_null()) return kNothing;
+  if (at(s, "bytes_raw").is_null()) return kNotMeasured;
   return fmt::format("{} MB of {} MB sampled ({} : 1), {} MB/s", number(at(s, "bytes_sent"), "{:.2f}", 1e-6),
                      number(at(s, "bytes_raw"), "{:.0f}", 1e-6), number(at(s, "compression_ratio"), "{:.0f}"),
                      number(at(s, "data_transfer_rate_mb_s"), "{:.2f}"));
@@ -178,11 +180,11 @@ void add_errors(const json& s, RunReport& out) {
 }
 
 // How a person names the folder next: runs/latest, where that is this run.
-std::string name_of(const std::string& directory) {
+std::string called_next(const std::string& directory) {
   std::error_code error;
   const fs::path latest = fs::path(directory).lexically_normal().parent_path() / "latest";
   const bool is_it = fs::is_symlink(latest, error) && fs::equivalent(latest, directory, error) && !error;
-  return shell_quoted(is_it ? latest.string() : directory);
+  return shell_line({is_it ? latest.string() : directory});
 }
 
 // What to do with the record. Nothing is replayed of volumes, and without what the viewer received.
@@ -193,12 +195,69 @@ void print_next(const std::string& directory) {
     if (const std::string path = directory + "/" + file; fs::exists(path, error) && !fs::is_empty(path, error))
       there += (there.empty() ? "" : ", ") + std::string(file);
   std::printf("\nEverything lies in %s (%s)\n", directory.c_str(), there.c_str());
-  const std::string name = name_of(directory);
+  const std::string name = called_next(directory);
   const auto scene = recorded_scene(directory);
   if (scene && (*scene)->pipeline() == scene::Pipeline::kPoints && fs::exists(directory + "/points.events", error))
     std::printf("telesplat compare %s draws its frames with every kernel, beside direct rendering\n", name.c_str());
   else
     std::printf("telesplat inspect %s tells more\n", name.c_str());
+}
+
+namespace fs = std::filesystem;
+
+struct File {
+  std::string name;  // from the run folder on
+  uint64_t bytes = 0;
+};
+
+// Subfolders after the folder's own files, each by name.
+std::vector<File> files_below(const std::string& directory) {
+  std::vector<File> out;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error))
+    if (entry->is_regular_file(error))
+      out.push_back({entry->path().lexically_relative(directory).string(), uint64_t(entry->file_size(error))});
+  const auto depth = [](const File& f) { return std::count(f.name.begin(), f.name.end(), '/') > 0; };
+  std::sort(out.begin(), out.end(),
+            [&](const File& a, const File& b) { return depth(a) != depth(b) ? depth(a) < depth(b) : a.name < b.name; });
+  return out;
+}
+
+void describe_scene(const std::string& directory, data::Description& out) {
+  std::error_code error;
+  if (!fs::exists(directory + "/session.toml", error)) return;
+  const auto scene = recorded_scene(directory);
+  if (!scene) {
+    out.row("scene", "cannot be told: " + scene.error().text);
+    out.json["scene_error"] = scene.error().text;
+    return;
+  }
+  std::istringstream lines((*scene)->describe_record());
+  std::string line;
+  for (bool first = true; std::getline(lines, line); first = false) out.row(first ? "scene" : "", line);
+}
+
+// A row for each of its own files, one for all of a subfolder.
+void describe_files(const std::string& directory, data::Description& out) {
+  const std::vector<File> files = files_below(directory);
+  std::map<std::string, std::pair<size_t, uint64_t>> folders;  // files, bytes
+  uint64_t all = 0;
+  for (const File& f : files) {
+    all += f.bytes;
+    out.json["files"].push_back({{"name", f.name}, {"bytes", f.bytes}});
+  }
+  out.row("files", fmt::format("{}, {}", files.size(), data::bytes_text(all)));
+  for (const File& f : files) {
+    const size_t slash = f.name.find('/');
+    if (slash == f.name.npos) {
+      out.row("", fmt::format("{:<18} {:>12} bytes", f.name, f.bytes));
+      continue;
+    }
+    auto& [count, bytes] = folders[f.name.substr(0, slash + 1)];
+    ++count, bytes += f.bytes;
+  }
+  for (const auto& [name, sum] : folders)
+    out.row("", fmt::format("{:<18} {:>12} bytes in {} files", name, sum.second, sum.first));
 }
 
 }  // namespace
@@ -234,6 +293,28 @@ void print_joined(const std::string& directory, const std::string& master_folder
       directory.c_str(),
       master_folder.empty() ? "are its master's, which keeps no record"
                             : ("will be in the session's record, " + master_folder + ", when it ends").c_str());
+}
+
+Result<data::Description> inspect_run(const std::string& directory, double skip_s) {
+  auto summary = summary_without_beginning(directory, skip_s);
+  if (!summary && skip_s > 0) return summary.error();
+  if (!summary)
+    return Error{
+        fmt::format("{}: is a folder that holds neither a finished run, which has a summary.json, nor a volume: DICOM "
+                    "slices or a numbered series of volume files ({})",
+                    directory, summary.error().text)};
+  data::Description out("run", fmt::format("{}: a run", directory));
+  out.json["path"] = directory;
+  out.json["summary"] = *std::move(summary);
+  if (const auto report = read_report(directory, skip_s)) {
+    out.row("shown", report->head);
+    for (const auto& [what, value] : report->lines) out.row(what, value);
+  } else {
+    out.row("figures", "cannot be told: " + report.error().text);
+  }
+  describe_scene(directory, out);
+  describe_files(directory, out);
+  return out;
 }
 
 }  // namespace telesplat::launcher

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "services/data/description.h"
 
 namespace telesplat::launcher {
 
@@ -23,5 +24,9 @@ Result<RunReport> read_report(const std::string& directory, double skip_s = 0);
 void print_report(const std::string& directory);
 /// The same of a viewer that joined a session. master_folder: of the session's record; empty: it is not known.
 void print_joined(const std::string& directory, const std::string& master_folder);
+
+/// Main figures, the scene as it was recorded, files by name with their sizes. Its JSON has all of summary.json. Error:
+/// it is no folder of a finished run.
+Result<data::Description> inspect_run(const std::string& directory, double skip_s = 0);
 
 }  // namespace telesplat::launcher

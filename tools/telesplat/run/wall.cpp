@@ -75,6 +75,12 @@ image::View resized(const image::View& picture, int width, int height) {
   return out;
 }
 
+Status keep_copy(const std::string& file, const std::string& kept) {
+  std::error_code error;
+  fs::copy_file(file, kept, fs::copy_options::overwrite_existing, error);
+  return error ? Status(Error{fmt::format("{}: {}", kept, error.message())}) : ok_status();
+}
+
 }  // namespace
 
 std::string viewer_name(int number) { return fmt::format("viewer-{}", number); }
@@ -116,22 +122,11 @@ Result<std::vector<TilePicture>> stitch_wall(const std::string& directory, const
 }
 
 Status keep_barrier(const std::string& run_directory, const std::string& barrier) {
-  if (barrier.empty()) return ok_status();
-  std::error_code error;
-  const std::string kept = run_directory + "/barrier.toml";
-  fs::copy_file(barrier, kept, fs::copy_options::overwrite_existing, error);
-  if (error) return Error{fmt::format("{}: {}", kept, error.message())};
-  return ok_status();
+  return barrier.empty() ? ok_status() : keep_copy(barrier, run_directory + "/barrier.toml");
 }
 
-std::string kept_description(const std::string& run_directory) { return run_directory + "/wall.toml"; }
-
 Status keep_description(const std::string& run_directory, const std::string& wall) {
-  if (!viewer::is_description(wall)) return ok_status();
-  std::error_code error;
-  fs::copy_file(wall, kept_description(run_directory), fs::copy_options::overwrite_existing, error);
-  if (error) return Error{fmt::format("{}: {}", kept_description(run_directory), error.message())};
-  return ok_status();
+  return viewer::is_description(wall) ? keep_copy(wall, run_directory + "/wall.toml") : ok_status();
 }
 
 }  // namespace telesplat::launcher

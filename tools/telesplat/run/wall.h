@@ -30,9 +30,8 @@ struct TilePicture {
 /// another size than its tile, or the whole is larger than a picture may be.
 Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, const viewer::WallTile& wall);
 
-/// Where the record keeps the description of its wall.
-std::string kept_description(const std::string& run_directory);
-/// Puts it there, if the wall has one. Error: it cannot be read or written any more.
+/// Keeps the description of the wall in the record, wall.toml, if it has one. Error: it cannot be read or written any
+/// more.
 Status keep_description(const std::string& run_directory, const std::string& wall);
 /// The same of an autostereo display's file, which people edit to calibrate it; empty: there is none.
 Status keep_barrier(const std::string& run_directory, const std::string& barrier);

@@ -1,4 +1,4 @@
-#include "tools/telesplat/scene/julia_keys.h"
+#include "tools/telesplat/scene/scene_keys.h"
 
 #include <fmt/format.h>
 

@@ -9,14 +9,14 @@
 #include "common/core/whole_file.h"
 #include "common/scene/clip_order.h"
 #include "services/sampler/julia/sampler.h"
-#include "tools/telesplat/scene/toml_file.h"
+#include "tools/telesplat/scene/scene_keys.h"
 
 namespace telesplat::launcher {
 namespace {
 
 class DirectJulia : public DirectScene {
  public:
-  DirectJulia(JuliaScene::Record julia, int threads) : julia_(std::move(julia)), threads_(threads), sampler_(threads) {}
+  DirectJulia(JuliaScene::Record julia, int threads) : julia_(std::move(julia)), threads_(threads) {}
 
   Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading, EpochId epoch,
                            double footprint_px) override {
@@ -24,12 +24,6 @@ class DirectJulia : public DirectScene {
     if (!scene) return scene.error();
     return sampler::render_julia_directly(*scene, camera, image::Shading(shading, camera), threads_, footprint_px);
   }
-  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) override {
-    const auto scene = at(epoch);
-    if (!scene) return scene.error();
-    return sampler_.sample(*scene, camera, {0, 0, camera.width, camera.height}, 1);
-  }
-  geometry::Box box_room() const override { return julia_.placement.box_room; }
   std::string size() const override { return fmt::format("{} iterations", julia_.begin.iterations); }
 
  private:
@@ -41,7 +35,6 @@ class DirectJulia : public DirectScene {
 
   JuliaScene::Record julia_;
   int threads_;
-  sampler::JuliaSampler sampler_;
 };
 
 std::map<std::string, double> numbers_of(const toml::node_view<toml::node>& table) {

@@ -39,11 +39,6 @@ class DirectMesh : public DirectScene {
     if (const Status s = prepare(epoch); !s) return s.error();
     return sampler::render_directly(*sampler_, camera, image::Shading(shading, camera));
   }
-  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) override {
-    if (const Status s = prepare(epoch); !s) return s.error();
-    return sampler_->sample(camera, {0, 0, camera.width, camera.height});
-  }
-  geometry::Box box_room() const override { return store_->info().box_room; }
   uint64_t primitives() const override { return store_->info().triangles; }
   std::string size() const override { return fmt::format("{} triangles", primitives()); }
 

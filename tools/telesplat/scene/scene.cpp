@@ -7,10 +7,9 @@
 
 #include "common/core/whole_file.h"
 #include "services/data/kinds.h"
-#include "tools/telesplat/scene/julia_keys.h"
 #include "tools/telesplat/scene/julia_scene.h"
 #include "tools/telesplat/scene/mesh_scene.h"
-#include "tools/telesplat/scene/toml_file.h"
+#include "tools/telesplat/scene/scene_keys.h"
 #include "tools/telesplat/scene/volume_scene.h"
 
 namespace telesplat::launcher {

@@ -10,7 +10,6 @@
 #include "common/options/suggest.h"
 #include "tools/telesplat/scene/scene.h"
 #include "tools/telesplat/scene/scene_keys.h"
-#include "tools/telesplat/scene/toml_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -207,6 +206,16 @@ Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> argu
     if (row.make_keys) row.make_keys()->give_way(*flags, arguments);
   arguments.insert(arguments.begin(), flags->begin(), flags->end());
   return arguments;
+}
+
+Result<toml::table> read_toml(const std::string& path, uint64_t most_bytes) {
+  const auto text = read_whole(path, most_bytes);
+  if (!text) return text.error();
+  try {
+    return toml::parse(*text, path);
+  } catch (const toml::parse_error& e) {
+    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
+  }
 }
 
 }  // namespace telesplat::launcher

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <toml++/toml.h>
+
+#include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +13,7 @@
 
 namespace telesplat::launcher {
 
+/// Of one kind of scene.
 class SceneKeys {
  public:
   virtual ~SceneKeys() = default;
@@ -34,5 +38,11 @@ class SceneKeys {
 
 /// A value as a flag takes it: text or number. Empty: it is neither.
 std::string flag_text(const toml::node& node);
+
+/// Error: the file cannot be read, is no regular file, has more than `most_bytes`, or is no TOML: then file and line.
+Result<toml::table> read_toml(const std::string& path, uint64_t most_bytes);
+
+/// Of a Julia set: its preset, constant and animation, its parameters in [julia], its key frames.
+std::unique_ptr<SceneKeys> make_julia_keys();
 
 }  // namespace telesplat::launcher

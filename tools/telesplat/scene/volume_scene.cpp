@@ -18,9 +18,8 @@ namespace {
 
 class DirectVolume : public DirectScene {
  public:
-  DirectVolume(std::string file, Epochs<VolumeScene::Epoch> epochs, std::unique_ptr<data::VolumeStore> store,
-               int threads)
-      : file_(std::move(file)), epochs_(std::move(epochs)), store_(std::move(store)), threads_(threads) {}
+  DirectVolume(Epochs<VolumeScene::Epoch> epochs, std::unique_ptr<data::VolumeStore> store, int threads)
+      : epochs_(std::move(epochs)), store_(std::move(store)), threads_(threads) {}
 
   Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading, EpochId epoch,
                            double) override {
@@ -35,10 +34,6 @@ class DirectVolume : public DirectScene {
     for (size_t i = 0; i < view.colour.size(); ++i)
       if (view.colour[i] >> 24 >= kVisible) view.depth_m[i] = 1;
   }
-  Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override {
-    return Error{fmt::format("{}: is a volume, of which no depth images are sampled", file_)};
-  }
-  geometry::Box box_room() const override { return store_->session().grid.box_room(); }
   std::string size() const override {
     const auto& n = store_->session().grid.size;
     return fmt::format("{} x {} x {} voxels", n[0], n[1], n[2]);
@@ -65,7 +60,6 @@ class DirectVolume : public DirectScene {
     return ok_status();
   }
 
-  std::string file_;
   Epochs<VolumeScene::Epoch> epochs_;
   std::unique_ptr<data::VolumeStore> store_;
   int threads_;
@@ -92,8 +86,7 @@ Status VolumeScene::read_record(const std::string& run_directory) {
 Result<std::unique_ptr<DirectScene>> VolumeScene::open_direct(int threads, const data::Progress& progress) const {
   auto store = data::VolumeStore::open(options_.scene, options_.volume, options_.mesh, progress);
   if (!store) return store.error();
-  return std::unique_ptr<DirectScene>(
-      std::make_unique<DirectVolume>(options_.scene, epochs_, std::move(*store), threads));
+  return std::unique_ptr<DirectScene>(std::make_unique<DirectVolume>(epochs_, std::move(*store), threads));
 }
 
 std::string VolumeScene::summary(uint64_t primitives) const {

@@ -2,25 +2,22 @@
 // several times, each run by the real command in a folder of its own.
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
 
+#include "common/core/descriptor.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
 #include "common/core/version.h"
 #include "common/core/whole_file.h"
 #include "common/net/service.h"
-#include "tools/common/complain.h"
+#include "common/options/complain.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/movie/movie.h"
-#include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/report/report.h"
 #include "tools/telesplat/run/process_group.h"
 #include "tools/telesplat/run/run_options.h"
-#include "tools/telesplat/sweep/cells/cells.h"
 #include "tools/telesplat/sweep/sweep.h"
 #include "tools/telesplat/sweep/tables.h"
 
@@ -37,27 +34,13 @@ struct SweepOptions {
   bool dry_run = false;
 };
 
-/// A folder that no other sweep writes into as long as this lives.
-class Claim {
- public:
-  static Result<Claim> take(const std::string& directory) {
-    const std::string path = directory + "/.sweep.lock";
-    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (file < 0) return Error{fmt::format("{}: cannot be written to", directory)};
-    Claim out;
-    out.file_ = file;
-    if (flock(file, LOCK_EX | LOCK_NB) != 0) return Error{fmt::format("{}: another sweep works there", directory)};
-    return out;
-  }
-  Claim(Claim&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
-  ~Claim() {
-    if (file_ >= 0) ::close(file_);
-  }
-
- private:
-  Claim() = default;
-  int file_ = -1;
-};
+// A folder that no other sweep writes into as long as what it returns lives.
+Result<Descriptor> claim(const std::string& directory) {
+  auto file = Descriptor::open_file(directory + "/.sweep.lock", O_RDWR | O_CREAT);
+  if (!file.valid()) return Error{fmt::format("{}: cannot be written to", directory)};
+  if (!file.lock(LOCK_EX | LOCK_NB)) return Error{fmt::format("{}: another sweep works there", directory)};
+  return file;
+}
 
 bool asks_for_nothing(const SweepOptions& o) { return o.scene.empty() && o.vary.empty() && o.flags.empty(); }
 
@@ -142,9 +125,9 @@ int carry_out(Sweep& sweep, const std::string& directory, double skip_s) {
     progress.line(fmt::format("telesplat: the sweep was begun with version {}; this is {}", m.version, version()));
   const auto end = sweep.carry_out(progress);
   progress.close();
-  if (!end) return tools::complain(end.error(), 1);
+  if (!end) return complain(end.error(), 1);
   const auto code = conclude(sweep, directory, skip_s, progress);
-  if (!code) return tools::complain(code.error(), 1);
+  if (!code) return complain(code.error(), 1);
   if (*end == Sweep::End::kDone) return *code;
   std::fprintf(stderr, "telesplat: interrupted; %zu of %zu runs are done, telesplat sweep --out %s goes on\n",
                sweep.runs() - sweep.to_do().size(), sweep.runs(), shell_line({directory}).c_str());
@@ -169,28 +152,27 @@ int sweep(SweepOptions o, const options::Given&) {
   // Whole: the sweep may go on in the folder where it began.
   const std::string directory = fs::absolute(o.out, error).lexically_normal().string();
   auto before = read_manifest(directory);
-  if (!before) return tools::complain(before.error());
+  if (!before) return complain(before.error());
   if (!*before && asks_for_nothing(o))
-    return tools::complain(
+    return complain(
         {"a scene is needed, telesplat sweep SCENE --vary FLAG=VALUE,VALUE; or --out FOLDER of a "
          "sweep that shall go on"});
-  if (const Status s = check_folder(directory, before->has_value()); !s) return tools::complain(s.error());
+  if (const Status s = check_folder(directory, before->has_value()); !s) return complain(s.error());
   auto manifest = manifest_for(o, std::move(*before));
-  if (!manifest) return tools::complain(manifest.error());
+  if (!manifest) return complain(manifest.error());
   fs::current_path(manifest->directory, error);
-  if (error)
-    return tools::complain({fmt::format("{}: the sweep was begun there: {}", manifest->directory, error.message())});
+  if (error) return complain({fmt::format("{}: the sweep was begun there: {}", manifest->directory, error.message())});
   Sweep sweep(std::move(*manifest), directory, program_directory() + "/telesplat", o.run_limit_s);
-  if (const Status s = sweep.check(); !s) return tools::complain(s.error());
+  if (const Status s = sweep.check(); !s) return complain(s.error());
   if (o.dry_run) {
     list(sweep);
     return 0;
   }
   fs::create_directories(directory, error);
-  if (error) return tools::complain({fmt::format("--out {}: cannot be made: {}", o.out, error.message())});
-  const auto claim = Claim::take(directory);
-  if (!claim) return tools::complain(claim.error());
-  if (const Status s = write_manifest(sweep.manifest(), directory); !s) return tools::complain(s.error());
+  if (error) return complain({fmt::format("--out {}: cannot be made: {}", o.out, error.message())});
+  const auto claimed = claim(directory);
+  if (!claimed) return complain(claimed.error());
+  if (const Status s = write_manifest(sweep.manifest(), directory); !s) return complain(s.error());
   net::install_signal_handlers();
   return carry_out(sweep, directory, o.skip_s);
 }

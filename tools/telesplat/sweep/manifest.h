@@ -7,10 +7,64 @@
 #include <vector>
 
 #include "common/core/result.h"
-#include "tools/telesplat/sweep/grid.h"
-#include "tools/telesplat/sweep/load.h"
+#include "common/options/table.h"
 
 namespace telesplat::launcher {
+
+/// A flag that varies, and its values in their order.
+struct Axis {
+  std::string flag;  ///< without dashes; "scene": the scene itself
+  std::vector<std::string> values;
+  bool operator==(const Axis&) const = default;
+};
+
+inline constexpr int kMostRepetitions = 1000;
+
+struct Grid {
+  std::string scene;                ///< empty: it varies
+  std::vector<std::string> flags;   ///< of every run, as `telesplat run` takes them
+  std::vector<Axis> axes;           ///< none: one configuration
+  int repeat = 3;                   ///< runs of each configuration
+  std::optional<uint64_t> shuffle;  ///< seed of the order within a repetition; none: the grid's own order
+  bool operator==(const Grid&) const = default;
+};
+
+/// One cell of the grid.
+struct Configuration {
+  std::string name;                 ///< of its folder
+  std::vector<std::string> values;  ///< one for each axis
+};
+
+/// Reads one `--vary FLAG=V1,V2,...` into `axes`. Where a semicolon stands among the values, semicolons separate them
+/// and commas belong to them; one at the end is left out. Another --vary of the same flag adds values. flags: those of
+/// `telesplat run`. Error: it has no such flag, a value is wrong for it, or stands there twice.
+Status add_axis(const std::string& text, const options::Table& flags, std::vector<Axis>& axes);
+
+/// Names of folders, by the values of all flags: those that a sweep has given already.
+using Names = std::map<std::map<std::string, std::string>, std::string>;
+
+/// All cells, the last axis changing fastest. A name says flags and values, in characters that need no quotes; known
+/// ones keep the name they have, and no two have the same.
+std::vector<Configuration> configurations(const Grid& grid, const Names& known = {});
+Names names_of(const Grid& grid, const std::vector<Configuration>& configurations);
+
+/// "coupling=sync samplers=2", for people; "all runs" where nothing varies.
+std::string words(const Grid& grid, const Configuration& configuration);
+
+/// The words behind `telesplat run`. A flag without value is given where its value is on.
+std::vector<std::string> arguments(const Grid& grid, const Configuration& configuration, const options::Table& flags);
+
+struct PlannedRun {
+  size_t configuration;
+  int repetition;  ///< from 1
+};
+/// Every run. All configurations take their turn before the next repetition begins, so that a machine that becomes
+/// slower or faster does so for all of them.
+std::vector<PlannedRun> run_order(const Grid& grid, size_t configurations);
+
+/// Whether a sweep of `before` may go on as one of `wanted`: the same scene and flags, the same flags vary, and no
+/// value or repetition is missing. Error: what differs.
+Status check_extends(const Grid& before, const Grid& wanted);
 
 /// What became of a run.
 struct RunOutcome {
@@ -20,7 +74,6 @@ struct RunOutcome {
   std::string reason;  ///< why it failed
   std::string begin;   ///< date and time, with time zone
   double wall_s = 0;
-  Load load;
 };
 
 /// Configuration's name, repetition.

@@ -1,18 +1,88 @@
 #include "tools/telesplat/sweep/sweep.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <csignal>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
 
+#include "common/core/clock.h"
+#include "common/core/utf8.h"
 #include "common/metrics/statistics.h"
+#include "common/net/service.h"
+#include "common/options/parser.h"
+#include "tools/telesplat/run/child_process.h"
 #include "tools/telesplat/run/run_options.h"
-#include "tools/telesplat/sweep/check.h"
+#include "tools/telesplat/scene/scene_file.h"
 #include "tools/telesplat/sweep/record.h"
 
 namespace telesplat::launcher {
 namespace {
+
+constexpr double kLook_s = 0.05;
+constexpr double kEndPatience_s = 30;  // of a run that is told to end because it took too long
+constexpr size_t kLongestReason = 300;
+
+std::string reason_for(int exit_code, const std::string& said) {
+  const std::string why = complaint_in(said);
+  const std::string how =
+      exit_code > 128 ? fmt::format("ended by signal {}", exit_code - 128) : fmt::format("exit code {}", exit_code);
+  return why.empty() ? how : how + ": " + why;
+}
+
+/// Waits for the child and passes on what this process is told.
+class Watch {
+ public:
+  Watch(ChildProcess& child, double limit_s) : child_(child), limit_s_(limit_s) {}
+
+  void until_ended(const std::function<void(double)>& watch) {
+    while (!child_.ended()) {
+      child_.read_lines();  // a full pipe must not hold it up
+      const double elapsed_s = monotonic_s() - begin_s_;
+      if (net::stop_requested()) pass_on();
+      if (limit_s_ > 0 && elapsed_s > limit_s_) end_late(elapsed_s);
+      watch(elapsed_s);
+      std::this_thread::sleep_for(std::chrono::duration<double>(kLook_s));
+    }
+  }
+  bool stopped() const { return stops_ > 0; }
+  bool late() const { return late_; }
+  double elapsed_s() const { return monotonic_s() - begin_s_; }
+
+ private:
+  void pass_on() {
+    net::forget_stop();
+    child_.signal(++stops_ < 3 ? SIGINT : SIGKILL);
+  }
+  void end_late(double elapsed_s) {
+    if (!late_) child_.signal(SIGINT);
+    if (elapsed_s > limit_s_ + kEndPatience_s) child_.signal(SIGKILL);
+    late_ = true;
+  }
+
+  ChildProcess& child_;
+  double limit_s_, begin_s_ = monotonic_s();
+  int stops_ = 0;
+  bool late_ = false;
+};
+
+struct Refused {
+  const char* flag;
+  const char* why;
+};
+constexpr Refused kRefused[] = {
+    {"--out", "the sweep gives each run a folder of its own"},
+    {"--label", "its runs are called by what varies"},
+    {"--overwrite", "the sweep replaces what it did not finish, and nothing else"},
+    {"--master", "each run of a sweep is a session of its own"},
+    {"--movie", "all runs would write one file; telesplat movie makes one of a run's folder"},
+};
 
 namespace fs = std::filesystem;
 
@@ -20,13 +90,6 @@ constexpr int kAttempts = 2;
 constexpr double kStarting_s = 4;  // of a run, beside what it lasts: a guess until one is done
 constexpr double kUnknown_s = 10;  // a run that ends after a number of frames
 constexpr double kLimitTimes = 10, kLimitMore_s = 600;
-
-std::string date_and_time() {
-  char text[40];
-  const std::time_t now = std::time(nullptr);
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S%z", std::localtime(&now));
-  return text;
-}
 
 // Flags of `telesplat run` by name; nothing is read into them.
 const options::Table& run_flags() {
@@ -36,6 +99,66 @@ const options::Table& run_flags() {
 }
 
 }  // namespace
+
+std::string complaint_in(const std::string& log) {
+  std::istringstream in(log);
+  std::string line, last, complaint;
+  while (std::getline(in, line)) {
+    std::erase_if(line, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+    if (line.starts_with("telesplat: ")) complaint = line.substr(11);
+    if (!line.empty()) last = line;
+  }
+  return to_utf8((complaint.empty() ? last : complaint).substr(0, kLongestReason));
+}
+
+std::string last_words(const std::string& path, uintmax_t offset) {
+  std::error_code error;
+  const uintmax_t size = std::filesystem::file_size(path, error);
+  std::ifstream in(path, std::ios::binary);
+  if (error || !in || size <= offset) return {};
+  const uintmax_t from = std::max(offset, size - std::min(size, kMostLastWords));
+  in.seekg(std::streamoff(from));
+  std::string out(size_t(size - from), '\0');
+  in.read(out.data(), std::streamsize(out.size()));
+  out.resize(size_t(in.gcount()));
+  return out;
+}
+
+RunEnd carry_out(const RunRequest& request, const std::function<void(double)>& watch) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(request.log, error);
+  const uintmax_t said_before = error ? 0 : size;
+  auto child = ChildProcess::start("run", request.program, request.arguments, request.log, 0);
+  if (!child) return {1, child.error().text, false, 0};
+  Watch watched(*child, request.limit_s);
+  watched.until_ended(watch);
+  RunEnd out{child->exit_code(), {}, watched.stopped(), watched.elapsed_s()};
+  if (watched.late())
+    out.reason = fmt::format("took longer than {:.0f} s", request.limit_s);
+  else if (out.exit_code != 0)
+    out.reason = reason_for(out.exit_code, last_words(request.log, said_before));
+  return out;
+}
+
+Result<double> check_run(const std::vector<std::string>& arguments) {
+  RunOptions o;
+  const options::Table flags = table(o);
+  auto words = expand_scene_file(arguments, flags);
+  if (!words) return words.error();
+  options::Parser parser("");
+  parser.add(flags);
+  if (const Status s = parser.parse("telesplat run", std::move(*words)); !s) return s.error();
+  const options::Given given = parser.given();
+  for (const auto& [flag, why] : kRefused)
+    if (std::find(given.begin(), given.end(), flag) != given.end())
+      return Error{fmt::format("{}: is not for sweeps: {}", flag, why)};
+  if (o.data.scene.empty()) return Error{"a scene is needed: telesplat sweep SCENE, or --vary scene=A,B"};
+  o.out = "run";  // it will have one
+  if (const auto scene = settle(o, given); !scene) return scene.error();
+  const auto& display = o.viewer.display;
+  if (display.duration_s <= 0 && display.frames == 0) return Error{"--duration 0: such a run does not end by itself"};
+  return display.duration_s;
+}
 
 double expected_wall_s(const Manifest& m, size_t configuration, double lasts_s) {
   std::vector<double> own, all;
@@ -121,7 +244,7 @@ Result<Sweep::End> Sweep::carry_out(tools::ProgressLine& progress) {
     double later_s = 0;
     for (size_t k = i + 1; k < runs_to_do.size(); ++k) later_s += expected_s(runs_to_do[k].configuration);
     const double own_s = expected_s(run.configuration);
-    RunOutcome outcome{.begin = date_and_time()};
+    RunOutcome outcome{.begin = fmt::format("{:%FT%T%z}", fmt::localtime(std::time(nullptr)))};
     while (!outcome.done && outcome.attempts < kAttempts) {
       const auto end = attempt(run, [&](double elapsed_s) {
         progress.show(fmt::format("{}: {:.0f} s, {} left", what, elapsed_s,
@@ -130,7 +253,7 @@ Result<Sweep::End> Sweep::carry_out(tools::ProgressLine& progress) {
       if (!end) return end.error();
       ++outcome.attempts;
       outcome.exit_code = end->exit_code, outcome.reason = end->reason;
-      outcome.wall_s = end->wall_s, outcome.load = end->load;
+      outcome.wall_s = end->wall_s;
       outcome.done = end->reason.empty();
       if (!outcome.done && end->interrupted) return End::kInterrupted;
       if (!outcome.done)

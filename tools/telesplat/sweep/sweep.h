@@ -1,6 +1,8 @@
 // A sweep from start to end: what is to be run, the runs, what they leave.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,9 +10,34 @@
 #include "common/core/result.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/sweep/manifest.h"
-#include "tools/telesplat/sweep/one_run.h"
 
 namespace telesplat::launcher {
+
+struct RunRequest {
+  std::string program;                 ///< telesplat
+  std::vector<std::string> arguments;  ///< run, scene, flags, --out
+  std::string log;                     ///< file that what it says on stderr is appended to
+  double limit_s = 0;                  ///< it is ended when it takes longer, and has failed; 0: no limit
+};
+
+struct RunEnd {
+  int exit_code = 0;         ///< or 128 + signal
+  std::string reason;        ///< empty: it is done
+  bool interrupted = false;  ///< this process was told to stop meanwhile
+  double wall_s = 0;
+};
+
+/// Runs it to its end. watch(seconds since its start) is called every 50 ms. If this process is told to stop, the run
+/// is told once (it ends in order), and again if that is repeated; the third time it is killed.
+RunEnd carry_out(const RunRequest& request, const std::function<void(double)>& watch);
+
+inline constexpr uintmax_t kMostLastWords = 1 << 20;
+/// What was written to a file behind its first `offset` bytes, the last kMostLastWords bytes of it.
+std::string last_words(const std::string& path, uintmax_t offset);
+
+/// What a run said last that it complained about: the last line that begins "telesplat: ", else the last one; without
+/// control characters, 300 bytes at most.
+std::string complaint_in(const std::string& log);
 
 /// A run that is to be carried out.
 struct NextRun {
@@ -53,5 +80,11 @@ class Sweep {
 /// What this run took part in: median of those of its configuration that are done, else of all that are done, else what
 /// it is asked to last and what starting takes; seconds.
 double expected_wall_s(const Manifest& manifest, size_t configuration, double lasts_s);
+
+/// arguments: the words behind `telesplat run`. Looks at flags, values and the scene as the command itself does, and
+/// starts nothing. Returns how long the run will last, in seconds; 0: not known, it ends after a number of frames.
+/// Error: what `telesplat run` would refuse; that the run would not end; that --out, --overwrite, --master or --movie
+/// is given, which are the sweep's business or would not be of one run.
+Result<double> check_run(const std::vector<std::string>& arguments);
 
 }  // namespace telesplat::launcher

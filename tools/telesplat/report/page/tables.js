@@ -37,9 +37,9 @@ R.tiles = function () {
     if (values.every((v) => v === null)) continue;
     const tile = R.el("div", { class: "tile", title: kind.meaning }, R.el("div", { class: "what", text: kind.label }));
     if (!R.several)
-      tile.append(R.el("div", {}, R.el("div", { class: "value" }, R.number(values[0]), R.el("small", { text: kind.unit })), R.interval(R.runs[0], kind)));
+      tile.append(R.el("div", {}, R.el("div", { class: "value" }, R.number(values[0]), R.el("small", { text: kind.unit }))));
     else
-      values.forEach((v, i) => tile.append(R.el("div", { class: "of-run" }, R.runSwatch(i), R.withUnit(v, kind.unit), R.interval(R.runs[i], kind))));
+      values.forEach((v, i) => tile.append(R.el("div", { class: "of-run" }, R.runSwatch(i), R.withUnit(v, kind.unit))));
     box.append(tile);
   }
   const errors = R.runs.map(R.errorsOf);
@@ -50,11 +50,7 @@ R.tiles = function () {
     box.append(tile);
   }
   document.getElementById("main").append(box);
-  if (R.runs.some((run) => Object.keys(run.intervals).length))
-    document.getElementById("main").append(R.help("Small figures are 95 % confidence intervals: how far the value may be off because the run did not last longer. Frames depend on those before them, so whole blocks of time were drawn again and again (circular block bootstrap). They say nothing of another run on another day: repeat it (telesplat sweep) for that."));
 };
-// How far off a figure may be; null: that is not known.
-R.interval = (run, kind) => (run.intervals[kind.key] ? R.el("div", { class: "interval", text: run.intervals[kind.key].map((v) => R.number(v, 3)).join(" to ") }) : null);
 R.errorsOf = (run) =>
   R.data.figures.filter((f) => f.table === "error").reduce((sum, f) => sum + (R.figure(run, f.key) || 0), 0) +
   run.logs.reduce((sum, log) => sum + log.errors, 0);

@@ -1,13 +1,71 @@
 // The tables of a run folder, as far as they are there.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "tools/telesplat/report/reading/loose_table.h"
+#include "common/core/result.h"
 
 namespace telesplat::launcher {
+
+/// Columns of a table, by name. Lines that cannot be read (tools::CsvTable), or have more than 64 KiB, are left out.
+class LooseTable {
+ public:
+  /// The columns that are asked for, as far as the file has them. Error: as of tools::CsvTable.
+  static Result<LooseTable> read(const std::string& path, const std::vector<std::string>& numbers,
+                                 const std::vector<std::string>& texts = {});
+
+  size_t rows() const { return rows_; }
+  size_t damaged() const { return damaged_; }  ///< lines that were left out
+  bool has(std::string_view name) const;
+  /// A value a row, within 1e12 of 0; NaN where there is no such number. All NaN if the file has no such column.
+  const std::vector<double>& numbers(const std::string& name) const;
+  /// Valid UTF-8, at most 200 bytes each; empty if the file has no such column.
+  const std::vector<std::string>& texts(const std::string& name) const;
+  /// Leaves out the rows whose value in this column, which was asked for, is less.
+  void leave_out_below(const std::string& column, double least);
+
+ private:
+  size_t rows_ = 0, damaged_ = 0;
+  std::vector<std::string> header_;
+  std::map<std::string, std::vector<double>, std::less<>> numbers_;
+  std::map<std::string, std::vector<std::string>, std::less<>> texts_;
+};
+
+/// A stage of a view update.
+struct UpdateStage {
+  const char* column;  ///< in stages.csv
+  const char* label;   ///< for people
+};
+
+/// In their order.
+inline constexpr UpdateStage kUpdateStages[] = {
+    {"request_network_ms", "request travels"},
+    {"view_queue_ms", "request waits at the master"},
+    {"plan_ms", "plan"},
+    {"lease_queue_ms", "waits for a sampler"},
+    {"lease_network_ms", "lease travels"},
+    {"sampler_queue_ms", "waits in the sampler"},
+    {"fetch_ms", "sampler fetches data"},
+    {"sampling_ms", "sampling"},
+    {"encoding_ms", "encoding"},
+    {"tile_network_ms", "tile travels"},
+    {"packer_queue_ms", "waits at the packer"},
+    {"packing_ms", "packing"},
+    {"publishing_ms", "publishing"},
+    {"patch_network_ms", "patch travels"},
+    {"viewer_queue_ms", "waits in the viewer"},
+    {"decoding_ms", "decoding"},
+    {"insertion_ms", "insertion"},
+};
+
+/// "network", "queue" or "work", as the column's name ends.
+constexpr const char* stage_group(std::string_view column) {
+  return column.ends_with("_network_ms") ? "network" : column.ends_with("_queue_ms") ? "queue" : "work";
+}
 
 /// What a report reads of the tables. A table that is not there, or has no rows, is not there; `notes` say so.
 struct RunTables {
@@ -19,7 +77,6 @@ struct RunTables {
   std::vector<char> drawn;         ///< whether each row of frames is of a frame that was drawn
   std::vector<std::string> notes;  ///< one line each: what is missing or damaged, and what the page lacks for it
 
-  bool has_frames() const { return frames.has_value(); }
   double duration_s() const { return end_s - origin_s; }
   /// The time that frames took for which nothing was drawn.
   double still_s() const;

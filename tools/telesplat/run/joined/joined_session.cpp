@@ -6,16 +6,12 @@
 #include <utility>
 
 #include "common/core/utf8.h"
+#include "tools/telesplat/control/json_fields.h"
 
 namespace telesplat::launcher {
 namespace {
 
-constexpr double kSilence_s = 3;  // of a master that is asked twice a second
-
-std::string text(const nlohmann::json& object, const char* key) {
-  const auto value = object.find(key);
-  return value != object.end() && value->is_string() ? value->get<std::string>() : std::string();
-}
+constexpr double kMasterSilence_s = 3;  // of a master that is asked twice a second
 
 // A session calls a data set by its file's name, with its ending or without.
 bool is_called(const std::string& shown, const std::string& named) {
@@ -29,7 +25,7 @@ JoinedSession::JoinedSession(std::string master, std::string named)
     : master_(std::move(master)), named_(std::move(named)), host_(master_) {}
 
 std::string JoinedSession::awaited(bool nobody_there, const std::string& refusal, double now_s) {
-  if (heard_s_ && now_s - *heard_s_ < kSilence_s) return net::lacking_text(lacks_);
+  if (heard_s_ && now_s - *heard_s_ < kMasterSilence_s) return net::lacking_text(lacks_);
   if (!refusal.empty()) return refusal;
   if (!nobody_there) return "no master answers at " + master_;
   host_.begin();
@@ -43,8 +39,8 @@ std::vector<std::string> JoinedSession::look(const nlohmann::json* status, bool 
   if (status) {
     heard_s_ = now_s;
     lacks_ = text(*status, "lacks");
-    const auto session = status->find("session");
-    const std::string shown = session == status->end() ? std::string() : text(*session, "scene");
+    const auto* session = field(*status, "session");
+    const std::string shown = session ? text(*session, "scene") : std::string();
     if (!named_.empty() && !shown.empty()) {
       if (!is_called(shown, named_))
         out.push_back(fmt::format("{} is not opened: the session shows {}", named_, printable(shown)));
