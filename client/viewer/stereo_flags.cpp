@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/stereo/autostereo/panel_file.h"
+#include "client/stereo/autostereo/panel_file.h"
 
 namespace telesplat::viewer {
 

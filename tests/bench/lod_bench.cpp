@@ -11,10 +11,10 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "client/viewer/coupling/frame_budget.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/measures/quality.h"
 #include "common/splat/cpu_splatter.h"
-#include "common/splat/select/frame_budget.h"
 #include "services/packer/points/packer_core.h"
 #include "services/sampler/mesh/ray_sampler.h"
 #include "tests/support/mesh_chunks.h"
@@ -131,7 +131,7 @@ void lod_transitions(benchmark::State& state) {
   size_t pops = 0;
   for (auto _ : state) {
     splat::DrawList list, last_list;
-    splat::SpeedDetail speed;
+    viewer::SpeedDetail speed;
     image::View last;
     for (size_t i = 0; i < m.cameras.size(); ++i) {
       const auto draw = [&](const splat::DrawList& l) {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "common/stereo/autostereo/interleaver.h"
-#include "common/stereo/compose.h"
+#include "client/stereo/autostereo/interleaver.h"
+#include "client/stereo/compose.h"
 
 namespace telesplat {
 namespace {

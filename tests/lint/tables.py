@@ -27,9 +27,8 @@ FLOORS = {
     "common": [
         ["common/core", "common/parallel"],
         ["common/geometry", "common/colour", "common/links"],
-        ["common/notes"],
-        ["common/image", "common/gl", "common/wall"],
-        ["common/codec", "common/points", "common/stereo"],
+        ["common/image", "common/gl"],
+        ["common/codec", "common/points"],
         [("common/volume", "common/volume/transfer"), "common/splat", "common/refinement"],
         ["common/volume/slices"],
         ["common/volume/warp"],
@@ -81,6 +80,7 @@ FLOORS = {
         ["services/packer/points", "services/packer/slices", "services/packer/pictures"],
         ["services/packer"],
     ],
+    "client": [["client/notes", "client/wall"], ["client/stereo"], ["client/viewer"], ["client/displays"]],
     "client/viewer": [
         ["client/viewer/tracking"],
         ["client/viewer/render", "client/viewer/coupling", "client/viewer/input", "client/viewer/hands"],
@@ -152,9 +152,9 @@ OUTSIDE_HEADERS = [
     (
         r"toml\+\+/.*",
         [
-            "common/wall",
+            "client/wall",
             "common/net/keys",
-            "common/stereo/autostereo/panel_file.cpp",
+            "client/stereo/autostereo/panel_file.cpp",
             "services/master/peers/told_tables.cpp",
             "tests/unit/master/told_tables_test.cpp",
             "tools/telesplat",

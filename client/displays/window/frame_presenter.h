@@ -6,8 +6,8 @@
 #include <string>
 
 #include "client/displays/window/overlay.h"
+#include "client/viewer/render/gl/program.h"
 #include "common/core/result.h"
-#include "common/gl/program.h"
 #include "common/image/file.h"
 
 namespace telesplat::viewer {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "common/splat/select/frame_budget.h"
+#include "client/viewer/coupling/frame_budget.h"
 #include "common/wire/short_camera.h"
 
 namespace telesplat::viewer {
@@ -66,7 +66,7 @@ geometry::Pose ViewRequester::expected_at(double t_s) const {
 
 // Whether what one sees from there looks as it does from here.
 bool ViewRequester::rests_at(const geometry::Pose& there, const geometry::Pose& here) const {
-  return splat::screen_movement(there, here, kNearest_m, display_->focal_x()) < kDeadBand_px;
+  return screen_movement(there, here, kNearest_m, display_->focal_x()) < kDeadBand_px;
 }
 
 geometry::Camera ViewRequester::wanted(double now_s, bool& still, const geometry::Camera* asked) {

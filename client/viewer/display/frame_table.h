@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "client/stereo/mode.h"
 #include "client/viewer/coupling/coupling.h"
 #include "client/viewer/display/eyes/eye_pair.h"
 #include "client/viewer/display/view_source.h"
-#include "common/stereo/mode.h"
 
 namespace telesplat::viewer {
 

@@ -1,16 +1,16 @@
 // A wall of displays that show what one head sees (T3.3.3, T7.4): tiles of one picture, counted by rows from the upper
-// left, or the screens of a description (common/wall).
+// left, or the screens of a description (client/wall).
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "client/wall/screen_camera.h"
+#include "client/wall/wall.h"
 #include "common/core/result.h"
 #include "common/geometry/camera.h"
 #include "common/image/legend.h"
-#include "common/wall/screen_camera.h"
-#include "common/wall/wall.h"
 
 namespace telesplat::viewer {
 

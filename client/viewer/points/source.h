@@ -1,12 +1,12 @@
 // The display's source for scenes of points: selects from the model cache, splats.
 #pragma once
 
+#include "client/viewer/coupling/frame_budget.h"
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/view_source.h"
 #include "client/viewer/points/received_points.h"
 #include "client/viewer/points/still_picture.h"
 #include "client/viewer/render/supersampler.h"
-#include "common/splat/select/frame_budget.h"
 
 namespace telesplat::viewer {
 
@@ -47,9 +47,9 @@ class PointSource final : public ViewSource {
   std::unique_ptr<Renderer> renderer_;
   ReceivedPoints& received_;
   image::View over_white_;
-  splat::FrameBudget budget_;
-  splat::HalfSize half_size_;
-  splat::SpeedDetail speed_;
+  FrameBudget budget_;
+  HalfSize half_size_;
+  SpeedDetail speed_;
   splat::DrawList list_;
   uint64_t drawn_ = 0;  // points of it
   ReceivedPoints::Cut cut_;

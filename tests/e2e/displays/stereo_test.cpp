@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "client/stereo/mode.h"
 #include "common/image/file.h"
-#include "common/stereo/mode.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {

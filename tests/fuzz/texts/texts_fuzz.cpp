@@ -2,6 +2,9 @@
 // it is written and read again. The first byte chooses the reader, as the table below has it.
 #include <cstdlib>
 
+#include "client/notes/book.h"
+#include "client/stereo/autostereo/panel_file.h"
+#include "client/wall/wall.h"
 #include "common/colour/paraview_json.h"
 #include "common/core/utf8.h"
 #include "common/geometry/clip.h"
@@ -11,14 +14,11 @@
 #include "common/julia/timeline.h"
 #include "common/links/link.h"
 #include "common/net/via.h"
-#include "common/notes/book.h"
 #include "common/scene/arrays.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/colouring.h"
 #include "common/scene/placement.h"
-#include "common/stereo/autostereo/panel_file.h"
 #include "common/volume/transfer/function.h"
-#include "common/wall/wall.h"
 #include "common/wire/head_pose.h"
 #include "tests/support/files/memory_file.h"
 

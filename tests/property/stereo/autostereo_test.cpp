@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "common/stereo/autostereo/interleaver.h"
-#include "common/stereo/autostereo/sight.h"
+#include "client/stereo/autostereo/interleaver.h"
+#include "client/stereo/autostereo/sight.h"
 
 namespace telesplat::stereo {
 namespace {

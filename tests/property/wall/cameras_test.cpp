@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 #include <random>
 
+#include "client/wall/screen_camera.h"
 #include "common/geometry/trajectory.h"
-#include "common/wall/screen_camera.h"
 
 namespace telesplat::wall {
 namespace {

@@ -14,8 +14,8 @@
 #include <random>
 #include <thread>
 
+#include "client/notes/shelf.h"
 #include "common/core/descriptor.h"
-#include "common/notes/shelf.h"
 #include "tests/support/patience.h"
 
 namespace telesplat::notes {

@@ -1,9 +1,9 @@
 // Two pictures on one display, by place and by colour.
 #include <gtest/gtest.h>
 
-#include "common/stereo/anaglyph.h"
-#include "common/stereo/compose.h"
-#include "common/stereo/pattern.h"
+#include "client/stereo/anaglyph.h"
+#include "client/stereo/compose.h"
+#include "client/stereo/pattern.h"
 
 namespace telesplat::stereo {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <fstream>
 
-#include "common/stereo/autostereo/interleaver.h"
-#include "common/stereo/autostereo/panel_file.h"
-#include "common/stereo/autostereo/sight.h"
+#include "client/stereo/autostereo/interleaver.h"
+#include "client/stereo/autostereo/panel_file.h"
+#include "client/stereo/autostereo/sight.h"
 #include "tests/support/files/own_folder.h"
 
 namespace telesplat::stereo {

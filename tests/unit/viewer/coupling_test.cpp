@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "client/viewer/coupling/frame_budget.h"
 #include "client/viewer/coupling/view_requester.h"
-#include "common/splat/select/frame_budget.h"
 #include "common/wire/short_camera.h"
 
 namespace telesplat::viewer {
@@ -147,7 +147,7 @@ TEST_F(Requester, AHeadThatTremblesAsksForTheSameViewAgain) {
   for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
   const geometry::Camera next = requester.next(now_s)->camera;
   const auto apart_px = [&](const geometry::Camera& asked) {
-    return splat::screen_movement(asked.pose, display.pose, ViewRequester::kNearest_m, display.focal_x());
+    return screen_movement(asked.pose, display.pose, ViewRequester::kNearest_m, display.focal_x());
   };
   EXPECT_LT(apart_px(next), 5e-3) << "what is displayed, but for what is short";
   // It drifts, in steps that are small each: the dead band is about what was asked for, not about the step before.

@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "common/wall/screen_camera.h"
-#include "common/wall/wall.h"
+#include "client/wall/screen_camera.h"
+#include "client/wall/wall.h"
 
 namespace telesplat::wall {
 namespace {

@@ -7,12 +7,12 @@
 #include <cstdio>
 #include <optional>
 
+#include "client/stereo/autostereo/interleaver.h"
+#include "client/stereo/autostereo/panel_file.h"
+#include "client/stereo/autostereo/sight.h"
+#include "client/stereo/pattern.h"
 #include "client/viewer/input/head_movement.h"
 #include "common/options/complain.h"
-#include "common/stereo/autostereo/interleaver.h"
-#include "common/stereo/autostereo/panel_file.h"
-#include "common/stereo/autostereo/sight.h"
-#include "common/stereo/pattern.h"
 #include "tools/telesplat/command.h"
 
 namespace telesplat::launcher {

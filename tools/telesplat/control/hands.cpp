@@ -7,9 +7,9 @@
 #include <ctime>
 #include <filesystem>
 
+#include "client/notes/shelf.h"
 #include "common/core/utf8.h"
 #include "common/core/whole_file.h"
-#include "common/notes/shelf.h"
 #include "common/options/complain.h"
 #include "common/scene/settings.h"
 #include "tools/telesplat/control/client.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "client/wall/unrolled.h"
 #include "common/image/canvas.h"
 #include "common/scene/legend.h"
-#include "common/wall/unrolled.h"
 #include "tools/telesplat/scene/epochs.h"
 
 namespace telesplat::launcher {

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <optional>
 
+#include "client/wall/unrolled.h"
 #include "common/geometry/camera.h"
 #include "common/image/canvas.h"
 #include "common/image/file.h"
-#include "common/wall/unrolled.h"
 #include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {

@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "common/notes/shelf.h"
+#include "client/notes/shelf.h"
 
 namespace telesplat::viewer {
 

@@ -6,10 +6,10 @@
 #include <limits>
 #include <utility>
 
+#include "client/stereo/autostereo/panel_file.h"
+#include "client/stereo/compose.h"
 #include "common/core/within.h"
 #include "common/geometry/stereo.h"
-#include "common/stereo/autostereo/panel_file.h"
-#include "common/stereo/compose.h"
 
 namespace telesplat::viewer {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <memory>
 
+#include "client/stereo/autostereo/interleaver.h"
 #include "client/viewer/display/eyes/eye_pair.h"
 #include "client/viewer/display/eyes/stereo_options.h"
 #include "common/geometry/box.h"
 #include "common/image/file.h"
-#include "common/stereo/autostereo/interleaver.h"
 
 namespace telesplat::viewer {
 

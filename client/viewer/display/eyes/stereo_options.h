@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
+#include "client/stereo/autostereo/panel.h"
+#include "client/stereo/mode.h"
+#include "client/stereo/pattern.h"
 #include "common/geometry/trajectory.h"
-#include "common/stereo/autostereo/panel.h"
-#include "common/stereo/mode.h"
-#include "common/stereo/pattern.h"
 
 namespace telesplat::viewer {
 

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "common/gl/program.h"
+#include "client/viewer/render/gl/program.h"
 #include "common/splat/finish.h"
 #include "common/splat/kernel_traits.h"
 

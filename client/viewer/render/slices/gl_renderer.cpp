@@ -8,12 +8,12 @@
 #include <limits>
 #include <vector>
 
+#include "client/viewer/render/gl/program.h"
 #include "client/viewer/render/gl/read_back.h"
 #include "client/viewer/render/gl/shaders/common.h"
 #include "client/viewer/render/gl/shaders/slices.h"
 #include "common/core/check.h"
 #include "common/core/clock.h"
-#include "common/gl/program.h"
 #include "common/volume/warp/plan.h"
 
 namespace telesplat::viewer {

@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "client/displays/window/panel/gui/style.h"
+#include "client/viewer/render/gl/program.h"
 #include "common/core/within.h"
-#include "common/gl/program.h"
 
 namespace telesplat::viewer {
 namespace {

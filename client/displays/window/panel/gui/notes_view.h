@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "common/notes/book.h"
+#include "client/notes/book.h"
 
 namespace telesplat::viewer {
 

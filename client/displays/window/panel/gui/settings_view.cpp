@@ -10,11 +10,11 @@
 
 #include "client/displays/window/panel/gui/setting_rows.h"
 #include "client/displays/window/panel/gui/widgets.h"
+#include "client/stereo/mode.h"
 #include "client/viewer/input/look.h"
 #include "common/core/within.h"
 #include "common/image/shading.h"
 #include "common/splat/kernel_traits.h"
-#include "common/stereo/mode.h"
 #include "common/wire/limits.h"
 
 namespace telesplat::viewer {

@@ -1,0 +1,65 @@
+// An autostereo display: its pixels, and the line screen before them.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "client/stereo/autostereo/line_screen.h"
+#include "client/stereo/mode.h"
+#include "common/geometry/stereo.h"
+
+namespace telesplat::stereo {
+
+/// How a pixel's colours lie in it, from left to right.
+enum class Subpixels {
+  kRgb,
+  kBgr,
+  kWhole  ///< in one place: whole pixels are shared out
+};
+
+struct Panel {
+  int width = 2560, height = 1600;  ///< pixels
+  double pixel_m = 0.25e-3;         ///< from pixel to pixel, both ways
+  Subpixels subpixels = Subpixels::kRgb;
+  Size eye{};               ///< the picture of one eye; 0: as many pixels as the display has
+  double distance_m = 0.7;  ///< of a person before it whose head is not tracked
+  LineScreen lines;
+  bool operator==(const Panel&) const = default;
+
+  double width_m() const { return width * pixel_m; }
+  double height_m() const { return height * pixel_m; }
+  Size eye_size() const { return eye.width > 0 ? eye : Size{width, height}; }
+};
+
+/// Error: names the value and its limits.
+Status validate(const Panel& panel);
+
+/// Where the eyes are on the panel's axes (line_screen.h).
+using Eyes = std::array<glm::dvec3, 2>;
+/// Straight before its middle.
+Eyes eyes_before(const Panel& panel, double separation_m, double distance_m);
+/// Of eyes whose cameras see through a window that is the panel: where they are to it. The window's width is that of
+/// the panel, whatever it is in the room.
+Eyes eyes_of(const Panel& panel, const std::array<geometry::Camera, 2>& cameras);
+/// Error: an eye is behind the lines or not before the panel, within 0.05 m and 100 m.
+Status validate(const Panel& panel, const Eyes& eyes);
+/// How far before the display's pixels an eye is at least, metres: beyond the plate.
+double nearest_eye_m(const Panel& panel);
+
+/// Middle of a subpixel on the panel's axes. subpixel: 0 to 2 from left to right; 1 is the pixel's middle.
+glm::dvec2 place_of(const Panel& panel, int x, int y, int subpixel);
+/// Bits of the colour of a subpixel, from left to right; 16: red, 8: green, 0: blue.
+std::array<int, 3> shifts_of(Subpixels subpixels);
+
+/// What its figures come to, for people.
+struct PanelFigures {
+  double best_distance_m = 0;  ///< where eyes of that separation see neighbouring halves of what lies behind a line
+  double repeat_m = 0;         ///< at distance_m the picture repeats itself after so much to the side
+  double pixels_a_line = 0;    ///< pixels from line to line, across the picture
+  double crosstalk = 0;        ///< share of an eye's light that is meant for the other one, of eyes that are tracked
+  double dark = 0;             ///< share of subpixels in guard bands
+};
+/// Eyes straight before it at distance_m. crosstalk and dark are counted over its middle.
+PanelFigures figures_of(const Panel& panel, double separation_m);
+
+}  // namespace telesplat::stereo
