@@ -1,10 +1,30 @@
 // One picture of two eyes' pictures, where a display shows them both by place or by colour.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "client/stereo/mode.h"
 #include "common/image/file.h"
 
 namespace telesplat::stereo {
+
+/// Rows of 3: red, green and blue of the anaglyph from red, green and blue of one eye's picture.
+using Matrix = std::array<float, 9>;
+struct AnaglyphMatrices {
+  Matrix left, right;
+  bool linear = false;  ///< they are meant for linear light; else for displayed (sRGB) values
+};
+
+/// Grey: luma of ITU-R BT.601. Colour: channels as they are. Dubois: for red and cyan filters, E. Dubois, "Conversion
+/// of a Stereo Pair to Anaglyph with the Least-Squares Projection Method", University of Ottawa, 2009: the displayed
+/// colour whose images through both filters are nearest to the pair's, in the sense of CIE XYZ, by least squares.
+/// Precondition: an anaglyph's mode.
+const AnaglyphMatrices& anaglyph_matrices(Mode mode);
+
+/// Anaglyphs of `count` pixels, 0xAARRGGBB; alpha is the greater one. What lies outside of what displays show is cut
+/// off.
+void anaglyph(Mode mode, const uint32_t* left, const uint32_t* right, size_t count, uint32_t* out);
 
 /// `out` gets the size of composed_size(), and depth where it is asked for and both pictures have it: a pixel's own, of
 /// squeezed pictures the nearer one of two, of anaglyphs the nearer one of both eyes'. Upper bytes go with the pixels;

@@ -1,4 +1,4 @@
-#include "client/viewer/head_options.h"
+#include "client/viewer/viewer_options.h"
 
 #include <fmt/format.h>
 

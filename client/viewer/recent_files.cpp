@@ -1,11 +1,8 @@
 #include "client/viewer/recent_files.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include "common/core/whole_file.h"
@@ -49,14 +46,9 @@ Status add_recent(const std::string& list, const std::string& data_set) {
   all.insert(all.begin(), entry);
   if (all.size() > kMostRecent) all.resize(kMostRecent);
   fs::create_directories(fs::path(list).parent_path(), error);
-  const std::string part = list + "." + std::to_string(getpid());
-  std::ofstream out(part, std::ios::binary);
-  for (const auto& line : all) out << line << '\n';
-  out.close();
-  if (out) fs::rename(part, list, error);
-  if (out && !error) return ok_status();
-  fs::remove(part, error);
-  return Error{list + ": cannot be written"};
+  std::string text;
+  for (const auto& line : all) text += line + '\n';
+  return write_whole(list, text);
 }
 
 }  // namespace telesplat::viewer

@@ -7,7 +7,6 @@
 #include <tuple>
 
 #include "client/viewer/coupling/coupling.h"
-#include "client/viewer/head_options.h"
 #include "common/image/background.h"
 #include "common/splat/kernel_traits.h"
 #include "common/wire/messages.h"

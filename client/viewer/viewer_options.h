@@ -9,7 +9,6 @@
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
-#include "client/viewer/display/xr_options.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/stereo_flags.h"
 #include "common/net/service.h"
@@ -87,5 +86,12 @@ inline bool in_step(const ViewerOptions& options) { return options.swap_barrier 
 /// What happens where the trajectory of a file ends before the viewer does, a line for the person; empty: it does not.
 /// For settled options.
 std::string end_of_trajectory(const ViewerOptions& options);
+
+/// What is wrong with "X,Y,Z"; empty: nothing.
+std::string complain_about_point(const std::string& text);
+/// Publishers of poses, prediction.
+options::Table head_source_table(ViewerOptions& options);
+/// What these flags and those of a headset come to. Error: names the flag that cannot be.
+Status settle_head_source(ViewerOptions& options);
 
 }  // namespace telesplat::viewer

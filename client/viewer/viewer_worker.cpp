@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/viewer/coupling/update_table.h"
+#include "client/viewer/coupling/stage_table.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/metrics/process.h"

@@ -8,11 +8,11 @@
 #include <mutex>
 #include <thread>
 
-#include "client/viewer/coupling/pipeline_depth.h"
+#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/stage_table.h"
 #include "client/viewer/display/frame_table.h"
+#include "client/viewer/hands/errands.h"
 #include "client/viewer/hands/meaning.h"
-#include "client/viewer/hands/order_desk.h"
 #include "client/viewer/input/pose_feed.h"
 #include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
@@ -36,7 +36,7 @@ class ViewerWorker {
     SessionRecord* record = nullptr;           ///< null: nothing is kept. Outlives the worker
     std::shared_ptr<const PoseFeed> poses;     ///< moves the head; null: nobody does. Its figures are reported
     std::shared_ptr<const RendererChoice> renderer = std::make_shared<RendererChoice>();  ///< of the display
-    double started_s = 0;                      ///< when the session was started, on the monotonic clock; 0: now
+    double started_s = 0;  ///< when the session was started, on the monotonic clock; 0: now
   };
 
   /// Starts the thread.

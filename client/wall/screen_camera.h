@@ -1,6 +1,8 @@
 // What a screen of a wall shows an eye: an off-axis camera whose picture plane is the screen.
 #pragma once
 
+#include <vector>
+
 #include "client/wall/wall.h"
 
 namespace telesplat::wall {
@@ -34,5 +36,15 @@ double shown_share(const Wall& wall, const geometry::Pose& head_room, const geom
 
 /// All screens lie in one plane, and have its axes.
 bool is_plane(const Wall& wall);
+
+struct Unrolled {
+  int width = 0, height = 0;           ///< pixels of the whole
+  std::vector<geometry::Rect> places;  ///< of each screen's picture
+  double metres_per_pixel = 0;
+};
+
+/// Pixels are as fine as the finest screen's. Screens of other pixels have places of other sizes than their pictures.
+/// Error: the whole is larger than a picture may be; names the wall, its size and the limit.
+Result<Unrolled> unrolled(const Wall& wall);
 
 }  // namespace telesplat::wall

@@ -14,9 +14,8 @@
 #include "common/core/clock.h"
 #include "common/core/machine.h"
 #include "common/parallel/crew.h"
-#include "common/splat/doubling.h"
+#include "common/splat/finish.h"
 #include "common/splat/item_figures.h"
-#include "common/splat/item_runs.h"
 #include "common/splat/tile_work.h"
 
 namespace telesplat::splat {
@@ -277,6 +276,13 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const Sight& 
 CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
 CpuSplatter::~CpuSplatter() = default;
 
+SplatStats& SplatStats::operator+=(const SplatStats& other) {
+  points_projected += other.points_projected, points_drawn += other.points_drawn;
+  prepare_ms += other.prepare_ms, project_ms += other.project_ms, resolve_ms += other.resolve_ms;
+  fill_ms += other.fill_ms, smooth_ms += other.smooth_ms, antialias_ms += other.antialias_ms;
+  return *this;
+}
+
 SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geometry::Camera> cameras,
                                      const RenderOptions& options, const image::Shading& shading,
                                      std::span<const FrameTarget> targets) {
@@ -302,15 +308,7 @@ SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geome
   });
   SplatStats sum;
   sum.prepare_ms = prepare_ms;
-  for (const Workspace& w : workspaces) {
-    sum.points_projected += w.stats.points_projected;
-    sum.points_drawn += w.stats.points_drawn;
-    sum.project_ms += w.stats.project_ms;
-    sum.resolve_ms += w.stats.resolve_ms;
-    sum.fill_ms += w.stats.fill_ms;
-    sum.smooth_ms += w.stats.smooth_ms;
-    sum.antialias_ms += w.stats.antialias_ms;
-  }
+  for (const Workspace& w : workspaces) sum += w.stats;
   return sum;
 }
 

@@ -25,6 +25,8 @@ struct SplatStats {
   double prepare_ms = 0;                                ///< wall-clock: what comes before the first tile
   double project_ms = 0, resolve_ms = 0;                ///< splatting and shading, summed over threads
   double fill_ms = 0, smooth_ms = 0, antialias_ms = 0;  ///< the finish, summed over threads
+
+  SplatStats& operator+=(const SplatStats& other);
 };
 
 class CpuSplatter {
@@ -35,7 +37,7 @@ class CpuSplatter {
 
   /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish
   /// has on (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
-  /// options.halved: colours between the pixels drawn are interpolated (doubling.h); depths are the nearest pixel's.
+  /// options.halved: colours between the pixels drawn are interpolated (finish.h); depths are the nearest pixel's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
   /// Two views of one list, as fast as can be: what they have in common is prepared once, and threads draw both at a

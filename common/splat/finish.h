@@ -33,6 +33,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/splat/cpu_splatter.h"
 #include "common/splat/pixel_key.h"
 #include "common/splat/render_options.h"
 
@@ -113,5 +114,10 @@ int fill_holes(const ResolvedTile& tile, int grow, Gaps gaps, FinishScratch& scr
 void smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch);
 /// Antialiases the tile. Reads one pixel more.
 void antialias(const ResolvedTile& tile, FinishScratch& scratch);
+
+/// Rows [first, last) of `to`: bilinear between the pixels of `half`, whose centres lie at (2 i + 1, 2 j + 1); beyond
+/// the outermost centres the outermost pixels go on. Channels are 2 of 255 off at most. Depths are those of the pixel
+/// of `half` that covers a pixel. Preconditions: half has half of to's size, rounded up, and depths if `to` has.
+void double_rows(const FrameTarget& half, const FrameTarget& to, int first, int last);
 
 }  // namespace telesplat::splat

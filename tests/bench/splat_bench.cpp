@@ -140,7 +140,7 @@ double gl_points_ms(float splat_px) {
   static std::map<float, double> known;
   const auto [at, fresh] = known.try_emplace(splat_px, 0.0);
   if (!fresh) return at->second;
-  auto gl = viewer::make_gl_renderer();
+  auto gl = viewer::make_renderer("gl", 1);
   if (!gl) return 0;
   const geometry::Camera camera = display_camera();
   const image::Shading shading({}, camera);
@@ -328,7 +328,7 @@ BENCHMARK(splat_eliminate_redundancy)->Unit(benchmark::kMillisecond);
 
 // Baseline: the same frames as GL_POINTS (on a machine without GPU: Mesa's llvmpipe on all cores), read back included.
 void splat_baseline_gl_points(benchmark::State& state) {
-  auto gl = viewer::make_gl_renderer();
+  auto gl = viewer::make_renderer("gl", 1);
   if (!gl) return state.SkipWithError(gl.error().text.c_str());
   const geometry::Camera camera = display_camera();
   const image::Shading shading({}, camera);

@@ -9,7 +9,7 @@
 #include <map>
 #include <thread>
 
-#include "client/viewer/render/slices/renderer.h"
+#include "client/viewer/render/renderer.h"
 #include "common/core/clock.h"
 #include "tests/support/volume/frames.h"
 
@@ -134,7 +134,7 @@ BENCHMARK(volume_warp)
     ->Unit(benchmark::kMillisecond);
 
 void volume_warp_gl(benchmark::State& state) {
-  const auto renderer = viewer::make_gl_volume_renderer();
+  const auto renderer = viewer::make_volume_renderer("gl", 1);
   if (!renderer) return state.SkipWithError(renderer.error().text.c_str());
   run(state, **renderer, 2);
 }

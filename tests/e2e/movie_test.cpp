@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "common/image/file.h"
-#include "common/splat/doubling.h"
+#include "common/splat/finish.h"
 #include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/movie/movie_target.h"

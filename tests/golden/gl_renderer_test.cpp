@@ -10,7 +10,6 @@
 namespace telesplat {
 namespace {
 
-using viewer::GlOptions;
 using viewer::GlRenderer;
 
 constexpr splat::Finish kNoFinish{false, false, false};
@@ -59,10 +58,10 @@ class GlRendererTest : public ::testing::Test {
 };
 
 TEST_F(GlRendererTest, WaysToMoveDataMakeNoDifference) {
-  const auto plain = made(GlRenderer::make({.persistent = false, .pack_buffers = false}));
-  const auto mapped = made(GlRenderer::make({.persistent = true, .pack_buffers = true}));
+  const auto plain = made(GlRenderer::make(false));
+  const auto mapped = made(GlRenderer::make(true));
   ASSERT_TRUE(plain && mapped);
-  for (int frame = 0; frame < 8; ++frame) {  // past all parts of the ring, growing
+  for (int frame = 0; frame < 8; ++frame) {  // growing
     const Scene scene(frame);
     const splat::RenderOptions options{splat::kKernels[static_cast<size_t>(frame) % std::size(splat::kKernels)],
                                        {frame % 2 == 0, true, frame % 3 == 0}};

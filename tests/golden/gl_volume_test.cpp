@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "client/viewer/render/slices/renderer.h"
+#include "client/viewer/render/renderer.h"
 #include "common/gl/egl_context.h"
 #include "common/image/file.h"
 #include "tests/support/volume/frames.h"
@@ -21,7 +21,7 @@ class GlVolumeTest : public ::testing::Test {
   // Machines without any OpenGL skip; renderers that cannot be made where there is one fail.
   void SetUp() override {
     if (const auto context = gl::EglContext::make(); !context) GTEST_SKIP() << context.error().text;
-    auto made = viewer::make_gl_volume_renderer();
+    auto made = viewer::make_volume_renderer("gl", 1);
     ASSERT_TRUE(made) << made.error().text;
     gl_ = std::move(*made);
   }

@@ -7,7 +7,7 @@
 
 #include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
-#include "client/viewer/slices/receiver.h"
+#include "client/viewer/slices/received_slices.h"
 #include "common/core/clock.h"
 #include "tests/support/fake_session.h"
 #include "tests/support/patience.h"
@@ -110,7 +110,7 @@ TEST(VolumeSession, AsynchronouslyFramesShowWhateverIsThere) {
   EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0) << "the display never waits";
   EXPECT_GE(s.counts.introductions, 1u);
   EXPECT_GT(s.counts.acknowledged, 0u);
-  EXPECT_LE(s.counts.most_unacknowledged, SliceReceiver::kAsyncBuffers);
+  EXPECT_LE(s.counts.most_unacknowledged, ReceivedSlices::kAsyncBuffers);
   EXPECT_FALSE(s.counts.in_order);
   EXPECT_EQ(s.counts.buffers, 0u);
   EXPECT_FALSE(s.updates.empty());

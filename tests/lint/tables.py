@@ -86,7 +86,7 @@ FLOORS = {
         ["client/viewer/render", "client/viewer/coupling", "client/viewer/input", "client/viewer/hands"],
         ["client/viewer/record"],
         ["client/viewer/display"],
-        [("client/viewer/received.h", "client/viewer/feeds.*")],
+        ["client/viewer/received.h"],
         [("client/viewer/points", "client/viewer/record/event_record.*"),
          ("client/viewer/slices", "client/viewer/record/slice_record.*"), "client/viewer/pictures"],
         [("client/viewer", "client/viewer/display/display_loop.*")],

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
+#include "tests/support/splat_surfel_plain.h"
 #include "tests/support/surfel_oracle.h"
 
 namespace telesplat {

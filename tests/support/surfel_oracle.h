@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "common/geometry/camera.h"
-#include "common/splat/surfel/contour.h"
+#include "common/splat/surfel/splat.h"
 
 namespace telesplat::testing {
 

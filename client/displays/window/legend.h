@@ -5,7 +5,7 @@
 
 #include "client/displays/window/overlay.h"
 #include "client/displays/window/panel/gui/legend_view.h"
-#include "client/displays/window/panel/scene/colour_controls.h"
+#include "client/displays/window/panel/scene_controls.h"
 #include "client/displays/window/window.h"
 #include "client/viewer/display/display_options.h"
 #include "common/image/legend.h"

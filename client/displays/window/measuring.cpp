@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "client/displays/window/new_file.h"
+#include "client/displays/window/screenshots.h"
 #include "client/viewer/hands/errands.h"
 #include "common/core/clock.h"
 #include "common/core/whole_file.h"
@@ -53,7 +53,6 @@ void Measuring::show_marks(const geometry::Camera& camera, bool seen) {
                                                  q.w, q.x, q.y, q.z, camera.left, camera.width, camera.height);
   if (state == std::exchange(marks_shown_, state)) return;
   auto marks = shown ? draw_marks(places_, camera, within(camera.height / 400, 1, 4)) : MarksPicture{};
-  if (marks.view.width == 0) return overlays_.hide("marks");
   overlays_.show("marks", {std::move(marks.view), Overlay::Corner::kNone, marks.x, marks.y});
 }
 

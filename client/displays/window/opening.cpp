@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <fcntl.h>
+#include <unistd.h>
+#include <cerrno>
 #include <filesystem>
+#include <utility>
 
 namespace telesplat::viewer {
 namespace {
@@ -21,6 +25,28 @@ Status readable(const std::string& path) {
 }
 
 }  // namespace
+
+LauncherLines::LauncherLines(int fd) : fd_(fd) {
+  if (fd_ >= 0) fcntl(fd_, F_SETFL, fcntl(fd_, F_GETFL) | O_NONBLOCK);
+}
+
+std::vector<std::string> LauncherLines::read() {
+  std::vector<std::string> out;
+  char buffer[4096];
+  while (fd_ >= 0) {
+    const ssize_t n = ::read(fd_, buffer, sizeof buffer);
+    if (n < 0 && errno == EINTR) continue;
+    if (n == 0) fd_ = -1;  // the launcher has gone
+    if (n <= 0) break;
+    for (ssize_t i = 0; i < n; ++i) {
+      if (buffer[i] == '\n')
+        out.push_back(std::exchange(part_, {}));
+      else if (part_.size() < kLongest)
+        part_ += buffer[i];
+    }
+  }
+  return out;
+}
 
 void Opening::take_launcher_lines(double now_s, bool has_scene, bool seen) {
   for (const std::string& line : launcher_.read()) {

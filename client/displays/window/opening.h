@@ -3,14 +3,33 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "client/displays/window/panel/gui/open_view.h"
-#include "client/displays/window/panel/launcher_lines.h"
 #include "client/displays/window/panel/panel.h"
 #include "client/displays/window/panel/scene_controls.h"
 #include "client/displays/window/window.h"
 
 namespace telesplat::viewer {
+
+/// Lines from a file descriptor, read without waiting. The launcher sends
+///   progress TEXT   what goes on, for people: "reading a.ply 43 %, 12 s left"; without TEXT: nothing
+///   problem TEXT    why a data set could not be opened
+/// One thread.
+class LauncherLines {
+ public:
+  static constexpr size_t kLongest = 4096;  ///< bytes of a line; what is longer is cut
+
+  /// Reads from `fd`, which becomes non-blocking; negative: nobody says anything.
+  explicit LauncherLines(int fd);
+  /// Whole lines that came since the last call.
+  std::vector<std::string> read();
+  bool open() const { return fd_ >= 0; }
+
+ private:
+  int fd_;
+  std::string part_;
+};
 
 /// One thread. What it is made of must live longer.
 class Opening {

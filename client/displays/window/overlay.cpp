@@ -16,6 +16,7 @@ constexpr int kPadding = 4, kLeading = 3;  // dots of a letter
 }  // namespace
 
 void Overlays::show(const std::string& name, Overlay overlay) {
+  if (overlay.picture.width == 0) return hide(name);
   all_.insert_or_assign(name, std::move(overlay));
   ++version_;
 }

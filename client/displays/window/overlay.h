@@ -22,7 +22,7 @@ struct Overlay {
 /// What lies over the frames at present, by names that their owners choose ("help"). Used by the display's thread.
 class Overlays {
  public:
-  /// Shows it, in place of what has this name.
+  /// Shows it, in place of what has this name. Hides that where the picture is empty.
   void show(const std::string& name, Overlay overlay);
   void hide(const std::string& name);
   bool shows(const std::string& name) const { return all_.contains(name); }

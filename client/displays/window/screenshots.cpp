@@ -9,7 +9,27 @@
 
 namespace telesplat::viewer {
 
+namespace {
+
 namespace fs = std::filesystem;
+
+std::string local_time() {
+  char date[32];
+  const std::time_t now = std::time(nullptr);
+  std::strftime(date, sizeof date, "%Y%m%d-%H%M%S", std::localtime(&now));
+  return date;
+}
+
+}  // namespace
+
+std::string new_file(const std::string& folder, const std::string& what, const std::string& ending) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const std::string name = fmt::format("{}/{}-{}", folder, what, local_time());
+  std::string out = name + ending;
+  for (int n = 2; fs::exists(out, error); ++n) out = fmt::format("{}-{}{}", name, n, ending);
+  return out;
+}
 
 Screenshots::Screenshots(std::string directory, std::function<void(const std::string&)> tell)
     : directory_(std::move(directory)), tell_(std::move(tell)) {}
@@ -19,13 +39,10 @@ Screenshots::~Screenshots() {
 }
 
 std::string Screenshots::next_path(const char* ending) {
-  char date[32];
-  const std::time_t now = std::time(nullptr);
-  std::strftime(date, sizeof date, "%Y%m%d-%H%M%S", std::localtime(&now));
   std::string path;
   std::error_code error;
   do {
-    path = fmt::format("{}/telesplat-{}-{:03d}.{}", directory_, date, ++count_, ending);
+    path = fmt::format("{}/telesplat-{}-{:03d}.{}", directory_, local_time(), ++count_, ending);
   } while (fs::exists(path, error));
   return path;
 }

@@ -10,6 +10,9 @@
 
 namespace telesplat::viewer {
 
+/// FOLDER/WHAT-DATE-TIME.ENDING, a name that no file has. Makes the folder; where that fails, writing will.
+std::string new_file(const std::string& folder, const std::string& what, const std::string& ending);
+
 class Screenshots {
  public:
   /// Into `directory` (made if need be). tell: what became of each picture, a line for the person; called from any

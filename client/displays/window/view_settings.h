@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "client/viewer/coupling/sampling_wish.h"
+#include "client/viewer/coupling/request_options.h"
 #include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/input/look.h"
 #include "common/core/result.h"

@@ -103,24 +103,7 @@ void survive_broken_connection() {
   dlclose(xlib);
 }
 
-constexpr std::pair<int, Key> kGlfwKeys[] = {{GLFW_KEY_A, Key::kA},
-                                             {GLFW_KEY_B, Key::kB},
-                                             {GLFW_KEY_I, Key::kI},
-                                             {GLFW_KEY_N, Key::kN},
-                                             {GLFW_KEY_X, Key::kX},
-                                             {GLFW_KEY_C, Key::kC},
-                                             {GLFW_KEY_D, Key::kD},
-                                             {GLFW_KEY_E, Key::kE},
-                                             {GLFW_KEY_F, Key::kF},
-                                             {GLFW_KEY_H, Key::kH},
-                                             {GLFW_KEY_O, Key::kO},
-                                             {GLFW_KEY_P, Key::kP},
-                                             {GLFW_KEY_Q, Key::kQ},
-                                             {GLFW_KEY_R, Key::kR},
-                                             {GLFW_KEY_S, Key::kS},
-                                             {GLFW_KEY_T, Key::kT},
-                                             {GLFW_KEY_W, Key::kW},
-                                             {GLFW_KEY_F1, Key::kF1},
+constexpr std::pair<int, Key> kGlfwKeys[] = {{GLFW_KEY_F1, Key::kF1},
                                              {GLFW_KEY_F11, Key::kF11},
                                              {GLFW_KEY_F12, Key::kF12},
                                              {GLFW_KEY_TAB, Key::kTab},
@@ -133,7 +116,7 @@ std::optional<Key> key_of(int glfw_key) {
     if (code == glfw_key) return key;
   for (const int first : {GLFW_KEY_1, GLFW_KEY_KP_1})
     if (glfw_key >= first && glfw_key < first + 8) return Key(int(Key::k1) + glfw_key - first);
-  return std::nullopt;
+  return glfw_key >= GLFW_KEY_A && glfw_key <= GLFW_KEY_Z ? letter_key(char(glfw_key)) : std::nullopt;
 }
 
 // What is printed on a key, in upper case; 0: no Latin letter.
@@ -450,10 +433,9 @@ double Window::refresh_s() {
 }
 
 std::string Window::key_name(Key key) const {
-  for (const auto& [code, known] : kGlfwKeys)
-    if (known == key && !lost())
-      // Keyboards of other scripts have Latin letters too, and the window's letters are ASCII.
-      if (const char* name = glfwGetKeyName(code, 0); name && *name && is_ascii(name)) return upper_case(name);
+  // Keyboards of other scripts have Latin letters too, and the window's letters are ASCII.
+  if (key < Key::k1 && !lost())
+    if (const char* name = glfwGetKeyName(us_name(key)[0], 0); name && *name && is_ascii(name)) return upper_case(name);
   return us_name(key);
 }
 

@@ -9,8 +9,8 @@
 #include <mutex>
 #include <utility>
 
-#include "client/displays/window/new_file.h"
 #include "client/displays/window/open_window.h"
+#include "client/displays/window/screenshots.h"
 #include "common/core/clock.h"
 #include "common/core/within.h"
 #include "common/geometry/fit.h"
@@ -56,8 +56,9 @@ geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int w
 // Screenshots tell from a thread of theirs.
 struct WindowSurface::Lines {
   std::mutex mutex;
-  std::function<void(const std::string&)> tell;
+  std::function<void(const std::string&)> tell;  // never from two threads at once
   std::vector<std::string> for_panel;
+  explicit Lines(std::function<void(const std::string&)> to) : tell(std::move(to)) {}
   void add(const std::string& line, bool to_panel = true) {
     const std::lock_guard lock(mutex);
     tell(line);
@@ -65,39 +66,39 @@ struct WindowSurface::Lines {
   }
 };
 
-Result<std::unique_ptr<WindowSurface>> WindowSurface::open(const Options& o,
-                                                           std::function<void(const std::string&)> tell,
-                                                           std::unique_ptr<ControlDesk> desk) {
+Result<std::unique_ptr<WindowSurface>> WindowSurface::open(const ViewerOptions& o, const DisplayHelp& help) {
   auto window = Window::open({o.display.width, o.display.height, o.fullscreen, "Telesplat",
                               o.display.stereo.mode == stereo::Mode::kQuadBuffer});
   if (!window) return window.error();
-  auto lines = std::make_shared<Lines>();
-  lines->tell = std::move(tell);
-  return std::unique_ptr<WindowSurface>(new WindowSurface(o, std::move(*window), std::move(lines), std::move(desk)));
+  return std::unique_ptr<WindowSurface>(new WindowSurface(o, help, std::move(*window)));
 }
 
-WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, std::shared_ptr<Lines> lines,
-                             std::unique_ptr<ControlDesk> desk)
+WindowSurface::WindowSurface(const ViewerOptions& o, const DisplayHelp& help, std::unique_ptr<Window> window)
     : options_(o),
+      poses_(help.poses),
+      sampling_{o.requests.adaptive, o.requests.sampling_width, o.requests.sampling_height,
+                o.least_sampling.value_or(o.requests.min_scale)},
+      sampling_chosen_(o.least_sampling.has_value()),
       window_(std::move(window)),
       interaction_(first_movement(o.movement), first_look(o.display.render, o.display.shading)),
-      bookmarks_([lines](const std::string& line) { lines->add(line); }),
-      lines_(std::move(lines)),
-      panel_({.transparent = o.display.transparent, .viewer = o.viewer, .shown = o.panel, .opens = bool(o.open)}),
-      opening_(o.open, o.launcher_fd, interaction_, panel_, scene_controls_,
-               [this](const std::string& line) { tell(line); }),
-      desk_(std::move(desk)),
-      screenshots_(o.screenshot_directory, [lines = lines_](const std::string& line) { lines->add(line); }) {
+      lines_(std::make_shared<Lines>(help.tell)),
+      bookmarks_([lines = lines_](const std::string& line) { lines->add(line); }),
+      panel_({.transparent = o.display.transparent, .viewer = o.service.name, .shown = o.panel, .opens = o.launched}),
+      opening_(o.launched ? ask_to_open : nullptr, o.launched ? STDIN_FILENO : -1, interaction_, panel_,
+               scene_controls_, [this](const std::string& line) { tell(line); }),
+      desk_(std::make_unique<ControlDesk>(o.service.master, help.asking)),
+      screenshots_(o.out.empty() ? "." : o.out + "/images",
+                   [lines = lines_](const std::string& line) { lines->add(line); }) {
   quad_buffers_ = o.display.stereo.mode == stereo::Mode::kQuadBuffer;
   interaction_.show_panel(o.panel);
-  interaction_.set_dialog(bool(o.open), has_scene());
+  interaction_.set_dialog(o.launched, has_scene());
   interaction_.show_dialog(o.begins_empty);
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
   tell(first_keys());
-  if (o.poses)
+  if (poses_)
     interaction_.set_tracked([this](double now_s) {
       tracked_ = true;
-      return options_.poses->begin_frame(now_s);
+      return poses_->begin_frame(now_s);
     });
 }
 
@@ -180,12 +181,8 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   run_panel(now_s, look);
   follow_bookmarks(head_);
   if (interaction_.take(Wish::kOverlays)) hands_.toggle_all();
-  if (auto picture = hands_.update(now_s, camera, scene_.box_room)) {
-    if (picture->width > 0)
-      overlays_.show("hands", {std::move(*picture), Overlay::Corner::kLowerLeft});
-    else
-      overlays_.hide("hands");
-  }
+  if (auto picture = hands_.update(now_s, camera, scene_.box_room))
+    overlays_.show("hands", {std::move(*picture), Overlay::Corner::kLowerLeft});
   measuring_.show_marks(camera, options_.display.stereo.mode == stereo::Mode::kOff);  // two eyes would need two
   show_help();
   show_news(now_s);
@@ -214,7 +211,6 @@ void WindowSurface::run_panel(double now_s, Look& look) {
                   .plays = interaction_.playing(),
                   .can_play = interaction_.can_play(),
                   .recorded_s = interaction_.path_s()});
-  background_ = look.background;
   std::vector<std::string> lines;
   {
     const std::lock_guard lock(lines_->mutex);
@@ -265,10 +261,7 @@ void WindowSurface::show_help() {
   const int scale = here ? help_scale(key_lines(), window_->width(), window_->height()) : 0;
   if (scale == help_scale_) return;
   help_scale_ = scale;
-  if (scale > 0)
-    overlays_.show("help", {text_panel(key_lines(), scale), Overlay::Corner::kUpperLeft});
-  else
-    overlays_.hide("help");
+  overlays_.show("help", {scale > 0 ? text_panel(key_lines(), scale) : image::View(), Overlay::Corner::kUpperLeft});
 }
 
 std::vector<std::string> WindowSurface::key_lines() const {
@@ -277,14 +270,14 @@ std::vector<std::string> WindowSurface::key_lines() const {
 
 // What keys led to: lines for the person, and a path that is complete.
 void WindowSurface::keep_path() {
-  if (options_.poses)
-    if (const auto news = options_.poses->take_news(monotonic_s())) tell(*news);
+  if (poses_)
+    if (const auto news = poses_->take_news(monotonic_s())) tell(*news);
   const auto notes = interaction_.take_notes();
   const auto help = notes.empty() ? std::vector<std::string>() : key_lines();
   for (const auto& note : notes) lines_->add(note, std::find(help.begin(), help.end(), note) == help.end());
   const auto path = interaction_.take_path();
   if (path.empty()) return;
-  const std::string name = new_file(options_.path_directory, "path", ".csv");
+  const std::string name = new_file(path_folder(), "path", ".csv");
   const Status written = geometry::write_trajectory(name, path);
   tell(written
            ? fmt::format("the camera's path of {:.1f} s: {} (T plays it, --trajectory takes it)", path.back().t_s, name)
@@ -297,7 +290,6 @@ void WindowSurface::present(const image::View& view, bool changed) {
                   panel_.shown() || opening_.shows_dialog() || legend_.built()};
   const bool same = now.width == shown_.width && now.height == shown_.height && now.overlays == shown_.overlays &&
                     now.panel == shown_.panel && !(now.panel && window_->gui_due(now.at_s));
-  if (panel_.shown() && changed && panel_.pipeline() == scene::Pipeline::kPoints) holes_.look_at(view, background_);
   if (!changed && same && now.at_s - shown_.at_s < kShowAgain_s) return;
   shown_ = now;
   if (now.panel)
@@ -306,14 +298,14 @@ void WindowSurface::present(const image::View& view, bool changed) {
     const LoggedBuild nothing(widget_log_);
     window_->present(view, overlays_);
   }
-  if (options_.poses) options_.poses->presented(monotonic_s());
+  if (poses_) poses_->presented(monotonic_s());
 }
 
 ViewSettings WindowSurface::settings() const {
   const auto& d = options_.display;
   return {.look = interaction_.look(),
           .transparent = d.transparent,
-          .sampling = options_.sampling,
+          .sampling = sampling_,
           .stereo = d.stereo,
           .quad_buffers = quad_buffers_,
           .legend = d.legend,
@@ -347,14 +339,14 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
     return std::tuple(o.mode, o.eye_separation_m, o.screen_m, o.swap_eyes);
   };
   if (eyes(changed.stereo) != eyes(d.stereo)) {
-    if (options_.recorded) return Error{"a run that is recorded keeps the two eyes that it began with"};
+    if (!options_.out.empty()) return Error{"a run that is recorded keeps the two eyes that it began with"};
     stereo_wish_ = d.stereo = changed.stereo;
     fitted_ = {};
   }
   interaction_.set_look(changed.look);
-  if (changed.sampling != options_.sampling) {
-    options_.sampling_chosen = true;
-    sampling_wish_ = options_.sampling = changed.sampling;
+  if (changed.sampling != sampling_) {
+    sampling_chosen_ = true;
+    sampling_wish_ = sampling_ = changed.sampling;
   }
   if (std::exchange(d.legend, changed.legend) != changed.legend) legend_.show();
   return ok_status();
@@ -380,7 +372,7 @@ double WindowSurface::build_panel(double now_s) {
   if (panel_.shown())
     width = show_panel(panel_, panel_view_, now_s, {[&](Panel&) {
                          show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); });
-                         show_measurements(measuring_.places(), [this] { measuring_.save(options_.path_directory); });
+                         show_measurements(measuring_.places(), [this] { measuring_.save(path_folder()); });
                          const auto book = bookmarks_.book();
                          notes_wish_ = show_notes(book.get(), notes_view_, !measuring_.places().empty(), now_s);
                        }});
@@ -407,12 +399,12 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
     notes_view_ = {};
   }
   had_scene_ = had_scene_ || !facts.fact("scene").empty();
-  auto& least = options_.sampling.least_sampling;
-  if (!options_.sampling_chosen) least = session->settings.least_sampling;
+  auto& least = sampling_.least_sampling;
+  if (!sampling_chosen_) least = session->settings.least_sampling;
 }
 
 void WindowSurface::save_transfer() {
-  const std::string name = new_file(options_.path_directory, "transfer", ".json");
+  const std::string name = new_file(path_folder(), "transfer", ".json");
   const Status saved = scene_controls_.save_transfer(name);
   tell(saved ? "transfer function: " + name : saved.error().text);
 }
@@ -481,16 +473,11 @@ void WindowSurface::follow_bookmarks(const geometry::Pose& pose) {
   if (const auto found = bookmarks_.take_found()) interaction_.go_to(found->pose);
 }
 
-void WindowSurface::report(const FrameFigures& told) {
-  FrameFigures figures = told;
-  figures.hole_share = holes_.share();
+void WindowSurface::report(const FrameFigures& figures) {
   panel_.on_figures(figures);
-  if (const bool waits = figures.waits_s > 0; waits != overlays_.shows("waiting")) {
-    if (waits)
-      overlays_.show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kUpperLeft});
-    else
-      overlays_.hide("waiting");
-  }
+  if (const bool waits = figures.waits_s > 0; waits != overlays_.shows("waiting"))
+    overlays_.show("waiting",
+                   {waits ? text_panel({"waiting for a view update"}, 2) : image::View(), Overlay::Corner::kUpperLeft});
   hands_.on_frame(figures.now_s, figures.frames);
   if (const auto title = title_.update(figures)) title_text_ = *title;
   const std::string title = interaction_.records_path() ? fmt::format("{} - recording the camera's path, {:.0f} s",
@@ -501,24 +488,7 @@ void WindowSurface::report(const FrameFigures& told) {
 
 // A window may be given another size than it asked for: the options follow.
 Result<std::unique_ptr<DisplaySurface>> open_window(ViewerOptions& o, const DisplayHelp& help) {
-  const std::string folder = o.out.empty() ? "." : o.out;
-  const auto& r = o.requests;
-  const WindowSurface::Options options{
-      .display = o.display,
-      .movement = o.movement,
-      .poses = help.poses,
-      .fullscreen = o.fullscreen,
-      .screenshot_directory = o.out.empty() ? "." : o.out + "/images",
-      .path_directory = folder,
-      .panel = o.panel,
-      .viewer = o.service.name,
-      .sampling = {r.adaptive, r.sampling_width, r.sampling_height, o.least_sampling.value_or(r.min_scale)},
-      .sampling_chosen = o.least_sampling.has_value(),
-      .open = o.launched ? std::function<void(const std::string&)>(ask_to_open) : nullptr,
-      .recorded = !o.out.empty(),
-      .begins_empty = o.begins_empty,
-      .launcher_fd = o.launched ? STDIN_FILENO : -1};
-  auto opened = WindowSurface::open(options, help.tell, std::make_unique<ControlDesk>(o.service.master, help.asking));
+  auto opened = WindowSurface::open(o, help);
   if (!opened) return opened.error();
   o.display.width = (*opened)->width();
   o.display.height = (*opened)->height();

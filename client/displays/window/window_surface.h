@@ -10,11 +10,9 @@
 #include "client/displays/window/measuring.h"
 #include "client/displays/window/opening.h"
 #include "client/displays/window/panel/control_desk.h"
-#include "client/displays/window/panel/gui/measurements_view.h"
 #include "client/displays/window/panel/gui/notes_view.h"
 #include "client/displays/window/panel/gui/panel_view.h"
 #include "client/displays/window/panel/gui/scene_view.h"
-#include "client/displays/window/panel/hole_meter.h"
 #include "client/displays/window/panel/order_undo.h"
 #include "client/displays/window/panel/panel.h"
 #include "client/displays/window/panel/scene_controls.h"
@@ -23,36 +21,15 @@
 #include "client/displays/window/title_line.h"
 #include "client/displays/window/view_settings.h"
 #include "client/displays/window/window.h"
-#include "client/viewer/display/display_options.h"
-#include "client/viewer/display/display_surface.h"
-#include "client/viewer/input/head_movement.h"
 #include "client/viewer/input/pose_feed.h"
+#include "client/viewer/viewer_service.h"
 
 namespace telesplat::viewer {
 
 class WindowSurface final : public DisplaySurface {
  public:
-  struct Options {
-    DisplayOptions display;
-    HeadMovement movement;            ///< unless it stands still it plays until the person takes the camera
-    std::shared_ptr<PoseFeed> poses;  ///< moves the camera until the person takes it; null: nobody does
-    bool fullscreen = false;
-    std::string screenshot_directory = ".", path_directory = ".";
-    bool panel = true;             ///< shown from the beginning
-    std::string viewer;            ///< this viewer's name
-    SamplingWish sampling;         ///< as it begins
-    bool sampling_chosen = false;  ///< its least sampling, by a flag
-    /// Asks whoever started the session for another data set; null: it is somebody else's session.
-    std::function<void(const std::string& path)> open;
-    bool recorded = false;      ///< movies are made of the run: two eyes' pictures stay as they are
-    bool begins_empty = false;  ///< there is nothing to see before a data set was opened
-    int launcher_fd = -1;       ///< LauncherLines
-  };
-  /// tell: lines for the person; may be called from another thread, never from two at once. desk: takes what the panel
-  /// orders to the master.
-  static Result<std::unique_ptr<WindowSurface>> open(const Options& options,
-                                                     std::function<void(const std::string&)> tell,
-                                                     std::unique_ptr<ControlDesk> desk);
+  /// The options' movement plays, unless it stands still, until the person takes the camera.
+  static Result<std::unique_ptr<WindowSurface>> open(const ViewerOptions& options, const DisplayHelp& help);
   /// A path that is being recorded is written.
   ~WindowSurface() override;
 
@@ -66,7 +43,7 @@ class WindowSurface final : public DisplaySurface {
   geometry::Pose head() const override { return head_; }
   geometry::Camera camera_of(const geometry::Pose& head) const override;
   bool visible() const override { return true; }
-  std::optional<PoseMoment> pose_moment() const override { return tracked_ ? options_.poses->moment() : std::nullopt; }
+  std::optional<PoseMoment> pose_moment() const override { return tracked_ ? poses_->moment() : std::nullopt; }
   double refresh_s() override { return window_->refresh_s(); }
   void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override { legend_.on_legend(legend); }
@@ -95,8 +72,7 @@ class WindowSurface final : public DisplaySurface {
 
  private:
   struct Lines;  // for the person, from any thread
-  WindowSurface(const Options& options, std::unique_ptr<Window> window, std::shared_ptr<Lines> lines,
-                std::unique_ptr<ControlDesk> desk);
+  WindowSurface(const ViewerOptions& options, const DisplayHelp& help, std::unique_ptr<Window> window);
   geometry::Camera whole(const geometry::Pose& pose) const;
   // The window's frustum; its middle lies at a tangent from the view's axis.
   struct FreePart {
@@ -118,13 +94,17 @@ class WindowSurface final : public DisplaySurface {
   double build_panel(double now_s);
   void save_transfer();
   void give(Order order, bool undoes);
+  std::string path_folder() const { return options_.out.empty() ? "." : options_.out; }
   // Or is about to have one.
   bool has_scene() const { return !options_.begins_empty || !scene_.box_room.empty(); }
   void follow_bookmarks(const geometry::Pose& pose);
   void follow_notes();
   notes::Shelf shelf() const;  // precondition: terms_
 
-  Options options_;  // display and sampling: as the person chose since
+  ViewerOptions options_;            // display: as the person chose since
+  std::shared_ptr<PoseFeed> poses_;  // moves the camera until the person takes it; null: nothing does
+  SamplingWish sampling_;            // as the person chose
+  bool sampling_chosen_;             // its least sampling
   std::optional<SamplingWish> sampling_wish_;
   std::optional<StereoOptions> stereo_wish_;
   std::unique_ptr<Window> window_;
@@ -134,6 +114,7 @@ class WindowSurface final : public DisplaySurface {
   Overlays overlays_;
   HandOverlays hands_{text_panel};
   std::shared_ptr<const SceneTerms> terms_;
+  std::shared_ptr<Lines> lines_;
   Bookmarks bookmarks_;
   Measuring measuring_{*window_, interaction_, hands_, overlays_, [this](const std::string& line) { tell(line); }};
   ShownScene scene_;
@@ -152,7 +133,6 @@ class WindowSurface final : public DisplaySurface {
   Shown shown_;                    // what is in the window
   int help_scale_ = 0;             // of the overlay's letters; 0: it is not shown
   std::vector<std::string> news_;  // that an overlay shows
-  std::shared_ptr<Lines> lines_;
   Panel panel_;
   SceneControls scene_controls_{[this](Order order) { panel_.order(std::move(order)); }};
   OrderUndo order_undo_;
@@ -163,9 +143,7 @@ class WindowSurface final : public DisplaySurface {
   NotesWish notes_wish_;
   WidgetLog widget_log_ = WidgetLog::from_environment();
   std::unique_ptr<ControlDesk> desk_;
-  HoleMeter holes_;
   bool quad_buffers_ = false;  // the window has them
-  uint32_t background_ = 0;    // of the frame at hand
   Screenshots screenshots_;
 };
 

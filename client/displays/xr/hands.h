@@ -1,4 +1,4 @@
-// Controllers: where they point, whether they are pressed.
+// Controllers: where they point, whether they are pressed, and their rays in the pictures.
 #pragma once
 
 #include <array>
@@ -7,6 +7,7 @@
 
 #include "client/displays/xr/xr_system.h"
 #include "common/geometry/camera.h"
+#include "common/image/file.h"
 
 namespace telesplat::viewer {
 
@@ -44,5 +45,18 @@ class Hands {
   std::array<XrPath, 2> hands_{};
   std::array<XrSpace, 2> spaces_{};
 };
+
+/// The first point of what the picture shows on the ray from `from` along `direction` (unit length), at most
+/// kFarthest_m away; nothing: it meets nothing that the picture shows. Precondition: the picture has depth, and the
+/// camera's size.
+std::optional<glm::dvec3> first_hit(const image::View& picture, const geometry::Camera& camera, const glm::dvec3& from,
+                                    const glm::dvec3& direction);
+
+/// A line in the room, three pixels wide, where nothing in the picture is before it; `colour` 0x00RRGGBB. Its depth
+/// goes into the picture's.
+void draw_line(image::View& picture, const geometry::Camera& camera, const glm::dvec3& from, const glm::dvec3& to,
+               uint32_t colour);
+
+inline constexpr double kFarthest_m = 10;
 
 }  // namespace telesplat::viewer

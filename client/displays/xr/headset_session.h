@@ -10,9 +10,8 @@
 
 #include "client/displays/xr/hands.h"
 #include "client/displays/xr/picture_chain.h"
-#include "client/displays/xr/xr_space.h"
 #include "client/displays/xr/xr_system.h"
-#include "client/viewer/display/xr_options.h"
+#include "client/viewer/display/display_options.h"
 #include "common/gl/egl_context.h"
 #include "common/image/file.h"
 

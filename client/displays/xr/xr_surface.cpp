@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "client/displays/xr/hand_rays.h"
+#include "client/displays/xr/hands.h"
 #include "client/viewer/display/frame_table.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"

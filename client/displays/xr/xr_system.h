@@ -1,15 +1,38 @@
-// A headset as an OpenXR runtime offers it: an instance, a system, what it wants pictures to be like.
+// A headset as an OpenXR runtime offers it: an instance, a system, what it wants pictures to be like. OpenXR as it is
+// used here (OpenGL through EGL, depth of layers, times of the monotonic clock), and its types as those of cameras.
 #pragma once
+
+#include <epoxy/egl.h>
+
+#include <ctime>
+
+#define XR_USE_GRAPHICS_API_OPENGL
+#define XR_USE_PLATFORM_EGL
+#define XR_USE_TIMESPEC
+#include <openxr/openxr.h>
+#include <openxr/openxr_platform.h>
 
 #include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "client/displays/xr/xr_api.h"
 #include "common/core/result.h"
+#include "common/geometry/camera.h"
 
 namespace telesplat::viewer {
+
+/// Both are right-handed, in metres, +y up, looking along -z. origin: the room's, in the headset's space.
+geometry::Pose room_pose(const XrPosef& pose, const glm::dvec3& origin);
+/// The camera of an eye; width x height pixels.
+geometry::Camera eye_camera(const XrView& view, const glm::dvec3& origin, int width, int height, double near_m);
+
+/// How far apart two depths are at a metre, of pictures with 16 bits for depths from near_m to far_m, metres.
+double step_of_depth_m(double near_m, double far_m);
+
+/// One camera that sees all that both eyes see, in the middle of their directions and so far behind them that its
+/// frustum holds both, with as many pixels a radian as they have. What is asked for is chosen once, for it.
+geometry::Camera both_eyes(const std::array<geometry::Camera, 2>& eyes);
 
 class XrSystem {
  public:

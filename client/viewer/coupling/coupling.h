@@ -2,6 +2,7 @@
 // decisions come out; no sockets, no clocks, no threads.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <optional>
 #include <string>
@@ -9,6 +10,8 @@
 #include <vector>
 
 #include "common/core/ids.h"
+#include "common/geometry/camera.h"
+#include "common/wire/limits.h"
 #include "common/wire/session_messages.h"
 
 namespace telesplat::viewer {
@@ -109,6 +112,85 @@ class Coupling {
   bool displaying_ = false;
   double heard_s_ = 0;  // a part of an answer, or the requests were sent again
   double sign_s_ = 0;
+};
+
+class StallWatch {
+ public:
+  static constexpr double kLong_s = 1;   ///< a wait that is told to people
+  static constexpr double kMost_s = 10;  ///< without any sign of an answer; then frames are drawn from what is there
+
+  explicit StallWatch(double most_s = kMost_s) : most_s_(most_s) {}
+
+  /// No update has come by now_s, in a wait that began at begin_s. last_sign_s: when part of an answer last came. True:
+  /// a frame is to be drawn from what is there, and so is every further one until an update comes.
+  bool waiting(double now_s, double begin_s, double last_sign_s, const CouplingState& coupling);
+  /// An update came, or nothing is waited for any more.
+  void over(double now_s);
+
+  /// How long it has waited; 0: not for long enough to tell people.
+  double told_s(double now_s) const { return told_ ? now_s - *since_s_ : 0; }
+  /// What is to be logged, once: when a wait begins to be long, when frames are drawn from what is there, when it is
+  /// over.
+  std::optional<std::string> take_news();
+
+ private:
+  double most_s_;
+  std::optional<double> since_s_;  // the wait began
+  bool told_ = false, draws_ = false;
+  std::optional<std::string> news_;
+};
+
+class PipelineDepth {
+ public:
+  static constexpr int kFirst = 2, kMost = int(wire::kMaxBuffers);
+  /// Views that wait somewhere: with fewer the next round has one more under way, with more one less.
+  static constexpr double kFewWait = 0.5, kManyWait = 1.5;
+
+  /// A view that came.
+  struct View {
+    double latency_ms = 0;  ///< since it was asked for
+    double queued_ms = 0;   ///< of it, in queues
+    double network_ms = 0;  ///< of it, on the way
+    int ahead = 0;          ///< views that were under way when it was asked for
+  };
+
+  /// Views under way at most.
+  int depth() const { return depth_; }
+
+  void answered(const View& v) {
+    // A view that had the way for itself tells what it takes now; others at most that it takes no longer.
+    if (least_ms_ == 0)
+      least_ms_ = v.network_ms;
+    else if (v.ahead == 0)
+      least_ms_ += kShare * (v.network_ms - least_ms_);
+    else
+      least_ms_ = std::min(least_ms_, v.network_ms);
+    sum_ms_ += v.latency_ms;
+    waited_ms_ += v.queued_ms + std::max(0.0, v.network_ms - least_ms_);
+    filled_ = filled_ && v.ahead + 1 >= depth_;
+    if (++count_ < depth_) return;
+    const double wait = depth_ * waited_ms_ / sum_ms_;
+    // Where fewer were under way than might have been, more are of no use.
+    if (wait > kManyWait)
+      depth_ = std::max(1, depth_ - 1);
+    else if (wait < kFewWait && filled_)
+      depth_ = std::min(kMost, depth_ + 1);
+    count_ = 0, sum_ms_ = waited_ms_ = 0, filled_ = true;
+  }
+
+ private:
+  static constexpr double kShare = 0.3;  // of a new value in least_ms_
+  int depth_ = kFirst, count_ = 0;
+  double least_ms_ = 0;  // on the way; 0: nothing is known
+  double sum_ms_ = 0, waited_ms_ = 0;
+  bool filled_ = true;
+};
+
+struct ShownUpdate {
+  RequestId request;
+  double requested_s = 0;  ///< master's clock
+  geometry::Pose pose;     ///< that was asked for
+  double posed_s = 0;      ///< master's clock: the head was there, unless it was predicted
 };
 
 }  // namespace telesplat::viewer

@@ -30,4 +30,11 @@ struct RequestOptions {
   bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 
+struct SamplingWish {
+  bool adaptive = true;         ///< as fine as updates in time allow (RequestOptions); else the size below
+  int width = 0, height = 0;    ///< not adaptive: pixels; in a window as many in its aspect
+  double least_sampling = 0.5;  ///< adaptive: sampled pixels a displayed pixel, on each axis, at least
+  bool operator==(const SamplingWish&) const = default;
+};
+
 }  // namespace telesplat::viewer

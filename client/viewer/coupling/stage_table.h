@@ -4,8 +4,10 @@
 
 #include <map>
 #include <optional>
+#include <string>
+#include <vector>
 
-#include "client/viewer/coupling/update_table.h"
+#include "client/viewer/coupling/view_requester.h"
 #include "common/metrics/recorder.h"
 #include "common/metrics/stages.h"
 
@@ -20,6 +22,15 @@ struct UpdateStages {
   metrics::StagesMs stages{};
   double display_ms = -1;  ///< -1: no frame showed it
 };
+
+/// last: the part that made the update complete.
+struct MeasuredUpdate {
+  const ViewRequester::Update& update;
+  const ViewPart& last;
+};
+
+std::vector<std::string> update_columns();
+std::vector<double> update_row(const MeasuredUpdate& measured);
 
 /// Used by one thread.
 class StageTable {

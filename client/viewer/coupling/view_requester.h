@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "client/viewer/coupling/request_options.h"
-#include "client/viewer/coupling/sampling_wish.h"
 #include "client/viewer/tracking/pose_predictor.h"
 #include "client/viewer/tracking/prediction_meter.h"
 #include "common/geometry/camera.h"

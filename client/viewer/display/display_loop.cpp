@@ -9,7 +9,7 @@
 
 #include "client/viewer/display/eyes/eye_pictures.h"
 #include "client/viewer/hands/errands.h"
-#include "client/viewer/render/fit_view.h"
+#include "client/viewer/render/renderer.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/within.h"
@@ -46,9 +46,7 @@ FrameFigures figures_of(double now_s, uint64_t frames, const DrawnFrame& drawn, 
 // Both eyes of a headset are one frame of the tables.
 void add(const DrawnFrame& other, DrawnFrame& sum) {
   sum.empty = sum.empty && other.empty;
-  for (const auto figure : {&DrawnFrame::prepare_ms, &DrawnFrame::project_cpu_ms, &DrawnFrame::resolve_cpu_ms,
-                            &DrawnFrame::fill_cpu_ms, &DrawnFrame::smooth_cpu_ms, &DrawnFrame::antialias_cpu_ms})
-    sum.*figure += other.*figure;
+  sum.stats += other.stats;
   sum.selected += other.selected, sum.drawn += other.drawn, sum.items += other.items;
   sum.detail = std::min(sum.detail, other.detail);
 }

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
 
-#include "client/viewer/coupling/stall_watch.h"
+#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/display/wall.h"
 #include "common/image/shading.h"
@@ -11,6 +13,14 @@
 #include "common/splat/select/view_selection.h"
 
 namespace telesplat::viewer {
+
+struct XrOptions {
+  /// Where the room's origin, around which the data set stands, lies in the headset's space: metres, +y up. Nothing:
+  /// what suits that space.
+  std::optional<glm::dvec3> origin_m;
+  double scale = 1;   ///< pixels drawn for each that the runtime recommends, on each axis
+  bool depth = true;  ///< submit depth, if the runtime takes it
+};
 
 struct DisplayOptions {
   int width = 1280, height = 800;      ///< of a window: at first

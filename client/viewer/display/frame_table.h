@@ -6,7 +6,7 @@
 
 #include "client/stereo/mode.h"
 #include "client/viewer/coupling/coupling.h"
-#include "client/viewer/display/eyes/eye_pair.h"
+#include "client/viewer/display/eyes/eye_rig.h"
 #include "client/viewer/display/view_source.h"
 
 namespace telesplat::viewer {

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "client/viewer/render/renderer.h"
-#include "client/viewer/render/slices/renderer.h"
 
 namespace telesplat::viewer {
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "client/viewer/coupling/shown_update.h"
+#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/display/display_surface.h"
 #include "client/viewer/hands/pick.h"
 #include "common/splat/cpu_splatter.h"
@@ -25,16 +25,15 @@ struct FrameInput {
 
 /// The columns of frames.csv that depend on what is drawn (docs/metrics.md).
 struct DrawnFrame {
-  bool empty = true;    ///< there was nothing of the scene to draw
-  bool changed = true;  ///< false: the view is as FrameInput::intact found it
-  bool still = false;   ///< nothing was drawn: the picture of the frame before stands
-  double chosen_s = 0;  ///< monotonic clock: what to draw was chosen
-  double prepare_ms = 0, project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0,
-         antialias_cpu_ms = 0;
+  bool empty = true;        ///< there was nothing of the scene to draw
+  bool changed = true;      ///< false: the view is as FrameInput::intact found it
+  bool still = false;       ///< nothing was drawn: the picture of the frame before stands
+  double chosen_s = 0;      ///< monotonic clock: what to draw was chosen
+  splat::SplatStats stats;  ///< of volumes the warp is the resolving
   uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
   uint64_t summaries = 0;  ///< of bricks, that had been made by then
   double detail = 1, budget_ms = 0;
-  bool halved = false;  ///< drawn at half its size (splat::RenderOptions)
+  bool halved = false;                ///< drawn at half its size (splat::RenderOptions)
   double refined = 0, refine_ms = 0;  ///< of a still picture: share of pixels drawn with sub-pixels; time for that
   int sub_pixels = 1;                 ///< of such a pixel, on each axis
   EpochId epoch;
@@ -52,7 +51,7 @@ class ViewSource {
   virtual void advance(RequestId request) = 0;
   /// Draws the view of input.camera, into `view`, which has its size.
   virtual DrawnFrame draw(const FrameInput& input, image::View& view) = 0;
-  /// Draws what both eyes see, of one choice. input.camera stands between them (eye_pair.h). Targets have room for
+  /// Draws what both eyes see, of one choice. input.camera stands between them (eyes/eye_rig.h). Targets have room for
   /// depth where input asks for it; their rows follow each other unless draws_into_parts().
   virtual DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                                const std::array<splat::FrameTarget, 2>& targets) = 0;

@@ -6,7 +6,7 @@
 
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
-#include "client/wall/unrolled.h"
+#include "client/wall/screen_camera.h"
 
 namespace telesplat::viewer {
 namespace {

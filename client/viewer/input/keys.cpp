@@ -46,7 +46,7 @@ constexpr HelpLine kHelp[] = {
 Key key_of(char mark) {
   if (mark == '^') return Key::kShift;
   if (mark >= '1' && mark <= '8') return Key(int(Key::k1) + mark - '1');
-  return Key(std::string_view(kLetters).find(mark));
+  return *letter_key(mark);
 }
 
 std::string named(std::string_view text, const KeyNames& name) {
@@ -74,6 +74,11 @@ std::string us_name(Key key) {
     if (named == key) return name;
   if (key >= Key::k1 && key <= Key::k8) return std::string(1, char('1' + int(key) - int(Key::k1)));
   return std::string(1, kLetters[size_t(key)]);
+}
+
+std::optional<Key> letter_key(char letter) {
+  const size_t at = std::string_view(kLetters).find(letter);
+  return at == std::string_view::npos ? std::nullopt : std::optional(Key(at));
 }
 
 std::vector<std::string> key_help(const KeyNames& name) {

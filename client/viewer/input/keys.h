@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,8 @@ std::string side_name(const Side& side);
 using KeyNames = std::function<std::string(Key)>;
 /// As it is printed on a US keyboard.
 std::string us_name(Key key);
+/// The key that has this letter there, A to Z; nothing: it means nothing here.
+std::optional<Key> letter_key(char letter);
 
 /// Keys and mouse, a line each: for F1, for --help and for documentation.
 std::vector<std::string> key_help(const KeyNames& name = us_name);

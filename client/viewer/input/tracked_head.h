@@ -5,13 +5,17 @@
 #include <optional>
 #include <string>
 
-#include "client/viewer/input/pose_moment.h"
-#include "client/viewer/tracking/pose_clock.h"
 #include "client/viewer/tracking/pose_predictor.h"
 #include "client/viewer/tracking/prediction_meter.h"
 #include "common/wire/head_pose.h"
 
 namespace telesplat::viewer {
+
+/// Seconds; taken_s on the monotonic clock.
+struct PoseMoment {
+  double taken_s = 0;  ///< the newest pose that it was made from was taken
+  double ahead_s = 0;  ///< it was predicted so far beyond that
+};
 
 /// One thread, or one at a time. Times are those of our monotonic clock where nothing else is said.
 class TrackedHead {

@@ -1,16 +1,71 @@
 #include "client/viewer/pictures/received_pictures.h"
 
-#include "client/viewer/pictures/source.h"
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
 #include "common/core/clock.h"
+#include "common/image/jpeg.h"
 #include "common/net/dispatch.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr Feed kFeeds[] = {{net::Kind::kDealer, "state"}};
+constexpr Feed kPictureFeeds[] = {{net::Kind::kDealer, "state"}};
 constexpr double kIntroductionPeriod_s = 1;
 
+constexpr uint32_t kColour = 0xffffff;
+
+// Between a and b, share of b in 1/256.
+uint32_t mixed(uint32_t a, uint32_t b, uint32_t share) {
+  const auto channel = [&](int shift) {
+    return ((a >> shift & 255) * (256 - share) + (b >> shift & 255) * share + 128) >> 8 << shift;
+  };
+  return channel(16) | channel(8) | channel(0);
+}
+
+// Where a pixel's centre lies between those of `from` pixels.
+struct Place {
+  int before, after;
+  uint32_t share;
+};
+Place place_of(int at, int to, int from) {
+  const double middle = std::clamp((at + 0.5) * from / to - 0.5, 0.0, double(from - 1));
+  const int before = int(middle);
+  return {before, std::min(before + 1, from - 1), uint32_t(std::lround((middle - before) * 256))};
+}
+
 }  // namespace
+
+PictureGatherer::Open& PictureGatherer::open(const wire::Picture& tile) {
+  const auto known = std::ranges::find_if(open_, [&](const Open& o) { return o.picture->frame == tile.frame; });
+  if (known != open_.end()) return *known;
+  if (open_.size() >= kMostOpen) open_.pop_front();
+  auto picture = std::make_shared<ShownPicture>(ShownPicture{
+      .epoch = tile.epoch, .frame = tile.frame, .request = tile.request, .camera = tile.camera, .view = {}});
+  picture->view.width = tile.camera.width, picture->view.height = tile.camera.height;
+  picture->view.colour.resize(size_t(tile.camera.width) * size_t(tile.camera.height));
+  return open_.emplace_back(Open{std::move(picture), tile.tiles_in_frame, {}});
+}
+
+Result<std::shared_ptr<const ShownPicture>> PictureGatherer::add(const wire::Picture& tile) {
+  if (const int64_t pixels = int64_t{tile.camera.width} * tile.camera.height; pixels > kMaxPixels)
+    return Error{fmt::format("a picture of {} pixels, limit {}", pixels, kMaxPixels)};
+  if (tile.request <= newest_) return std::shared_ptr<const ShownPicture>();
+  Open& o = open(tile);
+  if (o.picture->request != tile.request || o.picture->camera != tile.camera || o.tiles != tile.tiles_in_frame)
+    return Error{fmt::format("a tile of another view than the others of frame {}", tile.frame.value)};
+  image::View& view = o.picture->view;
+  uint32_t* to = view.colour.data() + size_t(tile.rect.y) * size_t(view.width) + size_t(tile.rect.x);
+  if (const Status s = image::decode_jpeg(tile.image, tile.rect.width, tile.rect.height, to, view.width); !s)
+    return s.error();
+  o.here.insert(tile.tile);
+  if (o.here.size() < o.tiles) return std::shared_ptr<const ShownPicture>();
+  std::shared_ptr<const ShownPicture> out = std::move(o.picture);
+  newest_ = out->request;
+  std::erase_if(open_, [&](const Open& other) { return !other.picture || other.picture->request <= newest_; });
+  return out;
+}
 
 void PictureShelf::put(DisplayedPicture picture) {
   const std::lock_guard lock(mutex_);
@@ -34,7 +89,7 @@ DisplayedPicture PictureShelf::displayed() const {
 
 Status ReceivedPictures::follow(const wire::Welcome&) { return ok_status(); }
 
-std::span<const Feed> ReceivedPictures::feeds() const { return kFeeds; }
+std::span<const Feed> ReceivedPictures::feeds() const { return kPictureFeeds; }
 
 void ReceivedPictures::receive(int most) {
   net::Socket& state = *links_.feeds.find("state");
@@ -97,6 +152,61 @@ void ReceivedPictures::add_status(net::MasterLink::Values& values) const {
 
 Result<std::unique_ptr<ViewSource>> ReceivedPictures::make_source(const DisplayOptions&, Renderers&) {
   return std::unique_ptr<ViewSource>(new PictureSource(shelf_));
+}
+
+void scale_into(const image::View& from, image::View& to) {
+  if (from.width == to.width && from.height == to.height) {
+    std::ranges::transform(from.colour, to.colour.begin(), [](uint32_t c) { return c & kColour; });
+    return;
+  }
+  std::vector<Place> columns(size_t(to.width));
+  for (int x = 0; x < to.width; ++x) columns[size_t(x)] = place_of(x, to.width, from.width);
+  for (int y = 0; y < to.height; ++y) {
+    const Place row = place_of(y, to.height, from.height);
+    const uint32_t* upper = &from.colour[size_t(row.before) * size_t(from.width)];
+    const uint32_t* lower = &from.colour[size_t(row.after) * size_t(from.width)];
+    for (int x = 0; x < to.width; ++x) {
+      const Place& c = columns[size_t(x)];
+      to.colour[size_t(y) * size_t(to.width) + size_t(x)] = mixed(
+          mixed(upper[c.before], upper[c.after], c.share), mixed(lower[c.before], lower[c.after], c.share), row.share);
+    }
+  }
+}
+
+DrawnFrame PictureSource::draw(const FrameInput& input, image::View& view) {
+  const DisplayedPicture shown = shelf_.displayed();
+  DrawnFrame out;
+  out.chosen_s = monotonic_s();
+  out.empty = !shown.picture;
+  if (out.empty) {
+    if (input.even_empty) std::ranges::fill(view.colour, input.look.background);
+    return out;
+  }
+  const ShownPicture& picture = *shown.picture;
+  out.still = drawn_ == shown.picture;
+  out.changed = !input.intact || !out.still;
+  if (out.changed) scale_into(picture.view, view);
+  drawn_ = shown.picture;
+  // A picture has no depth: who compares it takes that of the data (kPictureOnly of the spool).
+  if (input.with_depth) std::ranges::fill(view.depth_m, 1.0f);
+  out.picture_of = picture.camera;
+  out.selected = out.drawn = out.cached = picture.view.colour.size();
+  out.items = 1;
+  out.sequence = picture.frame.value;
+  out.epoch = picture.epoch;
+  out.update = shown.update;
+  return out;
+}
+
+DrawnFrame PictureSource::draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>&,
+                                    const std::array<splat::FrameTarget, 2>& targets) {
+  image::View view{targets[0].width, targets[0].height, {}, {}};
+  view.colour.resize(size_t(view.width) * size_t(view.height));
+  FrameInput one = input;
+  one.with_depth = one.intact = false;
+  DrawnFrame out = draw(one, view);
+  for (const auto& target : targets) std::ranges::copy(view.colour, target.colour);
+  return out;
 }
 
 }  // namespace telesplat::viewer

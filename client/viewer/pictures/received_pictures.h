@@ -4,13 +4,50 @@
 
 #include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
+#include <optional>
+#include <set>
 
-#include "client/viewer/pictures/picture_gatherer.h"
+#include "client/viewer/display/view_source.h"
 #include "client/viewer/received.h"
 #include "common/core/log.h"
+#include "common/image/file.h"
+#include "common/wire/messages.h"
 
 namespace telesplat::viewer {
+
+/// A complete picture.
+struct ShownPicture {
+  EpochId epoch;
+  FrameId frame;
+  RequestId request;
+  geometry::Camera camera;
+  image::View view;  ///< without depth
+};
+
+class PictureGatherer {
+ public:
+  static constexpr size_t kMostOpen = wire::kMaxBuffers;  ///< pictures that lack tiles; of more the oldest goes
+  static constexpr int64_t kMaxPixels = 1 << 26;          ///< of a picture: a few bytes may claim many
+
+  /// The picture, if this tile completes it; nothing: it lacks tiles yet, or is older than one that was complete.
+  /// Error: what is wrong with the tile, which is dropped. Bytes come from outside.
+  Result<std::shared_ptr<const ShownPicture>> add(const wire::Picture& tile);
+  /// Requests, frames and epochs begin anew.
+  void clear() { open_.clear(), newest_ = {}; }
+
+ private:
+  struct Open {
+    std::shared_ptr<ShownPicture> picture;
+    uint64_t tiles = 0;  // that it has when it is complete
+    std::set<uint64_t> here;
+  };
+  Open& open(const wire::Picture& tile);
+
+  std::deque<Open> open_;  // the oldest first
+  RequestId newest_;       // that is complete
+};
 
 /// A picture, and the update that it is.
 struct DisplayedPicture {
@@ -62,5 +99,27 @@ class ReceivedPictures final : public Received {
   uint64_t decode_errors_ = 0;
   log::RateLimiter log_limit_;
 };
+
+class PictureSource final : public ViewSource {
+ public:
+  explicit PictureSource(PictureShelf& shelf) : shelf_(shelf) {}
+
+  void advance(RequestId request) override { shelf_.advance(request); }
+  DrawnFrame draw(const FrameInput& input, image::View& view) override;
+  /// Both eyes see the same.
+  DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
+                       const std::array<splat::FrameTarget, 2>& targets) override;
+  /// A picture tells of no place.
+  std::optional<Pick> pick(const geometry::Camera&, double, double, double) override { return std::nullopt; }
+  const char* drawn_name() const override { return "pixels"; }
+  const char* cached_name() const override { return " pixels"; }
+
+ private:
+  PictureShelf& shelf_;
+  std::shared_ptr<const ShownPicture> drawn_;  // last
+};
+
+/// Colours of `from` at the size of `to`, between its four nearest pixels each.
+void scale_into(const image::View& from, image::View& to);
 
 }  // namespace telesplat::viewer

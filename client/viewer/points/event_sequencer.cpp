@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "common/codec/mask_stream.h"
+
 namespace telesplat::viewer {
 namespace {
 // More than this is not kept while an answer is awaited; the gap that dropping leaves is asked for afterwards.
@@ -120,6 +122,17 @@ void EventSequencer::drain() {
   kept.swap(kept_);
   kept_bytes_ = 0;
   for (auto& event : kept) on_published(std::move(event));
+}
+
+Status add_rays(const wire::Patch& patch, const image::DepthImage& image, FineRays& rays) {
+  if (patch.missed.empty()) {
+    rays.revise(patch.camera, patch.rect, image);
+    return ok_status();
+  }
+  const auto missed = codec::decode_mask(patch.missed, patch.missed_rect.width, patch.missed_rect.height);
+  if (!missed) return missed.error();
+  rays.add({patch.epoch, patch.camera, patch.missed_rect, &*missed, patch.rect, &image});
+  return ok_status();
 }
 
 }  // namespace telesplat::viewer

@@ -1,11 +1,15 @@
 #include "client/viewer/points/model_cache.h"
 
+#include <algorithm>
 #include <iterator>
 
 #include "common/core/check.h"
 
 namespace telesplat::viewer {
 namespace {
+
+constexpr size_t kMaxSeen =
+    1u << 21;  // 16 MiB; a display that draws more until the next report tells of the first frames only
 
 // More changes than this between two frames are told as a change of everything: 1.5 MB.
 constexpr size_t kMostChanges = 1u << 16;
@@ -17,6 +21,31 @@ void move_to_end(std::vector<T>& from, std::vector<T>& to) {
 }
 
 }  // namespace
+
+void AccessLog::add(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames) {
+  CHECK(frames.empty() || frames.size() == clusters.size());
+  if (clusters.empty()) return;
+  if (with_frames_ == frames.empty()) {
+    with_frames_ = !frames.empty();
+    seen_.clear();
+  }
+  if (seen_.size() + clusters.size() > kMaxSeen) return;
+  for (size_t i = 0; i < clusters.size(); ++i)
+    seen_.push_back(uint64_t{clusters[i]} << 32 | (frames.empty() ? 0 : frames[i]));
+}
+
+std::vector<AccessLog::Report> AccessLog::reports() {
+  std::sort(seen_.begin(), seen_.end());
+  seen_.erase(std::unique(seen_.begin(), seen_.end()), seen_.end());
+  std::vector<Report> out;
+  for (size_t i = 0; i < seen_.size(); ++i) {
+    if (i % kMaxInReport == 0) out.emplace_back();
+    out.back().clusters.push_back(static_cast<uint32_t>(seen_[i] >> 32));
+    if (with_frames_) out.back().frames.push_back(static_cast<uint32_t>(seen_[i]));
+  }
+  seen_.clear();  // its memory stays
+  return out;
+}
 
 void ModelCache::drop(Replica& replica) {
   Dropped& dropped = dropped_of(replica.model.get());
@@ -141,9 +170,7 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
   return made;
 }
 
-uint64_t ModelCache::digest() const {
-  return newest_.model ? newest_.model->digest() : 0;
-}
+uint64_t ModelCache::digest() const { return newest_.model ? newest_.model->digest() : 0; }
 
 void ModelCache::select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options,
                                   splat::DrawList& out) {

@@ -12,7 +12,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr Feed kFeeds[] = {{net::Kind::kSub, "patches"}, {net::Kind::kDealer, "state"}};
+constexpr Feed kPointFeeds[] = {{net::Kind::kSub, "patches"}, {net::Kind::kDealer, "state"}};
 constexpr size_t kSummariesAtOnce = 8;
 // Between two receipts: while events come, and while none do.
 constexpr double kReceipts_s = 0.03, kQuietReceipts_s = 0.5;
@@ -52,7 +52,7 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
   return ok_status();
 }
 
-std::span<const Feed> ReceivedPoints::feeds() const { return kFeeds; }
+std::span<const Feed> ReceivedPoints::feeds() const { return kPointFeeds; }
 
 void ReceivedPoints::receive(int most) {
   receiver_.receive_answers(*links_.feeds.find("state"), most);

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <mutex>
 
-#include "client/viewer/points/access_log.h"
 #include "client/viewer/points/model_cache.h"
 #include "client/viewer/points/receiver.h"
 #include "client/viewer/points/update_batches.h"

@@ -1,6 +1,6 @@
 #include "client/viewer/points/receiver.h"
 
-#include "client/viewer/points/patch_rays.h"
+#include "client/viewer/points/event_sequencer.h"
 #include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"

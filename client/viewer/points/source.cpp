@@ -95,20 +95,10 @@ void PointSource::draw_list(const FrameInput& input, const image::Shading& shadi
                             DrawnFrame& out) {
   splat::RenderOptions render = input.look.render;
   render.halved = out.halved;
-  note_stats(renderer_->render(
-                 list_, input.camera, render, shading,
-                 {view.width, view.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr}),
-             out);
-}
-
-void PointSource::note_stats(const splat::SplatStats& stats, DrawnFrame& out) {
-  out.prepare_ms = stats.prepare_ms;
-  out.project_cpu_ms = stats.project_ms;
-  out.resolve_cpu_ms = stats.resolve_ms;
-  out.fill_cpu_ms = stats.fill_ms;
-  out.smooth_cpu_ms = stats.smooth_ms;
-  out.antialias_cpu_ms = stats.antialias_ms;
-  drawn_ = stats.points_drawn;
+  out.stats = renderer_->render(
+      list_, input.camera, render, shading,
+      {view.width, view.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
+  drawn_ = out.stats.points_drawn;
 }
 
 double PointSource::wanted_detail(const FrameInput& input) {
@@ -120,9 +110,9 @@ double PointSource::wanted_detail(const FrameInput& input) {
 // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
 void PointSource::measure(const FrameInput& input, double detail, const DrawnFrame& out) {
   const double end_s = monotonic_s();
-  const double threads_ms =
-      out.project_cpu_ms + out.resolve_cpu_ms + out.fill_cpu_ms + out.smooth_cpu_ms + out.antialias_cpu_ms;
-  const double work_ms = out.prepare_ms + threads_ms / std::max(renderer_->threads(), 1);
+  const splat::SplatStats& s = out.stats;
+  const double threads_ms = s.project_ms + s.resolve_ms + s.fill_ms + s.smooth_ms + s.antialias_ms;
+  const double work_ms = s.prepare_ms + threads_ms / std::max(renderer_->threads(), 1);
   const double draw_ms = std::min((end_s - out.chosen_s) * 1e3, work_ms);
   budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, draw_ms, double(list_.points), detail);
   if (renderer_->halves() && out.halved == half_size_.on())
@@ -262,7 +252,8 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
   pair_sharp_ = still;
   if (list_.points > 0 || input.even_empty) {
     const image::Shading shading(options_.shading, input.camera);  // both look the same way
-    note_stats(renderer_->render_pair(list_, eyes, input.look.render, shading, targets), out);
+    out.stats = renderer_->render_pair(list_, eyes, input.look.render, shading, targets);
+    drawn_ = out.stats.points_drawn;
     for (size_t i = 0; i < eyes.size() && input.with_coverage; ++i) find_coverage(input, eyes[i], targets[i]);
   }
   if (!input.resting && !still) measure(input, detail, out);

@@ -35,7 +35,6 @@ class PointSource final : public ViewSource {
   void measure(const FrameInput& input, double detail, const DrawnFrame& out);
   void select(const FrameInput& input, double detail, DrawnFrame& out);
   void draw_list(const FrameInput& input, const image::Shading& shading, image::View& view, DrawnFrame& out);
-  void note_stats(const splat::SplatStats& stats, DrawnFrame& out);
   void draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out);
   void draw_still(const FrameInput& input, image::View& view, DrawnFrame& out);
   void refine(const FrameInput& input, image::View& view, DrawnFrame& out);

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "client/viewer/coupling/shown_update.h"
+#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/points/model_cache.h"
 #include "common/wire/wall_messages.h"
 

@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "client/viewer/points/patch_rays.h"
+#include "client/viewer/points/event_sequencer.h"
 #include "common/codec/depth_codec.h"
 #include "common/refinement/bounded_patches.h"
 #include "common/wire/serial.h"

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include "client/viewer/slices/receiver.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::viewer {
@@ -78,7 +77,7 @@ Result<bool> SliceReplay::read_frame(FrameId wanted, uint32_t replica) {
   if (frame->frame <= newest_) ++replica_;
   newest_ = frame->frame;
   if (frame->frame != wanted || replica_ < replica) return false;
-  auto decoded = SliceReceiver::decode(*frame, *grid_, images_);
+  auto decoded = decode_frame(*frame, *grid_, images_);
   if (!decoded) return file_.wrong(fmt::format("frame {}: {}", wanted.value, decoded.error().text));
   shown_ = std::move(decoded->frame);
   return true;

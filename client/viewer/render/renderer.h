@@ -1,4 +1,5 @@
-// The one interface of both display renderers.
+// The one interface of both display renderers, and that of both renderers of volumes: the warp of slice images into the
+// view of now.
 #pragma once
 
 #include <array>
@@ -7,7 +8,10 @@
 
 #include "client/viewer/render/renderer_trial.h"
 #include "common/core/result.h"
+#include "common/geometry/camera.h"
+#include "common/image/file.h"
 #include "common/splat/cpu_splatter.h"
+#include "common/volume/warp/warper.h"
 
 namespace telesplat::viewer {
 
@@ -41,15 +45,39 @@ class Renderer {
 };
 
 std::unique_ptr<Renderer> make_cpu_renderer(int threads);
-/// EGL, off-screen (device or Mesa surfaceless platform), OpenGL 4.3 or later. Fails with what was tried.
-Result<std::unique_ptr<Renderer>> make_gl_renderer();
 /// Draws with both by turns until `choice` says which is kept.
 std::unique_ptr<Renderer> try_renderers(std::unique_ptr<Renderer> cpu, std::unique_ptr<Renderer> gl,
                                         std::shared_ptr<RendererChoice> choice,
                                         std::function<double()> now_s = monotonic_s);
-/// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl".
+/// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl": EGL, off-screen (device or Mesa
+/// surfaceless platform), OpenGL 4.3 or later. Fails with what was tried.
 Result<std::unique_ptr<Renderer>> make_renderer(
     const std::string& kind, int threads,
     const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
+
+class VolumeRenderer {
+ public:
+  virtual ~VolumeRenderer() = default;
+  /// "cpu" or "gl"; "auto": both are still timed.
+  virtual const char* name() const = 0;
+  /// As volume::Warper::render. Called from one thread, the one that made the renderer.
+  virtual volume::WarpStats render(const volume::VolumeFrame* frame, const geometry::Camera& camera,
+                                   uint32_t background, const volume::WarpTarget& target) = 0;
+};
+
+std::unique_ptr<VolumeRenderer> make_cpu_volume_renderer(int threads);
+/// As make_renderer().
+Result<std::unique_ptr<VolumeRenderer>> make_volume_renderer(
+    const std::string& kind, int threads,
+    const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
+
+/// Makes room for a frame of this camera, with depth or without. What it held is void.
+inline void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
+  const size_t pixels = size_t(camera.width) * size_t(camera.height);
+  view.width = camera.width;
+  view.height = camera.height;
+  view.colour.resize(pixels);
+  view.depth_m.resize(with_depth ? pixels : 0);
+}
 
 }  // namespace telesplat::viewer

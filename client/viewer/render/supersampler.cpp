@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "client/viewer/render/fit_view.h"
+#include "client/viewer/render/renderer.h"
 #include "common/core/check.h"
 #include "common/splat/flat/splat_table.h"
 

@@ -1,10 +1,58 @@
 #include "client/viewer/slices/cache.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
-#include <utility>
+#include <map>
+#include <span>
 
 namespace telesplat::viewer {
+namespace {
+
+geometry::Rect hull(const geometry::Rect& a, const geometry::Rect& b) {
+  const int x = std::min(a.x, b.x), y = std::min(a.y, b.y);
+  return {x, y, std::max(a.x + a.width, b.x + b.width) - x, std::max(a.y + a.height, b.y + b.height) - y};
+}
+
+uint64_t pixels_of(const geometry::Rect& r) { return uint64_t(r.width) * uint64_t(r.height); }
+
+// Pixels that all images have, and the layers that they are merged to.
+uint64_t pixels_claimed(std::span<const volume::EncodedSlice> slices, const volume::ShearFrame& shear) {
+  uint64_t pixels = 0;
+  std::map<int, geometry::Rect> layers;
+  for (const auto& slice : slices) {
+    const geometry::Rect rect = volume::bounds(slice, shear.width, shear.height);
+    pixels += pixels_of(rect);
+    const auto [layer, first] = layers.try_emplace(slice.layer, rect);
+    if (!first) layer->second = hull(layer->second, rect);
+  }
+  for (const auto& [layer, rect] : layers) pixels += pixels_of(rect);
+  return pixels;
+}
+
+}  // namespace
+
+Result<BufferedFrame> decode_frame(const wire::SliceFrame& f, const volume::Grid& grid,
+                                   std::vector<volume::SliceImage>& images) {
+  if (const Status s = geometry::validate(f.camera); !s) return s.error();
+  if (const Status s = volume::validate(f.shear, grid); !s) return s.error();
+  const std::span bytes(reinterpret_cast<const uint8_t*>(f.data.data()), f.data.size());
+  const auto slices = volume::parse_slices(bytes, f.shear.width, f.shear.height, int(f.shear.layers.size()));
+  if (!slices) return slices.error();
+  if (const uint64_t pixels = pixels_claimed(*slices, f.shear); pixels > kMaxSlicePixels)
+    return Error{fmt::format("its images have {} pixels; at most {}", pixels, kMaxSlicePixels)};
+  images.resize(slices->size());
+  for (size_t i = 0; i < images.size(); ++i)
+    if (const Status s = volume::decode_slice_into(images[i], (*slices)[i], f.shear.width, f.shear.height); !s)
+      return s.error();
+  BufferedFrame out;
+  out.frame = std::make_shared<const volume::VolumeFrame>(
+      volume::make_volume_frame(grid, f.shear, images, f.frame, f.epoch, f.data.size()));
+  out.update = {f.request, f.moments.requested_s, f.camera.pose};
+  out.pixels = out.frame->pixels();
+  return out;
+}
 
 void SliceCache::show(BufferedFrame frame) {
   if (displayed_.frame) dropped_.push_back(std::move(displayed_.frame));

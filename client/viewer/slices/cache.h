@@ -8,8 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "client/viewer/coupling/shown_update.h"
+#include "client/viewer/coupling/coupling.h"
+#include "common/volume/slices/image.h"
 #include "common/volume/warp/warper.h"
+#include "common/wire/messages.h"
 
 namespace telesplat::viewer {
 
@@ -20,6 +22,13 @@ struct BufferedFrame {
   uint64_t pixels = 0;  ///< that it holds
   InstanceId source;    ///< the master that numbered it
 };
+
+/// Pixels of all images of a frame, those of its layers included, at most (1 GiB): a few bytes can claim many of them.
+inline constexpr uint64_t kMaxSlicePixels = 1u << 28;
+/// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log. images: memory that is used
+/// again.
+Result<BufferedFrame> decode_frame(const wire::SliceFrame& frame, const volume::Grid& grid,
+                                   std::vector<volume::SliceImage>& images);
 
 class SliceCache {
  public:

@@ -1,21 +1,35 @@
 // Frames of slice images of a session: the newest one, or those that wait for the display, in order.
 #pragma once
 
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "client/viewer/display/view_source.h"
 #include "client/viewer/received.h"
+#include "client/viewer/render/renderer.h"
 #include "client/viewer/slices/cache.h"
-#include "client/viewer/slices/receiver.h"
+#include "common/core/log.h"
 
 namespace telesplat::viewer {
 
+class SliceRecorder;
+
 class ReceivedSlices final : public Received {
  public:
+  /// Frames on their way to an asynchronous viewer: while one is decoded the next one travels.
+  static constexpr uint64_t kAsyncBuffers = 2;
+
   ReceivedSlices(const ReceivedOptions& options, const ReceivedLinks& links);
 
-  Status follow(const wire::Welcome& session) override { return receiver_.set_session(session); }
+  /// Without a valid grid no frame is taken.
+  Status follow(const wire::Welcome& session) override;
   std::span<const Feed> feeds() const override;
-  void on_connected() override { receiver_.begin_anew(); }
-  void on_new_master() override { receiver_.begin_anew(); }
+  void on_connected() override { heard_s_ = introduced_s_ = -1e9, newest_ = acknowledged_ = {}; }
+  void on_new_master() override { on_connected(); }
   void receive(int most) override;
+  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come, and when
+  /// none came for long: a packer that was restarted where it was does not know this viewer.
   void tick(double now_s) override;
   void on_coupling(int buffers) override;
   wire::ShownState newest_state() const override;
@@ -25,9 +39,45 @@ class ReceivedSlices final : public Received {
   Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) override;
 
  private:
+  void on(const wire::SliceFrame& frame, double arrived_s, net::Socket& state);
+  void acknowledge(FrameId frame, net::Socket& state, bool damaged = false);
+  void acknowledge_left(net::Socket& state);
+
   ReceivedLinks links_;
+  uint64_t buffers_;             // of the coupling; 0: asynchronous
+  SliceRecorder* const record_;  // keeps every frame that goes into the cache; null: nothing is kept
   SliceCache cache_;
-  SliceReceiver receiver_;
+  std::optional<volume::Grid> grid_;
+  std::vector<volume::SliceImage> images_;
+  InstanceId packer_, master_;
+  FrameId newest_, acknowledged_;
+  bool tell_buffers_ = false;  // to the packer
+  EpochId epoch_;
+  double introduced_s_ = -1e9, heard_s_ = -1e9;  // -1e9: nothing came yet
+  uint64_t decode_errors_ = 0;
+  log::RateLimiter log_limit_;
+};
+
+class SliceSource final : public ViewSource {
+ public:
+  SliceSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache)
+      : renderer_(std::move(renderer)), cache_(cache) {}
+
+  void advance(RequestId request) override { cache_.advance(request); }
+  std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) override;
+  DrawnFrame draw(const FrameInput& input, image::View& view) override;
+  DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
+                       const std::array<splat::FrameTarget, 2>& targets) override;
+  void displayed() override { cache_.frame_done(); }
+  const char* drawn_name() const override { return "samples"; }
+  const char* cached_name() const override { return " pixels"; }
+
+ private:
+  DrawnFrame draw_views(const FrameInput& input, std::span<const geometry::Camera> cameras,
+                        std::span<const volume::WarpTarget> targets);
+
+  std::unique_ptr<VolumeRenderer> renderer_;
+  SliceCache& cache_;
 };
 
 }  // namespace telesplat::viewer

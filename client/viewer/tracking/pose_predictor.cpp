@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "client/viewer/tracking/rotation.h"
+#include "client/viewer/tracking/head_filter.h"
 
 namespace telesplat::tracking {
 namespace {

@@ -2,9 +2,20 @@
 
 #include <algorithm>
 
-#include "client/viewer/tracking/rotation.h"
+#include "client/viewer/tracking/head_filter.h"
 
 namespace telesplat::tracking {
+
+double PoseClock::local_s(double t_s, double arrived_s) {
+  const double difference = arrived_s - t_s;
+  if (!this_ || arrived_s - window_began_s_ > kWindow_s || arrived_s < window_began_s_) {
+    before_ = arrived_s - window_began_s_ > 2 * kWindow_s ? std::nullopt : this_;
+    this_ = difference;
+    window_began_s_ = arrived_s;
+  }
+  this_ = std::min(*this_, difference);
+  return t_s + std::min(*this_, before_.value_or(*this_));
+}
 
 void PredictionMeter::predicted(double made_s, const geometry::Pose& now, double for_s,
                                 const geometry::Pose& expected) {

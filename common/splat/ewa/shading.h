@@ -3,7 +3,7 @@
 
 #include "common/image/shading.h"
 #include "common/splat/pixel_key.h"
-#include "common/splat/surfel/contour.h"
+#include "common/splat/surfel/splat.h"
 
 namespace telesplat::splat {
 

@@ -11,7 +11,7 @@
 #include "common/core/check.h"
 #include "common/parallel/in_parallel.h"
 #include "common/splat/facing.h"
-#include "common/splat/item_runs.h"
+#include "common/splat/item_figures.h"
 #include "common/splat/reference/tangent_planes.h"
 #include "common/splat/select/cluster_walk.h"
 #include "common/splat/select/view_selection.h"

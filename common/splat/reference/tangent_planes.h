@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/splat/surfel/contour.h"
+#include "common/splat/surfel/splat.h"
 
 namespace telesplat::splat {
 
@@ -13,7 +13,7 @@ struct PlaneSlope {
   float x, y;
 };
 
-/// Slopes are limited to those that splats follow (surfel/contour.h): normals are too coarse for more.
+/// Slopes are limited to those that splats follow (surfel/splat.h): normals are too coarse for more.
 class TangentPlanes {
  public:
   explicit TangentPlanes(const geometry::Camera& camera) : c_(surfel_camera(camera)) {}

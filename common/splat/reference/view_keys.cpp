@@ -12,7 +12,6 @@
 #include "common/parallel/in_parallel.h"
 #include "common/splat/facing.h"
 #include "common/splat/item_figures.h"
-#include "common/splat/item_runs.h"
 #include "common/splat/select/cluster_walk.h"
 
 namespace telesplat::splat {

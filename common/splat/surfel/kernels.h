@@ -1,5 +1,5 @@
 // The kernels `ellipse` and `ewa` inside one tile, on the widest vectors the machine has (Highway, chosen at run time).
-// Every target computes the same pixels: those of the plain functions in contour.h, splat.h and ewa/shading.h.
+// Every target computes the same pixels: those of the plain functions in ewa/shading.h, and of those that tests have.
 #pragma once
 
 #include <hwy/aligned_allocator.h>

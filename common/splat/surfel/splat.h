@@ -1,14 +1,76 @@
-// How the kernels `ellipse` and `ewa` turn a contour (contour.h) into pixels: constants and plain functions.
-// surfel-inl.h, ellipse-inl.h and ewa-inl.h do the same operations in the same order on vectors.
+// Where a sample's footprint on the surface appears on the screen, and what pixels the kernels `ellipse` and `ewa` make
+// of it: constants, and the figures of whole items. surfel-inl.h has what is done for each point.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
+#include <cstdint>
 
+#include "common/geometry/camera.h"
 #include "common/splat/flat/splat_table.h"
 #include "common/splat/pixel_key.h"
-#include "common/splat/surfel/contour.h"
 
 namespace telesplat::splat {
+
+/// Cosine below which a sample's footprint no longer grows with the slope at which it was taken. Without a limit,
+/// splats of samples taken at silhouettes would reach far beyond them.
+inline constexpr float kMinSampledCosine = 0.35f;
+/// Steepest surface, as the tangent of its angle to the screen, whose depth is followed across a splat: tan(78
+/// degrees). Beyond it normals of 16 bits are too coarse to give the depth.
+inline constexpr float kSteepest = 4.7f;
+/// Footprint radius over distance is taken as this at most: larger splats are cut to their largest size on the screen
+/// anyway, and no product overflows.
+inline constexpr float kMaxRadiusOverDepth = 1.0f;
+
+/// The camera figures that contours need. Camera axes: X right, Y down, Z forward; a point w (u, v, 1) lies at pixel
+/// (focal_x u + centre_x, focal_y v + centre_y).
+struct SurfelCamera {
+  float focal_x = 1, focal_y = 1, centre_x = 0, centre_y = 0;
+  float step_x = 1, step_y = 1;                     ///< 1 / focal
+  std::array<float, 3> right{}, down{}, forward{};  ///< the axes in room space
+};
+
+inline SurfelCamera surfel_camera(const geometry::Camera& c) {
+  const glm::dmat4 v = c.view();
+  const auto axis = [&](int i, double sign) {
+    return std::array{static_cast<float>(sign * v[0][i]), static_cast<float>(sign * v[1][i]),
+                      static_cast<float>(sign * v[2][i])};
+  };
+  return {static_cast<float>(c.focal_x()),
+          static_cast<float>(c.focal_y()),
+          static_cast<float>(-c.left * c.focal_x()),
+          static_cast<float>(c.top * c.focal_y()),
+          static_cast<float>(1.0 / c.focal_x()),
+          static_cast<float>(1.0 / c.focal_y()),
+          axis(0, 1),
+          axis(1, -1),
+          axis(2, -1)};
+}
+
+/// How an item's samples were taken: the circle that each stands for where the surface faced the sampling view, and the
+/// direction towards that view, unit length, in camera axes.
+struct SurfelSource {
+  float radius_m = 0;
+  std::array<float, 3> to_eye{0, 0, -1};
+};
+
+inline float dot(const std::array<float, 3>& a, float x, float y, float z) { return (a[0] * x + a[1] * y) + a[2] * z; }
+
+inline SurfelSource surfel_source(const SurfelCamera& c, float radius_m, const glm::vec3& to_eye_room) {
+  const float x = to_eye_room.x, y = to_eye_room.y, z = to_eye_room.z;
+  return {radius_m, {dot(c.right, x, y, z), dot(c.down, x, y, z), dot(c.forward, x, y, z)}};
+}
+
+/// Normal of 16 bits (image/normal.h) without its division and square root: 127 |x| + ... = 127, so coordinates are
+/// whole numbers.
+inline std::array<float, 3> surfel_normal(uint16_t code) {
+  const float x = std::min(static_cast<float>(code & 255) - 127.0f, 127.0f),
+              y = std::min(static_cast<float>(code >> 8) - 127.0f, 127.0f);
+  const float z = (127.0f - std::abs(x)) - std::abs(y), fold = std::max(-z, 0.0f);
+  return {x - std::copysign(fold, x), y - std::copysign(fold, y), z};
+}
 
 /// Low-pass of an opaque ellipse, squared pixels: S' = S + this. At equal sampling and display resolution the contour
 /// then still ends before the next sample; where samples crowd, each still reaches about a third of a pixel.
@@ -26,58 +88,9 @@ inline constexpr float kFilterVariance = 0.51f, kSupportGrowth = 2.5f, kSupportD
 /// shares of depth.
 inline constexpr float kEpsilonPerRadius = 2.0f, kLeastEpsilon = 1.0f / 512, kMostEpsilon = 1.0f / 32;
 
-/// Depth codes before rounding: 2^14 an octave, linear inside it.
-inline float depth_code(float w, float near_m) {
-  const auto bits = static_cast<int32_t>(std::bit_cast<uint32_t>(w) - std::bit_cast<uint32_t>(near_m));
-  return static_cast<float>(bits) * (1.0f / (1 << kDepthCodeShift));
-}
 /// Change of the depth code as depth changes by its own size: 2^14 times the mantissa of w, in [1, 2).
 inline float codes_per_depth(float w) {
   return std::bit_cast<float>((std::bit_cast<uint32_t>(w) & 0x007fffffu) | 0x46800000u);
-}
-
-/// d^T S^-1 d = dx (xx dx + xy dy) + yy dy dy about (centre_x, centre_y), in pixels of the image.
-struct SurfelConic {
-  float centre_x = 0, centre_y = 0;
-  float xx = 0, xy = 0, yy = 0;
-  /// Pixels whose centres lie in its box, [x0, x1) x [y0, y1), cut to kMaxSplatSide.
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-  float determinant = 0;  ///< of S
-
-  float at(float dx, float dy) const { return dx * (xx * dx + xy * dy) + (yy * dy) * dy; }
-};
-
-/// The conic of grow S + add I.
-inline SurfelConic surfel_conic(const SurfelContour& c, float x_pix, float y_pix, float grow, float add) {
-  SurfelConic out;
-  constexpr int kHalf = kMaxSplatSide / 2;
-  // No farther than binning allows for.
-  constexpr float kFarthest = kHalf - 1;
-  out.centre_x = x_pix + std::clamp(c.offset_x, -kFarthest, kFarthest);
-  out.centre_y = y_pix + std::clamp(c.offset_y, -kFarthest, kFarthest);
-  const float xx = grow * c.xx + add, xy = grow * c.xy, yy = grow * c.yy + add;
-  out.determinant = xx * yy - xy * xy;
-  const float inverse = 1.0f / out.determinant;
-  out.xx = yy * inverse, out.xy = (xy * -2.0f) * inverse, out.yy = xx * inverse;
-  const auto bounds = [](float centre, float reach, int& first, int& last) {
-    const int pixel = static_cast<int>(std::floor(centre));
-    const float from = centre - 0.5f;
-    first = std::max(static_cast<int>(std::ceil(from - reach)), pixel - (kHalf - 1));
-    last = std::min(static_cast<int>(std::floor(from + reach)) + 1, pixel + kHalf + 1);
-  };
-  bounds(out.centre_x, std::sqrt(xx), out.x0, out.x1);
-  bounds(out.centre_y, std::sqrt(yy), out.y0, out.y1);
-  return out;
-}
-
-/// The depth code across a splat: centre + x dx + y dy, offsets from the conic's centre.
-struct SurfelDepth {
-  float centre = 0, x = 0, y = 0;
-};
-inline SurfelDepth surfel_depth(const SurfelContour& c, float w, float near_m) {
-  const float scale = -codes_per_depth(w);
-  const float x = scale * c.slope_x, y = scale * c.slope_y;
-  return {(depth_code(w, near_m) + x * c.offset_x) + y * c.offset_y, x, y};
 }
 
 /// share of depth = clamp(factor * radius / w, least, most), in depth codes.
@@ -99,11 +112,6 @@ inline float ellipse_bias(float radius_m, float w) {
   return std::min(surfel_share(radius_m, w, kBiasPerRadius, kLeastBias, kMostBias), static_cast<float>(kMaxBias));
 }
 
-/// Factor of S in ewa's support, from det S = radius^4.
-inline float ewa_growth(float determinant_of_s) {
-  return std::max(kSupportGrowth - kSupportDrop / std::sqrt(std::max(determinant_of_s, 1e-12f)), 1.0f);
-}
-
 /// spacing_class of the samples' mean distance on the screen, by det S = radius^4: how many of these limits it reaches.
 ///   scale: that splats were drawn with (DrawList::scale): their radius is scale / 2 distances.
 using SpacingLimits = std::array<float, 3>;
@@ -114,11 +122,5 @@ inline SpacingLimits spacing_limits(float scale) {
   };
   return {limit(1.3f), limit(1.8f), limit(3.0f)};
 }
-inline uint32_t surfel_spacing(float determinant_of_s, const SpacingLimits& limits) {
-  return (determinant_of_s >= limits[0]) + (determinant_of_s >= limits[1]) + (determinant_of_s >= limits[2]);
-}
-
-/// ewa: weight in the splat's centre.
-inline float ewa_peak(float determinant_of_v) { return 1.0f / std::min(determinant_of_v, 1e6f); }
 
 }  // namespace telesplat::splat

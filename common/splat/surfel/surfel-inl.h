@@ -1,4 +1,10 @@
-// contour.h and splat.h on vectors of points.
+// Where a sample's footprint on the surface appears on the screen: a point, its normal and the view that sampled it
+// give an ellipse of pixels and the slope of depth across it (T4.4.1, eq. 4.2-4.7); many points at a time.
+// Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics
+// Interface 2004. We project the footprint in its dual form: the conic's adjugate, p p^T - V for a centre p and a
+// footprint V in space, needs neither a basis of the tangent plane nor matrices to be inverted, and gives the bounding
+// box at once. The contour is the same. Tests have the same operations in the same order on numbers, which give the
+// same bits.
 // Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_SURFEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_SURFEL_INL_H_
@@ -30,12 +36,15 @@ struct Sources {
   VF radius, x, y, z;
 };
 
-// A vector of points: what surfel_contour takes and gives.
+// A vector of points, and the footprint on the screen of each, in pixels: a pixel at offset d from the contour's centre
+// is inside if d^T S^-1 d <= 1.
 struct Surfels {
-  VF x, y, w;  // projected centre, depth
-  VF rho;      // radius over depth, limited
-  VF offset_x, offset_y, xx, xy, yy, slope_x, slope_y;
-  VF normal_x, normal_y, normal_z;
+  VF x, y, w;                       // projected centre, depth
+  VF rho;                           // radius over depth, limited
+  VF offset_x, offset_y;            // of the ellipse's centre from the projected centre
+  VF xx, xy, yy;                    // S
+  VF slope_x, slope_y;              // depth of the tangent plane = w / (1 + slope . offset from the projected centre)
+  VF normal_x, normal_y, normal_z;  // in camera axes, not of unit length
   VU normal_code, albedo;
 };
 
@@ -61,7 +70,15 @@ HWY_INLINE void DecodeNormals(VU code, VF& x, VF& y, VF& z) {
   y = hn::Sub(y, hn::CopySign(fold, y));
 }
 
-// surfel_contour. s: x, y, w, normal_code set. Comments and names are there.
+// s: x, y, w, normal_code set.
+// With m the normal, i = 1 / m.m, n n^T = i m m^T, e the direction to the sampling view and d = e - (e.n) n, the
+// footprint is
+//   V = radius^2 (I - n n^T + kappa d d^T),  kappa = 1 / max((e.n)^2, kMinSampledCosine^2)
+// a circle stretched along the slope by 1 / (e.n), or by sqrt(1 + |d|^2 / kMinSampledCosine^2) beyond the limit. With
+// T the shift of image coordinates by (u, v), s = T m, t = T d:
+//   G = T T^T - i s s^T + kappa t t^T,   dual conic about the projected centre: diag(0, 0, 1) - (radius / w)^2 G
+// and its centre and S follow as k = 1 - (radius / w)^2 Gzz divides. Where the splat reaches the eye (k < 1/4) its
+// projection is taken as parallel. No low-pass is added to S.
 HWY_INLINE void ContourOf(const SurfelCamera& c, const Sources& e, Surfels& s) {
   const auto one = Const(1.0f);
   VF nx, ny, nz;
@@ -100,6 +117,8 @@ HWY_INLINE void ContourOf(const SurfelCamera& c, const Sources& e, Surfels& s) {
   s.xy = hn::Add(hn::Mul(hn::Mul(ax, fy), gxy), hn::Mul(s.offset_x, s.offset_y));
   s.yy = hn::Add(hn::Mul(hn::Mul(ay, fy), gyy), hn::Mul(s.offset_y, s.offset_y));
 
+  // The tangent plane m . P = m . p, P on the ray through the pixel. Seen edge-on it has no depth to follow: it gets
+  // the steepest.
   const auto along = hn::Add(hn::Add(hn::Mul(mx, u), hn::Mul(my, v)), mz);
   const auto inverse = hn::Div(one, hn::CopySign(hn::Max(hn::Abs(along), Const(1e-3f)), along));
   const auto limit_x = Const(kSteepest * c.step_x), limit_y = Const(kSteepest * c.step_y);
@@ -108,10 +127,11 @@ HWY_INLINE void ContourOf(const SurfelCamera& c, const Sources& e, Surfels& s) {
   s.normal_x = mx, s.normal_y = my, s.normal_z = mz;
 }
 
-// surfel_conic, its box cut to the rectangle too.
+// The conic of grow S + add I: d^T S^-1 d = dx (xx dx + xy dy) + yy dy dy about the centre, in pixels of the image. Its
+// box [x0, x1) x [y0, y1) holds the pixels whose centres lie in it, cut to kMaxSplatSide and to the rectangle.
 struct Conics {
-  VF centre_x, centre_y, xx, xy, yy, determinant;
-  VI x0, y0, x1, y1;    // the box
+  VF centre_x, centre_y, xx, xy, yy, determinant;  // of S
+  VI x0, y0, x1, y1;
   VI pixel_x, pixel_y;  // that holds the centre
   hn::Mask<I32> cut;    // the box was cut to kMaxSplatSide
 };
@@ -119,7 +139,7 @@ HWY_INLINE Conics ConicOf(const Surfels& s, VF grow, float add, const geometry::
   const I32 di;
   Conics c;
   constexpr int kHalf = kMaxSplatSide / 2;
-  const auto farthest = Const(kHalf - 1);
+  const auto farthest = Const(kHalf - 1);  // no farther than binning allows for
   c.centre_x = hn::Add(s.x, Clamp(s.offset_x, hn::Neg(farthest), farthest));
   c.centre_y = hn::Add(s.y, Clamp(s.offset_y, hn::Neg(farthest), farthest));
   const auto xx = hn::Add(hn::Mul(grow, s.xx), Const(add)), xy = hn::Mul(grow, s.xy),
@@ -153,7 +173,7 @@ HWY_INLINE hn::Mask<I32> CentreIn(const Conics& c, const geometry::Rect& r) {
                  hn::And(hn::Gt(c.pixel_y, hn::Set(di, r.y - 1)), hn::Lt(c.pixel_y, hn::Set(di, r.y + r.height))));
 }
 
-// SurfelConic::at.
+// d^T S^-1 d.
 template <class V>
 HWY_INLINE V At(V xx, V xy, V yy, V dx, V dy) {
   return hn::Add(hn::Mul(dx, hn::Add(hn::Mul(xx, dx), hn::Mul(xy, dy))), hn::Mul(hn::Mul(yy, dy), dy));
@@ -164,7 +184,8 @@ HWY_INLINE VF CodesPerDepth(VF w) {
   return hn::BitCast(F32(), hn::Or(hn::And(hn::BitCast(du, w), hn::Set(du, 0x007fffffu)), hn::Set(du, 0x46800000u)));
 }
 
-// surfel_depth.
+// The depth code across a splat: centre + x dx + y dy, offsets from the conic's centre. Codes are not rounded: 2^14 an
+// octave, linear inside it.
 struct Depths {
   VF centre, x, y;
 };

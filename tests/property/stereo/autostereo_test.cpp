@@ -6,7 +6,6 @@
 #include <random>
 
 #include "client/stereo/autostereo/interleaver.h"
-#include "client/stereo/autostereo/sight.h"
 
 namespace telesplat::stereo {
 namespace {

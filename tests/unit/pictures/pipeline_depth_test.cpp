@@ -1,5 +1,5 @@
 // How many pictures are asked for ahead, against servers and links of known speed.
-#include "client/viewer/coupling/pipeline_depth.h"
+#include "client/viewer/coupling/coupling.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/view_requester.h"
-#include "client/viewer/pictures/source.h"
+#include "client/viewer/pictures/received_pictures.h"
 #include "common/image/jpeg.h"
 
 namespace telesplat::viewer {

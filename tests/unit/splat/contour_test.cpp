@@ -3,7 +3,7 @@
 
 #include "common/geometry/trajectory.h"
 #include "common/image/normal.h"
-#include "common/splat/surfel/contour.h"
+#include "tests/support/splat_surfel_plain.h"
 
 namespace telesplat {
 namespace {

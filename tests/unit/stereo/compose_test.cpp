@@ -1,7 +1,6 @@
 // Two pictures on one display, by place and by colour.
 #include <gtest/gtest.h>
 
-#include "client/stereo/anaglyph.h"
 #include "client/stereo/compose.h"
 #include "client/stereo/pattern.h"
 

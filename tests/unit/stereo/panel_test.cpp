@@ -5,7 +5,6 @@
 
 #include "client/stereo/autostereo/interleaver.h"
 #include "client/stereo/autostereo/panel_file.h"
-#include "client/stereo/autostereo/sight.h"
 #include "tests/support/files/own_folder.h"
 
 namespace telesplat::stereo {

@@ -1,7 +1,6 @@
 // Which replica is displayed, what its draw lists say, and what is reported of them.
 #include <gtest/gtest.h>
 
-#include "client/viewer/points/access_log.h"
 #include "client/viewer/points/epoch_switch.h"
 #include "client/viewer/points/model_cache.h"
 #include "tests/support/points_scenes.h"

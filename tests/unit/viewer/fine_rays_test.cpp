@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/viewer/points/patch_rays.h"
+#include "client/viewer/points/event_sequencer.h"
 #include "common/codec/mask_stream.h"
 
 namespace telesplat::viewer {

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "client/viewer/coupling/update_table.h"
+#include "client/viewer/coupling/stage_table.h"
 #include "client/viewer/display/frame_table.h"
 #include "client/viewer/viewer_options.h"
 #include "common/metrics/tables/viewer_tables.h"

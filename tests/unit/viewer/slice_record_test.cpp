@@ -8,7 +8,7 @@
 #include <random>
 
 #include "client/viewer/record/slice_record.h"
-#include "client/viewer/slices/receiver.h"
+#include "client/viewer/slices/cache.h"
 #include "common/wire/serial.h"
 #include "tests/support/volume/frames.h"
 #include "tests/support/volume/slices.h"
@@ -98,7 +98,7 @@ TEST_F(SliceRecord, FramesComeBackAsTheyWere) {
     ASSERT_TRUE(found.ok()) << found.error().text;
     ASSERT_TRUE(*found) << n;
     std::vector<volume::SliceImage> images;
-    const auto expected = SliceReceiver::decode(sent(n, grid_)->message, grid_, images);
+    const auto expected = decode_frame(sent(n, grid_)->message, grid_, images);
     expect_same(*(*replay)->frame(), *expected->frame);
   }
   EXPECT_FALSE(*(*replay)->advance({9}, 0)) << "the record ends before it";

@@ -1,7 +1,7 @@
 // A wall laid flat: where pictures lie in the picture of all.
 #include <gtest/gtest.h>
 
-#include "client/wall/unrolled.h"
+#include "client/wall/screen_camera.h"
 
 namespace telesplat::wall {
 namespace {

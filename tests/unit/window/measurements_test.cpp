@@ -1,6 +1,6 @@
 // What a person measures in a window: rows of places, what is told of them, their marks in the picture.
 #include "client/viewer/hands/measurements.h"
-#include "client/displays/window/hands/marks.h"
+#include "client/displays/window/hands/hand_overlays.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

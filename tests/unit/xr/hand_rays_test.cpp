@@ -1,5 +1,5 @@
 // Rays of controllers in pictures.
-#include "client/displays/xr/hand_rays.h"
+#include "client/displays/xr/hands.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Rows of pictures as a headset's textures have them.
-#include "client/displays/xr/texture_rows.h"
+#include "client/displays/xr/picture_chain.h"
 
 #include <gtest/gtest.h>
 

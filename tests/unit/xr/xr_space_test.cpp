@@ -1,12 +1,12 @@
 // Eyes of a headset as cameras.
-#include "client/displays/xr/xr_space.h"
+#include "client/displays/xr/xr_system.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "client/viewer/display/eyes/eye_pair.h"
+#include "client/viewer/display/eyes/eye_rig.h"
 
 namespace telesplat::viewer {
 namespace {

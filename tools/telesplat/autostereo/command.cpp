@@ -9,7 +9,6 @@
 
 #include "client/stereo/autostereo/interleaver.h"
 #include "client/stereo/autostereo/panel_file.h"
-#include "client/stereo/autostereo/sight.h"
 #include "client/stereo/pattern.h"
 #include "client/viewer/input/head_movement.h"
 #include "common/options/complain.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "client/wall/unrolled.h"
+#include "client/wall/screen_camera.h"
 #include "common/image/canvas.h"
 #include "common/scene/legend.h"
 #include "tools/telesplat/scene/epochs.h"

@@ -8,7 +8,6 @@
 #include "client/viewer/points/still_picture.h"
 #include "client/viewer/record/slice_record.h"
 #include "client/viewer/render/renderer.h"
-#include "client/viewer/render/slices/renderer.h"
 #include "client/viewer/render/supersampler.h"
 #include "common/image/background.h"
 

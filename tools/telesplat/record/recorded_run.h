@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "client/viewer/display/eyes/eye_pair.h"
+#include "client/viewer/display/eyes/eye_rig.h"
 #include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/display/wall.h"
 #include "client/viewer/input/look.h"

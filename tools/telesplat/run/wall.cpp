@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "client/wall/unrolled.h"
+#include "client/wall/screen_camera.h"
 #include "common/geometry/camera.h"
 #include "common/image/canvas.h"
 #include "common/image/file.h"

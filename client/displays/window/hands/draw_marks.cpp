@@ -6,7 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "client/displays/window/hands/marks.h"
+#include "client/displays/window/hands/hand_overlays.h"
 #include "client/viewer/hands/measurements.h"
 #include "common/image/canvas.h"
 

@@ -9,7 +9,6 @@
 #include <thread>
 #include <vector>
 
-#include "client/displays/window/panel/order.h"
 #include "client/displays/window/panel/session_status.h"
 #include "common/net/keys/access.h"
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "client/displays/window/panel/order.h"
+#include "client/displays/window/panel/session_status.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::viewer {

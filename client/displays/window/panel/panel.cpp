@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/core/within.h"
 #include "common/wire/limits.h"
@@ -10,18 +11,45 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kRatePeriod_s = 0.5;
-enum PlotIndex { kInterFrame, kLatency, kPoints, kBytes, kHoles };
+enum PlotIndex { kInterFrame, kLatency, kPoints, kBytes };
 
 std::vector<Panel::Plot> make_plots() {
   const auto plot = [](const char* name, const char* unit, uint32_t colour, int digits, double floor) {
     return Panel::Plot{name, unit, History(Panel::kSpan_s), colour, digits, floor};
   };
   return {plot("inter-frame delay", "ms", 0x56b4e9, 1, 20), plot("update latency", "ms", 0xe69f00, 0, 100),
-          plot("points drawn", "M", 0x009e73, 2, 0.1), plot("received", "MB/s", 0xcc79a7, 2, 0.1),
-          plot("holes (estimate)", "%", 0xf0e442, 2, 1)};
+          plot("points drawn", "M", 0x009e73, 2, 0.1), plot("received", "MB/s", 0xcc79a7, 2, 0.1)};
 }
 
 }  // namespace
+
+constexpr double kMostValue = 1e30;  // what a plot is drawn with has float coordinates
+
+void History::add(double t_s, double value) {
+  if (!std::isfinite(t_s) || !(std::abs(value) < kMostValue)) return;
+  if (!samples_.empty() && t_s < samples_.back().t_s) samples_.clear();
+  samples_.push_back({t_s, value});
+  // One that is older stays: the plot's left edge goes on from it.
+  while (samples_.size() > 2 && (samples_[1].t_s < t_s - span_s_ || samples_.size() > kMost)) samples_.pop_front();
+}
+
+std::vector<float> History::columns(double now_s, size_t count) const {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> out(count, kNone);
+  const double from_s = now_s - span_s_;
+  float before = kNone;  // what the first column goes on from
+  for (const auto& s : samples_) {
+    if (s.t_s < from_s) {
+      before = float(s.value);
+      continue;
+    }
+    if (s.t_s > now_s) break;
+    const auto column = std::min(count - 1, size_t((s.t_s - from_s) / span_s_ * double(count)));
+    out[column] = std::isnan(out[column]) ? float(s.value) : std::max(out[column], float(s.value));
+  }
+  for (float& value : out) before = value = std::isnan(value) ? before : value;
+  return out;
+}
 
 Panel::Panel(Setup setup) : setup_(std::move(setup)), shown_(setup_.shown), plots_(make_plots()) {}
 
@@ -42,15 +70,9 @@ void Panel::on_figures(const FrameFigures& f) {
   if (f.updates != figures_.updates) plots_[kLatency].history.add(f.now_s, f.latency_ms);
   plots_[kPoints].name = std::string(f.drawn_name) + " drawn";
   plots_[kPoints].history.add(f.now_s, double(f.points_drawn) / 1e6);
-  if (std::isnan(f.hole_share)) plots_[kHoles].history = History(kSpan_s);
-  plots_[kHoles].history.add(f.now_s, f.hole_share * 100);
   count_rates(f);
   figures_ = f;
   if (wished_coupling_ == f.coupling) wished_coupling_.reset();
-}
-
-bool Panel::means_something(const Plot& plot) const {
-  return pipeline_ == scene::Pipeline::kPoints || &plot != &plots_[kHoles];
 }
 
 void Panel::on_answer(double now_s, const OrderAnswer& answer) {

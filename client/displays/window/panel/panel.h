@@ -11,14 +11,38 @@
 #include <vector>
 
 #include "client/displays/window/input/interaction.h"
-#include "client/displays/window/panel/history.h"
-#include "client/displays/window/panel/order.h"
 #include "client/displays/window/panel/session_status.h"
-#include "client/viewer/display/frame_figures.h"
-#include "client/viewer/input/picture_wish.h"
+#include "client/viewer/display/display_surface.h"
+#include "client/viewer/input/look.h"
 #include "common/scene/kind.h"
 
 namespace telesplat::viewer {
+
+/// Values as they come, each with its time; those older than the span are forgotten. One thread.
+class History {
+ public:
+  static constexpr size_t kMost = 4096;  ///< values; more in the span push out the oldest
+
+  explicit History(double span_s) : span_s_(span_s) {}
+
+  /// A value that is not finite is ignored. A time before the newest one begins the history anew.
+  void add(double t_s, double value);
+  bool empty() const { return samples_.empty(); }
+  /// The newest value; 0 where there is none.
+  double newest() const { return samples_.empty() ? 0 : samples_.back().value; }
+  double span_s() const { return span_s_; }
+
+  /// The span before `now_s` in `count` columns, the oldest first: the largest value of each, so that a single peak is
+  /// seen; where none falls into a column the one before goes on; NaN before the first.
+  std::vector<float> columns(double now_s, size_t count) const;
+
+ private:
+  struct Sample {
+    double t_s, value;
+  };
+  double span_s_;
+  std::deque<Sample> samples_;
+};
 
 /// One thread, the display's.
 class Panel {
@@ -63,8 +87,6 @@ class Panel {
   /// The session shows a scene of this kind.
   void on_scene(scene::Pipeline pipeline) { pipeline_ = pipeline; }
   void on_kind(std::optional<scene::Kind> kind) { kind_ = kind; }
-  /// Whether a plot means something for what is shown: slice images have no holes.
-  bool means_something(const Plot& plot) const;
   /// The window's settings as texts, by their orders (scene::settings()).
   void on_values(std::map<std::string, std::string> values) { values_ = std::move(values); }
   void on_answer(double now_s, const OrderAnswer& answer);

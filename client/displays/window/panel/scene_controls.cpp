@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <cstdio>
 
 #include "common/core/within.h"
 #include "common/scene/session.h"
@@ -12,12 +12,147 @@
 namespace telesplat::viewer {
 namespace {
 
+constexpr double kLeastKept = 1;  // per cent
+
+std::vector<std::string> names_of(const std::vector<scene::ArrayInfo>& infos) {
+  std::vector<std::string> out;
+  for (const auto& info : infos) {
+    out.push_back(info.name);
+    for (int c = 0; info.components > 1 && c < std::min(info.components, scene::kMaxComponents); ++c)
+      out.push_back(info.components <= 3 ? fmt::format("{}.{}", info.name, "xyz"[c])
+                                         : fmt::format("{}[{}]", info.name, c));
+  }
+  return out;
+}
+
 constexpr double kSameTime_s = 0.05;
 
 // Ten seconds with the value that it has, then the new one, then back: what repeats should not jump.
 constexpr double kFirstLength_s = 10;
 
 }  // namespace
+
+void CutControls::on_session(double now_s, const wire::Welcome& session) {
+  const scene::SessionView view(session);
+  placement_ = {};
+  if (const std::string text = view.fact(scene::kPlacementFact); !text.empty())
+    if (auto read = scene::placement_from_text(text)) placement_ = *std::move(read);
+  order_ = view.fact(scene::kClipOrderFact);
+  if (wished_ && (now_s - wished_->since_s > kPatience_s || wished_->order == order_)) wished_.reset();
+}
+
+std::array<CutControls::Kept, 3> CutControls::kept() const {
+  std::array<Kept, 3> out;
+  const auto parsed = scene::parse_clip(order());
+  if (!parsed || !knows_box()) return out;
+  for (const auto& plane : parsed->planes)
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 across(0.0);
+      across[axis] = plane.normal[axis];
+      if (across != plane.normal || plane.normal[axis] == 0) continue;
+      const double lo = placement_.box_data.lo[axis], extent = placement_.box_data.hi[axis] - lo;
+      const double at = plane.value / plane.normal[axis];
+      const double share = plane.percent || !(extent > 0) ? at : (at - lo) / extent * 100;
+      auto& end = plane.normal[axis] > 0 ? out[size_t(axis)].from : out[size_t(axis)].to;
+      end = within(share, 0.0, 100.0);
+    }
+  return out;
+}
+
+double CutControls::value(int axis, double percent) const {
+  const auto& box = placement_.box_data;
+  return box.empty() ? percent : box.lo[axis] + (box.hi[axis] - box.lo[axis]) * percent / 100;
+}
+
+void CutControls::keep(double now_s, int axis, Kept wanted) {
+  if (!std::isfinite(wanted.from) || !std::isfinite(wanted.to)) return;
+  auto all = kept();
+  wanted.from = within(wanted.from, 0.0, 100 - kLeastKept);
+  wanted.to = within(wanted.to, wanted.from + kLeastKept, 100.0);
+  all[size_t(axis)] = wanted;
+  std::string text;
+  for (int a = 0; a < 3; ++a) {
+    const Kept& k = all[size_t(a)];
+    if (k.from > 0) text += fmt::format("{}plane {}>={:.5g}%", text.empty() ? "" : "; ", "xyz"[a], k.from);
+    if (k.to < 100) text += fmt::format("{}plane {}<={:.5g}%", text.empty() ? "" : "; ", "xyz"[a], k.to);
+  }
+  if (text == order()) return;
+  if (const Status s = give(now_s, text.empty() ? "off" : text); !s) return;
+}
+
+Status CutControls::give(double now_s, const std::string& order) {
+  if (const auto parsed = scene::parse_clip(order); !parsed) return parsed.error();
+  wished_ = {order == "off" ? "" : order, now_s};
+  give_({"clip", {{"clip", order}}, "clip"});
+  return ok_status();
+}
+
+void ColourControls::on_session(double now_s, const wire::Welcome& session) {
+  const scene::SessionView view(session);
+  if (const std::string text = view.fact(scene::kArraysFact); text != infos_text_) {
+    infos_text_ = text;
+    auto read = scene::arrays_from_text(text);
+    infos_ = read ? *std::move(read) : std::vector<scene::ArrayInfo>();
+    arrays_ = names_of(infos_);
+  }
+  const auto before = std::exchange(colouring_, std::nullopt);
+  if (const std::string text = view.fact(scene::kColouringFact); !text.empty())
+    if (auto read = scene::colouring_from_text(text)) colouring_ = *std::move(read);
+  if (wished_ &&
+      (now_s - wished_->since_s > kPatience_s || !colouring_ || !before || before->array != colouring_->array ||
+       (colouring_->lo == wished_->lo && colouring_->hi == wished_->hi)))
+    wished_.reset();
+  iso_.reset();
+  iso_range_ = {};
+  double value = 0;
+  if (std::sscanf(view.fact(scene::kIsoFact).c_str(), "%lf %lf %lf", &value, &iso_range_.lo, &iso_range_.hi) >= 1 &&
+      std::abs(value) <= scene::kMaxScalar)
+    iso_ = value;
+  if (!(iso_range_.lo >= -scene::kMaxScalar && iso_range_.hi <= scene::kMaxScalar)) iso_range_ = {};
+  histogram_.reset();
+  if (const std::string text = iso_ ? view.fact(volume::kHistogramFact) : ""; !text.empty())
+    if (auto read = volume::histogram_from_text(text)) histogram_ = *std::move(read);
+}
+
+std::pair<double, double> ColourControls::range() const {
+  if (wished_) return {wished_->lo, wished_->hi};
+  return colouring_ ? std::pair(colouring_->lo, colouring_->hi) : std::pair(0.0, 1.0);
+}
+
+scene::ValueSpan ColourControls::whole_range() const {
+  if (!colouring_) return {};
+  const auto choice = scene::choose_array(infos_, colouring_->array);
+  return choice ? scene::span_of(infos_, *choice) : scene::ValueSpan{};
+}
+
+void ColourControls::choose_array(const std::string& name) {
+  wished_.reset();
+  give_({"colour", {{"array", name}}, "array"});
+}
+
+void ColourControls::choose_range(double now_s, double lo, double hi) {
+  if (!colouring_ || !(lo < hi && lo >= -scene::kMaxScalar && hi <= scene::kMaxScalar)) return;
+  if (std::pair(lo, hi) == range()) return;
+  wished_ = {lo, hi, now_s};
+  give_({"colour", {{"array", fmt::format("{}:{}:{}", colouring_->array, lo, hi)}}, "array"});
+}
+
+void ColourControls::reset_range() {
+  if (colouring_) choose_array(colouring_->array);
+}
+
+void ColourControls::choose_map(const colour::ColourMap& map) {
+  give_({"colour", {{"map", colour::to_text(map)}}, "map"});
+}
+
+std::vector<HistogramBar> ColourControls::iso_bars() const {
+  if (!histogram_ || !(iso_range_.lo < iso_range_.hi)) return {};
+  return bars_of(*histogram_, iso_range_.lo, iso_range_.hi, true);
+}
+
+void ColourControls::choose_iso(double value) {
+  if (iso_ && std::isfinite(value) && value != *iso_) give_({"iso", {{"value", fmt::format("{}", value)}}, "iso"});
+}
 
 void SceneControls::on_session(double now_s, const wire::Welcome& session) {
   kind_ = scene::SessionView(session).kind();
@@ -72,9 +207,7 @@ void SceneControls::choose_speed(double now_s, double steps_a_second) {
   wish(now_s, "volume.steps-per-s", within(steps_a_second, 0.0, 1000.0));
 }
 
-void SceneControls::play_series(bool plays) {
-  give_({"animate", {{"timeline", plays ? "on" : "off"}}, "animate"});
-}
+void SceneControls::play_series(bool plays) { give_({"animate", {{"timeline", plays ? "on" : "off"}}, "animate"}); }
 
 double SceneControls::value(std::string_view name) const {
   const std::string key(name);

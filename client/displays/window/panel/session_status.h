@@ -1,12 +1,29 @@
-// Who takes part in a session, as its master tells it to `telesplat ctl status`, and what is missing.
+// What passes between the panel and a session's master: orders, which are the commands of `telesplat ctl`, and who
+// takes part, as `telesplat ctl status` has it, and what is missing.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
 #include "common/core/result.h"
 
 namespace telesplat::viewer {
+
+struct Order {
+  std::string command;  ///< wire::Control
+  std::map<std::string, std::string> arguments;
+  /// Of orders that wait, a later one of the same subject takes the place of an earlier one: a slider that is dragged
+  /// orders often. Empty: none is replaced.
+  std::string subject;
+  bool operator==(const Order&) const = default;
+};
+
+struct OrderAnswer {
+  Order order;
+  bool obeyed = false;
+  std::string text;  ///< what the master said, or why it said nothing; a line for the person
+};
 
 struct SessionStatus {
   struct Process {

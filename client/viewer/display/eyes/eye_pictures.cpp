@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "client/viewer/render/fit_view.h"
+#include "client/viewer/render/renderer.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 

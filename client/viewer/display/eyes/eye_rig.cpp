@@ -1,7 +1,6 @@
 #include "client/viewer/display/eyes/eye_rig.h"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>

@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/gl/programs.h"
-#include "client/viewer/render/gl/read_back.h"
 #include "client/viewer/render/gl/splat_passes.h"
 #include "client/viewer/render/gl/stage_timer.h"
 #include "common/core/check.h"
@@ -41,11 +41,8 @@ std::string device_name() {
 }  // namespace
 
 struct GlRenderer::Parts {
-  Parts(Programs made, const GlOptions& options)
-      : programs(std::move(made)),
-        splatting(options.persistent),
-        read_back(options.pack_buffers.value_or(!gl::is_software(device_name()))),
-        timer(kStages) {
+  Parts(Programs made, std::optional<bool> pack_buffers)
+      : programs(std::move(made)), read_back(pack_buffers.value_or(!gl::is_software(device_name()))), timer(kStages) {
     glGenVertexArrays(1, &no_vertices);
     glDisable(GL_DITHER);
     glPointParameteri(GL_POINT_SPRITE_COORD_ORIGIN, GL_UPPER_LEFT);
@@ -62,19 +59,19 @@ struct GlRenderer::Parts {
   uint32_t no_vertices = 0;  // vertex array of whole-frame passes
 };
 
-Result<std::unique_ptr<GlRenderer::Parts>> GlRenderer::make_parts(const GlOptions& options) {
+Result<std::unique_ptr<GlRenderer::Parts>> GlRenderer::make_parts(std::optional<bool> pack_buffers) {
   if (const Status good = check_limits(); !good) return Error{device_name() + ": " + good.error().text};
   auto programs = Programs::make();
   if (!programs) return Error{device_name() + ": " + programs.error().text};
-  return std::make_unique<Parts>(std::move(*programs), options);
+  return std::make_unique<Parts>(std::move(*programs), pack_buffers);
 }
 
-Result<std::unique_ptr<GlRenderer>> GlRenderer::make(const GlOptions& options) {
+Result<std::unique_ptr<GlRenderer>> GlRenderer::make(std::optional<bool> pack_buffers) {
   auto context = gl::EglContext::make();
   if (!context) return context.error();
   const gl::EglContext::Current current(**context);
   if (!current.ok()) return Error{(*context)->renderer() + ": cannot be made current"};
-  auto parts = make_parts(options);
+  auto parts = make_parts(pack_buffers);
   if (!parts) return parts.error();
   std::string device = (*context)->renderer();
   return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(*parts), std::move(device)));

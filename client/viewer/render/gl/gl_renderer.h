@@ -12,16 +12,11 @@
 
 namespace telesplat::viewer {
 
-/// Features that a context may offer and that need not be used. The defaults are best; tests try the others.
-struct GlOptions {
-  bool persistent = true;            ///< buffers that stay mapped, where there are any
-  std::optional<bool> pack_buffers;  ///< reading back through them: unless the renderer is software
-};
-
 class GlRenderer final : public Renderer {
  public:
-  /// With a context of its own, off-screen, which is current during its calls only.
-  static Result<std::unique_ptr<GlRenderer>> make(const GlOptions& options = {});
+  /// With a context of its own, off-screen, which is current during its calls only. pack_buffers: frames are read back
+  /// through them; not told: unless the renderer is software.
+  static Result<std::unique_ptr<GlRenderer>> make(std::optional<bool> pack_buffers = {});
   ~GlRenderer() override;
 
   const char* name() const override { return "gl"; }
@@ -39,7 +34,7 @@ class GlRenderer final : public Renderer {
   enum Stage { kSplatting, kResolving, kFilling, kSmoothing, kAntialiasing, kStages };
   struct Parts;  // what lives in the context
   GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device);
-  static Result<std::unique_ptr<Parts>> make_parts(const GlOptions& options);
+  static Result<std::unique_ptr<Parts>> make_parts(std::optional<bool> pack_buffers);
   Status draw(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,
               const image::Shading& shading, bool with_depth);
   void shade_and_finish(const splat::RenderOptions& options, bool with_depth);

@@ -4,24 +4,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <numeric>
 
 #include "common/splat/ewa/shading.h"
-#include "common/splat/item_figures.h"
 #include "common/splat/surfel/splat.h"
 
 namespace telesplat::viewer {
 namespace {
-
-template <class T>
-gl::StreamBuffer::Slice take(gl::StreamBuffer& stream, size_t count) {
-  return stream.take(std::max<size_t>(count, 1) * sizeof(T));
-}
-
-void bind(const gl::StreamBuffer& stream, GLenum target, uint32_t binding, const gl::StreamBuffer::Slice& slice) {
-  glBindBufferRange(target, binding, stream.buffer(), slice.offset, static_cast<GLsizeiptr>(slice.bytes));
-}
 
 // What does not depend on where the item's points lie.
 DrawRecord record(const splat::ItemFigures& item) {
@@ -58,7 +47,8 @@ void clear_depth_and_test() {
 
 }  // namespace
 
-SplatPasses::SplatPasses(bool persistent) : stream_(persistent) {
+SplatPasses::SplatPasses() {
+  glGenBuffers(kStreams, streams_);
   glGenVertexArrays(1, &vertex_array_);
   glGenBuffers(1, &draw_numbers_);
   glBindVertexArray(vertex_array_);
@@ -72,46 +62,40 @@ SplatPasses::SplatPasses(bool persistent) : stream_(persistent) {
 SplatPasses::~SplatPasses() {
   glDeleteVertexArrays(1, &vertex_array_);
   glDeleteBuffers(1, &draw_numbers_);
+  glDeleteBuffers(kStreams, streams_);
+}
+
+void SplatPasses::send(Stream stream, const void* data, size_t bytes) {
+  glBindBuffer(GL_COPY_WRITE_BUFFER, streams_[stream]);  // no other state hangs on this binding
+  glBufferData(GL_COPY_WRITE_BUFFER, static_cast<GLsizeiptr>(bytes), data, GL_STREAM_DRAW);
 }
 
 splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camera& camera,
                                         splat::Kernel kernel) {
-  const auto clusters = take<ClusterRecord>(stream_, runs_.runs.size());
-  const auto draws = take<DrawRecord>(stream_, list.items.size());
+  clusters_.clear();
+  draws_.assign(list.items.size(), {});
   splat::FrameFigures figures(splat::traits_of(kernel), camera, list.scale);
   for (auto& commands : commands_by_arena_) commands.clear();
   for (uint32_t r = 0; r < runs_.runs.size(); ++r) {
-    const ClusterRecord cluster = record(runs_.transforms[r], runs_.facing[r]);
-    std::memcpy(clusters.data + r * sizeof cluster, &cluster, sizeof cluster);
+    clusters_.push_back(record(runs_.transforms[r], runs_.facing[r]));
     for (uint32_t i = runs_.runs[r].first; i < runs_.runs[r].last; ++i) {
       const splat::DrawItem& item = list.items[i];
       if (item.level.count == 0) continue;
       const PointRange range = arenas_.place(item, list.replica);
-      DrawRecord d = record(figures.add(item));
+      DrawRecord& d = draws_[i] = record(figures.add(item));
       d.word = range.word;
       d.count = item.arrays().count;
       d.cluster = r;
-      std::memcpy(draws.data + i * sizeof d, &d, sizeof d);
       if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
       commands_by_arena_[range.arena].push_back({item.level.count, 1, item.first, i});
     }
   }
-  bind(stream_, GL_SHADER_STORAGE_BUFFER, 1, draws);
-  bind(stream_, GL_SHADER_STORAGE_BUFFER, 2, clusters);
-  write_commands(list.items.size());
+  send(kDraws, draws_.data(), draws_.size() * sizeof(DrawRecord));
+  send(kClusters, clusters_.data(), clusters_.size() * sizeof(ClusterRecord));
+  std::vector<DrawCommand> commands;
+  for (const auto& of_arena : commands_by_arena_) commands.insert(commands.end(), of_arena.begin(), of_arena.end());
+  send(kCommands, commands.data(), commands.size() * sizeof(DrawCommand));
   return figures.rim();
-}
-
-void SplatPasses::write_commands(size_t most) {
-  const auto commands = take<DrawCommand>(stream_, most);
-  size_t written = 0;
-  command_offsets_.clear();
-  for (const auto& of_arena : commands_by_arena_) {
-    command_offsets_.push_back(commands.offset + static_cast<intptr_t>(written));
-    const size_t bytes = of_arena.size() * sizeof(DrawCommand);
-    if (bytes) std::memcpy(commands.data + written, of_arena.data(), bytes);
-    written += bytes;
-  }
 }
 
 void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
@@ -137,12 +121,8 @@ void SplatPasses::write_view(const geometry::Camera& camera, const image::Shadin
   const splat::SpacingLimits limits = splat::spacing_limits(scale);
   std::copy(limits.begin(), limits.end(), v.spacing_limits);
   std::copy(rim.begin(), rim.end(), v.rim_bias);
-  const auto view = take<ViewRecord>(stream_, 1);
-  std::memcpy(view.data, &v, sizeof v);
-  bind(stream_, GL_UNIFORM_BUFFER, 0, view);
-  const auto intensities = stream_.take(shading.table().size());
-  std::memcpy(intensities.data, shading.table().data(), intensities.bytes);
-  bind(stream_, GL_SHADER_STORAGE_BUFFER, 3, intensities);
+  send(kView, &v, sizeof v);
+  send(kIntensities, shading.table().data(), shading.table().size());
 }
 
 void SplatPasses::number_draws(size_t count) {
@@ -157,26 +137,26 @@ void SplatPasses::number_draws(size_t count) {
 void SplatPasses::prepare(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                           const image::Shading& shading) {
   runs_.build(list.items, camera);
-  const size_t items = std::max<size_t>(list.items.size(), 1), runs = std::max<size_t>(runs_.runs.size(), 1);
-  stream_.begin(stream_.padded(runs * sizeof(ClusterRecord)) + stream_.padded(items * sizeof(DrawRecord)) +
-                stream_.padded(items * sizeof(DrawCommand)) + stream_.padded(sizeof(ViewRecord)) +
-                stream_.padded(shading.table().size()));
   number_draws(list.items.size());
   const splat::RimBias rim = write_draws(list, camera, kernel);
   write_view(camera, shading, list.scale, rim);
-  stream_.commit();
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, streams_[kView]);
+  for (const Stream stream : {kDraws, kClusters, kIntensities})
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, stream, streams_[stream]);
 }
 
 void SplatPasses::draw_points(const gl::Program& program) {
   program.use();
   glBindVertexArray(vertex_array_);
-  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, stream_.buffer());
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, streams_[kCommands]);
+  size_t first = 0;
   for (uint32_t arena = 0; arena < commands_by_arena_.size(); ++arena) {
     const auto& commands = commands_by_arena_[arena];
     if (commands.empty()) continue;
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, arenas_.buffer(arena));
-    glMultiDrawArraysIndirect(GL_POINTS, reinterpret_cast<const void*>(command_offsets_[arena]),
+    glMultiDrawArraysIndirect(GL_POINTS, reinterpret_cast<const void*>(first * sizeof(DrawCommand)),
                               static_cast<GLsizei>(commands.size()), 0);
+    first += commands.size();
   }
 }
 
@@ -214,11 +194,6 @@ void SplatPasses::splat(const FrameTargets& targets, const Programs& programs, s
     splat_sums(targets, programs.of(kernel));
   else
     splat_keys(targets, programs.of(kernel).splat);
-}
-
-void SplatPasses::end_frame() {
-  stream_.end();
-  arenas_.end_frame();
 }
 
 }  // namespace telesplat::viewer

@@ -6,9 +6,8 @@
 #include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/gl/point_arena.h"
 #include "client/viewer/render/gl/programs.h"
-#include "client/viewer/render/gl/stream_buffer.h"
 #include "common/image/shading.h"
-#include "common/splat/item_runs.h"
+#include "common/splat/item_figures.h"
 #include "common/splat/kernel_traits.h"
 #include "common/splat/pixel_key.h"
 
@@ -54,7 +53,7 @@ static_assert(sizeof(DrawRecord) == 48);
 /// Needs a current GL context for all it does.
 class SplatPasses {
  public:
-  explicit SplatPasses(bool persistent);
+  SplatPasses();
   ~SplatPasses();
   SplatPasses(const SplatPasses&) = delete;
   SplatPasses& operator=(const SplatPasses&) = delete;
@@ -66,15 +65,16 @@ class SplatPasses {
   /// Clears and writes targets.keys() or, for a kernel of Passes::kSums, targets.sums().
   void splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel);
   /// After the frame's last pass.
-  void end_frame();
+  void end_frame() { arenas_.end_frame(); }
 
  private:
   struct DrawCommand {
     uint32_t count, instances, first, base_instance;
   };
+  /// What is written anew every frame, each in a buffer; up to kIntensities in the order of shader bindings.
+  enum Stream { kView, kDraws, kClusters, kIntensities, kCommands, kStreams };
+  void send(Stream stream, const void* data, size_t bytes);
   splat::RimBias write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
-  /// At most `most` commands: those of commands_by_arena_.
-  void write_commands(size_t most);
   void write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
                   const splat::RimBias& rim);
   void number_draws(size_t count);
@@ -83,12 +83,13 @@ class SplatPasses {
   void splat_sums(const FrameTargets& targets, const KernelPrograms& programs);
 
   PointArenas arenas_;
-  gl::StreamBuffer stream_;
+  uint32_t streams_[kStreams] = {};
   uint32_t vertex_array_ = 0, draw_numbers_ = 0;
   size_t draw_number_count_ = 0;
   splat::ItemRuns runs_;
-  std::vector<std::vector<DrawCommand>> commands_by_arena_;
-  std::vector<intptr_t> command_offsets_;  // in the stream, one an arena
+  std::vector<ClusterRecord> clusters_;
+  std::vector<DrawRecord> draws_;
+  std::vector<std::vector<DrawCommand>> commands_by_arena_;  // as kCommands holds them, one arena after the other
 };
 
 }  // namespace telesplat::viewer

@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/gl/program.h"
-#include "client/viewer/render/gl/read_back.h"
 #include "client/viewer/render/gl/shaders/common.h"
 #include "client/viewer/render/gl/shaders/slices.h"
 #include "common/core/check.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "client/viewer/render/slices/renderer.h"
+#include "client/viewer/render/renderer.h"
 #include "common/core/log.h"
 #include "common/gl/egl_context.h"
 

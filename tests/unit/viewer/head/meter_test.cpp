@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "client/viewer/tracking/pose_clock.h"
 #include "client/viewer/tracking/prediction_meter.h"
 
 namespace telesplat::tracking {

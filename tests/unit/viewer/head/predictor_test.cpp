@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
+#include "client/viewer/tracking/head_filter.h"
 #include "client/viewer/tracking/pose_predictor.h"
-#include "client/viewer/tracking/rotation.h"
 
 namespace telesplat::tracking {
 namespace {

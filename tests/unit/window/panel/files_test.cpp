@@ -7,8 +7,8 @@
 #include <fstream>
 #include <thread>
 
+#include "client/displays/window/opening.h"
 #include "client/displays/window/panel/file_list.h"
-#include "client/displays/window/panel/launcher_lines.h"
 #include "client/viewer/recent_files.h"
 
 namespace telesplat::viewer {

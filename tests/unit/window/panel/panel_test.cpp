@@ -1,12 +1,10 @@
-// The panel without its window: plots, holes, what is chosen and what comes of it.
+// The panel without its window: plots, what is chosen and what comes of it.
 #include "client/displays/window/panel/panel.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
-
-#include "client/displays/window/panel/hole_meter.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -52,66 +50,6 @@ TEST(History, IsBounded) {
   EXPECT_FLOAT_EQ(columns[1], 1);
 }
 
-class HoleMeterTest : public testing::Test {
- protected:
-  static constexpr uint32_t kBackground = 0x141820;
-  HoleMeterTest() { view_.colour.assign(64 * 32, 0xff000000 | kBackground); }
-  uint32_t& at(int x, int y) { return view_.colour[size_t(y * 64 + x)]; }
-  void object(int from, int to) {
-    for (int y = 0; y < 32; ++y)
-      for (int x = from; x < to; ++x) at(x, y) = 0xffa0a0a0;
-  }
-  double measure() {
-    HoleMeter m;
-    for (int i = 0; i < HoleMeter::kTurns; ++i) m.look_at(view_, kBackground);
-    return m.share();
-  }
-  image::View view_{64, 32, {}, {}};
-};
-
-TEST_F(HoleMeterTest, SeesNoHolesInABlockNorInNothing) {
-  EXPECT_TRUE(std::isnan(measure()));
-  object(10, 50);
-  EXPECT_EQ(measure(), 0);
-}
-
-TEST_F(HoleMeterTest, CountsNarrowGapsInAnObjectAndNoWideOnes) {
-  object(10, 50);
-  for (int y = 8; y < 16; ++y) at(20, y) = at(21, y) = kBackground;
-  EXPECT_DOUBLE_EQ(measure(), 16.0 / (40 * 32));
-  for (int y = 8; y < 16; ++y)
-    for (int x = 30; x < 31 + HoleMeter::kWidest; ++x) at(x, y) = kBackground;  // one too wide
-  EXPECT_DOUBLE_EQ(measure(), 16.0 / double(40 * 32 - 8 * (HoleMeter::kWidest + 1)));
-}
-
-// The table below a patient is two thin lines beside each other, upright, level or slanting.
-TEST_F(HoleMeterTest, AGapBetweenLinesIsNoHole) {
-  for (const auto& [across, down] : {std::pair{1, 0}, {0, 1}, {1, 1}}) {
-    view_.colour.assign(64 * 32, 0xff000000 | kBackground);
-    for (int y = 0; y < 32; ++y)
-      for (int x = 0; x < 64; ++x) {
-        const int off = across * (x - 20) - down * (y - 8);
-        if ((off >= 0 && off < 5) || (off >= 8 && off < 13)) at(x, y) = 0xffa0a0a0;  // a gap of three
-      }
-    EXPECT_EQ(measure(), 0) << across << down;
-  }
-}
-
-TEST_F(HoleMeterTest, SaysNothingOfThinLines) {
-  for (int x = 4; x < 60; x += 6)
-    for (int y = 0; y < 32; ++y) at(x, y) = at(x + 1, y) = 0xffa0a0a0;
-  EXPECT_TRUE(std::isnan(measure()));
-  object(0, 64);  // a surface behind them
-  at(20, 7) = kBackground;
-  EXPECT_GT(measure(), 0);
-}
-
-TEST_F(HoleMeterTest, ASingleHoleIsFoundInOneOfTheTurns) {
-  object(0, 64);
-  at(33, 7) = kBackground;
-  EXPECT_DOUBLE_EQ(measure(), 1.0 / (64 * 32));
-}
-
 class PanelTest : public testing::Test {
  protected:
   static Panel::Setup setup() { return {.viewer = "viewer-1"}; }
@@ -134,17 +72,6 @@ TEST_F(PanelTest, RatesAreMeansOfHalfASecond) {
   EXPECT_NEAR(panel_.plots()[0].history.newest(), 16, 1e-9);
   EXPECT_NEAR(panel_.plots()[1].history.newest(), 80, 1e-9);
   EXPECT_NEAR(panel_.plots()[2].history.newest(), 0.5, 1e-9);
-}
-
-TEST_F(PanelTest, HolesThatAreNotKnownArePlottedNowhere) {
-  panel_.on_figures({.now_s = 1, .hole_share = kNan});
-  EXPECT_TRUE(panel_.plots()[4].history.empty());
-  panel_.on_figures({.now_s = 2, .hole_share = 0.02});
-  EXPECT_NEAR(panel_.plots()[4].history.newest(), 2, 1e-9);
-  EXPECT_TRUE(panel_.means_something(panel_.plots()[4]));
-  panel_.on_scene(scene::Pipeline::kSlices);
-  EXPECT_FALSE(panel_.means_something(panel_.plots()[4]));
-  EXPECT_TRUE(panel_.means_something(panel_.plots()[0]));
 }
 
 TEST_F(PanelTest, WhatIsChosenOfTheWindowIsTakenOnceAndShownAtOnce) {

@@ -77,8 +77,7 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
                        .latency_ms = 90,
                        .points_drawn = 100'000,
                        .inter_frame_ms = 16 + std::sin(now_s_),
-                       .coupling = coupling_,
-                       .hole_share = 0.01});
+                       .coupling = coupling_});
     ImGui::NewFrame();
     show_panel(panel_, view_, now_s_, {[&](Panel&) {
                  show_scene(controls_, scene_view_, now_s_, [this] { ++saved_; });

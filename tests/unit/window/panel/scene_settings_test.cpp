@@ -1,8 +1,7 @@
 // Colours, cuts and window settings as the panel and `telesplat ctl` change them.
 #include <gtest/gtest.h>
 
-#include "client/displays/window/panel/scene/colour_controls.h"
-#include "client/displays/window/panel/scene/cut_controls.h"
+#include "client/displays/window/panel/scene_controls.h"
 #include "client/displays/window/view_settings.h"
 #include "common/scene/placement.h"
 #include "common/scene/settings.h"

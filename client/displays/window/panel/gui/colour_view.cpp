@@ -1,4 +1,4 @@
-#include "client/displays/window/panel/gui/colour_view.h"
+#include "client/displays/window/panel/gui/scene_view.h"
 
 #include <fmt/format.h>
 #include <imgui.h>
@@ -7,8 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/displays/window/panel/gui/setting_rows.h"
-#include "client/displays/window/panel/gui/transfer_view.h"
+#include "client/displays/window/panel/gui/panel_view.h"
 #include "client/displays/window/panel/gui/widgets.h"
 #include "common/core/within.h"
 

@@ -1,10 +1,12 @@
-// The part of the panel that shows what is kept beside the data set, bookmarks and notes.
+// The parts of the panel that show what is kept beside the data set, bookmarks and notes, and measurements.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "client/notes/book.h"
+#include "client/viewer/hands/measurements.h"
 
 namespace telesplat::viewer {
 
@@ -25,5 +27,8 @@ struct NotesViewState {
 
 /// book: null: not read, or it cannot be. picked: something was picked, so a note can be about it.
 NotesWish show_notes(const notes::Book* book, NotesViewState& state, bool picked, double now_s);
+
+/// Builds the list of measurements, between Dear ImGui's frames. save: writes the table to a file.
+void show_measurements(Measurements& measurements, const std::function<void()>& save);
 
 }  // namespace telesplat::viewer

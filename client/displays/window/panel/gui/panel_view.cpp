@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 
-#include "client/displays/window/panel/gui/setting_rows.h"
 #include "client/displays/window/panel/gui/widgets.h"
 #include "common/core/within.h"
 #include "common/geometry/camera.h"
@@ -70,9 +69,7 @@ void show_figures(const Panel& panel, double now_s) {
   if (f.renderer.gl_ms > 0)
     text(fmt::format("{} draws: a frame took {:.1f} ms on the processor, {:.1f} ms by OpenGL", f.renderer.kept,
                      f.renderer.cpu_ms, f.renderer.gl_ms));
-  for (const auto& plot : panel.plots()) {
-    if (panel.means_something(plot)) show_plot(plot, now_s);
-  }
+  for (const auto& plot : panel.plots()) show_plot(plot, now_s);
 }
 
 // Buttons are keys: both do the same.

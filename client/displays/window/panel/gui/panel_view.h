@@ -2,12 +2,41 @@
 #pragma once
 
 #include <functional>
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
-#include "client/displays/window/panel/gui/settings_view.h"
 #include "client/displays/window/panel/panel.h"
 
 namespace telesplat::viewer {
+
+// Rows of the panel for settings of scene::settings(): name and explanation come from there.
+
+/// The row's name, which explains itself while it is pointed at; then what the next item fills. Precondition: there is
+/// such a setting.
+void setting_row(const char* name);
+/// Explains the setting while the item before it is pointed at.
+void setting_hint(const char* name);
+
+// ---- settings that this window keeps: each shows Panel::value() and calls Panel::choose() ----
+void setting_list(Panel& panel, const char* name, std::span<const std::string> choices);
+void setting_slider(Panel& panel, const char* name, double least, double most, const char* format);
+/// Without a row of its own: several stand beside each other.
+void setting_box(Panel& panel, const char* name);
+
+/// What these parts keep between frames.
+struct SettingsViewState {
+  std::string room_size, z_scale;  ///< as they are typed
+  std::optional<int> samplers;     ///< while it is dragged
+};
+
+void show_data(Panel& panel, SettingsViewState& state, std::optional<scene::Kind> kind);
+void show_display(Panel& panel);
+void show_sampling(Panel& panel);
+void show_over_the_picture(Panel& panel);
+void show_stereo(Panel& panel);
+void show_samplers(Panel& panel, SettingsViewState& state);
 
 /// A part of the panel below the general ones: other files add theirs.
 using PanelSection = std::function<void(Panel&)>;

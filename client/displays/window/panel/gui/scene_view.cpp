@@ -5,10 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
-#include "client/displays/window/panel/gui/transfer_view.h"
-#include "client/displays/window/panel/gui/widgets.h"
 #include "common/core/within.h"
 
 namespace telesplat::viewer {

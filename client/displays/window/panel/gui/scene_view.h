@@ -3,13 +3,38 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
-#include "client/displays/window/panel/gui/colour_view.h"
-#include "client/displays/window/panel/gui/transfer_view.h"
+#include "client/displays/window/panel/gui/widgets.h"
 #include "client/displays/window/panel/scene_controls.h"
 
 namespace telesplat::viewer {
+
+/// What the editor keeps between frames.
+struct TransferViewState {
+  int point = 0;        ///< that is chosen, where the function has so many
+  bool drags = false;   ///< the pointer holds it
+  bool linear = false;  ///< heights of the histogram
+};
+
+/// Draws bars from the lower side of an area.
+void draw_bars(const PlotArea& area, const std::vector<HistogramBar>& bars);
+
+/// Builds it. Between Dear ImGui's frames. save: writes the transfer function to a file of its own choice.
+void show_transfer(SceneControls& controls, TransferViewState& state, double now_s, const std::function<void()>& save);
+
+/// What these parts keep between frames.
+struct ColourViewState {
+  std::optional<double> iso;  ///< while it is dragged or typed
+  std::string order;          ///< of a clip, as it is typed
+  std::string typed_for;      ///< the order in force when that began
+  std::string complaint;      ///< about what was typed
+};
+
+void show_colours(ColourControls& colours, double now_s);
+void show_cut(CutControls& cut, ColourViewState& state, double now_s);
+void show_isosurface(ColourControls& colours, ColourViewState& state);
 
 /// What the parts keep between frames.
 struct SceneViewState {

@@ -1,4 +1,4 @@
-#include "client/displays/window/panel/gui/settings_view.h"
+#include "client/displays/window/panel/gui/panel_view.h"
 
 #include <fmt/format.h>
 #include <imgui.h>
@@ -8,12 +8,13 @@
 #include <array>
 #include <cstdlib>
 
-#include "client/displays/window/panel/gui/setting_rows.h"
 #include "client/displays/window/panel/gui/widgets.h"
 #include "client/stereo/mode.h"
 #include "client/viewer/input/look.h"
+#include "common/core/check.h"
 #include "common/core/within.h"
 #include "common/image/shading.h"
+#include "common/scene/settings.h"
 #include "common/splat/kernel_traits.h"
 #include "common/wire/limits.h"
 
@@ -89,6 +90,44 @@ void show_finish(Panel& panel) {
 }
 
 }  // namespace
+
+void setting_hint(const char* name) {
+  const auto* setting = scene::find_setting(name);
+  CHECK(setting);
+  hint(setting->what.data());
+}
+
+void setting_row(const char* name) {
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted(name);
+  setting_hint(name);
+  ImGui::SameLine(ImGui::GetFontSize() * 7.5f);
+  ImGui::SetNextItemWidth(-1);
+}
+
+void setting_list(Panel& panel, const char* name, std::span<const std::string> choices) {
+  setting_row(name);
+  const std::string now = panel.value(name);
+  if (!begin_list(name, now.c_str())) return;
+  for (const auto& text : choices)
+    if (choice(name, text, text == now)) panel.choose(name, text);
+  ImGui::EndCombo();
+}
+
+void setting_slider(Panel& panel, const char* name, double least, double most, const char* format) {
+  setting_row(name);
+  float value = std::strtof(panel.value(name).c_str(), nullptr);
+  const std::string id = std::string("##") + name;
+  if (seen("slider", name,
+           ImGui::SliderFloat(id.c_str(), &value, float(least), float(most), format, ImGuiSliderFlags_AlwaysClamp)))
+    panel.choose(name, fmt::format("{:.6g}", within(double(value), least, most)));
+}
+
+void setting_box(Panel& panel, const char* name) {
+  bool on = panel.value(name) == "on";
+  if (checkbox(name, &on)) panel.choose(name, on ? "on" : "off");
+  setting_hint(name);
+}
 
 void show_data(Panel& panel, SettingsViewState& state, std::optional<scene::Kind> kind) {
   if (kind == scene::Kind::kJulia || !kind) return ImGui::TextDisabled("nothing of it can be changed");

@@ -1,4 +1,4 @@
-#include "client/displays/window/panel/gui/transfer_view.h"
+#include "client/displays/window/panel/gui/scene_view.h"
 
 #include <fmt/format.h>
 
