@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
+#include "services/sampler/julia/steps.h"
 #include "services/sampler/julia/trace.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -57,6 +59,30 @@ HWY_AFTER_NAMESPACE();
 namespace telesplat::sampler {
 
 HWY_EXPORT(TraceParts);
+
+namespace {
+float dot3(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+}  // namespace
+
+bool face_normal(const JuliaScene::Constants& k, const JuliaRays& rays, const float* direction, float t,
+                 float* normal) {
+  for (int i = 0; i < 3; ++i) {
+    const float v = direction[i], inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
+    const float ta = (k.box_lo[i] - rays.origin[4 + i]) * inverse, tb = (k.box_hi[i] - rays.origin[4 + i]) * inverse;
+    if (std::min(ta, tb) != t) continue;
+    std::fill_n(normal, 3, 0.0f);
+    normal[i] = v < 0 ? 1.0f : -1.0f;
+    return true;
+  }
+  for (int i = 0; i < k.planes; ++i) {
+    const float v = dot3(k.plane_normal[i], direction), inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
+    const float at = (k.plane_offset[i] - dot3(k.plane_normal[i], rays.origin + 4)) * inverse;
+    if (inverse < 0 || at != t) continue;
+    for (int a = 0; a < 3; ++a) normal[a] = -k.plane_normal[i][a];
+    return true;
+  }
+  return false;
+}
 
 void julia_trace(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
                  JuliaPoints& points) {

@@ -1,6 +1,5 @@
-// Tracing a part of an image: from rays to surface points with normals and colours. Two implementations with equal
-// results: a SIMD kernel, chosen for the processor at run time, and its scalar oracle, in which the algorithm is meant
-// to be read.
+// Tracing a part of an image: from rays to surface points with normals and colours, by a SIMD kernel that is chosen for
+// the processor at run time. Its scalar oracle, with equal results, is meant to be read: tests/support/julia_plain.h.
 //
 //   cones    for each block of 8 x 8 pixels the depth up to which none of its rays meets the surface, or that none does
 //   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left
@@ -58,11 +57,7 @@ using JuliaTrace = void (*)(const JuliaScene::Constants& scene, const JuliaRays&
 bool face_normal(const JuliaScene::Constants& scene, const JuliaRays& rays, const float* direction, float t,
                  float* normal);
 
-/// SIMD.
 void julia_trace(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
                  JuliaPoints& points);
-/// The oracle.
-void julia_trace_plainly(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
-                         JuliaPoints& points);
 
 }  // namespace telesplat::sampler

@@ -8,7 +8,6 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/measures/reference.h"
 #include "common/image/normal.h"
-#include "services/sampler/julia/palette.h"
 #include "services/sampler/julia/sampler.h"
 #include "tests/support/julia_reference.h"
 

@@ -1,5 +1,7 @@
 // The scalar oracle of the Julia kernels: one ray after the other, the same operations in the same order. Read this one
 // first.
+#pragma once
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,20 +10,20 @@
 #include "services/sampler/julia/trace.h"
 
 namespace telesplat::sampler {
-namespace {
+namespace plain {
 
 using Constants = JuliaScene::Constants;
 
 struct Vec4 {
   float v[4];
 };
-Vec4 along(const float* origin, const Vec4& d, float t) {
+inline Vec4 along(const float* origin, const Vec4& d, float t) {
   Vec4 q;
   for (int i = 0; i < 4; ++i) q.v[i] = origin[i] + t * d.v[i];
   return q;
 }
 // What a step of `length` set units in the room-space direction n gains in orbit coordinates.
-Vec4 orbit_vector(const Constants& k, const float* n) {
+inline Vec4 orbit_vector(const Constants& k, const float* n) {
   Vec4 d;
   for (int i = 0; i < 4; ++i) d.v[i] = (n[0] * k.axes[0][i] + n[1] * k.axes[1][i]) + n[2] * k.axes[2][i];
   return d;
@@ -29,7 +31,7 @@ Vec4 orbit_vector(const Constants& k, const float* n) {
 
 // log x for normal x > 0: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh s, s = (m - 1) / (m + 1). Error below
 // 2e-7.
-float log_of(float x) {
+inline float log_of(float x) {
   const uint32_t offset = std::bit_cast<uint32_t>(x) - kSqrtHalfBits;
   const auto e = static_cast<float>(static_cast<int32_t>(offset) >> 23);
   const float m = std::bit_cast<float>((offset & 0x7fffff) + kSqrtHalfBits);
@@ -39,7 +41,7 @@ float log_of(float x) {
 }
 
 // The distance estimate in set units.
-float estimate(const Constants& k, const Vec4& q) {
+inline float estimate(const Constants& k, const Vec4& q) {
   float w = q.v[0], p = q.v[1], r = q.v[2] * q.v[2] + q.v[3] * q.v[3], d = 1;
   for (int i = 0; i <= k.iterations; ++i) {
     const float ww = w * w, n = ww + (p * p + r);
@@ -52,14 +54,14 @@ float estimate(const Constants& k, const Vec4& q) {
   return 0;
 }
 
-float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+inline float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
 
 // Depths between which a line lies in the ball |q| <= radius, in the box and inside the clip's planes, all grown by
 // `margin`; none if t1 < t0.
 struct Interval {
   float t0, t1;
 };
-Interval clip(const Constants& k, const JuliaRays& rays, const float* d, float ball, float margin) {
+inline Interval clip(const Constants& k, const JuliaRays& rays, const float* d, float ball, float margin) {
   const float* o = rays.origin;
   float a = 0, b = 0, c = -(ball * ball);
   for (int i = 0; i < 4; ++i) a = a + d[i] * d[i], b = b + o[i] * d[i], c = c + o[i] * o[i];
@@ -83,10 +85,12 @@ Interval clip(const Constants& k, const JuliaRays& rays, const float* d, float b
   return out;
 }
 
-float speed_of(const float* d) { return 0.5f * std::sqrt((d[0] * d[0] + d[1] * d[1]) + (d[2] * d[2] + d[3] * d[3])); }
+inline float speed_of(const float* d) {
+  return 0.5f * std::sqrt((d[0] * d[0] + d[1] * d[1]) + (d[2] * d[2] + d[3] * d[3]));
+}
 
 // Depth up to which the rays of a block are free, kNothing if they meet nothing.
-float cone_start(const Constants& k, const JuliaRays& rays, int block_x, int block_y) {
+inline float cone_start(const Constants& k, const JuliaRays& rays, int block_x, int block_y) {
   float d[7];
   for (int i = 0; i < 7; ++i) d[i] = rays.block_column[i][block_x] + rays.block_row[i][block_y];
   const Interval range = clip(k, rays, d, rays.block_ball, rays.block_margin);
@@ -107,7 +111,7 @@ float cone_start(const Constants& k, const JuliaRays& rays, int block_x, int blo
 struct Bracket {
   float t0, g0, t1, g1;
 };
-bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval range, Bracket& out) {
+inline bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval range, Bracket& out) {
   const float inverse = 1.0f / speed_of(d.v), threshold = (k.lod * rays.footprint) * inverse;  // set units -> depth
   float t = range.t0, last_t = t, last_r = 0;
   for (int i = 0; i < kMaxSteps; ++i) {
@@ -136,7 +140,7 @@ bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval ra
 }
 
 // Regula falsi, the Illinois way: an end that stays has its value halved.
-float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Bracket b) {
+inline float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Bracket b) {
   const float inverse = 1.0f / speed_of(d.v), threshold = (k.lod * rays.footprint) * inverse;
   const auto secant = [&] { return b.t0 + (b.t1 - b.t0) * (b.g0 / std::max(b.g0 - b.g1, kTiny)); };
   for (int i = 0; i < kRefinements; ++i) {
@@ -155,7 +159,7 @@ float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Bracket b
 struct Orbit {
   float gradient[3], trap;
 };
-Orbit follow(const Constants& k, const Vec4& q) {
+inline Orbit follow(const Constants& k, const Vec4& q) {
   const float r0 = q.v[2] * q.v[2] + q.v[3] * q.v[3];
   const float across = k.plane[1] * q.v[2] + k.plane[2] * q.v[3];
   float w = q.v[0], p = q.v[1], s = 1;  // s: what r1 and r2 have been multiplied by
@@ -188,7 +192,7 @@ Orbit follow(const Constants& k, const Vec4& q) {
 }
 
 // To unit length; false if it has none or is not finite.
-bool normalise(float* n) {
+inline bool normalise(float* n) {
   const float most = std::max(std::max(std::abs(n[0]), std::abs(n[1])), std::abs(n[2]));
   for (int i = 0; i < 3; ++i)
     if (!(std::abs(n[i]) < kNothing)) return false;
@@ -204,7 +208,7 @@ bool normalise(float* n) {
 // becomes the mean of itself and the one half a pixel further in, away from the rim. Where nothing is there, as of a
 // thread thinner than a pixel, the direction towards the viewer stands for it. Flat surfaces keep their normals,
 // however steep. back: towards the viewer, unit length; reach: a pixel there, in set units.
-void widen(const Constants& k, const Vec4& q, float reach, const float* back, float* n) {
+inline void widen(const Constants& k, const Vec4& q, float reach, const float* back, float* n) {
   const float lean = dot(n, back), in = kInward * reach;
   if (!(lean < kSteep)) return;
   float side[3];
@@ -226,7 +230,8 @@ void widen(const Constants& k, const Vec4& q, float reach, const float* back, fl
 
 // The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the
 // viewer. What still faces away, at a silhouette, is turned until it just does not.
-void normal_at(const Constants& k, const Vec4& q, const float* gradient, float reach, const float* ray, float* n) {
+inline void normal_at(const Constants& k, const Vec4& q, const float* gradient, float reach, const float* ray,
+                      float* n) {
   float back[3] = {-ray[0], -ray[1], -ray[2]};
   normalise(back);
   std::copy_n(gradient, 3, n);
@@ -247,7 +252,7 @@ void normal_at(const Constants& k, const Vec4& q, const float* gradient, float r
 }
 
 // Set units from a point of the room to where a line leaves what the clip keeps: what is cut away darkens nothing.
-float exit_of(const Constants& k, const float* room, const float* towards) {
+inline float exit_of(const Constants& k, const float* room, const float* towards) {
   float out = kNothing;
   for (int i = 0; i < k.planes; ++i) {
     const float inside = dot(k.plane_normal[i], room) - k.plane_offset[i], along = dot(k.plane_normal[i], towards);
@@ -256,7 +261,7 @@ float exit_of(const Constants& k, const float* room, const float* towards) {
   return out;
 }
 
-float occlusion_at(const Constants& k, const Vec4& q, const float* n, float exit) {
+inline float occlusion_at(const Constants& k, const Vec4& q, const float* n, float exit) {
   const Vec4 step = orbit_vector(k, n);
   float sum = 0;
   for (int i = 0; i < kOcclusionSteps; ++i) {
@@ -268,7 +273,7 @@ float occlusion_at(const Constants& k, const Vec4& q, const float* n, float exit
 }
 
 // 0 in full shadow .. 1 in full light.
-float lit_at(const Constants& k, const Vec4& q, float exit) {
+inline float lit_at(const Constants& k, const Vec4& q, float exit) {
   const Vec4 step = orbit_vector(k, k.light);
   float lit = 1, s = kShadowBegin * k.radius;
   for (int i = 0; i < kShadowSteps && s < std::min(kShadowEnd * k.radius, exit) && lit > 0; ++i) {
@@ -279,8 +284,8 @@ float lit_at(const Constants& k, const Vec4& q, float exit) {
   return lit;
 }
 
-void add_point(const Constants& k, const JuliaRays& rays, int x, int y, const float* d, const Bracket& bracket,
-               JuliaPoints& out) {
+inline void add_point(const Constants& k, const JuliaRays& rays, int x, int y, const float* d, const Bracket& bracket,
+                      JuliaPoints& out) {
   const Vec4 direction{d[0], d[1], d[2], d[3]};
   const float t = refine(k, rays, direction, bracket);
   const Vec4 q = along(rays.origin, direction, t);
@@ -301,7 +306,7 @@ void add_point(const Constants& k, const JuliaRays& rays, int x, int y, const fl
   out.light[i] = light;
 }
 
-void trace_block(const Constants& k, const JuliaRays& rays, const JuliaPart& part, int block, JuliaPoints& out) {
+inline void trace_block(const Constants& k, const JuliaRays& rays, const JuliaPart& part, int block, JuliaPoints& out) {
   const float start = cone_start(k, rays, block, part.block_row);
   for (int row = 0; row < kJuliaBlock; ++row)
     for (int column = 0; column < kJuliaBlock; ++column) {
@@ -317,32 +322,13 @@ void trace_block(const Constants& k, const JuliaRays& rays, const JuliaPart& par
     }
 }
 
-}  // namespace
+}  // namespace plain
 
-bool face_normal(const Constants& k, const JuliaRays& rays, const float* direction, float t, float* normal) {
-  for (int i = 0; i < 3; ++i) {
-    const float v = direction[i], inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
-    const float ta = (k.box_lo[i] - rays.origin[4 + i]) * inverse, tb = (k.box_hi[i] - rays.origin[4 + i]) * inverse;
-    if (std::min(ta, tb) != t) continue;
-    std::fill_n(normal, 3, 0.0f);
-    normal[i] = v < 0 ? 1.0f : -1.0f;
-    return true;
-  }
-  for (int i = 0; i < k.planes; ++i) {
-    const float v = dot(k.plane_normal[i], direction), inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
-    const float at = (k.plane_offset[i] - dot(k.plane_normal[i], rays.origin + 4)) * inverse;
-    if (inverse < 0 || at != t) continue;
-    for (int a = 0; a < 3; ++a) normal[a] = -k.plane_normal[i][a];
-    return true;
-  }
-  return false;
-}
-
-void julia_trace_plainly(const Constants& k, const JuliaRays& rays, std::span<const JuliaPart> parts,
-                         JuliaPoints& out) {
+inline void julia_trace_plainly(const JuliaScene::Constants& k, const JuliaRays& rays, std::span<const JuliaPart> parts,
+                                JuliaPoints& out) {
   for (const JuliaPart& part : parts)
     for (int block = part.block_begin; block < part.block_end; ++block)
-      if (part.any(block)) trace_block(k, rays, part, block, out);
+      if (part.any(block)) plain::trace_block(k, rays, part, block, out);
 }
 
 }  // namespace telesplat::sampler
