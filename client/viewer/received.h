@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "client/viewer/coupling/coupling.h"
-#include "client/viewer/coupling/coupling_gate.h"
 #include "client/viewer/coupling/view_requester.h"
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/renderers.h"

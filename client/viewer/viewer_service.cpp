@@ -15,7 +15,7 @@
 #include "common/core/file_hash.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
-#include "common/metrics/about.h"
+#include "common/metrics/process.h"
 #include "common/net/control.h"
 #include "common/net/service_main.h"
 

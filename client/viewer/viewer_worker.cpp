@@ -410,7 +410,7 @@ void ViewerWorker::request_views(double now_s) {
   if (!link_.session() || !feeds_.connected()) return;
   ask_again(now_s);
   if (wished_) return;  // nothing more is asked for until the coupling has changed
-  bool may_ask = gate_.with([](Coupling& c) { return c.may_ask(); });
+  bool may_ask = gate_.may_ask();
   while (may_ask) {
     const auto request = requester_.next(to_master_s(now_s));
     if (!request) return;
@@ -420,10 +420,7 @@ void ViewerWorker::request_views(double now_s) {
       const std::lock_guard lock(mutex_);
       sampled_width_ = request->camera.width, sampled_height_ = request->camera.height;
     }
-    gate_.with([&](Coupling& c) {
-      c.asked(request->request, now_s);
-      may_ask = c.waits() && c.may_ask();
-    });
+    may_ask = gate_.asked(request->request, now_s);
   }
 }
 

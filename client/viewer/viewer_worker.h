@@ -16,9 +16,9 @@
 #include "client/viewer/input/pose_feed.h"
 #include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
+#include "client/viewer/record/recent_values.h"
 #include "client/viewer/session_record.h"
 #include "client/viewer/succession.h"
-#include "common/metrics/recent/recent_values.h"
 #include "common/net/service.h"
 #include "common/scene/session.h"
 
@@ -178,7 +178,7 @@ class ViewerWorker {
   std::atomic<InstanceId> instance_;
   std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
   std::atomic<double> longest_gap_ms_{0};  // between two displayed frames
-  metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
+  RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
   std::thread thread_;
 };
 

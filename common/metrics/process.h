@@ -13,6 +13,9 @@ inline constexpr const char* kRecordFailed = "record_failed";
 /// Status values by which a viewer tells how many rows of updates.csv and stages.csv it has sent.
 inline constexpr const char *kUpdateRows = "update_rows", *kStageRows = "stage_rows";
 
+/// Facts by which processes tell the record what the figures do not: tables of session.toml, "\n[table]\nkey = ...\n".
+inline constexpr const char* kRecordFact = "record";
+
 struct Process {
   std::string role, name;
   uint64_t pid = 0;

@@ -10,7 +10,6 @@
 
 #include "common/core/log.h"
 #include "common/core/whole_file.h"
-#include "common/metrics/lives/lives.h"
 
 namespace telesplat::metrics {
 namespace {

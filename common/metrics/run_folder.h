@@ -8,6 +8,9 @@
 
 namespace telesplat::metrics {
 
+/// Tells when each master that wrote the record began (services/master/record/lives.h).
+inline constexpr const char* kLivesFile = "lives.csv";
+
 /// Who looks: a launcher writes logs too; a master that is started by hand finds those of others there.
 enum class Logs { kOurs, kOthers };
 

@@ -8,13 +8,17 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 
 #include "common/core/log.h"
+#include "common/core/machine.h"
+#include "common/core/version.h"
 #include "common/net/master_address.h"
 #include "common/options/complain.h"
 
 namespace telesplat::net {
+
 namespace {
 
 constexpr const char* kWhoComes = "who takes part, and how much";
@@ -226,6 +230,16 @@ int guarded_main(const std::function<int()>& body) {
   } catch (const std::exception& e) {
     return complain({e.what()}, 1);
   }
+}
+
+std::map<std::string, std::string> process_facts() {
+  const Machine machine = this_machine();
+  std::map<std::string, std::string> out{{"host", host_name()}, {"version", version()}, {"command", command_line()}};
+  if (!machine.processor.empty()) out["processor"] = machine.processor;
+  if (machine.cores > 0) out["cores"] = std::to_string(machine.cores);
+  if (machine.memory_mb > 0) out["memory_mb"] = fmt::format("{:.0f}", machine.memory_mb);
+  if (const char* launcher = std::getenv(kLaunchedByVariable); launcher && *launcher) out["launched_by"] = launcher;
+  return out;
 }
 
 }  // namespace telesplat::net

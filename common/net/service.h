@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -97,5 +98,11 @@ double peak_resident_mb();
 
 /// Runs a program's body: exceptions that escape become one line and exit code 1.
 int guarded_main(const std::function<int()>& body);
+
+// What every process tells the record of a run about itself.
+
+/// Facts of a hello: "host", "version", "processor", "cores", "memory_mb", "command" (its command line), "launched_by"
+/// (the command line of the launcher that started it). What the system does not tell is not there.
+std::map<std::string, std::string> process_facts();
 
 }  // namespace telesplat::net

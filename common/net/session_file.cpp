@@ -24,16 +24,16 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kMostBytes = 64 << 10;
 constexpr size_t kMostText = 4096;  // of one value that is read; less is written
-constexpr std::string_view kBegin = "session-", kEnd = ".json";
+constexpr std::string_view kFileBegin = "session-", kFileEnd = ".json";
 
 // Where a process number means something: a container has numbers of its own, and after the machine started anew they
 // are others.
-struct Place {
+struct SessionPlace {
   std::string host, numbers, boot;
 };
 
-Place this_place() {
-  Place out{.host = to_utf8(host_name()), .numbers = {}, .boot = {}};
+SessionPlace this_place() {
+  SessionPlace out{.host = to_utf8(host_name()), .numbers = {}, .boot = {}};
   std::error_code error;
   out.numbers = to_utf8(fs::read_symlink("/proc/self/ns/pid", error).string());
   std::ifstream("/proc/sys/kernel/random/boot_id") >> out.boot;
@@ -58,7 +58,7 @@ std::optional<uint64_t> process_start(uint64_t pid) {
 }
 
 Json to_json(const RunningSession& s) {
-  const Place place = this_place();
+  const SessionPlace place = this_place();
   const auto told = [](const std::string& text) { return to_utf8(text).substr(0, kMostText - 8); };
   return {{"address", told(s.address)},
           {"pid", s.pid},
@@ -77,7 +77,7 @@ Json to_json(const RunningSession& s) {
 struct File {
   RunningSession session;
   uint64_t process_start = 0;
-  Place place;
+  SessionPlace place;
 };
 
 // What would steer a terminal, or break a table's line.
@@ -101,7 +101,7 @@ std::optional<uint64_t> count_at(const Json& json, const char* key) {
   return it != json.end() && it->is_number_unsigned() ? std::optional(it->get<uint64_t>()) : std::nullopt;
 }
 
-bool is_address(const std::string& text) {
+bool looks_like_address(const std::string& text) {
   return (text.starts_with("tcp://") || text.starts_with("ipc://")) && text.find(' ') == std::string::npos;
 }
 
@@ -114,7 +114,7 @@ std::optional<File> parse(const std::string& text) {
              folder = text_at(json, "run_folder"), by = text_at(json, "started_by"), host = text_at(json, "host"),
              numbers = text_at(json, "numbers"), boot = text_at(json, "boot"), keys = text_at(json, "keys");
   if (!pid || !start || at == json.end() || !at->is_number() || !std::isfinite(at->get<double>()) || !address ||
-      !is_address(*address) || !scene || !kind || !folder || !by || !host || !numbers || !boot ||
+      !looks_like_address(*address) || !scene || !kind || !folder || !by || !host || !numbers || !boot ||
       (!keys && json.contains("keys")))
     return std::nullopt;
   return File{.session = {.address = *address,
@@ -129,9 +129,9 @@ std::optional<File> parse(const std::string& text) {
               .place = {.host = *host, .numbers = *numbers, .boot = *boot}};
 }
 
-void read_sessions(const RuntimeFolder& folder, const Place& here, std::vector<RunningSession>& out) {
+void read_sessions(const RuntimeFolder& folder, const SessionPlace& here, std::vector<RunningSession>& out) {
   for (const auto& name : folder.names()) {
-    if (!name.starts_with(kBegin) || !name.ends_with(kEnd)) continue;
+    if (!name.starts_with(kFileBegin) || !name.ends_with(kFileEnd)) continue;
     const auto text = folder.read(name, kMostBytes);
     auto file = text ? parse(*text) : std::nullopt;
     if (!file || file->place.host != here.host || file->place.numbers != here.numbers) continue;
@@ -148,7 +148,7 @@ Result<SessionFile> SessionFile::publish(const RunningSession& session) {
   auto folder = RuntimeFolder::make();
   if (!folder) return folder.error();
   const auto start = process_start(session.pid);
-  SessionFile out(std::move(*folder), fmt::format("{}{}-{}{}", kBegin, session.pid, start.value_or(0), kEnd));
+  SessionFile out(std::move(*folder), fmt::format("{}{}-{}{}", kFileBegin, session.pid, start.value_or(0), kFileEnd));
   if (const Status s = out.update(session); !s) return s.error();
   return out;
 }
@@ -162,7 +162,7 @@ Status SessionFile::update(const RunningSession& session) const {
 }
 
 std::vector<RunningSession> running_sessions() {
-  const Place here = this_place();
+  const SessionPlace here = this_place();
   std::vector<RunningSession> out;
   for (const auto& path : RuntimeFolder::candidates())
     if (const auto folder = RuntimeFolder::open(path, false)) read_sessions(*folder, here, out);

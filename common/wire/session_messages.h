@@ -128,7 +128,7 @@ struct WhoAreYou {
   template <class F> static void fields(F& f, auto& m) { f("master", m.master); }
 };
 
-/// Every process -> master, and its answer: what the master's clock says (common/net/clock_estimate.h).
+/// Every process -> master, and its answer: what the master's clock says (common/net/master_link.h).
 struct ClockRequest {
   static constexpr std::string_view kName = "clock_request";
   double sent_s = 0;      ///< sender's own clock
@@ -144,28 +144,6 @@ struct ClockReply {
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("sent_s", m.sent_s); f("received_s", m.received_s); f("replied_s", m.replied_s);
     f("clock", m.clock);
-  }
-};
-
-/// Viewer -> master: sample this view. With `buffers` 0 (asynchronous coupling) only the newest request of a viewer
-/// waits: it replaces the one before. Otherwise (synchronous: 1, loose: the buffers of T6.4) requests wait in order, at
-/// most `buffers` of a viewer; more are dropped.
-struct ViewRequest {
-  static constexpr std::string_view kName = "view_request";
-  InstanceId viewer;
-  RequestId request;
-  geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
-  Moments moments;          ///< requested_s; the master goes on
-  uint64_t buffers = 0;     ///< at most kMaxBuffers
-  double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0: of
-                            ///< one of camera's pixels
-  std::string wall;           ///< SwapReady::wall of a viewer that presents with others; empty: it does not
-  uint64_t wall_viewers = 0;  ///< that the wall has, at most kMaxWallViewers
-  uint64_t ask = 0;           ///< Swap::ask: views of the same are of one head; 0: of the viewer's own
-  template <class F> static void fields(F& f, auto& m) {
-    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("moments", m.moments);
-    f("buffers", m.buffers); f("footprint", m.footprint); f("wall", m.wall); f("wall_viewers", m.wall_viewers);
-    f("ask", m.ask);
   }
 };
 

@@ -19,6 +19,28 @@ namespace telesplat::wire {
 // Structs and their fields() stand as tables.
 // clang-format off
 
+/// Viewer -> master: sample this view. With `buffers` 0 (asynchronous coupling) only the newest request of a viewer
+/// waits: it replaces the one before. Otherwise (synchronous: 1, loose: the buffers of T6.4) requests wait in order, at
+/// most `buffers` of a viewer; more are dropped.
+struct ViewRequest {
+  static constexpr std::string_view kName = "view_request";
+  InstanceId viewer;
+  RequestId request;
+  geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
+  Moments moments;          ///< requested_s; the master goes on
+  uint64_t buffers = 0;     ///< at most kMaxBuffers
+  double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0: of
+                            ///< one of camera's pixels
+  std::string wall;           ///< SwapReady::wall of a viewer that presents with others; empty: it does not
+  uint64_t wall_viewers = 0;  ///< that the wall has, at most kMaxWallViewers
+  uint64_t ask = 0;           ///< Swap::ask: views of the same are of one head; 0: of the viewer's own
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("moments", m.moments);
+    f("buffers", m.buffers); f("footprint", m.footprint); f("wall", m.wall); f("wall_viewers", m.wall_viewers);
+    f("ask", m.ask);
+  }
+};
+
 // ---- control: samplers and packer (DEALER) <-> master (ROUTER) -----------------------------------------------------
 
 /// Sampler -> master: one tile, please, as soon as there is one. Samplers of a volume ask for their next frame with it.

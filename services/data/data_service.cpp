@@ -8,7 +8,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
-#include "common/metrics/about.h"
+#include "common/metrics/process.h"
 #include "common/net/connections/peer_rates.h"
 #include "common/net/master_link.h"
 #include "services/data/base/cut_off.h"

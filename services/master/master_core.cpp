@@ -9,9 +9,9 @@
 
 #include "common/core/log.h"
 #include "common/core/utf8.h"
-#include "common/metrics/tables/viewer_tables.h"
 #include "common/scene/session.h"
-#include "services/master/peers/hello_check.h"
+#include "services/master/peers.h"
+#include "services/master/record/measured.h"
 
 namespace telesplat::master {
 namespace {
@@ -35,7 +35,7 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
     : options_(options),
       instance_(instance),
       record_(record),
-      signer_(instance,
+      outbox_(instance,
               [this](const std::string& id) {
                 const auto p = peers_.find(id);
                 return p == peers_.end() ? InstanceId{} : p->second.hello.instance;
@@ -49,12 +49,10 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
     const auto id = instances_.find(instance);
     return id == instances_.end() ? std::string("?") : name_of(id->second);
   };
-  const PlanLinks links{.outbox = outbox_,
-                        .signer = signer_,
-                        .record = record_,
-                        .name_of = name_of,
-                        .name_of_instance = name_of_instance,
-                        .packer = [this] { return packer(); }};
+  const PlanLinks links{
+      .outbox = outbox_, .record = record_, .name_of = name_of, .name_of_instance = name_of_instance, .packer = [this] {
+        return packer();
+      }};
   for (const auto kind : scene::kKinds)
     if (auto& plan = plans_[scene::pipeline_of(kind)]; !plan)
       plan = make_plan(scene::pipeline_of(kind), options_, links);

@@ -12,19 +12,15 @@
 #include <vector>
 
 #include "common/core/log.h"
-#include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
 #include "services/master/gate/gate.h"
-#include "services/master/leases/lease_signer.h"
 #include "services/master/live/exposition.h"
-#include "services/master/orders/clipping.h"
-#include "services/master/orders/errands.h"
+#include "services/master/master_options.h"
+#include "services/master/orders.h"
 #include "services/master/outbox.h"
-#include "services/master/peers/departed.h"
-#include "services/master/peers/namesakes.h"
-#include "services/master/peers/pace.h"
+#include "services/master/peers.h"
 #include "services/master/plan.h"
-#include "services/master/settings.h"
+#include "services/master/record/run_record.h"
 #include "services/master/wall/swap_barrier.h"
 
 namespace telesplat::master {
@@ -181,7 +177,6 @@ class MasterCore {
   InstanceId instance_;
   metrics::RunRecord& record_;
   Outbox outbox_;
-  LeaseSigner signer_;
   Gate gate_{options_.limits};
   net::RunningSession session_;
   std::string run_id_;

@@ -1,11 +1,11 @@
 #include "services/master/master_options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <optional>
-
-#include <fmt/format.h>
 
 #include "common/image/background.h"
 #include "common/image/shading.h"
@@ -14,6 +14,7 @@
 #include "common/wire/limits.h"
 
 namespace telesplat::master {
+
 namespace {
 
 using scene::Kinds;
@@ -291,6 +292,33 @@ options::Table table(MasterServiceOptions& o) {
       background_row(o.master.settings)};
   return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own),
                          options::joined(options::joined(record_table(o), limit_table(o)), session_table(o)));
+}
+
+namespace {
+
+const scene::Policy& policy(std::optional<scene::Kind> kind) {
+  return scene::policy_of(kind.value_or(scene::Kind::kMesh));
+}
+
+}  // namespace
+
+const char* name_of(Progressive progressive) {
+  return progressive == Progressive::kAuto ? "auto" : progressive == Progressive::kOn ? "on" : "off";
+}
+
+bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  if (options.settings.pictures) return false;
+  return options.progressive == Progressive::kAuto ? policy(kind).progressive : options.progressive == Progressive::kOn;
+}
+
+wire::SessionSettings settings(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  wire::SessionSettings out = options.settings;
+  const bool points = scene::pipeline_of(kind.value_or(scene::Kind::kMesh)) == scene::Pipeline::kPoints;
+  out.steering = out.steering && points && !out.pictures && !out.keep_redundant;
+  out.max_rate_mbit = options.schedule.max_rate_mbit;
+  out.max_sampling_pixels = options.limits.max_sampling_pixels;
+  out.least_sampling = policy(kind).least_sampling;
+  return out;
 }
 
 }  // namespace telesplat::master

@@ -1,11 +1,13 @@
 // What the master sends: plans and MasterCore put messages in, the service takes them out.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/core/log.h"
+#include "common/wire/lease_seal.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::master {
@@ -17,6 +19,19 @@ struct Outgoing {
 
 class Outbox {
  public:
+  /// instance_of: of the sampler with this routing id.
+  Outbox(InstanceId master, std::function<InstanceId(const std::string& sampler)> instance_of)
+      : master_(master), instance_of_(std::move(instance_of)) {}
+
+  /// A lease: wire::Lease or wire::SliceLease, with the master's mark and seal. sampler: the routing id of who gets it.
+  template <class L>
+  void send_lease(const std::string& sampler, L& lease) {
+    lease.master = master_;
+    wire::seal(lease, instance_of_(sampler), lease_key_);
+    send(sampler, lease);
+  }
+  /// For the packer.
+  const std::vector<uint32_t>& lease_key() const { return lease_key_; }
   /// Not one that no receiver would take.
   template <class M>
   void send(const std::string& peer, const M& m) {
@@ -37,6 +52,9 @@ class Outbox {
   std::vector<Outgoing> take() { return std::exchange(messages_, {}); }
 
  private:
+  InstanceId master_;
+  std::function<InstanceId(const std::string&)> instance_of_;
+  std::vector<uint32_t> lease_key_ = wire::make_lease_key();
   bool told_ = false;  // that one was too large
   std::vector<Outgoing> messages_;
 };

@@ -26,7 +26,6 @@ class RunRecord;
 
 namespace telesplat::master {
 
-class LeaseSigner;
 class Outbox;
 struct MasterOptions;
 
@@ -147,7 +146,6 @@ class Plan : public Scene, public Schedule {
 /// What plans see of the master. Must outlive them.
 struct PlanLinks {
   Outbox& outbox;
-  const LeaseSigner& signer;
   metrics::RunRecord& record;
   /// For people; "?": it is not known.
   std::function<std::string(const std::string& sampler)> name_of;

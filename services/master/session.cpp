@@ -13,7 +13,7 @@
 #include "common/scene/session.h"
 #include "common/scene/settings.h"
 #include "services/master/master_core.h"
-#include "services/master/orders/health.h"
+#include "services/master/orders.h"
 
 namespace telesplat::master {
 namespace {
@@ -101,7 +101,7 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
     w.facts["run_folder"] = session_.run_folder;
     w.facts["run_id"] = run_id_;
   }
-  if (to.hello.role == "packer") w.lease_key = signer_.key();
+  if (to.hello.role == "packer") w.lease_key = outbox_.lease_key();
   if (to.coupling) {
     w.settings.coupling = to.coupling->mode;
     w.settings.buffers = to.coupling->buffers;

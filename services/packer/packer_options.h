@@ -1,6 +1,9 @@
 // What the packer can be told on its command line.
 #pragma once
 
+#include <string>
+
+#include "common/core/result.h"
 #include "common/net/service.h"
 
 namespace telesplat::packer {
@@ -16,5 +19,11 @@ struct PackerOptions {
 
 /// A row a flag; they point into `options`.
 options::Table table(PackerOptions& options);
+
+// Where the sockets of a packer bind.
+
+/// Where the n-th socket (from 0) of a process that was told to bind to `bind` does so: tcp://HOST:PORT with PORT + n.
+/// Free ports (`*`) and other transports stay as they are. Error: a port above 65535.
+Result<std::string> bind_of(const std::string& bind, int n);
 
 }  // namespace telesplat::packer

@@ -10,15 +10,13 @@
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
 #include "common/net/connections/peer_rates.h"
-#include "common/net/connections/work_shares.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
-#include "services/packer/epoch_hold.h"
+#include "services/packer/packer_options.h"
+#include "services/packer/packing.h"
 #include "services/packer/pictures/picture_packing.h"
 #include "services/packer/points/point_packing.h"
-#include "services/packer/ports.h"
 #include "services/packer/slices/slice_packing.h"
-#include "services/packer/spare_time.h"
 
 namespace telesplat::packer {
 namespace {
@@ -285,6 +283,26 @@ class PackerService {
 };
 
 }  // namespace
+
+bool SpareTime::begins(double now_s, bool hurried) {
+  if (hurried && now_s - rested_s_ < kLongestHurry_s) return false;
+  rested_s_ = now_s;
+  return true;
+}
+
+void SpareTime::follow(const wire::PlanRequest& view) {
+  if (question_ && question_->viewer == view.viewer && question_->epoch == view.epoch)
+    question_->camera = view.camera, question_->still = view.still;
+}
+
+const wire::PlanRequest* SpareTime::question(double now_s) const {
+  return question_ && (question_->still || now_s >= next_s_) ? &*question_ : nullptr;
+}
+
+void SpareTime::worked(double from_s, double until_s, bool done) {
+  next_s_ = from_s + (1 + kPause) * (until_s - from_s);
+  if (done) question_.reset();
+}
 
 Result<int> run(const PackerOptions& o) {
   const auto access = net::begin_service(o.service, {net::Role::kPacker}, true);

@@ -10,7 +10,7 @@ struct SamplerOptions {
   std::string kind = "auto";     ///< of meshes: "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
   int threads = 0;               ///< 0: all cores
   double chunk_cache_mb = 8192;  ///< of chunks or voxels held, unless one view needs more
-  std::string replay;            ///< file of rows sampled before (tiles/replay_file.h); empty: samples itself
+  std::string replay;            ///< file of rows sampled before (tiles/replay.h); empty: samples itself
   double cost_scale = 1;         ///< a replayed lease takes this times what its rows took
 };
 

@@ -1,16 +1,22 @@
 #include "services/sampler/sampler_service.h"
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
+#include <mutex>
 #include <optional>
+#include <thread>
+#include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/guarded.h"
 #include "common/core/machine.h"
 #include "common/metrics/recorder.h"
 #include "common/net/master_link.h"
 #include "common/options/complain.h"
 #include "common/scene/session.h"
-#include "services/sampler/drain_guard.h"
 #include "services/sampler/mesh/sampler.h"
 #include "services/sampler/tiles/replay.h"
 #include "services/sampler/tiles/work.h"
@@ -19,11 +25,63 @@
 namespace telesplat::sampler {
 namespace {
 
-constexpr int kLeases = 2;              // held and asked for: one being sampled, one to go on with at once
-constexpr double kIdle_s = 0.1;         // the longest wait: then status reports and hellos are due
-constexpr double kSpanFlush_s = 1;      // between two deliveries of spans
-constexpr double kSendAgain_s = 0.025;  // between two tries to send
-constexpr double kSendFor_s = 1;        // to a packer that is slow or being restarted
+constexpr int kLeases = 2;                           // held and asked for: one being sampled, one to go on with at once
+constexpr double kIdle_s = 0.1;                      // the longest wait: then status reports and hellos are due
+constexpr double kSpanFlush_s = 1;                   // between two deliveries of spans
+constexpr double kSendAgain_s = 0.025;               // between two tries to send
+constexpr double kSendFor_s = 1;                     // to a packer that is slow or being restarted
+constexpr std::chrono::duration<double> kLook{0.2};  // how late a stop is noticed
+
+// A sampler begins no lease later than this after it was told to stop.
+constexpr double kDrain_s = 0.8;
+// This long after it was told to stop it ends, in the middle of anything: its manager may kill it after two seconds.
+constexpr double kStop_s = 1.3;
+
+// Makes a sampler that is told to stop end in time, even in the middle of a lease that never ends.
+class DrainGuard {
+ public:
+  // From then on watches net::stop_requested(). If the process still runs kStop_s after it was told to stop, says
+  // goodbye to the master in the name of `instance`, so that its leases go to others at once, and ends the process
+  // with code 0.
+  DrainGuard(const std::string& master, InstanceId instance, net::Access access = {});
+  ~DrainGuard();
+
+ private:
+  void watch(const std::string& master, InstanceId instance, const net::Access& access);
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool done_ = false;
+  std::thread thread_;
+};
+
+DrainGuard::DrainGuard(const std::string& master, InstanceId instance, net::Access access)
+    : thread_([this, master, instance, access = std::move(access)] { watch(master, instance, access); }) {}
+
+DrainGuard::~DrainGuard() {
+  {
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void DrainGuard::watch(const std::string& master, InstanceId instance, const net::Access& access) {
+  std::unique_lock lock(mutex_);
+  const auto done = [this] { return done_; };
+  while (!net::stop_requested())
+    if (wake_.wait_for(lock, kLook, done)) return;
+  if (wake_.wait_for(lock, std::chrono::duration<double>(kStop_s), done)) return;
+  log::warn("told to stop, and a lease takes too long: it is given up");
+  const Status told = guarded("saying goodbye", [&] {
+    // The service's own socket belongs to the thread that is busy.
+    net::Context context(access);
+    net::Socket socket(context, net::Kind::kDealer, "goodbye");
+    if (socket.connect(master)) socket.send(wire::Goodbye{instance});
+  });
+  std::_Exit(told ? 0 : 1);
+}
 
 class SamplerService {
  public:

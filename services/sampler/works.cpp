@@ -5,7 +5,7 @@
 #include "services/sampler/julia/tiles.h"
 #include "services/sampler/mesh/tiles.h"
 #include "services/sampler/tiles/work.h"
-#include "services/sampler/volume/shear/slabs.h"
+#include "services/sampler/volume/shear/splatter.h"
 #include "services/sampler/volume/work.h"
 
 namespace telesplat::sampler {

@@ -16,7 +16,7 @@
 #include "common/image/measures/quality.h"
 #include "common/splat/cpu_splatter.h"
 #include "services/packer/points/packer_core.h"
-#include "services/sampler/mesh/ray_sampler.h"
+#include "services/sampler/mesh/sampler.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat {

@@ -9,7 +9,7 @@
 #include "common/julia/parameters.h"
 #include "common/volume/session.h"
 #include "services/master/master_core.h"
-#include "services/master/slabs/scatter_schedule.h"
+#include "services/master/slabs/assignment.h"
 
 namespace telesplat {
 namespace {

@@ -7,7 +7,7 @@
 #include "common/points/mosaic_builder.h"
 #include "common/wire/serial.h"
 #include "services/packer/points/block_gatherer.h"
-#include "services/packer/points/patch_obsolescence.h"
+#include "services/packer/points/obsolescence.h"
 #include "tests/support/packer_scenes.h"
 
 namespace telesplat {

@@ -1,12 +1,11 @@
-// Mesh samplers on a terrain of about a million triangles, whole frames of 1280 x 800. Baselines in the same run: the
-// same rays through Embree without attributes, and the OpenGL rasteriser.
+// Mesh samplers on a terrain of about a million triangles, whole frames of 1280 x 800. Baseline in the same run:
+// the OpenGL rasteriser.
 #include <benchmark/benchmark.h>
 
 #include <array>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/mesh/ray_packets.h"
-#include "services/sampler/mesh/ray_sampler.h"
+#include "services/sampler/mesh/sampler.h"
 #include "tests/support/masks.h"
 #include "tests/support/mesh_chunks.h"
 
@@ -42,15 +41,6 @@ void sample_frames(benchmark::State& state, Sampler& sampler) {
 }
 
 void SamplerRay(benchmark::State& state) { sample_frames(state, *make_ray_sampler(0)); }
-
-void SamplerRayWithoutAttributes(benchmark::State& state) {
-  RayScene scene(0);
-  if (!scene.add(terrain()).ok()) return state.SkipWithError("chunks refused");
-  const geometry::Camera camera = view(double(state.range(0)));
-  for (auto _ : state)
-    trace_tile(scene, camera, kFrame, [](const RTCRayHit8& packet, int, int) { benchmark::DoNotOptimize(packet); });
-  count(state, kFrame.width * kFrame.height);
-}
 
 void SamplerRaster(benchmark::State& state) {
   auto sampler = make_raster_sampler();
@@ -120,7 +110,6 @@ void SamplerRasterMasked(benchmark::State& state) {
 BENCHMARK(SamplerRayMasked)->DenseRange(0, 4)->Unit(benchmark::kMillisecond);
 BENCHMARK(SamplerRasterMasked)->DenseRange(0, 4)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerRay)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(SamplerRayWithoutAttributes)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerRaster)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerRenderDirectly)->Arg(90)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerBuild)->Unit(benchmark::kMillisecond)->UseRealTime();

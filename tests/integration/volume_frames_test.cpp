@@ -8,7 +8,7 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "services/packer/slices/slice_packing.h"
-#include "services/sampler/volume/shear/slabs.h"
+#include "services/sampler/volume/shear/splatter.h"
 #include "services/sampler/volume/work.h"
 #include "tests/support/keys/lease_key.h"
 #include "tests/support/patience.h"

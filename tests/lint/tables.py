@@ -55,6 +55,7 @@ FLOORS = {
         ["services/sampler"],
     ],
     "services/master": [
+        ["services/master/record"],
         [("services/master", "services/master/gate/gate.*", "services/master/master_options.*")],
         [
             "services/master/gate",
@@ -62,8 +63,6 @@ FLOORS = {
             "services/master/slabs",
             "services/master/live",
             "services/master/wall",
-            "services/master/orders",
-            "services/master/peers",
         ],
         ["services/master/plan.cpp"],
         [
@@ -76,7 +75,7 @@ FLOORS = {
         ],
     ],
     "services/packer": [
-        [("services/packer/epoch_hold.h", "services/packer/packing.h", "services/packer/state_senders.h")],
+        ["services/packer/packing.h"],
         ["services/packer/points", "services/packer/slices", "services/packer/pictures"],
         ["services/packer"],
     ],
@@ -155,7 +154,7 @@ OUTSIDE_HEADERS = [
             "client/wall",
             "common/net/keys",
             "client/stereo/autostereo/panel_file.cpp",
-            "services/master/peers/told_tables.cpp",
+            "services/master/master_record.cpp",
             "tests/unit/master/told_tables_test.cpp",
             "tools/telesplat",
         ],

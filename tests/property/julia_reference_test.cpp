@@ -8,7 +8,7 @@
 
 #include "common/geometry/trajectory.h"
 #include "services/sampler/julia/sampler.h"
-#include "tests/support/julia_reference.h"
+#include "tests/support/julia/reference.h"
 
 namespace telesplat::sampler {
 namespace {

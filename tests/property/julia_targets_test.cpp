@@ -5,7 +5,7 @@
 
 #include "common/geometry/trajectory.h"
 #include "services/sampler/julia/sampler.h"
-#include "tests/support/julia_plain.h"
+#include "tests/support/julia/plain.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::sampler {

@@ -8,7 +8,7 @@
 #include "services/sampler/julia/sampler.h"
 #include "services/sampler/mesh/masked_pixels.h"
 #include "services/sampler/mesh/sampler.h"
-#include "tests/support/julia_plain.h"
+#include "tests/support/julia/plain.h"
 #include "tests/support/masks.h"
 #include "tests/support/mesh_chunks.h"
 

@@ -8,7 +8,7 @@
 
 #include "common/codec/mask_stream.h"
 #include "common/wire/tile_messages.h"
-#include "services/packer/points/sampled_tile.h"
+#include "services/packer/points/event.h"
 #include "tests/support/points_scenes.h"
 
 namespace telesplat::test {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "common/core/check.h"
+#include "client/viewer/coupling/view_requester.h"
 
 namespace telesplat::viewer {
 
@@ -43,72 +43,6 @@ std::optional<CouplingState> coupling_told(wire::CouplingOrder order, uint64_t b
       break;
   }
   return coupling_state(CouplingMode::kLoose, int(buffers));
-}
-
-void Coupling::set_buffers(int buffers) {
-  buffers_ = buffers;
-  if (waits()) return;
-  open_.clear();
-  ready_.clear();
-}
-
-void Coupling::asked(RequestId request, double now_s) {
-  if (!waits()) return;
-  CHECK(open_.empty() || open_.back().request < request);
-  if (open_.empty()) heard_s_ = now_s;
-  open_.push_back({request});
-}
-
-bool Coupling::is_open(RequestId request) const {
-  return std::any_of(open_.begin(), open_.end(), [&](const Open& o) { return o.request == request && !o.complete; });
-}
-
-void Coupling::skip_before(RequestId request) {
-  if (is_open(request)) std::erase_if(open_, [&](const Open& o) { return o.request < request && !o.complete; });
-}
-
-std::vector<RequestId> Coupling::release() {
-  std::vector<RequestId> out;
-  for (; !open_.empty() && open_.front().complete; open_.pop_front()) out.push_back(open_.front().request);
-  ready_.insert(ready_.end(), out.begin(), out.end());
-  return out;
-}
-
-std::vector<RequestId> Coupling::completed(RequestId request, double now_s) {
-  progress(now_s);
-  const auto found = std::ranges::find(open_, request, &Open::request);
-  if (found != open_.end()) found->complete = true;
-  if (newest_ && found != open_.end()) {
-    open_.erase(open_.begin(), found);
-    ready_.clear();
-  }
-  return release();
-}
-
-std::vector<RequestId> Coupling::overdue(double now_s, std::vector<RequestId>& released) {
-  if (open_.empty() || now_s < heard_s_ + kPatience_s) return {};
-  heard_s_ = now_s;
-  const auto complete = std::find_if(open_.begin(), open_.end(), [](const Open& o) { return o.complete; });
-  if (complete == open_.end()) return open();
-  open_.erase(open_.begin(), complete);
-  released = release();
-  return {};
-}
-
-std::vector<RequestId> Coupling::open() const {
-  std::vector<RequestId> out;
-  for (const Open& o : open_)
-    if (!o.complete) out.push_back(o.request);
-  return out;
-}
-
-std::optional<RequestId> Coupling::take() {
-  CHECK(!displaying_);
-  if (ready_.empty()) return std::nullopt;
-  const RequestId out = ready_.front();
-  ready_.pop_front();
-  displaying_ = true;
-  return out;
 }
 
 bool StallWatch::waiting(double now_s, double begin_s, double last_sign_s, const CouplingState& coupling) {

@@ -1,15 +1,12 @@
-// How the display and the server wait for each other (T6.3-6.5). Requests, updates and frames go in as they happen,
-// decisions come out; no sockets, no clocks, no threads.
+// How the display and the server wait for each other (T6.3-6.5): the modes and their names. view_requester.h has the
+// credits.
 #pragma once
 
 #include <algorithm>
-#include <deque>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "common/core/ids.h"
 #include "common/geometry/camera.h"
 #include "common/wire/limits.h"
 #include "common/wire/session_messages.h"
@@ -40,79 +37,6 @@ CouplingState coupling_state(CouplingMode mode, int loose);
 std::string coupling_text(const CouplingState& state);
 /// As the session's settings have it. nullopt: the viewer keeps its own.
 std::optional<CouplingState> coupling_told(wire::CouplingOrder order, uint64_t buffers);
-
-/// Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that
-/// shows its update has been displayed. Updates are displayed in the order of their requests, each in exactly one
-/// frame.
-class Coupling {
- public:
-  /// Without any sign of an answer for so long the master may have forgotten the requests (it was restarted) or found
-  /// nothing to sample.
-  static constexpr double kPatience_s = 2;
-
-  /// buffers: as buffers_of(); 0: asynchronous, nothing below applies and may_ask() is always true.
-  /// newest: an update that comes makes those before it void, and holds no credit: it is displayed unless a newer one
-  /// comes before.
-  explicit Coupling(int buffers, bool newest = false) : buffers_(buffers), newest_(newest) {}
-  int buffers() const { return buffers_; }
-  bool waits() const { return buffers_ > 0; }
-  /// From now on there are so many. Credits that are out stay out: with fewer buffers than before nothing may be asked
-  /// for until enough updates were displayed. 0: what is open or complete is forgotten, nothing is waited for any more.
-  void set_buffers(int buffers);
-  void set_newest(bool newest) { newest_ = newest; }
-
-  // ---- requests ----
-  bool may_ask() const {
-    const size_t here = newest_ ? 0 : ready_.size() + (displaying_ ? 1 : 0);
-    return !waits() || open_.size() + here < size_t(buffers_);
-  }
-  /// Ids ascend.
-  void asked(RequestId request, double now_s);
-  bool is_open(RequestId request) const;
-  /// Part of an answer came.
-  void progress(double now_s) { heard_s_ = sign_s_ = now_s; }
-  /// When the newest part of an answer came; 0: none ever.
-  double last_sign_s() const { return sign_s_; }
-  /// Answers come in the order of requests: those before this one will not be answered any more. Their credits are
-  /// free.
-  void skip_before(RequestId request);
-  /// The update is complete. Returns the requests whose updates can be displayed from now on, in order: none while an
-  /// earlier one is open. One that is not open changes nothing.
-  std::vector<RequestId> completed(RequestId request, double now_s);
-  /// Nothing came for kPatience_s: the open requests, which are to be sent again - the master knows them by their ids,
-  /// if it does. The patience begins anew. Empty: it is not over, or nothing is open. Where a later update is complete,
-  /// the earlier ones are given up instead: `released` gets those that can be displayed now.
-  std::vector<RequestId> overdue(double now_s, std::vector<RequestId>& released);
-  /// What is complete and waits for earlier ones will not be displayed: its credits are free.
-  void drop_complete() {
-    std::erase_if(open_, [](const Open& o) { return o.complete; });
-  }
-  /// Another master: it knows nothing of what is open. All of it is to be sent again.
-  std::vector<RequestId> open() const;
-
-  // ---- display ----
-  /// The next update that is complete, if one is; its frame begins. Precondition: no frame is being displayed.
-  std::optional<RequestId> take();
-  /// The frame that take() began has been displayed: its credit is free. Without one: no effect.
-  void displayed() { displaying_ = false; }
-  /// Complete updates that wait to be displayed.
-  int filled() const { return int(ready_.size()); }
-
- private:
-  struct Open {
-    RequestId request;
-    bool complete = false;
-  };
-  std::vector<RequestId> release();
-
-  int buffers_;
-  bool newest_ = false;
-  std::deque<Open> open_;
-  std::deque<RequestId> ready_;
-  bool displaying_ = false;
-  double heard_s_ = 0;  // a part of an answer, or the requests were sent again
-  double sign_s_ = 0;
-};
 
 class StallWatch {
  public:

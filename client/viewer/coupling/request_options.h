@@ -30,6 +30,7 @@ struct RequestOptions {
   bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 
+/// How finely views are to be sampled, as a person wishes it while looking.
 struct SamplingWish {
   bool adaptive = true;         ///< as fine as updates in time allow (RequestOptions); else the size below
   int width = 0, height = 0;    ///< not adaptive: pixels; in a window as many in its aspect

@@ -1,13 +1,19 @@
-// Which view to ask for next, and when (T6.3-6.5). Poses of the past are all it knows.
+// Which view to ask for next, and when (T6.3-6.5): what it shows, by poses of the past, and whether the display and the
+// server wait for each other.
 #pragma once
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/tracking/pose_predictor.h"
 #include "client/viewer/tracking/prediction_meter.h"
@@ -168,6 +174,163 @@ class ViewRequester {
   double last_sent_s_ = -1e9, due_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0, epoch_began_s_ = -1e9,
          last_update_s_ = -1e9;
   std::map<RequestId, Update> open_;
+};
+
+/// Requests, updates and frames go in as they happen, decisions come out; no sockets, no clocks, no threads.
+///   Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that
+/// shows its update has been displayed. Updates are displayed in the order of their requests, each in exactly one
+/// frame.
+class Coupling {
+ public:
+  /// Without any sign of an answer for so long the master may have forgotten the requests (it was restarted) or found
+  /// nothing to sample.
+  static constexpr double kPatience_s = 2;
+
+  /// buffers: as buffers_of(); 0: asynchronous, nothing below applies and may_ask() is always true.
+  /// newest: an update that comes makes those before it void, and holds no credit: it is displayed unless a newer one
+  /// comes before.
+  explicit Coupling(int buffers, bool newest = false) : buffers_(buffers), newest_(newest) {}
+  int buffers() const { return buffers_; }
+  bool waits() const { return buffers_ > 0; }
+  /// From now on there are so many. Credits that are out stay out: with fewer buffers than before nothing may be asked
+  /// for until enough updates were displayed. 0: what is open or complete is forgotten, nothing is waited for any more.
+  void set_buffers(int buffers);
+  void set_newest(bool newest) { newest_ = newest; }
+
+  // ---- requests ----
+  bool may_ask() const {
+    const size_t here = newest_ ? 0 : ready_.size() + (displaying_ ? 1 : 0);
+    return !waits() || open_.size() + here < size_t(buffers_);
+  }
+  /// Ids ascend.
+  void asked(RequestId request, double now_s);
+  bool is_open(RequestId request) const;
+  /// Part of an answer came.
+  void progress(double now_s) { heard_s_ = sign_s_ = now_s; }
+  /// When the newest part of an answer came; 0: none ever.
+  double last_sign_s() const { return sign_s_; }
+  /// Answers come in the order of requests: those before this one will not be answered any more. Their credits are
+  /// free.
+  void skip_before(RequestId request);
+  /// The update is complete. Returns the requests whose updates can be displayed from now on, in order: none while an
+  /// earlier one is open. One that is not open changes nothing.
+  std::vector<RequestId> completed(RequestId request, double now_s);
+  /// Nothing came for kPatience_s: the open requests, which are to be sent again - the master knows them by their ids,
+  /// if it does. The patience begins anew. Empty: it is not over, or nothing is open. Where a later update is complete,
+  /// the earlier ones are given up instead: `released` gets those that can be displayed now.
+  std::vector<RequestId> overdue(double now_s, std::vector<RequestId>& released);
+  /// What is complete and waits for earlier ones will not be displayed: its credits are free.
+  void drop_complete() {
+    std::erase_if(open_, [](const Open& o) { return o.complete; });
+  }
+  /// Another master: it knows nothing of what is open. All of it is to be sent again.
+  std::vector<RequestId> open() const;
+
+  // ---- display ----
+  /// The next update that is complete, if one is; its frame begins. Precondition: no frame is being displayed.
+  std::optional<RequestId> take();
+  /// The frame that take() began has been displayed: its credit is free. Without one: no effect.
+  void displayed() { displaying_ = false; }
+  /// Complete updates that wait to be displayed.
+  int filled() const { return int(ready_.size()); }
+
+ private:
+  struct Open {
+    RequestId request;
+    bool complete = false;
+  };
+  std::vector<RequestId> release();
+
+  int buffers_;
+  bool newest_ = false;
+  std::deque<Open> open_;
+  std::deque<RequestId> ready_;
+  bool displaying_ = false;
+  double heard_s_ = 0;  // a part of an answer, or the requests were sent again
+  double sign_s_ = 0;
+};
+
+/// Where the worker and the display thread meet: Coupling behind a lock, with a condition that the display waits on.
+class CouplingGate {
+ public:
+  explicit CouplingGate(const CouplingState& state)
+      : state_(state), coupling_(state.buffers, state.mode == CouplingMode::kImages) {}
+  /// What has so many buffers: 0 async, 1 sync, else loose.
+  explicit CouplingGate(int buffers)
+      : CouplingGate({buffers == 0   ? CouplingMode::kAsync
+                      : buffers == 1 ? CouplingMode::kSync
+                                     : CouplingMode::kLoose,
+                      buffers}) {}
+
+  // ---- any thread ----
+  CouplingState state() const {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
+  int buffers() const { return state().buffers; }
+  bool waits() const { return state().waits(); }
+
+  // ---- worker ----
+  /// Coupling::may_ask().
+  bool may_ask();
+  /// Coupling::asked(). Returns whether another view may be asked for at once.
+  bool asked(RequestId request, double now_s);
+  /// Another coupling from now on (Coupling::set_buffers). A display that waits is woken.
+  void change(const CouplingState& state) {
+    {
+      const std::lock_guard lock(mutex_);
+      state_ = state;
+      coupling_.set_newest(state.mode == CouplingMode::kImages);
+      coupling_.set_buffers(state.buffers);
+    }
+    changed_.notify_one();
+  }
+
+  /// Runs f(Coupling&) alone; wakes the display if an update is there for it afterwards.
+  template <class F>
+  auto with(F&& f) {
+    struct Wake {
+      CouplingGate& gate;
+      std::unique_lock<std::mutex> lock;
+      ~Wake() {
+        const bool there = gate.coupling_.filled() > 0;
+        lock.unlock();
+        if (there) gate.changed_.notify_one();
+      }
+    } wake{*this, std::unique_lock(mutex_)};
+    return f(coupling_);
+  }
+
+  // ---- display ----
+  struct Taken {
+    CouplingState coupling;            ///< in force when the wait ended
+    std::optional<RequestId> request;  ///< the next complete update; none: there was none in time
+    double last_sign_s = 0;            ///< Coupling::last_sign_s()
+    bool asked = false;                ///< some request waits for its answer
+  };
+  /// The next complete update, waited for at most `timeout_s`; not at all where the coupling is asynchronous, also if
+  /// that is changed meanwhile.
+  Taken take(double timeout_s) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::duration<double>(timeout_s),
+                      [&] { return coupling_.filled() > 0 || !state_.waits(); });
+    const auto next = coupling_.take();
+    return {state_, next, coupling_.last_sign_s(), !coupling_.open().empty()};
+  }
+  void displayed() {
+    const std::lock_guard lock(mutex_);
+    coupling_.displayed();
+  }
+  int filled() const {
+    const std::lock_guard lock(mutex_);
+    return coupling_.filled();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  CouplingState state_;
+  Coupling coupling_;
 };
 
 }  // namespace telesplat::viewer

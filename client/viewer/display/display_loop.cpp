@@ -156,7 +156,7 @@ class DisplayLoop {
 
   // What samplers are to be asked for: what the camera sees, or its eyes.
   geometry::Camera asked(double now_s, double t_s, const geometry::Camera& camera, const geometry::Pose& head) {
-    return eyes_.begin(now_s, camera, head.orientation, t_s, scene_.box_room);
+    return eyes_.on() ? eyes_.begin(now_s, camera, head.orientation, t_s, scene_.box_room) : camera;
   }
 
   DrawnFrame draw(const FrameInput& input, bool kept) {
@@ -339,7 +339,9 @@ class DisplayLoop {
 
   // All viewers of a wall ask for views of this head now.
   void ask_for(uint64_t ask, const geometry::Pose& head) {
-    worker_.on_ask(ask, eyes_.sampled(surface_.camera_of(head), head.orientation, wall_->turn().t_s, scene_.box_room));
+    geometry::Camera camera = surface_.camera_of(head);
+    if (eyes_.on()) camera = eyes_.sampled(camera, head.orientation, wall_->turn().t_s, scene_.box_room);
+    worker_.on_ask(ask, camera);
   }
 
   // What the frame that begins is drawn from, and its camera.

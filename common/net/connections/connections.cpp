@@ -4,17 +4,22 @@
 #include <fmt/format.h>
 #include <linux/tcp.h>  // has newer fields than the C library
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "common/core/clock.h"
 
 namespace telesplat::net {
+
 namespace {
 
 constexpr size_t kMostEnded = 4096;  // before they are judged, whatever may still come of them
@@ -275,6 +280,72 @@ Connections::Counts Connections::counts() {
   Counts out = counts_;
   out.open = open_.size();
   return out;
+}
+
+namespace {
+
+constexpr int kUnread_ms = 50;  // what a fast network brings meanwhile is read into memory, whoever sends it
+
+}  // namespace
+
+// Signals are for the threads that wait for them.
+Lookout::Lookout() : woken_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  thread_ = std::thread([this] { loop(); });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+Lookout::~Lookout() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  wake();
+  thread_.join();
+  ::close(woken_);
+}
+
+void Lookout::add(Connections& connections) {
+  {
+    const std::lock_guard lock(mutex_);
+    watched_[&connections] = connections.descriptor();
+  }
+  wake();
+}
+
+void Lookout::remove(Connections& connections) {
+  {
+    const std::lock_guard lock(mutex_);
+    watched_.erase(&connections);
+  }
+  wake();
+}
+
+void Lookout::wake() const {
+  const uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(woken_, &one, sizeof one);
+}
+
+void Lookout::loop() {
+  std::vector<pollfd> items;
+  for (;;) {
+    bool anybody = false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (stop_) return;
+      for (const auto& [connections, descriptor] : watched_) {
+        connections->look();
+        anybody |= connections->hang_up_on_unread();
+      }
+      items.assign(1, {woken_, POLLIN, 0});
+      for (const auto& [connections, descriptor] : watched_) items.push_back({descriptor, POLLIN, 0});
+    }
+    ::poll(items.data(), items.size(), anybody ? kUnread_ms : -1);
+    uint64_t count = 0;
+    [[maybe_unused]] const ssize_t read = ::read(woken_, &count, sizeof count);
+  }
 }
 
 }  // namespace telesplat::net

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -83,7 +84,7 @@ class Connections {
     uint64_t read = 0;   // bytes of it that were read
     std::string user;    // spoke()
   };
-  enum class End { kReadsOn, kAtOnce };  // what it has sent is read; is not
+  enum class End { kReadsOn, kAtOnce };   // what it has sent is read; is not
   using Name = std::pair<int, uint64_t>;  // file descriptor, and number: descriptors are used again
   void drain();
   void take(const Monitor::Event& event, double now_s);
@@ -113,6 +114,31 @@ class Connections {
   double looked_for_late_s_ = -1e300;
   Counts counts_;
   log::RateLimiter limiter_;
+};
+
+// A thread that looks after the connections of all sockets of a context that bind, however busy their owners are.
+// Private to this library.
+
+class Lookout {
+ public:
+  /// Starts the thread.
+  Lookout();
+  ~Lookout();
+
+  /// From now on connections.look() is called whenever something has happened, and hang_up_on_unread() often.
+  void add(Connections& connections);
+  /// It is not called any more when this returns.
+  void remove(Connections& connections);
+
+ private:
+  void loop();
+  void wake() const;
+
+  const int woken_;
+  std::mutex mutex_;                               // guards what follows
+  std::unordered_map<Connections*, int> watched_;  // with their descriptors
+  bool stop_ = false;
+  std::thread thread_;
 };
 
 }  // namespace telesplat::net

@@ -1,16 +1,48 @@
 // What ZeroMQ tells of a socket's connections. Private to this library.
 #pragma once
 
+#include <zmq.hpp>
+
+#include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 #include <string>
-#include <zmq.hpp>
-
-#include "common/net/connections/undisturbed.h"
 
 namespace telesplat::net {
+
+// Calls of ZeroMQ while signals come. Private to this library.
+
+/// A call of ZeroMQ that a signal may interrupt, until it is done: given up between two parts of a message it would
+/// tear the message. It does not wait.
+template <class Call>
+auto undisturbed(const Call& call) {
+  for (;;) {
+    try {
+      return call();
+    } catch (const zmq::error_t& e) {
+      if (e.num() != EINTR) throw;
+    }
+  }
+}
+
+// Connections over which nothing comes any more.
+
+/// To be called before a socket binds or connects: TCP looks after its connections. One whose other end does not
+/// answer for about patience_s is taken for broken; a process that stands still answers, its kernel does.
+/// ZeroMQ's own heartbeats are off. ZeroMQ 4.3 ends the process if it is time for one over a connection that broke
+/// while what came over it waited to be read (libzmq/issues/4841); and what comes, and when it breaks, is up to others.
+inline void look_after(zmq::socket_t& socket, double patience_s) {
+  constexpr int kIdle_s = 5, kApart_s = 5;
+  socket.set(zmq::sockopt::heartbeat_ivl, 0);
+  socket.set(zmq::sockopt::tcp_keepalive, 1);
+  socket.set(zmq::sockopt::tcp_keepalive_idle, kIdle_s);
+  socket.set(zmq::sockopt::tcp_keepalive_intvl, kApart_s);
+  socket.set(zmq::sockopt::tcp_keepalive_cnt, std::max(1, static_cast<int>(patience_s - kIdle_s) / kApart_s));
+  socket.set(zmq::sockopt::tcp_maxrt, static_cast<int>(patience_s * 1e3));
+}
 
 /// Several threads may use it, one at a time; `socket` must outlive it.
 class Monitor {

@@ -5,7 +5,7 @@
 #include <toml++/toml.h>
 #include <algorithm>
 
-#include "common/net/keys/key_pair.h"
+#include "common/net/keys/key_files.h"
 
 namespace telesplat::net {
 namespace {

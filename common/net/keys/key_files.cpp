@@ -4,24 +4,28 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sys/stat.h>
-#include <unistd.h>
-
 #include <toml++/toml.h>
+#include <unistd.h>
+#include <zmq.h>
+
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 
+#include "common/core/check.h"
 #include "common/core/descriptor.h"
 
 namespace telesplat::net {
+
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr mode_t kOthersWrite = S_IWGRP | S_IWOTH, kOthers = S_IRWXG | S_IRWXO;
 
-Error failed(const std::string& path, const char* what) {
+Error key_file_failed(const std::string& path, const char* what) {
   return Error{fmt::format("{}: {}: {}", path, what, std::strerror(errno))};
 }
 
@@ -110,7 +114,7 @@ Result<NamedKey> parse_named_key(std::string_view text) {
 Result<std::string> read_key_file(const std::string& path, Privacy privacy) {
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
   struct stat about {};
-  if (file.get() < 0 || fstat(file.get(), &about) != 0) return failed(path, "cannot be read");
+  if (file.get() < 0 || fstat(file.get(), &about) != 0) return key_file_failed(path, "cannot be read");
   if (!S_ISREG(about.st_mode)) return Error{fmt::format("{}: is no plain file", path)};
   if (const Status s = check_owner(path, about); !s) return s.error();
   if (privacy == Privacy::kSecret && (about.st_mode & kOthers))
@@ -122,7 +126,7 @@ Result<std::string> read_key_file(const std::string& path, Privacy privacy) {
   for (char buffer[4096];;) {
     const ssize_t n = ::read(file.get(), buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return failed(path, "cannot be read");
+    if (n < 0) return key_file_failed(path, "cannot be read");
     if (n == 0) return out;
     if (out.size() + size_t(n) > AllowList::kMostBytes)
       return Error{fmt::format("{}: has more than {} bytes", path, AllowList::kMostBytes)};
@@ -196,6 +200,36 @@ Result<Keys> read_keys(const std::string& folder, const std::vector<Role>& roles
   if (!own) return own.error();
   out.own = *std::move(own);
   return out;
+}
+
+namespace {
+constexpr size_t kBytes = 32, kCharacters = 40;
+using Text = std::array<char, kCharacters + 1>;  // with the zero at its end
+}  // namespace
+
+KeyPair make_key_pair() {
+  Text open{}, secret{};
+  CHECK(zmq_curve_keypair(open.data(), secret.data()) == 0);  // ZeroMQ of Debian has CURVE
+  return {open.data(), secret.data()};
+}
+
+bool is_key(std::string_view text) {
+  std::array<unsigned char, kBytes> bytes{};
+  // What is decoded stops at a zero.
+  return text.size() == kCharacters && text.find('\0') == text.npos &&
+         zmq_z85_decode(bytes.data(), std::string(text).c_str()) != nullptr;
+}
+
+std::string key_bytes(std::string_view text) {
+  std::array<unsigned char, kBytes> bytes{};
+  CHECK(text.size() == kCharacters && zmq_z85_decode(bytes.data(), std::string(text).c_str()));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string public_of(const std::string& secret) {
+  Text open{};
+  CHECK(is_key(secret) && zmq_curve_public(open.data(), secret.c_str()) == 0);
+  return open.data();
 }
 
 }  // namespace telesplat::net

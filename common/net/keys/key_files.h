@@ -9,9 +9,24 @@
 
 #include "common/core/result.h"
 #include "common/net/keys/allow_list.h"
-#include "common/net/keys/key_pair.h"
 
 namespace telesplat::net {
+
+// CURVE keys as text: Z85, 40 characters.
+
+struct KeyPair {
+  std::string open;    ///< the public key: others know its owner by it
+  std::string secret;  ///< only its owner has it
+};
+
+KeyPair make_key_pair();
+
+/// Whether it is one of 32 bytes, as text.
+bool is_key(std::string_view text);
+/// The 32 bytes that it stands for; is_key(text) must be true.
+std::string key_bytes(std::string_view text);
+/// The public key that belongs to a secret one; is_key(secret) must be true.
+std::string public_of(const std::string& secret);
 
 inline constexpr std::string_view kSecretEnd = ".key";
 inline constexpr const char* kServerFile = "server.key";

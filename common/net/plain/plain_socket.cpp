@@ -7,13 +7,13 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "common/net/connections/broken.h"
+#include "common/net/connections/monitor.h"
 #include "common/net/local_endpoint.h"
 
 namespace telesplat::net {
 namespace {
 
-constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads; handshakes fit
+constexpr int64_t kListenerBytes = 4096;  // largest frame a publisher reads; handshakes fit
 
 void set_common(zmq::socket_t& socket, const PlainLimits& limits, int64_t most_bytes) {
   socket.set(zmq::sockopt::sndhwm, limits.queued);
@@ -99,7 +99,7 @@ Result<std::unique_ptr<PlainPublisher>> PlainPublisher::bind(const std::string& 
     return Error{fmt::format("{} is not a loopback or ipc address; others need --insecure", endpoint)};
   auto impl = std::make_unique<Impl>();
   try {
-    set_common(impl->socket, limits, kSubscriptionBytes);
+    set_common(impl->socket, limits, kListenerBytes);
     impl->socket.set(zmq::sockopt::xpub_verboser, 1);
     if (is_ipv6(endpoint)) impl->socket.set(zmq::sockopt::ipv6, 1);
     impl->socket.bind(numeric_host(endpoint));

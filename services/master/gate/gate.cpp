@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "common/core/utf8.h"
+#include "common/net/keys/roles.h"
 
 namespace telesplat::master {
 
@@ -19,6 +20,64 @@ wire::ViewRequest Gate::admit(const wire::ViewRequest& view) {
   do out.camera = geometry::subsample(view.camera, step++);
   while (pixels(out.camera) > most);
   return out;
+}
+
+Status Senders::admit(const net::Message& from, const wire::Hello& m) {
+  if (from.role && !net::may_be(*from.role, m.role))
+    return Error{fmt::format("the key {} is {}'s: its owner cannot be a {}", from.user, net::described(*from.role),
+                             net::as_word(m.role))};
+  if (Status s = is_same_user(from, m.instance); !s)
+    return Error{fmt::format("{}: {}", wire::kInstanceTaken, s.error().text)};
+  if (const auto owner = owners_.find(m.instance); owner == owners_.end()) {
+    auto& instances = of_user_[from.user];
+    owners_[m.instance] = {from.peer, from.user, instances.insert(instances.end(), m.instance)};
+  } else if (owner->second.peer != from.peer) {
+    // It came back over another connection, and the one before speaks for it no more.
+    instances_.erase(std::exchange(owner->second.peer, from.peer));
+  }
+  // Or it is another process from now on.
+  const auto before = instances_.find(from.peer);
+  if (before != instances_.end() && before->second != m.instance) forget(before->second);
+  instances_[from.peer] = m.instance;
+  if (owners_.size() > kMost) {
+    const auto most = std::max_element(of_user_.begin(), of_user_.end(),
+                                       [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+    forget(most->second.front());
+  }
+  return ok_status();
+}
+
+void Senders::forget(InstanceId instance) {
+  const auto owner = owners_.find(instance);
+  const auto user = of_user_.find(owner->second.user);
+  user->second.erase(owner->second.place);
+  if (user->second.empty()) of_user_.erase(user);
+  instances_.erase(owner->second.peer);
+  owners_.erase(owner);
+}
+
+// A process whose own connection is busy says it over another.
+Status Senders::admit(const net::Message& from, const wire::Goodbye& m) { return speaks_for(from, m.instance); }
+
+// Viewers of walls have a connection of its own for this.
+Status Senders::admit(const net::Message& from, const wire::SwapReady& m) { return is_same_user(from, m.viewer); }
+
+Status Senders::admit(const net::Message& from, const wire::Control& m) {
+  if (!from.role || net::may_command(*from.role, m.command)) return ok_status();
+  return Error{net::refused_command(*from.role, from.user, m.command)};
+}
+
+Status Senders::speaks_for(const net::Message& from, InstanceId instance) const {
+  const auto said = instances_.find(from.peer);
+  if (said == instances_.end()) return is_same_user(from, instance);  // over a second connection
+  if (said->second == instance) return ok_status();
+  return Error{"it speaks in the name of another process"};
+}
+
+Status Senders::is_same_user(const net::Message& from, InstanceId instance) const {
+  const auto owner = owners_.find(instance);
+  if (owner == owners_.end() || owner->second.user == from.user) return ok_status();
+  return Error{fmt::format("the key {} speaks in the name of a process of {}", from.user, owner->second.user)};
 }
 
 }  // namespace telesplat::master

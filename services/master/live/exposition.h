@@ -1,14 +1,80 @@
 // A session in the text format that Prometheus reads (docs/metrics.md, "Prometheus").
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "services/master/live/live_figures.h"
+#include "common/wire/session_messages.h"
+#include "common/wire/tile_messages.h"
 
 namespace telesplat::master {
+
+// What the master counts for people who watch: how long frames and updates take, and who sampled how much. It follows
+// the rows and tiles that the record gets, in bounded memory.
+
+/// How many values were at most as large as each bound.
+class Histogram {
+ public:
+  /// Seconds; the last bucket has no bound.
+  static constexpr std::array<double, 18> kBounds{0.002, 0.005, 0.0084, 0.0112, 0.014, 0.0168, 0.025, 0.034, 0.05,
+                                                  0.1,   0.15,  0.2,    0.3,    0.5,   1,      2,     5,     10};
+
+  /// Values that are no number do not count, negative ones count as 0.
+  void add(double seconds);
+  uint64_t count() const { return count_; }
+  double sum_s() const { return sum_s_; }
+  /// Of values up to kBounds[bucket].
+  uint64_t up_to(size_t bucket) const;
+
+ private:
+  std::array<uint64_t, kBounds.size()> counts_{};
+  uint64_t count_ = 0;
+  double sum_s_ = 0;
+};
+
+class LiveFigures {
+ public:
+  /// Viewers, and samplers. Of more, those that left make room, the one that was measured longest ago first; where all
+  /// are here, nothing is kept of a new one.
+  static constexpr size_t kMostNames = 256;
+
+  struct Named {
+    bool here = true;          ///< it takes part; else it left
+    uint64_t measured_at = 0;  ///< rises with each value of any name
+  };
+  struct Viewer : Named {
+    Histogram inter_frame, motion_to_photon, update_latency, start_up;
+    uint64_t refreshes_missed = 0;
+  };
+  struct Sampler : Named {
+    uint64_t tiles = 0, bytes = 0, rays = 0;
+    double busy_s = 0;  ///< sampling and encoding
+  };
+
+  /// A process of this role and name takes part from now on, or does not any more. Roles that are not measured change
+  /// nothing.
+  void set_here(const std::string& role, const std::string& name, bool here);
+  /// Rows of frames.csv or updates.csv that the record took, of a viewer that takes part; others change nothing.
+  void add_rows(const std::string& viewer, const wire::MetricRows& rows);
+  /// here: the sampler takes part; one that has left may have tiles that come later.
+  void add_tile(const std::string& sampler, const wire::TileDone& tile, bool here = true);
+
+  const std::map<std::string, Viewer>& viewers() const { return viewers_; }
+  const std::map<std::string, Sampler>& samplers() const { return samplers_; }
+
+ private:
+  template <class V>
+  V* entry(std::map<std::string, V>& map, const std::string& name, bool here);
+
+  std::map<std::string, Viewer> viewers_;
+  std::map<std::string, Sampler> samplers_;
+  uint64_t measured_ = 0;
+};
 
 /// What the master knows of a process.
 struct LiveProcess {

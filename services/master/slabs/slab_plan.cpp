@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "common/core/log.h"
-#include "common/metrics/run_record.h"
-#include "services/master/leases/lease_signer.h"
+#include "services/master/master_options.h"
 #include "services/master/outbox.h"
-#include "services/master/settings.h"
+#include "services/master/record/run_record.h"
 #include "services/master/slabs/assignment.h"
 
 namespace telesplat::master {
@@ -197,8 +197,7 @@ void SlabPlan::give_leases(Idle& idle, double now_s) {
       ++i;
       continue;
     }
-    links_.signer.sign(*lease, idle[i].id);
-    links_.outbox.send(idle[i].id, *lease);
+    links_.outbox.send_lease(idle[i].id, *lease);
     idle.served_in_place(i);
   }
 }
@@ -239,6 +238,47 @@ Figures SlabPlan::figures() const {
 void SlabPlan::add_counters(std::map<std::string, double>& counters) const {
   counters["partitions"] = double(partitions_.made());
   counters["bytes_per_voxel"] = whole_ ? volume_.bytes_per_voxel() : 0;
+}
+
+namespace {
+
+nlohmann::ordered_json slabs_told(const Partition& partition, bool in_use, const PlanLinks& links) {
+  using Json = nlohmann::ordered_json;
+  Json out{{"number", partition.number},
+           {"in_use", in_use},
+           {"ready", partition.ready()},
+           {"slabs", Json::array()},
+           {"spare", Json::array()}};
+  for (const Slab& s : partition.slabs)
+    out["slabs"].push_back({{"sampler", links.name_of(s.sampler)},
+                            {"begin", s.range.begin},
+                            {"end", s.range.end},
+                            {"weight", s.weight},
+                            {"ready", s.ready},
+                            {"voxels", s.voxels},
+                            {"bytes", s.bytes}});
+  for (const auto& id : partition.spare) out["spare"].push_back(links.name_of(id));
+  return out;
+}
+
+}  // namespace
+
+void SlabPlan::add_status(nlohmann::ordered_json& status) const {
+  if (!whole_) return;
+  using Json = nlohmann::ordered_json;
+  const auto& session = volume_.session();
+  Json& out = status["volume"];
+  out = {{"transfer", volume::to_text(session.transfer)},
+         {"step", session.step},
+         {"steps", session.steps},
+         {"layers", schedule_.layers()},
+         {"bytes_per_voxel", volume_.bytes_per_voxel()},
+         {"data_servers", Json::array()},
+         {"partitions", partitions_.made()}};
+  for (const auto& s : volume_.servers())
+    out["data_servers"].push_back({{"name", s.name}, {"begin", s.begin}, {"end", s.end}, {"here", s.here}});
+  if (const auto partition = partitions_.newest())
+    out["partition"] = slabs_told(*partition, partitions_.in_use() == partition, links_);
 }
 
 }  // namespace telesplat::master

@@ -1,12 +1,37 @@
 // The part of the schedule that is steered: plans are asked for, and become frames.
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
+#include "common/codec/mask_stream.h"
 #include "common/core/check.h"
 #include "services/master/tiles/frame_schedule.h"
-#include "services/master/tiles/plan_check.h"
 
 namespace telesplat::master {
 namespace {
+
+wire::PlanRequest request_of(const PlannedView& view, const PlanLimits& limits) {
+  return {.frame = view.frame,
+          .epoch = view.epoch,
+          .viewer = view.view.viewer,
+          .request = view.view.request,
+          .camera = view.view.camera,
+          .tile_size = uint64_t(std::clamp(limits.tile_size, 32, wire::kMaxTileSide)),
+          .tile_rays = limits.tile_rays,
+          .moments = view.view.moments};
+}
+
+auto answered_by(const wire::Plan& plan) {
+  return [&](const auto& asked) { return asked.request.frame == plan.frame && asked.request.epoch == plan.epoch; };
+}
+
+// Refining rays of a view: edges may have four times as many, and what is new has no limit.
+constexpr uint64_t kRefiningPart = 3;
+
+uint64_t within(uint64_t rays, uint64_t link_rays) {
+  return link_rays == 0 ? rays : std::max<uint64_t>(1, std::min(rays, link_rays));
+}
 
 // Before anything is known of what rays cost.
 constexpr uint64_t kFirstTileRays = 8192, kFirstExtraRays = 65536;
@@ -34,7 +59,139 @@ PlannedView planned(PlannedView view, double now_s) {
   return view;
 }
 
+// More than any plan has. Hostile masks of as many pixels take up to 0.4 s to decode.
+constexpr uint64_t kMaxMaskedPixels = uint64_t{1} << 24;
+
+// Error: the plan of a view is of another camera than was asked for; a tile's mask is none of its size, or has another
+// number of rays than the plan says; all masks together have more than kMaxMaskedPixels. What wire::check(plan)
+// refuses need not be looked for.
+// Cost: that of decoding the masks; those of plans take 0.1 to 0.6 ms a million pixels.
+Status check_answer(const wire::PlanRequest& asked, const wire::Plan& plan) {
+  if (plan.full) return ok_status();
+  if (!asked.extra && plan.camera != asked.camera)
+    return Error{fmt::format("the plan of frame {} is not of the camera that was asked for", plan.frame.value)};
+  const std::span<const uint32_t> masks(plan.masks);
+  size_t begin = 0;
+  uint64_t pixels = 0;
+  for (size_t i = 0; i < plan.tiles.size(); i += wire::kPlanNumbers) {
+    const uint32_t *n = &plan.tiles[i], rays = n[4], words = n[5];
+    if (words == 0) continue;
+    if (pixels += uint64_t(n[2]) * n[3]; pixels > kMaxMaskedPixels)
+      return Error{fmt::format("the plan of frame {}: masks of {} pixels, limit {}", plan.frame.value, pixels,
+                               kMaxMaskedPixels)};
+    const auto mask = codec::decode_mask(masks.subspan(begin, words), int(n[2]), int(n[3]));
+    begin += words;
+    const auto where = [&] {
+      return fmt::format("the plan of frame {}, tile {}", plan.frame.value, i / wire::kPlanNumbers);
+    };
+    if (!mask) return Error{fmt::format("{}: {}", where(), mask.error().text)};
+    if (mask->count() != rays) return Error{fmt::format("{}: {} rays, its mask has {}", where(), rays, mask->count())};
+  }
+  return ok_status();
+}
+
 }  // namespace
+
+PlanQuestions::Seen& PlanQuestions::see(const PlannedView& view) {
+  Seen& seen = viewers_[view.view.viewer];
+  const bool still = seen.view.epoch == view.epoch && seen.view.view.camera == view.view.camera;
+  seen = {.view = view, .still = still, .round = seen.round, .since_extra = seen.since_extra + 1};
+  return seen;
+}
+
+wire::PlanRequest PlanQuestions::ask(const PlannedView& view, const PlanLimits& limits, double now_s) {
+  const Seen& seen = see(view);
+  wire::PlanRequest request = request_of(view, limits);
+  request.still = seen.still;
+  request.most_rays = within(limits.refining_rays * (seen.still ? kStillViews : 1), limits.link_rays / kRefiningPart);
+  open_.push_back({view, request, now_s});
+  return request;
+}
+
+double PlanQuestions::patience_s() const {
+  return std::clamp(kUsualAnswers * answer_s_.value(), kLeastPatience_s, kLongestPatience_s);
+}
+
+void PlanQuestions::known(const PlannedView& view) {
+  const auto seen = viewers_.find(view.view.viewer);
+  if (seen != viewers_.end() && seen->second.view.frame == view.frame) seen->second.known = true;
+}
+
+bool PlanQuestions::extra_wanted(EpochId epoch, Extra which) const {
+  return std::any_of(viewers_.begin(), viewers_.end(), [&](const auto& v) { return v.second.wants(epoch, which); });
+}
+
+wire::PlanRequest PlanQuestions::ask_extra(FrameId frame, EpochId epoch, Extra which, const PlanLimits& limits,
+                                           double now_s) {
+  const auto wants = [&](const auto& v) { return v.second.wants(epoch, which); };
+  auto next = std::find_if(viewers_.upper_bound(last_), viewers_.end(), wants);
+  if (next == viewers_.end()) next = std::find_if(viewers_.begin(), viewers_.end(), wants);
+  CHECK(next != viewers_.end());
+  last_ = next->first;
+  Seen& seen = next->second;
+  seen.since_extra = 0;
+  PlannedView view = seen.view;
+  view.frame = frame;
+  wire::PlanRequest request = request_of(view, limits);
+  request.extra = true;
+  request.round = seen.round++;
+  request.still = seen.still;
+  request.most_rays = within(limits.most_rays * (seen.still ? kStillExtras : 1), limits.link_rays);
+  open_.push_back({view, request, now_s});
+  return request;
+}
+
+std::optional<wire::PlanRequest> PlanQuestions::waiting_for(const wire::Plan& plan) const {
+  const auto asked = std::find_if(open_.begin(), open_.end(), answered_by(plan));
+  return asked == open_.end() ? std::nullopt : std::optional(asked->request);
+}
+
+std::optional<PlanQuestions::Asked> PlanQuestions::answered(const wire::Plan& plan, double now_s) {
+  const auto asked = std::find_if(open_.begin(), open_.end(), answered_by(plan));
+  if (asked == open_.end()) return std::nullopt;
+  Asked out = std::move(*asked);
+  open_.erase(asked);
+  in_vain_ = 0, rest_s_ = 0;
+  if (!out.request.extra) answer_s_.add(now_s - out.asked_s);
+  if (out.request.extra && (plan.full || plan.tiles.empty())) exhaust(out.request);
+  return out;
+}
+
+std::vector<PlanQuestions::Asked> PlanQuestions::give_up(double now_s) {
+  std::vector<Asked> out;
+  std::erase_if(open_, [&](Asked& a) {
+    if (now_s - a.asked_s <= (a.request.extra ? kExtraAnswer_s : patience_s())) return false;
+    out.push_back(std::move(a));
+    return true;
+  });
+  for (const Asked& a : out) {
+    if (a.request.extra) exhaust(a.request);
+    if (a.request.extra || ++in_vain_ < 2) continue;
+    rest_s_ = rest_s_ == 0 ? kFirstRest_s : std::min(2 * rest_s_, kLongestRest_s);
+    rests_until_s_ = now_s + rest_s_;
+  }
+  return out;
+}
+
+bool PlanQuestions::extra_open() const {
+  return std::any_of(open_.begin(), open_.end(), [](const Asked& a) { return a.request.extra; });
+}
+
+// Of the view that it was about; a newer one may want more.
+void PlanQuestions::exhaust(const wire::PlanRequest& extra) {
+  const auto seen = viewers_.find(extra.viewer);
+  if (seen != viewers_.end() && seen->second.view.view.request == extra.request) seen->second.exhausted = true;
+}
+
+void PlanQuestions::forget_viewer(InstanceId viewer) {
+  viewers_.erase(viewer);
+  std::erase_if(open_, [&](const Asked& a) { return a.request.extra && a.request.viewer == viewer; });
+}
+
+void PlanQuestions::clear() {
+  open_.clear();
+  for (auto& [viewer, seen] : viewers_) seen.known = false;
+}
 
 PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer, double now_s) const {
   const double ray_s = costs_.pixel_s({});

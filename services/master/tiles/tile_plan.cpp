@@ -5,8 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/core/log.h"
-#include "common/metrics/run_record.h"
-#include "services/master/leases/lease_signer.h"
+#include "services/master/record/run_record.h"
 #include "services/master/outbox.h"
 
 namespace telesplat::master {
@@ -136,8 +135,7 @@ bool TilePlan::give_one(Idle& idle, double now_s) {
     for (size_t i = 0; i < idle.size(); ++i) {
       auto lease = schedule_.lease(idle[i].id, now_s, even_own, idle[i].holds_none());
       if (!lease) continue;
-      links_.signer.sign(*lease, idle[i].id);
-      links_.outbox.send(idle[i].id, *lease);
+      links_.outbox.send_lease(idle[i].id, *lease);
       idle.served(i);
       return true;
     }

@@ -1,8 +1,8 @@
 // Scenes that travel as points: a frame is cut into tiles, and each goes to the sampler that asks first.
 #pragma once
 
+#include "services/master/master_options.h"
 #include "services/master/plan.h"
-#include "services/master/settings.h"
 #include "services/master/tiles/frame_schedule.h"
 #include "services/master/tiles/julia_parameters.h"
 #include "services/master/tiles/mesh_colours.h"

@@ -6,9 +6,7 @@
 #include <set>
 
 #include "common/metrics/recorder.h"
-#include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
-#include "services/packer/state_senders.h"
 
 namespace telesplat::packer {
 
@@ -60,7 +58,7 @@ class PicturePacking final : public Packing {
   EpochHold<Unmet> unmet_{{.items = 64, .bytes = 64u << 20}};
   std::map<InstanceId, std::string> peers_;  // of viewers
   StateSenders senders_;
-  std::deque<Frame> frames_;                 // the newest last
+  std::deque<Frame> frames_;  // the newest last
   uint64_t tiles_ = 0, duplicate_ = 0, other_epoch_ = 0, unsealed_ = 0, bytes_sent_ = 0;
 };
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "services/packer/points/sampled_tile.h"
+#include "services/packer/points/event.h"
 
 namespace telesplat::packer {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/splat/reference/reference_depth.h"
-#include "services/packer/points/frame_part.h"
+#include "services/packer/points/event.h"
 
 namespace telesplat::packer {
 

@@ -17,7 +17,6 @@
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/frame_book.h"
 #include "services/packer/points/obsolescence.h"
-#include "services/packer/points/patch_obsolescence.h"
 
 namespace telesplat::packer {
 namespace {

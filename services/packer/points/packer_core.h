@@ -2,23 +2,45 @@
 // out. One thread at a time.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "common/codec/error_bounds.h"
 #include "common/core/result.h"
+#include "common/geometry/camera.h"
 #include "common/points/point_model.h"
 #include "common/splat/reference/reference_depth.h"
-#include "services/packer/points/errors/allowed_errors.h"
 #include "services/packer/points/event.h"
 #include "services/packer/points/event_log.h"
-#include "services/packer/points/known_reference.h"
-#include "services/packer/points/model_watcher.h"
-#include "services/packer/points/sampled_tile.h"
 
 namespace telesplat::packer {
+
+// How far published points may be from sampled ones, as people say it.
+
+struct AllowedErrors {
+  double depth_pixels = 0;  ///< of a pixel's footprint at that depth, along the line of sight; 0: none
+  int normal = 0;           ///< codes of the octahedral map, each coordinate
+  int colour = 0;           ///< of each channel, of 255
+
+  bool exact() const { return depth_pixels <= 0 && normal <= 0 && colour <= 0; }
+  bool operator==(const AllowedErrors&) const = default;
+};
+
+/// The same for the pixels of one camera, those of the finer axis. Frusta are wider the faster a head moves: bounds of
+/// depth are rounded down to one of 16 an octave, so that coders, which keep tables by bound, do not make one a frame.
+inline codec::ErrorBounds bounds_of(const AllowedErrors& allowed, const geometry::Camera& camera) {
+  if (allowed.exact()) return {};
+  constexpr int kBits = 5;
+  auto out = codec::error_bounds(allowed.depth_pixels, 1 / std::max(camera.focal_x(), camera.focal_y()), allowed.normal,
+                                 allowed.colour);
+  if (const int below = std::bit_width(out.depth) - kBits; below > 0) out.depth = out.depth >> below << below;
+  return out;
+}
 
 enum class Redundancy {
   kEliminate,  ///< T4.3.1: only what the model does not show yet is packed
@@ -37,7 +59,7 @@ struct Config {
   /// Bytes of the patches kept for events_since(). Above it those least recently drawn are forgotten with their
   /// clusters, down to 90 % of it; 0: no limit.
   uint64_t max_log_bytes = 0;
-  // With kKeep single patches of clusters are forgotten instead, highest score first (patch_obsolescence.h); the three
+  // With kKeep single patches of clusters are forgotten instead, highest score first (obsolescence.h); the three
   // limits above are then about patches.
   uint32_t patches_per_cluster = 6;  ///< at most; 0: no limit
   int threads = 1;                   ///< for reference depth maps; 0: all cores

@@ -5,10 +5,9 @@
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
-#include "common/net/connections/work_shares.h"
+#include "common/net/connections/peer_rates.h"
 #include "common/net/dispatch.h"
 #include "common/wire/lease_seal.h"
-#include "services/packer/points/plan/blue_noise.h"
 
 namespace telesplat::packer {
 namespace {

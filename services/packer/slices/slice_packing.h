@@ -4,10 +4,8 @@
 #include <optional>
 
 #include "common/metrics/recorder.h"
-#include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
 #include "services/packer/slices/gatherer.h"
-#include "services/packer/state_senders.h"
 
 namespace telesplat::packer {
 

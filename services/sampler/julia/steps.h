@@ -36,7 +36,7 @@ inline constexpr int kRefill = 2;     ///< lanes that are given new rays at once
 
 inline constexpr float kLeast = 0.02f;  ///< cosine at which normals that faced away are left
 
-// Steep normals: the mean of two, the second half a pixel further in (julia_plain.h, widen)
+// Steep normals: the mean of two, the second half a pixel further in (julia/plain.h, widen)
 inline constexpr float kSteep = 0.95f;    ///< cosine between normal and ray below which a normal is steep
 inline constexpr float kInward = 0.5f;    ///< pixels
 inline constexpr float kInwardSlope = 4;  ///< of the surface against the screen, for where the second point is sought

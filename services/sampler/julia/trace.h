@@ -1,5 +1,5 @@
 // Tracing a part of an image: from rays to surface points with normals and colours, by a SIMD kernel that is chosen for
-// the processor at run time. Its scalar oracle, with equal results, is meant to be read: tests/support/julia_plain.h.
+// the processor at run time. Its scalar oracle, with equal results, is meant to be read: tests/support/julia/plain.h.
 //
 //   cones    for each block of 8 x 8 pixels the depth up to which none of its rays meets the surface, or that none does
 //   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left

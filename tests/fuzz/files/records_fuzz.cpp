@@ -5,7 +5,7 @@
 #include "client/viewer/record/event_record.h"
 #include "client/viewer/record/frame_spool.h"
 #include "client/viewer/record/slice_record.h"
-#include "services/sampler/tiles/replay_file.h"
+#include "services/sampler/tiles/replay.h"
 #include "tests/support/files/memory_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

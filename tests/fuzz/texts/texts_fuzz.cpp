@@ -13,7 +13,7 @@
 #include "common/julia/flags.h"
 #include "common/julia/timeline.h"
 #include "common/links/link.h"
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 #include "common/scene/arrays.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/colouring.h"

@@ -9,7 +9,7 @@
 #include "common/options/parser.h"
 #include "services/data/kinds.h"
 #include "services/data/record.h"
-#include "services/master/peers/told_tables.h"
+#include "services/master/master_record.h"
 #include "tools/telesplat/run/run_options.h"
 
 namespace telesplat::launcher {

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "common/metrics/run_record.h"
+#include "services/master/record/run_record.h"
 #include "tests/support/files/own_folder.h"
 #include "tools/telesplat/run/run_report.h"
 

@@ -8,8 +8,8 @@
 
 #include "common/core/log.h"
 #include "common/core/utf8.h"
-#include "common/metrics/tables/viewer_tables.h"
 #include "services/master/master_core.h"
+#include "services/master/record/measured.h"
 
 namespace telesplat::master {
 namespace {
@@ -797,7 +797,7 @@ TEST_F(Master, TenThousandPastHealthChecksCostNothing) {
 }
 
 TEST_F(Master, AWelcomeThatNobodyCouldReadIsNotSent) {
-  Outbox outbox;
+  Outbox outbox({1}, [](const std::string&) { return InstanceId{}; });
   wire::Welcome w;
   for (int i = 0; i < 17; ++i) w.facts["f" + std::to_string(i)] = std::string(wire::kMaxFact, 'x');
   outbox.send("v", w);

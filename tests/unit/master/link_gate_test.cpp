@@ -1,4 +1,4 @@
-#include "services/master/tiles/link_gate.h"
+#include "services/master/tiles/pacing.h"
 
 #include <gtest/gtest.h>
 

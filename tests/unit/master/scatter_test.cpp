@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "services/master/slabs/scatter_schedule.h"
+#include "services/master/slabs/assignment.h"
 
 namespace telesplat::master {
 namespace {

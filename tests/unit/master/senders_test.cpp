@@ -1,5 +1,5 @@
 // Who may speak in whose name.
-#include "services/master/gate/senders.h"
+#include "services/master/gate/gate.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,10 @@
 // What others tell session.toml of themselves.
-#include "services/master/peers/told_tables.h"
+#include "services/master/master_record.h"
 
 #include <gtest/gtest.h>
 #include <toml++/toml.h>
 
-#include "common/metrics/run_record.h"
-#include "services/master/master_record.h"
+#include "services/master/record/run_record.h"
 
 namespace telesplat::master {
 namespace {

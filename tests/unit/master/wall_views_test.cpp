@@ -1,12 +1,10 @@
 // Views of a wall's viewers are sampled as one frame; who is late, new or gone holds up nobody for long.
-#include "services/master/slabs/wall_views.h"
+#include "services/master/slabs/schedule.h"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <set>
-
-#include "services/master/slabs/schedule.h"
 
 namespace telesplat::master {
 namespace {

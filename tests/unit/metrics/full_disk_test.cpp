@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "common/metrics/text_file.h"
+#include "services/master/record/text_file.h"
 #include "tests/unit/metrics/record_fixture.h"
 
 namespace telesplat::metrics {

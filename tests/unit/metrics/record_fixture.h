@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "common/metrics/run_record.h"
+#include "services/master/record/run_record.h"
 
 namespace telesplat::metrics {
 

@@ -1,5 +1,5 @@
 // What exchanges of messages tell of another clock.
-#include "common/net/clock_estimate.h"
+#include "common/net/master_link.h"
 
 #include <gtest/gtest.h>
 

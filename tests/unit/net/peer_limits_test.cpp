@@ -4,7 +4,6 @@
 
 #include "common/net/connections/peer_rates.h"
 #include "common/net/connections/queued_bytes.h"
-#include "common/net/connections/work_shares.h"
 #include "common/net/service.h"
 
 namespace telesplat::net {

@@ -1,4 +1,4 @@
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 
 #include <numeric>
 
-#include "services/packer/epoch_hold.h"
+#include "services/packer/packing.h"
 #include "services/packer/points/frame_book.h"
 #include "tests/support/packer_scenes.h"
 

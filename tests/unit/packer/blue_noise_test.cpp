@@ -1,5 +1,5 @@
 // Picks of pixels: every one in turn, each set spread evenly.
-#include "services/packer/points/plan/blue_noise.h"
+#include "services/packer/points/plan/validation.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "services/packer/packer_options.h"
-#include "services/packer/ports.h"
 
 namespace telesplat::packer {
 namespace {

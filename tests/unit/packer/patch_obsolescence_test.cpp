@@ -1,6 +1,6 @@
 // Which patches go first where packing keeps redundant ones: scores, limits, ties, order; and what of it reaches late
 // replicas.
-#include "services/packer/points/patch_obsolescence.h"
+#include "services/packer/points/obsolescence.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 
 #include "common/codec/mask_stream.h"
 #include "common/wire/serial.h"
-#include "services/packer/points/plan/ray_class.h"
-#include "services/packer/points/plan/ray_tiles.h"
+#include "services/packer/points/plan/planned_frame.h"
+#include "services/packer/points/plan/planner.h"
 #include "services/packer/points/plan/view/view_map.h"
 #include "tests/support/files/own_folder.h"
 #include "tests/support/points_scenes.h"

@@ -1,8 +1,8 @@
 // What a plan has seen of the model serves the tiles that come back: they are compared with it as with the model.
 #include <gtest/gtest.h>
 
+#include "services/packer/points/plan/planned_frame.h"
 #include "services/packer/points/plan/planner.h"
-#include "services/packer/points/plan/ray_tiles.h"
 #include "tests/support/packer_scenes.h"
 #include "tests/support/planned_tiles.h"
 

@@ -5,7 +5,7 @@
 #include <queue>
 #include <vector>
 
-#include "services/packer/slices/slice_pace.h"
+#include "services/packer/slices/gatherer.h"
 
 namespace telesplat::packer {
 namespace {

@@ -1,5 +1,5 @@
 // When the packer does what can wait.
-#include "services/packer/spare_time.h"
+#include "services/packer/packer_service.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // What the planner remembers of viewers and of frames under way is bounded, whoever comes and goes, and is void only
 // for those who may see what was forgotten.
-#include "services/packer/points/plan/viewer_views.h"
+#include "services/packer/points/plan/planned_frame.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/jpeg.h"
 #include "common/image/normal.h"
-#include "services/master/settings.h"
+#include "services/master/master_options.h"
 #include "services/master/tiles/frame_tiles.h"
 #include "services/packer/pictures/picture_packing.h"
 #include "services/sampler/tiles/picture_maker.h"

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/mesh/chunk_cache.h"
+#include "services/sampler/mesh/tiles.h"
 
 namespace telesplat::sampler {
 namespace {

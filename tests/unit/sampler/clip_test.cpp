@@ -10,7 +10,7 @@
 #include "services/sampler/mesh/sampler.h"
 #include "services/sampler/volume/raycaster.h"
 #include "services/sampler/volume/shear/splatter.h"
-#include "tests/support/julia_plain.h"
+#include "tests/support/julia/plain.h"
 #include "tests/support/mesh_chunks.h"
 #include "tests/support/volume/scenes.h"
 

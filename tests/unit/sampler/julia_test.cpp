@@ -9,7 +9,7 @@
 #include "common/image/measures/reference.h"
 #include "common/image/normal.h"
 #include "services/sampler/julia/sampler.h"
-#include "tests/support/julia_reference.h"
+#include "tests/support/julia/reference.h"
 
 namespace telesplat::sampler {
 namespace {

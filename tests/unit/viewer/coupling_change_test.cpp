@@ -7,7 +7,6 @@
 #include <thread>
 
 #include "client/viewer/coupling/coupling.h"
-#include "client/viewer/coupling/coupling_gate.h"
 #include "client/viewer/coupling/view_requester.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/slices/cache.h"

@@ -8,7 +8,7 @@
 #include "client/viewer/coupling/stage_table.h"
 #include "client/viewer/display/frame_table.h"
 #include "client/viewer/viewer_options.h"
-#include "common/metrics/tables/viewer_tables.h"
+#include "services/master/record/measured.h"
 #include "tests/support/files/own_folder.h"
 
 namespace telesplat::viewer {

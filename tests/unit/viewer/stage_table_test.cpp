@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "common/metrics/tables/viewer_tables.h"
+#include "services/master/record/measured.h"
 
 namespace telesplat::viewer {
 namespace {

@@ -29,7 +29,7 @@
 #include "common/options/complain.h"
 #include "common/options/table.h"
 #include "services/sampler/julia/sampler.h"
-#include "services/sampler/tiles/replay_file.h"
+#include "services/sampler/tiles/replay.h"
 #include "tools/common/progress_line.h"
 #include "tools/lab/commands.h"
 #include "tools/lab/scaling/session.h"

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "common/metrics/lives/read_back.h"
+#include "services/master/record/lives.h"
 #include "common/metrics/statistics.h"
-#include "common/metrics/summary.h"
+#include "services/master/record/summary.h"
 #include "tools/common/csv_table.h"
 #include "tools/common/json_file.h"
 

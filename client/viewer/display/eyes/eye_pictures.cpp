@@ -33,7 +33,6 @@ void EyePictures::follow_panel_file(double now_s) {
 
 geometry::Camera EyePictures::begin(double now_s, const geometry::Camera& head, const glm::dquat& turned, double t_s,
                                     const geometry::Box& scene_room) {
-  if (!on()) return head;
   follow_panel_file(now_s);
   pair_ = rig_.eyes(head, turned, t_s, scene_room);
   return EyeRig::sampled(pair_, scene_room);
@@ -41,7 +40,7 @@ geometry::Camera EyePictures::begin(double now_s, const geometry::Camera& head, 
 
 geometry::Camera EyePictures::sampled(const geometry::Camera& head, const glm::dquat& turned, double t_s,
                                       const geometry::Box& scene_room) {
-  return on() ? EyeRig::sampled(rig_.eyes(head, turned, t_s, scene_room), scene_room) : head;
+  return EyeRig::sampled(rig_.eyes(head, turned, t_s, scene_room), scene_room);
 }
 
 // The places of both pictures in a display that has one beside or above the other.

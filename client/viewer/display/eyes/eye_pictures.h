@@ -16,8 +16,8 @@ class EyePictures {
   explicit EyePictures(const StereoOptions& options) : rig_(options) {}
 
   bool on() const { return rig_.on(); }
-  /// Where the eyes of the frame that begins are; the camera to ask samplers for. Without stereo it is the head's.
-  /// turned: the head, which a wall's screens need not face.
+  /// Where the eyes of the frame that begins are; the camera to ask samplers for.
+  /// turned: the head, which a wall's screens need not face. Precondition of this and sampled(): on().
   geometry::Camera begin(double now_s, const geometry::Camera& head, const glm::dquat& turned, double t_s,
                          const geometry::Box& scene_room);
   /// The camera to ask samplers for where a head is to be.

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/wire/short_camera.h"
-#include "services/packer/points/plan/planner_impl.h"
+#include "services/packer/points/plan/planner.h"
 
 namespace telesplat::packer {
 namespace {
@@ -110,7 +110,7 @@ bool any(const image::PixelMask& mask, const geometry::Rect& r) {
 
 }  // namespace
 
-void Planner::Impl::plan_extra(Question& q, ViewerView& view) {
+void Planner::plan_extra(Question& q, ViewerView& view) {
   // A view that this planner has not planned, as after a restart.
   if (!view.known || !(view.camera == q.request.camera)) {
     follow(q.request.camera, view);
@@ -118,8 +118,8 @@ void Planner::Impl::plan_extra(Question& q, ViewerView& view) {
   }
   if (q.model.points() == 0) return;
   // Near its limit the model would forget for them what the view needs.
-  if (config.max_points > 0 &&
-      static_cast<double>(q.model.points()) > kMostFull * static_cast<double>(config.max_points))
+  if (config_.max_points > 0 &&
+      static_cast<double>(q.model.points()) > kMostFull * static_cast<double>(config_.max_points))
     return;
   view.still = view.still || q.request.still;
   if (q.request.most_rays > 0) q.most_rays = q.request.most_rays;
@@ -132,8 +132,8 @@ void Planner::Impl::plan_extra(Question& q, ViewerView& view) {
 
 // Tiles of extra frames that were given up for the view's are asked for again: each was planned once and is not found
 // again.
-bool Planner::Impl::plan_lost(Question& q, ViewerView& view) {
-  for (PlannedFrame& frame : shelf.frames()) {
+bool Planner::plan_lost(Question& q, ViewerView& view) {
+  for (PlannedFrame& frame : shelf_.frames()) {
     if (frame.viewer != view.viewer || frame.kind == PlannedFrame::Kind::kView || frame.complete()) continue;
     if (q.now_s - frame.planned_s < kLost_s) continue;
     LostTiles lost{frame.camera, frame.kind, {}};
@@ -155,8 +155,8 @@ bool Planner::Impl::plan_lost(Question& q, ViewerView& view) {
   return issue(q, std::move(lost.tiles), {.kind = lost.kind, .camera = lost.camera, .base = view.camera}) > 0;
 }
 
-bool Planner::Impl::plan_cells(Question& q, ViewerView& view) {
-  if (!(config.view_cell_m > 0)) return false;
+bool Planner::plan_cells(Question& q, ViewerView& view) {
+  if (!(config_.view_cell_m > 0)) return false;
   if (!view.still) {
     const auto most = static_cast<uint64_t>(kMovingCells * view.camera.width * view.camera.height);
     if (view.cell_rays >= most) return false;
@@ -177,14 +177,14 @@ bool Planner::Impl::plan_cells(Question& q, ViewerView& view) {
 
 // From beside what is near the surface is another world: a head close to a mesh that was looked at from 20 cm aside
 // added 400,000 points a round, on and on.
-double Planner::Impl::step_aside_m(const ViewerView& view) const {
-  if (!view.map) return config.view_cell_m;
+double Planner::step_aside_m(const ViewerView& view) const {
+  if (!view.map) return config_.view_cell_m;
   const auto& depth_m = view.map->depth_m;
   const auto nearest = std::min_element(depth_m.begin(), depth_m.end());
-  return nearest == depth_m.end() ? config.view_cell_m : std::min(config.view_cell_m, kStepAside * double{*nearest});
+  return nearest == depth_m.end() ? config_.view_cell_m : std::min(config_.view_cell_m, kStepAside * double{*nearest});
 }
 
-bool Planner::Impl::plan_cell(Question& q, ViewerView& view, unsigned turn) {
+bool Planner::plan_cell(Question& q, ViewerView& view, unsigned turn) {
   // As many rays a side as the view has: with half of them points beyond silhouettes are larger there than what they
   // belong to, which took 1.1 dB from a moving head.
   geometry::Camera camera = widened(view.camera);
@@ -195,12 +195,12 @@ bool Planner::Impl::plan_cell(Question& q, ViewerView& view, unsigned turn) {
       step_aside_m(view) * (ahead ? view.movement_m / moved : camera.pose.orientation * direction(turn));
   camera = wire::shortened(camera);
   // A head does not go where nobody has looked: into what is solid, whose inside is another surface, and near.
-  if (!geometry::validate(camera) || known_empty.unseen_at(camera.pose.position_room)) return false;
+  if (!geometry::validate(camera) || known_empty_.unseen_at(camera.pose.position_room)) return false;
   q.look_at(camera);
   const std::shared_ptr<ViewMap> map = new_map();
-  render_view_map(q.model, camera, {kEpsilonFromBeside, kNearestFromBeside}, true, keys, *map);
+  render_view_map(q.model, camera, {kEpsilonFromBeside, kNearestFromBeside}, true, keys_, *map);
   image::PixelMask cast;
-  known_empty.project(camera, map->depth_m, config.threads, cast);
+  known_empty_.project(camera, map->depth_m, config_.threads, cast);
   drop_far_from_edges(*map, cast);
   PlannedFrame frame{.kind = PlannedFrame::Kind::kCell, .camera = camera, .base = view.camera, .map = map};
   frame.firm.reset(camera.width, camera.height);
@@ -225,34 +225,34 @@ bool Planner::Impl::plan_cell(Question& q, ViewerView& view, unsigned turn) {
   return issue(q, std::move(tiles), std::move(frame)) > 0;
 }
 
-bool Planner::Impl::plan_fine(Question& q, ViewerView& view) {
+bool Planner::plan_fine(Question& q, ViewerView& view) {
   if (!view.still) return false;
   if (q.breaks_off()) return true;
   if (!view.fine_map) look_closer(q, view);
   if (plan_stages(q, view)) return true;
-  if (view.fine_changes == changes || view.looks >= kMostLooks) return false;
+  if (view.fine_changes == changes_ || view.looks >= kMostLooks) return false;
   if (q.breaks_off()) return true;
   look_closer(q, view);
   return plan_stages(q, view);
 }
 
 // First at the view, then at what finer rays have added to it.
-void Planner::Impl::look_closer(Question& q, ViewerView& view) {
+void Planner::look_closer(Question& q, ViewerView& view) {
   if (view.looks++ == 0) {
     map_view(q, view);
     view.fine_map = view.map;
   } else {
     view.fine_map = nullptr;
     const std::shared_ptr<ViewMap> map = new_map();
-    render_view_map(q.model, view.camera, test, true, keys, *map, true);
+    render_view_map(q.model, view.camera, test_, true, keys_, *map, true);
     view.fine_map = map;
   }
-  view.fine_changes = changes;
+  view.fine_changes = changes_;
 }
 
-bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
+bool Planner::plan_stages(Question& q, ViewerView& view) {
   const std::shared_ptr<const ViewMap> map = view.fine_map;
-  const int most = config.still_rays;
+  const int most = config_.still_rays;
   // What differs little gets all of its rays at once: what waits for them shows little of it, and each pass more is
   // another patch of each cluster for packer and viewers to merge.
   const int weak = most >= 16 ? 2 : 1;
@@ -333,12 +333,12 @@ image::PixelMask fine_rays(const splat::ViewKeys::Tile& tile, const PixelJudge& 
 
 // Of one region: until there are enough rays, or the piece ends. Its tiles are cut from what was found in all of it:
 // packer and viewers pay for each tile.
-void Planner::Impl::look_into(Question& q, const geometry::Rect& region, FineSearch& search) {
+void Planner::look_into(Question& q, const geometry::Rect& region, FineSearch& search) {
   const int times = search.camera.width / search.open.width();
   const std::vector<Part> parts = parts_of(search.open, region, times);
   const geometry::Camera camera = geometry::crop(search.camera, region);
-  keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight, true);
-  const PixelJudge judge(camera, test, keys.rim());
+  keys_.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight, true);
+  const PixelJudge judge(camera, test_, keys_.rim());
   image::PixelMask cast(region.width, region.height);
   std::mutex mutex;
   for (size_t first = 0; first < parts.size() && !q.enough(search.rays); first += kTilesAtOnce) {
@@ -346,7 +346,7 @@ void Planner::Impl::look_into(Question& q, const geometry::Rect& region, FineSea
     const std::span<const Part> some(parts.data() + first, std::min(kTilesAtOnce, parts.size() - first));
     std::vector<int> indices;
     for (const Part& part : some) indices.push_back(part.tile);
-    keys.draw(indices, [&](const splat::ViewKeys::Tile& tile) {
+    keys_.draw(indices, [&](const splat::ViewKeys::Tile& tile) {
       const geometry::Rect& part =
           std::find_if(some.begin(), some.end(), [&](const Part& p) { return p.tile == tile.index; })->rect;
       const image::PixelMask wanted = fine_rays(tile, judge, cropped(search.open, part), times, search.all);
@@ -363,7 +363,7 @@ void Planner::Impl::look_into(Question& q, const geometry::Rect& region, FineSea
   }
 }
 
-bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const FineStage& stage) {
+bool Planner::plan_fine(Question& q, ViewerView& view, const FineStage& stage) {
   const int times = 1 << stage.finer;
   FineSearch search{.camera = finer_camera(view.camera, times),
                     .all = stage.all,

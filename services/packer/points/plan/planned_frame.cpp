@@ -1,13 +1,211 @@
 #include "services/packer/points/plan/planned_frame.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 
+#include "common/codec/mask_stream.h"
+#include "common/parallel/in_parallel.h"
 #include "common/splat/reference/reference_depth.h"
 
 namespace telesplat::packer {
+
+namespace {
+
+// 64 pixels of a row from x on; those beyond the row's words are zero.
+uint64_t bits_at(const uint64_t* row, size_t words, int x) {
+  const auto word = static_cast<size_t>(x) >> 6;
+  const int shift = x & 63;
+  const uint64_t low = word < words ? row[word] >> shift : 0;
+  return shift == 0 || word + 1 >= words ? low : low | row[word + 1] << (64 - shift);
+}
+
+uint64_t first_bits(int n) { return n >= 64 ? ~uint64_t{0} : (uint64_t{1} << n) - 1; }
+
+// How many rays a rectangle has, and their box.
+struct Content {
+  uint64_t rays = 0;
+  geometry::Rect box;
+};
+Content content_of(const image::PixelMask& mask, const geometry::Rect& r) {
+  Content out;
+  int x0 = r.x + r.width, x1 = r.x, y0 = -1, y1 = 0;
+  for (int y = r.y; y < r.y + r.height; ++y) {
+    const uint64_t rays = out.rays;
+    for (int x = r.x; x < r.x + r.width; x += 64) {
+      const uint64_t bits = bits_at(mask.row(y), mask.words_per_row(), x) & first_bits(r.x + r.width - x);
+      if (bits == 0) continue;
+      out.rays += static_cast<uint64_t>(std::popcount(bits));
+      x0 = std::min(x0, x + std::countr_zero(bits));
+      x1 = std::max(x1, x + 64 - std::countl_zero(bits));
+    }
+    if (out.rays == rays) continue;
+    if (y0 < 0) y0 = y;
+    y1 = y + 1;
+  }
+  if (out.rays > 0) out.box = {x0, y0, x1 - x0, y1 - y0};
+  return out;
+}
+
+// Where to cut a box that is wider than high: so that about `share` of its rays lie on the left. At a word of the
+// mask, where there is one.
+int cut_across(const image::PixelMask& mask, const geometry::Rect& box, double share, uint64_t rays) {
+  const int first = box.x / 64 + 1, last = (box.x + box.width - 1) / 64;
+  if (first > last) return box.x + box.width / 2;
+  std::vector<uint64_t> before(static_cast<size_t>(last - first + 1));  // rays of the word before each place
+  for (int y = box.y; y < box.y + box.height; ++y) {
+    const uint64_t* const row = mask.row(y);
+    before[0] += static_cast<uint64_t>(std::popcount(row[first - 1] >> (box.x & 63)));
+    for (size_t i = 1; i < before.size(); ++i)
+      before[i] += static_cast<uint64_t>(std::popcount(row[static_cast<size_t>(first) + i - 1]));
+  }
+  const double wanted = share * static_cast<double>(rays);
+  int best = first;
+  double sum = 0, least = HUGE_VAL;
+  for (size_t i = 0; i < before.size(); ++i) {
+    sum += static_cast<double>(before[i]);
+    if (std::abs(sum - wanted) < least) least = std::abs(sum - wanted), best = first + static_cast<int>(i);
+  }
+  return best * 64;
+}
+
+// The same of one that is higher than wide: about `share` of its rays above.
+int cut_down(const image::PixelMask& mask, const geometry::Rect& box, double share, uint64_t rays) {
+  const double wanted = share * static_cast<double>(rays);
+  int best = box.y + 1;
+  double sum = 0, least = HUGE_VAL;
+  for (int y = box.y; y + 1 < box.y + box.height; ++y) {
+    sum += static_cast<double>(content_of(mask, {box.x, y, box.width, 1}).rays);
+    if (std::abs(sum - wanted) < least) least = std::abs(sum - wanted), best = y + 1;
+  }
+  return best;
+}
+
+void cut(const image::PixelMask& mask, const geometry::Rect& r, const TileLimits& limits, std::vector<RayTile>& tiles) {
+  const auto [rays, box] = content_of(mask, r);
+  if (rays == 0) return;
+  const int longest = std::max(box.width, box.height);
+  const auto parts = [](uint64_t all, uint64_t of) { return (all + of - 1) / of; };
+  const uint64_t by_size =
+      parts(static_cast<uint64_t>(longest), static_cast<uint64_t>(std::max(limits.size, kLeastTile)));
+  const uint64_t by_rays = limits.rays == 0 || longest <= kLeastTile ? 1 : parts(rays, limits.rays);
+  const uint64_t most = std::max(by_size, by_rays);
+  if (most == 1) {
+    tiles.push_back({box, cropped(mask, box), rays});
+    return;
+  }
+  const double share = static_cast<double>(most / 2) / static_cast<double>(most);
+  if (box.width >= box.height) {
+    const int x = cut_across(mask, box, share, rays);
+    cut(mask, {box.x, box.y, x - box.x, box.height}, limits, tiles);
+    cut(mask, {x, box.y, box.x + box.width - x, box.height}, limits, tiles);
+  } else {
+    const int y = cut_down(mask, box, share, rays);
+    cut(mask, {box.x, box.y, box.width, y - box.y}, limits, tiles);
+    cut(mask, {box.x, y, box.width, box.y + box.height - y}, limits, tiles);
+  }
+}
+
+}  // namespace
+
+image::PixelMask cropped(const image::PixelMask& mask, const geometry::Rect& r) {
+  image::PixelMask out(r.width, r.height);
+  for (int y = 0; y < r.height; ++y) {
+    uint64_t* row = out.row(y);
+    for (int x = 0; x < r.width; x += 64)
+      row[x >> 6] = bits_at(mask.row(r.y + y), mask.words_per_row(), r.x + x) & first_bits(r.width - x);
+  }
+  return out;
+}
+
+void merge(const image::PixelMask& part, int x, int y, image::PixelMask& mask) {
+  const int shift = x & 63;
+  for (int row = 0; row < part.height(); ++row) {
+    const uint64_t* from = part.row(row);
+    uint64_t* to = mask.row(y + row) + (x >> 6);
+    for (size_t w = 0; w < part.words_per_row(); ++w) {
+      if (from[w] == 0) continue;
+      to[w] |= from[w] << shift;
+      if (shift != 0 && from[w] >> (64 - shift) != 0) to[w + 1] |= from[w] >> (64 - shift);
+    }
+  }
+}
+
+std::vector<RayTile> cut_tiles(const image::PixelMask& mask, const geometry::Rect& area, const TileLimits& limits) {
+  std::vector<RayTile> tiles;
+  cut(mask, area, limits, tiles);
+  return tiles;
+}
+
+uint64_t put_off_rays(const image::PixelMask& some, uint64_t most, image::PixelMask& cast) {
+  constexpr int kWidth = 64, kHeight = 16;  // a word of a mask
+  struct Piece {
+    size_t word;
+    int y;
+    uint64_t rays;
+    double distance2;
+  };
+  std::vector<Piece> pieces;
+  uint64_t left = 0;
+  for (int y = 0; y < some.height(); y += kHeight)
+    for (size_t word = 0; word < some.words_per_row(); ++word) {
+      uint64_t rays = 0;
+      for (int row = y; row < std::min(y + kHeight, some.height()); ++row)
+        rays += static_cast<uint64_t>(std::popcount(some.row(row)[word]));
+      if (rays == 0) continue;
+      const double dx = (static_cast<double>(word) + 0.5) * kWidth - 0.5 * some.width();
+      const double dy = y + 0.5 * kHeight - 0.5 * some.height();
+      pieces.push_back({word, y, rays, dx * dx + dy * dy});
+      left += rays;
+    }
+  if (left <= most) return 0;
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const Piece& a, const Piece& b) { return a.distance2 > b.distance2; });
+  uint64_t taken = 0;
+  for (const Piece& piece : pieces) {
+    if (left <= most) break;
+    for (int row = piece.y; row < std::min(piece.y + kHeight, some.height()); ++row)
+      cast.row(row)[piece.word] &= ~some.row(row)[piece.word];
+    left -= piece.rays, taken += piece.rays;
+  }
+  return taken;
+}
+
+void sort_by_distance_to_centre(std::vector<RayTile>& tiles, int width, int height) {
+  const auto distance2 = [&](const RayTile& t) {
+    const double dx = t.rect.x + 0.5 * t.rect.width - 0.5 * width, dy = t.rect.y + 0.5 * t.rect.height - 0.5 * height;
+    return dx * dx + dy * dy;
+  };
+  std::stable_sort(tiles.begin(), tiles.end(),
+                   [&](const RayTile& a, const RayTile& b) { return distance2(a) < distance2(b); });
+}
+
+size_t add_tiles(const std::vector<RayTile>& tiles, int threads, wire::Plan& plan) {
+  std::vector<std::vector<uint32_t>> masks(tiles.size());
+  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    in_parallel(size_t{0}, tiles.size(), [&](size_t i) {
+      const RayTile& t = tiles[i];
+      if (t.rays < static_cast<uint64_t>(t.rect.width) * static_cast<uint64_t>(t.rect.height))
+        masks[i] = codec::encode_mask(t.mask);
+    });
+  });
+  for (size_t i = 0; i < tiles.size(); ++i) {
+    const RayTile& t = tiles[i];
+    if (plan.tiles.size() / wire::kPlanNumbers >= wire::kMaxTiles || masks[i].size() > wire::kMaxMaskWords ||
+        plan.masks.size() + masks[i].size() > wire::kMaxPlanWords)
+      return i;
+    for (const int n : {t.rect.x, t.rect.y, t.rect.width, t.rect.height}) plan.tiles.push_back(uint32_t(n));
+    plan.tiles.push_back(uint32_t(t.rays));
+    plan.tiles.push_back(uint32_t(masks[i].size()));
+    plan.masks.insert(plan.masks.end(), masks[i].begin(), masks[i].end());
+  }
+  return tiles.size();
+}
+
+// ---- frames --------------------------------------------------------------------------------------------------------
 
 size_t PlannedFrame::find(const geometry::Rect& rect) const {
   const auto found = std::find_if(tiles.begin(), tiles.end(), [&](const RayTile& t) { return t.rect == rect; });
@@ -70,92 +268,95 @@ void note_inserted(const points::PreparedPatch& patch, const points::ModelConfig
   }
 }
 
+// ---- views ---------------------------------------------------------------------------------------------------------
+
 namespace {
 
-class Depths {
- public:
-  explicit Depths(const geometry::Camera& camera) : scale_(static_cast<float>(camera.near_m * image::kMaxDepthCode)) {}
-  float metres(uint32_t code) const {
-    return code == 0 ? std::numeric_limits<float>::infinity() : scale_ / static_cast<float>(code);
-  }
+size_t pixels_of(const geometry::Camera& camera) {
+  return static_cast<size_t>(camera.width) * static_cast<size_t>(camera.height);
+}
 
- private:
-  float scale_;
-};
+// Of its maps.
+size_t pixels_in(const ViewerView& v) {
+  const size_t each = pixels_of(v.camera);
+  return (v.map ? each : 0) + (v.fine_map && v.fine_map != v.map ? each : 0);
+}
+
+geometry::Box grown(const geometry::Box& box, float by_m) { return {box.lo - by_m, box.hi + by_m}; }
 
 }  // namespace
 
-std::vector<float> depths_of(const SampledTile& tile, const image::PixelMask& cast) {
-  const Depths depths(tile.camera);
-  std::vector<float> out;
-  for (int y = 0; y < tile.rect.height; ++y) {
-    const uint32_t* code = &tile.image.depth[static_cast<size_t>(y) * tile.rect.width];
-    image::for_each_set(cast.row(y), cast.words_per_row(), [&](size_t x) { out.push_back(depths.metres(code[x])); });
+void forget_casts(ViewerView& view) {
+  const int width = view.camera.width, height = view.camera.height;
+  view.done.reset(width, height);
+  view.doubted.reset(width, height);
+  for (image::PixelMask& mask : view.refined) mask.reset(width, height);
+  for (auto& tiles : view.found) tiles.clear();
+  view.cells_done = 0;
+  view.fine_map = nullptr;
+  view.looks = 0;
+  view.lost.clear();
+  view.cell_rays = 0;
+}
+
+void follow(const geometry::Camera& camera, ViewerView& view) {
+  view.still = view.known && view.camera == camera;
+  view.movement_m = view.known ? camera.pose.position_room - view.camera.pose.position_room : glm::dvec3(0);
+  if (view.still) return;
+  view.camera = camera;
+  view.known = true;
+  view.map = nullptr;
+  forget_casts(view);
+}
+
+bool may_see(const geometry::Camera& camera, double around_m, const points::ModelConfig& model,
+             std::span<const points::ClusterKey> leaves) {
+  // Views from beside see a little more on each side; splats stand out of their leaf.
+  const int x = camera.width / 16 + 1, y = camera.height / 16 + 1;
+  const geometry::Frustum frustum(geometry::crop(camera, {-x, -y, camera.width + 2 * x, camera.height + 2 * y}));
+  const auto out_m = static_cast<float>(around_m + points::octree_grid(model).leaf_size);
+  return std::any_of(leaves.begin(), leaves.end(), [&](points::ClusterKey key) {
+    return frustum.may_contain(grown(points::leaf_box(model, key), out_m));
+  });
+}
+
+ViewerView* ViewerViews::find(InstanceId viewer) {
+  const auto found =
+      std::find_if(views_.begin(), views_.end(), [&](const ViewerView& v) { return v.viewer == viewer; });
+  return found == views_.end() ? nullptr : &*found;
+}
+
+ViewerView& ViewerViews::use(InstanceId viewer) {
+  auto used = std::find_if(views_.begin(), views_.end(), [&](const ViewerView& v) { return v.viewer == viewer; });
+  if (used == views_.end()) {
+    used = views_.emplace(views_.begin());
+    used->viewer = viewer;
   }
+  views_.splice(views_.begin(), views_, used);
+  size_t views = 0, pixels = 0, maps = 0, map_pixels = 0;
+  std::erase_if(views_, [&](const ViewerView& v) {
+    pixels += pixels_of(v.camera);
+    return ++views > kMaxViewers || (views > 1 && pixels > kMaxViewPixels);
+  });
+  for (ViewerView& v : views_) {
+    maps += (v.map != nullptr) + (v.fine_map && v.fine_map != v.map);
+    map_pixels += pixels_in(v);
+    if (&v == &views_.front() || (maps <= kMaxMaps && map_pixels <= kMaxMapPixels)) continue;
+    v.map = nullptr, v.fine_map = nullptr;
+  }
+  return views_.front();
+}
+
+size_t ViewerViews::map_pixels() const {
+  size_t out = 0;
+  for (const ViewerView& v : views_) out += pixels_in(v);
   return out;
 }
 
-void write_depths(const SampledTile& tile, std::vector<float>& depth_m) {
-  const Depths depths(tile.camera);
-  for (int y = 0; y < tile.rect.height; ++y) {
-    const uint32_t* code = &tile.image.depth[static_cast<size_t>(y) * tile.rect.width];
-    float* out = &depth_m[static_cast<size_t>(tile.rect.y + y) * tile.camera.width + tile.rect.x];
-    for (int x = 0; x < tile.rect.width; ++x) out[x] = depths.metres(code[x]);
-  }
-}
-
-namespace {
-
-constexpr float kKnown = -1;  // sign of what was known before
-
-// A ray that saw what was shown tells nothing new.
-bool confirms(float came_m, float shown_m) {
-  constexpr float kTolerance = 0.01f;
-  return came_m == shown_m || std::abs(came_m - shown_m) <= kTolerance * shown_m;
-}
-
-// What was not cast is as it was shown, unless a ray was needed to tell. At edges, and where samples
-// are far apart, the nearest surface around counts.
-void clear_as_shown(const PlannedFrame& frame, int y, float* clear_m) {
-  const ViewMap& map = *frame.map;
-  const int width = map.camera.width, height = map.camera.height;
-  const float* shown = &map.depth_m[static_cast<size_t>(y) * width];
-  image::for_each_set(frame.firm.row(y), frame.firm.words_per_row(), [&](size_t x) { clear_m[x] = kKnown * shown[x]; });
-  const auto nearest = [&](int x) {
-    float least = std::numeric_limits<float>::infinity();
-    for (int j = std::max(y - 1, 0); j <= std::min(y + 1, height - 1); ++j)
-      for (int i = std::max(x - 1, 0); i <= std::min(x + 1, width - 1); ++i)
-        least = std::min(least, map.depth_m[static_cast<size_t>(j) * width + i]);
-    return least;
-  };
-  for (size_t w = 0; w < map.edge.words_per_row(); ++w) {
-    const uint64_t edges = map.edge.row(y)[w] & map.covered.row(y)[w] & ~map.lacking.row(y)[w] & ~frame.firm.row(y)[w];
-    const uint64_t put_off = frame.put_off.height() > 0 ? frame.put_off.row(y)[w] : 0;
-    for (uint64_t rest = edges | put_off; rest != 0; rest &= rest - 1) {
-      const int x = static_cast<int>(w) * 64 + std::countr_zero(rest);
-      clear_m[x] = kKnown * nearest(x);
-    }
-  }
-}
-
-}  // namespace
-
-void clear_depths(const PlannedFrame& frame, std::vector<float>& clear_m) {
-  const auto width = static_cast<size_t>(frame.camera.width);
-  clear_m.assign(width * static_cast<size_t>(frame.camera.height), 0.0f);
-  for (int y = 0; frame.map && y < frame.firm.height(); ++y) clear_as_shown(frame, y, &clear_m[y * width]);
-  for (size_t i = 0; i < frame.came_m.size(); ++i) {
-    const RayTile& tile = frame.tiles[i];
-    const float* next = frame.came_m[i].data();
-    if (frame.came_m[i].size() != tile.rays) continue;
-    for (int y = 0; y < tile.rect.height; ++y) {
-      float* clear = &clear_m[static_cast<size_t>(tile.rect.y + y) * width + static_cast<size_t>(tile.rect.x)];
-      image::for_each_set(tile.mask.row(y), tile.mask.words_per_row(), [&](size_t x) {
-        const float came = *next++;
-        if (!confirms(came, kKnown * clear[x])) clear[x] = came;
-      });
-    }
-  }
+void ViewerViews::forgotten(const points::ModelConfig& model, double around_m,
+                            std::span<const points::ClusterKey> leaves) {
+  for (ViewerView& view : views_)
+    if (view.known && may_see(view.camera, around_m, model, leaves)) forget_casts(view);
 }
 
 }  // namespace telesplat::packer

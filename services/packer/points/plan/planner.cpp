@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "services/packer/points/plan/planner_impl.h"
-
 namespace telesplat::packer {
 namespace {
 
@@ -28,7 +26,7 @@ uint64_t last_word_mask(int width) { return (width & 63) == 0 ? ~uint64_t{0} : (
 }  // namespace
 
 // Which pixels of a view are cast, and why: each for one reason.
-struct Planner::Impl::ViewClasses {
+struct Planner::ViewClasses {
   image::PixelMask cast, firm;
   // What of `cast` only refines surfaces that are shown, with nothing unseen before them; and what of that is put off.
   image::PixelMask sparse, edge, put_off;
@@ -36,16 +34,16 @@ struct Planner::Impl::ViewClasses {
   uint64_t needed = 0;  // rays that are no validation
 };
 
-Planner::Impl::Impl(const PlanConfig& c)
-    : config(c),
-      test{c.relative_epsilon, c.nearest_sample},
-      keys(c.threads),
-      known_empty(c.model),
-      blue_noise(std::max(c.validation, 1) * kSets),
-      validation(c.model) {}
+Planner::Planner(const PlanConfig& c)
+    : config_(c),
+      test_{c.relative_epsilon, c.nearest_sample},
+      keys_(c.threads),
+      known_empty_(c.model),
+      blue_noise_(std::max(c.validation, 1) * kSets),
+      validation_(c.model) {}
 
-size_t Planner::Impl::issue(Question& q, std::vector<RayTile> tiles, PlannedFrame frame) {
-  tiles.resize(add_tiles(tiles, config.threads, q.plan));
+size_t Planner::issue(Question& q, std::vector<RayTile> tiles, PlannedFrame frame) {
+  tiles.resize(add_tiles(tiles, config_.threads, q.plan));
   frame.id = q.request.frame;
   frame.viewer = q.request.viewer;
   frame.planned_s = q.now_s;
@@ -56,33 +54,33 @@ size_t Planner::Impl::issue(Question& q, std::vector<RayTile> tiles, PlannedFram
   q.plan.camera = frame.camera;
   q.plan.figures["mask_bytes"] = 4.0 * static_cast<double>(q.plan.masks.size());
   const size_t count = frame.tiles.size();
-  if (count > 0) shelf.add(std::move(frame));
+  if (count > 0) shelf_.add(std::move(frame));
   return count;
 }
 
 // Memory of maps that nobody looks at any more is used again: to get it anew costs as much as to fill it.
-std::shared_ptr<ViewMap> Planner::Impl::new_map() {
+std::shared_ptr<ViewMap> Planner::new_map() {
   size_t pixels = 0;
-  std::erase_if(maps, [&](const auto& map) {
+  std::erase_if(maps_, [&](const auto& map) {
     pixels += map->depth_m.capacity();
     return map.use_count() == 1 && pixels > ViewerViews::kMaxMapPixels;
   });
-  for (const auto& map : maps)
+  for (const auto& map : maps_)
     if (map.use_count() == 1) return map;
-  if (maps.size() < ViewerViews::kMaxMaps) return maps.emplace_back(std::make_shared<ViewMap>());
+  if (maps_.size() < ViewerViews::kMaxMaps) return maps_.emplace_back(std::make_shared<ViewMap>());
   return std::make_shared<ViewMap>();
 }
 
 // The same view of the same model looks as it did.
-void Planner::Impl::map_view(Question& q, ViewerView& view) {
-  if (view.map && view.map_changes == changes) return;
+void Planner::map_view(Question& q, ViewerView& view) {
+  if (view.map && view.map_changes == changes_) return;
   view.map = new_map();
-  render_view_map(q.model, view.camera, test, true, keys, *view.map);
-  view.map_changes = changes;
+  render_view_map(q.model, view.camera, test_, true, keys_, *view.map);
+  view.map_changes = changes_;
 }
 
-uint64_t Planner::Impl::validation_sets(const Question& q, ViewerView& view) const {
-  if (config.validation == 0) return 0;
+uint64_t Planner::validation_sets(const Question& q, ViewerView& view) const {
+  if (config_.validation == 0) return 0;
   const double most = view.still ? kStillSets : kSets;
   const double since_s = q.now_s - view.validated_s;
   view.sets_due = std::clamp(view.sets_due + kSets * since_s / kTurn_s, 0.0, most);
@@ -92,20 +90,20 @@ uint64_t Planner::Impl::validation_sets(const Question& q, ViewerView& view) con
   return static_cast<uint64_t>(sets);
 }
 
-Planner::Impl::ViewClasses Planner::Impl::classify(Question& q, ViewerView& view) {
+Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
   const ViewMap& map = *view.map;
   const int width = map.camera.width, height = map.camera.height;
   ViewClasses out;
   for (image::PixelMask* mask : {&out.cast, &out.firm, &out.sparse, &out.edge}) mask->reset(width, height);
   image::PixelMask may_hold, stale(width, height);
-  known_empty.project(map.camera, map.depth_m, config.threads, may_hold);
-  validation.mark_stale(map.camera, q.now_s, stale);
+  known_empty_.project(map.camera, map.depth_m, config_.threads, may_hold);
+  validation_.mark_stale(map.camera, q.now_s, stale);
   std::array<uint64_t, kRayClasses> pixels{}, rays{};
   const uint64_t picks = validation_sets(q, view);
   for (int y = 0; y < height; ++y) {
     uint64_t picked = 0, picked_empty = 0;
-    for (uint64_t i = 0; i < picks; ++i) picked |= blue_noise.row(y, view.round + i);
-    for (uint64_t i = 0; i < picks; i += kEmptyShare) picked_empty |= blue_noise.row(y, view.round + i);
+    for (uint64_t i = 0; i < picks; ++i) picked |= blue_noise_.row(y, view.round + i);
+    for (uint64_t i = 0; i < picks; i += kEmptyShare) picked_empty |= blue_noise_.row(y, view.round + i);
     for (size_t w = 0; w < map.covered.words_per_row(); ++w) {
       const uint64_t inside = w + 1 == map.covered.words_per_row() ? last_word_mask(width) : ~uint64_t{0};
       const uint64_t covered = map.covered.row(y)[w], lacking = map.lacking.row(y)[w], edge = map.edge.row(y)[w];
@@ -150,13 +148,13 @@ Planner::Impl::ViewClasses Planner::Impl::classify(Question& q, ViewerView& view
 }
 
 // The master samples all of it. What its tiles tell is learned as they come.
-void Planner::Impl::plan_full(Question& q, const ViewerView& view) {
+void Planner::plan_full(Question& q, const ViewerView& view) {
   q.plan.full = true;
   q.plan.camera = view.camera;
 }
 
 // What is shown already, though coarsely, can wait; edges less than what lies between them.
-void Planner::Impl::put_off(uint64_t most_rays, ViewClasses& classes) {
+void Planner::put_off(uint64_t most_rays, ViewClasses& classes) {
   constexpr uint64_t kEdges = 4;  // times as many (PlanRequest::most_rays)
   const uint64_t sparse = put_off_rays(classes.sparse, most_rays, classes.cast);
   const uint64_t edge = put_off_rays(classes.edge, kEdges * std::min(most_rays, ~uint64_t{0} / kEdges), classes.cast);
@@ -173,7 +171,7 @@ void Planner::Impl::put_off(uint64_t most_rays, ViewClasses& classes) {
   classes.figures["rays.put_off"] = static_cast<double>(sparse + edge);
 }
 
-void Planner::Impl::plan_view(Question& q, ViewerView& view) {
+void Planner::plan_view(Question& q, ViewerView& view) {
   follow(q.request.camera, view);
   if (q.model.points() == 0) return plan_full(q, view);
   map_view(q, view);
@@ -190,9 +188,6 @@ void Planner::Impl::plan_view(Question& q, ViewerView& view) {
   issue(q, std::move(tiles), std::move(frame));
 }
 
-Planner::Planner(const PlanConfig& config) : impl_(std::make_unique<Impl>(config)) {}
-Planner::~Planner() = default;
-
 wire::Plan Planner::plan(const points::PointModel& model, Sequence sequence, const wire::PlanRequest& request,
                          double now_s) {
   for (;;)
@@ -201,9 +196,8 @@ wire::Plan Planner::plan(const points::PointModel& model, Sequence sequence, con
 
 std::optional<wire::Plan> Planner::plan_piece(const points::PointModel& model, Sequence sequence,
                                               const wire::PlanRequest& request, double now_s) {
-  Impl& m = *impl_;
-  m.settle_old(now_s);
-  Impl::Question q{model, sequence, request, now_s};
+  settle_old(now_s);
+  Question q{model, sequence, request, now_s};
   q.plan.frame = request.frame;
   q.plan.epoch = request.epoch;
   q.plan.camera = request.camera;
@@ -212,50 +206,36 @@ std::optional<wire::Plan> Planner::plan_piece(const points::PointModel& model, S
     q.plan.full = !request.extra;
     return std::move(q.plan);
   }
-  ViewerView& view = m.viewers.use(request.viewer);
+  ViewerView& view = viewers_.use(request.viewer);
   if (request.extra)
-    m.plan_extra(q, view);
+    plan_extra(q, view);
   else
-    m.plan_view(q, view);
+    plan_view(q, view);
   if (q.plan.tiles.empty() && q.unfinished) return std::nullopt;
   return std::move(q.plan);
 }
 
-void Planner::take(const SampledTile& tile, bool whole, double now_s) { impl_->take(tile, whole, now_s); }
-void Planner::end_frame(FrameId id) { impl_->end_frame(id); }
-std::optional<KnownReference> Planner::reference(const SampledTile& tile) const { return impl_->reference(tile); }
-image::PixelMask Planner::missed(const SampledTile& tile) const { return impl_->missed(tile); }
-void Planner::learn(const points::PointModel& model) { impl_->known_empty.add(model); }
-bool Planner::settle() { return impl_->settle(); }
-size_t Planner::frames() const { return impl_->shelf.frames().size(); }
-bool Planner::settles_soon() const { return tells_much(impl_->shelf); }
-bool Planner::view_under_way(double now_s) const { return packer::view_under_way(impl_->shelf, now_s); }
-
-std::vector<points::ClusterKey> Planner::disproved() { return impl_->validation.disproved(); }
-
 void Planner::inserted(const points::PreparedPatch& patch) {
-  impl_->changes += !patch.mosaics.empty();
-  impl_->known_empty.add(patch);
-  note_inserted(patch, impl_->config.model, impl_->shelf);
+  changes_ += !patch.mosaics.empty();
+  known_empty_.add(patch);
+  note_inserted(patch, config_.model, shelf_);
 }
 
 void Planner::forgotten(std::span<const points::ClusterKey> clusters) {
-  ++impl_->changes;  // single patches may have gone, and no cluster with them
+  ++changes_;  // single patches may have gone, and no cluster with them
   if (clusters.empty()) return;
-  impl_->known_empty.forget(clusters);
-  impl_->validation.forgotten(clusters);
-  for (PlannedFrame& frame : impl_->shelf.frames()) frame.nearest_known = false;
-  impl_->viewers.forgotten(impl_->config.model, impl_->config.view_cell_m, clusters);
+  known_empty_.forget(clusters);
+  validation_.forgotten(clusters);
+  for (PlannedFrame& frame : shelf_.frames()) frame.nearest_known = false;
+  viewers_.forgotten(config_.model, config_.view_cell_m, clusters);
 }
 
 void Planner::cleared() {
-  ++impl_->changes;
-  impl_->known_empty.clear();
-  impl_->validation.clear();
-  impl_->viewers.clear();
-  impl_->shelf.clear();
+  ++changes_;
+  known_empty_.clear();
+  validation_.clear();
+  viewers_.clear();
+  shelf_.clear();
 }
-
-void Planner::forget_frames() { impl_->shelf.clear(); }
 
 }  // namespace telesplat::packer

@@ -2,6 +2,9 @@
 // come in, plans come out. One thread at a time.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -10,12 +13,24 @@
 #include "common/core/ids.h"
 #include "common/points/point_model.h"
 #include "common/wire/tile_messages.h"
-#include "services/packer/points/known_reference.h"
-#include "services/packer/points/model_watcher.h"
-#include "services/packer/points/plan/ray_class.h"
-#include "services/packer/points/sampled_tile.h"
+#include "services/packer/points/event.h"
+#include "services/packer/points/plan/known_empty.h"
+#include "services/packer/points/plan/planned_frame.h"
+#include "services/packer/points/plan/validation.h"
 
 namespace telesplat::packer {
+
+// Why a pixel of a view is cast; or why not.
+
+enum class RayClass : uint8_t { kNothing, kUnproven, kSparse, kEdge, kStale, kValidation, kGood, kKnownEmpty };
+inline constexpr int kRayClasses = 8;
+
+/// As in figures of plans: "nothing", "known_empty".
+inline const char* name_of(RayClass c) {
+  constexpr std::array<const char*, kRayClasses> kNames{"nothing", "unproven",   "sparse", "edge",
+                                                        "stale",   "validation", "good",   "known_empty"};
+  return kNames[static_cast<size_t>(c)];
+}
 
 struct PlanConfig {
   points::ModelConfig model;
@@ -33,10 +48,9 @@ class Planner final : public ModelWatcher {
  public:
   /// Precondition: points::validate(config.model).
   explicit Planner(const PlanConfig& config);
-  ~Planner() override;
 
   /// What a model holds already.
-  void learn(const points::PointModel& model);
+  void learn(const points::PointModel& model) { known_empty_.add(model); }
 
   /// The tiles of a view, or of rays beyond it (request.extra): which of its rays the model lacks.
   ///   model: as of the event `sequence`; the same one in all calls, and of request.epoch. The planner watches it
@@ -61,34 +75,116 @@ class Planner final : public ModelWatcher {
   void end_frame(FrameId id);
   /// What the model shows where the tile of a planned frame was cast, as of now: PackerCore::submit() takes it in place
   /// of rendering the model. nullopt: it is not known. Valid until the planner or the model changes.
-  std::optional<KnownReference> reference(const SampledTile& tile) const;
+  std::optional<KnownReference> reference(const SampledTile& tile);
   /// Of a tile of rays finer than a view's: those that met nothing, of its size. Empty: it is no such tile, or that is
   /// not known any more.
-  image::PixelMask missed(const SampledTile& tile) const;
+  image::PixelMask missed(const SampledTile& tile);
   /// Learns from a frame that is complete: where nothing is. To be called when there is time, after its points are
   /// inserted, until nothing is left to do (false). plan() does it where it has waited for long.
   bool settle();
   /// settle() should not wait: else a view's rays into empty space are cast again.
-  bool settles_soon() const;
+  bool settles_soon() const { return tells_much(shelf_); }
   /// Planned, and not forgotten yet: their maps are most of what planning keeps in memory.
-  size_t frames() const;
+  size_t frames() const { return shelf_.frames().size(); }
 
   /// A view was planned, or began to come, a moment ago, and is not complete.
-  bool view_under_way(double now_s) const;
+  bool view_under_way(double now_s) const { return packer::view_under_way(shelf_, now_s); }
 
   /// What the rays since the last call have disproved: clusters whose points are to be forgotten. Ascending.
-  std::vector<points::ClusterKey> disproved();
+  std::vector<points::ClusterKey> disproved() { return validation_.disproved(); }
 
   /// Frames are numbered anew from here.
-  void forget_frames();
+  void forget_frames() { shelf_.clear(); }
 
   void inserted(const points::PreparedPatch& patch) override;
   void forgotten(std::span<const points::ClusterKey> clusters) override;
   void cleared() override;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  /// One question, and what answers it.
+  struct Question {
+    const points::PointModel& model;
+    Sequence sequence;
+    const wire::PlanRequest& request;
+    double now_s;
+    wire::Plan plan{};
+
+    TileLimits limits() const { return {static_cast<int>(request.tile_size), request.tile_rays}; }
+    /// Extra rays of this plan, at most.
+    uint64_t most_rays = ~uint64_t{0};
+    bool enough(uint64_t rays) const { return rays >= most_rays; }
+
+    /// Extra rays are looked for in pieces: pixels that this one has looked at, and whether it broke off.
+    uint64_t looked_at = 0;
+    bool unfinished = false;
+    void look_at(const geometry::Camera& camera) { looked_at += uint64_t(camera.width) * uint64_t(camera.height); }
+    /// To be asked where more is left to be looked at: true ends the piece. What was looked at is not again.
+    bool breaks_off() { return unfinished = looked_at >= Planner::kPiecePixels; }
+  };
+
+  std::shared_ptr<ViewMap> new_map();
+
+  // planner.cpp: views.
+  void plan_view(Question& q, ViewerView& view);
+  void map_view(Question& q, ViewerView& view);
+  struct ViewClasses;
+  uint64_t validation_sets(const Question& q, ViewerView& view) const;
+  ViewClasses classify(Question& q, ViewerView& view);
+  void put_off(uint64_t most_rays, ViewClasses& classes);
+  void plan_full(Question& q, const ViewerView& view);
+
+  // extra_rays.cpp: rays beyond a view.
+  void plan_extra(Question& q, ViewerView& view);
+  bool plan_lost(Question& q, ViewerView& view);
+  double step_aside_m(const ViewerView& view) const;
+  bool plan_cell(Question& q, ViewerView& view, unsigned direction);
+  bool plan_cells(Question& q, ViewerView& view);
+  bool plan_fine(Question& q, ViewerView& view);
+  void look_closer(Question& q, ViewerView& view);
+  bool plan_stages(Question& q, ViewerView& view);
+  /// Pixels that shall have 2^finer rays a side; all: also where the model has samples. number: of the stage.
+  struct FineStage {
+    size_t number;
+    const image::PixelMask& wanted;
+    int finer;
+    bool all;
+  };
+  bool plan_fine(Question& q, ViewerView& view, const FineStage& stage);
+  /// Pixels of a view that have not had such rays; what was looked at, and found there.
+  struct FineSearch {
+    geometry::Camera camera;  ///< of the finer view
+    bool all;                 ///< rays are wanted wherever the model has samples, too
+    image::PixelMask open;
+    image::PixelMask& refined;
+    std::vector<RayTile>& tiles;
+    uint64_t rays = 0;  ///< of the tiles
+  };
+  void look_into(Question& q, const geometry::Rect& region, FineSearch& search);
+
+  /// Puts the tiles into the plan and on the shelf. Those that a message does not hold are left out. Returns their
+  /// number.
+  size_t issue(Question& q, std::vector<RayTile> tiles, PlannedFrame frame);
+
+  // planned tiles come back: take_tile.cpp
+  void take_whole(const SampledTile& tile, double now_s);
+  void take_planned(PlannedFrame& frame, const SampledTile& tile, double now_s);
+  void note_done(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask* cast);
+  void refill_empty(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask& contradicted);
+  void settle(const PlannedFrame& frame);
+  void carve(const geometry::Camera& full, const std::vector<float>& all_m);
+  void settle_old(double now_s);
+
+  const PlanConfig config_;
+  const PixelTest test_;
+  splat::ViewKeys keys_;
+  KnownEmpty known_empty_;
+  BlueNoise blue_noise_;
+  Validation validation_;
+  ViewerViews viewers_;
+  FrameShelf shelf_;
+  std::vector<std::shared_ptr<ViewMap>> maps_;  // kept for their memory, some of them in use
+  std::vector<float> clear_m_, coarse_m_;       // kept for their memory
+  uint64_t changes_ = 0;                        // of the model: patches that brought nothing are none
 };
 
 }  // namespace telesplat::packer

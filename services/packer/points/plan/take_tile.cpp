@@ -1,8 +1,10 @@
 // What sampled tiles tell the planner.
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <limits>
 
-#include "services/packer/points/plan/planner_impl.h"
+#include "services/packer/points/plan/planner.h"
 
 namespace telesplat::packer {
 namespace {
@@ -25,10 +27,10 @@ constexpr size_t kCoarseCarve = size_t{1} << 19;  // pixels: larger views are ca
 
 }  // namespace
 
-void Planner::Impl::take(const SampledTile& tile, bool whole, double now_s) {
-  PlannedFrame* frame = shelf.find(tile.frame);
+void Planner::take(const SampledTile& tile, bool whole, double now_s) {
+  PlannedFrame* frame = shelf_.find(tile.frame);
   if (frame && !frame->whole && whole && frame->find(tile.rect) == frame->tiles.size()) {
-    shelf.drop(tile.frame);  // its plan came too late: it is sampled whole
+    shelf_.drop(tile.frame);  // its plan came too late: it is sampled whole
     frame = nullptr;
   }
   if (frame && !frame->whole) {
@@ -38,21 +40,21 @@ void Planner::Impl::take(const SampledTile& tile, bool whole, double now_s) {
   }
 }
 
-void Planner::Impl::end_frame(FrameId id) {
-  PlannedFrame* frame = shelf.find(id);
+void Planner::end_frame(FrameId id) {
+  PlannedFrame* frame = shelf_.find(id);
   if (frame) frame->left = 0, frame->ended = true;
 }
 
-std::optional<KnownReference> Planner::Impl::reference(const SampledTile& tile) {
-  const PlannedFrame* frame = shelf.find(tile.frame);
+std::optional<KnownReference> Planner::reference(const SampledTile& tile) {
+  const PlannedFrame* frame = shelf_.find(tile.frame);
   if (!frame || frame->whole || !frame->map || !frame->nearest_known || !(frame->camera == tile.camera)) return {};
   const size_t at = frame->find(tile.rect);
   if (at == frame->tiles.size() || !only_cast(tile, frame->tiles[at].mask)) return {};
   return KnownReference{frame->tiles[at].mask, frame->map->nearest_m};
 }
 
-image::PixelMask Planner::Impl::missed(const SampledTile& tile) {
-  const PlannedFrame* frame = shelf.find(tile.frame);
+image::PixelMask Planner::missed(const SampledTile& tile) {
+  const PlannedFrame* frame = shelf_.find(tile.frame);
   if (!frame || frame->kind != PlannedFrame::Kind::kFine || !(frame->camera == tile.camera)) return {};
   const size_t at = frame->find(tile.rect);
   if (at == frame->tiles.size() || !only_cast(tile, frame->tiles[at].mask)) return {};
@@ -66,18 +68,18 @@ image::PixelMask Planner::Impl::missed(const SampledTile& tile) {
 }
 
 // A frame that nobody planned, or that was to be sampled whole.
-void Planner::Impl::take_whole(const SampledTile& tile, double now_s) {
+void Planner::take_whole(const SampledTile& tile, double now_s) {
   const auto pixels = static_cast<uint64_t>(tile.camera.width) * static_cast<uint64_t>(tile.camera.height);
-  PlannedFrame* frame = shelf.find(tile.frame);
+  PlannedFrame* frame = shelf_.find(tile.frame);
   if (!frame) {
     if (pixels > FrameShelf::kMaxPixels) return;
-    frame = &shelf.add({.id = tile.frame,
-                        .viewer = tile.viewer,
-                        .camera = tile.camera,
-                        .planned_s = now_s,
-                        .whole = true,
-                        .left = pixels,
-                        .whole_m = std::vector<float>(pixels)});
+    frame = &shelf_.add({.id = tile.frame,
+                         .viewer = tile.viewer,
+                         .camera = tile.camera,
+                         .planned_s = now_s,
+                         .whole = true,
+                         .left = pixels,
+                         .whole_m = std::vector<float>(pixels)});
   }
   if (!(frame->camera == tile.camera)) return;
   write_depths(tile, frame->whole_m);
@@ -86,7 +88,7 @@ void Planner::Impl::take_whole(const SampledTile& tile, double now_s) {
   frame->left -= std::min(came, frame->left);
 }
 
-void Planner::Impl::take_planned(PlannedFrame& frame, const SampledTile& tile, double now_s) {
+void Planner::take_planned(PlannedFrame& frame, const SampledTile& tile, double now_s) {
   const size_t at = frame.find(tile.rect);
   if (at == frame.tiles.size() || frame.returned[at] || frame.ended) return;
   frame.returned[at] = true;
@@ -102,17 +104,17 @@ void Planner::Impl::take_planned(PlannedFrame& frame, const SampledTile& tile, d
   if (!frame.map) return;
   const ViewMap& map = *frame.map;
   image::PixelMask contradicted;
-  ViewerView* view = viewers.find(frame.viewer);
+  ViewerView* view = viewers_.find(frame.viewer);
   const bool same = view && view->known && view->camera == frame.camera;
-  validation.check({map.camera, map.depth_m, map.colour, map.normal, frame.firm}, tile.rect, cast, tile.image, now_s,
-                   contradicted, same ? &view->doubted : nullptr);
+  validation_.check({map.camera, map.depth_m, map.colour, map.normal, frame.firm}, tile.rect, cast, tile.image, now_s,
+                    contradicted, same ? &view->doubted : nullptr);
   if (same) merge(contradicted, tile.rect.x, tile.rect.y, view->doubted);
   refill_empty(frame, tile, contradicted);
 }
 
 // The viewer that still looks from there needs these pixels no more.
-void Planner::Impl::note_done(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask* cast) {
-  ViewerView* view = viewers.find(frame.viewer);
+void Planner::note_done(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask* cast) {
+  ViewerView* view = viewers_.find(frame.viewer);
   if (!view || !view->known || !(view->camera == frame.camera)) return;
   if (cast) return merge(*cast, tile.rect.x, tile.rect.y, view->done);
   for (int y = tile.rect.y; y < tile.rect.y + tile.rect.height; ++y)
@@ -120,8 +122,7 @@ void Planner::Impl::note_done(const PlannedFrame& frame, const SampledTile& tile
 }
 
 // Hits where nothing was: other rays shall look around there.
-void Planner::Impl::refill_empty(const PlannedFrame& frame, const SampledTile& tile,
-                                 const image::PixelMask& contradicted) {
+void Planner::refill_empty(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask& contradicted) {
   std::vector<glm::vec3> hits;
   for (int y = 0; y < contradicted.height(); ++y)
     image::for_each_set(contradicted.row(y), contradicted.words_per_row(), [&](size_t x) {
@@ -131,17 +132,17 @@ void Planner::Impl::refill_empty(const PlannedFrame& frame, const SampledTile& t
       hits.emplace_back(
           tile.camera.unproject(frame_x + 0.5, frame_y + 0.5, image::decode_depth(code, tile.camera.near_m)));
     });
-  if (!hits.empty()) known_empty.refill(hits);
+  if (!hits.empty()) known_empty_.refill(hits);
 }
 
 // Pixels of large views are smaller than cells: half as many on each axis tell nearly as much, in a fourth of the time,
 // and later views look closer where that leaves something open.
-void Planner::Impl::carve(const geometry::Camera& full, const std::vector<float>& all_m) {
+void Planner::carve(const geometry::Camera& full, const std::vector<float>& all_m) {
   const int width = full.width / 2, height = full.height / 2;
-  if (all_m.size() < kCoarseCarve || width < 1 || height < 1) return known_empty.carve(full, all_m, config.threads);
+  if (all_m.size() < kCoarseCarve || width < 1 || height < 1) return known_empty_.carve(full, all_m, config_.threads);
   geometry::Camera camera = geometry::crop(full, {0, 0, 2 * width, 2 * height});
   camera.width = width, camera.height = height;
-  coarse_m.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
+  coarse_m_.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const float* upper = &all_m[static_cast<size_t>(2 * y) * full.width + 2 * x];
@@ -149,45 +150,135 @@ void Planner::Impl::carve(const geometry::Camera& full, const std::vector<float>
       // As far as all four are clear; it is new if one of them is.
       const float clear = std::min({std::abs(upper[0]), std::abs(upper[1]), std::abs(lower[0]), std::abs(lower[1])});
       const bool news = upper[0] > 0 || upper[1] > 0 || lower[0] > 0 || lower[1] > 0;
-      coarse_m[static_cast<size_t>(y) * width + x] = news ? clear : -clear;
+      coarse_m_[static_cast<size_t>(y) * width + x] = news ? clear : -clear;
     }
-  known_empty.carve(camera, coarse_m, config.threads);
+  known_empty_.carve(camera, coarse_m_, config_.threads);
 }
 
-void Planner::Impl::settle(const PlannedFrame& frame) {
+void Planner::settle(const PlannedFrame& frame) {
   if (frame.whole) {
     carve(frame.camera, frame.whole_m);
   } else if (!frame.came_m.empty()) {
-    clear_depths(frame, clear_m);
-    carve(frame.camera, clear_m);
+    clear_depths(frame, clear_m_);
+    carve(frame.camera, clear_m_);
   }
-  if (frame.kind == PlannedFrame::Kind::kView && !frame.whole && !frame.ended) validation.resampled(frame.planned_s);
+  if (frame.kind == PlannedFrame::Kind::kView && !frame.whole && !frame.ended) validation_.resampled(frame.planned_s);
 }
 
 // The newest one first: later views look at what it saw.
-bool Planner::Impl::settle() {
-  auto& frames = shelf.frames();
+bool Planner::settle() {
+  auto& frames = shelf_.frames();
   const auto found = std::find_if(frames.rbegin(), frames.rend(), [](const PlannedFrame& f) { return f.complete(); });
   if (found == frames.rend()) return false;
   settle(*found);
-  shelf.drop(FrameId(found->id));
+  shelf_.drop(FrameId(found->id));
   return true;
 }
 
 // Whole frames tell most, so the next plan waits for them. Others that found no time are forgotten: where they saw
 // nothing rays are cast once more. So are those whose tiles do not come: their samplers died, or a newer view went
 // first. What comes all the same is compared with the model.
-void Planner::Impl::settle_old(double now_s) {
+void Planner::settle_old(double now_s) {
   constexpr double kOld_s = 1;
-  for (size_t i = shelf.frames().size(); i-- > 0;) {
-    const PlannedFrame& frame = shelf.frames()[i];
+  for (size_t i = shelf_.frames().size(); i-- > 0;) {
+    const PlannedFrame& frame = shelf_.frames()[i];
     if (FrameShelf::given_up(frame, now_s)) {
-      shelf.drop(FrameId(frame.id));
+      shelf_.drop(FrameId(frame.id));
       continue;
     }
     if (!frame.complete() || (!frame.whole && now_s - frame.planned_s < kOld_s)) continue;
     if (frame.whole) settle(frame);
-    shelf.drop(FrameId(frame.id));
+    shelf_.drop(FrameId(frame.id));
+  }
+}
+
+// ---- depths --------------------------------------------------------------------------------------------------------
+
+namespace {
+
+class Depths {
+ public:
+  explicit Depths(const geometry::Camera& camera) : scale_(static_cast<float>(camera.near_m * image::kMaxDepthCode)) {}
+  float metres(uint32_t code) const {
+    return code == 0 ? std::numeric_limits<float>::infinity() : scale_ / static_cast<float>(code);
+  }
+
+ private:
+  float scale_;
+};
+
+}  // namespace
+
+std::vector<float> depths_of(const SampledTile& tile, const image::PixelMask& cast) {
+  const Depths depths(tile.camera);
+  std::vector<float> out;
+  for (int y = 0; y < tile.rect.height; ++y) {
+    const uint32_t* code = &tile.image.depth[static_cast<size_t>(y) * tile.rect.width];
+    image::for_each_set(cast.row(y), cast.words_per_row(), [&](size_t x) { out.push_back(depths.metres(code[x])); });
+  }
+  return out;
+}
+
+void write_depths(const SampledTile& tile, std::vector<float>& depth_m) {
+  const Depths depths(tile.camera);
+  for (int y = 0; y < tile.rect.height; ++y) {
+    const uint32_t* code = &tile.image.depth[static_cast<size_t>(y) * tile.rect.width];
+    float* out = &depth_m[static_cast<size_t>(tile.rect.y + y) * tile.camera.width + tile.rect.x];
+    for (int x = 0; x < tile.rect.width; ++x) out[x] = depths.metres(code[x]);
+  }
+}
+
+namespace {
+
+constexpr float kKnown = -1;  // sign of what was known before
+
+// A ray that saw what was shown tells nothing new.
+bool confirms(float came_m, float shown_m) {
+  constexpr float kTolerance = 0.01f;
+  return came_m == shown_m || std::abs(came_m - shown_m) <= kTolerance * shown_m;
+}
+
+// What was not cast is as it was shown, unless a ray was needed to tell. At edges, and where samples
+// are far apart, the nearest surface around counts.
+void clear_as_shown(const PlannedFrame& frame, int y, float* clear_m) {
+  const ViewMap& map = *frame.map;
+  const int width = map.camera.width, height = map.camera.height;
+  const float* shown = &map.depth_m[static_cast<size_t>(y) * width];
+  image::for_each_set(frame.firm.row(y), frame.firm.words_per_row(), [&](size_t x) { clear_m[x] = kKnown * shown[x]; });
+  const auto nearest = [&](int x) {
+    float least = std::numeric_limits<float>::infinity();
+    for (int j = std::max(y - 1, 0); j <= std::min(y + 1, height - 1); ++j)
+      for (int i = std::max(x - 1, 0); i <= std::min(x + 1, width - 1); ++i)
+        least = std::min(least, map.depth_m[static_cast<size_t>(j) * width + i]);
+    return least;
+  };
+  for (size_t w = 0; w < map.edge.words_per_row(); ++w) {
+    const uint64_t edges = map.edge.row(y)[w] & map.covered.row(y)[w] & ~map.lacking.row(y)[w] & ~frame.firm.row(y)[w];
+    const uint64_t put_off = frame.put_off.height() > 0 ? frame.put_off.row(y)[w] : 0;
+    for (uint64_t rest = edges | put_off; rest != 0; rest &= rest - 1) {
+      const int x = static_cast<int>(w) * 64 + std::countr_zero(rest);
+      clear_m[x] = kKnown * nearest(x);
+    }
+  }
+}
+
+}  // namespace
+
+void clear_depths(const PlannedFrame& frame, std::vector<float>& clear_m) {
+  const auto width = static_cast<size_t>(frame.camera.width);
+  clear_m.assign(width * static_cast<size_t>(frame.camera.height), 0.0f);
+  for (int y = 0; frame.map && y < frame.firm.height(); ++y) clear_as_shown(frame, y, &clear_m[y * width]);
+  for (size_t i = 0; i < frame.came_m.size(); ++i) {
+    const RayTile& tile = frame.tiles[i];
+    const float* next = frame.came_m[i].data();
+    if (frame.came_m[i].size() != tile.rays) continue;
+    for (int y = 0; y < tile.rect.height; ++y) {
+      float* clear = &clear_m[static_cast<size_t>(tile.rect.y + y) * width + static_cast<size_t>(tile.rect.x)];
+      image::for_each_set(tile.mask.row(y), tile.mask.words_per_row(), [&](size_t x) {
+        const float came = *next++;
+        if (!confirms(came, kKnown * clear[x])) clear[x] = came;
+      });
+    }
   }
 }
 

@@ -1,7 +1,9 @@
-// Whether the model still shows what is there: rays that were cast at pixels which need none are compared with what the
-// model shows. No clocks; one thread at a time.
+// Whether the model still shows what is there: rays are cast at some pixels that need none, spread evenly, and compared
+// with what the model shows. No clocks; one thread at a time.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -14,6 +16,30 @@
 #include "common/points/point_model.h"
 
 namespace telesplat::packer {
+
+/// Blue noise: sparse sets of pixels that are spread evenly, without regular patterns.
+/// Source: Ulichney 1993, "The void-and-cluster method for dither array generation".
+///   Cuts the pixels of a 64x64 square, which repeats over the image, into `share` sets of about equal size, each of
+/// them spread evenly: round r picks set r % share, so that every pixel is picked once in `share` rounds.
+class BlueNoise {
+ public:
+  static constexpr int kSide = 64, kMaxShare = 4096;
+
+  /// share outside [1, kMaxShare] is brought into it.
+  explicit BlueNoise(int share);
+
+  int share() const { return share_; }
+  bool picks(int x, int y, uint64_t round) const { return (row(y, round) >> (x & (kSide - 1)) & 1) != 0; }
+  /// Of pixels x = 64 n to 64 n + 63 of row y, whatever n: as a word of an image::PixelMask.
+  uint64_t row(int y, uint64_t round) const;
+
+ private:
+  int share_;
+  std::vector<uint64_t> rows_;  // share x kSide
+};
+
+/// The dither array: each of 0..4095 once, at y * 64 + x. Computed at the first call.
+const std::array<uint16_t, size_t{BlueNoise::kSide} * BlueNoise::kSide>& blue_noise_ranks();
 
 /// What the model shows in a view: planes of camera.width x camera.height pixels, row by row.
 struct ShownView {

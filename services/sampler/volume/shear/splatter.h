@@ -1,15 +1,59 @@
 // Shear-splatting (T4.5.1): the voxels of a slab, slice by slice front to back, into one slice image a layer.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "common/volume/shear.h"
 #include "common/volume/slices/image.h"
 #include "common/volume/transfer/function.h"
-#include "services/sampler/volume/shear/slab_volume.h"
+#include "services/sampler/volume/shear/rows.h"
+#include "services/sampler/volume/slab.h"
 
 namespace telesplat::sampler {
+
+// What a sampler holds of one time step, arranged so that the slices of any principal axis can be gone through in
+// either direction.
+
+/// Voxels of the slices [k_begin, k_end): a slab and a slice on both sides. Immutable.
+class SlabVolume {
+ public:
+  SlabVolume(const volume::Grid& grid, volume::Voxels voxels) : grid_(grid), voxels_(std::move(voxels)) {}
+
+  const volume::Grid& grid() const { return grid_; }
+  const volume::Voxels& voxels() const { return voxels_; }
+  /// Memory, with the arrangement of every axis.
+  size_t bytes() const;
+  /// Made when a frame first needs it, once; safe to ask for from several threads. axis: the principal one.
+  const ShearRows& rows(int axis) const;
+
+ private:
+  volume::Grid grid_;
+  volume::Voxels voxels_;
+  mutable std::once_flag made_[3];
+  mutable ShearRows rows_[3];
+};
+
+// Early termination: which pixels nearer layers hide, also from eyes a little beside the sampled one.
+
+/// Bits of a raster's pixels, in bytes of 8 pixels, rows of blocks_across bytes.
+class HiddenPixels {
+ public:
+  HiddenPixels(int width, int height);
+  uint8_t* bytes() { return bytes_.data(); }
+  const uint8_t* bytes() const { return bytes_.data(); }
+  int blocks_across() const { return across_; }
+
+  /// Keeps the pixels whose neighbours, to `dx` and `dy` pixels on all sides, have all been set. Beyond the raster
+  /// everything is.
+  void shrink(int dx, int dy);
+
+ private:
+  int width_, height_, across_;
+  std::vector<uint8_t> bytes_;
+};
 
 struct ShearStats {
   uint64_t voxels = 0;   ///< splatted
@@ -43,5 +87,10 @@ class ShearSplatter {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// Slabs that ShearSplatter splats.
+
+/// They share one splatter with `threads` threads (0: one a core); one of them is splatted at a time.
+MakeSlab make_shear_slabs(int threads);
 
 }  // namespace telesplat::sampler

@@ -1,0 +1,36 @@
+// What was measured in the last seconds, for people who watch: a bounded number of values. Thread-safe.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <mutex>
+
+namespace telesplat::viewer {
+
+class RecentValues {
+ public:
+  static constexpr size_t kMost = 1024;  ///< values that are remembered; then the oldest goes
+
+  /// Values older than window_s do not count.
+  explicit RecentValues(double window_s) : window_s_(window_s) {}
+  /// now_s rises.
+  void add(double now_s, double value);
+
+  struct Figures {
+    size_t count = 0;
+    double median = 0, p95 = 0;  ///< as metrics::distribution() has them; 0 of nothing
+  };
+  /// Cost: that of sorting kMost values.
+  Figures figures(double now_s) const;
+
+ private:
+  struct Value {
+    double at_s, value;
+  };
+  const double window_s_;
+  mutable std::mutex mutex_;
+  std::array<Value, kMost> values_{};
+  size_t next_ = 0, count_ = 0;
+};
+
+}  // namespace telesplat::viewer
