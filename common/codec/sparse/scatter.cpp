@@ -24,11 +24,11 @@ Four load(const float* p) {
 }
 
 // Distance to the power of -3, of -2 to -4 the best; by its square.
-float weight_of(uint32_t square) { return 1 / (static_cast<float>(square) * std::sqrt(static_cast<float>(square))); }
+float near_weight(uint32_t square) { return 1 / (static_cast<float>(square) * std::sqrt(static_cast<float>(square))); }
 constexpr uint32_t kWeights = 1024;
 const auto kWeightOf = [] {
   std::array<float, kWeights> out{};
-  for (uint32_t i = 1; i < kWeights; ++i) out[i] = weight_of(i);
+  for (uint32_t i = 1; i < kWeights; ++i) out[i] = near_weight(i);
   return out;
 }();
 
@@ -158,7 +158,7 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
     const uint32_t square = static_cast<uint32_t>(dx) * static_cast<uint32_t>(dx) +
                             static_cast<uint32_t>(dy) * static_cast<uint32_t>(dy);  // below 2^32: a tile is that small
     near.x[i] = static_cast<float>(dx), near.y[i] = static_cast<float>(dy);
-    near.weight[i] = square < kWeights ? kWeightOf[square] : weight_of(square);
+    near.weight[i] = square < kWeights ? kWeightOf[square] : near_weight(square);
     if (square < least) least = square, nearest = &k;
   }
   for (size_t i = 0; i < near.count; ++i) near.depth[i] = known_[neighbours[i]].depth - nearest->depth;
