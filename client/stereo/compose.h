@@ -11,6 +11,7 @@ namespace telesplat::stereo {
 
 /// Rows of 3: red, green and blue of the anaglyph from red, green and blue of one eye's picture.
 using Matrix = std::array<float, 9>;
+/// Two pictures in one for glasses with a red filter before the left eye and a cyan one before the right.
 struct AnaglyphMatrices {
   Matrix left, right;
   bool linear = false;  ///< they are meant for linear light; else for displayed (sRGB) values

@@ -37,6 +37,7 @@ double shown_share(const Wall& wall, const geometry::Pose& head_room, const geom
 /// All screens lie in one plane, and have its axes.
 bool is_plane(const Wall& wall);
 
+/// A wall laid flat: where the picture of each screen lies in one picture of all, with the gaps that bezels leave.
 struct Unrolled {
   int width = 0, height = 0;           ///< pixels of the whole
   std::vector<geometry::Rect> places;  ///< of each screen's picture

@@ -21,14 +21,14 @@
 namespace telesplat::points {
 
 /// Mosaics of fewer points are merged whatever the other's size, and without levels of detail: to copy them costs
-/// little. Set by telesplat-lab cache: with 64 the bonsai had 10,500 items after a minute's orbit, with 128 it has
+/// little. Measured: with 64 the bonsai had 10,500 items after a minute's orbit, with 128 it has
 /// 9,100.
 inline constexpr uint32_t kSmallMosaic = 128;
 /// Sizes of the mosaics of one density class in a cluster differ by more than this factor.
 inline constexpr uint32_t kGrowth = 4;
 
 /// Octaves of a mosaic's pixel range: floor(log2(range)), the same on every machine. Half octaves gave the bonsai more
-/// mosaics and the same pictures (26.21 against 26.23 dB, telesplat-lab cache).
+/// mosaics and the same pictures (26.21 against 26.23 dB).
 int density_class(float pixel_range);
 
 /// What a cluster becomes as `fresh` is added: mosaics[i] for i in `replaced` (ascending) go, `added` come after the

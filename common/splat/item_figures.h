@@ -47,6 +47,7 @@ class FrameFigures {
   std::array<double, 4> bias_{}, points_{};
 };
 
+/// Consecutive draw items of one cluster share their leaf's transform and their place in the tiles.
 struct ItemRuns {
   std::vector<ItemRun> runs;
   std::vector<LeafTransform> transforms;  ///< one a run

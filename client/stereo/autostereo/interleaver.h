@@ -54,6 +54,7 @@ double visible_share(const Panel& panel, const glm::dvec3& eye, int x, int y, in
 /// all of it were. Preconditions: the panel and the eye validate; the picture has the panel's size.
 image::View seen_by(const Panel& panel, const glm::dvec3& eye, const image::View& picture);
 
+/// What eyes see of a panel through its line screen: simulated, for calibration, documents and tests.
 struct SeenShares {
   double crosstalk = 0;  ///< of the light that an eye sees: how much is of subpixels that belong to the other one
   double dark = 0;       ///< of the subpixels: how many belong to nobody

@@ -12,6 +12,18 @@
 
 namespace telesplat::stereo {
 
+/// A line screen before a display: a parallax barrier (opaque, with slits) or a sheet of cylindrical lenses. From
+/// each place of the display light reaches an eye through it or not, and that decides which eye's picture belongs
+/// there (Sandin et al. 2005).
+///
+/// Lengths are metres on the display's own axes: x to the right and y up from its middle, z towards the person;
+/// pixels lie at z = 0. Next to them comes air, `gap_m` thick, then a plate of `thickness_m` with refractive index
+/// `index`; the lines lie on its far side. Which of the two comes first makes no difference.
+///
+/// Line k is where (x cos tilt + y sin tilt - shift) / pitch = k, so lines lean to the left with a tilt above 0. Of
+/// a barrier it is the middle of a slit, of lenses that of a lens: there the light of a place passes as through a
+/// slit, because the lens makes it parallel (the display lies in its focal plane) in the direction of the ray
+/// through its middle. So one map serves both.
 struct LineScreen {
   double pitch_m = 0.9e-3;  ///< from line to line, across them
   double tilt_deg = 0;      ///< of the lines against the vertical

@@ -38,6 +38,8 @@ std::string coupling_text(const CouplingState& state);
 /// As the session's settings have it. nullopt: the viewer keeps its own.
 std::optional<CouplingState> coupling_told(wire::CouplingOrder order, uint64_t buffers);
 
+/// Where the display waits for view updates: what it does and says when none comes for long (docs/coupling.md).
+/// Times come in.
 class StallWatch {
  public:
   static constexpr double kLong_s = 1;   ///< a wait that is told to people
@@ -64,6 +66,10 @@ class StallWatch {
   std::optional<std::string> news_;
 };
 
+/// How many views are asked for ahead where the servers draw them (--coupling images): as many as keep samplers and
+/// link busy, and no more, for a view that waits is one of the past. Each view tells how long it waited for
+/// somebody who was busy; on the way it waited for what a view takes longer than one that nothing goes before, as
+/// in TCP Vegas (Brakmo, Peterson 1995). No sockets, no clocks.
 class PipelineDepth {
  public:
   static constexpr int kFirst = 2, kMost = int(wire::kMaxBuffers);
@@ -110,6 +116,7 @@ class PipelineDepth {
   bool filled_ = true;
 };
 
+/// The view update that a displayed frame shows: what its age and its error are counted from.
 struct ShownUpdate {
   RequestId request;
   double requested_s = 0;  ///< master's clock

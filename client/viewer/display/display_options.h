@@ -14,6 +14,7 @@
 
 namespace telesplat::viewer {
 
+/// What a headset's display is told before it begins.
 struct XrOptions {
   /// Where the room's origin, around which the data set stands, lies in the headset's space: metres, +y up. Nothing:
   /// what suits that space.

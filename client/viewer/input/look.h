@@ -60,6 +60,7 @@ inline Look first_look(const splat::RenderOptions& render, const image::ShadingP
           .background = shading.background};
 }
 
+/// A picture that a person wants of what is on display.
 struct PictureWish {
   int width = 0, height = 0;  ///< pixels; 0: as the display has them
   bool exr = false;           ///< EXR with depth, else PNG

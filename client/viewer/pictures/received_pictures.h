@@ -26,6 +26,8 @@ struct ShownPicture {
   image::View view;  ///< without depth
 };
 
+/// Puts the tiles of pictures together, decoded. Of several pictures the newest wins: what is older than one that
+/// is complete is not decoded any more. No sockets, no clocks.
 class PictureGatherer {
  public:
   static constexpr size_t kMostOpen = wire::kMaxBuffers;  ///< pictures that lack tiles; of more the oldest goes
@@ -100,6 +102,8 @@ class ReceivedPictures final : public Received {
   log::RateLimiter log_limit_;
 };
 
+/// The display's source where views come as pictures: the picture as it came, for the pose that was asked for. It
+/// is scaled where the display has another size by now.
 class PictureSource final : public ViewSource {
  public:
   explicit PictureSource(PictureShelf& shelf) : shelf_(shelf) {}

@@ -55,6 +55,7 @@ Result<std::unique_ptr<Renderer>> make_renderer(
     const std::string& kind, int threads,
     const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
 
+/// The one interface of both renderers of volumes: the warp of slice images into the view of now.
 class VolumeRenderer {
  public:
   virtual ~VolumeRenderer() = default;

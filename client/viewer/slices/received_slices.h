@@ -58,6 +58,8 @@ class ReceivedSlices final : public Received {
   log::RateLimiter log_limit_;
 };
 
+/// The display's source for slice images: warps the newest complete frame of slice images, or where the display
+/// waits the next one, into the view of now.
 class SliceSource final : public ViewSource {
  public:
   SliceSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache)

@@ -30,7 +30,7 @@ struct Elimination {
 /// A sample is not needed where the model has a point of its surface within this many pixels, since that point's splat
 /// reaches as far. This bounds a model's points, from any number of views. No two points are nearer to each other than
 /// this times the sample distance of the finer one, unless a nearer point of the same pixel hid one of them. So a
-/// surface has at most about 2 / sqrt 3 / kNearestSample^2 points a pixel. Set by telesplat-lab cache.
+/// surface has at most about 2 / sqrt 3 / kNearestSample^2 points a pixel.
 inline constexpr float kNearestSample = 0.6f;
 
 /// Clears every pixel of `image` (the tile `tile` of the frame `camera`) that the model already shows. It is kept if

@@ -28,6 +28,7 @@ struct ColouringOptions {
   std::string map = "viridis";  ///< colour::resolve_colour_map()
 };
 
+/// How a mesh is read, placed and kept.
 struct MeshOptions : StoreOptions {
   ElevationOptions elevation;                       ///< of elevation rasters alone
   uint64_t texture_detail = kDefaultTextureDetail;  ///< triangles, at most, of a mesh whose textures are baked

@@ -29,6 +29,7 @@ struct RecordLosses {
   std::map<std::string, uint64_t> cut;   ///< rows beyond the limit of a file
 };
 
+/// What was run, where and when: the part of a record that is not measured.
 struct About {
   std::string id;       ///< the run's own, as in its folder's run.id; empty: none
   std::string version;  ///< of the master's program; empty: unknown

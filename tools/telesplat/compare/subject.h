@@ -11,6 +11,7 @@
 
 namespace telesplat::launcher {
 
+/// What `telesplat compare` is told.
 struct CompareOptions {
   std::string path;   ///< a run folder
   std::string moved;  ///< the data file, where it is not where the run found it

@@ -62,6 +62,7 @@ struct Wish {
 /// Those without an answer yet. What is strange is left out.
 std::vector<Wish> wishes_of(const nlohmann::json& status);
 
+/// Which session a command of `telesplat ctl` means.
 struct SessionChoice {
   std::string master;   ///< --master, or TELESPLAT_MASTER in the environment; empty: the one that runs here
   std::string session;  ///< --session: as net::find_master() takes it

@@ -20,6 +20,7 @@ struct Axis {
 
 inline constexpr int kMostRepetitions = 1000;
 
+/// What a sweep runs: a grid over flags of `telesplat run`, each of its configurations several times.
 struct Grid {
   std::string scene;                ///< empty: it varies
   std::vector<std::string> flags;   ///< of every run, as `telesplat run` takes them

@@ -13,6 +13,7 @@
 
 namespace telesplat::launcher {
 
+/// One run of a sweep: `telesplat run` as a child process, watched until it has ended.
 struct RunRequest {
   std::string program;                 ///< telesplat
   std::vector<std::string> arguments;  ///< run, scene, flags, --out

@@ -10,6 +10,7 @@
 
 namespace telesplat::viewer {
 
+/// What the panel orders of a session's master: the commands of `telesplat ctl`.
 struct Order {
   std::string command;  ///< wire::Control
   std::map<std::string, std::string> arguments;

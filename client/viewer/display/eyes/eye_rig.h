@@ -13,6 +13,7 @@
 
 namespace telesplat::viewer {
 
+/// The cameras of a frame that two eyes see.
 struct EyePair {
   geometry::Camera head;                 ///< stands between the eyes, with their orientation
   std::array<geometry::Camera, 2> eyes;  ///< left, right: all three have one size and pixels of one size

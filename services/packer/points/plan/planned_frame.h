@@ -139,6 +139,7 @@ struct LostTiles {
   std::vector<RayTile> tiles;
 };
 
+/// What the planner remembers of each viewer: its last view, and what was cast for it already.
 struct ViewerView {
   InstanceId viewer;
   geometry::Camera camera;
