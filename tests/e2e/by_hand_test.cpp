@@ -159,6 +159,12 @@ TEST_F(ByHand, ProcessesOfAnotherVersionAreToldSo) {
               std::string::npos)
         << body;
   }
+  // A service that has not joined hears nothing of the session's end.
+  EXPECT_TRUE(wait_until([&] {
+    Program status("telesplat", {"ctl", "status", "--json", "--master", master_}, folder_ / "status");
+    const auto told = nlohmann::json::parse(status.wait() == 0 ? status.out() : "", nullptr, false);
+    return told.is_object() && told["processes"].size() == 3;
+  }));
   end();
 }
 
