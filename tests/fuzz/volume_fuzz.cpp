@@ -40,7 +40,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   NoCompanions none;
   if (const auto image = vtk::read_image_header(content, "fuzz", none, "");
       image && image->extent[1] < 64 && image->extent[3] < 64 && image->extent[5] < 64)
-    vtk::read_image(*image, content, "fuzz", none);
+    if (const auto voxels = vtk::read_image(*image, content, "fuzz", none); !voxels && voxels.error().text.empty())
+      std::abort();
   if (const auto mesh = vtk::read_mesh(content, "fuzz", none, ""); !mesh && mesh.error().text.find("fuzz") != 0)
     std::abort();
   if (const auto pages = tiff_pages(content); pages && pages->data_at > size) std::abort();
