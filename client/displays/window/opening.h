@@ -20,7 +20,7 @@ class LauncherLines {
  public:
   static constexpr size_t kLongest = 4096;  ///< bytes of a line; what is longer is cut
 
-  /// Reads from `fd`, which becomes non-blocking; negative: nobody says anything.
+  /// Reads from `fd`, which becomes non-blocking; negative: no process reports.
   explicit LauncherLines(int fd);
   /// Whole lines that came since the last call.
   std::vector<std::string> read();

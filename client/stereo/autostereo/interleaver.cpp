@@ -156,7 +156,7 @@ image::View seen_by(const Panel& panel, const glm::dvec3& eye, const image::View
   const int reach = std::max(1, int(std::ceil(panel.lines.pitch_m / panel.pixel_m)));
   const auto width = size_t(panel.width);
   in_parallel(0, panel.height, [&](int y) {
-    // Of each channel, sums from the row's beginning.
+    // Each channel's sums from the row's beginning.
     std::vector<double> light(width + 1), visible(width + 1);
     const uint32_t* row = picture.colour.data() + size_t(y) * width;
     uint32_t* to = out.colour.data() + size_t(y) * width;

@@ -28,7 +28,7 @@ class History {
   /// A value that is not finite is ignored. A time before the newest one begins the history anew.
   void add(double t_s, double value);
   bool empty() const { return samples_.empty(); }
-  /// The newest value; 0 where there is none.
+  /// Returns the newest value, or 0 before the first.
   double newest() const { return samples_.empty() ? 0 : samples_.back().value; }
   double span_s() const { return span_s_; }
 

@@ -51,7 +51,7 @@ class CutControls {
   double value(int axis, double percent) const;
   /// At least a hundredth of the box is kept.
   void keep(double now_s, int axis, Kept kept);
-  /// Any order. Error: it is none.
+  /// Takes any order. Error: it is not valid.
   Status give(double now_s, const std::string& order);
 
  private:
@@ -81,7 +81,7 @@ class ColourControls {
   const std::vector<std::string>& arrays() const { return arrays_; }
   /// Nothing: by its own colours.
   const std::optional<scene::Colouring>& colouring() const { return colouring_; }
-  /// Of the colouring, as it is or was set and is not yet.
+  /// Returns the range of the colouring in force, or the range that was ordered and has not come yet.
   std::pair<double, double> range() const;
   /// All values of its array; empty: not known.
   scene::ValueSpan whole_range() const;
@@ -95,7 +95,7 @@ class ColourControls {
 
   /// The value of the isosurface that is shown; nothing: none is.
   std::optional<double> iso() const { return iso_; }
-  /// Of its volume; empty: not known.
+  /// Returns the values of the isosurface's volume; empty: not known.
   scene::ValueSpan iso_range() const { return iso_range_; }
   /// How often they are in it; empty: not known.
   std::vector<HistogramBar> iso_bars() const;

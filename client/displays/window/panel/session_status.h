@@ -14,8 +14,8 @@ namespace telesplat::viewer {
 struct Order {
   std::string command;  ///< wire::Control
   std::map<std::string, std::string> arguments;
-  /// Of orders that wait, a later one of the same subject takes the place of an earlier one: a slider that is dragged
-  /// orders often. Empty: none is replaced.
+  /// A later order of the same subject replaces one that waits: a slider that is dragged orders often. Empty: it
+  /// replaces none.
   std::string subject;
   bool operator==(const Order&) const = default;
 };

@@ -13,7 +13,7 @@ namespace telesplat::viewer {
 
 /// What the editor keeps between frames.
 struct TransferViewState {
-  int point = 0;        ///< that is chosen, where the function has so many
+  int point = 0;        ///< index of the chosen point, if the function has that many
   bool drags = false;   ///< the pointer holds it
   bool linear = false;  ///< heights of the histogram
 };
