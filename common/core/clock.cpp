@@ -6,6 +6,8 @@
 #include <sstream>
 #include <thread>
 
+#include "common/core/machine.h"
+
 namespace telesplat {
 namespace {
 
@@ -35,14 +37,21 @@ std::string read_clock_id() {
 }  // namespace
 
 const std::string& clock_id() {
+  if (World* world = simulated_world()) return world->clock_id();
   static const std::string id = read_clock_id();
   return id;
 }
-double monotonic_s() { return read_s(CLOCK_MONOTONIC); }
+double monotonic_s() {
+  World* world = simulated_world();
+  return world ? world->monotonic_s() : read_s(CLOCK_MONOTONIC);
+}
 void sleep_until(double t_s) {
   const double wait_s = t_s - monotonic_s();
   if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
 }
-double thread_cpu_s() { return read_s(CLOCK_THREAD_CPUTIME_ID); }
+double thread_cpu_s() {
+  World* world = simulated_world();
+  return world ? world->thread_cpu_s() : read_s(CLOCK_THREAD_CPUTIME_ID);
+}
 
 }  // namespace telesplat

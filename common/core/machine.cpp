@@ -2,12 +2,15 @@
 
 #include <sched.h>
 #include <sys/sysinfo.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <random>
 #include <thread>
 
 namespace telesplat {
@@ -98,6 +101,27 @@ std::string command_line() {
   std::string out = shell_line(arguments);
   if (out.size() > kMaxCommandLine) out = out.substr(0, kMaxCommandLine) + "...";
   return out;
+}
+
+namespace {
+
+std::atomic<World*> world_now{nullptr};
+
+}  // namespace
+
+void enter_world(World* world) { world_now.store(world, std::memory_order_release); }
+World* simulated_world() { return world_now.load(std::memory_order_acquire); }
+
+uint64_t random_bits() {
+  if (World* world = simulated_world()) return world->random_bits();
+  std::random_device random;
+  const uint64_t high = random();
+  return high << 32 | random();
+}
+
+uint64_t process_id() {
+  World* world = simulated_world();
+  return world ? world->process_id() : uint64_t(getpid());
 }
 
 }  // namespace telesplat

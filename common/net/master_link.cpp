@@ -1,7 +1,6 @@
 #include "common/net/master_link.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/machine.h"
 #include "common/core/utf8.h"
 #include "common/net/service.h"
 #include "common/scene/session.h"
@@ -45,7 +45,7 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
   hello_.name = to_utf8(hello_.name);
   for (auto& [fact, value] : hello_.facts) value = to_utf8(value);
-  hello_.pid = static_cast<uint64_t>(getpid());
+  hello_.pid = process_id();
   life_->self = hello_.instance;
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);
   socket_.set_due([life = life_]() -> std::optional<std::pair<std::string, std::string>> {

@@ -183,7 +183,10 @@ void install_signal_handlers() {
   handle_signals(set_flag);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of who writes it, like a disk that is full
 }
-bool stop_requested() { return stop_flag; }
+bool stop_requested() {
+  World* world = simulated_world();
+  return world ? world->stop_requested() : stop_flag.load();
+}
 void forget_stop() { stop_flag = false; }
 
 void keep_freed_memory() {
@@ -194,6 +197,7 @@ void keep_freed_memory() {
 }
 
 void return_freed_memory() {
+  if (simulated_world()) return;
 #ifdef __GLIBC__
   malloc_trim(1 << 20);
 #endif
@@ -212,6 +216,7 @@ void lower_thread_priority(int levels) {
 }
 
 double resident_mb() {
+  if (simulated_world()) return 0;
   std::ifstream statm("/proc/self/statm");
   double total_pages = 0, resident_pages = 0;
   statm >> total_pages >> resident_pages;
@@ -219,6 +224,7 @@ double resident_mb() {
 }
 
 double peak_resident_mb() {
+  if (simulated_world()) return 0;
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
@@ -233,6 +239,7 @@ int guarded_main(const std::function<int()>& body) {
 }
 
 std::map<std::string, std::string> process_facts() {
+  if (simulated_world()) return {};
   const Machine machine = this_machine();
   std::map<std::string, std::string> out{{"host", host_name()}, {"version", version()}, {"command", command_line()}};
   if (!machine.processor.empty()) out["processor"] = machine.processor;

@@ -20,18 +20,22 @@ namespace telesplat::net {
 
 enum class Kind { kRouter, kDealer, kPush, kPull, kPub, kSub };
 
+class Carrier;
+class Network;
+
 /// One a process: ZeroMQ's I/O threads. Sockets must not outlive it.
 class Context {
  public:
   /// access: the proxies that connections over TCP go through, and the keys by which its sockets know others and are
   /// known; without keys nothing is encrypted.
   explicit Context(Access access = {});
+  /// Of a network that is simulated.
+  explicit Context(std::unique_ptr<Network> network);
   ~Context();
-  struct Impl;
-  Impl& impl() { return *impl_; }
+  Network& network() { return *network_; }
 
  private:
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Network> network_;
 };
 
 /// A received message. body points into memory that `owner` keeps alive.
@@ -151,16 +155,16 @@ class Socket {
   bool tunnelled() const;
   const std::string& name() const;
 
-  struct Impl;
-  Impl& impl() const { return *impl_; }
+  Carrier& carrier() const { return *carrier_; }
 
  private:
   bool send_made(std::string_view peer, std::string_view type, uint64_t bytes,
                  const std::function<std::string()>& encoded);
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Carrier> carrier_;
 };
 
 /// Waits until one of the sockets has a message, `timeout_ms` passed, or a signal came. True if a message is there.
+/// Sockets of a simulated network are not waited for: in a simulation turns end in place of waits.
 bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms);
 /// The same for at most `timeout_s`, to some 50 us; the last part of a millisecond is slept, whatever comes.
 bool wait_readable_s(const std::vector<Socket*>& sockets, double timeout_s);

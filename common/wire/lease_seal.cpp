@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/core/check.h"
+#include "common/core/machine.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::wire {
@@ -59,7 +60,10 @@ bool fits(const L& lease, InstanceId sampler, std::span<const uint32_t> key) {
 std::vector<uint32_t> make_lease_key() {
   CHECK(ready());
   Words out(kLeaseKeyWords);
-  randombytes_buf(out.data(), out.size() * sizeof out[0]);
+  if (simulated_world())
+    for (uint32_t& word : out) word = uint32_t(random_bits());
+  else
+    randombytes_buf(out.data(), out.size() * sizeof out[0]);
   return out;
 }
 
