@@ -47,12 +47,15 @@ ViewerWorker::ViewerWorker(net::Context& context, const Options& options, Coupli
       feeds_(context, options.service.name),
       requester_(with_buffers(options.requests, gate), link_.instance()),
       started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
-      instance_(link_.instance()),
-      thread_([this] { loop(); }) {}
+      instance_(link_.instance()) {
+  link_.on_order([this](const wire::Order& order) { orders_.put(order); });
+  link_.on_renewed([this](InstanceId instance) { renew(instance); });
+  if (options_.own_thread) thread_ = std::thread([this] { loop(); });
+}
 
 ViewerWorker::~ViewerWorker() {
   stop_ = true;
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void ViewerWorker::on_expected(double t_s, const geometry::Pose& pose) {
@@ -146,32 +149,35 @@ std::shared_ptr<const SceneTerms> ViewerWorker::terms() const {
 
 void ViewerWorker::loop() {
   net::lower_thread_priority(5);  // the display comes first
-  link_.on_order([this](const wire::Order& order) { orders_.put(order); });
-  link_.on_renewed([this](InstanceId instance) { renew(instance); });
   try {
-    while (!stop_) {
-      const double poll_s = gate_.waits() ? kCoupledPoll_s : options_.requests.wall.empty() ? kPoll_s : kWallPoll_s;
-      const double now = monotonic_s();
-      offset_s_ = link_.to_master_s(now) - now;
-      link_.tick(now, [this] { return status(); });
-      follow_session();
-      change_coupling(now);
-      take_sampling();
-      request_views(now);
-      report(now, false);
-      std::vector<net::Socket*> sockets{&link_.socket()};
-      feeds_.add_to(sockets);
-      net::wait_readable_s(sockets, std::min(poll_s, requester_.due_in_s(to_master_s(monotonic_s())).value_or(poll_s)));
-      receive_control();
-      receive();
-    }
-    report(monotonic_s(), true);
-    link_.leave([this] { return status(); });
+    net::take_turns(*this);
   } catch (const std::exception& e) {
     log::error("the viewer's worker failed: {}", e.what());
     failed_ = true;
     shutdown_ = true;
   }
+}
+
+std::optional<net::Wait> ViewerWorker::turn() {
+  receive_control();
+  receive();
+  const double poll_s = gate_.waits() ? kCoupledPoll_s : options_.requests.wall.empty() ? kPoll_s : kWallPoll_s;
+  const double now = monotonic_s();
+  if (stop_) {
+    report(now, true);
+    link_.leave([this] { return status(); });
+    return std::nullopt;
+  }
+  offset_s_ = link_.to_master_s(now) - now;
+  link_.tick(now, [this] { return status(); });
+  follow_session();
+  change_coupling(now);
+  take_sampling();
+  request_views(now);
+  report(now, false);
+  net::Wait wait{{&link_.socket()}, std::min(poll_s, requester_.due_in_s(to_master_s(monotonic_s())).value_or(poll_s))};
+  feeds_.add_to(wait.sockets);
+  return wait;
 }
 
 void ViewerWorker::receive() {

@@ -20,11 +20,12 @@
 #include "client/viewer/session_record.h"
 #include "client/viewer/succession.h"
 #include "common/net/service.h"
+#include "common/net/turns.h"
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
 
-class ViewerWorker {
+class ViewerWorker : public net::Turns {
  public:
   struct Options {
     net::ServiceOptions service;
@@ -36,14 +37,18 @@ class ViewerWorker {
     SessionRecord* record = nullptr;           ///< null: nothing is kept. Outlives the worker
     std::shared_ptr<const PoseFeed> poses;     ///< moves the head; null: nobody does. Its figures are reported
     std::shared_ptr<const RendererChoice> renderer = std::make_shared<RendererChoice>();  ///< of the display
-    double started_s = 0;  ///< when the session was started, on the monotonic clock; 0: now
+    bool own_thread = true;  ///< false: its owner takes its turns
+    double started_s = 0;    ///< when the session was started, on the monotonic clock; 0: now
   };
 
-  /// Starts the thread.
+  /// Starts the thread, unless its owner takes the turns.
   ViewerWorker(net::Context& context, const Options& options, CouplingGate& gate, metrics::TableRecorder& frames,
                metrics::SpanRecorder& spans);
-  /// Stops it, after a last flush of metrics and a goodbye.
-  ~ViewerWorker();
+  /// Stops the thread, after a last flush of metrics and a goodbye.
+  ~ViewerWorker() override;
+
+  // ---- worker thread ----
+  std::optional<net::Wait> turn() override;
 
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.

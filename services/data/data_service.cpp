@@ -19,7 +19,7 @@ namespace telesplat::data {
 namespace {
 
 // How long the loop waits for messages. While something is worked on, its end ends no wait.
-constexpr int kQuiet_ms = 50, kBusy_ms = 2;
+constexpr double kQuiet_s = 0.05, kBusy_s = 0.002;
 constexpr size_t kMostRemarks = 4000;  // bytes that the session is told of them
 constexpr int kRequestsATurn = 64;     // so that the master is not kept waiting
 
@@ -115,47 +115,87 @@ wire::Hello make_hello(const Served& served, const std::string& name, const std:
   return hello;
 }
 
-int serve(net::Context& context, Served& served, const net::ServiceOptions& o, const std::function<bool()>& stop,
-          const Recorded& recorded) {
+namespace {
+
+class DataTurns final : public DataService {
+ public:
+  DataTurns(net::Context& context, Served& served, const net::ServiceOptions& o, std::optional<net::Socket> requests,
+            wire::Hello hello, const std::vector<std::string>& files, std::function<bool()> stop)
+      : served_(served),
+        stop_(std::move(stop)),
+        requests_(std::move(requests)),
+        link_(context, o.master, std::move(hello), o.give_up_after_s),
+        hash_(files),
+        rates_(o.max_messages) {
+    served_.begin(link_.instance());
+    link_.on_order([&](const wire::Order& order) {
+      const auto answer = served_.carry_out(order);
+      if (!answer) return link_.answer(order.number, false, answer.error().text);
+      if (*answer) link_.answer(order.number, true, **answer);
+    });
+  }
+
+  std::optional<net::Wait> turn() override {
+    receive();
+    const auto status = [&] { return status_of(served_, requests_, rates_); };
+    if (net::stop_requested() || link_.shutdown_requested() || (stop_ && stop_())) {
+      link_.leave(status);
+      return std::nullopt;
+    }
+    link_.tick(monotonic_s(), status);
+    net::Wait wait{{&link_.socket()}, served_.busy() ? kBusy_s : kQuiet_s};
+    if (requests_) wait.sockets.push_back(&*requests_);
+    return wait;
+  }
+  int exit_code() const override { return link_.exit_code(); }
+
+ private:
+  void receive() {
+    link_.receive();
+    if (link_.version() != version_) {
+      version_ = link_.version();
+      if (const Status s = served_.follow(*link_.session()); !s) log::warn("{}", s.error().text);
+    }
+    if (requests_) answer_some(served_, {*requests_, link_.socket()}, rates_);
+    for (const auto& [fact, value] : served_.news()) link_.tell(fact, value);
+    if (const auto known = hash_.take()) {
+      link_.tell("data_bytes", std::to_string(known->bytes));
+      link_.tell("data_hash", hash_text(known->hash));
+    }
+  }
+
+  Served& served_;
+  const std::function<bool()> stop_;
+  std::optional<net::Socket> requests_;
+  net::MasterLink link_;
+  BackgroundHash hash_;
+  net::PeerRates rates_;
+  int version_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<DataService>> DataService::open(net::Context& context, Served& served,
+                                                       const net::ServiceOptions& o, const Recorded& recorded,
+                                                       std::function<bool()> stop) {
   std::optional<net::Socket> requests;
   const auto endpoint = bind_requests(requests, context, served.requests(), o);
-  if (!endpoint) {
-    log::error("{}", endpoint.error().text);
-    return 2;
-  }
+  if (!endpoint) return endpoint.error();
   wire::Hello hello = make_hello(served, o.name, *endpoint);
   for (const auto& [fact, value] : recorded.facts) hello.facts[fact] = value;
-  net::MasterLink link(context, o.master, std::move(hello), o.give_up_after_s);
-  BackgroundHash hash(recorded.files);
-  served.begin(link.instance());
-  link.on_order([&](const wire::Order& order) {
-    const auto answer = served.carry_out(order);
-    if (!answer) return link.answer(order.number, false, answer.error().text);
-    if (*answer) link.answer(order.number, true, **answer);
-  });
-  net::PeerRates rates(o.max_messages);
-  const auto status = [&] { return status_of(served, requests, rates); };
-  std::vector<net::Socket*> sockets{&link.socket()};
-  if (requests) sockets.push_back(&*requests);
+  return {std::make_unique<DataTurns>(context, served, o, std::move(requests), std::move(hello), recorded.files,
+                                      std::move(stop))};
+}
 
-  int version = 0;
-  while (!net::stop_requested() && !link.shutdown_requested() && !stop()) {
-    link.tick(monotonic_s(), status);
-    net::wait_readable(sockets, served.busy() ? kBusy_ms : kQuiet_ms);
-    link.receive();
-    if (link.version() != version) {
-      version = link.version();
-      if (const Status s = served.follow(*link.session()); !s) log::warn("{}", s.error().text);
-    }
-    if (requests) answer_some(served, {*requests, link.socket()}, rates);
-    for (const auto& [fact, value] : served.news()) link.tell(fact, value);
-    if (const auto known = hash.take()) {
-      link.tell("data_bytes", std::to_string(known->bytes));
-      link.tell("data_hash", hash_text(known->hash));
-    }
+int serve(net::Context& context, Served& served, const net::ServiceOptions& o, const std::function<bool()>& stop,
+          const Recorded& recorded) {
+  const auto service = DataService::open(context, served, o, recorded, stop);
+  if (!service) {
+    log::error("{}", service.error().text);
+    return 2;
   }
-  link.leave(status);
-  return link.exit_code();
+  net::take_turns(**service);
+  return (*service)->exit_code();
 }
 
 Result<int> run(const DataServiceOptions& o) {

@@ -3,10 +3,11 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "common/net/socket.h"
+#include "common/net/turns.h"
 #include "services/data/data_options.h"
 #include "services/data/served.h"
 
@@ -22,7 +23,17 @@ struct Recorded {
   std::vector<std::string> files;
 };
 
-/// Binds, says hello, answers until told to stop; `stop` ends it, too. Exit code: 0, or 2 if nothing can be bound.
+/// The process that serves: it says hello, answers until told to stop, and says goodbye.
+class DataService : public net::Turns {
+ public:
+  /// Binds. Error: that cannot be done. Context and `served` must outlive it.
+  static Result<std::unique_ptr<DataService>> open(net::Context& context, Served& served,
+                                                   const net::ServiceOptions& options, const Recorded& recorded = {},
+                                                   std::function<bool()> stop = {});
+  virtual int exit_code() const = 0;
+};
+
+/// Takes its turns until told to stop; `stop` ends it, too. Exit code: 0, or 2 if nothing can be bound.
 int serve(net::Context& context, Served& served, const net::ServiceOptions& options, const std::function<bool()>& stop,
           const Recorded& recorded = {});
 

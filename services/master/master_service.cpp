@@ -1,7 +1,5 @@
 #include "services/master/master_service.h"
 
-#include <unistd.h>
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,6 +12,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/machine.h"
 #include "common/core/version.h"
 #include "common/metrics/run_folder.h"
 #include "common/net/dispatch.h"
@@ -47,7 +46,7 @@ Result<MasterOptions> core_options(const MasterServiceOptions& o) {
 
 net::RunningSession introduction(const MasterServiceOptions& o, const std::string& endpoint) {
   return {.address = net::local_address(endpoint),
-          .pid = uint64_t(getpid()),
+          .pid = process_id(),
           .scene = {},
           .kind = {},
           .run_folder = net::absolute_path(o.out),
@@ -63,12 +62,12 @@ std::string flags_of_ctl(const net::ServiceOptions& o, const std::string& endpoi
 }
 
 /// The control socket, and the core that answers what comes over it.
-class MasterService {
+class MasterTurns final : public MasterService {
  public:
-  MasterService(const MasterServiceOptions& o, const MasterOptions& core, std::unique_ptr<metrics::RunRecord> record,
-                std::string run_id, const net::Access& access)
+  MasterTurns(net::Context& context, const MasterServiceOptions& o, const MasterOptions& core,
+              std::unique_ptr<metrics::RunRecord> record, std::string run_id)
       : options_(o),
-        context_(access),
+        context_(context),
         record_(std::move(record)),
         run_id_(std::move(run_id)),
         core_(core, net::make_instance_id(), *record_) {}
@@ -85,50 +84,57 @@ class MasterService {
     return ok_status();
   }
 
-  /// Binds, and says so on stdout: whoever started this process waits for the line. From then on it can be found.
   Status listen() {
-    const auto endpoint = control_.bind(options_.service.bind, options_.service.insecure);
+    auto endpoint = control_.bind(options_.service.bind, options_.service.insecure);
     if (!endpoint) return endpoint.error();
-    core_.introduce(introduction(options_, *endpoint), run_id_);
+    endpoint_ = *std::move(endpoint);
+    core_.introduce(introduction(options_, endpoint_), run_id_);
+    return ok_status();
+  }
+
+  // Says on stdout that it listens: whoever started this process waits for the line. From then on it can be found.
+  void announce() {
     if (auto file = net::SessionFile::publish(core_.session()))
       file_.emplace(std::move(*file));
     else
       log::warn("telesplat ctl will not find this session: {}", file.error().text);
     told_ = core_.session();
-    std::printf("listening on %s\n", endpoint->c_str());
+    std::printf("listening on %s\n", endpoint_.c_str());
     if (options_.started_by == "hand")
       std::printf("telesplat ctl status%s asks this session; others join it with --master %s\n",
-                  file_ ? "" : flags_of_ctl(options_.service, *endpoint).c_str(),
-                  net::announced(*endpoint, {}).c_str());
+                  file_ ? "" : flags_of_ctl(options_.service, endpoint_).c_str(),
+                  net::announced(endpoint_, {}).c_str());
     else
-      log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
+      log::info("listening on {}", endpoint_);  // stdout is read by who started it, and goes nowhere
     if (!options_.service.keys.empty())
       log::info("keys of {}: others need theirs", options_.service.keys);
     else
       log::warn("without keys: everybody {} can watch and end this session (--keys DIR lets in whom you want)",
-                net::is_local(*endpoint) ? "on this machine" : "who reaches this machine");
+                net::is_local(endpoint_) ? "on this machine" : "who reaches this machine");
     std::fflush(stdout);
-    return ok_status();
   }
 
-  void serve() {
-    while (!net::stop_requested() && !core_.stop_requested()) serve_for(core_.hurried() ? 5 : 20);
+  std::optional<net::Wait> turn() override {
+    if (!leaves_since_s_ && (net::stop_requested() || core_.stop_requested())) {
+      file_.reset();  // nobody shall find what ends
+      core_.shut_down(net::stop_requested() ? "the session's master was told to stop" : core_.stop_reason());
+      leaves_since_s_ = monotonic_s();
+    }
+    serve();
+    double wait_s = leaves_since_s_ ? 0.01 : core_.hurried() ? 0.005 : 0.02;
+    const double now_s = monotonic_s();
+    if (leaves_since_s_ && (core_.everyone_left() || now_s - *leaves_since_s_ > patience_s())) return std::nullopt;
+    if (const auto due_s = core_.due_s()) wait_s = std::clamp(*due_s - now_s, 0.0, wait_s);
+    return net::Wait{{&control_}, wait_s};
   }
 
-  /// Tells everyone to finish, and listens to their last words.
-  void say_goodbye() {
-    file_.reset();  // nobody shall find what ends
-    core_.shut_down(net::stop_requested() ? "the session's master was told to stop" : core_.stop_reason());
-    const auto patience_s = [] { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; };
-    for (const double begin = monotonic_s(); !core_.everyone_left() && monotonic_s() - begin < patience_s();)
-      serve_for(10);
-  }
+  const MasterCore& core() const override { return core_; }
 
-  Status write_record() {
+  Status write_record() override {
     auto processes = core_.processes();
     processes.push_back({"master",
                          options_.service.name,
-                         uint64_t(getpid()),
+                         process_id(),
                          net::process_facts(),
                          {{"peak_rss_mb", net::peak_resident_mb()},
                           {"messages_rejected", double(control_.rejected())},
@@ -150,10 +156,10 @@ class MasterService {
   }
 
  private:
-  void serve_for(int timeout_ms) {
-    double timeout_s = timeout_ms * 1e-3;
-    if (const auto due_s = core_.due_s()) timeout_s = std::clamp(*due_s - monotonic_s(), 0.0, timeout_s);
-    net::wait_readable_s({&control_}, timeout_s);
+  // How long others may take for their last words.
+  static double patience_s() { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; }
+
+  void serve() {
     look_at_the_clock();
     for (int n = 0; n < kMessagesAtOnce && core_.outgoing() < kMostOutgoing; ++n) {
       const auto message = control_.receive();
@@ -264,7 +270,7 @@ class MasterService {
   }
 
   const MasterServiceOptions& options_;
-  net::Context context_;
+  net::Context& context_;
   net::Socket control_{context_,
                        net::Kind::kRouter,
                        "master",
@@ -275,20 +281,18 @@ class MasterService {
                         .most_queued_bytes = options_.service.queue_limit_bytes()}};
   Senders senders_;
   std::unique_ptr<metrics::RunRecord> record_;
+  std::string endpoint_;
   const std::string run_id_;  // empty: no record is written
   MasterCore core_;
   net::RunningSession told_;  // in the file
   std::optional<net::SessionFile> file_;
+  std::optional<double> leaves_since_s_;   // everyone was told to finish
   double looked_s_ = monotonic_s();        // when it was looked at the clock last
   std::unique_ptr<HttpEndpoint> metrics_;  // null: nobody watches
   double published_s_ = -1e9;
 };
 
-}  // namespace
-
-Result<int> run(const MasterServiceOptions& o) {
-  const auto access = net::begin_service(o.service, {}, true);
-  if (!access) return access.error();
+Result<std::unique_ptr<MasterTurns>> open_master(net::Context& context, const MasterServiceOptions& o) {
   const auto options = core_options(o);
   if (!options) return options.error();
   if (o.overwrite && o.goes_on) return Error{"--continue and --overwrite: the record goes on, or is replaced"};
@@ -309,14 +313,31 @@ Result<int> run(const MasterServiceOptions& o) {
       {.table_bytes = bytes(o.table_limit_mb), .trace_bytes = bytes(o.trace_limit_mb), .goes_on = goes_on});
   if (!record) return record.error();
   if (goes_on) log::info("{}: its record goes on; this is master {} of it", o.out, (*record)->lives());
-  MasterService service(o, *options, *std::move(record), std::move(run_id), *access);
-  Status opened = service.open_metrics();
-  if (opened) opened = service.listen();
+  auto service = std::make_unique<MasterTurns>(context, o, *options, *std::move(record), std::move(run_id));
+  Status opened = service->open_metrics();
+  if (opened) opened = service->listen();
   if (!opened && !o.out.empty() && !goes_on) metrics::remove_record(o.out, !was_there);
   if (!opened) return opened.error();
-  service.serve();
-  service.say_goodbye();
-  if (const Status s = service.write_record(); !s) {
+  return {std::move(service)};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<MasterService>> MasterService::open(net::Context& context, const MasterServiceOptions& o) {
+  auto out = open_master(context, o);
+  if (!out) return out.error();
+  return {std::unique_ptr<MasterService>(*std::move(out))};
+}
+
+Result<int> run(const MasterServiceOptions& o) {
+  const auto access = net::begin_service(o.service, {}, true);
+  if (!access) return access.error();
+  net::Context context(*access);
+  const auto service = open_master(context, o);
+  if (!service) return service.error();
+  (*service)->announce();
+  net::take_turns(**service);
+  if (const Status s = (*service)->write_record(); !s) {
     if (o.started_by != "hand") std::printf("record failed %s\n", s.error().text.c_str());  // the launcher reads it
     log::error("{}", s.error().text);
     return 1;

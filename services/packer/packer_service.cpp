@@ -21,7 +21,7 @@
 namespace telesplat::packer {
 namespace {
 
-constexpr double kSpanFlush_s = 1;
+constexpr double kSpanFlush_s = 1, kLongestWait_s = 0.05;
 constexpr int kRecordedImages = 50;   // of --record-depth
 constexpr double kKeepFreed_s = 10;   // memory that was not needed for that long goes back to the system
 constexpr double kOnTheirWay_s = 30;  // messages of the data set before, after a change
@@ -39,9 +39,9 @@ bool belongs(std::string_view type, scene::Pipeline pipeline) {
   return is_any<wire::DepthTile, wire::StateRequest, wire::AccessReport, wire::Receipt>(type);
 }
 
-class PackerService {
+class PackerTurns final : public PackerService {
  public:
-  PackerService(const PackerOptions& o, net::Context& context)
+  PackerTurns(const PackerOptions& o, net::Context& context)
       : options_(o),
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
                {.high_water_mark = 16,
@@ -89,24 +89,27 @@ class PackerService {
     return ok_status();
   }
 
-  int serve() {
-    while (!net::stop_requested() && !link_->shutdown_requested()) {
-      const double now = monotonic_s();
-      link_->tick(now, [&] { return status(); });
-      early_.expire(now);
-      if (packing_) packing_->tick(now);
-      flush_spans(now);
-      const std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
-      if (!net::wait_readable(sockets, 0) && !use_spare_time(now)) {
-        return_freed_memory(now);
-        net::wait_readable(sockets, longest_wait_ms());
-      }
-      receive_control();
-      receive(state_, kStateAtOnce, &Packing::take_state);
-      receive(tiles_, kSampledAtOnce, &Packing::take_sampled);
+  std::optional<net::Wait> turn() override {
+    receive_control();
+    receive(state_, kStateAtOnce, &Packing::take_state);
+    receive(tiles_, kSampledAtOnce, &Packing::take_sampled);
+    if (net::stop_requested() || link_->shutdown_requested()) {
+      flush_spans(1e300);
+      link_->leave([&] { return status(); });
+      return std::nullopt;
     }
-    flush_spans(1e300);
-    link_->leave([&] { return status(); });
+    const double now = monotonic_s();
+    link_->tick(now, [&] { return status(); });
+    early_.expire(now);
+    if (packing_) packing_->tick(now);
+    flush_spans(now);
+    const std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
+    if (net::wait_readable(sockets, 0) || use_spare_time(now)) return net::Wait{};
+    return_freed_memory(now);
+    return net::Wait{sockets, longest_wait_s()};
+  }
+
+  int exit_code() const override {
     if (const int code = link_->exit_code()) return code;
     const auto values = status();
     const auto failed = values.find(metrics::kRecordFailed);
@@ -154,9 +157,9 @@ class PackerService {
   }
 
   // Until something is due that no message tells of.
-  int longest_wait_ms() const {
+  double longest_wait_s() const {
     const auto due_s = packing_ ? packing_->due_s() : std::nullopt;
-    return due_s ? int(std::ceil(std::clamp(*due_s - monotonic_s(), 0.001, 0.05) * 1e3)) : 50;
+    return due_s ? std::clamp(*due_s - monotonic_s(), 0.001, kLongestWait_s) : kLongestWait_s;
   }
 
   // One piece of what can wait. False: there is none, or it waits.
@@ -284,6 +287,12 @@ class PackerService {
 
 }  // namespace
 
+Result<std::unique_ptr<PackerService>> PackerService::open(net::Context& context, const PackerOptions& o) {
+  auto out = std::make_unique<PackerTurns>(o, context);
+  if (const Status s = out->open(context); !s) return s.error();
+  return {std::move(out)};
+}
+
 bool SpareTime::begins(double now_s, bool hurried) {
   if (hurried && now_s - rested_s_ < kLongestHurry_s) return false;
   rested_s_ = now_s;
@@ -309,9 +318,10 @@ Result<int> run(const PackerOptions& o) {
   if (!access) return access.error();
   net::keep_freed_memory();
   net::Context context(*access);
-  PackerService service(o, context);
-  if (const Status s = service.open(context); !s) return s.error();
-  return service.serve();
+  const auto service = PackerService::open(context, o);
+  if (!service) return service.error();
+  net::take_turns(**service);
+  return (*service)->exit_code();
 }
 
 }  // namespace telesplat::packer

@@ -1,12 +1,22 @@
 // The packer process (T4.3): takes what samplers send and gives viewers what they do not have yet.
 #pragma once
 
+#include <memory>
 #include <optional>
 
+#include "common/net/turns.h"
 #include "common/wire/tile_messages.h"
 #include "services/packer/packer_options.h"
 
 namespace telesplat::packer {
+
+class PackerService : public net::Turns {
+ public:
+  /// Binds its sockets. Error: that cannot be done, or what it shall record to cannot be written. Context and options
+  /// must outlive it.
+  static Result<std::unique_ptr<PackerService>> open(net::Context& context, const PackerOptions& options);
+  virtual int exit_code() const = 0;
+};
 
 /// Serves until told to stop. Exit code 0, or 2 if it cannot bind.
 Result<int> run(const PackerOptions& options);

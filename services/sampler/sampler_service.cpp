@@ -83,11 +83,11 @@ void DrainGuard::watch(const std::string& master, InstanceId instance, const net
   std::_Exit(told ? 0 : 1);
 }
 
-class SamplerService {
+class SamplerTurns final : public SamplerService {
  public:
   /// mesh_sampler: made beforehand, or null. replay: samples scenes of every kind, or null.
-  SamplerService(const SamplerOptions& o, InstanceId instance, std::unique_ptr<Sampler> mesh_sampler,
-                 std::unique_ptr<TileSource> replay, net::Context& context)
+  SamplerTurns(const SamplerOptions& o, InstanceId instance, std::unique_ptr<Sampler> mesh_sampler,
+               std::unique_ptr<TileSource> replay, net::Context& context)
       : options_(o),
         context_(context),
         mesh_sampler_(std::move(mesh_sampler)),
@@ -96,30 +96,39 @@ class SamplerService {
     if (replays_) set_work(std::make_unique<TileWork>(std::move(replay), link_));
   }
 
-  int serve() {
-    while (!link_.shutdown_requested() && !failed_) {
-      const double now = monotonic_s();
-      if (net::stop_requested() && !give_up_s_) give_up_s_ = now + kDrain_s;
-      link_.tick(now, [&] { return status(); });
-      flush_metrics(now);
-      send_out(now);
-      const Readiness next = look_at_next(now);
-      const bool ready = held() > 0 && next.state == Readiness::State::kReady && !unsent_;
-      if (drained(ready, next, now)) break;
-      if (!give_up_s_) ask_for_leases();
-      if (work_) work_->fetch(now);
-      if (!ready) wait(std::min(unsent_ ? kSendAgain_s : next.again_s - now, kIdle_s));
-      receive_control(!give_up_s_);
-      if (work_) work_->receive(monotonic_s());
-      // What came meanwhile may have changed what is known of the lease's epoch.
-      if (ready && look_at_next(monotonic_s()).state == Readiness::State::kReady && held() > 0) sample_next();
-    }
-    flush_metrics(1e300);
-    link_.leave([&] { return status(); });
-    return link_.exit_code() ? link_.exit_code() : int(failed_);
+  std::optional<net::Wait> turn() override {
+    receive_control(!give_up_s_);
+    if (work_) work_->receive(monotonic_s());
+    // What came meanwhile may have changed what is known of the lease's epoch.
+    if (std::exchange(ready_, false) && look_at_next(monotonic_s()).state == Readiness::State::kReady && held() > 0)
+      sample_next();
+    const double now = monotonic_s();
+    if (net::stop_requested() && !give_up_s_) give_up_s_ = now + kDrain_s;
+    if (link_.shutdown_requested() || failed_) return leave();
+    link_.tick(now, [&] { return status(); });
+    flush_metrics(now);
+    send_out(now);
+    const Readiness next = look_at_next(now);
+    ready_ = held() > 0 && next.state == Readiness::State::kReady && !unsent_;
+    if (drained(ready_, next, now)) return leave();
+    if (!give_up_s_) ask_for_leases();
+    if (work_) work_->fetch(now);
+    if (ready_) return net::Wait{};
+    net::Wait wait{{&link_.socket()}, std::max(0.0, std::min(unsent_ ? kSendAgain_s : next.again_s - now, kIdle_s))};
+    if (work_)
+      for (net::Socket* s : work_->sockets()) wait.sockets.push_back(s);
+    return wait;
   }
 
+  int exit_code() const override { return link_.exit_code() ? link_.exit_code() : int(failed_); }
+
  private:
+  std::optional<net::Wait> leave() {
+    flush_metrics(1e300);
+    link_.leave([&] { return status(); });
+    return std::nullopt;
+  }
+
   static wire::Hello make_hello(const SamplerOptions& o, InstanceId instance) {
     wire::Hello hello;
     hello.role = "sampler";
@@ -208,13 +217,6 @@ class SamplerService {
     }
   }
 
-  void wait(double for_s) {
-    std::vector<net::Socket*> sockets{&link_.socket()};
-    if (work_)
-      for (net::Socket* s : work_->sockets()) sockets.push_back(s);
-    net::wait_readable_s(sockets, std::max(for_s, 0.0));
-  }
-
   void receive_control(bool takes_leases) {
     while (const auto message = link_.socket().receive()) {
       const double now = monotonic_s();
@@ -266,12 +268,18 @@ class SamplerService {
   std::optional<double> give_up_s_;  // set once told to stop
   int leases_asked_ = 0;
   bool failed_ = false;
+  bool ready_ = false;  // the first lease may be sampled once what is here is received
   uint64_t tiles_sampled_ = 0;
   double busy_s_ = 0;  // sampling and encoding
   double last_flush_s_ = 0;
 };
 
 }  // namespace
+
+std::unique_ptr<SamplerService> SamplerService::open(net::Context& context, const SamplerOptions& o,
+                                                     std::unique_ptr<Sampler> mesh_sampler) {
+  return std::make_unique<SamplerTurns>(o, net::make_instance_id(), std::move(mesh_sampler), nullptr, context);
+}
 
 Result<int> run(const SamplerOptions& given) {
   SamplerOptions o = given;
@@ -293,7 +301,9 @@ Result<int> run(const SamplerOptions& given) {
   const InstanceId instance = net::make_instance_id();
   const DrainGuard guard(o.service.master, instance, *access);
   net::Context context(*access);
-  return SamplerService(o, instance, std::move(sampler), std::move(replay), context).serve();
+  SamplerTurns service(o, instance, std::move(sampler), std::move(replay), context);
+  net::take_turns(service);
+  return service.exit_code();
 }
 
 }  // namespace telesplat::sampler

@@ -2,9 +2,22 @@
 // the session's kind of scene (works.h).
 #pragma once
 
+#include <memory>
+
+#include "common/net/turns.h"
 #include "services/sampler/sampler_options.h"
 
 namespace telesplat::sampler {
+
+class Sampler;
+
+class SamplerService : public net::Turns {
+ public:
+  /// mesh_sampler: samples meshes; null: one is made when a mesh comes. Context and options must outlive it.
+  static std::unique_ptr<SamplerService> open(net::Context& context, const SamplerOptions& options,
+                                              std::unique_ptr<Sampler> mesh_sampler);
+  virtual int exit_code() const = 0;
+};
 
 /// Serves until told to finish. Told by SIGINT or SIGTERM it finishes what it holds, asks for no more, and is gone
 /// within 2 s; told by the master it ends at once. Exit code: 0; 1 if the sampler asked for cannot be made; 2 if the
