@@ -430,6 +430,17 @@ TEST_P(Network, WhatWasSentLingersUntilItIsTaken) {
   for (int i = 0; i < 20; ++i) EXPECT_EQ(number(bed_->next(pull)), i);
 }
 
+TEST_P(Network, WhatARouterAnsweredLastLingersToo) {
+  Peer router = bed_->bound(Kind::kRouter, at_);
+  Peer dealer = bed_->connected(Kind::kDealer, at_);
+  ASSERT_TRUE(send(dealer, 1));
+  const auto asks = bed_->next(router);
+  ASSERT_TRUE(asks);
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(send(router, i, kLarge, asks->peer));
+  router.end();
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(number(bed_->next(dealer)), i);
+}
+
 TEST_P(Network, WithoutLingerNothingIsSentAfterTheEnd) {
   bed_->bound(Kind::kPull, at_).end();
   {
@@ -500,46 +511,69 @@ TEST_P(Network, WhoSendsMoreThanIsReadIsHungUpOn) {
   for (int i = 0; i < 64; ++i) ASSERT_EQ(number(bed_->next(pull)), i) << "what was whole is not lost";
 }
 
+// Real processes, which are forked, beside simulated ones.
+
+class Child {
+ public:
+  /// run(out, in): in the child; it ends when it is killed.
+  explicit Child(const std::function<void(int out, int in)>& run) {
+    EXPECT_EQ(pipe(from_) + pipe(to_), 0);
+    id_ = fork();
+    if (id_ != 0) return;
+    run(from_[1], to_[0]);
+    for (;;) pause();
+  }
+  ~Child() {
+    end();
+    for (const int fd : {from_[0], from_[1], to_[0], to_[1]}) close(fd);
+  }
+  void tell(const std::string& text) const { EXPECT_GT(write(to_[1], text.c_str(), text.size() + 1), 0); }
+  std::string hear() const { return hear(from_[0]); }
+  void stop() const {
+    kill(id_, SIGSTOP);
+    waitpid(id_, nullptr, WUNTRACED);
+  }
+  void end() {
+    if (id_ <= 0) return;
+    kill(id_, SIGKILL);
+    waitpid(std::exchange(id_, 0), nullptr, 0);
+  }
+  static std::string hear(int fd) {
+    char text[100] = {};
+    return read(fd, text, sizeof text - 1) > 0 ? text : "";
+  }
+
+ private:
+  int from_[2], to_[2];
+  pid_t id_ = 0;
+};
+
+const SocketOptions kSmallQueue{.high_water_mark = 8, .linger_ms = 0, .watch_connecting = true};
+
 // A process that stands still is given messages as long as its kernel and queues take any.
 TEST(StoppedProcess, IsStillGivenMessages) {
-  int ends[2];
-  ASSERT_EQ(pipe(ends), 0);
-  const pid_t child = fork();
-  if (child == 0) {
+  const Child child([](int out, int) {
     net::Context context;
-    net::Socket pull(context, Kind::kPull, "stopped", {.high_water_mark = 8});
+    net::Socket pull(context, Kind::kPull, "stopped", kSmallQueue);
     const auto bound = pull.bind("tcp://127.0.0.1:*");
-    if (!bound || write(ends[1], bound->c_str(), bound->size() + 1) < 0) _exit(1);
-    for (;;) {
-      while (pull.receive()) {
-      }
-      net::wait_readable({&pull}, 1000);
-    }
-  }
-  char at[100] = {};
-  ASSERT_GT(read(ends[0], at, sizeof at - 1), 0);
+    if (!bound || write(out, bound->c_str(), bound->size() + 1) < 0) _exit(1);
+    pause();
+  });
   {
     net::Context context;
-    net::Socket push(context, Kind::kPush, "sends", {.high_water_mark = 8, .linger_ms = 0, .watch_connecting = true});
-    ASSERT_TRUE(push.connect(at).ok());
+    net::Socket push(context, Kind::kPush, "sends", kSmallQueue);
+    ASSERT_TRUE(push.connect(child.hear()).ok());
     while (!push.in_touch()) net::wait_readable({}, 5);
-    kill(child, SIGSTOP);
-    waitpid(child, nullptr, WUNTRACED);
+    child.stop();
     for (int i = 0; i < 16; ++i)
       while (!push.send_frames({}, "x", std::string(1000, 'x'))) net::wait_readable({}, 5);
     EXPECT_TRUE(push.in_touch());
   }
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
-  close(ends[0]), close(ends[1]);
-
   SimulatedNetwork network(1);
   net::Context receiver(network.attach(0)), sender(network.attach(1));
-  net::Socket pull(receiver, Kind::kPull, "stopped", {.high_water_mark = 8});
-  net::Socket push(sender, Kind::kPush, "sends", {.high_water_mark = 8, .watch_connecting = true});
+  net::Socket pull(receiver, Kind::kPull, "stopped", kSmallQueue), push(sender, Kind::kPush, "sends", kSmallQueue);
   ASSERT_TRUE(push.connect(*pull.bind("tcp://127.0.0.1:*")).ok());
   network.advance(1);
-  EXPECT_TRUE(push.in_touch());
   network.stop(0);
   for (int i = 0; i < 16; ++i) EXPECT_TRUE(push.send_frames({}, "x", std::string(1000, 'x'))) << i;
   network.advance(2);
@@ -547,6 +581,51 @@ TEST(StoppedProcess, IsStillGivenMessages) {
   EXPECT_TRUE(push.in_touch());
   network.go_on(0);
   for (int i = 0; i < 16; ++i) EXPECT_TRUE(pull.receive()) << i;
+}
+
+// How many messages of 64 KiB are taken before one is refused for good.
+int fill_up(net::Socket& push, const std::function<void()>& wait) {
+  int sent = 0;
+  for (int refused = 0; refused < 40;)
+    push.send_frames({}, "x", std::string(kLarge, 'x')) ? (++sent, refused = 0) : (++refused, wait(), 0);
+  return sent;
+}
+
+// What its kernel had, and what had come, is still read; what waited in its own queue is lost.
+TEST(KilledProcess, WhatItsKernelHadArrives) {
+  Child child([](int out, int in) {
+    net::Context context;
+    net::Socket push(context, Kind::kPush, "killed", kSmallQueue);
+    if (!push.connect(Child::hear(in))) _exit(1);
+    const std::string sent = std::to_string(fill_up(push, [] { net::wait_readable({}, 5); }));
+    if (write(out, sent.c_str(), sent.size() + 1) < 0) _exit(1);
+    pause();
+  });
+  const auto count = [](net::Socket& pull, const std::function<void()>& wait) {
+    int got = 0;
+    for (int idle = 0; idle < 40;) pull.receive() ? (++got, idle = 0) : (++idle, wait(), 0);
+    return got;
+  };
+  {
+    net::Context context;
+    net::Socket pull(context, Kind::kPull, "reads", kSmallQueue);
+    child.tell(*pull.bind("tcp://127.0.0.1:*"));
+    const int sent = std::stoi(child.hear());
+    child.end();
+    const int got = count(pull, [] { net::wait_readable({}, 5); });
+    EXPECT_GE(got, sent - 10);
+    EXPECT_LE(got, sent - 3);
+  }
+  SimulatedNetwork network(1);
+  net::Context receiver(network.attach(0)), sender(network.attach(1));
+  net::Socket pull(receiver, Kind::kPull, "reads", kSmallQueue), push(sender, Kind::kPush, "killed", kSmallQueue);
+  ASSERT_TRUE(push.connect(*pull.bind("tcp://127.0.0.1:*")).ok());
+  const auto wait = [&] { network.advance(network.now_s() + 0.005); };
+  const int sent = fill_up(push, wait);
+  network.crash(1);
+  const int got = count(pull, wait);
+  EXPECT_GE(got, sent - 10);
+  EXPECT_LE(got, sent - 3);
 }
 
 }  // namespace

@@ -79,6 +79,33 @@ TEST_F(Faults, WhatIsOnTheWireOfAKilledProcessArrivesAndWhatWaitsIsLost) {
   EXPECT_FALSE(router->receive());
 }
 
+TEST_F(Faults, AProcessCanBeKilledAtAnyMessageThatItSends) {
+  int seen = 0;
+  network.on_passed = [&](const Passed& p) {
+    if (p.what == Passed::What::kSent && ++seen == 3) network.crash(p.from);
+  };
+  std::vector<bool> sent;
+  for (const char* text : {"one", "two", "three", "four"}) sent.push_back(say(text));
+  EXPECT_EQ(sent, (std::vector<bool>{true, true, false, false}));
+  dealer.reset();
+  network.advance(2);
+  EXPECT_EQ(text(router->receive()), "one");
+  EXPECT_EQ(text(router->receive()), "two");
+  EXPECT_FALSE(router->receive());
+}
+
+TEST_F(Faults, AProcessCanBeKilledAtAnyMessageThatComes) {
+  for (const char* text : {"one", "two", "three"}) ASSERT_TRUE(say(text));
+  int seen = 0;
+  network.on_passed = [&](const Passed& p) {
+    if (p.what == Passed::What::kDelivered && ++seen == 2) network.crash(p.to);
+  };
+  network.advance(2);
+  EXPECT_FALSE(router->receive());
+  EXPECT_EQ(seen, 2);
+  EXPECT_FALSE(dealer->in_touch());
+}
+
 TEST_F(Faults, ThoseWhoWereConnectedToAKilledProcessFindTheNextOneInItsPlace) {
   network.crash(0);
   router.reset();

@@ -252,6 +252,7 @@ void State::drop_all(End& e) {
 void State::close_end(End& e) {
   if (e.gone) return;
   e.gone = true;
+  e.up = false;
   drop_all(e);
   const auto wire = std::exchange(e.wire, nullptr);
   if (!wire) return;

@@ -20,7 +20,7 @@ struct LinkOptions {
   double latency_s = 0.0005;
   double jitter_s = 0;               ///< a message takes up to this much longer; drawn for each
   double bytes_s = 0;                ///< rate; 0: no limit
-  uint64_t buffer_bytes = 4u << 20;  ///< what the two kernels keep of a connection
+  uint64_t buffer_bytes = 4u << 20;  ///< what the two kernels keep of a connection; as measured over loopback
 };
 
 /// The key that a process shows, as its allow-list would name it.
@@ -82,8 +82,8 @@ class SimulatedNetwork {
   /// takes its connection for broken; otherwise bytes arrive late.
   void silence(int a, int b, double for_s);
 
-  /// Is told of each message. kSent comes before anything is done: what it throws leaves Socket::send(), and nothing
-  /// was sent. It must not call the network.
+  /// Is told of each message; kSent before it is queued. It may crash and stop processes, also the one that sends; all
+  /// else of the network is not to be called from it.
   std::function<void(const Passed&)> on_passed;
   /// A process' socket has become readable; may be told more often.
   std::function<void(int process)> on_ready;

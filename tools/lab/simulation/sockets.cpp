@@ -58,6 +58,7 @@ bool State::send(SimulatedSocket& s, std::string_view peer, std::string_view typ
     start_reading(s);
     sent = s.unsent.size() < size_t(s.options.high_water_mark);
     if (sent) s.unsent.push_back(parcel()), send_unsent(s);
+    sent = sent && !s.dead;
   } else if (s.self->kind == net::Kind::kPub) {
     sent = publish(s, type, bytes, parcel);
   } else if (s.self->kind == net::Kind::kRouter) {
@@ -75,7 +76,9 @@ bool State::offer(SimulatedSocket& s, const std::function<Parcel()>& make) {
     const size_t i = (s.next_out + n) % s.ends.size();
     End& e = *s.ends[i];
     if (e.gone || e.out.full()) continue;
-    e.out.push(make());
+    Parcel p = make();
+    if (s.dead) return false;  // it was killed at this message
+    e.out.push(std::move(p));
     s.next_out = i + 1;
     push_out(e);
     return true;
@@ -93,6 +96,7 @@ bool State::route(SimulatedSocket& s, std::string_view peer, std::string_view ty
   const auto found = std::ranges::find_if(s.ends, [&](const auto& e) { return !e->gone && e->peer == peer; });
   if (found == s.ends.end() || (*found)->out.full()) return false;
   Parcel p = make();
+  if (s.dead) return false;
   p.ticket = std::make_shared<net::QueuedBytes::Ticket>(s.queued.add(peer, p.body->size()));
   (*found)->out.push(std::move(p));
   push_out(**found);
@@ -111,6 +115,7 @@ bool State::publish(SimulatedSocket& s, std::string_view type, uint64_t bytes, c
     }
   }
   Parcel p = make();
+  if (s.dead) return false;
   p.ticket = std::make_shared<net::QueuedBytes::Ticket>(s.queued.add({}, p.body->size()));
   for (const auto& e : s.ends) {
     if (!e->up) continue;
@@ -125,7 +130,8 @@ bool State::publish(SimulatedSocket& s, std::string_view type, uint64_t bytes, c
 }
 
 void State::send_unsent(SimulatedSocket& s) {
-  while (!s.unsent.empty() && !frozen(s) && offer(s, [&] { return std::move(s.unsent.front()); })) s.unsent.pop_front();
+  while (!s.unsent.empty() && !frozen(s) && offer(s, [&] { return std::exchange(s.unsent.front(), {}); }))
+    s.unsent.pop_front();
 }
 
 std::optional<net::Message> State::receive(SimulatedSocket& s) {
