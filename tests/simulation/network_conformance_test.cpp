@@ -232,7 +232,7 @@ TEST_P(Network, PushGivesMessagesInTurnToOneThatDoesNotReadUntilItsQueuesAreFull
 TEST_P(Network, ARouterIsToldThatAPeerIsGone) {
   Peer router = bed_->bound(Kind::kRouter, at_);
   Peer dealer = bed_->connected(Kind::kDealer, at_);
-  EXPECT_FALSE(send(router, 0, 4, "nobody"));
+  EXPECT_FALSE(send(router, 0, 4, "unknown"));
   ASSERT_TRUE(send(dealer, 1));
   const auto asks = bed_->next(router);
   ASSERT_TRUE(asks);
@@ -326,7 +326,7 @@ TEST_P(Network, ABrokenConnectionIsMadeAnewAndCountsAsFailed) {
   const auto after = bed_->next(router);
   EXPECT_EQ(number(after), 2);
   EXPECT_NE(after->peer, before->peer);
-  EXPECT_FALSE(send(router, 3, 4, before->peer)) << "its old name is nobody's";
+  EXPECT_FALSE(send(router, 3, 4, before->peer)) << "its old name reaches no peer";
   EXPECT_TRUE(send(router, 4, 4, after->peer));
   EXPECT_EQ(number(bed_->next(dealer)), 4);
   EXPECT_EQ(router->rejected(), 0u);

@@ -16,7 +16,7 @@ namespace {
 using net::Kind;
 using net::Role;
 
-// A router of process 0 and a dealer of process 1, who have met.
+// A router of process 0 and a dealer of process 1, which are connected.
 class Faults : public ::testing::Test {
  protected:
   explicit Faults(uint64_t seed = 1) : network(seed) {
@@ -74,7 +74,7 @@ TEST_F(Faults, WhatIsOnTheWireOfAKilledProcessArrivesAndWhatWaitsIsLost) {
   dealer.reset();
   network.advance(1.11);
   EXPECT_EQ(text(router->receive()).size(), 2000u);
-  EXPECT_FALSE(answer("to nobody"));
+  EXPECT_FALSE(answer("too late"));
   network.advance(3);
   EXPECT_FALSE(router->receive());
 }
@@ -141,12 +141,24 @@ TEST_F(Faults, ALongSilenceIsTakenForABrokenConnection) {
   EXPECT_TRUE(answer("lost")) << "neither has noticed";
   network.advance(11.1);
   EXPECT_FALSE(dealer->in_touch());
-  EXPECT_FALSE(answer("nobody"));
+  EXPECT_FALSE(answer("too late"));
   say("after");
   network.advance(33);
   EXPECT_TRUE(dealer->in_touch());
   EXPECT_EQ(text(router->receive()), "after");
   EXPECT_FALSE(dealer->receive());
+}
+
+// Its kernel keeps the time.
+TEST_F(Faults, AStoppedProcessFindsAConnectionBrokenThatWasSilentForLong) {
+  network.stop(1);
+  network.silence(0, 1, 15);
+  network.advance(20);
+  network.go_on(1);
+  network.advance(20.01);
+  EXPECT_EQ(dealer->failed_connections(), 1u);
+  network.advance(21);
+  EXPECT_TRUE(dealer->in_touch());
 }
 
 TEST_F(Faults, AResetLosesWhatIsOnTheWire) {
@@ -205,7 +217,7 @@ TEST(SimulatedKeys, ARoleSendsOnlyWhatIsItsOwn) {
   ASSERT_TRUE(a.connect(at).ok() && b.connect(at).ok() && pushes.connect(at_tiles).ok());
   a.send_frames({}, "lease_request", "not hers");
   a.send_frames({}, "hello", "hers");
-  b.send_frames({}, "hello", "nobody's");
+  b.send_frames({}, "hello", "without a key");
   network.advance(0.1);
   const auto got = control.receive();
   ASSERT_TRUE(got);

@@ -12,7 +12,7 @@
 
 namespace telesplat::simulation {
 
-using State = SimulatedNetwork::State;
+using NetworkState = SimulatedNetwork::State;
 
 namespace {
 
@@ -30,7 +30,7 @@ std::string place_of(const std::string& endpoint) {
 
 }  // namespace
 
-Result<std::string> State::bind(SimulatedSocket& s, const std::string& endpoint) {
+Result<std::string> NetworkState::bind(SimulatedSocket& s, const std::string& endpoint) {
   CHECK(s.self->kind != net::Kind::kSub);
   std::string out = endpoint;
   if (out.starts_with("tcp://") && out.ends_with(":*")) out.replace(out.size() - 1, 1, std::to_string(ports_++));
@@ -39,7 +39,7 @@ Result<std::string> State::bind(SimulatedSocket& s, const std::string& endpoint)
   return out;
 }
 
-void State::connect(SimulatedSocket& s, const std::string& endpoint) {
+void NetworkState::connect(SimulatedSocket& s, const std::string& endpoint) {
   CHECK(s.self->kind != net::Kind::kPub);
   const Pipe pipe(s.options.high_water_mark);
   s.ends.push_back(std::make_shared<End>(End{.socket = s, .side = 0, .out = pipe, .in = pipe, .endpoint = endpoint}));
@@ -47,7 +47,7 @@ void State::connect(SimulatedSocket& s, const std::string& endpoint) {
 }
 
 // ZeroMQ and TCP greet each other in three round trips; the side that accepts may send half of one before the other.
-void State::attempt(const std::weak_ptr<End>& end) {
+void NetworkState::attempt(const std::weak_ptr<End>& end) {
   const auto e = end.lock();
   if (!e || e->gone) return;
   const int from = e->socket.self->process;
@@ -61,8 +61,8 @@ void State::attempt(const std::weak_ptr<End>& end) {
   at(now_s + 3 * link(from, to).latency_s + 2 * link(to, from).latency_s, -1, [this, end] { accept(end); });
 }
 
-// was_refused: somebody is there, who did not let it in.
-void State::retry(End& e, bool was_refused) {
+// was_refused: a server is there and did not let it in.
+void NetworkState::retry(End& e, bool was_refused) {
   SimulatedSocket& s = e.socket;
   if (e.gone || (s.closing && e.out.empty())) return close_end(e);
   s.in_touch = false;
@@ -73,7 +73,7 @@ void State::retry(End& e, bool was_refused) {
   at(now_s + wait_s, s.self->process, [this, end = std::weak_ptr(*found)] { attempt(end); });
 }
 
-void State::accept(const std::weak_ptr<End>& end) {
+void NetworkState::accept(const std::weak_ptr<End>& end) {
   const auto e = end.lock();
   if (!e || e->gone || e->socket.dead) return;
   const int from = e->socket.self->process;
@@ -91,7 +91,7 @@ void State::accept(const std::weak_ptr<End>& end) {
   const uint64_t open = uint64_t(std::ranges::count(bound.ends, false, [](const auto& b) { return b->gone; }));
   const bool too_many = refused.empty() && open >= bound.options.most_connections;
   if (refused.empty() && !too_many) return shake_hands(e, bound);
-  if (too_many && draw() < 0.5) {  // it is hung up on when it has begun to speak, or before
+  if (too_many && draw() < 0.5) {  // a server hangs up after the handshake, or before its end
     shake_hands(e, bound);
     return hang_up(*bound.ends.back());
   }
@@ -105,8 +105,8 @@ void State::accept(const std::weak_ptr<End>& end) {
   });
 }
 
-// What the one who connects hears; empty: it is let in.
-std::string State::refusal(const SimulatedSocket& connects, SimulatedSocket& bound) {
+// Returns why the bound socket does not let it in; empty: it does.
+std::string NetworkState::refusal(const SimulatedSocket& connects, SimulatedSocket& bound) {
   const auto& key = processes[connects.self->process].options.key;
   if (!processes[bound.self->process].options.key) {
     if (!key) return {};
@@ -118,7 +118,7 @@ std::string State::refusal(const SimulatedSocket& connects, SimulatedSocket& bou
   return key ? fmt::format("the key {} is not let in there", key->user) : "it wants a key (--keys DIR)";
 }
 
-void State::shake_hands(const std::shared_ptr<End>& end, SimulatedSocket& bound) {
+void NetworkState::shake_hands(const std::shared_ptr<End>& end, SimulatedSocket& bound) {
   const int from = end->socket.self->process, to = bound.self->process;
   const Pipe pipe(bound.options.high_water_mark);
   const uint32_t number = ++peers_;
@@ -146,14 +146,14 @@ void State::shake_hands(const std::shared_ptr<End>& end, SimulatedSocket& bound)
       e->socket.broken_off = 0;
       go_on_sending(*e);
       if (!publishes) return;
-      on_wire(wire, 1, now_s + link(from, to).latency_s, [wire] {  // it subscribes
+      on_wire(wire, 1, now_s + link(from, to).latency_s, [wire] {  // the subscription
         if (wire->ends[1]) wire->ends[1]->up = wire->ends[1]->spoken = true;
       });
     });
   });
 }
 
-void State::push_out(End& e) {
+void NetworkState::push_out(End& e) {
   if (!e.wire || !e.up || frozen(e.socket)) return;
   const auto wire = e.wire;
   Way& way = wire->ways[e.side];
@@ -170,25 +170,25 @@ void State::push_out(End& e) {
   }
 }
 
-void State::go_on_sending(End& e) {
+void NetworkState::go_on_sending(End& e) {
   push_out(e);
   send_unsent(e.socket);
   if (e.socket.closing && e.out.empty()) close_end(e);
 }
 
-void State::arrive(Wire& wire, int side) {
+void NetworkState::arrive(Wire& wire, int side) {
   Way& way = wire.ways[1 - side];
   if (way.flying.empty()) return;  // the connection was reset
   Parcel p = std::move(way.flying.front());
   way.flying.pop_front();
   if (End* sender = wire.ends[1 - side]) sender->taken += p.bytes();
   End* e = wire.ends[side];
-  if (!e) return passed(Passed::What::kDropped, p, wire.process[side]);
+  if (!e || way.finished) return passed(Passed::What::kDropped, p, wire.process[side]);
   way.arrived.push_back(std::move(p));
   take_in(*e);
 }
 
-void State::take_in(End& e) {
+void NetworkState::take_in(End& e) {
   const auto wire = e.wire;
   if (!wire || frozen(e.socket)) return;
   SimulatedSocket& s = e.socket;
@@ -214,14 +214,14 @@ void State::take_in(End& e) {
   if (way.arrived.empty() && way.finished) lost(e);
 }
 
-void State::hang_up(End& e) {
+void NetworkState::hang_up(End& e) {
   ++e.socket.connections_refused;
-  e.spoken = true;  // it is not counted twice
+  e.spoken = true;  // rejected() does not count it again
   lost(e);
 }
 
-// Everything that was sent arrives before the end does.
-void State::finish(const std::shared_ptr<Wire>& wire, int side) {
+// Tells ends[side] that the other end has closed, after all that was sent.
+void NetworkState::finish(const std::shared_ptr<Wire>& wire, int side) {
   if (!wire->ends[side]) return;
   const double latency_s = link(wire->process[1 - side], wire->process[side]).latency_s;
   on_wire(wire, side, std::max(wire->ways[1 - side].last_s, now_s + latency_s), [this, wire, side] {
@@ -230,7 +230,7 @@ void State::finish(const std::shared_ptr<Wire>& wire, int side) {
   });
 }
 
-void State::lost(End& e) {
+void NetworkState::lost(End& e) {
   const auto wire = std::exchange(e.wire, nullptr);
   if (!wire) return;
   e.up = false;
@@ -245,11 +245,11 @@ void State::lost(End& e) {
   if (!e.spoken && !(kind == net::Kind::kPull && now_s - e.since_s > kQuietPusher_s)) ++e.socket.rejected;
 }
 
-void State::drop_all(End& e) {
+void NetworkState::drop_all(End& e) {
   while (!e.out.empty()) passed(Passed::What::kDropped, e.out.pop(), e.wire ? e.wire->process[1 - e.side] : -1);
 }
 
-void State::close_end(End& e) {
+void NetworkState::close_end(End& e) {
   if (e.gone) return;
   e.gone = true;
   e.up = false;
@@ -262,7 +262,7 @@ void State::close_end(End& e) {
   finish(wire, 1 - e.side);
 }
 
-void State::close(SimulatedSocket& s) {
+void NetworkState::close(SimulatedSocket& s) {
   std::erase_if(bound_, [&](const auto& b) { return b.second == &s; });
   if (s.dead) return;
   send_unsent(s);

@@ -10,7 +10,7 @@
 
 namespace telesplat::simulation {
 
-using State = SimulatedNetwork::State;
+using NetworkState = SimulatedNetwork::State;
 
 namespace {
 
@@ -18,10 +18,10 @@ std::pair<int, int> pair_of(int a, int b) { return {std::min(a, b), std::max(a, 
 
 }  // namespace
 
-State::State(SimulatedNetwork& owner, uint64_t seed) : owner(owner), random_(seed) {}
+NetworkState::State(SimulatedNetwork& owner, uint64_t seed) : owner(owner), random_(seed) {}
 
 // SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
-double State::draw() {
+double NetworkState::draw() {
   uint64_t z = random_ += 0x9e3779b97f4a7c15u;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
@@ -29,21 +29,21 @@ double State::draw() {
   return double(z >> 11) * 0x1p-53;
 }
 
-const LinkOptions& State::link(int from, int to) const {
+const LinkOptions& NetworkState::link(int from, int to) const {
   const auto own = own_links.find({from, to});
   return own != own_links.end() ? own->second : links;
 }
 
-bool State::frozen(const SimulatedSocket& s) {
+bool NetworkState::frozen(const SimulatedSocket& s) {
   const ProcessState& p = processes[s.self->process];
   return p.stopped || p.crashed;
 }
 
-void State::at(double when_s, int process, Action action) {
+void NetworkState::at(double when_s, int process, Action action) {
   events.emplace(std::pair(std::max(when_s, now_s), numbers_++), Event{process, std::move(action)});
 }
 
-void State::run_next() {
+void NetworkState::run_next() {
   const Event event = std::move(events.begin()->second);
   now_s = events.begin()->first.first;
   events.erase(events.begin());
@@ -55,12 +55,12 @@ void State::run_next() {
   event.action();
 }
 
-bool State::is_silent(int a, int b) const {
+bool NetworkState::is_silent(int a, int b) const {
   const auto found = silences_.find(pair_of(a, b));
   return found != silences_.end() && found->second.until_s > now_s;
 }
 
-void State::on_wire(const std::shared_ptr<Wire>& wire, int side, double when_s, Action action) {
+void NetworkState::on_wire(const std::shared_ptr<Wire>& wire, int side, double when_s, Action action) {
   at(when_s, -1, [this, wire, side, action = std::move(action)] {
     const int from = wire->process[1 - side], to = wire->process[side];
     if (!is_silent(from, to)) return action();
@@ -68,7 +68,7 @@ void State::on_wire(const std::shared_ptr<Wire>& wire, int side, double when_s, 
   });
 }
 
-void State::crash(int process) {
+void NetworkState::crash(int process) {
   ProcessState& p = processes[process];
   p.crashed = true;
   p.held.clear();
@@ -82,10 +82,10 @@ void State::crash(int process) {
   }
 }
 
-void State::go_on(int process) {
+void NetworkState::go_on(int process) {
   ProcessState& p = processes[process];
   p.stopped = false;
-  for (const Action& action : std::exchange(p.held, {})) action();
+  for (Action& action : std::exchange(p.held, {})) at(now_s, process, std::move(action));
   for (size_t i = 0; i < sockets.size(); ++i) {
     if (sockets[i]->self->process != process) continue;
     for (const auto& e : std::vector(sockets[i]->ends)) {
@@ -96,7 +96,7 @@ void State::go_on(int process) {
   }
 }
 
-void State::break_connections(int a, int b) {
+void NetworkState::break_connections(int a, int b) {
   for (const auto& s : sockets) {
     if (s->self->process != a && s->self->process != b) continue;
     for (const auto& e : std::vector(s->ends)) {
@@ -112,29 +112,31 @@ void State::break_connections(int a, int b) {
   }
 }
 
-void State::silence(int a, int b, double for_s) {
+void NetworkState::silence(int a, int b, double for_s) {
   Silence& silence = silences_[pair_of(a, b)];
   if (silence.until_s <= now_s) silence.since_s = now_s;
   silence.until_s = std::max(silence.until_s, now_s + for_s);
   for (const auto& s : sockets) {
     for (const auto& e : s->ends) {
       if (!e->wire || pair_of(a, b) != pair_of(e->wire->process[0], e->wire->process[1])) continue;
-      at(silence.since_s + s->options.patience_s, s->self->process,
+      at(silence.since_s + s->options.patience_s, -1,
          [this, wire = e->wire, side = e->side, key = pair_of(a, b), since_s = silence.since_s] {
            const Silence& now = silences_[key];
-           if (now.since_s == since_s && now.until_s > now_s && wire->ends[side]) lost(*wire->ends[side]);
+           if (now.since_s != since_s || now.until_s <= now_s || !wire->ends[side]) return;
+           wire->ways[1 - side].finished = true;
+           take_in(*wire->ends[side]);
          });
     }
   }
 }
 
-void State::forget_closed() {
+void NetworkState::forget_closed() {
   std::erase_if(sockets, [](const auto& s) {
     return s->dead || (s->closing && std::ranges::all_of(s->ends, [](const auto& e) { return e->gone; }));
   });
 }
 
-void State::passed(Passed::What what, const Parcel& p, int to) {
+void NetworkState::passed(Passed::What what, const Parcel& p, int to) {
   if (!owner.on_passed) return;
   owner.on_passed({.what = what,
                    .sent_s = p.sent_s,

@@ -34,7 +34,7 @@ struct ProcessOptions {
   std::function<double(double network_s)> clock = {};
   /// Calls what is to run as this process: Socket::Due. Empty: calls it.
   std::function<void(const std::function<void()>&)> run = {};
-  /// With a key, sockets let in those who have one that fits (keys/roles.h). Nothing: no keys.
+  /// With a key, bound sockets let in processes whose role may connect (keys/roles.h). Nothing: no keys.
   std::optional<Identity> key = {};
 };
 
@@ -43,7 +43,7 @@ struct Passed {
   enum class What : uint8_t { kSent, kDelivered, kDropped };
   What what = What::kSent;
   double sent_s = 0, now_s = 0;  ///< of the network
-  int from = -1, to = -1;        ///< processes; to: -1 where there is none yet
+  int from = -1, to = -1;        ///< processes; to: -1 where the receiver is not known
   net::Kind kind{};              ///< of the socket that sent it
   std::string_view socket, type;
   wire::Bytes body;  ///< empty where a message was refused before it was made
@@ -51,7 +51,7 @@ struct Passed {
 
 class SimulatedNetwork {
  public:
-  /// All that is drawn comes from `seed`.
+  /// seed: of jitter and of waits before reconnecting.
   explicit SimulatedNetwork(uint64_t seed);
   /// Sockets must be gone by then.
   ~SimulatedNetwork();
@@ -59,7 +59,7 @@ class SimulatedNetwork {
   /// What the process' net::Context is made of. process: a number for one life of one process, from 0.
   std::unique_ptr<net::Network> attach(int process, ProcessOptions options = {});
 
-  /// Links that have no options of their own.
+  /// Options of all links but those of set_link().
   void set_links(const LinkOptions& options);
   /// Holds for what is sent from now on.
   void set_link(int from, int to, const LinkOptions& options);
@@ -70,8 +70,8 @@ class SimulatedNetwork {
   /// Delivers all that arrives by then, in order of time. Not to be called by callbacks, nor backwards.
   void advance(double now_s);
 
-  /// SIGKILL. What is on the wire still arrives; everything else of the process is lost, and whatever its objects do
-  /// from now on does nothing. Those who were connected learn of it a latency later.
+  /// SIGKILL. What is on the wire still arrives; all else of the process is lost. Its objects may live on: their calls
+  /// do nothing. Connected processes learn of it a latency later.
   void crash(int process);
   /// SIGSTOP, SIGCONT. A stopped process' kernel goes on taking bytes; nothing else happens in it.
   void stop(int process);
@@ -82,12 +82,12 @@ class SimulatedNetwork {
   /// takes its connection for broken; otherwise bytes arrive late.
   void silence(int a, int b, double for_s);
 
-  /// Is told of each message; kSent before it is queued. It may crash and stop processes, also the one that sends; all
-  /// else of the network is not to be called from it.
+  /// Is called for each message; with kSent before it is queued. It may crash and stop processes, also the sender. It
+  /// must call nothing else of the network.
   std::function<void(const Passed&)> on_passed;
-  /// A process' socket has become readable; may be told more often.
+  /// A socket of the process has become readable. It may be called more often.
   std::function<void(int process)> on_ready;
-  /// Messages that were sent, those refused aside.
+  /// Messages that sockets took to be sent.
   uint64_t messages() const;
 
   class State;

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/log.h"
 #include "common/net/carrier.h"
 #include "common/net/connections/queued_bytes.h"
 #include "common/net/read_ahead.h"
@@ -33,7 +34,7 @@ struct Parcel {
   uint64_t bytes() const { return type.size() + body->size() + 4; }
 };
 
-/// A queue of messages with a high-water mark. Who fills it learns of what was taken in steps of half the mark.
+/// A queue of messages with a high-water mark. Its writer learns what was taken in steps of half the mark.
 class Pipe {
  public:
   explicit Pipe(int mark) : mark_(uint64_t(mark)) {}
@@ -63,7 +64,7 @@ struct SimulatedSocket;
 /// One direction of a TCP connection.
 struct Way {
   std::deque<Parcel> flying, arrived;  // arrived: in the receiver's kernel
-  uint64_t bytes = 0;                  // of both
+  uint64_t bytes = 0;                  // flying and arrived
   double free_s = 0, last_s = 0;       // when the sender's link is free; when the last byte arrives
   bool finished = false;               // the receiver's kernel knows that nothing more comes
 };
@@ -82,14 +83,14 @@ struct End {
   Pipe out, in;
   std::string endpoint = {};          // side 0
   std::string peer = {};              // side 1: routing id
-  std::optional<Identity> key = {};   // side 1: of who connected
+  std::optional<Identity> key = {};   // side 1: the other process' key
   std::shared_ptr<Wire> wire = {};    // null: not connected
   bool up = false;                    // it may send
   bool gone = false;                  // side 1: the connection is over; what came is still read
   bool spoken = false;                // side 1: a message came
   double since_s = 0;                 // side 1
   double reconnect_s = 0.05;          // side 0: what ZMQ_RECONNECT_IVL has become
-  uint64_t published = 0, taken = 0;  // of a subscriber: bytes
+  uint64_t published = 0, taken = 0;  // side 1 of a publisher: bytes
 };
 
 struct SimulatedSocket {
@@ -115,6 +116,7 @@ struct SimulatedSocket {
   int broken_off = 0;  // handshakes, one after the other
   std::string refused = {};
   double looked_for_late_s = -1e300;
+  log::RateLimiter limiter = {};
 };
 
 }  // namespace telesplat::simulation

@@ -13,7 +13,7 @@
 
 namespace telesplat::simulation {
 
-using State = SimulatedNetwork::State;
+using NetworkState = SimulatedNetwork::State;
 
 namespace {
 
@@ -29,11 +29,11 @@ bool is_full(const SimulatedSocket& s) {
 
 }  // namespace
 
-std::shared_ptr<SimulatedSocket> State::shared(const SimulatedSocket& s) const {
+std::shared_ptr<SimulatedSocket> NetworkState::shared(const SimulatedSocket& s) const {
   return *std::ranges::find(sockets, &s, &std::shared_ptr<SimulatedSocket>::get);
 }
 
-Parcel State::made(SimulatedSocket& s, std::string_view type, std::string body) {
+Parcel NetworkState::made(SimulatedSocket& s, std::string_view type, std::string body) {
   Parcel out{.from = s.self,
              .type = std::string(type),
              .body = std::make_shared<const std::string>(std::move(body)),
@@ -43,14 +43,15 @@ Parcel State::made(SimulatedSocket& s, std::string_view type, std::string body) 
   return out;
 }
 
-void State::refuse(const SimulatedSocket& s, std::string_view type) {
+void NetworkState::refuse(const SimulatedSocket& s, std::string_view type) {
+  if (!owner.on_passed) return;
   passed(Passed::What::kDropped,
          {.from = s.self, .type = std::string(type), .body = std::make_shared<const std::string>(), .sent_s = now_s},
          -1);
 }
 
-bool State::send(SimulatedSocket& s, std::string_view peer, std::string_view type, uint64_t bytes,
-                 const std::function<std::string()>& make) {
+bool NetworkState::send(SimulatedSocket& s, std::string_view peer, std::string_view type, uint64_t bytes,
+                        const std::function<std::string()>& make) {
   if (s.dead || s.closing) return false;
   const auto parcel = [&] { return made(s, type, make()); };
   bool sent = false;
@@ -70,14 +71,14 @@ bool State::send(SimulatedSocket& s, std::string_view peer, std::string_view typ
   return sent;
 }
 
-// To whoever is next and has room.
-bool State::offer(SimulatedSocket& s, const std::function<Parcel()>& make) {
+// Gives the message to the next connection that has room.
+bool NetworkState::offer(SimulatedSocket& s, const std::function<Parcel()>& make) {
   for (size_t n = 0; n < s.ends.size(); ++n) {
     const size_t i = (s.next_out + n) % s.ends.size();
     End& e = *s.ends[i];
     if (e.gone || e.out.full()) continue;
     Parcel p = make();
-    if (s.dead) return false;  // it was killed at this message
+    if (s.dead) return false;  // on_passed killed it
     e.out.push(std::move(p));
     s.next_out = i + 1;
     push_out(e);
@@ -86,11 +87,12 @@ bool State::offer(SimulatedSocket& s, const std::function<Parcel()>& make) {
   return false;
 }
 
-bool State::route(SimulatedSocket& s, std::string_view peer, std::string_view type, uint64_t bytes,
-                  const std::function<Parcel()>& make) {
+bool NetworkState::route(SimulatedSocket& s, std::string_view peer, std::string_view type, uint64_t bytes,
+                         const std::function<Parcel()>& make) {
   if (!s.queued.has_room(peer, bytes)) {
     ++s.queue_refused;
-    log::warn("{}: dropped message '{}': {} bytes wait for its peer already", s.self->name, type, s.queued.of(peer));
+    if (s.limiter.allow(now_s))
+      log::warn("{}: dropped message '{}': {} bytes wait for its peer already", s.self->name, type, s.queued.of(peer));
     return false;
   }
   const auto found = std::ranges::find_if(s.ends, [&](const auto& e) { return !e->gone && e->peer == peer; });
@@ -103,7 +105,8 @@ bool State::route(SimulatedSocket& s, std::string_view peer, std::string_view ty
   return true;
 }
 
-bool State::publish(SimulatedSocket& s, std::string_view type, uint64_t bytes, const std::function<Parcel()>& make) {
+bool NetworkState::publish(SimulatedSocket& s, std::string_view type, uint64_t bytes,
+                           const std::function<Parcel()>& make) {
   for (const auto& e : s.ends)
     if (e->up) e->published += type.size() + bytes + 4;
   if (!s.queued.has_room({}, bytes) && now_s - s.looked_for_late_s >= kLatePeriod_s) {
@@ -129,12 +132,12 @@ bool State::publish(SimulatedSocket& s, std::string_view type, uint64_t bytes, c
   return true;
 }
 
-void State::send_unsent(SimulatedSocket& s) {
+void NetworkState::send_unsent(SimulatedSocket& s) {
   while (!s.unsent.empty() && !frozen(s) && offer(s, [&] { return std::exchange(s.unsent.front(), {}); }))
     s.unsent.pop_front();
 }
 
-std::optional<net::Message> State::receive(SimulatedSocket& s) {
+std::optional<net::Message> NetworkState::receive(SimulatedSocket& s) {
   if (s.dead || s.closing || s.self->kind == net::Kind::kPub) return std::nullopt;
   if (!s.options.read_ahead) return take(s);
   start_reading(s);
@@ -146,7 +149,7 @@ std::optional<net::Message> State::receive(SimulatedSocket& s) {
   return out;
 }
 
-bool State::readable(SimulatedSocket& s) {
+bool NetworkState::readable(SimulatedSocket& s) {
   if (s.dead || s.closing || s.self->kind == net::Kind::kPub) return false;
   if (s.options.read_ahead) {
     start_reading(s);
@@ -155,8 +158,8 @@ bool State::readable(SimulatedSocket& s) {
   return std::ranges::any_of(s.ends, [](const auto& e) { return !e->in.empty(); });
 }
 
-// One message of each connection in turn.
-std::optional<net::Message> State::take(SimulatedSocket& s) {
+// Takes one message of each connection in turn.
+std::optional<net::Message> NetworkState::take(SimulatedSocket& s) {
   for (size_t n = 0; n < s.ends.size();) {
     const size_t i = (s.next_in + n) % s.ends.size();
     const auto e = s.ends[i];
@@ -177,16 +180,21 @@ std::optional<net::Message> State::take(SimulatedSocket& s) {
     if (e->key) out.user = e->key->user, out.role = e->key->role;
     take_in(*e);
     if (e->key && !net::may_send(e->key->role, s.serves, out.type))
-      ++s.rejected;
+      reject(s, out, fmt::format("not allowed: the key {} is {}'s", out.user, net::described(e->key->role)));
     else if (p.body->size() > s.options.max_message_bytes)
-      ++s.rejected;
+      reject(s, out, fmt::format("{} bytes, limit {}", p.body->size(), s.options.max_message_bytes));
     else
       return out;
   }
   return std::nullopt;
 }
 
-void State::read_ahead(SimulatedSocket& s) {
+void NetworkState::reject(SimulatedSocket& s, const net::Message& message, const std::string& why) {
+  ++s.rejected;
+  if (s.limiter.allow(now_s)) log::warn("{}: dropped message '{}': {}", s.self->name, message.type, why);
+}
+
+void NetworkState::read_ahead(SimulatedSocket& s) {
   if (!s.reads || frozen(s) || std::exchange(s.reading_ahead, true)) return;
   while (!is_full(s)) {
     auto message = take(s);
@@ -197,13 +205,13 @@ void State::read_ahead(SimulatedSocket& s) {
   s.reading_ahead = false;
 }
 
-void State::start_reading(SimulatedSocket& s) {
+void NetworkState::start_reading(SimulatedSocket& s) {
   if (std::exchange(s.reads, true)) return;
   read_ahead(s);
   if (s.due) at(now_s, s.self->process, [this, socket = std::weak_ptr(shared(s))] { ask_due(socket); });
 }
 
-void State::ask_due(const std::weak_ptr<SimulatedSocket>& socket) {
+void NetworkState::ask_due(const std::weak_ptr<SimulatedSocket>& socket) {
   const auto s = socket.lock();
   if (!s || s->closing) return;
   const auto ask = [&] {
@@ -218,7 +226,8 @@ namespace {
 
 class SimulatedCarrier final : public net::Carrier {
  public:
-  SimulatedCarrier(State& state, std::shared_ptr<SimulatedSocket> socket) : state_(state), s_(std::move(socket)) {
+  SimulatedCarrier(NetworkState& state, std::shared_ptr<SimulatedSocket> socket)
+      : state_(state), s_(std::move(socket)) {
     state_.sockets.push_back(s_);
   }
   ~SimulatedCarrier() override { state_.close(*s_); }
@@ -238,10 +247,7 @@ class SimulatedCarrier final : public net::Carrier {
   }
   std::optional<net::Message> receive() override { return state_.receive(*s_); }
   std::optional<bool> readable() override { return state_.readable(*s_); }
-  void reject(const net::Message& message, const std::string& why) override {
-    ++s_->rejected;
-    log::warn("{}: dropped message '{}': {}", s_->self->name, message.type, why);
-  }
+  void reject(const net::Message& message, const std::string& why) override { state_.reject(*s_, message, why); }
 
   uint64_t rejected() override { return s_->rejected; }
   uint64_t failed_connections() override { return s_->options.watch_connecting ? s_->failed_connections : 0; }
@@ -257,25 +263,25 @@ class SimulatedCarrier final : public net::Carrier {
             .may_pass = true};
   }
   bool in_touch() override { return s_->options.watch_connecting && s_->in_touch; }
-  /// Whoever does not go through a tunnel looks for its host in a thread (net::HostSearch).
+  /// Says yes, because otherwise MasterLink starts a thread that looks for the host (net::HostSearch).
   bool tunnelled() override { return true; }
   const std::string& name() const override { return s_->self->name; }
   bool reads_ahead() const override { return s_->options.read_ahead; }
 
  private:
-  State& state_;
+  NetworkState& state_;
   const std::shared_ptr<SimulatedSocket> s_;
 };
 
 struct ProcessNetwork final : net::Network {
-  ProcessNetwork(State& state, int process) : state(state), process(process) {}
+  ProcessNetwork(NetworkState& state, int process) : state(state), process(process) {}
   std::unique_ptr<net::Carrier> open(net::Kind kind, std::string name, const net::SocketOptions& options) override {
     auto self = std::make_shared<const Sender>(process, kind, std::move(name));
     return std::make_unique<SimulatedCarrier>(
         state, std::shared_ptr<SimulatedSocket>(new SimulatedSocket{
                    .self = std::move(self), .options = options, .serves = std::string(options.serves)}));
   }
-  State& state;
+  NetworkState& state;
   const int process;
 };
 

@@ -47,6 +47,7 @@ class SimulatedNetwork::State {
             const std::function<std::string()>& make);
   std::optional<net::Message> receive(SimulatedSocket& s);
   bool readable(SimulatedSocket& s);
+  void reject(SimulatedSocket& s, const net::Message& message, const std::string& why);
   void send_unsent(SimulatedSocket& s);
   void read_ahead(SimulatedSocket& s);
 
