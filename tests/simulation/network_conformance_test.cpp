@@ -121,10 +121,10 @@ class Network : public ::testing::TestWithParam<bool> {
     else
       bed_ = std::make_unique<RealBed>();
   }
-  // Sends until it was refused 40 times at 5 ms. Returns how many were taken.
+  // Sends until it was refused 80 times at 5 ms. Returns how many were taken.
   int fill(const Peer& peer, std::string_view to = {}) {
     int sent = 0;
-    for (int refused = 0; refused < 40 && sent < 10000;) {
+    for (int refused = 0; refused < 80 && sent < 10000;) {
       if (send(peer, sent, kLarge, to))
         ++sent, refused = 0;
       else
@@ -480,7 +480,7 @@ TEST_P(Network, BytesThatWaitForARoutersPeerAreLimited) {
   const int sent = fill(router, asks->peer);
   EXPECT_GE(sent * kLarge, kMost);
   EXPECT_LE(sent * kLarge, kMost + kKernels);
-  EXPECT_GE(router->queue_refused(), 40u);
+  EXPECT_GE(router->queue_refused(), 80u);
   EXPECT_GE(router->queued_bytes(asks->peer), kMost - kLarge);
   EXPECT_LE(router->queued_bytes(asks->peer), kMost);
 }
@@ -508,7 +508,11 @@ TEST_P(Network, WhoSendsMoreThanIsReadIsHungUpOn) {
   Peer push = bed_->connected(Kind::kPush, at_, {.high_water_mark = 1000, .watch_connecting = true});
   for (int i = 0; i < 1000; ++i) ASSERT_TRUE(send(push, i, kLarge));
   EXPECT_TRUE(bed_->until([&] { return pull->connections_refused() > 0; }));
-  for (int i = 0; i < 64; ++i) ASSERT_EQ(number(bed_->next(pull)), i) << "what was whole is not lost";
+  // What was whole is not lost; beside it comes what is sent over the next connection.
+  std::vector<int> got = numbers_until(pull, 63);
+  std::erase_if(got, [](int n) { return n > 63; });
+  ASSERT_EQ(got.size(), 64u);
+  for (int i = 0; i < 64; ++i) EXPECT_EQ(got[i], i);
 }
 
 // Real processes, which are forked, beside simulated ones.
@@ -586,7 +590,7 @@ TEST(StoppedProcess, IsStillGivenMessages) {
 // How many messages of 64 KiB are taken before one is refused for good.
 int fill_up(net::Socket& push, const std::function<void()>& wait) {
   int sent = 0;
-  for (int refused = 0; refused < 40;)
+  for (int refused = 0; refused < 80;)
     push.send_frames({}, "x", std::string(kLarge, 'x')) ? (++sent, refused = 0) : (++refused, wait(), 0);
   return sent;
 }

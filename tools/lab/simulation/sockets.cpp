@@ -276,7 +276,7 @@ class SimulatedCarrier final : public net::Carrier {
 struct ProcessNetwork final : net::Network {
   ProcessNetwork(NetworkState& state, int process) : state(state), process(process) {}
   std::unique_ptr<net::Carrier> open(net::Kind kind, std::string name, const net::SocketOptions& options) override {
-    auto self = std::make_shared<const Sender>(process, kind, std::move(name));
+    auto self = std::make_shared<const Sender>(Sender{process, kind, std::move(name)});
     return std::make_unique<SimulatedCarrier>(
         state, std::shared_ptr<SimulatedSocket>(new SimulatedSocket{
                    .self = std::move(self), .options = options, .serves = std::string(options.serves)}));
