@@ -271,7 +271,9 @@ TEST_P(Network, ADealerIsRefusedOnceItsQueueIsFull) {
 TEST_P(Network, WithReadAheadTwiceAsManyWait) {
   Peer dealer =
       bed_->connected(Kind::kDealer, "tcp://127.0.0.1:1", {.high_water_mark = 8, .linger_ms = 0, .read_ahead = true});
-  EXPECT_EQ(fill(dealer), 16);
+  const int taken = fill(dealer);
+  EXPECT_GE(taken, 16);
+  EXPECT_LE(taken, 17);  // one that the thread tries to send is in neither queue
 }
 
 TEST_P(Network, ReadAheadTakesWhatComesUntilAThousandMessagesWait) {

@@ -267,7 +267,7 @@ void NetworkState::close(SimulatedSocket& s) {
   if (s.dead) return;
   send_unsent(s);
   s.closing = true;
-  s.unsent.clear();
+  for (const Parcel& p : std::exchange(s.unsent, {})) passed(Passed::What::kDropped, p, -1);
   s.received.clear();
   for (const auto& e : s.ends)
     if (e->out.empty() || s.options.linger_ms == 0) close_end(*e);

@@ -78,7 +78,7 @@ void NetworkState::crash(int process) {
     s->dead = true;
     for (const auto& e : s->ends) close_end(*e);
     s->received.clear();
-    s->unsent.clear();
+    for (const Parcel& parcel : std::exchange(s->unsent, {})) passed(Passed::What::kDropped, parcel, -1);
   }
 }
 
