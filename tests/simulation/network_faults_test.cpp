@@ -168,10 +168,17 @@ TEST_F(Faults, AStoppedProcessFindsAConnectionBrokenThatWasSilentForLong) {
 
 TEST_F(Faults, AResetLosesWhatIsOnTheWire) {
   network.set_links({.latency_s = 0.1});
+  network.set_link(0, 1, {.buffer_bytes = 1});
+  int dropped = 0;
+  network.on_passed = [&](const Passed& p) { dropped += p.what == Passed::What::kDropped; };
   say("lost");
+  ASSERT_TRUE(answer("lost") && answer("waits"));
+  EXPECT_GT(router->queued_bytes(peer), 0u);
   network.break_connections(0, 1);
   network.advance(1.5);
   EXPECT_FALSE(router->receive());
+  EXPECT_EQ(router->queued_bytes(peer), 0u);
+  EXPECT_EQ(dropped, 3);
   say("after");
   network.advance(3);
   EXPECT_EQ(text(router->receive()), "after");
@@ -211,9 +218,12 @@ TEST_F(Faults, WhatIsDueIsSaidWhileTheOwnerTakesNoTurn) {
 }
 
 TEST_F(Faults, AConnectionEndsOnceItsOwnerHasEndedAndAllIsSent) {
+  network.set_link(1, 0, {.buffer_bytes = 1});
+  say("first");
   say("last");
   dealer.reset();
   network.advance(1.1);
+  EXPECT_EQ(text(router->receive()), "first");
   EXPECT_EQ(text(router->receive()), "last");
   EXPECT_FALSE(answer("too late"));
 }
