@@ -1,0 +1,228 @@
+// Scenes of simulated sessions: what the real services need of them, and that they are the same everywhere.
+#include <gtest/gtest.h>
+
+#include "common/geometry/mesh_chunk.h"
+#include "common/image/normal.h"
+#include "services/sampler/mesh/tiles.h"
+#include "tools/lab/simulation/scenes/surface.h"
+#include "tools/lab/simulation/scenes/surface_parts.h"
+
+namespace telesplat::simulation {
+namespace {
+
+constexpr int kWidth = 128, kHeight = 96;
+constexpr geometry::Rect kAll{0, 0, kWidth, kHeight};
+
+// Turned by few degrees about y, without a tangent of an angle.
+geometry::Camera camera_at(const glm::dvec3& position, double turn = 0) {
+  const double w = 1 / std::sqrt(1 + turn * turn);
+  return {.pose = {position, {w, 0, turn * w, 0}},
+          .left = -0.5,
+          .right = 0.5,
+          .bottom = -0.375,
+          .top = 0.375,
+          .width = kWidth,
+          .height = kHeight};
+}
+
+class Surfaces : public testing::TestWithParam<Surface> {
+ protected:
+  static geometry::ChunkBytes chunk(size_t id) { return {parts_of(GetParam()).bytes[id], nullptr}; }
+  static size_t chunks() { return parts_of(GetParam()).chunks.size(); }
+  std::unique_ptr<sampler::Sampler> full() const {
+    auto out = sample_surface(GetParam());
+    for (size_t id = 0; id < chunks(); ++id) EXPECT_TRUE(out->add_chunk({id}, chunk(id)));
+    return out;
+  }
+  const geometry::Camera camera = camera_at({0.05, 0.12, 1.0}, 0.02);
+};
+INSTANTIATE_TEST_SUITE_P(All, Surfaces, testing::Values(Surface::kSpheres, Surface::kTerrain, Surface::kFence));
+
+size_t covered(const image::DepthImage& image) {
+  return size_t(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; }));
+}
+
+TEST_P(Surfaces, ChunksValidateAndTheirBoxesAreThoseOfTheList) {
+  const SurfaceParts& surface = parts_of(GetParam());
+  EXPECT_GE(chunks(), 4u);
+  EXPECT_LE(chunks(), 12u);
+  for (const geometry::ChunkInfo& info : surface.chunks) {
+    const auto view = geometry::MeshChunkView::validate(surface.bytes[size_t(info.id.value)]);
+    ASSERT_TRUE(view) << view.error().text;
+    EXPECT_EQ(view->box_room, info.box_room);
+    EXPECT_EQ(view->triangles(), info.triangles);
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_GE(info.box_room.lo[axis], -0.401f);
+      EXPECT_LE(info.box_room.hi[axis], 0.401f);
+    }
+  }
+}
+
+TEST_P(Surfaces, TheDataServerTellsOfTheMeshAndHandsOutItsChunks) {
+  const auto served = serve_surface(GetParam());
+  EXPECT_EQ(served->kind(), scene::Kind::kMesh);
+  EXPECT_EQ(served->requests().endpoint, "chunks");
+  wire::Hello hello;
+  served->describe(hello);
+  EXPECT_EQ(hello.facts.at("primitives"), std::to_string(parts_of(GetParam()).triangles));
+  EXPECT_EQ(hello.facts.at("content_hash").size(), 16u);
+  EXPECT_EQ(hello.box_room, parts_of(GetParam()).box_room);
+  EXPECT_TRUE(served->notes().empty());
+  EXPECT_FALSE(served->busy());
+
+  net::Context context;
+  net::Socket requests(context, net::Kind::kRouter, "requests"), master(context, net::Kind::kDealer, "master"),
+      asker(context, net::Kind::kDealer, "asker");
+  const auto endpoint = requests.bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(endpoint && asker.connect(*endpoint));
+  const auto ask = [&](const auto& request, const auto& take) {
+    asker.send(request);
+    ASSERT_TRUE(net::wait_readable({&requests}, 20'000));
+    served->answer(*requests.receive(), {requests, master});
+    ASSERT_TRUE(net::wait_readable({&asker}, 20'000));
+    take(*asker.receive());
+  };
+  const SurfaceParts& surface = parts_of(GetParam());
+  ask(wire::ChunkListRequest{{3}, ""}, [&](const net::Message& m) {
+    const auto list = wire::decode<wire::ChunkList>(m.body);
+    ASSERT_TRUE(list);
+    EXPECT_EQ(list->chunks, surface.chunks);
+  });
+  ask(wire::ChunkRequest{{3}, {2}, ""}, [&](const net::Message& m) {
+    const auto chunk = wire::decode<wire::Chunk>(m.body);
+    ASSERT_TRUE(chunk);
+    EXPECT_TRUE(std::ranges::equal(chunk->data, surface.bytes[2]));
+  });
+}
+
+TEST_P(Surfaces, ImagesAreCanonicalAndFaceTheEye) {
+  const auto image = full()->sample(camera, kAll);
+  EXPECT_GT(covered(image), image.pixels() / 4);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const size_t at = size_t(y) * kWidth + size_t(x);
+      if (image.depth[at] == 0) {
+        EXPECT_EQ(image.colour[at], 0u);
+        EXPECT_EQ(image.normal[at], 0u);
+        continue;
+      }
+      EXPECT_EQ(image.normal[at], image::canonical_normal16(image.normal[at]));
+      const glm::dvec3 ray = camera.unproject(x + 0.5, y + 0.5, 1) - camera.pose.position_room;
+      EXPECT_LT(glm::dot(glm::dvec3(image::decode_normal16(image.normal[at])), ray), 0.03) << x << " " << y;
+    }
+}
+
+TEST_P(Surfaces, APixelDoesNotDependOnItsTileNorOnTheMask) {
+  const auto sampler = full();
+  const auto all = sampler->sample(camera, kAll);
+  for (const geometry::Rect& tile : {geometry::Rect{0, 0, 64, 48}, {64, 48, 64, 48}, {37, 21, 31, 17}}) {
+    image::PixelMask mask(tile.width, tile.height);
+    for (int y = 0; y < tile.height; ++y)
+      for (int x = (y * 7) % 5; x < tile.width; x += 5) mask.set(x, y);
+    const auto whole = sampler->sample(camera, tile), some = sampler->sample(camera, tile, &mask);
+    for (int y = 0; y < tile.height; ++y)
+      for (int x = 0; x < tile.width; ++x) {
+        const size_t at = size_t(y) * size_t(tile.width) + size_t(x),
+                     from = size_t(tile.y + y) * kWidth + size_t(tile.x + x);
+        ASSERT_EQ(whole.depth[at], all.depth[from]);
+        ASSERT_EQ(whole.colour[at], all.colour[from]);
+        ASSERT_EQ(whole.normal[at], all.normal[from]);
+        ASSERT_EQ(some.depth[at], mask.at(x, y) ? all.depth[from] : 0);
+      }
+  }
+}
+
+TEST_P(Surfaces, WhatAMissingChunkHoldsIsEmpty) {
+  const auto sampler = full();
+  const auto all = sampler->sample(camera, kAll);
+  size_t lost = 0;
+  for (size_t id = 0; id < chunks(); ++id) {
+    sampler->remove_chunk({id});
+    const auto without = sampler->sample(camera, kAll);
+    for (size_t i = 0; i < all.pixels(); ++i) {
+      ASSERT_TRUE(without.depth[i] == all.depth[i] || without.depth[i] == 0) << "what lies behind must not show";
+      lost += without.depth[i] != all.depth[i];
+    }
+    ASSERT_TRUE(sampler->add_chunk({id}, chunk((id + 1) % chunks())));
+    EXPECT_EQ(sampler->sample(camera, kAll), without) << "bytes of another chunk are not this one";
+    ASSERT_TRUE(sampler->add_chunk({id}, chunk(id)));
+  }
+  EXPECT_EQ(lost, covered(all)) << "each pixel belongs to one chunk";
+}
+
+TEST_P(Surfaces, RefusesDamagedChunks) {
+  auto bytes = parts_of(GetParam()).bytes[0];
+  bytes[0] = std::byte{0};
+  const auto sampler = sample_surface(GetParam());
+  EXPECT_FALSE(sampler->add_chunk({0}, {bytes, nullptr}));
+  EXPECT_EQ(covered(sampler->sample(camera, kAll)), 0u);
+}
+
+// A view that needs a hit's chunk must find it in the frustum.
+TEST_P(Surfaces, ChunksHoldTheHits) {
+  const auto image = full()->sample(camera, kAll);
+  for (size_t i = 0; i < image.pixels(); ++i) {
+    if (image.depth[i] == 0) continue;
+    const glm::vec3 p(camera.unproject(double(i % kWidth) + 0.5, double(i / kWidth) + 0.5,
+                                       image::decode_depth(image.depth[i], camera.near_m)));
+    const auto& all = parts_of(GetParam()).chunks;
+    EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const geometry::ChunkInfo& c) {
+      return glm::all(glm::greaterThan(p, c.box_room.lo - 1e-4f)) && glm::all(glm::lessThan(p, c.box_room.hi + 1e-4f));
+    }));
+  }
+}
+
+TEST_P(Surfaces, AClipShowsWhatLayBehindIt) {
+  const auto sampler = full();
+  const auto all = sampler->sample(camera, kAll);
+  geometry::Clip clip{{{{0, 0, -1}, 0.0}}};  // keeps z <= 0
+  sampler->set_clip(clip);
+  const auto cut = sampler->sample(camera, kAll);
+  size_t uncovered = 0;
+  for (size_t i = 0; i < all.pixels(); ++i) {
+    if (cut.depth[i] == 0) continue;
+    const glm::dvec3 p = camera.unproject(double(i % kWidth) + 0.5, double(i / kWidth) + 0.5,
+                                          image::decode_depth(cut.depth[i], camera.near_m));
+    EXPECT_LE(p.z, 1e-5);
+    uncovered += cut.depth[i] < all.depth[i];
+  }
+  EXPECT_GT(uncovered, 50u);
+  const auto truth = render_surface(GetParam(), camera, {{}, camera}, clip);
+  for (size_t i = 0; i < all.pixels(); ++i) EXPECT_EQ(cut.depth[i] == 0, std::isinf(truth.depth_m[i]));
+  sampler->set_clip({});
+  EXPECT_EQ(sampler->sample(camera, kAll), all);
+}
+
+TEST_P(Surfaces, TheTruthIsTheSampleShaded) {
+  const auto image = full()->sample(camera, kAll);
+  const image::Shading shading({}, camera);
+  const auto truth = render_surface(GetParam(), camera, shading);
+  for (size_t i = 0; i < image.pixels(); ++i) {
+    if (image.depth[i] == 0) {
+      ASSERT_EQ(truth.colour[i], shading.background());
+      ASSERT_TRUE(std::isinf(truth.depth_m[i]));
+      continue;
+    }
+    ASSERT_NEAR(image::decode_depth(image.depth[i], camera.near_m) / double(truth.depth_m[i]), 1, 1e-5);
+    const uint32_t shaded = image::Shading::apply(image.colour[i], shading.table()[image.normal[i]]);
+    for (const int shift : {0, 8, 16})
+      ASSERT_NEAR(int(shaded >> shift & 255), int(truth.colour[i] >> shift & 255), 6) << i;
+  }
+}
+
+TEST_P(Surfaces, BitsAreTheSameOnEveryMachine) {
+  uint64_t hash = 0xcbf29ce484222325;
+  const auto add = [&](uint64_t v) { hash = (hash ^ v) * 0x100000001b3; };
+  const auto sampler = full();
+  for (const double z : {0.6, 0.9, 1.3}) {
+    const auto view = camera_at({0.3 - 0.2 * z, 0.1 * z, z}, 0.1 * z - 0.08);
+    const auto image = sampler->sample(view, kAll);
+    for (size_t i = 0; i < image.pixels(); ++i) add(image.depth[i]), add(image.colour[i]), add(image.normal[i]);
+    for (const uint32_t c : render_surface(GetParam(), view, {{}, view}).colour) add(c);
+  }
+  constexpr uint64_t kExpected[] = {6059239088662779875u, 12420893594646991378u, 16416144061803486836u};
+  EXPECT_EQ(hash, kExpected[size_t(GetParam())]);
+}
+
+}  // namespace
+}  // namespace telesplat::simulation
