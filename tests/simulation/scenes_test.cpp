@@ -3,7 +3,13 @@
 
 #include "common/geometry/mesh_chunk.h"
 #include "common/image/normal.h"
-#include "services/sampler/mesh/tiles.h"
+#include "common/volume/session.h"
+#include "common/volume/shear.h"
+#include "common/volume/voxels.h"
+#include "services/sampler/julia/sampler.h"
+#include "services/sampler/volume/shear/splatter.h"
+#include "tests/support/simd_targets.h"
+#include "tools/lab/simulation/scenes/fields.h"
 #include "tools/lab/simulation/scenes/surface.h"
 #include "tools/lab/simulation/scenes/surface_parts.h"
 
@@ -25,7 +31,16 @@ geometry::Camera camera_at(const glm::dvec3& position, double turn = 0) {
           .height = kHeight};
 }
 
-class Surfaces : public testing::TestWithParam<Surface> {
+// FNV-1a.
+struct Digest {
+  uint64_t value = 0xcbf29ce484222325;
+  void add(uint64_t v) { value = (value ^ v) * 0x100000001b3; }
+  void add(const image::DepthImage& image) {
+    for (size_t i = 0; i < image.pixels(); ++i) add(image.depth[i]), add(image.colour[i]), add(image.normal[i]);
+  }
+};
+
+class Surfaces : public ::testing::TestWithParam<Surface> {
  protected:
   static geometry::ChunkBytes chunk(size_t id) { return {parts_of(GetParam()).bytes[id], nullptr}; }
   static size_t chunks() { return parts_of(GetParam()).chunks.size(); }
@@ -36,7 +51,7 @@ class Surfaces : public testing::TestWithParam<Surface> {
   }
   const geometry::Camera camera = camera_at({0.05, 0.12, 1.0}, 0.02);
 };
-INSTANTIATE_TEST_SUITE_P(All, Surfaces, testing::Values(Surface::kSpheres, Surface::kTerrain, Surface::kFence));
+INSTANTIATE_TEST_SUITE_P(All, Surfaces, ::testing::Values(Surface::kSpheres, Surface::kTerrain, Surface::kFence));
 
 size_t covered(const image::DepthImage& image) {
   return size_t(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; }));
@@ -211,17 +226,105 @@ TEST_P(Surfaces, TheTruthIsTheSampleShaded) {
 }
 
 TEST_P(Surfaces, BitsAreTheSameOnEveryMachine) {
-  uint64_t hash = 0xcbf29ce484222325;
-  const auto add = [&](uint64_t v) { hash = (hash ^ v) * 0x100000001b3; };
+  Digest digest;
   const auto sampler = full();
   for (const double z : {0.6, 0.9, 1.3}) {
     const auto view = camera_at({0.3 - 0.2 * z, 0.1 * z, z}, 0.1 * z - 0.08);
-    const auto image = sampler->sample(view, kAll);
-    for (size_t i = 0; i < image.pixels(); ++i) add(image.depth[i]), add(image.colour[i]), add(image.normal[i]);
-    for (const uint32_t c : render_surface(GetParam(), view, {{}, view}).colour) add(c);
+    digest.add(sampler->sample(view, kAll));
+    for (const uint32_t c : render_surface(GetParam(), view, {{}, view}).colour) digest.add(c);
   }
   constexpr uint64_t kExpected[] = {6059239088662779875u, 12420893594646991378u, 16416144061803486836u};
-  EXPECT_EQ(hash, kExpected[size_t(GetParam())]);
+  EXPECT_EQ(digest.value, kExpected[size_t(GetParam())]);
+}
+
+// What a session is told when this data server has said hello.
+wire::Welcome welcome_of(const data::Served& served) {
+  wire::Hello hello;
+  served.describe(hello);
+  wire::Welcome out;
+  out.master = {7};
+  out.epoch = {1};
+  out.facts = hello.facts;
+  out.facts["kind"] = std::string(scene::name_of(served.kind()));
+  out.parameters = hello.parameters;
+  out.box_room = hello.box_room;
+  return out;
+}
+
+TEST(JuliaSet, IsTheSameOnEveryTargetAndMachine) {
+  const auto served = serve_julia_set();
+  const wire::Welcome session = welcome_of(*served);
+  const auto parameters = julia::from_map(session.parameters);
+  const auto placement = julia::placement_from_map(session.parameters, session.box_room);
+  ASSERT_TRUE(parameters && placement);
+  const sampler::JuliaScene scene(*parameters, *placement);
+  for (const int64_t target : testing::simd_targets()) {
+    const testing::OnTarget on(target);
+    Digest digest;
+    size_t pixels = 0;
+    for (const double z : {0.6, 1.0, 1.6}) {
+      const auto image = sampler::JuliaSampler(1).sample(scene, camera_at({0.1 * z, 0.1, z}, 0.03), kAll, 1);
+      digest.add(image);
+      pixels += covered(image);
+    }
+    EXPECT_EQ(digest.value, 18053867813431576254u) << hwy::TargetName(target);
+    EXPECT_GT(pixels, 10000u);
+  }
+}
+
+TEST(BallVolume, AnswersInTheCallersTurnsAndIsTheSameOnEveryTargetAndMachine) {
+  const auto served = serve_ball_volume();
+  net::Context context;
+  net::Socket requests(context, net::Kind::kRouter, "requests"), session(context, net::Kind::kRouter, "session"),
+      master(context, net::Kind::kDealer, "master"), asker(context, net::Kind::kDealer, "asker");
+  const auto asked = requests.bind("tcp://127.0.0.1:*"), told = session.bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(asked && told && asker.connect(*asked) && master.connect(*told));
+  const data::Outlets outlets{requests, master};
+
+  served->begin({5});
+  EXPECT_FALSE(served->busy());
+  const wire::Welcome welcome = welcome_of(*served);
+  ASSERT_TRUE(served->follow(welcome));
+  ASSERT_TRUE(served->busy());
+  served->send_finished(outlets);
+  EXPECT_FALSE(served->busy());
+  ASSERT_TRUE(net::wait_readable({&session}, 20'000));
+  const auto weights_message = session.receive();
+  const auto weights = wire::decode<wire::SliceWeights>(weights_message->body);
+  ASSERT_TRUE(weights);
+  ASSERT_EQ(weights->voxels.size(), 32u);
+  EXPECT_GT(weights->voxels[16], 400u);
+
+  asker.send(wire::VoxelRequest{.epoch = {1}, .step = 0, .begin = 0, .end = 32});
+  ASSERT_TRUE(net::wait_readable({&requests}, 20'000));
+  served->answer(*requests.receive(), outlets);
+  ASSERT_TRUE(served->busy());
+  served->send_finished(outlets);
+  ASSERT_TRUE(net::wait_readable({&asker}, 20'000));
+  const auto answer = asker.receive();
+  const auto data = wire::decode<wire::VoxelData>(answer->body);
+  ASSERT_TRUE(data && data->known);
+  EXPECT_EQ(data->end, 32u);
+
+  const auto scene = volume::read_session(welcome.parameters, welcome.facts);
+  ASSERT_TRUE(scene);
+  const auto voxels = volume::decode_voxels({reinterpret_cast<const uint8_t*>(data->data.data()), data->data.size()},
+                                            32, 32, 0, 32, scene->levels.count);
+  ASSERT_TRUE(voxels);
+  const auto camera = camera_at({0.1, 0.1, 1.0}, 0.03);
+  const auto frame = volume::plan_frame(scene->grid, std::span(&camera, 1));
+  ASSERT_TRUE(frame);
+  const auto slab = sampler::make_shear_slabs(1)(scene->grid, *voxels);
+  for (const int64_t target : testing::simd_targets()) {
+    const testing::OnTarget on(target);
+    Digest digest;
+    uint64_t splatted = 0;
+    for (const auto& image :
+         slab->splat(volume::level_colours(scene->transfer, scene->levels), *frame, 0, 32, {}, splatted))
+      for (const uint32_t pixel : image.pixels) digest.add(pixel);
+    EXPECT_GT(splatted, 5000u);
+    EXPECT_EQ(digest.value, 4505414584431123979u) << hwy::TargetName(target);
+  }
 }
 
 }  // namespace

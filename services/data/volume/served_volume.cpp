@@ -14,13 +14,14 @@
 namespace telesplat::data {
 namespace {
 
-// The thread that works off requests, so that the serve loop keeps talking to the master meanwhile.
+// Works off requests, in a thread if it has one.
 class Worker {
  public:
-  Worker(VolumeAnswers& answers, InstanceId self)
-      : answers_(answers), self_(self), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+  Worker(VolumeAnswers& answers, InstanceId self, VolumeWorker who) : answers_(answers), self_(self) {
+    if (who == VolumeWorker::kThread) thread_.emplace([this](const std::stop_token& stop) { run(stop); });
+  }
   ~Worker() {
-    thread_.request_stop();
+    if (thread_) thread_->request_stop();
     wake_.notify_one();
   }
   /// There may be something to do.
@@ -32,9 +33,11 @@ class Worker {
     const std::lock_guard lock(mutex_);
     return working_ || !done_.empty() || answers_.has_work();
   }
-  /// Throws what ended the thread, if something did.
+  /// Throws what ended the thread, if something did. Without a thread it works off one request.
   std::vector<VolumeAnswers::Reply> take() {
     const std::lock_guard lock(mutex_);
+    if (!thread_)
+      if (auto reply = answers_.work(self_)) done_.push_back(std::move(*reply));
     if (failed_) std::rethrow_exception(std::exchange(failed_, nullptr));
     return std::exchange(done_, {});
   }
@@ -76,13 +79,13 @@ class Worker {
   bool working_ = false;
   std::exception_ptr failed_;
   std::vector<VolumeAnswers::Reply> done_;
-  std::jthread thread_;  // last: it uses the others
+  std::optional<std::jthread> thread_;  // last: it uses the others
 };
 
 class ServedVolume final : public Served {
  public:
-  ServedVolume(std::shared_ptr<VolumeStore> store, std::string title)
-      : store_(std::move(store)), title_(std::move(title)), answers_(*store_) {}
+  ServedVolume(std::shared_ptr<VolumeStore> store, std::string title, VolumeWorker who)
+      : store_(std::move(store)), title_(std::move(title)), who_(who), answers_(*store_) {}
 
   scene::Kind kind() const override { return scene::Kind::kVolume; }
   std::string title() const override { return title_; }
@@ -95,7 +98,7 @@ class ServedVolume final : public Served {
   // Few answers wait for a peer: they are large, and samplers ask for one at a time.
   Requests requests() const override { return {"voxels", 8}; }
 
-  void begin(InstanceId self) override { worker_.emplace(answers_, self); }
+  void begin(InstanceId self) override { worker_.emplace(answers_, self, who_); }
   Status follow(const wire::Welcome& session) override {
     const Status followed = answers_.follow(session);
     worker_->wake();
@@ -141,6 +144,7 @@ class ServedVolume final : public Served {
 
   const std::shared_ptr<VolumeStore> store_;
   const std::string title_;
+  const VolumeWorker who_;
   uint64_t asked_ = 0, bytes_ = 0, voxels_ = 0;
   VolumeAnswers answers_;
   std::optional<Worker> worker_;  // from begin() on; last: its thread uses the others
@@ -173,10 +177,10 @@ void ServedVolume::describe(wire::Hello& hello) const {
 
 }  // namespace
 
-std::unique_ptr<Served> serve_volume(std::shared_ptr<VolumeStore> store, const std::string& path) {
+std::unique_ptr<Served> serve_volume(std::shared_ptr<VolumeStore> store, const std::string& path, VolumeWorker worker) {
   std::filesystem::path file = std::filesystem::path(path).lexically_normal();
   if (!file.has_filename()) file = file.parent_path();  // a folder's name that ends in a slash
-  return std::make_unique<ServedVolume>(std::move(store), file.filename().string());
+  return std::make_unique<ServedVolume>(std::move(store), file.filename().string(), worker);
 }
 
 }  // namespace telesplat::data
