@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
@@ -90,6 +91,16 @@ Status read_keys(std::string_view part, std::string_view text, Track& track) {
   return ok_status();
 }
 
+// (1 - cos(pi x)) / 2 = sin(pi x / 2)^2 for x from 0 to 1, by the sine's Taylor polynomial: cos() has other last bits
+// on processors without FMA, and everybody must have the same scene.
+double smooth(double x) {
+  const double angle = 0.5 * glm::pi<double>() * std::min(x, 1 - x), square = angle * angle;
+  double sine = 1;
+  for (int n = 16; n > 0; n -= 2) sine = 1 - square / (n * (n + 1)) * sine;
+  const double low = angle * angle * sine * sine;
+  return x <= 0.5 ? low : 1 - low;
+}
+
 }  // namespace
 
 double Track::value(double t_s) const {
@@ -99,7 +110,7 @@ double Track::value(double t_s) const {
   while (next + 1 < keys.size() && keys[next].t_s <= t) ++next;
   const Key &a = keys[next - 1], &b = keys[next];
   const double part = (t - a.t_s) / (b.t_s - a.t_s);
-  return a.value + (b.value - a.value) * 0.5 * (1 - std::cos(glm::pi<double>() * part));
+  return a.value + (b.value - a.value) * smooth(part);
 }
 
 std::map<std::string, double> Timeline::values(double t_s) const {

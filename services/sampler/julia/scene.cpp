@@ -114,7 +114,7 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
 
   // The farthest pixel centre of a block from its middle; a little more, for rounding. What is in the ball lies no
   // deeper than `deepest`.
-  const double reach = (kJuliaBlock - 1) * 0.5 * std::hypot(pixel_x, pixel_y) * 1.001;
+  const double reach = (kJuliaBlock - 1) * 0.5 * std::sqrt(pixel_x * pixel_x + pixel_y * pixel_y) * 1.001;
   const double radius = scene.constants().radius * 1.01;  // so that estimates at its edge are safe from rounding
   const double deepest = (glm::length(orbit) / 2 + radius) / scene.units_per_metre();
   ball = static_cast<float>(2 * radius);
