@@ -7,7 +7,9 @@
 #include "common/volume/shear.h"
 #include "common/volume/voxels.h"
 #include "services/sampler/julia/sampler.h"
+#include "services/sampler/mesh/tiles.h"
 #include "services/sampler/volume/shear/splatter.h"
+#include "tests/support/patience.h"
 #include "tests/support/simd_targets.h"
 #include "tools/lab/simulation/scenes/fields.h"
 #include "tools/lab/simulation/scenes/surface.h"
@@ -53,6 +55,20 @@ class Surfaces : public ::testing::TestWithParam<Surface> {
 };
 INSTANTIATE_TEST_SUITE_P(All, Surfaces, ::testing::Values(Surface::kSpheres, Surface::kTerrain, Surface::kFence));
 
+// What a session is told when this data server has said hello.
+wire::Welcome welcome_of(const data::Served& served) {
+  wire::Hello hello;
+  served.describe(hello);
+  wire::Welcome out;
+  out.master = {7};
+  out.epoch = {1};
+  out.facts = hello.facts;
+  out.facts["kind"] = std::string(scene::name_of(served.kind()));
+  out.parameters = hello.parameters;
+  out.box_room = hello.box_room;
+  return out;
+}
+
 size_t covered(const image::DepthImage& image) {
   return size_t(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; }));
 }
@@ -73,7 +89,7 @@ TEST_P(Surfaces, ChunksValidateAndTheirBoxesAreThoseOfTheList) {
   }
 }
 
-TEST_P(Surfaces, TheDataServerTellsOfTheMeshAndHandsOutItsChunks) {
+TEST_P(Surfaces, TheDataServerTellsOfTheMesh) {
   const auto served = serve_surface(GetParam());
   EXPECT_EQ(served->kind(), scene::Kind::kMesh);
   EXPECT_EQ(served->requests().endpoint, "chunks");
@@ -84,30 +100,38 @@ TEST_P(Surfaces, TheDataServerTellsOfTheMeshAndHandsOutItsChunks) {
   EXPECT_EQ(hello.box_room, parts_of(GetParam()).box_room);
   EXPECT_TRUE(served->notes().empty());
   EXPECT_FALSE(served->busy());
+}
 
+// However little memory it has, a sampler has all chunks of a tile when it samples it.
+TEST_P(Surfaces, TilesFetchTheirChunksFromTheDataServer) {
   net::Context context;
-  net::Socket requests(context, net::Kind::kRouter, "requests"), master(context, net::Kind::kDealer, "master"),
-      asker(context, net::Kind::kDealer, "asker");
+  net::Socket requests(context, net::Kind::kRouter, "requests"), master(context, net::Kind::kDealer, "master");
+  net::MasterLink link(context, "inproc://nobody", {});
+  metrics::SpanRecorder spans;
   const auto endpoint = requests.bind("tcp://127.0.0.1:*");
-  ASSERT_TRUE(endpoint && asker.connect(*endpoint));
-  const auto ask = [&](const auto& request, const auto& take) {
-    asker.send(request);
-    ASSERT_TRUE(net::wait_readable({&requests}, 20'000));
-    served->answer(*requests.receive(), {requests, master});
-    ASSERT_TRUE(net::wait_readable({&asker}, 20'000));
-    take(*asker.receive());
-  };
-  const SurfaceParts& surface = parts_of(GetParam());
-  ask(wire::ChunkListRequest{{3}, ""}, [&](const net::Message& m) {
-    const auto list = wire::decode<wire::ChunkList>(m.body);
-    ASSERT_TRUE(list);
-    EXPECT_EQ(list->chunks, surface.chunks);
-  });
-  ask(wire::ChunkRequest{{3}, {2}, ""}, [&](const net::Message& m) {
-    const auto chunk = wire::decode<wire::Chunk>(m.body);
-    ASSERT_TRUE(chunk);
-    EXPECT_TRUE(std::ranges::equal(chunk->data, surface.bytes[2]));
-  });
+  ASSERT_TRUE(endpoint);
+  const auto served = serve_surface(GetParam());
+  wire::Welcome session = welcome_of(*served);
+  session.endpoints["chunks"] = *endpoint;
+  for (const uint64_t budget_bytes : {uint64_t{1} << 20, uint64_t{1}}) {
+    sampler::MeshTiles tiles(sample_surface(GetParam()), budget_bytes, "sampler", context, link, spans);
+    tiles.on_welcome(session);
+    for (const geometry::Rect& tile : {geometry::Rect{0, 0, 64, 48}, {64, 48, 64, 48}, {64, 0, 64, 48}}) {
+      sampler::HeldLease lease;
+      lease.lease.epoch = session.epoch, lease.lease.camera = camera, lease.lease.rect = tile;
+      const double until_s = monotonic_s() + test::patient(20);
+      while (tiles.readiness(lease, monotonic_s()).state != sampler::Readiness::State::kReady) {
+        ASSERT_LT(monotonic_s(), until_s);
+        tiles.fetch(&lease, monotonic_s());
+        std::vector<net::Socket*> sockets = tiles.sockets();
+        sockets.push_back(&requests);
+        net::wait_readable(sockets, 5);
+        while (const auto request = requests.receive()) served->answer(*request, {requests, master});
+        tiles.receive();
+      }
+      EXPECT_EQ(tiles.sample(lease).image, full()->sample(camera, tile));
+    }
+  }
 }
 
 TEST_P(Surfaces, ImagesAreCanonicalAndFaceTheEye) {
@@ -235,20 +259,6 @@ TEST_P(Surfaces, BitsAreTheSameOnEveryMachine) {
   }
   constexpr uint64_t kExpected[] = {6059239088662779875u, 12420893594646991378u, 16416144061803486836u};
   EXPECT_EQ(digest.value, kExpected[size_t(GetParam())]);
-}
-
-// What a session is told when this data server has said hello.
-wire::Welcome welcome_of(const data::Served& served) {
-  wire::Hello hello;
-  served.describe(hello);
-  wire::Welcome out;
-  out.master = {7};
-  out.epoch = {1};
-  out.facts = hello.facts;
-  out.facts["kind"] = std::string(scene::name_of(served.kind()));
-  out.parameters = hello.parameters;
-  out.box_room = hello.box_room;
-  return out;
 }
 
 TEST(JuliaSet, IsTheSameOnEveryTargetAndMachine) {
