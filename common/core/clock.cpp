@@ -45,6 +45,11 @@ double monotonic_s() {
   World* world = simulated_world();
   return world ? world->monotonic_s() : read_s(CLOCK_MONOTONIC);
 }
+double wall_clock_s() {
+  constexpr double kSimulatedBegin_s = 1.7e9;
+  if (World* world = simulated_world()) return kSimulatedBegin_s + world->monotonic_s();
+  return read_s(CLOCK_REALTIME);
+}
 void sleep_until(double t_s) {
   const double wait_s = t_s - monotonic_s();
   if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));

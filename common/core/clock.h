@@ -12,6 +12,9 @@ double monotonic_s();
 /// cannot be told here.
 const std::string& clock_id();
 
+/// Seconds since 1970 (UTC), by the system's clock, which people and NTP set.
+double wall_clock_s();
+
 /// Returns at once if monotonic_s() is t_s or later.
 void sleep_until(double t_s);
 

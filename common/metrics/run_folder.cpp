@@ -6,9 +6,9 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <random>
 
 #include "common/core/log.h"
+#include "common/core/machine.h"
 #include "common/core/whole_file.h"
 
 namespace telesplat::metrics {
@@ -156,8 +156,7 @@ Status set_aside(const std::string& directory, const Found& found) {
 }
 
 std::string new_id() {
-  std::random_device random;
-  return fmt::format("{:08x}{:08x}", random(), random());
+  return fmt::format("{:016x}", random_bits());
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "common/core/machine.h"
 #include "common/core/utf8.h"
 #include "common/net/service.h"
 
@@ -194,7 +195,7 @@ std::string local_address(const std::string& endpoint) {
 }
 
 std::string absolute_path(const std::string& path) {
-  if (path.empty()) return {};
+  if (path.empty() || simulated_world()) return path;
   std::error_code error;
   fs::path out = fs::weakly_canonical(fs::absolute(path, error), error);
   if (!out.has_filename()) out = out.parent_path();

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -50,8 +49,7 @@ net::RunningSession introduction(const MasterServiceOptions& o, const std::strin
           .scene = {},
           .kind = {},
           .run_folder = net::absolute_path(o.out),
-          .started_at_s =
-              std::floor(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),
+          .started_at_s = std::floor(wall_clock_s()),
           .started_by = o.started_by,
           .keys = net::absolute_path(o.service.keys)};
 }

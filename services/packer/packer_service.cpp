@@ -159,7 +159,9 @@ class PackerTurns final : public PackerService {
   // Until something is due that no message tells of.
   double longest_wait_s() const {
     const auto due_s = packing_ ? packing_->due_s() : std::nullopt;
-    return due_s ? std::clamp(*due_s - monotonic_s(), 0.001, kLongestWait_s) : kLongestWait_s;
+    if (!due_s) return kLongestWait_s;
+    // Whole milliseconds: a message ends the wait at any moment of those.
+    return std::ceil(std::clamp(*due_s - monotonic_s(), 0.001, kLongestWait_s) * 1e3) * 1e-3 + 1e-6;
   }
 
   // One piece of what can wait. False: there is none, or it waits.
