@@ -78,6 +78,8 @@ class Received {
   virtual void receive(int most) = 0;
   /// What is due by time alone. To be called every few milliseconds.
   virtual void tick(double now_s) = 0;
+  /// All parts of a view update of this viewer's are here. Only where the display waits for whole updates.
+  virtual void on_complete(RequestId) {}
   /// A view update of this viewer's is complete. Where the display waits for whole updates: and may be displayed from
   /// now on, since all before it may.
   virtual void on_update(const ShownUpdate&) {}

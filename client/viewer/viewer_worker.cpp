@@ -54,7 +54,7 @@ ViewerWorker::ViewerWorker(net::Context& context, const Options& options, Coupli
 }
 
 ViewerWorker::~ViewerWorker() {
-  stop_ = true;
+  stop();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -362,6 +362,7 @@ void ViewerWorker::on_part(const ViewPart& part) {
   }
   if (!gate_.waits()) return;
   complete_[u->request] = update;
+  received_->on_complete(u->request);
   gate_.with([&](Coupling& c) { release(c.completed(u->request, local_s)); });
 }
 

@@ -50,6 +50,10 @@ class ViewerWorker : public net::Turns {
   // ---- worker thread ----
   std::optional<net::Wait> turn() override;
 
+  // ---- any thread ----
+  /// The next turn is the last one.
+  void stop() { stop_ = true; }
+
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
   void on_pose(double now_s, const geometry::Camera& camera);

@@ -198,7 +198,7 @@ options::Table packing_table(wire::SessionSettings& s) {
            .fits = points},
           {.flag = "--packing.obsolete_after_s",
            .value = &s.obsolete_after_s,
-           .help = "forget clusters not seen for so long; 0: never",
+           .help = "forget clusters not seen for so long, at least 3 s; 0: never",
            .limits = options::Range{0.0, 1e12},
            .fits = points},
           {.flag = "--packing.redundancy",

@@ -129,11 +129,10 @@ void ReceivedPoints::report() {
     const std::lock_guard lock(mutex_);
     std::swap(seen_, reported_);
   }
-  auto reports = reported_.reports();
+  if (auto reports = reported_.reports(); !reports.empty()) on_display_ = std::move(reports);
   auto* state = links_.feeds.find("state");
   if (!state) return;
-  for (auto& part : reports)
-    state->send(wire::AccessReport{links_.viewer, std::move(part.clusters), std::move(part.frames)});
+  for (const auto& part : on_display_) state->send(wire::AccessReport{links_.viewer, part.clusters, part.frames});
 }
 
 void ReceivedPoints::add_status(net::MasterLink::Values& values) const {

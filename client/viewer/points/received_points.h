@@ -22,6 +22,7 @@ class ReceivedPoints final : public Received {
   void on_connected() override { receiver_.start(); }
   void receive(int most) override;
   void tick(double now_s) override;
+  void on_complete(RequestId request) override { batches_.complete(request); }
   void on_update(const ShownUpdate& update) override;
   void on_coupling(int buffers) override;
   void report() override;
@@ -68,6 +69,8 @@ class ReceivedPoints final : public Received {
   PointReceiver receiver_;
   points::ModelConfig config_;  // valid once the feeds are connected
   AccessLog reported_;          // takes turns with seen_
+  /// What was drawn last is on display, also while the display waits and draws nothing.
+  std::vector<AccessLog::Report> on_display_;
   Sequence receipted_;          // the newest event that the packer was told of, and when
   double receipt_s_ = -1e9;
   uint64_t receipt_bytes_ = 0;

@@ -40,9 +40,18 @@ void UpdateBatches::add(Change change, ModelCache& cache, InstanceId packer) {
   cache.show_newest();
 }
 
+void UpdateBatches::complete(RequestId request) {
+  const std::lock_guard lock(mutex_);
+  complete_[request] = first_ + changes_.size();
+}
+
 void UpdateBatches::close(const ShownUpdate& update) {
   const std::lock_guard lock(mutex_);
-  ends_.push_back({update, first_ + changes_.size()});
+  const auto found = complete_.find(update.request);
+  uint64_t until = found == complete_.end() ? first_ + changes_.size() : found->second;
+  if (!ends_.empty()) until = std::max(until, ends_.back().change);
+  complete_.erase(complete_.begin(), complete_.upper_bound(update.request));
+  ends_.push_back({update, until});
   newest_.replica = begun_;
 }
 

@@ -5,6 +5,7 @@
 
 #include <deque>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <variant>
@@ -44,7 +45,10 @@ class UpdateBatches {
   // ---- worker ----
   /// packer: whose event it is.
   void add(Change change, ModelCache& cache, InstanceId packer = {});
-  /// Everything added so far belongs to this update or to earlier ones.
+  /// The update of this request is complete with what was added so far. It may have to wait for earlier ones.
+  void complete(RequestId request);
+  /// It may be displayed from now on: to it, or to earlier ones, belongs what was added until it was complete, or so
+  /// far.
   void close(const ShownUpdate& update);
   /// The display waits for nothing any more: applies everything and shows the newest replica that a closed update is
   /// of; then it calls shown(). begun: told of each replica that begins after that, and whether an older one stays on
@@ -77,7 +81,8 @@ class UpdateBatches {
     uint64_t change = 0;  // number of the first that does not belong to it
   };
   std::deque<End> ends_;
-  uint64_t first_ = 0;  // number of changes_.front()
+  std::map<RequestId, uint64_t> complete_;  // complete(): End::change
+  uint64_t first_ = 0;                      // number of changes_.front()
   uint64_t points_ = 0;
   wire::ShownState newest_;   // of the newest change
   uint64_t begun_ = 0;        // ShownState::replica of the newest

@@ -24,6 +24,7 @@ namespace {
 constexpr uint32_t kMostRestNumber = points::kRestTag - 1;
 // Viewers whose rests are kept: those of one person and a few guests.
 constexpr size_t kMaxRests = 16;
+constexpr double kUnheard_s = 60;  // without a report of any viewer: what was drawn is out of date
 
 uint32_t rest_tag(uint32_t rest) { return static_cast<uint32_t>(points::tagged({}, 1, rest).value); }
 
@@ -93,6 +94,7 @@ struct PackerCore::Impl {
   FrameBook frames;
   Obsolescence obsolescence;             // of clusters, kEliminate
   PatchObsolescence patch_obsolescence;  // kKeep
+  std::optional<double> reported_s;      // when a viewer last told what it drew
   Statistics statistics;
   ModelWatcher* watcher = nullptr;
   std::vector<float> reference_depth_m;               // kept for its memory
@@ -447,6 +449,7 @@ void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double n
                           std::span<const uint32_t> frames) {
   CHECK(frames.empty() || frames.size() == clusters.size());
   Impl& i = *impl_;
+  i.reported_s = now_s;
   for (size_t n = 0; n < clusters.size(); ++n) {
     if (!i.keeps()) {
       if (i.obsolescence.knows(clusters[n])) i.obsolescence.accessed(clusters[n], now_s);
@@ -462,12 +465,14 @@ std::vector<Event> PackerCore::tick(double now_s) {
   Impl& i = *impl_;
   const Config& c = i.config;
   std::vector<Event> out;
+  // While no report gets through, what is drawn is not known.
+  const double known_s = i.reported_s ? std::max(*i.reported_s, now_s - kUnheard_s) : now_s;
   if (i.keeps()) {
     const PatchLimits limits{c.obsolete_after_s, c.patches_per_cluster, c.max_points};
-    i.forget_patches(i.patch_obsolescence.choose(limits, now_s), out);
+    i.forget_patches(i.patch_obsolescence.choose(limits, known_s), out);
     if (c.max_log_bytes > 0) i.forget_patches(i.patch_obsolescence.choose_events(i.model, i.log, c.max_log_bytes), out);
   } else {
-    i.forget(i.obsolescence.choose(i.model, now_s, c.obsolete_after_s, c.max_points), out);
+    i.forget(i.obsolescence.choose(i.model, known_s, c.obsolete_after_s, c.max_points), out);
     if (c.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.log, c.max_log_bytes), out);
   }
   return out;

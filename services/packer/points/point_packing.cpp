@@ -12,12 +12,16 @@
 namespace telesplat::packer {
 namespace {
 
+// Viewers tell once a second what they drew: what is forgotten sooner may be on display.
+constexpr double kLeastObsolete_s = 3;
+
 Config config_of(const wire::Welcome& session, const PointPacking::Options& options) {
   const bool keep = session.settings.keep_redundant;
   Config c;
   c.model = {session.box_room, int(session.octree_depth), !keep};
   c.redundancy = keep ? Redundancy::kKeep : Redundancy::kEliminate;
-  c.obsolete_after_s = session.settings.obsolete_after_s;
+  const double after_s = session.settings.obsolete_after_s;
+  c.obsolete_after_s = after_s > 0 ? std::max(after_s, kLeastObsolete_s) : 0;
   c.max_points = session.settings.max_points;
   c.max_log_bytes = options.max_log_bytes;
   c.threads = options.threads;

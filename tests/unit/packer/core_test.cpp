@@ -349,6 +349,7 @@ TEST(PackerCore, ClustersNobodyDrawsBecomeObsolete) {
   const std::vector<points::ClusterKey> drawn(all.begin(), all.begin() + static_cast<ptrdiff_t>(all.size() / 3));
   core.accessed(drawn, 103);
   core.accessed(std::vector<points::ClusterKey>{0x3fffffff}, 103);  // no such cluster
+  core.accessed({}, 105.5);  // a viewer reports
   const std::vector<Event> events = core.tick(105.5);
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].kind, Event::Kind::kForget);
@@ -356,9 +357,20 @@ TEST(PackerCore, ClustersNobodyDrawsBecomeObsolete) {
   EXPECT_EQ(events[0].clusters.size(), all.size() - drawn.size());
   EXPECT_EQ(keys_of(core.model()), drawn);
   EXPECT_EQ(core.statistics().clusters_forgotten, all.size() - drawn.size());
+  core.accessed({}, 108.1);
   EXPECT_EQ(core.tick(108.1).at(0).clusters, drawn);
   EXPECT_EQ(core.model().points(), 0u);
   EXPECT_TRUE(core.tick(1000).empty());
+}
+
+TEST(PackerCore, NothingBecomesObsoleteWhileNoReportComes) {
+  Config config = packer_config();
+  config.obsolete_after_s = 5;
+  PackerCore core(config, kEpoch);
+  submit_all(core, sampled_frame({1}, camera(), 64), 100);
+  core.accessed(keys_of(core.model()), 103);
+  EXPECT_TRUE(core.tick(150).empty()) << "viewers may draw all of it";
+  EXPECT_FALSE(core.tick(103 + 5 + 61).empty()) << "viewers are gone";
 }
 
 TEST(PackerCore, ZeroMeansNeverObsolete) {
@@ -422,8 +434,10 @@ TEST(PackerCore, LateJoinersGetOnlyWhatStillMatters) {
   for (const points::ClusterKey key : keys_of(core.model()))
     if (drawn.size() < 3 && !other.model().find(key)) drawn.push_back(key);
   core.accessed(drawn, 4);
+  core.accessed({}, 6);                // a viewer reports
   EXPECT_EQ(core.tick(6).size(), 1u);  // most of it goes; a few patches keep points
   const auto second = submit_all(core, sampled_frame({2}, camera(2), 64), 6);
+  core.accessed({}, 9.5);
   EXPECT_EQ(core.tick(9.5).at(0).clusters, drawn);  // and now these
 
   test::Replica late(config.model);

@@ -308,11 +308,13 @@ TEST(KeepMode, WhatIsDrawnStays) {
   }
   core.accessed(drawn, 4, frames);
   core.accessed(some, 4);
+  core.accessed({}, 8);  // a viewer reports
   core.tick(8);
   const points::PointModel& model = core.model();
   EXPECT_EQ(model.clusters().size(), drawn.size() + some.size());
   for (size_t i = 0; i < drawn.size(); ++i)
     for (const auto& m : model.find(drawn[i])->mosaics) EXPECT_EQ(m.frame_tag(), frames[i]);
+  core.accessed({}, 9.5);
   core.tick(9.5);
   EXPECT_EQ(model.points(), 0u);
   EXPECT_TRUE(core.events_since({0}).empty()) << "patches without points are left out";
