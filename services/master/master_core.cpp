@@ -485,7 +485,8 @@ bool MasterCore::begin_view(double now_s) {
 void MasterCore::dispatch(double now_s) {
   plan_->prepare(now_s);
   const bool early = plan_->begins_early(now_s) && samplers_here();
-  if (stop_ || (idle_.empty() && !early) || packer().empty()) return;
+  // Before that nothing tells which pipeline the session has: samplers may know it from another master.
+  if (stop_ || !scene_known_ || (idle_.empty() && !early) || packer().empty()) return;
   do plan_->give_leases(idle_, now_s);
   while ((!idle_.empty() || early) && begin_view(now_s));
   if (early) plan_->begin_extra(epoch_, now_s);

@@ -186,7 +186,20 @@ TEST_F(Master, TilesThatThePackerRefusesAreLeasedAgainAtOnce) {
   EXPECT_EQ(sent<wire::Lease>("s2").size(), 1u);
 }
 
+TEST_F(Master, NothingIsLeasedBeforeTheSceneIsKnown) {
+  core.on("p", hello("packer", "packer", 2), 0);
+  core.on("s1", hello("sampler", "sampler-1", 3), 0);
+  core.on("v", hello("viewer", "viewer-1", 5), 0);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  request(1);
+  EXPECT_TRUE(sent<wire::Lease>("s1").empty());
+  core.on("d", hello("data", "data", 1), 1);
+  core.tick(1.1);
+  EXPECT_EQ(sent<wire::Lease>("s1").size(), 1u);
+}
+
 TEST_F(Master, NothingIsLeasedWithoutAPacker) {
+  core.on("d", hello("data", "data", 1), 0);
   core.on("s1", hello("sampler", "sampler-1", 3), 0);
   core.on("v", hello("viewer", "viewer-1", 5), 0);
   core.on("s1", wire::LeaseRequest{}, 1);
