@@ -49,7 +49,9 @@ void ReceivedSlices::on(const wire::SliceFrame& f, double arrived_s, net::Socket
   acknowledge_left(state);  // before this one: packers see frames let go in their order
   // What is not put into a buffer has left it.
   const bool again = f.packer == packer_ && f.frame <= newest_;
-  if (again || f.viewer != links_.viewer || !grid_ ||
+  // A request may be repeated by a link, or by somebody else.
+  const bool overtaken = buffers_ == 0 && f.request.value > 0 && f.request < newest_request_;
+  if (again || overtaken || f.viewer != links_.viewer || !grid_ ||
       (buffers_ > 0 && !links_.gate.with([&](Coupling& c) { return c.is_open(f.request); })))
     return acknowledge(f.frame, state);
   auto frame = decode_frame(f, *grid_, images_);
@@ -61,6 +63,7 @@ void ReceivedSlices::on(const wire::SliceFrame& f, double arrived_s, net::Socket
   }
   packer_ = f.packer;
   newest_ = f.frame;
+  newest_request_ = std::max(newest_request_, f.request);
   if (epoch_.value != 0 && f.epoch != epoch_) links_.on_epoch();
   epoch_ = f.epoch;
   if (const auto requested_s = links_.requested_s(f.request)) frame->update.requested_s = *requested_s;

@@ -51,6 +51,7 @@ class ReceivedSlices final : public Received {
   std::vector<volume::SliceImage> images_;
   InstanceId packer_, master_;
   FrameId newest_, acknowledged_;
+  RequestId newest_request_;  // that a frame answered
   bool tell_buffers_ = false;  // to the packer
   EpochId epoch_;
   double introduced_s_ = -1e9, heard_s_ = -1e9;  // -1e9: nothing came yet
