@@ -323,7 +323,9 @@ TEST(Keys, PatchesAreForWatchersAlone) {
   EXPECT_FALSE(got.empty());
   ASSERT_TRUE(patches.refuses(2));
   patches.socket.send_frames({}, "patch", "points");
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  patches.socket.send_frames({}, "patch", "the last points");
+  ASSERT_TRUE(receive_until(
+      viewer.socket, [&] { return got.back().body.size() == std::string_view("the last points").size(); }, &got));
   EXPECT_FALSE(sampler.socket.receive());
   EXPECT_FALSE(nobody.socket.receive());
 }

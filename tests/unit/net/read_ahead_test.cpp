@@ -22,6 +22,7 @@ struct FakeSocket {
   std::deque<Message> given;
   std::vector<std::string> taken;
   std::atomic<bool> refuses{false};
+  std::atomic<int> looks{0};  // of the thread, for something to send or that is due
 
   ReadAhead::Ends ends() {
     return {.receive = [this]() -> std::optional<Message> {
@@ -42,7 +43,11 @@ struct FakeSocket {
                 [](int descriptor, int) {
                   pollfd item{descriptor, POLLIN, 0};
                   poll(&item, 1, 1);
-                }};
+                },
+            .due = [this]() -> std::optional<ReadAhead::Outgoing> {
+              ++looks;
+              return std::nullopt;
+            }};
   }
   void give(size_t bytes) {
     auto body = std::make_shared<std::vector<std::byte>>(bytes);
@@ -95,7 +100,7 @@ TEST(ReadAhead, StopsReadingWhenTooMuchWaits) {
     ReadAhead ahead(socket.ends(), limits);
     for (int i = 0; i < 10; ++i) socket.give(100);
     ASSERT_TRUE(eventually([&] { return socket.waiting() == 6; }));
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    ASSERT_TRUE(eventually([&, before = socket.looks.load()] { return socket.looks >= before + 2; }));
     EXPECT_EQ(socket.waiting(), 6u) << "the sender is held up";
     for (int i = 0; i < 10; ++i)
       ASSERT_TRUE(eventually([&] { return ahead.receive().has_value(); })) << "and goes on: " << i;

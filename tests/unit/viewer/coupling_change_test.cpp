@@ -108,17 +108,17 @@ TEST(ChangedCoupling, NeverHangsAndNeverRepeats) {
 }
 
 TEST(ChangedCoupling, ADisplayThatWaitsIsWokenAtOnce) {
-  CouplingGate gate(kSync);
-  const double begin_s = monotonic_s();
-  std::thread worker([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    gate.change(kAsync);
-  });
-  const auto taken = gate.take(60);
-  worker.join();
-  EXPECT_FALSE(taken.request);
-  EXPECT_EQ(taken.coupling, kAsync);
-  EXPECT_LT(monotonic_s() - begin_s, 30);
+  // The change comes before the display waits or, most often, after.
+  for (int i = 0; i < 100; ++i) {
+    CouplingGate gate(kSync);
+    const double begin_s = monotonic_s();
+    std::thread worker([&] { gate.change(kAsync); });
+    const auto taken = gate.take(60);
+    worker.join();
+    EXPECT_FALSE(taken.request);
+    EXPECT_EQ(taken.coupling, kAsync);
+    ASSERT_LT(monotonic_s() - begin_s, 30);
+  }
 }
 
 TEST(ChangedRequests, ArePacedByCreditsOrByTheirRate) {
