@@ -2,12 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <thread>
 
 #include "common/geometry/trajectory.h"
 #include "common/net/control.h"
@@ -250,7 +248,14 @@ TEST_F(WindowTest, APathIsRecordedPlayedAgainAndATrajectory) {
   display_->button(1, true);
   display_->move_pointer(window, 290, 150);
   display_->button(1, false);
-  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  // Half a second longer than the head needs to move.
+  EXPECT_TRUE(wait_until([&] {
+    const auto x = run.column("frames.csv", "px"), t = run.column("frames.csv", "t_s");
+    const size_t rows = std::min(x.size(), t.size());
+    size_t moved = 0;
+    while (moved < rows && std::abs(x[moved] - x[0]) < 0.1) ++moved;
+    return moved < rows && t[rows - 1] > t[moved] + 0.5;
+  }));
   display_->tap("c");
   std::string path;
   EXPECT_TRUE(wait_until([&] {
@@ -296,16 +301,15 @@ TEST_F(WindowTest, AMovieShowsWhatKeysHadChanged) {
   PipelineRun run({"--trajectory", "orbit", "--record-every", "1", "--size", "200x150"}, "", "view");
   const auto window = live_window(run.program());
   ASSERT_NE(window, 0u);
-  for (const char* key : {"3", "5", "8"}) {  // ellipse, fill off, unlit
-    display_->tap(key);
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  for (const auto& [key, column] : {std::pair{"3", "splat"}, {"5", "finish"}, {"8", "lit"}}) {
+    display_->tap(key);  // ellipse, fill off, unlit
+    EXPECT_TRUE(wait_until([&, column = column] {
+      const auto values = run.column("frames.csv", column);
+      return !values.empty() && values.front() != values.back();
+    })) << column;
   }
   display_->tap("q", "Control_L");
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
-  for (const char* column : {"splat", "finish", "lit"}) {
-    const auto values = run.column("frames.csv", column);
-    EXPECT_NE(values.front(), values.back()) << column;
-  }
   EXPECT_GT(expect_as_displayed(run, 15), 10u);
 }
 
