@@ -70,13 +70,5 @@ const Coupled kCoupled[] = {{"mesh", "sync"},     {"julia", "sync"},     {"volum
 INSTANTIATE_TEST_SUITE_P(Kinds, Couplings, ::testing::ValuesIn(kCoupled),
                          [](const auto& info) { return info.param.kind + "_" + info.param.coupling; });
 
-TEST(CouplingUsage, BuffersAreOfLooseCoupling) {
-  for (const auto& [coupling, buffers] : {std::pair{"loose", "0"}, {"loose", "9"}, {"tight", "3"}}) {
-    PipelineRun run({"--coupling", coupling, "--buffers", buffers});
-    EXPECT_EQ(run.program().wait(60), 2) << coupling << buffers;
-    EXPECT_TRUE(run.all_gone());
-  }
-}
-
 }  // namespace
 }  // namespace telesplat::test

@@ -190,29 +190,12 @@ TEST(Faults, AMasterKilledIsStartedAgainAndTheRecordGoesOn) {
   EXPECT_TRUE(run.all_gone());
 }
 
-TEST(Faults, TheRunEndsWithItsViewer) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  kill_process(run, "viewer-1");
-  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
-  EXPECT_TRUE(std::filesystem::exists(run.out() + "/summary.json"));
-  EXPECT_TRUE(run.all_gone());
-}
-
 TEST(Faults, ALauncherKilledTakesItsChildrenAlong) {
   PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   run.program().signal(SIGKILL);
   EXPECT_EQ(run.program().wait(), 128 + SIGKILL);
   EXPECT_TRUE(run.all_gone(30));
-}
-
-TEST(Faults, StopEndsTheRun) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  EXPECT_EQ(run.stop(), 0) << run.program().err();
-  EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
-  EXPECT_TRUE(run.all_gone());
 }
 
 }  // namespace

@@ -138,16 +138,6 @@ TEST(Interrupted, ARunWithAnEndSaysSoAndIsComplete) {
   EXPECT_TRUE(has(run.out() + "/images/frame-000000.png"));
 }
 
-TEST(Interrupted, ARunWithoutAnEndIsDone) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  run.program().signal(SIGINT);
-  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
-  EXPECT_TRUE(run.all_gone());
-  EXPECT_EQ(run.program().err().find("interrupted"), std::string::npos) << run.program().err();
-  EXPECT_GT(run.summary()["frames"], 0);
-}
-
 TEST(Interrupted, BeforeTheFirstFrameThereAreNoResults) {
   // The first view takes long.
   PipelineRun run({"--duration", "60", "--size", "4096x4096", "--sampling-size", "4096x4096"});

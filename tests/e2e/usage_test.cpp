@@ -44,77 +44,19 @@ const Case kCases[] = {
     {"WrongFlag",
      {"telesplat", "run", "MESH", "--durationn", "3"},
      "telesplat: --durationn: no such flag of telesplat run; did you mean --duration?"},
-    {"WrongFlagWithValue",
-     {"telesplat", "run", "MESH", "--samplrs=2"},
-     "telesplat: --samplrs: no such flag of telesplat run; did you mean --samplers?"},
-    {"WrongFlagLikeNone",
-     {"telesplat", "run", "MESH", "--elephant"},
-     "telesplat: --elephant: no such flag of telesplat run"},
     {"WrongFlagOfAService",
      {"telesplat-viewer", "--sise", "3x3"},
      "telesplat-viewer: --sise: no such flag of telesplat-viewer; did you mean --size?"},
-    {"WrongCommand", {"telesplat", "rnu", "MESH"}, "telesplat: rnu: no such command of telesplat; did you mean run?"},
     {"WrongOrder",
      {"telesplat", "ctl", "stauts"},
      "telesplat: stauts: no such command of telesplat ctl; did you mean status?"},
-    {"NotANumber",
-     {"telesplat", "run", "MESH", "--samplers", "two"},
-     "telesplat: --samplers two: is not a whole number"},
     {"TooMany", {"telesplat", "run", "MESH", "--samplers", "99"}, "telesplat: --samplers 99: is not between 1 and 64"},
-    {"WrongName",
-     {"telesplat", "run", "MESH", "--splat", "dsc"},
-     "telesplat: --splat dsc: is not one of square, disc, ellipse, ewa; did you mean disc?"},
-    {"NegativeFrames",
-     {"telesplat", "run", "MESH", "--frames", "-1"},
-     "telesplat: --frames -1: is not a whole number of 0 or more"},
-    {"NegativePictures",
-     {"telesplat", "run", "MESH", "--record-every", "-1"},
-     "telesplat: --record-every -1: is not a whole number of 0 or more"},
-    {"NegativeVerify",
-     {"telesplat", "run", "MESH", "--verify", "-1"},
-     "telesplat: --verify -1: is not a whole number of 0 or more"},
-    {"NegativePoints",
-     {"telesplat", "run", "MESH", "--record-points", "-1"},
-     "telesplat: --record-points -1: is not between 0 and 1048576"},
-    {"HugeFrames",
-     {"telesplat", "run", "MESH", "--frames", "99999999999999999999"},
-     "telesplat: --frames 99999999999999999999: is too large or too small a number"},
-    {"DurationIsNoNumber",
-     {"telesplat", "run", "MESH", "--duration", "nan"},
-     "telesplat: --duration nan: is not between 0 and 1000000"},
-    {"DurationIsInfinite",
-     {"telesplat", "run", "MESH", "--duration", "inf"},
-     "telesplat: --duration inf: is not between 0 and 1000000"},
-    {"FovIsNoNumber", {"telesplat", "run", "MESH", "--fov", "nan"}, "telesplat: --fov nan: is not between 1 and 170"},
-    {"HoldIsNoNumber",
-     {"telesplat", "run", "MESH", "--hold", "nan"},
-     "telesplat: --hold nan: is not between 0 and 1000000"},
-    {"NearIsNoNumber",
-     {"telesplat", "run", "MESH", "--near", "nan"},
-     "telesplat: --near nan: is not between 0.00001 and 1000"},
-    {"RateIsNoNumber",
-     {"telesplat", "run", "MESH", "--target-fps", "nan"},
-     "telesplat: --target-fps nan: is not between 0 and 1000"},
-    {"IsoIsNoNumber", {"telesplat", "run", "MESH", "--iso", "nan"}, "telesplat: --iso nan: is not a finite number"},
-    {"ViewersFov", {"telesplat-viewer", "--fov", "nan"}, "telesplat-viewer: --fov nan: is not between 1 and 170"},
-    {"ViewersClock",
-     {"telesplat-viewer", "--clock-from", "nan"},
-     "telesplat-viewer: --clock-from nan: is not a finite number"},
     {"MastersRate",
      {"telesplat-master", "--max-rate", "nan"},
      "telesplat-master: --max-rate nan: is not between 0 and 1000000"},
-    {"MastersLimit",
-     {"telesplat-master", "--packing.max_points", "nan"},
-     "telesplat-master: --packing.max_points nan: is not between 0 and 1000000000000"},
     {"SamplersCost",
      {"telesplat-sampler", "--cost-scale", "inf"},
      "telesplat-sampler: --cost-scale inf: is not between 0 and 1000000"},
-    {"NoAddress",
-     {"telesplat", "run", "--master", "foo"},
-     "telesplat: --master foo: is no address such as tcp://127.0.0.1:7700"},
-    {"ViewersMaster",
-     {"telesplat-viewer", "--master", "foo"},
-     "telesplat: --master foo: is no address such as tcp://127.0.0.1:7700"},
     {"OrdersMaster",
      {"telesplat", "ctl", "status", "--master", "foo"},
      "telesplat: --master foo: is no address such as tcp://127.0.0.1:7700"},
@@ -138,25 +80,6 @@ TEST(UsageOfHelp, HelpNamesACommandOrOneOfItsOwn) {
   EXPECT_EQ(said({"help", "ctl", "clip"}), said({"ctl", "clip", "--help"}));
   EXPECT_NE(said({"--help"}).find("telesplat help COMMAND"), std::string::npos) << "it is told";
   EXPECT_EQ(said({"help", "rnu"}, 2), "telesplat: rnu: no such command of telesplat; did you mean run?\n");
-}
-
-// What a scene file says is refused with its line.
-TEST(UsageOfSceneFiles, NamesFileAndLine) {
-  TemporaryFolder folder;
-  write_terrain(folder / "terrain.ply", 4);
-  const std::string scene = folder / "scene.toml";
-  const auto said = [&](const std::string& line) {
-    std::ofstream(scene) << "[scene]\nfile = \"terrain.ply\"\n" << line << "\n";
-    Program program("telesplat", {"run", scene, "--out", folder / "out", "--no-cache"}, folder / "program");
-    EXPECT_EQ(program.wait(30), 2) << line;
-    return program.err();
-  };
-  EXPECT_EQ(said("sise = \"100x100\""),
-            "telesplat: " + scene + ":3: key sise is none: there is no flag --sise; did you mean size?\n");
-  EXPECT_EQ(said("duration = nan"), "telesplat: " + scene + ":3: --duration nan: is not between 0 and 1000000\n");
-  EXPECT_EQ(said("frames = -1"), "telesplat: " + scene + ":3: --frames -1: is not a whole number of 0 or more\n");
-  EXPECT_EQ(said("fov = inf"), "telesplat: " + scene + ":3: --fov inf: is not between 1 and 170\n");
-  EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
 // A viewer without windows and headsets names the program that has them, and what builds it.

@@ -106,6 +106,7 @@ TEST(Viewers, TheDeathOfTheLastEndsItsRunWithOne) {
   ::kill(process(run.status(), "viewer-1")["pid"].get<pid_t>(), SIGKILL);
   EXPECT_EQ(run.program().wait(60), 1);
   EXPECT_NE(run.program().err().find("viewer-1 ended with code 137"), std::string::npos) << run.program().err();
+  EXPECT_TRUE(run.summary().is_object());
   EXPECT_TRUE(run.all_gone());
 }
 

