@@ -2,6 +2,7 @@
 #include "common/net/service.h"
 #include "services/data/base/cut_off.h"
 #include "tools/lab/commands.h"
+#include "tools/lab/simulation/command.h"
 
 int main(int argc, char** argv) {
   using namespace telesplat;
@@ -9,6 +10,6 @@ int main(int argc, char** argv) {
     data::end_at_cut_off_files(2);
     return launcher::run_commands("telesplat-lab",
                                   "telesplat-lab: measures parts of Telesplat, and plays recorded heads to it",
-                                  {lab::scaling_command(), lab::pose_replay_command()}, {argv + 1, argv + argc});
+                                  {lab::scaling_command(), lab::pose_replay_command(), simulation::simulate_command()}, {argv + 1, argv + argc});
   });
 }

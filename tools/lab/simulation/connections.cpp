@@ -163,7 +163,7 @@ void NetworkState::push_out(End& e) {
     Parcel p = e.out.pop();
     p.ticket.reset();
     way.bytes += p.bytes();
-    way.free_s = std::max(now_s, way.free_s) + (over.bytes_s > 0 ? double(p.bytes()) / over.bytes_s : 0);
+    way.free_s = std::max({now_s, p.sent_s, way.free_s}) + (over.bytes_s > 0 ? double(p.bytes()) / over.bytes_s : 0);
     way.last_s = std::max(way.last_s, way.free_s + over.latency_s + over.jitter_s * draw());
     way.flying.push_back(std::move(p));
     on_wire(wire, side, way.last_s, [this, wire, side] { arrive(*wire, side); });

@@ -87,6 +87,12 @@ class SimulatedNetwork {
   std::function<void(const Passed&)> on_passed;
   /// A socket of the process has become readable. It may be called more often.
   std::function<void(int process)> on_ready;
+  /// For how long the process whose turn it is has worked since now_s(), in s: what it sends leaves so much later.
+  /// Empty: not at all.
+  std::function<double()> ahead_s;
+  /// A process refuses a message that came.
+  std::function<void(int process, std::string_view socket, const net::Message& message, const std::string& why)>
+      on_rejected;
   /// Messages that sockets took to be sent.
   uint64_t messages() const;
 

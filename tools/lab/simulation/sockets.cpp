@@ -37,7 +37,7 @@ Parcel NetworkState::made(SimulatedSocket& s, std::string_view type, std::string
   Parcel out{.from = s.self,
              .type = std::string(type),
              .body = std::make_shared<const std::string>(std::move(body)),
-             .sent_s = now_s};
+             .sent_s = now_s + (owner.ahead_s ? owner.ahead_s() : 0)};
   ++messages;
   passed(Passed::What::kSent, out, -1);
   return out;
@@ -191,6 +191,7 @@ std::optional<net::Message> NetworkState::take(SimulatedSocket& s) {
 
 void NetworkState::reject(SimulatedSocket& s, const net::Message& message, const std::string& why) {
   ++s.rejected;
+  if (owner.on_rejected) owner.on_rejected(s.self->process, s.self->name, message, why);
   if (s.limiter.allow(now_s)) log::warn("{}: dropped message '{}': {}", s.self->name, message.type, why);
 }
 

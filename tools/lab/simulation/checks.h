@@ -1,0 +1,127 @@
+// What must hold in every session, looked at all the time: by what passes over the network, by what viewers display and
+// by what processes report. A check that fails ends the session.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/lab/simulation/session.h"
+
+namespace telesplat::simulation {
+
+/// The names of the checks, as failures tell them.
+inline constexpr std::string_view kCheckNames[] = {
+    "replica",    // a replica is not the packer's model by its digest
+    "behind",     // a viewer does not have all that was published though its network has been quiet
+    "request",    // a view request does not end in time
+    "twice",      // a tile or an update is published twice
+    "lease",      // a lease is lost, or outlives its master
+    "backwards",  // a display goes back to an older update or epoch
+    "blank",      // a display has no picture though it had one
+    "limit",      // a model, a log or a queue is larger than its limit
+    "standing",   // a standing head sees holes or errors, or its rays go on
+    "order",      // an order gets no answer
+    "rejected",   // a process rejects a message that none of ours may send
+    "exit",       // a process ends that nothing told to end
+    "record",     // an update is not in the record once
+};
+
+struct Failure {
+  std::string check, text;
+  double at_s = 0;
+};
+
+/// What a session came to, the same for the same scenario.
+struct Figures {
+  uint64_t digest = 0;  ///< of all messages that were delivered, with their times
+  uint64_t messages = 0, frames = 0, updates = 0, turns = 0;
+  uint64_t rays = 0, bytes = 0, points = 0;  ///< cast; sent to viewers; of the packer's model at the end
+  double holes = 0, psnr_db = 0;             ///< of the last frame of viewer 0, against the truth; -1: not known
+};
+struct Outcome : Figures {
+  std::optional<Failure> failure;
+};
+
+/// A picture beside the truth, whose sides are kFine times as long.
+inline constexpr int kFine = 4;
+struct Compared {
+  double holes = 0, wrong = 0, psnr_db = 0;
+  uint64_t whole = 0;
+};
+Compared compare(const image::View& view, const image::View& truth);
+
+class Checks final : public Observer {
+ public:
+  explicit Checks(const Scenario& scenario);
+
+  void on_passed(const Passed& message) override;
+  void on_event(const Event& event) override;
+  void on_begin(Part part, int process, double now_s) override;
+  void on_end(Part part, int process, double now_s, const std::string& how) override;
+  void on_frame(Part part, SimulatedViewer& viewer, const viewer::DrawnFrame& drawn, double now_s) override;
+  void on_rejected(Part part, std::string_view socket, const net::Message& message, const std::string& why) override;
+  void on_unexpected(Part part, const std::string& what, double now_s) override;
+
+  /// To be called at the end of the calm, before the session ends.
+  void at_rest(Session& session);
+  /// To be called when the session has ended. folder: of its record; empty: none.
+  void at_end(const std::string& folder, double now_s);
+  Outcome& outcome() { return outcome_; }
+  /// Is called with the first failure.
+  std::function<void()> on_failure;
+
+ private:
+  struct Viewer {  // a life of one
+    int process = -1;
+    InstanceId instance;
+    std::map<uint64_t, double> open;     // requests, when they were sent
+    std::optional<double> open_since_s;  // some request has been open since then, and none was answered
+    uint64_t shown = 0, epoch = 0;       // request of the newest update that was shown
+    bool pictured = false, another_master = false;
+    std::map<std::string, double> status;
+    double digests_equal_at_calm = -1;
+  };
+  struct Asked {
+    double at_s = 0;
+    std::string text;
+  };
+  void fail(std::string_view check, const std::string& text, double now_s);
+  void digest(const Passed& m);
+  void sent(const Passed& m);
+  void delivered(const Passed& m);
+  void on_patch(const Passed& m, Part from);
+  void on_updates(const wire::MetricRows& rows, Part part);
+  void note_sequence(uint64_t sequence, double now_s);
+  void on_lease(const wire::Lease& lease);
+  void on_done(const wire::TileDone& done, double now_s);
+  void on_status(const Passed& m, Part part);
+  void answered(int process, InstanceId viewer, RequestId request, double now_s);
+  void look_at_requests(double now_s);
+  void compare_pictures(Session& session);
+  bool disturbed(double from_s, double until_s) const;
+  Viewer* viewer_of(int process);
+
+  const Scenario scenario_;
+  Outcome outcome_;
+  std::map<int, Part> parts_;                                 // by process
+  std::map<int, Viewer> viewers_;                             // by process
+  std::map<std::pair<uint64_t, uint64_t>, int> published_;    // frame and tile, of this packer and master
+  std::map<uint64_t, std::pair<uint64_t, uint64_t>> leases_;  // lease: frame and tile, of this master
+  std::set<std::pair<uint64_t, uint64_t>> updates_;           // rows of updates that viewers sent
+  std::map<int, Asked> orders_;                               // by process of who asked
+  std::map<std::string, double> packer_;                      // its newest status
+  double looked_s_ = 0, last_rays_s_ = 0, now_s_ = 0;
+  std::deque<std::pair<double, uint64_t>> sequences_;  // that the packer had, and when
+  uint64_t rows_ = 0;                                  // of updates, that came to the master
+  bool strangers_ = false, rests_ = false, packer_welcomed_ = false;
+  std::string clip_;  // in force
+};
+
+}  // namespace telesplat::simulation

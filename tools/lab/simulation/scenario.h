@@ -1,0 +1,103 @@
+// What a simulated session is: who takes part, over which links, what they look at, and what goes wrong when. All of it
+// is drawn from one seed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/viewer/coupling/coupling.h"
+#include "common/geometry/trajectory.h"
+#include "common/wire/session_messages.h"
+#include "tools/lab/simulation/network.h"
+
+namespace telesplat::simulation {
+
+enum class Role : uint8_t { kMaster, kData, kPacker, kSampler, kViewer };
+inline constexpr std::string_view kRoleNames[] = {"master", "data", "packer", "sampler", "viewer"};
+
+enum class Show : uint8_t { kSpheres, kTerrain, kBars, kJulia, kBall, kMesh };
+inline constexpr std::string_view kShowNames[] = {"spheres", "terrain", "bars", "julia", "ball", "mesh"};
+
+/// What goes wrong, or what people do.
+enum class Fault : uint8_t {
+  kKill,           ///< SIGKILL; the launcher starts it again after `amount` s
+  kTerminate,      ///< SIGTERM; likewise
+  kStop,           ///< SIGSTOP, SIGCONT after `amount` s
+  kBreak,          ///< resets connections between `a` and `b`
+  kSilence,        ///< nothing passes between `a` and `b` for `amount` s
+  kIsolate,        ///< nothing passes between `a` and anybody for `amount` s
+  kClockStep,      ///< its clock jumps `amount` s forward, as after a virtual machine was moved
+  kSlowLink,       ///< `amount` bytes a second to `a`, until the calm
+  kSlowWork,       ///< a tile takes `a` this many times as long, until the calm
+  kKillAtMessage,  ///< SIGKILL just before it sends its `amount`-th message from now on
+  kDiskFull,       ///< files cannot grow for `amount` s
+  kEpoch,          ///< an order: `telesplat ctl epoch`
+  kClip,           ///< an order: a clip that cuts part of it away, or none (amount 0)
+  kCoupling,       ///< an order: async, sync or loose (amount 0, 1, 2 and more: buffers)
+  kStatus,         ///< an order: `telesplat ctl status`
+  kLeave,          ///< viewer or sampler leaves for good
+  kJoin,           ///< one more of role `a`
+  kStranger,       ///< a peer without a part sends valid messages of any kind to `a`, `amount` of them
+  kImpostor,       ///< a peer says hello as role `b` under a name that is in use, and falls silent
+};
+inline constexpr std::string_view kFaultNames[] = {
+    "kill", "terminate", "stop", "break",    "silence", "isolate", "clock-step", "slow-link", "slow-work", "kill-at",
+    "full", "epoch",     "clip", "coupling", "status",  "leave",   "join",       "stranger",  "impostor"};
+
+/// An order that a person gives.
+inline bool is_order(Fault f) {
+  return f == Fault::kEpoch || f == Fault::kClip || f == Fault::kCoupling || f == Fault::kStatus;
+}
+
+/// A part of a session: a role, and which one of it, from 0.
+struct Part {
+  Role role = Role::kMaster;
+  int number = 0;
+  auto operator<=>(const Part&) const = default;
+};
+std::string text_of(Part part);
+
+struct Event {
+  double at_s = 0;
+  Fault fault = Fault::kKill;
+  Part a, b;
+  double amount = 0;
+};
+/// "12.345 kill sampler-1 0.5".
+std::string text_of(const Event& event);
+
+/// Where a head is: it goes from place to place around the scene, and rests at the last one from `until_s` on.
+geometry::Trajectory draw_head(uint64_t seed, double until_s);
+
+struct Scenario {
+  uint64_t seed = 0;
+  double duration_s = 16;  ///< in its last calm_s nothing goes wrong, and heads stand still
+  double calm_s = 6;
+  Show show = Show::kSpheres;
+  std::string file;                         ///< of Show::kMesh
+  std::vector<geometry::Trajectory> heads;  ///< of the first viewers; those of others are drawn
+  int samplers = 2, viewers = 1;
+  int width = 48, height = 36;  ///< of a display, pixels
+  double display_hz = 20;
+  viewer::CouplingState coupling;
+  wire::SessionSettings settings;
+  int tile_size = 32;
+  double tile_s = 0.004;      ///< a tile of tile_size² pixels takes a sampler
+  double log_limit_mb = 512;  ///< of the packer
+  bool one_machine = true;    ///< with one clock; else each process has its own
+  bool keys = false;
+  bool records = false;  ///< in a folder
+  LinkOptions links, to_viewers;
+  std::vector<Event> events;  ///< in order of time
+};
+
+/// The scenario of a seed.
+Scenario draw_scenario(uint64_t seed);
+/// The same, of a session of `hours` with one viewer and two samplers.
+Scenario draw_long(uint64_t seed, double hours);
+/// One line a fact, for people.
+std::string text_of(const Scenario& scenario);
+
+}  // namespace telesplat::simulation
