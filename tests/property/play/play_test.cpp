@@ -33,14 +33,6 @@ TEST(Play, TheMasterServesTheHonestWhateverOthersSay) {
       play_master, 100,
       {"welcome", "lease", "plan_request", "control_reply", "order", "swap", "slab_assignment", "frames completed"});
 }
-TEST(Play, ReplicasOfPointsEqualTheirPackersModel) {
-  expect_no_complaint(play_points, 30,
-                      {"patch", "forget", "refine", "epoch_begin", "gaps", "models with points", "plans with tiles"});
-}
-TEST(Play, FramesOfVolumesReachTheHonest) {
-  expect_no_complaint(play_slices, 100,
-                      {"frames sent", "volume_frames_complete", "slabs_refused", "volume_frames_dropped"});
-}
 TEST(Play, AViewerFollowsAnHonestPackerWhateverCameBefore) {
   expect_no_complaint(play_receiver, 100, {"points", "gaps", "epochs shown", "decode errors", "patches refined"});
 }

@@ -24,14 +24,6 @@ using Play = Complaint (*)(std::span<const uint8_t> bytes, Reached* reached);
 /// have gone, a session of honest processes gets its view.
 Complaint play_master(std::span<const uint8_t> bytes, Reached* reached = nullptr);
 
-/// Tiles, state requests, reports and sessions at the packer of a point model, whose events go to viewers over links
-/// that lose and delay. In the end the links are kind: every viewer's replica has the packer's digest.
-Complaint play_points(std::span<const uint8_t> bytes, Reached* reached = nullptr);
-
-/// Slabs, acknowledgements and sessions at the packer of a volume. No viewer gets more frames than it has buffers, none
-/// out of order; in the end an honest viewer gets an honest frame.
-Complaint play_slices(std::span<const uint8_t> bytes, Reached* reached = nullptr);
-
 /// Events of several packers at a viewer, out of order, doubled, lost and made up. In the end one packer is there, and
 /// the replica has its digest.
 Complaint play_receiver(std::span<const uint8_t> bytes, Reached* reached = nullptr);

@@ -1,6 +1,0 @@
-// What happens to the packer of a point model and its viewers.
-#include "tests/fuzz/play/play_fuzz.h"
-
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  return telesplat::test::play_or_abort(telesplat::test::play_points, data, size);
-}
