@@ -29,7 +29,7 @@ class Context {
   /// access: the proxies that connections over TCP go through, and the keys by which its sockets know others and are
   /// known; without keys nothing is encrypted.
   explicit Context(Access access = {});
-  /// Of a network that is simulated.
+  /// Makes sockets of a network that is simulated.
   explicit Context(std::unique_ptr<Network> network);
   ~Context();
   Network& network() { return *network_; }

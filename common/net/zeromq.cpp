@@ -139,7 +139,7 @@ struct Parts {
     if (tunnel) home.retire(*tunnel);
   }
 
-  // Of what is read; what claims more ends its connection.
+  // Limits what is read; a frame that claims more ends its connection.
   int64_t most_frame_bytes() const {
     return kind == Kind::kPub ? kSubscriptionBytes : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes;
   }
@@ -168,7 +168,7 @@ struct Parts {
                 endpoint);
   }
 
-  // Of a socket that connects: why it is not let in.
+  // Events that tell a socket that connects why it is not let in.
   static constexpr int kHandshakeFailed =
       ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
@@ -178,7 +178,7 @@ struct Parts {
       broken_off = 0;
     } else if (what & kHandshakeFailed) {
       ++failed_unseen;
-      if (tunnel && tunnel->failed() != tunnel_failed)  // nobody is there, at the tunnel's other end
+      if (tunnel && tunnel->failed() != tunnel_failed)  // no process listens at the tunnel's other end
         ++tunnel_failed, ++failed_connections;
       else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
         ++broken_off;
@@ -218,7 +218,7 @@ struct Parts {
                 visitor_of(user).value_or(Visitor{}).name);
   }
 
-  // To be called before messages are read until there is none.
+  // Is called before messages are read, until no message is left.
   void begin_reading() {
     if (connections) connections->begin_reading();
     if (connections && guarded) close_revoked();
@@ -285,7 +285,7 @@ struct Parts {
                   fmt::format("{} bytes wait for it already (--queue-limit-mb)", queued.of(peer)));
     return false;
   }
-  // Of a frame, with what ZMTP and CURVE add.
+  // Counts a frame with what ZMTP and CURVE add.
   uint64_t wire_bytes(size_t bytes) const {
     const uint64_t sent = bytes + (guarded ? 33 : 0);
     return sent + (sent > 255 ? 9 : 2);

@@ -31,13 +31,6 @@ TEST(Sessions, PointsOnDisplayAreNotObsoleteBetweenReports) {
   EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
 }
 
-TEST(Sessions, PointsOfAWaitingDisplayAreNotObsolete) {
-  Scenario s{.seed = 31, .show = Show::kTerrain, .coupling = {viewer::CouplingMode::kLoose, 2}};
-  s.settings.obsolete_after_s = 3.2;
-  s.events = {{.at_s = 3, .fault = Fault::kStop, .a = {Role::kPacker, 0}, .b = {}, .amount = 5}};
-  EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
-}
-
 TEST(Sessions, ANewMasterLeasesNothingBeforeItKnowsTheScene) {
   Scenario s{.seed = 148, .show = Show::kBall};
   s.events = {{.at_s = 2, .fault = Fault::kKill, .a = {Role::kData, 0}, .b = {}, .amount = 2},
