@@ -1,11 +1,12 @@
 #include "tools/wan_relay/relay.h"
 
 #include <fmt/format.h>
+#include <sys/signalfd.h>
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/signal_set.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/write.hpp>
 #include <chrono>
 #include <csignal>
@@ -25,6 +26,17 @@ constexpr double kDialoguePatience_s = 10, kAcceptPause_s = 0.1;
 
 Timer::duration seconds(double s) {
   return std::chrono::duration_cast<Timer::duration>(std::chrono::duration<double>(s));
+}
+
+/// Blocks the signals that this process reads, and returns a descriptor that they are read from. Handlers would
+/// interrupt what the relay does at each signal, and Boost.Asio 1.74 reads its signals until none comes: a process that
+/// is told to end without a pause would not end.
+int read_signals() {
+  sigset_t known;
+  sigemptyset(&known);
+  for (const int number : {SIGINT, SIGTERM, SIGUSR1}) sigaddset(&known, number);
+  pthread_sigmask(SIG_BLOCK, &known, nullptr);
+  return ::signalfd(-1, &known, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
 std::string shown(const Tcp::endpoint& at) {
@@ -163,8 +175,8 @@ struct Relay::Impl {
   const Options& options;
   const double from_s;
   Context context{1};
-  // The launcher may send a signal twice: until this is gone, none ends the process before it has told what passed.
-  boost::asio::signal_set ends{context, SIGINT, SIGTERM}, asks{context, SIGUSR1};
+  boost::asio::posix::stream_descriptor signals{context, read_signals()};
+  signalfd_siginfo signal{};  // the newest
   Way to_far, to_near;
   std::deque<OpenDoor> doors;
   uint64_t taken = 0, now_open = 0, failed = 0;
@@ -198,13 +210,12 @@ std::string Relay::statistics() const {
 
 void Relay::run(const std::function<void(const std::string&)>& tell) {
   Impl& r = *impl_;
-  r.ends.async_wait([&](const error_code&, int) { r.context.stop(); });
-  const std::function<void(const error_code&, int)> answer = [&](const error_code& error, int) {
-    if (error) return;
+  const std::function<void(const error_code&, size_t)> answer = [&](const error_code& error, size_t) {
+    if (error || r.signal.ssi_signo != SIGUSR1) return r.context.stop();
     tell(statistics());
-    r.asks.async_wait(answer);
+    r.signals.async_read_some(boost::asio::buffer(&r.signal, sizeof r.signal), answer);
   };
-  r.asks.async_wait(answer);
+  r.signals.async_read_some(boost::asio::buffer(&r.signal, sizeof r.signal), answer);
   for (auto& d : r.doors) r.accept(d);
   r.context.run();
 }
