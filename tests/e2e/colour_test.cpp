@@ -91,10 +91,11 @@ bool shows_epoch(PipelineRun& run, double epoch) {
 
 TEST_F(ColouredRun, WhatIsDisplayedIsWhatRaysSee) {
   for (const std::string by : {"temperature", "part:0:20"}) {
-    PipelineRun run(with({"--colour-by", by, "--colour-map", "plasma", "--duration", "3", "--hold", "1.5", "--verify",
-                          "10", "--sampling-size", "480x300"}),
-                    mesh());
-    ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+    auto flags = with({"--colour-by", by, "--colour-map", "plasma", "--verify", "10", "--sampling-size", "480x300"});
+    flags.insert(flags.end(), kComesToRest.begin(), kComesToRest.end());
+    PipelineRun run(flags, mesh());
+    ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+    ASSERT_EQ(run.stop(), 0) << run.program().err();
     const auto s = run.summary();
     ASSERT_TRUE(s.is_object());
     EXPECT_EQ(s["errors"]["messages_rejected"], 0);

@@ -251,11 +251,11 @@ TEST_F(Hands, CutScenesAreComparedWithCutScenes) {
   for (const std::string scene : {"julia", "volume"}) {
     std::string file = scene;
     if (scene == "volume") write_volume(file = folder_ / "balls.mha");
-    std::vector<std::string> flags{
-        "--clip", "plane x<=55%; plane z>=30%", "--duration", "4", "--hold", "2.5", "--verify", "12", "--sampling-size",
-        "320x200"};
+    auto flags = kComesToRest;
+    flags.insert(flags.end(), {"--clip", "plane x<=55%; plane z>=30%", "--verify", "12", "--sampling-size", "320x200"});
     PipelineRun run(flags, file);
-    ASSERT_EQ(run.program().wait(140), 0) << run.program().err();
+    ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+    ASSERT_EQ(run.stop(), 0) << run.program().err();
     const auto s = run.summary();
     ASSERT_TRUE(s.is_object());
     EXPECT_GE(s["quality"]["views"], 2);

@@ -21,9 +21,11 @@ std::vector<std::string> with(std::vector<std::string> more) {
 }
 
 TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
-  PipelineRun run(with({"--preset", "wings", "--duration", "3", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
-                  "julia");
-  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  auto flags = with(kComesToRest);
+  flags.insert(flags.end(), {"--preset", "wings", "--verify", "10", "--samplers", "2"});
+  PipelineRun run(flags, "julia");
+  ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto s = run.summary();
   ASSERT_TRUE(s.is_object());

@@ -78,9 +78,11 @@ double psnr_db(const image::View& a, const image::View& b) {
 }
 
 TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
-  PipelineRun run(with({"--tf", kGlass, "--duration", "3", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
-                  volume());
-  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  auto flags = with(kComesToRest);
+  flags.insert(flags.end(), {"--tf", kGlass, "--verify", "10", "--samplers", "2"});
+  PipelineRun run(flags, volume());
+  ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto s = run.summary();
   ASSERT_TRUE(s.is_object());
@@ -107,15 +109,13 @@ TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
 }
 
 TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
-  const std::vector<std::string> common{"--tf",         kGlass,
-                                        "--fov",        "60",
-                                        "--duration",   ordinary_or_slow("2.5", "11"),
-                                        "--hold",       ordinary_or_slow("1.5", "10"),
-                                        "--target-fps", "20"};
+  auto common = kComesToRest;
+  common.insert(common.end(), {"--tf", kGlass, "--fov", "60", "--target-fps", "20"});
   auto arguments = common;
   arguments.insert(arguments.end(), {"--size", "320x400", "--data-servers", "2", "--samplers", "3", "--wall", "2x1"});
   PipelineRun wall(with(arguments), volume());
-  ASSERT_EQ(wall.program().wait(100), 0) << wall.program().err();
+  ASSERT_TRUE(wall.wait_at_rest()) << wall.program().err();
+  ASSERT_EQ(wall.stop(), 0) << wall.program().err();
   EXPECT_TRUE(wall.all_gone());
   EXPECT_NE(wall.program().out().find("viewer-2 frame"), std::string::npos) << wall.program().out();
   const auto s = wall.summary();
@@ -126,7 +126,8 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
   arguments = common;
   arguments.insert(arguments.end(), {"--size", "640x400"});
   PipelineRun single(with(arguments), volume());
-  ASSERT_EQ(single.program().wait(100), 0) << single.program().err();
+  ASSERT_TRUE(single.wait_at_rest()) << single.program().err();
+  ASSERT_EQ(single.stop(), 0) << single.program().err();
   const auto stitched = image::read_view(wall.out() + "/images/wall.png"),
              whole = image::read_view(newest_picture(single.out() + "/images"));
   ASSERT_TRUE(stitched.ok()) << stitched.error().text;
@@ -227,9 +228,11 @@ TEST_F(VolumeRun, ASeriesPlaysAndStands) {
 TEST_F(VolumeRun, TheSurfaceOfARawVolumeIsShownVerifiedAndCompared) {
   const std::string mha = read_text(volume());
   std::ofstream(folder_ / "balls.raw", std::ios::binary) << mha.substr(mha.size() - 40 * 40 * 40);
-  PipelineRun run({"--raw", "40x40x40:u8", "--iso", "100", "--duration", "2", "--hold", "1", "--verify", "20"},
-                  folder_ / "balls.raw");
-  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  auto flags = kComesToRest;
+  flags.insert(flags.end(), {"--raw", "40x40x40:u8", "--iso", "100", "--verify", "20"});
+  PipelineRun run(flags, folder_ / "balls.raw");
+  ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto s = run.summary();
   EXPECT_EQ(s["kind"], "mesh");

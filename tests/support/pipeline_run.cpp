@@ -14,6 +14,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <thread>
 
@@ -246,6 +247,28 @@ bool PipelineRun::wait_status(const std::function<bool(const nlohmann::json&)>& 
 bool PipelineRun::wait_showing() {
   return wait_status(
       [](const auto& s) { return value(s, "viewer-1", "points") > 0 && value(s, "viewer-1", "frames") > 0; });
+}
+
+bool PipelineRun::wait_at_rest() {
+  constexpr double kFramesMoving = 2 * 30;  // at most: the constructor asks for 30 frames a second
+  struct Model {
+    double points, updates;
+  };
+  std::map<std::string, Model> last;  // of each viewer, when its points last changed
+  return wait_status([&](const auto& s) {
+    int viewers = 0, complete = 0;
+    for (const auto& p : s["processes"]) {
+      if (p["role"] != "viewer") continue;
+      ++viewers;
+      const std::string name = p["name"];
+      if (value(s, name, "frames") <= kFramesMoving) continue;
+      const Model now{value(s, name, "points"), value(s, name, "updates")};
+      Model& then = last.emplace(name, now).first->second;
+      if (now.points > 1.001 * then.points) then = now;
+      complete += now.updates > then.updates + 3;
+    }
+    return viewers > 0 && complete == viewers;
+  });
 }
 
 int PipelineRun::stop() {

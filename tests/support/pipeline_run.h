@@ -69,6 +69,9 @@ class Program {
   int exit_code_ = -1;
 };
 
+/// Flags of a run whose head moves for two seconds and then stands, until the test stops it after wait_at_rest().
+inline const std::vector<std::string> kComesToRest{"--duration", "60", "--hold", "58"};
+
 /// `telesplat run` of a small terrain at a small size with its cache and record in a temporary folder.
 class PipelineRun {
  public:
@@ -93,6 +96,9 @@ class PipelineRun {
   bool wait_status(const std::function<bool(const nlohmann::json&)>& condition, double deadline_s = 40);
   /// Waits until the viewer shows points.
   bool wait_showing();
+  /// Waits until the head of a run with kComesToRest stands and three more view updates gave no viewer new points: what
+  /// is displayed then does not depend on how busy the machine is.
+  bool wait_at_rest();
   /// Commands the session to stop; the run's exit code.
   int stop();
   /// Whether none of the processes that took part runs any more, within `deadline_s`.

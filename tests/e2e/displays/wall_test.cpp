@@ -86,10 +86,9 @@ void expect_in_step(const std::vector<Row>& rows, bool same_state = true) {
   }
 }
 
-const std::vector<std::string> kCommon{"--duration", "4", "--hold", "2", "--target-fps", "20"};
-
 std::vector<std::string> with(std::vector<std::string> more) {
-  more.insert(more.end(), kCommon.begin(), kCommon.end());
+  more.insert(more.end(), kComesToRest.begin(), kComesToRest.end());
+  more.insert(more.end(), {"--target-fps", "20"});
   return more;
 }
 
@@ -100,7 +99,8 @@ void expect_as_one(const std::string& scene, std::vector<std::string> more, doub
   if (!scene.ends_with(".mha")) arguments.insert(arguments.end(), {"--detail-budget", "off"});
   arguments.insert(arguments.end(), more.begin(), more.end());
   PipelineRun wall(arguments, scene);
-  ASSERT_EQ(wall.program().wait(100), 0) << wall.program().err();
+  ASSERT_TRUE(wall.wait_at_rest()) << wall.program().err();
+  ASSERT_EQ(wall.stop(), 0) << wall.program().err();
   EXPECT_TRUE(wall.all_gone());
   const auto s = wall.summary();
   EXPECT_EQ(s["viewers"], 4);
@@ -114,7 +114,8 @@ void expect_as_one(const std::string& scene, std::vector<std::string> more, doub
   arguments = with({"--size", "320x200", "--fov", "60", "--sampling-size", "auto"});
   arguments.insert(arguments.end(), more.begin(), more.end());
   PipelineRun single(arguments, scene);
-  ASSERT_EQ(single.program().wait(100), 0) << single.program().err();
+  ASSERT_TRUE(single.wait_at_rest()) << single.program().err();
+  ASSERT_EQ(single.stop(), 0) << single.program().err();
   const auto stitched = image::read_view(wall.out() + "/images/wall.png"),
              whole = image::read_view(newest_picture(single.out() + "/images"));
   ASSERT_TRUE(stitched.ok()) << stitched.error().text;

@@ -256,9 +256,12 @@ TEST(Links, APackerThatIsStartedAgainIsFoundThroughTheLink) {
 
 // Errors within bounds, and none of them where the head has come to rest.
 TEST(Links, PointsHaveErrorsUntilTheHeadRests) {
-  PipelineRun run({"--duration", "6", "--hold", "4", "--size", "640x400", "--link", "20ms", "--depth-error", "1/16",
-                   "--normal-error", "2", "--colour-error", "off"});
-  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  auto flags = kComesToRest;
+  flags.insert(flags.end(), {"--size", "640x400", "--link", "20ms", "--depth-error", "1/16", "--normal-error", "2",
+                             "--colour-error", "off"});
+  PipelineRun run(flags);
+  ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto s = run.summary();
   ASSERT_TRUE(s.is_object());
