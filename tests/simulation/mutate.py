@@ -7,10 +7,12 @@ Draws lines by seed from all lines of the cores (CORES) that can be mutated, and
 `<` for `<=` and so on, `&&` for `||`, a negation dropped, a call left out, a constant + 1, another value returned.
 Lines that only log or measure are not drawn (MEASURES): no session could tell.
 All mutations are compiled into one telesplat-lab, in a worktree that has build/release; TELESPLAT_MUTANT chooses one
-of them. One that does not compile, or overlaps another, is replaced by the next draw. Seeds that fail without any
-mutation do not count. Prints a table: line, mutation, the check that found it, at which seed.
+of them. One that does not compile, or overlaps another, is replaced by the next draw. Looks at the figures of the
+standard walks first, those of real meshes aside, as tests/simulation/figures_test.cpp does, then at seeds. Seeds that
+fail without any mutation do not count. Prints a table: line, mutation, the check that found it, and where.
 """
 import argparse
+import json
 import os
 import random
 import re
@@ -261,14 +263,20 @@ def compile_all(tree, order, count, originals):
         chosen = [m for m in chosen if m.number not in bad]
 
 
-def simulate(tree, number, first, seeds, limit_s):
-    """(seed, check, text) of the first failure from seed `first` on; None: all hold."""
-    env = dict(os.environ)
+def restore(tree, originals):
+    for path, text in originals.items():
+        if (tree / path).read_text() != text:
+            (tree / path).write_text(text)
+    (tree / 'telesplat_mutant.h').unlink(missing_ok=True)
+
+
+def call(number, words, limit_s):
+    """What simulate prints, and its exit code; a number in place of both: it did not end within so many seconds."""
+    env = dict(os.environ) | {'TELESPLAT_DATA': '/nonexistent'}
     env.pop('TELESPLAT_MUTANT', None)
     if number is not None:
         env |= {'TELESPLAT_MUTANT': str(number), 'TELESPLAT_REACHED': str(SCRATCH / f'reached-{number}')}
-    words = [str(tree.resolve() / 'build/release/bin/telesplat-lab'), 'simulate', '--seed', str(first)]
-    words += ['--seeds', str(seeds), '--first'] if seeds > 1 else []
+    words = [str(SCRATCH / 'telesplat-lab'), 'simulate', *words]
 
     def limits():  # a session that never ends is killed, and fails by that
         resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
@@ -276,34 +284,63 @@ def simulate(tree, number, first, seeds, limit_s):
         if os.getuid() == 0:  # a mutation may write anywhere, as one did to /
             os.setgid(NOBODY)
             os.setuid(NOBODY)
-    child = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-                             cwd=SCRATCH,
+    child = subprocess.Popen(words, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=SCRATCH,
                              start_new_session=True, preexec_fn=limits)
     try:
-        out, _ = child.communicate(timeout=limit_s)
+        out, err = child.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:
-        return (first, 'hang', f'no end within {limit_s:.0f} s')
+        return limit_s
     finally:
         if child.poll() is None:
             os.killpg(child.pid, signal.SIGKILL)
             child.wait()
+    return out, err, child.returncode
+
+
+def walk(number, golden):
+    """('', check, text) of the first figure that differs by more than 1 %; golden: figures without any mutation."""
+    said = call(number, ['--figures'], 600)
+    if isinstance(said, float | int):
+        return ('walk', 'hang', f'no end within {said:.0f} s')
+    out, err, code = said
+    if found := re.search(r'(\S+): seed \d+ FAILS at [\d.]+ s: ([\w-]+): (.*)', err):
+        return found.groups()
+    try:
+        now = json.loads(out)
+    except ValueError:
+        return ('walk', 'crash', f'code {code}')
+    for name, figures in golden.items():
+        for figure, was in figures.items():
+            most = 0.1 if 'holes' in figure or 'psnr' in figure else 0.01 * abs(was)
+            if abs(now[name].get(figure, 1e9) - was) > most + 1e-9:
+                return (name, 'figures', f'{figure} {now[name].get(figure)}, golden {was}')
+    return None
+
+
+def simulate(number, first, seeds, limit_s):
+    """(seed, check, text) of the first failure from seed `first` on; None: all hold."""
+    words = ['--seed', str(first), *(['--seeds', str(seeds), '--first'] if seeds > 1 else [])]
+    said = call(number, words, limit_s)
+    if isinstance(said, float | int):
+        return (first, 'hang', f'no end within {said:.0f} s')
+    out, _, code = said
     found = [(int(a), b, c) for a, b, c in re.findall(r'seed (\d+) FAILS at [\d.]+ s: ([\w-]+): (.*)', out)]
     if found:
         return min(found)
-    return None if child.returncode == 0 else (first, 'crash', f'code {child.returncode}')
+    return None if code == 0 else (first, 'crash', f'code {code}')
 
 
-def look_for(tree, m, until, plain, limit_s):
+def look_for(m, until, plain, limit_s):
     """Runs more seeds, to `until`, unless it was found. plain: what seeds do without mutations, by seed."""
     while not m.failures and m.seeds < until:
         first = m.seeds + 1
-        found = simulate(tree, m.number, first, until - m.seeds, 120 + limit_s * (until - m.seeds))
+        found = simulate(m.number, first, until - m.seeds, 120 + limit_s * (until - m.seeds))
         if not found:
             m.seeds = until
             break
         m.seeds = found[0]
         if found[0] not in plain:
-            plain[found[0]] = simulate(tree, None, found[0], 1, 120)
+            plain[found[0]] = simulate(None, found[0], 1, 120)
         if not plain[found[0]] or found[1] == 'hang':
             m.failures.append(found)
     m.reached = (SCRATCH / f'reached-{m.number}').exists()
@@ -311,7 +348,7 @@ def look_for(tree, m, until, plain, limit_s):
 
 def table(chosen):
     found = sum(bool(m.failures) for m in chosen)
-    out = [f'{found} of {len(chosen)} found', '', '| line | mutation | check | seed |', '|---|---|---|---|']
+    out = [f'{found} of {len(chosen)} found', '', '| line | mutation | check | seed or walk |', '|---|---|---|---|']
     for m in sorted(chosen, key=lambda m: (m.path, m.line)):
         check, seed = (m.failures[0][1], m.failures[0][0]) if m.failures else (
             'survived' if m.reached else 'survived, never reached' if m.seeds else '', f'> {m.seeds}')
@@ -339,15 +376,21 @@ def main():
     SCRATCH.chmod(0o777)
     try:
         chosen, plain = compile_all(a.tree, order, a.count, originals), {}
+        shutil.copy(a.tree / 'build/release/bin/telesplat-lab', SCRATCH)
+        restore(a.tree, originals)
+        golden = json.loads(call(None, ['--figures'], 600)[0])
+        for m in chosen:
+            if found := walk(m.number, golden):
+                m.failures.append(found)
+            m.reached = (SCRATCH / f'reached-{m.number}').exists()
+            print(m.path, m.line, m.number, m.what, m.failures or 'has the golden figures', flush=True)
         for until in map(int, a.rounds.split(',')):
             for m in chosen:
-                look_for(a.tree, m, until, plain, a.limit)
+                look_for(m, until, plain, a.limit)
                 print(m.path, m.line, m.number, m.what, m.failures or f'survives {m.seeds}', flush=True)
                 a.out.write_text(table(chosen))
     finally:
-        for path, text in originals.items():
-            (a.tree / path).write_text(text)
-        (a.tree / 'telesplat_mutant.h').unlink(missing_ok=True)
+        restore(a.tree, originals)
         shutil.rmtree(SCRATCH)
     print(table(chosen))
 

@@ -16,11 +16,14 @@ namespace telesplat::simulation {
 namespace {
 
 constexpr double kRecovers_s = 6;   // what a fault does may last so long after it
-constexpr double kAnswers_s = 2.5;  // a view, besides what its link and its samplers take
+constexpr double kAnswers_s = 0.5;  // a view, besides what its link and its samplers take
+constexpr double kTakesOver_s = 2;  // another sampler, from one that fails: lease_timeout_s
 constexpr double kOrderAnswers_s = 2.5;
 constexpr double kLook_s = 0.1;
+constexpr double kLast_s = 1.5, kMostLateViews = 1.5;  // rays of so many views, of a head that has stood for long
+constexpr double kLeast_dB[] = {22, 27, 12};           // of what a standing head sees: spheres, terrain, bars
 constexpr double kMostForgets = 32e6;  // bytes of forgets that the log keeps beyond its limit, at most (event_log.h)
-constexpr double kMostHoles = 0.02, kMostWrong = 0.2;  // shares of pixels that one surface covers whole
+constexpr double kMostHoles = 0.02, kMostWrong = 0.02;  // shares of pixels that one surface covers whole
 constexpr double kBehind_s = 2.5;  // events that were published earlier have arrived, and were told of
 
 template <class M>
@@ -63,9 +66,50 @@ double lasts_s(const Scenario& s, const Event& e) {
   }
 }
 
+// The number of the sampler whose work this event holds up, and nothing else; -1: it holds up others.
+int sampler_of(const Event& e) {
+  switch (e.fault) {
+    case Fault::kBreak:
+    case Fault::kSilence:
+      return e.a.role == Role::kSampler ? e.a.number : -1;
+    case Fault::kKill:
+    case Fault::kTerminate:
+    case Fault::kStop:
+    case Fault::kIsolate:
+    case Fault::kClockStep:
+    case Fault::kSlowWork:
+    case Fault::kKillAtMessage:
+    case Fault::kLeave:
+      return e.a.role == Role::kSampler ? e.a.number : -1;
+    default:
+      return -1;
+  }
+}
+
+// Whether a sampler works from before the event until after what it does.
+bool has_another(const Scenario& s, const Event& event) {
+  const auto touches = [&](int sampler) {
+    return std::any_of(s.events.begin(), s.events.end(), [&](const Event& e) {
+      if (sampler_of(e) != sampler) return false;
+      const bool lasts = e.fault == Fault::kLeave || e.at_s + lasts_s(s, e) >= event.at_s;
+      return lasts && e.at_s <= event.at_s + lasts_s(s, event);
+    });
+  };
+  for (int n = 0; n < s.samplers; ++n)
+    if (n != sampler_of(event) && !touches(n)) return true;
+  return false;
+}
+
+bool has_any(const std::vector<Event>& events, const Scenario& s, double from_s, double until_s) {
+  return std::any_of(events.begin(), events.end(),
+                     [&](const Event& e) { return e.at_s <= until_s && e.at_s + lasts_s(s, e) >= from_s; });
+}
+
 }  // namespace
 
 Checks::Checks(const Scenario& scenario) : scenario_(scenario) {
+  for (const Event& e : scenario.events)
+    (sampler_of(e) >= 0 && has_another(scenario, e) ? delays_ : excuses_).push_back(e);
   strangers_ = std::any_of(scenario_.events.begin(), scenario_.events.end(),
                            [](const Event& e) { return e.fault == Fault::kStranger || e.fault == Fault::kImpostor; });
 }
@@ -76,10 +120,9 @@ void Checks::fail(std::string_view check, const std::string& text, double now_s)
   if (on_failure) on_failure();
 }
 
-bool Checks::disturbed(double from_s, double until_s) const {
-  return std::any_of(scenario_.events.begin(), scenario_.events.end(),
-                     [&](const Event& e) { return e.at_s <= until_s && e.at_s + lasts_s(scenario_, e) >= from_s; });
-}
+bool Checks::disturbed(double from_s, double until_s) const { return has_any(excuses_, scenario_, from_s, until_s); }
+
+bool Checks::delayed(double from_s, double until_s) const { return has_any(delays_, scenario_, from_s, until_s); }
 
 Checks::Viewer* Checks::viewer_of(int process) {
   const auto found = viewers_.find(process);
@@ -127,7 +170,8 @@ void Checks::sent(const Passed& m) {
     }
   } else if (part.role == Role::kMaster) {
     if (const auto lease = read<wire::Lease>(m)) on_lease(*lease);
-    if (const auto slab = read<wire::SliceLease>(m)) leases_[slab->lease.value] = {slab->frame.value, slab->slab};
+    if (const auto slab = read<wire::SliceLease>(m))
+      leases_[slab->lease.value] = {slab->frame.value, slab->slab}, ++outcome_.leases;
     if (const auto welcome = read<wire::Welcome>(m)) {
       const auto clip = welcome->facts.find(scene::kClipFact);
       clip_ = clip == welcome->facts.end() ? "" : clip->second;
@@ -148,8 +192,10 @@ void Checks::on_updates(const wire::MetricRows& rows, Part part) {
 
 void Checks::on_lease(const wire::Lease& lease) {
   leases_[lease.lease.value] = {lease.frame.value, lease.tile};
+  ++outcome_.leases;
   outcome_.rays += lease.rays > 0 ? lease.rays : uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
-  last_rays_s_ = now_s_;
+  if (now_s_ > scenario_.duration_s - kLast_s)
+    late_rays_ += lease.rays > 0 ? lease.rays : uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
 }
 
 void Checks::on_done(const wire::TileDone& done, double now_s) {
@@ -172,6 +218,8 @@ void Checks::on_patch(const Passed& m, Part) {
   if (const auto mark = read<wire::StateMark>(m)) {
     note_sequence(mark->sequence.value, m.now_s);
     outcome_.points = mark->points;
+    if (const double most = double(scenario_.settings.max_points); most > 0 && mark->points > most * 1.5 + 2000)
+      fail("limit", fmt::format("the model has {} points, limit {}", mark->points, most), m.now_s);
     return;
   }
   const auto patch = read<wire::Patch>(m);
@@ -201,6 +249,7 @@ void Checks::delivered(const Passed& m) {
 void Checks::answered(int process, InstanceId, RequestId request, double now_s) {
   Viewer& v = viewers_.at(process);
   ++outcome_.updates;
+  if (const auto asked = v.open.find(request.value); asked != v.open.end()) outcome_.waited_s += now_s - asked->second;
   v.open.erase(v.open.begin(), v.open.upper_bound(request.value));
   v.open_since_s = v.open.empty() ? std::nullopt : std::optional(now_s);
 }
@@ -210,7 +259,8 @@ void Checks::look_at_requests(double now_s) {
   double most_s = kAnswers_s + 6 * scenario_.to_viewers.latency_s + 3 * tiles * scenario_.tile_s;
   if (scenario_.to_viewers.bytes_s > 0) most_s += 3e5 / scenario_.to_viewers.bytes_s;
   for (const auto& [process, v] : viewers_)
-    if (v.open_since_s && now_s - *v.open_since_s > most_s && !disturbed(*v.open_since_s, now_s))
+    if (v.open_since_s && now_s - *v.open_since_s > most_s + (delayed(*v.open_since_s, now_s) ? kTakesOver_s : 0) &&
+        !disturbed(*v.open_since_s, now_s))
       fail("request",
            fmt::format("{} has had no answer for {:.1f} s, requests from {} on are open", text_of(parts_.at(process)),
                        now_s - *v.open_since_s, v.open.begin()->first),
@@ -307,10 +357,17 @@ void Checks::at_rest(Session& session) {
   }
   if (packer_["log_bytes"] > scenario_.log_limit_mb * 1.1e6 + kMostForgets)
     fail("limit", fmt::format("the packer's log has {} bytes", packer_["log_bytes"]), now_s);
-  const double most = double(scenario_.settings.max_points);
-  if (most > 0 && packer_["points"] > most * 1.5 + 2000)
-    fail("limit", fmt::format("the model has {} points, limit {}", packer_["points"], most), now_s);
+  look_at_late_rays(session);
   compare_pictures(session);
+}
+
+// Where displays wait for updates, heads stand later.
+void Checks::look_at_late_rays(const Session& session) {
+  const double views = double(late_rays_) / double(scenario_.width * scenario_.height);
+  if (scenario_.settings.steering && scenario_.coupling.mode == viewer::CouplingMode::kAsync &&
+      views > kMostLateViews * double(viewers_.size()))
+    fail("standing", fmt::format("rays of {:.1f} views are cast for {} heads that stand", views, viewers_.size()),
+         session.now_s());
 }
 
 namespace {
@@ -390,10 +447,11 @@ void Checks::compare_pictures(Session& session) {
     const Compared c = compare(v->view(), truth);
     if (n == 0) outcome_.holes = c.holes, outcome_.psnr_db = c.psnr_db;
     if (scenario_.settings.steering && c.whole > 60 &&
-        (c.holes > (scenario_.show == Show::kBars ? 4 : 1) * kMostHoles || c.wrong > kMostWrong))
+        (c.holes > (scenario_.show == Show::kBars ? 4 : 1) * kMostHoles || c.wrong > kMostWrong ||
+         c.psnr_db < kLeast_dB[size_t(scenario_.show)]))
       fail("standing",
-           fmt::format("viewer-{} of {} sees {:.1f} % holes and {:.1f} % in another colour after the calm", n,
-                       kShowNames[size_t(scenario_.show)], c.holes * 100, c.wrong * 100),
+           fmt::format("viewer-{} of {} sees {:.1f} % holes, {:.1f} % in another colour, and {:.1f} dB after the calm",
+                       n, kShowNames[size_t(scenario_.show)], c.holes * 100, c.wrong * 100, c.psnr_db),
            session.now_s());
   }
 }

@@ -42,8 +42,10 @@ struct Failure {
 struct Figures {
   uint64_t digest = 0;  ///< of all messages that were delivered, with their times
   uint64_t messages = 0, frames = 0, updates = 0, turns = 0;
-  uint64_t rays = 0, bytes = 0, points = 0;  ///< cast; sent to viewers; of the packer's model at the end
-  double holes = 0, psnr_db = 0;             ///< of the last frame of viewer 0, against the truth; -1: not known
+  uint64_t leases = 0, rays = 0;   ///< of tiles, and that they named
+  uint64_t bytes = 0, points = 0;  ///< sent to viewers; of the packer's model at the end
+  double waited_s = 0;             ///< for all `updates`, each from the request that it answers
+  double holes = 0, psnr_db = 0;   ///< of the last frame of viewer 0, against the truth; -1: not known
 };
 struct Outcome : Figures {
   std::optional<Failure> failure;
@@ -104,11 +106,14 @@ class Checks final : public Observer {
   void on_status(const Passed& m, Part part);
   void answered(int process, InstanceId viewer, RequestId request, double now_s);
   void look_at_requests(double now_s);
+  void look_at_late_rays(const Session& session);
   void compare_pictures(Session& session);
   bool disturbed(double from_s, double until_s) const;
+  bool delayed(double from_s, double until_s) const;
   Viewer* viewer_of(int process);
 
   const Scenario scenario_;
+  std::vector<Event> excuses_, delays_;  // what may hold up everybody, and what another sampler can make good
   Outcome outcome_;
   std::map<int, Part> parts_;                                 // by process
   std::map<int, Viewer> viewers_;                             // by process
@@ -117,7 +122,8 @@ class Checks final : public Observer {
   std::set<std::pair<uint64_t, uint64_t>> updates_;           // rows of updates that viewers sent
   std::map<int, Asked> orders_;                               // by process of who asked
   std::map<std::string, double> packer_;                      // its newest status
-  double looked_s_ = 0, last_rays_s_ = 0, now_s_ = 0;
+  double looked_s_ = 0, now_s_ = 0;
+  uint64_t late_rays_ = 0;
   std::deque<std::pair<double, uint64_t>> sequences_;  // that the packer had, and when
   uint64_t rows_ = 0;                                  // of updates, that came to the master
   bool strangers_ = false, rests_ = false, packer_welcomed_ = false;

@@ -76,6 +76,13 @@ Scenario with(Scenario s, const std::function<void(Scenario&)>& change) {
   return s;
 }
 
+// The same where something goes wrong.
+Scenario disturbed(Show show, geometry::Trajectory head, std::vector<Event> events) {
+  Scenario s = plain(show, std::move(head));
+  s.events = std::move(events);
+  return s;
+}
+
 Scenario real(const char* file, geometry::Trajectory head) {
   Scenario s = plain(Show::kMesh, std::move(head));
   const char* set = std::getenv("TELESPLAT_DATA");
@@ -132,6 +139,9 @@ class Counter final : public Observer {
     WalkFigures out{{"bytes", double(bytes_)},
                     {"first_bytes", double(first_bytes_)},
                     {"first_s", first_s_},
+                    {"latency_ms", outcome.waited_s * 1e3 / double(std::max<uint64_t>(outcome.updates, 1))},
+                    {"leases", double(outcome.leases)},
+                    {"messages", double(outcome.messages)},
                     {"updates", double(outcome.updates)}};
     if (outcome.rays > 0) {
       out["rays"] = double(outcome.rays), out["points"] = double(outcome.points);
@@ -217,6 +227,31 @@ std::vector<Walk> standard_walks() {
       {"fence-walk", plain(kBars, along())},
       {"julia-walk", with(plain(kJulia, along()), [](Scenario& s) { s.display_hz = 10; })},
       {"ball-walk", with(plain(kBall, along()), [](Scenario& s) { s.display_hz = 10; })},
+      {"terrain-small-tiles", with(plain(kTerrain, around()),
+                                   [](Scenario& s) {
+                                     s.tile_size = 16, s.samplers = 3, s.settings.max_points = 3000;
+                                     s.settings.obsolete_after_s = 3;
+                                   })},
+      {"ball-slow-link",
+       with(plain(kBall, along()),
+            [](Scenario& s) { s.display_hz = 10, s.to_viewers = {.latency_s = 0.02, .bytes_s = 2e5}; })},
+      {"spheres-sampler-stops", disturbed(kSpheres, around(), {{3, Fault::kStop, {Role::kSampler, 1}, {}, 3}})},
+      {"terrain-samplers-die", disturbed(kTerrain, turning(),
+                                         {{3, Fault::kKill, {Role::kSampler, 0}, {}, 1},
+                                          {3.1, Fault::kKill, {Role::kSampler, 1}, {}, 1.5},
+                                          {6, Fault::kLeave, {Role::kSampler, 1}, {}, 0}})},
+      {"spheres-another-master", disturbed(kSpheres, along(), {{3, Fault::kKill, {Role::kMaster, 0}, {}, 0.5}})},
+      {"spheres-epoch-on-a-slow-link",
+       with(disturbed(kSpheres, turning(), {{3.2, Fault::kEpoch, {}, {}, 0}, {6, Fault::kEpoch, {}, {}, 0}}),
+            [](Scenario& s) { s.to_viewers = {.latency_s = 0.02, .bytes_s = 1e5}; })},
+      {"ball-loose-with-breaks", with(disturbed(kBall, along(),
+                                                {{3, Fault::kEpoch, {}, {}, 0},
+                                                 {3.05, Fault::kBreak, {Role::kViewer, 0}, {Role::kPacker, 0}, 0},
+                                                 {5, Fault::kCoupling, {}, {}, 1},
+                                                 {5.5, Fault::kBreak, {Role::kViewer, 0}, {Role::kPacker, 0}, 0}}),
+                                      [](Scenario& s) {
+                                        s.display_hz = 10, s.coupling = {viewer::CouplingMode::kLoose, 3};
+                                      })},
       {"bone-walk", real("alderson-bone-718k.ply", around())},
       {"bone-turning-head", real("alderson-bone-718k.ply", turning())},
       {"bone-slow-link", with(real("alderson-bone-718k.ply", along()),

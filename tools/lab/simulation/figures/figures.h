@@ -1,5 +1,4 @@
-// Golden figures: what standard walks cost and show. They are counted in sessions without faults, so they are the same
-// on every machine. tests/simulation/figures.json holds them.
+// Golden figures: what standard walks cost and show. Nothing of them depends on the machine. tests/simulation/figures.json holds them.
 #pragma once
 
 #include <map>
@@ -35,6 +34,9 @@ inline constexpr FigureRule kFigureRules[] = {
     {"first_s", 3},                         // and how long after its start that was
     {"holes_percent", 2, false, 0.1},       // of the last frame of viewer 0: Compared::holes
     {"holes_walk_percent", 2, false, 0.1},  // mean over a frame of each second
+    {"latency_ms", 1},                      // of an update, from its request on: mean
+    {"leases", 0},                          // of tiles or slabs
+    {"messages", 0},                        // that arrived at anybody
     {"points", 0},                          // of the packer's model at the end
     {"psnr_db", 2, true, 0.1},              // of the last frame of viewer 0
     {"psnr_walk_db", 2, true, 0.1},         // mean over a frame of each second
