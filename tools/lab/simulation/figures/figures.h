@@ -1,4 +1,4 @@
-// Golden figures: what standard walks cost and show. Nothing of them depends on the machine. tests/simulation/figures.json holds them.
+// Golden figures: what standard walks cost and show, the same on every machine (tests/simulation/figures.json).
 #pragma once
 
 #include <map>
