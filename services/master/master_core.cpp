@@ -247,6 +247,15 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   dispatch(now_s);
 }
 
+// A scene that did not fit beside one that has left.
+void MasterCore::adopt_refused(double now_s) {
+  for (auto& [id, p] : peers_) {
+    if (p.gone || !p.refused || p.hello.role != "data" || !adopt_scene(id, p.hello, now_s)) continue;
+    p.refused = false;
+    announce_soon(now_s);
+  }
+}
+
 void MasterCore::take_put_off_hellos(double now_s) {
   std::vector<std::pair<std::string, wire::Hello>> due;
   for (const auto& [id, p] : peers_)
@@ -299,6 +308,7 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   live_.set_here(p.hello.role, p.hello.name, false);
   idle_.remove(routing_id);
   int leases = 0;
+  data_left_ = data_left_ || p.hello.role == "data";
   for (auto& [pipeline, plan] : plans_) {
     leases += plan->release_sampler(routing_id);
     if (p.hello.role == "data") plan->leave_data(p.hello.instance);
@@ -455,6 +465,7 @@ void MasterCore::tick(double now_s) {
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
   forget_departed(now_s);
+  if (std::exchange(data_left_, false)) adopt_refused(now_s);
   follow_another_packer(now_s);
   if (announce_due_ || told_lacks_ != lacks()) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);

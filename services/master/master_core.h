@@ -142,6 +142,7 @@ class MasterCore {
   void forget(const Peer& peer, const std::string& routing_id);
   void replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s);
   void take_put_off_hellos(double now_s);
+  void adopt_refused(double now_s);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
   void forget_viewer(const wire::Hello& hello);
   void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
@@ -204,6 +205,7 @@ class MasterCore {
   double leases_rest_until_s_ = -1e9;
   Pace announcements_{8, 20};
   bool announce_due_ = false;
+  bool data_left_ = false;  // a data server, since the last tick
   std::string told_lacks_;  // lacks(), as everyone was told it
   double now_s_ = 0;        // of what came last
   bool stop_ = false;
