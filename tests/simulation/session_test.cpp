@@ -39,23 +39,58 @@ TEST(Sessions, ANewMasterLeasesNothingBeforeItKnowsTheScene) {
 }
 
 TEST(Sessions, AnUpdateThatWaitsForAnEarlierOneEndsWhereItWasComplete) {
-  Scenario s = draw_scenario(780);
-  s.events = {
-      {.at_s = 2.0865, .fault = Fault::kCoupling, .a = {Role::kMaster, 0}, .b = {Role::kViewer, 0}, .amount = 2},
-      {.at_s = 5.459, .fault = Fault::kImpostor, .a = {Role::kData, 0}, .b = {Role::kViewer, 0}, .amount = 0},
-      {.at_s = 6.7536, .fault = Fault::kEpoch, .a = {Role::kMaster, 0}, .b = {Role::kViewer, 0}, .amount = 0}};
+  Scenario s{.seed = 780, .duration_s = 14.54, .show = Show::kTerrain, .samplers = 3, .display_hz = 8};
+  s.coupling = {viewer::CouplingMode::kSync, 1};
+  s.tile_s = 0.013944531;
+  s.one_machine = false;
+  s.keys = true;
+  s.links.latency_s = 0.00019407448;
+  s.to_viewers = {.latency_s = 0.028236543, .jitter_s = 0.0001823445, .bytes_s = 2744789};
+  s.settings.obsolete_after_s = 4.2616848;
+  s.settings.depth_error = 0.40622853, s.settings.normal_error = 4, s.settings.colour_error = 8;
+  s.events = {{.at_s = 2.0865,
+               .fault = Fault::kOrder,
+               .a = {},
+               .b = {Role::kViewer, 0},
+               .order = "coupling|coupling=loose|buffers=2"},
+              {.at_s = 5.459, .fault = Fault::kImpostor, .a = {Role::kData, 0}, .b = {Role::kViewer, 0}, .amount = 0},
+              {.at_s = 6.7536, .fault = Fault::kOrder, .a = {}, .b = {Role::kViewer, 0}, .order = "epoch"}};
   EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
 }
 
 TEST(Sessions, APackerThatHearsNothingKeepsWhatIsOnDisplay) {
-  Scenario s = draw_scenario(784);
+  Scenario s{.seed = 784, .duration_s = 14.5, .show = Show::kTerrain, .samplers = 1, .viewers = 2, .display_hz = 8};
+  s.tile_size = 64;
+  s.tile_s = 0.0061638363;
+  s.links = s.to_viewers = {.latency_s = 0.00014596261, .jitter_s = 0.0014350043};
+  s.settings.obsolete_after_s = 3.7272724;
   s.events = {{.at_s = 1.3372, .fault = Fault::kIsolate, .a = {Role::kPacker, 0}, .b = {}, .amount = 4.1}};
   EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
 }
 
 TEST(Sessions, ARequestThatIsRepeatedShowsNoOlderSlices) {
-  Scenario s = draw_scenario(1018);
+  Scenario s{.seed = 1018, .duration_s = 12.2, .show = Show::kBall, .samplers = 1, .display_hz = 3};
+  s.tile_size = 64;
+  s.tile_s = 0.0099240534;
+  s.one_machine = false;
+  s.links = {.latency_s = 0.00033108779, .jitter_s = 9.77333505885183e-05};
+  s.to_viewers = {.latency_s = 0.073561398, .bytes_s = 4113289};
+  s.settings.steering = false;
+  s.settings.obsolete_after_s = 4.0314150;
+  s.settings.view_cell_m = 0;
   s.events = {{.at_s = 1.867, .fault = Fault::kStranger, .a = {Role::kMaster, 0}, .b = {}, .amount = 31}};
+  EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
+}
+
+TEST(Sessions, PartsOfAnotherVolumeAreTakenOnceThoseBeforeHaveLeft) {
+  Scenario s{.seed = 19, .show = Show::kBall, .data_servers = 2};
+  s.events = {{.at_s = 2,
+               .fault = Fault::kShow,
+               .a = {Role::kData, 0},
+               .b = {},
+               .amount = 0.6,
+               .order = {},
+               .show = Show::kSeries}};
   EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
 }
 

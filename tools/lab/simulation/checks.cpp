@@ -8,22 +8,25 @@
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "common/geometry/clip.h"
 #include "common/scene/clip_order.h"
+#include "common/scene/session.h"
 
 namespace telesplat::simulation {
 namespace {
 
 constexpr double kRecovers_s = 6;   // what a fault does may last so long after it
-constexpr double kAnswers_s = 0.5;  // a view, besides what its link and its samplers take
+constexpr double kAnswers_s = 1;    // a view, besides what its link and its samplers take
 constexpr double kTakesOver_s = 2;  // another sampler, from one that fails: lease_timeout_s
 constexpr double kOrderAnswers_s = 2.5;
+constexpr double kEpoch_s = 4;  // from an epoch's beginning until each viewer shows it
 constexpr double kLook_s = 0.1;
 constexpr double kLast_s = 1.5, kMostLateViews = 1.5;  // rays of so many views, of a head that has stood for long
 constexpr double kLeast_dB[] = {22, 27, 12};           // of what a standing head sees: spheres, terrain, bars
 constexpr double kMostForgets = 32e6;  // bytes of forgets that the log keeps beyond its limit, at most (event_log.h)
-constexpr double kMostHoles = 0.02, kMostWrong = 0.02;  // shares of pixels that one surface covers whole
+constexpr double kMostHoles = 0.02, kMostWrong = 0.05;  // shares of pixels that one surface covers whole
 constexpr double kBehind_s = 2.5;  // events that were published earlier have arrived, and were told of
 
 template <class M>
@@ -31,6 +34,10 @@ std::optional<M> read(const Passed& m) {
   if (m.type != M::kName) return std::nullopt;
   auto out = wire::decode<M>(m.body);
   return out ? std::optional<M>(*std::move(out)) : std::nullopt;
+}
+
+std::string fact_of(const wire::Welcome& w, const std::string& name) {
+  return scene::value_or(w.facts, name, std::string());
 }
 
 // FNV-1a over words.
@@ -47,23 +54,14 @@ void mix(uint64_t& digest, const void* data, size_t bytes) {
 
 // For so long an event keeps the session busy.
 double lasts_s(const Scenario& s, const Event& e) {
-  switch (e.fault) {
-    case Fault::kStop:
-    case Fault::kSilence:
-    case Fault::kIsolate:
-    case Fault::kKill:
-    case Fault::kDiskFull:
-    case Fault::kClockStep:
-      return e.amount + kRecovers_s;
-    case Fault::kSlowLink:
-    case Fault::kSlowWork:
-    case Fault::kKillAtMessage:
-      return std::max(0.0, s.duration_s - s.calm_s - e.at_s) + kRecovers_s;
-    case Fault::kStatus:
-      return 0;
-    default:
-      return kRecovers_s;
-  }
+  using enum Fault;
+  const Fault f = e.fault;
+  if (f == kOrder || f == kIntruder) return 0;
+  if (f == kSlowLink || f == kSlowWork || f == kKillAtMessage)
+    return std::max(0.0, s.duration_s - s.calm_s - e.at_s) + kRecovers_s;
+  const bool lasts =
+      f == kStop || f == kSilence || f == kIsolate || f == kKill || f == kDiskFull || f == kClockStep || f == kShow;
+  return (lasts ? e.amount : 0) + kRecovers_s;
 }
 
 // The number of the sampler whose work this event holds up, and nothing else; -1: it holds up others.
@@ -154,7 +152,7 @@ void Checks::digest(const Passed& m) {
 void Checks::sent(const Passed& m) {
   const auto from = parts_.find(m.from);
   if (from == parts_.end()) {  // somebody without a part
-    if (m.type == wire::Control::kName) orders_[m.from] = {m.now_s, std::string(m.type)};
+    if (const auto order = read<wire::Control>(m)) orders_[m.from] = {m.now_s, *order, speaker_};
     return;
   }
   const Part part = from->second;
@@ -172,14 +170,47 @@ void Checks::sent(const Passed& m) {
     if (const auto lease = read<wire::Lease>(m)) on_lease(*lease);
     if (const auto slab = read<wire::SliceLease>(m))
       leases_[slab->lease.value] = {slab->frame.value, slab->slab}, ++outcome_.leases;
-    if (const auto welcome = read<wire::Welcome>(m)) {
-      const auto clip = welcome->facts.find(scene::kClipFact);
-      clip_ = clip == welcome->facts.end() ? "" : clip->second;
-    }
+    if (const auto welcome = read<wire::Welcome>(m)) on_welcome(*welcome, m.sent_s);
   } else if (part.role == Role::kPacker) {
     if (m.kind == net::Kind::kPub) on_patch(m, part);
     if (const auto done = read<wire::TileDone>(m)) on_done(*done, m.now_s);
   }
+}
+
+void Checks::on_welcome(const wire::Welcome& welcome, double now_s) {
+  // Orders go with the data that they were given for.
+  for (const char* name : {"kind", "content_hash", scene::kPlacementFact})
+    if (fact_of(session_, name) != fact_of(welcome, name)) ordered_.clear(), scene_since_s_ = now_s;
+  session_ = welcome;
+  if (epochs_.empty() || epochs_.back().second < welcome.epoch.value) epochs_.emplace_back(now_s, welcome.epoch.value);
+  while (epochs_.size() > 1 && epochs_[1].first < now_s - kEpoch_s) epochs_.pop_front();
+}
+
+// Answers to two people may come in another order than they were given in.
+void Checks::on_reply(const wire::ControlReply& reply, const Passed& m) {
+  const auto asked = orders_.find(m.to);
+  if (asked == orders_.end()) return;
+  const auto [at_s, order, speaker] = asked->second;
+  const bool wrong = speaker.fault == Fault::kOrder && speaker.amount == 1;
+  orders_.erase(asked);
+  if (reply.ok && order.command == "status" && now_s_ > scenario_.duration_s - kLast_s) status_ = reply.text;
+  const auto now_is = [&](const std::string& name, const std::string& value) {
+    Ordered& o = ordered_[name];
+    if (m.sent_s >= o.at_s) o = {m.sent_s, m.sent_s > o.at_s ? value : ""};
+  };
+  if (wrong && (reply.ok || reply.text.empty()))
+    fail("order", fmt::format("the wrong order {} is answered by \"{}\"", order.command, reply.text), now_s_);
+  if (m.sent_s <= scene_since_s_ || fact_of(session_, "kind").empty()) return;
+  const bool fits =
+      order.command == "epoch" || order.command == "clip" ||
+      (fact_of(session_, "kind") == "volume" && (order.command == "tf" || order.arguments.contains("volume.layers")));
+  if (!reply.ok && !wrong && fits && speaker.fault == Fault::kOrder)
+    fail("order", fmt::format("{} is refused: {}", order.command, reply.text), now_s_);
+  if (!reply.ok) return;
+  if (order.command == "animate" || order.command == "play")
+    for (const char* name : {"c.x", "c.y", "c.z", "volume.step"}) now_is(name, "");
+  if (order.command == "set" || order.command == "clip" || order.command == "tf")
+    for (const auto& [name, value] : order.arguments) now_is(name, value);
 }
 
 void Checks::on_updates(const wire::MetricRows& rows, Part part) {
@@ -240,8 +271,11 @@ void Checks::delivered(const Passed& m) {
     }
   }
   const auto to = parts_.find(m.to);
-  if (m.type == wire::Welcome::kName && to != parts_.end() && to->second.role == Role::kPacker) packer_welcomed_ = true;
-  if (m.type == wire::ControlReply::kName) orders_.erase(m.to);
+  if (m.type == wire::Welcome::kName && m.from == master_ && to != parts_.end() && to->second.role == Role::kPacker)
+    packer_welcomed_ = true;
+  if (const auto reply = read<wire::ControlReply>(m)) on_reply(*reply, m);
+  if (intruders_.contains(m.to) && m.type != wire::Shutdown::kName)
+    fail("intruder", fmt::format("a process without a right to it is sent {}", m.type), m.now_s);
   const auto rows = read<wire::MetricRows>(m);
   if (rows && rows->table == "updates" && !rows->columns.empty()) rows_ += rows->values.size() / rows->columns.size();
 }
@@ -265,9 +299,16 @@ void Checks::look_at_requests(double now_s) {
            fmt::format("{} has had no answer for {:.1f} s, requests from {} on are open", text_of(parts_.at(process)),
                        now_s - *v.open_since_s, v.open.begin()->first),
            now_s);
-  for (const auto& [process, order] : orders_)
-    if (now_s - order.at_s > kOrderAnswers_s && !disturbed(order.at_s - kRecovers_s, now_s))
-      fail("order", "an order has no answer", now_s);
+  for (const auto& [process, asked] : orders_)
+    if (now_s - asked.at_s > kOrderAnswers_s && !disturbed(asked.at_s - kRecovers_s, now_s))
+      fail("order", asked.order.command + " has no answer", now_s);
+  if (epochs_.empty() || now_s - epochs_.front().first < kEpoch_s || disturbed(epochs_.front().first, now_s)) return;
+  for (const auto& [process, v] : viewers_)
+    if (v.pictured && v.epoch < epochs_.front().second)
+      fail("order",
+           fmt::format("{} shows epoch {}, {} began {:.1f} s before", text_of(parts_.at(process)), v.epoch,
+                       epochs_.front().second, now_s - epochs_.front().first),
+           now_s);
 }
 
 void Checks::on_status(const Passed& m, Part part) {
@@ -277,9 +318,7 @@ void Checks::on_status(const Passed& m, Part part) {
     const auto found = status->values.find(name);
     return found == status->values.end() ? 0 : found->second;
   };
-  if (part.role == Role::kPacker) {
-    packer_ = status->values;
-  }
+  if (part.role == Role::kPacker) packer_ = status->values;
   if (part.role != Role::kViewer) return;
   Viewer& v = viewers_.at(m.from);
   v.status = status->values;
@@ -291,14 +330,22 @@ void Checks::on_status(const Passed& m, Part part) {
 
 // ---- what happens ---------------------------------------------------------------------------------------------------
 
-void Checks::on_event(const Event&) {}
+void Checks::on_event(const Event& e) { speaker_ = e; }
 
 void Checks::on_begin(Part part, int process, double) {
+  if (part.number >= kFirstIntruder) {
+    intruder_keys_.insert(text_of(part));
+    return void(intruders_.insert(process));
+  }
   parts_[process] = part;
   if (part.role == Role::kViewer) viewers_[process].process = process;
   if (part.role == Role::kMaster) {
     leases_.clear();
+    master_ = process;
     packer_welcomed_ = false;
+    epochs_.clear();
+    ordered_.clear();
+    session_ = {};
     for (auto& [number, v] : viewers_) v.another_master = true;
   }
   if (part.role == Role::kMaster || part.role == Role::kPacker) published_.clear();
@@ -306,6 +353,7 @@ void Checks::on_begin(Part part, int process, double) {
 
 void Checks::on_end(Part part, int process, double, const std::string&) {
   if (part.role == Role::kViewer) viewers_.erase(process);
+  intruders_.erase(process);
 }
 
 void Checks::on_unexpected(Part part, const std::string& what, double now_s) {
@@ -314,8 +362,17 @@ void Checks::on_unexpected(Part part, const std::string& what, double now_s) {
 
 // Clients of strangers aside, all here say what others expect. What comes faster than a limit allows is refused, too.
 void Checks::on_rejected(Part part, std::string_view socket, const net::Message& message, const std::string& why) {
-  if (strangers_) return;
+  // Who has not heard of another scene yet asks for what the former one had.
+  const bool shows = std::any_of(excuses_.begin(), excuses_.end(), [&](const Event& e) {
+    return e.fault == Fault::kShow && e.at_s <= now_s_ && now_s_ <= e.at_s + lasts_s(scenario_, e);
+  });
+  if (strangers_ || shows || intruder_keys_.contains(message.user)) return;
   fail("rejected", fmt::format("{} refuses {} at {}: {}", text_of(part), message.type, socket, why), now_s_);
+}
+
+// Whether orders have changed a Julia set: it may have left the view, or change for ever.
+bool Checks::reshaped() const {
+  return std::any_of(ordered_.begin(), ordered_.end(), [](const auto& o) { return o.first.starts_with("c."); });
 }
 
 void Checks::on_frame(Part part, SimulatedViewer& viewer, const viewer::DrawnFrame& drawn, double now_s) {
@@ -332,7 +389,7 @@ void Checks::on_frame(Part part, SimulatedViewer& viewer, const viewer::DrawnFra
   if (drawn.epoch.value < v.epoch && !std::exchange(v.another_master, false))
     fail("backwards", fmt::format("{} shows epoch {} after {}", text_of(part), drawn.epoch.value, v.epoch), now_s);
   v.epoch = drawn.epoch.value;
-  if (drawn.empty && drawn.cached == 0 && v.pictured)
+  if (drawn.empty && drawn.cached == 0 && v.pictured && !reshaped())
     fail("blank", fmt::format("{} has no picture any more", text_of(part)), now_s);
   v.pictured = v.pictured || !drawn.empty;
 }
@@ -349,25 +406,74 @@ void Checks::at_rest(Session& session) {
       fail("request", name + " has no picture at the end of the calm", now_s);
       continue;
     }
-    if (const uint64_t had = sequences_.empty() ? 0 : sequences_.front().second; v.status["sequence"] < double(had))
+    const uint64_t had = sequences_.empty() || is_volume(session.show()) ? 0 : sequences_.front().second;
+    if (v.status["sequence"] < double(had))
       fail("behind", fmt::format("{} has events up to {} of {}", name, v.status["sequence"], had), now_s);
-    if (surface_of(scenario_.show) && v.status["buffers"] == 0 &&
+    if (surface_of(session.show()) && v.status["buffers"] == 0 &&
         !(v.status["digests_equal"] > v.digests_equal_at_calm))
       fail("replica", fmt::format("no digest of {} was compared in the calm", name), now_s);
   }
   if (packer_["log_bytes"] > scenario_.log_limit_mb * 1.1e6 + kMostForgets)
     fail("limit", fmt::format("the packer's log has {} bytes", packer_["log_bytes"]), now_s);
+  const std::string kind = fact_of(session_, "kind"), scene = kind == "julia" ? kind : fact_of(session_, "scene");
+  if (session.show() != Show::kMesh && scene != kShowNames[size_t(session.show())])
+    fail("scene", fmt::format("the session shows \"{}\"", scene), now_s);
+  if (!intruders_.empty()) fail("intruder", "a process whose key is not of its role goes on", now_s);
+  if (!strangers_) look_at_orders(session), look_at_status(session);
   look_at_late_rays(session);
   compare_pictures(session);
 }
 
 // Where displays wait for updates, heads stand later.
 void Checks::look_at_late_rays(const Session& session) {
+  const bool waits =
+      std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.status.at("coupling") != 0; });
   const double views = double(late_rays_) / double(scenario_.width * scenario_.height);
-  if (scenario_.settings.steering && scenario_.coupling.mode == viewer::CouplingMode::kAsync &&
+  const bool forgets = scenario_.settings.obsolete_after_s > 0;  // looks from beside, which come again
+  if (scenario_.settings.steering && !waits && !forgets && !reshaped() &&
       views > kMostLateViews * double(viewers_.size()))
     fail("standing", fmt::format("rays of {:.1f} views are cast for {} heads that stand", views, viewers_.size()),
          session.now_s());
+}
+
+// Who takes part, as the master told it last.
+void Checks::look_at_status(const Session& session) {
+  const auto status = nlohmann::json::parse(status_, nullptr, false);
+  if (!status.is_object()) return;
+  std::map<std::string, int> alive;
+  for (const auto& p : status["processes"]) alive[p["role"]] += p["alive"].get<bool>();
+  for (const Role role : {Role::kData, Role::kPacker, Role::kSampler, Role::kViewer}) {
+    const std::string name(kRoleNames[size_t(role)]);
+    if (alive[name] != session.count(role))
+      fail("order", fmt::format("status has {} of the role {}, {} run", alive[name], name, session.count(role)),
+           session.now_s());
+    if (const std::string lacks = status["lacks"]; session.count(role) > 0 && lacks.find(name) != std::string::npos)
+      fail("order", fmt::format("status lacks {}, {} run", lacks, session.count(role)), session.now_s());
+  }
+}
+
+// What was ordered last is what the master tells, and what viewers were told.
+void Checks::look_at_orders(Session& session) {
+  const auto told = [](const wire::Welcome& w, const std::string& name) {
+    if (name == "volume.layers") return fmt::format("{}", w.settings.layers);
+    if (const auto number = w.parameters.find(name); number != w.parameters.end())
+      return fmt::format("{}", number->second);
+    const std::string fact = fact_of(w, name == "clip" ? scene::kClipOrderFact : name);
+    return fact.empty() ? "off" : fact;
+  };
+  for (const auto& [name, o] : ordered_)
+    if (!o.value.empty() && told(session_, name) != o.value)
+      fail("order", fmt::format("{} was ordered to be {} and is {}", name, o.value, told(session_, name)),
+           session.now_s());
+  for (const auto& [process, v] : viewers_) {
+    SimulatedViewer* const viewer = session.viewer(parts_.at(process).number);
+    const auto known = viewer ? viewer->session() : nullptr;
+    if (!known || known->epoch != session_.epoch) continue;
+    for (const auto& [name, o] : ordered_)
+      if (told(*known, name) != told(session_, name))
+        fail("order", fmt::format("{} takes {} for {}", text_of(parts_.at(process)), name, told(*known, name)),
+             session.now_s());
+  }
 }
 
 namespace {
@@ -434,10 +540,13 @@ Compared compare(const image::View& view, const image::View& truth) {
 
 // Holes and errors of the last frames, against the truth.
 void Checks::compare_pictures(Session& session) {
-  const auto surface = surface_of(scenario_.show);
-  const auto clip = clip_.empty() ? Result<geometry::Clip>(geometry::Clip{}) : geometry::clip_from_text(clip_);
+  const auto surface = surface_of(session.show());
+  const auto clip = geometry::clip_from_text(fact_of(session_, scene::kClipFact));
   outcome_.holes = outcome_.psnr_db = -1;
-  if (!surface || !clip) return;
+  // A surface that comes back after other data is sampled as the mesh of its chunks, which is not the surface.
+  const bool changed = std::any_of(scenario_.events.begin(), scenario_.events.end(),
+                                   [](const Event& e) { return e.fault == Fault::kShow && !surface_of(e.show); });
+  if (!surface || !clip || changed) return;
   for (int n = 0; n < 6; ++n) {
     SimulatedViewer* const v = session.viewer(n);
     if (!v || v->view().colour.empty()) continue;
@@ -446,12 +555,12 @@ void Checks::compare_pictures(Session& session) {
     const auto truth = render_surface(*surface, fine, image::Shading({}, fine), *clip);
     const Compared c = compare(v->view(), truth);
     if (n == 0) outcome_.holes = c.holes, outcome_.psnr_db = c.psnr_db;
+    const double most = (session.show() == Show::kBars ? 4 : clip->empty() ? 1 : 2) * kMostHoles;  // edges of a cut
     if (scenario_.settings.steering && c.whole > 60 &&
-        (c.holes > (scenario_.show == Show::kBars ? 4 : 1) * kMostHoles || c.wrong > kMostWrong ||
-         c.psnr_db < kLeast_dB[size_t(scenario_.show)]))
+        (c.holes > most || c.wrong > kMostWrong || c.psnr_db < kLeast_dB[size_t(session.show())]))
       fail("standing",
            fmt::format("viewer-{} of {} sees {:.1f} % holes, {:.1f} % in another colour, and {:.1f} dB after the calm",
-                       n, kShowNames[size_t(scenario_.show)], c.holes * 100, c.wrong * 100, c.psnr_db),
+                       n, kShowNames[size_t(session.show())], c.holes * 100, c.wrong * 100, c.psnr_db),
            session.now_s());
   }
 }
@@ -460,7 +569,7 @@ void Checks::compare_pictures(Session& session) {
 // counts them as lost: sessions with such faults are left out.
 void Checks::at_end(const std::string& folder, double now_s) {
   const bool whole = std::none_of(scenario_.events.begin(), scenario_.events.end(), [](const Event& e) {
-    return !is_order(e.fault) && e.fault != Fault::kSlowWork && e.fault != Fault::kSlowLink;
+    return e.fault != Fault::kOrder && e.fault != Fault::kSlowWork && e.fault != Fault::kSlowLink;
   });
   if (folder.empty() || outcome_.failure || !whole) return;
   std::ifstream file(folder + "/updates.csv");

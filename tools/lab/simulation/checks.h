@@ -27,7 +27,9 @@ inline constexpr std::string_view kCheckNames[] = {
     "blank",      // a display has no picture though it had one
     "limit",      // a model, a log or a queue is larger than its limit
     "standing",   // a standing head sees holes or errors, or its rays go on
-    "order",      // an order gets no answer
+    "order",      // an order gets no answer, is not carried out, or not refused though it is wrong
+    "scene",      // the session shows another scene than its data servers have
+    "intruder",   // a process whose key is not of its role is told anything of the session, or goes on
     "rejected",   // a process rejects a message that none of ours may send
     "exit",       // a process ends that nothing told to end
     "record",     // an update is not in the record once
@@ -92,7 +94,8 @@ class Checks final : public Observer {
   };
   struct Asked {
     double at_s = 0;
-    std::string text;
+    wire::Control order;
+    Event speaker;
   };
   void fail(std::string_view check, const std::string& text, double now_s);
   void digest(const Passed& m);
@@ -106,7 +109,12 @@ class Checks final : public Observer {
   void on_status(const Passed& m, Part part);
   void answered(int process, InstanceId viewer, RequestId request, double now_s);
   void look_at_requests(double now_s);
+  bool reshaped() const;
   void look_at_late_rays(const Session& session);
+  void look_at_status(const Session& session);
+  void on_reply(const wire::ControlReply& reply, const Passed& m);
+  void on_welcome(const wire::Welcome& welcome, double now_s);
+  void look_at_orders(Session& session);
   void compare_pictures(Session& session);
   bool disturbed(double from_s, double until_s) const;
   bool delayed(double from_s, double until_s) const;
@@ -121,13 +129,25 @@ class Checks final : public Observer {
   std::map<uint64_t, std::pair<uint64_t, uint64_t>> leases_;  // lease: frame and tile, of this master
   std::set<std::pair<uint64_t, uint64_t>> updates_;           // rows of updates that viewers sent
   std::map<int, Asked> orders_;                               // by process of who asked
-  std::map<std::string, double> packer_;                      // its newest status
+  struct Ordered {
+    double at_s = 0;
+    std::string value;  // empty: not known
+  };
+  std::map<std::string, Ordered> ordered_;          // what orders changed
+  std::deque<std::pair<double, uint64_t>> epochs_;  // that this master told, and when
+  wire::Welcome session_;                           // as it told last
+  std::set<int> intruders_;                         // that run
+  std::set<std::string> intruder_keys_;
+  double scene_since_s_ = 0;
+  std::map<std::string, double> packer_;  // its newest status
+  std::string status_;                    // in the last second, as JSON
   double looked_s_ = 0, now_s_ = 0;
   uint64_t late_rays_ = 0;
+  int master_ = -1;                                    // the process of the newest
   std::deque<std::pair<double, uint64_t>> sequences_;  // that the packer had, and when
   uint64_t rows_ = 0;                                  // of updates, that came to the master
   bool strangers_ = false, rests_ = false, packer_welcomed_ = false;
-  std::string clip_;  // in force
+  Event speaker_;  // who speaks is begun by it
 };
 
 }  // namespace telesplat::simulation

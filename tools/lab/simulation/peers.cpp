@@ -7,26 +7,24 @@ namespace telesplat::simulation {
 namespace {
 
 ProcessOptions attached(bool keys, const Event& e) {
-  ProcessOptions out;
-  if (keys)
-    out.key = Identity{is_order(e.fault) ? "operator" : "stranger",
-                       is_order(e.fault) ? net::Role::kOperator : net::Role::kViewer};
-  return out;
+  if (!keys) return {};
+  const bool orders = e.fault == Fault::kOrder, data = e.fault == Fault::kImpostor && e.b.role == Role::kData;
+  return {.key = Identity{orders ? "operator" : "stranger", orders ? net::Role::kOperator
+                                                            : data ? net::Role::kData
+                                                                   : net::Role::kViewer}};
 }
 
-wire::Control order_of(const Event& e) {
-  const int n = int(e.amount);
-  switch (e.fault) {
-    case Fault::kClip:
-      return {"clip", {{"clip", n == 0 ? "off" : n == 1 ? "plane x>=40%" : "plane y<=60%"}}};
-    case Fault::kCoupling:
-      if (n < 2) return {"coupling", {{"coupling", n == 0 ? "async" : "sync"}}};
-      return {"coupling", {{"coupling", "loose"}, {"buffers", std::to_string(n)}}};
-    case Fault::kStatus:
-      return {"status", {}};
-    default:
-      return {"epoch", {}};
-  }
+// The hello that was heard last, or a new one under the name; a data server's volume lacks all that makes one.
+std::string hello_of(const Event& e, const std::string& name, const Heard& heard, Dice& dice) {
+  const auto said = heard.hellos.find(std::string(kRoleNames[size_t(e.b.role)]));
+  if (e.amount == 1 && e.b.role != Role::kData && said != heard.hellos.end()) return said->second;
+  wire::Hello hello;
+  hello.role = kRoleNames[size_t(e.b.role)];
+  hello.name = e.b.role == Role::kData ? "data-9" : name;
+  if (e.b.role == Role::kData) hello.facts["kind"] = "volume";
+  hello.instance = {dice.bits() >> 11 | 1};
+  hello.pid = 1;
+  return wire::encode(hello);
 }
 
 }  // namespace
@@ -39,7 +37,9 @@ void Heard::listen(const Passed& m) {
   (state ? to_packer : to_master)[std::string(m.type)] = body;
   if (m.type != wire::Hello::kName) return;
   const auto hello = wire::decode<wire::Hello>(m.body);
-  if (hello && hello->role == "packer") packer_state = hello->endpoints.at("state");
+  if (!hello) return;
+  hellos[hello->role] = body;
+  if (hello->role == "packer" && hello->endpoints.contains("state")) packer_state = hello->endpoints.at("state");
 }
 
 Session::Peer::Peer(SimulatedNetwork& network, int process, bool keys, const Event& e)
@@ -50,12 +50,7 @@ void Session::Peer::speak(const Event& e, const std::string& name, const Heard& 
   if (to_packer && heard.packer_state.empty()) return;
   if (!socket_.connect(to_packer ? heard.packer_state : kMasterEndpoint)) return;
   if (e.fault == Fault::kImpostor) {
-    wire::Hello hello;
-    hello.role = kRoleNames[size_t(e.b.role)];
-    hello.name = name;
-    hello.instance = {dice.bits() >> 11 | 1};
-    hello.pid = 1;
-    socket_.send(hello);
+    socket_.send_frames({}, std::string(wire::Hello::kName), hello_of(e, name, heard, dice));
   } else if (e.fault == Fault::kStranger) {
     const auto& words = to_packer ? heard.to_packer : heard.to_master;
     for (int n = 0; n < int(e.amount) && !words.empty(); ++n) {

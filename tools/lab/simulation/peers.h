@@ -15,6 +15,7 @@ namespace telesplat::simulation {
 struct Heard {
   std::map<std::string, std::string> to_master;  ///< bodies, the newest of each type
   std::map<std::string, std::string> to_packer;  ///< to its socket "state"
+  std::map<std::string, std::string> hellos;     ///< the newest of each role
   std::string packer_state;                      ///< its address
   void listen(const Passed& message);
 };

@@ -20,21 +20,22 @@ net::ServiceOptions service_of(const std::string& name) {
   return out;
 }
 
-Result<std::unique_ptr<data::Served>> serve_scene(const Scenario& s) {
+Result<std::unique_ptr<data::Served>> serve_scene(const Surroundings& s) {
   if (s.show == Show::kMesh) {
     data::DataOptions options;
-    options.scene = s.file;
+    options.scene = s.scenario.file;
     options.mesh.use_cache = false;
     return data::open(options, [](const char*, double) {});
   }
   if (const auto surface = surface_of(s.show)) return serve_surface(*surface);
-  return s.show == Show::kJulia ? serve_julia_set() : serve_ball_volume();
+  if (s.show == Show::kJulia) return serve_julia_set();
+  const int parts = s.scenario.data_servers;
+  return serve_ball_volume(s.show == Show::kSeries, s.number % parts, parts);
 }
 
 std::unique_ptr<sampler::Sampler> sample_scene(Show show) {
   if (show == Show::kMesh) return sampler::make_ray_sampler(1);
-  const auto surface = surface_of(show);
-  return surface ? sample_surface(*surface) : nullptr;
+  return sample_surface(surface_of(show).value_or(Surface::kSpheres));
 }
 
 class MasterProgram final : public Program {
@@ -68,7 +69,7 @@ class DataProgram final : public Program {
   static Result<std::unique_ptr<Program>> begin(net::Context& context, const Surroundings& s) {
     auto out = std::make_unique<DataProgram>();
     out->options_ = service_of(s.name);
-    auto served = serve_scene(s.scenario);
+    auto served = serve_scene(s);
     if (!served) return served.error();
     out->served_ = *std::move(served);
     auto made = data::DataService::open(context, *out->served_, out->options_);
@@ -143,8 +144,7 @@ class SamplerProgram final : public Program {
     auto out = std::make_unique<SamplerProgram>();
     out->options_.service = service_of(s.name);
     out->options_.threads = 1;
-    auto meshes = sample_scene(s.scenario.show);
-    if (meshes) meshes = std::make_unique<SlowSampler>(std::move(meshes), s);
+    auto meshes = std::make_unique<SlowSampler>(sample_scene(s.scenario.show), s);
     out->service_ = sampler::SamplerService::open(context, out->options_, std::move(meshes));
     return {std::move(out)};
   }

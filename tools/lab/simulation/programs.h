@@ -26,6 +26,8 @@ class Program {
 
 struct Surroundings {
   const Scenario& scenario;
+  Show show = Show::kSpheres;                 ///< of data servers: what they show
+  int number = 0;                             ///< likewise: which of them it is
   std::string name;                           ///< of the process
   std::string folder;                         ///< of the record; empty: none
   bool first = true;                          ///< its first life

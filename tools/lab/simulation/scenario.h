@@ -17,8 +17,9 @@ namespace telesplat::simulation {
 enum class Role : uint8_t { kMaster, kData, kPacker, kSampler, kViewer };
 inline constexpr std::string_view kRoleNames[] = {"master", "data", "packer", "sampler", "viewer"};
 
-enum class Show : uint8_t { kSpheres, kTerrain, kBars, kJulia, kBall, kMesh };
-inline constexpr std::string_view kShowNames[] = {"spheres", "terrain", "bars", "julia", "ball", "mesh"};
+enum class Show : uint8_t { kSpheres, kTerrain, kBars, kJulia, kBall, kSeries, kMesh };
+inline constexpr std::string_view kShowNames[] = {"spheres", "terrain", "fence", "julia", "ball", "series", "mesh"};
+inline bool is_volume(Show show) { return show == Show::kBall || show == Show::kSeries; }
 
 /// What goes wrong, or what people do.
 enum class Fault : uint8_t {
@@ -33,23 +34,18 @@ enum class Fault : uint8_t {
   kSlowWork,       ///< a tile takes `a` this many times as long, until the calm
   kKillAtMessage,  ///< SIGKILL just before it sends its `amount`-th message from now on
   kDiskFull,       ///< files cannot grow for `amount` s
-  kEpoch,          ///< an order: `telesplat ctl epoch`
-  kClip,           ///< an order: a clip that cuts part of it away, or none (amount 0)
-  kCoupling,       ///< an order: async, sync or loose (amount 0, 1, 2 and more: buffers)
-  kStatus,         ///< an order: `telesplat ctl status`
+  kOrder,          ///< `telesplat ctl`: Event::order; amount 1: one that must be refused
+  kShow,           ///< the data servers are killed, and after `amount` s others come with Event::show
   kLeave,          ///< viewer or sampler leaves for good
   kJoin,           ///< one more of role `a`
   kStranger,       ///< a peer without a part sends valid messages of any kind to `a`, `amount` of them
-  kImpostor,       ///< a peer says hello as role `b` under a name that is in use, and falls silent
+  kImpostor,  ///< a peer says hello as role `b` under a name that is in use, and falls silent; amount 1: as the very
+              ///< process that was heard last; kData: with a volume that is none
+  kIntruder,  ///< a process of role `a` begins whose key is of role `b`, or (kMaster) no key
 };
 inline constexpr std::string_view kFaultNames[] = {
-    "kill", "terminate", "stop", "break",    "silence", "isolate", "clock-step", "slow-link", "slow-work", "kill-at",
-    "full", "epoch",     "clip", "coupling", "status",  "leave",   "join",       "stranger",  "impostor"};
-
-/// An order that a person gives.
-inline bool is_order(Fault f) {
-  return f == Fault::kEpoch || f == Fault::kClip || f == Fault::kCoupling || f == Fault::kStatus;
-}
+    "kill",    "terminate", "stop",  "break", "silence", "isolate", "clock-step", "slow-link", "slow-work",
+    "kill-at", "full",      "order", "show",  "leave",   "join",    "stranger",   "impostor",  "intruder"};
 
 /// A part of a session: a role, and which one of it, from 0.
 struct Part {
@@ -58,13 +54,17 @@ struct Part {
   auto operator<=>(const Part&) const = default;
 };
 std::string text_of(Part part);
+inline constexpr int kFirstIntruder = 10;  ///< Part::number of those whose key is not of their role
 
 struct Event {
   double at_s = 0;
   Fault fault = Fault::kKill;
   Part a, b;
   double amount = 0;
+  std::string order = {};  ///< the command and its arguments: "set|c.y=0.3"
+  Show show = Show::kSpheres;
 };
+wire::Control order_of(const Event& event);
 /// "12.345 kill sampler-1 0.5".
 std::string text_of(const Event& event);
 
@@ -79,6 +79,7 @@ struct Scenario {
   std::string file;                         ///< of Show::kMesh
   std::vector<geometry::Trajectory> heads;  ///< of the first viewers; those of others are drawn
   int samplers = 2, viewers = 1;
+  int data_servers = 1;         ///< each has a part of a volume, or all of another scene
   int width = 48, height = 36;  ///< of a display, pixels
   double display_hz = 20;
   viewer::CouplingState coupling;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/core/check.h"
+#include "common/net/keys/roles.h"
 #include "common/scene/session.h"
 #include "tools/lab/simulation/peers.h"
 
@@ -17,25 +18,13 @@ constexpr double kTurn_s = 40e-6, kPacks_s = 300e-6;  // what a turn takes, and 
 constexpr double kRestart_s = 0.3;
 constexpr double kBootTime_s = 1000;
 
-net::Role key_of(Role role) {
-  switch (role) {
-    case Role::kData:
-      return net::Role::kData;
-    case Role::kPacker:
-      return net::Role::kPacker;
-    case Role::kSampler:
-      return net::Role::kSampler;
-    case Role::kViewer:
-      return net::Role::kViewer;
-    default:
-      return net::Role::kServer;
-  }
-}
+net::Role key_of(Role role) { return net::role_named(kRoleNames[size_t(role)]).value_or(net::Role::kServer); }
 
 }  // namespace
 
 Session::Session(const Scenario& scenario, std::vector<Observer*> observers, std::string folder)
     : scenario_(scenario),
+      show_(scenario.show),
       observers_(std::move(observers)),
       folder_(std::move(folder)),
       dice_(scenario.seed ^ 0x73657373),
@@ -53,7 +42,7 @@ Session::Session(const Scenario& scenario, std::vector<Observer*> observers, std
   };
   network_.set_links(scenario_.links);
   add({Role::kMaster, 0}, 0);
-  add({Role::kData, 0}, dice_.between(0, 0.5));
+  for (int n = 0; n < scenario_.data_servers; ++n) add({Role::kData, n}, dice_.between(0, 0.5));
   add({Role::kPacker, 0}, dice_.between(0, 0.5));
   for (int n = 0; n < scenario_.samplers; ++n) add({Role::kSampler, n}, dice_.between(0, 0.5));
   for (int n = 0; n < scenario_.viewers; ++n) add({Role::kViewer, n}, dice_.between(0, 0.8));
@@ -105,9 +94,10 @@ void Session::add(Part part, double starts_s) {
   if (!scenario_.one_machine) p->offset_s = dice_.between(0, 1e5), p->drift = dice_.between(-60e-6, 60e-6);
   p->starts_s = starts_s;
   if (part.role == Role::kViewer)
-    heads_.push_back(heads_.size() < scenario_.heads.size()
-                         ? scenario_.heads[heads_.size()]
-                         : draw_head(scenario_.seed + uint64_t(part.number), scenario_.duration_s - scenario_.calm_s));
+    heads_[part.number] =
+        size_t(part.number) < scenario_.heads.size()
+            ? scenario_.heads[size_t(part.number)]
+            : draw_head(scenario_.seed + uint64_t(part.number), scenario_.duration_s - scenario_.calm_s);
   processes_.push_back(std::move(p));
 }
 
@@ -122,13 +112,16 @@ void Session::begin(Process& p) {
   options.run = [this, &p, number = p.number](const std::function<void()>& what) {
     if (p.number == number && p.program) run_as(p, what);
   };
-  if (scenario_.keys) options.key = Identity{p.name, key_of(p.part.role)};
+  const Role key_role = p.key_of.value_or(p.part.role);
+  if (p.key_of ? key_role != Role::kMaster : scenario_.keys) options.key = Identity{p.name, key_of(key_role)};
   p.context = std::make_unique<net::Context>(network_.attach(p.number, std::move(options)));
   link(p);
   for (Observer* o : observers_) o->on_begin(p.part, p.number, now_s_);
   run_as(p, [&] {
     auto made = make_program(p.part.role, *p.context,
                              {.scenario = scenario_,
+                              .show = show_,
+                              .number = p.part.number,
                               .name = p.name,
                               .folder = folder_,
                               .first = first,
@@ -178,8 +171,9 @@ void Session::ended(Process& p) {
   });
   for (Observer* o : observers_) {
     o->on_end(p.part, p.number, now_s_, "ended");
-    if (code != 0) o->on_unexpected(p.part, "exit code " + std::to_string(code), now_s_);
+    if (code != 0 && !p.key_of) o->on_unexpected(p.part, "exit code " + std::to_string(code), now_s_);
   }
+  p.gone = p.gone || p.key_of;
   if (!p.gone && !ends_ && !p.starts_s) p.starts_s = now_s_ + kRestart_s;
 }
 
@@ -210,7 +204,7 @@ void Session::display(Process& p) {
   if (v.over()) p.ready = true;
 }
 
-geometry::Pose Session::head(int viewer) const { return heads_.at(size_t(viewer)).at(now_s_); }
+geometry::Pose Session::head(int viewer) const { return heads_.at(viewer).at(now_s_); }
 
 SimulatedViewer* Session::viewer(int number) {
   for (auto& p : processes_)
@@ -223,7 +217,7 @@ bool Session::runs(Part part) const {
 }
 int Session::count(Role role) const {
   return int(std::count_if(processes_.begin(), processes_.end(),
-                           [&](const auto& p) { return p->part.role == role && !p->gone; }));
+                           [&](const auto& p) { return p->part.role == role && !p->gone && !p->key_of; }));
 }
 
 // ---- the loop -------------------------------------------------------------------------------------------------------
@@ -307,7 +301,7 @@ void Session::passed(const Passed& m) {
     }
     if (m.type == wire::TileDone::kName) spend(kPacks_s);
     const bool sampled =
-        m.type == wire::SliceImages::kName || (m.type == wire::DepthTile::kName && scenario_.show == Show::kJulia);
+        m.type == wire::SliceImages::kName || (m.type == wire::DepthTile::kName && show_ == Show::kJulia);
     if (sampled) spend(scenario_.tile_s * current_->slowness);
   }
   heard_->listen(m);
@@ -331,44 +325,23 @@ void Session::apply(const Event& e) {
   const auto found = std::find_if(processes_.begin(), processes_.end(), [&](const auto& p) { return p->part == e.a; });
   Process* const a = found == processes_.end() ? nullptr : found->get();
   const bool runs = a && a->program;
-  switch (e.fault) {
-    case Fault::kKill:
-      if (runs) kill(*a, "killed"), a->starts_s = now_s_ + e.amount;
-      return;
-    case Fault::kTerminate:
-      if (runs) a->told_to_stop = a->ready = true;
-      return;
-    case Fault::kKillAtMessage:
-      if (runs) a->killed_after = e.amount;
-      return;
-    case Fault::kStop:
-      if (!runs || a->stopped) return;
-      network_.stop(a->number);
-      a->stopped = true, a->goes_on_s = now_s_ + e.amount;
-      return;
-    case Fault::kClockStep:
-      for (auto& p : processes_)
-        if (p.get() == a || scenario_.one_machine) p->offset_s += e.amount;
-      return;
-    case Fault::kSlowWork:
-      if (a) a->slowness = e.amount;
-      return;
-    case Fault::kDiskFull:
-      return fill_disk(e.amount);
-    case Fault::kLeave:
-      return leave(e.a);
-    case Fault::kJoin:
-      return join(e.a.role);
-    case Fault::kStranger:
-    case Fault::kImpostor:
-    case Fault::kEpoch:
-    case Fault::kClip:
-    case Fault::kCoupling:
-    case Fault::kStatus:
-      return speak(e);
-    default:
-      return trouble_links(e);
-  }
+  using enum Fault;
+  const Fault f = e.fault;
+  if (f == kKill && runs) kill(*a, "killed"), a->starts_s = now_s_ + e.amount;
+  if (f == kTerminate && runs) a->told_to_stop = a->ready = true;
+  if (f == kKillAtMessage && runs) a->killed_after = e.amount;
+  if (f == kStop && runs && !a->stopped) network_.stop(a->number), a->stopped = true, a->goes_on_s = now_s_ + e.amount;
+  if (f == kClockStep)
+    for (auto& p : processes_)
+      if (p.get() == a || scenario_.one_machine) p->offset_s += e.amount;
+  if (f == kSlowWork && a) a->slowness = e.amount;
+  if (f == kDiskFull) fill_disk(e.amount);
+  if (f == kLeave) leave(e.a);
+  if (f == kJoin) join(e.a.role);
+  if (f == kIntruder) join(e.a.role, e.b.role);
+  if (f == kShow) change_show(e);
+  if (f == kStranger || f == kImpostor || f == kOrder) speak(e);
+  if (f == kBreak || f == kSilence || f == kIsolate || f == kSlowLink) trouble_links(e);
 }
 
 void Session::trouble_links(const Event& e) {
@@ -401,10 +374,23 @@ void Session::leave(Part part) {
     }
 }
 
-void Session::join(Role role) {
-  const int number =
-      int(std::count_if(processes_.begin(), processes_.end(), [&](const auto& p) { return p->part.role == role; }));
-  if (number < 6) add({role, number}, now_s_);
+void Session::join(Role role, std::optional<Role> key_of) {
+  const auto is_one = [&](const auto& p) {
+    return p->part.role == role && p->key_of.has_value() == key_of.has_value();
+  };
+  const int number = int(std::count_if(processes_.begin(), processes_.end(), is_one));
+  if (number >= 6 || (key_of == Role::kMaster && !scenario_.keys)) return;
+  add({role, key_of ? kFirstIntruder + number : number}, now_s_);
+  processes_.back()->key_of = key_of;
+}
+
+void Session::change_show(const Event& e) {
+  show_ = e.show;
+  for (auto& p : processes_) {
+    if (p->part.role != Role::kData || p->key_of) continue;
+    if (p->program) kill(*p, "killed");
+    p->starts_s = now_s_ + e.amount;
+  }
 }
 
 // Files cannot grow while the disk is full; the process that simulates must be of its own.

@@ -54,6 +54,8 @@ class Session final : public World {
   /// Null: it does not run.
   SimulatedViewer* viewer(int number);
   bool runs(Part part) const;
+  /// What the data servers show now.
+  Show show() const { return show_; }
   /// How many of a role have a part, running or about to.
   int count(Role role) const;
   geometry::Pose head(int viewer) const;
@@ -82,6 +84,7 @@ class Session final : public World {
     net::Wait wait;
     double wake_s = 0, busy_until_s = 0, cpu_s = 0, slowness = 1;
     bool ready = false, stopped = false, told_to_stop = false, gone = false, dies = false;
+    std::optional<Role> key_of;                               // of an intruder: the role of its key
     std::optional<double> starts_s, goes_on_s, killed_after;  // killed_after: messages
     double next_frame_s = 0;
   };
@@ -97,7 +100,8 @@ class Session final : public World {
   void apply(const Event& event);
   void trouble_links(const Event& event);
   void speak(const Event& event);
-  void join(Role role);
+  void join(Role role, std::optional<Role> key_of = {});
+  void change_show(const Event& event);
   void leave(Part part);
   void begin_calm();
   void fill_disk(double for_s);
@@ -106,13 +110,14 @@ class Session final : public World {
   void link(Process& p);
 
   const Scenario scenario_;
+  Show show_;
   const std::vector<Observer*> observers_;
   const std::string folder_;
   Dice dice_;
   SimulatedNetwork network_;
   std::vector<std::unique_ptr<Process>> processes_;
-  std::vector<Part> lives_;  // by number on the network
-  std::vector<geometry::Trajectory> heads_;
+  std::vector<Part> lives_;                    // by number on the network
+  std::map<int, geometry::Trajectory> heads_;  // by number of the viewer
   Process* current_ = nullptr;
   double now_s_ = 0, spent_s_ = 0;
   size_t next_event_ = 0;

@@ -22,6 +22,7 @@ class SimulatedViewer {
   std::optional<viewer::DrawnFrame> frame(const geometry::Pose& head);
   /// The session ends, and its worker was told to.
   bool over() const { return worker_->shutdown_requested(); }
+  std::shared_ptr<const wire::Welcome> session() const { return worker_->session(); }
   InstanceId instance() const { return worker_->instance(); }
   const image::View& view() const { return view_; }
   const geometry::Camera& camera() const { return camera_; }

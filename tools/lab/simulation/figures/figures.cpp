@@ -242,12 +242,13 @@ std::vector<Walk> standard_walks() {
                                           {6, Fault::kLeave, {Role::kSampler, 1}, {}, 0}})},
       {"spheres-another-master", disturbed(kSpheres, along(), {{3, Fault::kKill, {Role::kMaster, 0}, {}, 0.5}})},
       {"spheres-epoch-on-a-slow-link",
-       with(disturbed(kSpheres, turning(), {{3.2, Fault::kEpoch, {}, {}, 0}, {6, Fault::kEpoch, {}, {}, 0}}),
+       with(disturbed(kSpheres, turning(),
+                      {{3.2, Fault::kOrder, {}, {}, 0, "epoch"}, {6, Fault::kOrder, {}, {}, 0, "epoch"}}),
             [](Scenario& s) { s.to_viewers = {.latency_s = 0.02, .bytes_s = 1e5}; })},
       {"ball-loose-with-breaks", with(disturbed(kBall, along(),
-                                                {{3, Fault::kEpoch, {}, {}, 0},
+                                                {{3, Fault::kOrder, {}, {}, 0, "epoch"},
                                                  {3.05, Fault::kBreak, {Role::kViewer, 0}, {Role::kPacker, 0}, 0},
-                                                 {5, Fault::kCoupling, {}, {}, 1},
+                                                 {5, Fault::kOrder, {}, {}, 0, "coupling|coupling=sync"},
                                                  {5.5, Fault::kBreak, {Role::kViewer, 0}, {Role::kPacker, 0}, 0}}),
                                       [](Scenario& s) {
                                         s.display_hz = 10, s.coupling = {viewer::CouplingMode::kLoose, 3};

@@ -156,14 +156,15 @@ uint32_t rounded(const glm::dvec3& colour) {
 
 class SurfaceSampler final : public sampler::Sampler {
  public:
-  explicit SurfaceSampler(const SurfaceParts& surface) : surface_(surface), held_(surface.chunks.size(), false) {}
+  explicit SurfaceSampler(const SurfaceParts& surface) : surface_(&surface) {}
 
   const char* name() const override { return "ray"; }
   Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) override {
     const auto held = sampler::hold(id, std::move(chunk));
     if (!held) return held.error();
-    if (id.value < held_.size())
-      held_[size_t(id.value)] = held->view.box_room == surface_.chunks[size_t(id.value)].box_room;
+    boxes_[size_t(id.value)] = held->view.box_room;
+    for (const Surface other : {Surface::kSpheres, Surface::kTerrain, Surface::kFence})
+      if (!fits(*surface_) && fits(parts_of(other))) surface_ = &parts_of(other);
     return ok_status();
   }
   Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override {
@@ -172,22 +173,20 @@ class SurfaceSampler final : public sampler::Sampler {
       if (const Status s = add_chunk(id, std::move(bytes)); !s) refusals.add(s.error());
     return refusals.status();
   }
-  void remove_chunk(ChunkId id) override {
-    if (id.value < held_.size()) held_[size_t(id.value)] = false;
-  }
+  void remove_chunk(ChunkId id) override { boxes_.erase(size_t(id.value)); }
   void set_colours(std::shared_ptr<const scene::ColourTable>) override {}
   void set_clip(const geometry::Clip& clip) override { clip_ = clip; }
 
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
                            const image::PixelMask* mask) override {
     image::DepthImage out(tile.width, tile.height);
-    const Rays rays(surface_, camera, tile, clip_);
+    const Rays rays(*surface_, camera, tile, clip_);
     for (int y = 0; y < tile.height; ++y)
       for (int x = 0; x < tile.width; ++x) {
         if (mask && !mask->at(x, y)) continue;
         const glm::dvec3 direction = rays.direction(x, y);
         const Hit hit = rays.trace(direction);
-        if (!hit.part || !held_[hit.part->chunk]) continue;
+        if (!hit.part || !holds(*surface_, hit.part->chunk)) continue;
         const glm::dvec3 p = rays.at(direction, hit.depth_m);
         const size_t pixel = size_t(y) * size_t(tile.width) + size_t(x);
         out.depth[pixel] = image::encode_depth(hit.depth_m, camera.near_m);
@@ -198,8 +197,17 @@ class SurfaceSampler final : public sampler::Sampler {
   }
 
  private:
-  const SurfaceParts& surface_;
-  std::vector<bool> held_;  // by chunk
+  bool holds(const SurfaceParts& surface, size_t chunk) const {
+    const auto box = boxes_.find(chunk);
+    return box != boxes_.end() && chunk < surface.chunks.size() && box->second == surface.chunks[chunk].box_room;
+  }
+  // Some chunks of two surfaces have the same box.
+  bool fits(const SurfaceParts& surface) const {
+    return std::all_of(boxes_.begin(), boxes_.end(), [&](const auto& b) { return holds(surface, b.first); });
+  }
+
+  const SurfaceParts* surface_;
+  std::map<size_t, geometry::Box> boxes_;  // of held chunks
   geometry::Clip clip_;
 };
 

@@ -26,9 +26,10 @@ enum class Surface {
 /// starts no thread.
 std::unique_ptr<data::Served> serve_surface(Surface surface);
 
-/// A sampler of the surface, for MeshTiles in place of the ray sampler. It refuses chunks that do not validate. A pixel
-/// is empty where its ray's first hit belongs to a chunk that is not held, or that has another box than the surface's
-/// chunk: nothing behind the hit is shown. Colours of arrays are ignored.
+/// A sampler of the surface, for MeshTiles in place of the ray sampler. Once it is given a chunk of another surface it
+/// samples that one. It refuses chunks that do not validate. A pixel is empty where its ray's first hit belongs to a
+/// chunk that is not held, or that has another box than the surface's chunk: nothing behind the hit is shown. Colours
+/// of arrays are ignored.
 std::unique_ptr<sampler::Sampler> sample_surface(Surface surface);
 
 /// What `camera` sees of all chunks, shaded with unquantised normals: the truth that pictures are compared with. Depth
