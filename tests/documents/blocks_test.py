@@ -43,9 +43,11 @@ class Blocks(unittest.TestCase):
             blocks.blocks("```\ntelesplat run\n")
 
     def test_runs_are_short_and_small_unless_they_say_otherwise(self):
-        self.assertEqual(run_blocks.shortened("telesplat run a"), "telesplat run a --duration 1.5 --size 320x240")
+        self.assertEqual(run_blocks.shortened("telesplat run a"), "telesplat run a --duration 0.7 --size 320x240")
         self.assertEqual(run_blocks.shortened("telesplat run a --duration=60 --size 9x9"),
-                         "telesplat run a --duration 1.5 --size 9x9")
+                         "telesplat run a --duration 0.7 --size 9x9")
+        self.assertEqual(run_blocks.shortened("telesplat run a --size 2560x800 --verify 20"),
+                         "telesplat run a --size 320x100 --verify 100 --duration 0.7")
 
 
 class Pages(unittest.TestCase):

@@ -1,6 +1,7 @@
 """Data sets under the names that the pages use. They are small and made up; each is made when a command names it."""
 
 import gzip
+import math
 import os
 import struct
 import subprocess
@@ -12,8 +13,8 @@ class Files:
     def __init__(self, programs, folder):
         self._programs, self._folder = programs, folder
         self._makers = {
-            "MY.ply": self._terrain,
-            "crater.ply": self._terrain,
+            "MY.ply": _terrain,
+            "crater.ply": _terrain,
             "bonsai.nii.gz": self._nifti,
             "head.nrrd": lambda path: self._volume(path, 48, 16),
             "foot.raw": lambda path: self._volume(path, 256, 8),
@@ -38,8 +39,6 @@ class Files:
     def _run(self, program, *arguments):
         subprocess.run([os.path.join(self._programs, program), *arguments], check=True, stdout=subprocess.DEVNULL)
 
-    def _terrain(self, path):
-        self._run("make-terrain", "--triangles", "20000", "-o", path)
 
     def _volume(self, path, size, bits, seed=1):
         self._run("make-volume", "--size", str(size), "--bits", str(bits), "--seed", str(seed), "-o", path)
@@ -77,6 +76,24 @@ class Files:
             part = voxels[z * size * size * 2 : (z + 1) * size * size * 2]
             with open(f"{path}/slice{z:03}.dcm", "wb") as file:
                 file.write(_dicom_slice(size, z, part))
+
+
+def _terrain(path, cells=100):
+    """2 * cells^2 triangles of a coloured, bumpy land in z, as binary PLY."""
+    side = cells + 1
+    with open(path, "wb") as file:
+        file.write(f"ply\nformat binary_little_endian 1.0\nelement vertex {side * side}\n".encode() +
+                   b"".join(f"property float {axis}\n".encode() for axis in "xyz") +
+                   b"".join(f"property uchar {name}\n".encode() for name in ("red", "green", "blue")) +
+                   f"element face {2 * cells * cells}\nproperty list uchar int vertex_indices\nend_header\n".encode())
+        for y in range(side):
+            for x in range(side):
+                z = 8 * math.sin(x / 9) * math.cos(y / 7) + math.sin(x / 2)
+                file.write(struct.pack("<3f3B", x, y, z, 100 + int(8 * z), 160 - x, 60 + y))
+        for y in range(cells):
+            for x in range(cells):
+                a, b = y * side + x, (y + 1) * side + x
+                file.write(struct.pack("<B3iB3i", 3, a, a + 1, b, 3, a + 1, b + 1, b))
 
 
 def _movement(path):

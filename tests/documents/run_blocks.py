@@ -4,7 +4,8 @@
 A block without a language holds commands. They run in a folder of their own, one after the other, and each must end
 with exit code 0. These things differ from what a person does:
 - data sets with the names that a page uses are small and made up (files.py);
-- runs, and those of sweeps, are short and their displays small, unless the command says otherwise;
+- runs, and those of sweeps, are short, their displays small, and few of their frames are verified; `compare` draws one
+  pose once;
 - windows open on an Xvfb;
 - the addresses of other machines are this machine's;
 - `telesplat ctl` talks to what the last `run` or `view` of its block started, or the command of a comment above the
@@ -40,16 +41,25 @@ SKIPPED = {
 SERVICES = {f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay")}
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
-SECONDS, SIZE = 1.5, "320x240"  # of a run that does not say
+SECONDS, WIDTH, HEIGHT, VERIFY_EVERY = 0.7, 320, 240, 100  # of runs
+
+
+def small(size):
+    """A size of the same shape, at most WIDTH wide."""
+    width, height = (int(n) for n in size.split("x"))
+    times = max(1, -(-width // WIDTH))
+    return f"{width // times}x{height // times}"
 
 
 def shortened(text, seconds=SECONDS):
     """A `telesplat run` or `view`, made short and small."""
+    text = re.sub(r"--verify[ =]\d+", f"--verify {VERIFY_EVERY}", text)
+    text = re.sub(r"--size[ =](\d+x\d+)", lambda found: f"--size {small(found[1])}", text)
     if re.search(r"--duration[ =]", text):
         text = re.sub(r"--duration[ =]\S+", f"--duration {seconds}", text)
     else:
         text += f" --duration {seconds}"
-    return text if re.search(r"--size[ =]|--wall \S+\.toml", text) else f"{text} --size {SIZE}"
+    return text if re.search(r"--size[ =]|--wall \S+\.toml", text) else f"{text} --size {WIDTH}x{HEIGHT}"
 
 
 def shortened_sweep(text):
@@ -57,7 +67,7 @@ def shortened_sweep(text):
     own, behind, flags = text.partition(" -- ")
     if not behind:
         return text  # it goes on
-    return f"{own} --repeat 1 -- {shortened(flags, 1)}"
+    return f"{own} --repeat 1 -- {shortened(flags)}"
 
 
 class Screen:
@@ -175,6 +185,8 @@ class Page:
             self._foreground(where, shortened(text))
         elif program == "telesplat" and verb == "sweep":
             self._foreground(where, shortened_sweep(text))
+        elif program == "telesplat" and verb == "compare" and "--poses" not in text:
+            self._foreground(where, f"{text} --poses 1 --repeat 1")
         elif program == "telesplat" and verb == "ctl":
             self._control(where, text)
         else:
