@@ -15,7 +15,7 @@ namespace {
 using image::DepthImage;
 
 TEST(CodecProperties, RoundTrip) {
-  for (uint32_t seed = 1; seed <= 15; ++seed)
+  for (uint32_t seed = 1; seed <= 8; ++seed)
     for (const DepthImage& image : test::codec_images(seed)) {
       ASSERT_TRUE(test::is_canonical(image));
       const auto back = decode(encode(image), image.width, image.height);
@@ -38,24 +38,23 @@ TEST(CodecProperties, RoundTripOfSeveralTiles) {
 }
 
 TEST(CodecProperties, EveryTruncationIsAnError) {
-  for (uint32_t seed = 1; seed <= 2; ++seed)
-    for (const DepthImage& image : test::codec_images(seed)) {
-      const auto bytes = encode(image);
-      for (size_t length = 0; length < bytes.size(); ++length) {
-        const std::vector<uint8_t> part(
-            bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length));  // its own memory: overruns are seen
-        ASSERT_FALSE(decode(part).ok()) << "seed " << seed << ", " << length << " of " << bytes.size();
-      }
+  for (const DepthImage& image : test::codec_images(1)) {
+    const auto bytes = encode(image);
+    for (size_t length = 0; length < bytes.size(); ++length) {
+      const std::vector<uint8_t> part(
+          bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length));  // its own memory: overruns are seen
+      ASSERT_FALSE(decode(part).ok()) << length << " of " << bytes.size();
     }
+  }
 }
 
 TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
   std::mt19937 random(11);
   size_t refused = 0, accepted = 0;
-  for (uint32_t seed = 1; seed <= 10; ++seed)
+  for (uint32_t seed = 1; seed <= 5; ++seed)
     for (const DepthImage& image : test::codec_images(seed)) {
       const auto bytes = encode(image);
-      for (int trial = 0; trial < 60; ++trial) {
+      for (int trial = 0; trial < 40; ++trial) {
         auto bad = bytes;
         for (uint32_t flips = 1 + random() % 3; flips > 0; --flips)
           bad[random() % bad.size()] ^= static_cast<uint8_t>(1u << random() % 8);
