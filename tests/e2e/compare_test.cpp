@@ -172,90 +172,27 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
     EXPECT_NE(entry.path().extension(), ".part") << entry.path();
 }
 
-// A run folder of one frame, made by hand.
-struct Refusal {
-  std::string name, file, content;     // what is written over one of its files; content "GONE": it is removed
-  std::vector<std::string> arguments;  // instead of none
-  std::string named;                   // what the line must name
-};
-void PrintTo(const Refusal& r, std::ostream* out) { *out << r.name; }
-
-class CompareRefuses : public testing::TestWithParam<Refusal> {};
-
-constexpr const char* kFrames =
-    "viewer,frame,t_s,points_drawn,sequence,px,py,pz,qw,qx,qy,qz\n"
-    "viewer-1,0,0.5,5000,3,0,0,1,1,0,0,0\nviewer-1,1,0.6,5000,4,0,0,1,1,0,0,0\n";
-
-TEST_P(CompareRefuses, WithCodeTwoAndOneLine) {
-  const Refusal& r = GetParam();
+TEST(Compare, RefusesWhatIsNoRunOrEndsTooEarlyInOneLine) {
   TemporaryFolder folder;
   const std::string run = folder / "run";
   fs::create_directory(run);
   write_terrain(folder / "terrain.ply", 4);
-  std::ofstream(run + "/session.toml") << "[session]\noctree_depth = 6\n[[process]]\nrole = \"viewer\"\nname = "
-                                          "\"viewer-1\"\nwidth = \"160\"\nheight = \"100\"\n"
-                                       << "[scene]\nfile = \"" << (folder / "terrain.ply") << "\"\ncache = \""
-                                       << (folder / "cache") << "\"\n[display]\nfov = 90\nnear = 0.02\n";
-  std::ofstream(run + "/frames.csv") << kFrames;
+  std::ofstream(run + "/session.toml") << "[[process]]\nrole = \"viewer\"\nname = \"viewer-1\"\nwidth = \"160\"\n"
+                                       << "height = \"100\"\n[scene]\nfile = \"" << (folder / "terrain.ply")
+                                       << "\"\ncache = \"" << (folder / "cache") << "\"\n";
+  std::ofstream(run + "/frames.csv") << "viewer,frame,t_s,points_drawn,sequence,px,py,pz,qw,qx,qy,qz\n"
+                                        "viewer-1,0,0.5,5000,3,0,0,1,1,0,0,0\n";
   std::ofstream(run + "/points.events") << "TSEVENT2";
-  if (r.content == "GONE")
-    fs::remove(folder / r.file);
-  else if (!r.file.empty())
-    std::ofstream(folder / r.file, std::ios::trunc) << r.content;
-  std::vector<std::string> arguments{"compare", run, "--renderers", "cpu", "--out", folder / "out"};
-  for (const std::string& a : r.arguments) {
-    if (a == "MISSING" || a == "terrain.ply")
-      arguments[1] = folder / a;
-    else
-      arguments.push_back(a);
+  for (const auto& [path, said] :
+       {std::pair{folder / "MISSING", "MISSING: no such file"}, {run, "displayed event 3"}}) {
+    Program compare("telesplat", {"compare", path, "--renderers", "cpu", "--out", folder / "out"}, folder / "log");
+    EXPECT_EQ(compare.wait(60), 2) << compare.err();
+    const std::string err = compare.err();
+    EXPECT_NE(err.find(said), std::string::npos) << err;
+    EXPECT_EQ(err.rfind("telesplat: "), err.rfind('\n', err.size() - 2) + 1) << err;
+    EXPECT_FALSE(fs::exists(folder / "out")) << "a folder was left";
   }
-  Program compare("telesplat", arguments, folder / "log");
-  EXPECT_EQ(compare.wait(60), 2) << compare.err();
-  const std::string err = compare.err();
-  EXPECT_NE(err.find(r.named), std::string::npos) << err;
-  EXPECT_FALSE(fs::exists(folder / "out")) << "a folder was left";
 }
-
-const std::string kHeader = "viewer,frame,t_s,points_drawn,sequence,px,py,pz,qw,qx,qy,qz\n";
-const Refusal kRefusals[] = {
-    {"MissingFolder", "", "", {"MISSING"}, "MISSING: no such file"},
-    {"AFile", "", "", {"terrain.ply"}, "is not a run folder"},
-    {"NoEvents", "run/points.events", "GONE", {}, "points.events"},
-    {"NoSession", "run/session.toml", "GONE", {}, "session.toml"},
-    {"BrokenSession", "run/session.toml", "[session\n", {}, "session.toml:1"},
-    {"NoViewer", "run/session.toml", "[session]\n", {}, "no viewer"},
-    {"HugeDisplay",
-     "run/session.toml",
-     "[[process]]\nrole = \"viewer\"\nname = \"viewer-1\"\nwidth = \"99999999\"\nheight = \"10\"\n",
-     {},
-     "99999999"},
-    {"NoSceneNamed",
-     "run/session.toml",
-     "[[process]]\nrole = \"viewer\"\nname = \"viewer-1\"\nwidth = \"160\"\nheight = \"100\"\n",
-     {},
-     "--scene"},
-    {"NoFrames", "run/frames.csv", "GONE", {}, "frames.csv"},
-    {"OnlyAHeader", "run/frames.csv", kHeader, {}, "frames.csv"},
-    {"NoSequence", "run/frames.csv", "viewer,frame,t_s\nviewer-1,0,0\n", {}, "no column sequence"},
-    {"CutLine", "run/frames.csv", kHeader + "viewer-1,0,0.5,5000,3,0,0", {}, "frames.csv:2"},
-    {"CutNumber", "run/frames.csv", kHeader + "viewer-1,0,0.5,5000,3,0,0,1,1,0,0,0", {}, "cut off"},
-    {"NotANumber", "run/frames.csv", kHeader + "viewer-1,0,0.5,many,3,0,0,1,1,0,0,0\n", {}, "many"},
-    {"NaN", "run/frames.csv", kHeader + "viewer-1,0,0.5,5000,3,nan,0,1,1,0,0,0\n", {}, "px"},
-    {"NoRotation", "run/frames.csv", kHeader + "viewer-1,0,0.5,5000,3,0,0,1,9,0,0,0\n", {}, "frames.csv:2"},
-    {"FarAway", "run/frames.csv", kHeader + "viewer-1,0,0.5,5000,3,1e30,0,1,1,0,0,0\n", {}, "frames.csv:2"},
-    {"NothingShown", "run/frames.csv", kHeader + "viewer-1,0,0.5,0,3,0,0,1,1,0,0,0\n", {}, "no frame shows"},
-    {"NoSuchFrame", "", "", {"--frames", "0,77"}, "77"},
-    {"EventsEndEarly", "", "", {}, "displayed event 3"},
-    {"NoRecord", "run/points.events", "something else", {}, "points.events"},
-    {"SceneGone", "terrain.ply", "GONE", {}, "terrain.ply"},
-    {"SceneEmpty", "terrain.ply", "", {}, "terrain.ply"},
-    {"UnknownKernel", "", "", {"--kernels", "square,star"}, "star"},
-    {"UnknownFinish", "", "", {"--finish", "fill,polish"}, "polish"},
-    {"BadSamples", "", "", {"--samples", "10"}, "--samples: 10 rays a pixel"},
-    {"NoPoses", "", "", {"--poses", "0"}, "--poses"}};
-
-INSTANTIATE_TEST_SUITE_P(All, CompareRefuses, testing::ValuesIn(kRefusals),
-                         [](const auto& info) { return info.param.name; });
 
 }  // namespace
 }  // namespace telesplat::test
