@@ -173,6 +173,7 @@ struct Window::Impl {
   std::unique_ptr<FramePresenter> presenter;
   Interaction* interaction = nullptr;  // while poll() runs
   bool pointer_caught = false, draws_without_gpu = false;
+  std::optional<glm::dvec2> pointer;  // where it was last told to be, in screen coordinates; nothing: not told yet
   int hidden = 0;       // pixels at the left
   bool writes = false;  // the key that was pressed last is meant for a text
   std::unique_ptr<Gui> gui;
@@ -199,8 +200,10 @@ struct Window::Impl {
     return 1.0 / std::max(1, height);
   }
 
+  // Whether an event is meant for the panel: the pointer's place is that of the event, for it may have moved on since.
   bool gui_takes_pointer() const {
     if (pointer_caught) return false;
+    if (pointer) return gui->takes_pointer(pointer->x, pointer->y);
     double x = 0, y = 0;
     glfwGetCursorPos(window, &x, &y);
     return gui->takes_pointer(x, y);
@@ -251,6 +254,7 @@ struct Window::Impl {
         if (code == button && of(w).interaction) of(w).interaction->button(known, action == GLFW_PRESS);
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+      of(w).pointer = glm::dvec2(x, y);
       of(w).gui->on_move();
       if (of(w).interaction) of(w).interaction->move(x * of(w).per_height(), y * of(w).per_height());
     });
@@ -387,6 +391,7 @@ void Window::poll(Interaction& interaction) {
   if (lost()) return;
   if (interaction.wants_pointer() != impl_->pointer_caught) {
     impl_->pointer_caught = interaction.wants_pointer();
+    impl_->pointer.reset();  // while it is caught, its places are not in the window
     glfwSetInputMode(impl_->window, GLFW_CURSOR, impl_->pointer_caught ? GLFW_CURSOR_DISABLED : GLFW_CURSOR_NORMAL);
   }
   impl_->gui->expect_text(interaction.shows_dialog());
