@@ -49,6 +49,7 @@ class ByHand : public testing::Test {
     Program program("telesplat", arguments, folder_ / "about");
     EXPECT_EQ(program.wait(120), 0) << arguments.front() << ": " << program.err();
   }
+  void expect_other_versions_told();
   Program& service(const std::string& name) { return *services_.at(name); }
   std::string out() const { return folder_ / "runs/by-hand"; }
   nlohmann::json summary() const { return nlohmann::json::parse(read_text(out() + "/summary.json"), nullptr, false); }
@@ -83,22 +84,42 @@ TEST_F(ByHand, LeavesTheSameRecordAsARun) {
   EXPECT_TRUE(fs::exists(out() + "/compare/contact-sheet.png"));
 }
 
-TEST_F(ByHand, SoDoesAJuliaSet) {
-  begin({"julia", "--preset", "coral"});
-  ASSERT_EQ(start_viewer("first", {}).wait(), 0) << service("viewer/first").err();
-  end();
-  EXPECT_TRUE(summary()["data"].is_null()) << "no file";
-  expect_understood({"inspect", out()});
-  expect_understood({"compare", out(), "--poses", "1", "--kernels", "disc", "--renderers", "cpu"});
+// As an old viewer asks, or one that was written from another page.
+void ByHand::expect_other_versions_told() {
+  net::Context context;
+  net::Socket old(context, net::Kind::kDealer, "old", net::kControlSocket);
+  ASSERT_TRUE(old.connect(master_).ok());
+  for (const char* type : {"hello", "control"}) {
+    old.send_frames({}, type, std::string("\x82\xa4role\xa6viewer\xa1v\x0d"));
+    std::optional<net::Message> answer;
+    ASSERT_TRUE(wait_until([&] { return (answer = old.receive()).has_value(); })) << type;
+    EXPECT_EQ(answer->type, type == std::string("hello") ? "shutdown" : "control_reply");
+    const std::string body(reinterpret_cast<const char*>(answer->body.data()), answer->body.size());
+    EXPECT_NE(body.find("\xa1v\x0d"), std::string::npos) << "the answer is of the asker's version";
+    EXPECT_NE(body.find("it speaks version 13 of the protocol, and this master version " +
+                        std::to_string(wire::kProtocolVersion)),
+              std::string::npos)
+        << body;
+  }
+  // A service that has not joined hears nothing of the session's end.
+  EXPECT_TRUE(wait_until([&] {
+    Program status("telesplat", {"ctl", "status", "--json", "--master", master_}, folder_ / "status");
+    const auto told = nlohmann::json::parse(status.wait() == 0 ? status.out() : "", nullptr, false);
+    return told.is_object() && told["processes"].size() == 3;
+  }));
 }
 
-TEST_F(ByHand, EveryoneIsToldWhoEndedTheSession) {
-  begin({"julia"});
+TEST_F(ByHand, AJuliaSetLeavesARecordTooAndEveryoneIsToldWhoEndedTheSession) {
+  begin({"julia", "--preset", "coral"});
+  expect_other_versions_told();
   ASSERT_EQ(start_viewer("first", {}).wait(), 0) << service("viewer/first").err();
   end();
   const std::string who = "the session was ended by " + net::this_person();
   for (const char* name : {"master", "data", "packer", "sampler"})
     EXPECT_NE(service(name).err().find(who), std::string::npos) << name << ": " << service(name).err();
+  EXPECT_TRUE(summary()["data"].is_null()) << "no file";
+  expect_understood({"inspect", out()});
+  expect_understood({"compare", out(), "--poses", "1", "--kernels", "disc", "--renderers", "cpu"});
 }
 
 TEST_F(ByHand, WhatIsWaitedForIsSaid) {
@@ -139,33 +160,6 @@ TEST_F(ByHand, AServiceWithoutAMasterSaysSoAndGivesUp) {
                              "no master is at tcp://127.0.0.1:9; gives up after 4 s (--give-up-after)"})
       EXPECT_NE(service(role).err().find(line), std::string::npos) << role << ": " << service(role).err();
   }
-}
-
-// As an old viewer does, or one that was written from another page.
-TEST_F(ByHand, ProcessesOfAnotherVersionAreToldSo) {
-  begin({"julia"});
-  net::Context context;
-  net::Socket old(context, net::Kind::kDealer, "old", net::kControlSocket);
-  ASSERT_TRUE(old.connect(master_).ok());
-  for (const char* type : {"hello", "control"}) {
-    old.send_frames({}, type, std::string("\x82\xa4role\xa6viewer\xa1v\x0d"));
-    std::optional<net::Message> answer;
-    ASSERT_TRUE(wait_until([&] { return (answer = old.receive()).has_value(); })) << type;
-    EXPECT_EQ(answer->type, type == std::string("hello") ? "shutdown" : "control_reply");
-    const std::string body(reinterpret_cast<const char*>(answer->body.data()), answer->body.size());
-    EXPECT_NE(body.find("\xa1v\x0d"), std::string::npos) << "the answer is of the asker's version";
-    EXPECT_NE(body.find("it speaks version 13 of the protocol, and this master version " +
-                        std::to_string(wire::kProtocolVersion)),
-              std::string::npos)
-        << body;
-  }
-  // A service that has not joined hears nothing of the session's end.
-  EXPECT_TRUE(wait_until([&] {
-    Program status("telesplat", {"ctl", "status", "--json", "--master", master_}, folder_ / "status");
-    const auto told = nlohmann::json::parse(status.wait() == 0 ? status.out() : "", nullptr, false);
-    return told.is_object() && told["processes"].size() == 3;
-  }));
-  end();
 }
 
 TEST_F(ByHand, AMasterThatIsRefusedLeavesNothing) {

@@ -61,6 +61,7 @@ class Sessions : public testing::Test {
     const size_t begin = said.find(words);
     return begin == std::string::npos ? "" : said.substr(begin + words.size(), said.find('\n') - words.size());
   }
+  void expect_status_for_programs(PipelineRun& run);
   size_t files() const { return size_t(std::distance(fs::directory_iterator(runtime_), fs::directory_iterator())); }
 
   TemporaryFolder folder_;
@@ -75,6 +76,38 @@ size_t widest_line(const std::string& text) {
   std::istringstream in(text);
   for (std::string line; std::getline(in, line);) out = std::max(out, line.size());
   return out;
+}
+
+// `telesplat ctl status --json` of a run of the terrain.
+void Sessions::expect_status_for_programs(PipelineRun& run) {
+  const auto said = ctl({"status", "--json"});
+  const auto status = nlohmann::json::parse(said.out, nullptr, false);
+  ASSERT_TRUE(status.is_object()) << said.out << said.err;
+  EXPECT_EQ(status["session"]["scene"], "terrain.ply");
+  EXPECT_EQ(status["session"]["kind"], "mesh");
+  EXPECT_EQ(status["session"]["started_by"], "run");
+  EXPECT_EQ(status["session"]["address"], run.master());
+  EXPECT_TRUE(process(status, "viewer-1")["values"]["frames"].is_number_integer());
+  EXPECT_TRUE(process(status, "sampler-1")["values"]["tiles_sampled"].is_number_integer());
+  EXPECT_EQ(process(status, "sampler-1")["facts"]["threads"], "1");
+  EXPECT_TRUE(run.wait_status([](const auto& s) {
+    const auto p = process(s, "viewer-1");
+    return p.is_object() && p["rates"].value("frames", 0.0) > 0;
+  })) << "rates are known after two reports";
+  // One sampler of its own accord: as many threads as there are cores, which it must tell.
+  Program sampler("telesplat-sampler", {"--master", run.master(), "--name", "all-cores"}, folder_ / "all-cores");
+  EXPECT_TRUE(run.wait_status([](const auto& s) {
+    const auto p = process(s, "all-cores");
+    return p.is_object() && std::atoi(p["facts"].value("threads", "0").c_str()) > 0;
+  }));
+  // And no more than it may use.
+  Program bound("/usr/bin/taskset",
+                {"-c", "0", TELESPLAT_BIN "/telesplat-sampler", "--master", run.master(), "--name", "one-core"},
+                folder_ / "one-core");
+  EXPECT_TRUE(run.wait_status([](const auto& s) {
+    const auto p = process(s, "one-core");
+    return p.is_object() && p["facts"].value("threads", "0") == "1" && p["facts"].value("cores", "0") == "1";
+  })) << bound.err();
 }
 
 TEST_F(Sessions, CtlFindsWhatRunStarted) {
@@ -107,6 +140,7 @@ TEST_F(Sessions, CtlFindsWhatRunStarted) {
                   folder_ / "sampler");
   EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "found-it", "tiles_sampled") > 0; }));
 
+  expect_status_for_programs(run);
   EXPECT_EQ(ctl({"stop"}).out, "stopping\n");
   EXPECT_EQ(run.program().wait(), 0) << run.program().err();
   EXPECT_EQ(files(), 0u);
@@ -117,39 +151,6 @@ TEST_F(Sessions, CtlFindsWhatRunStarted) {
       << after.err;
   EXPECT_EQ(ctl({"list"}).out, "no session of yours runs on this machine\n");
   EXPECT_EQ(telesplat({"run", "--master", "auto", "--out", folder_ / "none"}).code, 1);
-}
-
-TEST_F(Sessions, StatusIsForProgramsToo) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_TRUE(run.wait_showing());
-  const auto said = ctl({"status", "--json"});
-  const auto status = nlohmann::json::parse(said.out, nullptr, false);
-  ASSERT_TRUE(status.is_object()) << said.out << said.err;
-  EXPECT_EQ(status["session"]["scene"], "terrain.ply");
-  EXPECT_EQ(status["session"]["kind"], "mesh");
-  EXPECT_EQ(status["session"]["started_by"], "run");
-  EXPECT_EQ(status["session"]["address"], run.master());
-  EXPECT_TRUE(process(status, "viewer-1")["values"]["frames"].is_number_integer());
-  EXPECT_TRUE(process(status, "sampler-1")["values"]["tiles_sampled"].is_number_integer());
-  EXPECT_EQ(process(status, "sampler-1")["facts"]["threads"], "1");
-  EXPECT_TRUE(run.wait_status([](const auto& s) {
-    const auto p = process(s, "viewer-1");
-    return p.is_object() && p["rates"].value("frames", 0.0) > 0;
-  })) << "rates are known after two reports";
-  // One sampler of its own accord: as many threads as there are cores, which it must tell.
-  Program sampler("telesplat-sampler", {"--master", run.master(), "--name", "all-cores"}, folder_ / "sampler");
-  EXPECT_TRUE(run.wait_status([](const auto& s) {
-    const auto p = process(s, "all-cores");
-    return p.is_object() && std::atoi(p["facts"].value("threads", "0").c_str()) > 0;
-  }));
-  // And no more than it may use.
-  Program bound("/usr/bin/taskset",
-                {"-c", "0", TELESPLAT_BIN "/telesplat-sampler", "--master", run.master(), "--name", "one-core"},
-                folder_ / "one-core");
-  EXPECT_TRUE(run.wait_status([](const auto& s) {
-    const auto p = process(s, "one-core");
-    return p.is_object() && p["facts"].value("threads", "0") == "1" && p["facts"].value("cores", "0") == "1";
-  })) << bound.err();
 }
 
 TEST_F(Sessions, OfSeveralOneIsChosen) {
@@ -204,6 +205,11 @@ TEST_F(Sessions, SignalsEndThemAndTheirFiles) {
   for (const int signal : {SIGTERM, SIGINT}) {
     const auto by_hand = master("master-" + std::to_string(signal), {"--out", folder_ / "record"});
     EXPECT_EQ(files(), 1u);
+    const std::string said = by_hand->out() + by_hand->err(), words = "listening on ";
+    EXPECT_EQ(said.find(words), said.rfind(words)) << said;
+    EXPECT_TRUE(
+        holds(said, "telesplat ctl status asks this session; others join it with --master " + address(*by_hand)))
+        << said;
     const auto sessions = nlohmann::json::parse(ctl({"list", "--json"}).out, nullptr, false);
     ASSERT_TRUE(sessions.is_array() && sessions.size() == 1);
     EXPECT_EQ(sessions[0]["started_by"], "hand");
@@ -214,14 +220,6 @@ TEST_F(Sessions, SignalsEndThemAndTheirFiles) {
     EXPECT_EQ(files(), 0u);
     fs::remove_all(folder_ / "record");
   }
-}
-
-TEST_F(Sessions, AMasterSaysOnceWhereItListens) {
-  const auto by_hand = master("by-hand");
-  const std::string said = by_hand->out() + by_hand->err(), words = "listening on ";
-  EXPECT_EQ(said.find(words), said.rfind(words)) << said;
-  EXPECT_TRUE(holds(said, "telesplat ctl status asks this session; others join it with --master " + address(*by_hand)))
-      << said;
 }
 
 TEST_F(Sessions, WithoutAFolderForFilesTheSessionRunsAllTheSame) {
@@ -242,22 +240,16 @@ TEST_F(Sessions, WithoutAFolderForFilesTheSessionRunsAllTheSame) {
 }
 
 // A folder that others may write into is refused: the line of a run says how the session is asked all the same.
-TEST_F(Sessions, ARunThatIsNotFoundSaysHowItIsAsked) {
+TEST_F(Sessions, ARunThatIsNotFoundSaysHowItIsAskedAndTheEnvironmentMayNameIt) {
   fs::permissions(runtime_, fs::perms(0777));
   PipelineRun run({"--duration", "0", "--keys", "none"});
   ASSERT_TRUE(run.wait_showing());
-  EXPECT_TRUE(holds(run.program().err(),
-                    "session at " + run.master() + "; telesplat ctl status --master " + run.master() + " shows it"))
-      << run.program().err();
-  EXPECT_EQ(ctl({"status"}).code, 1);
-  EXPECT_EQ(ctl({"status", "--master", run.master()}).code, 0);
-}
-
-TEST_F(Sessions, TheEnvironmentNamesTheMasterOfCtlAndRun) {
-  PipelineRun run({"--duration", "0", "--keys", "none"});  // the file that would name them is not found below
-  ASSERT_TRUE(run.wait_showing());
-  setenv("TELESPLAT_RUNTIME", (folder_ / "another").c_str(), 1);
+  for (const std::string& told :
+       {"session at " + run.master() + "; telesplat ctl status --master " + run.master() + " shows it",
+        std::string("telesplat: --keys none: everybody on this machine can watch and end this session\n")})
+    EXPECT_TRUE(holds(run.program().err(), told)) << run.program().err();
   EXPECT_EQ(ctl({"status"}).code, 1) << "not to be found";
+  EXPECT_EQ(ctl({"status", "--master", run.master()}).code, 0);
   setenv("TELESPLAT_MASTER", run.master().c_str(), 1);
   EXPECT_EQ(ctl({"status"}).code, 0);
   const auto joined = telesplat({"run", "--size", "160x100", "--frames", "20", "--out", folder_ / "joined"});
@@ -266,41 +258,6 @@ TEST_F(Sessions, TheEnvironmentNamesTheMasterOfCtlAndRun) {
     EXPECT_TRUE(holds(joined.out, told)) << told << " in\n" << joined.out;
   EXPECT_TRUE(fs::is_directory(folder_ / "joined/images"));
   EXPECT_TRUE(process(run.status(), "viewer-1").is_object()) << "the session goes on";
-}
-
-// As README prints it: nothing but the transfer function.
-TEST_F(Sessions, ATransferFunctionIsChangedWhileAVolumeRuns) {
-  TemporaryFolder data;
-  write_volume(data / "balls.mha");
-  PipelineRun run({"--duration", "0"}, data / "balls.mha");
-  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; }));
-  const auto changed = ctl({"tf", "bone"});
-  EXPECT_EQ(changed.code, 0) << changed.err;
-  EXPECT_EQ(changed.out, "epoch 2\n");
-  EXPECT_EQ(ctl({"tf", "30%:#000000:0, 60%:#ff4000:0.3"}).out, "epoch 3\n");
-
-  const auto unknown = ctl({"tf", "nosuch"});
-  EXPECT_EQ(unknown.code, 2);
-  for (const char* told : {"nosuch", "plain", "bone", "skin"}) EXPECT_TRUE(holds(unknown.err, told)) << unknown.err;
-  // What the master refuses is bad usage as well.
-  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"tf", "0:#000000:7"},
-                                                {"set", "volume.step=7"},
-                                                {"set", "c.y=0.3"},
-                                                {"animate", "on"}}) {
-    const auto refused = ctl(wrong);
-    EXPECT_EQ(refused.code, 2) << wrong[0] << ": " << refused.out << refused.err;
-    EXPECT_TRUE(refused.err.starts_with("telesplat: ")) << refused.err;
-  }
-  // What ctl found wrong by itself was not the master's business.
-  const auto counted = nlohmann::json::parse(ctl({"status", "--json"}).out, nullptr, false);
-  ASSERT_TRUE(counted.is_object());
-  EXPECT_EQ(counted["epoch"], 3);
-  const auto status = ctl({"status"});
-  for (const char* told : {"balls.mha (volume)", "transfer", "slab of", "voxels held", "ready"})
-    EXPECT_TRUE(holds(status.out, told)) << told << " in\n" << status.out;
-  EXPECT_LE(widest_line(status.out), 120u) << status.out;
-  EXPECT_EQ(run.stop(), 0);
-  EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
 }
 
 TEST_F(Sessions, WordsThatAreNoOrderAreBadUsage) {

@@ -75,9 +75,18 @@ class Deployment {
   std::map<std::string, Program> services_;
 };
 
-TEST(Deployment, AViewerEndsTheSessionWhenItsRunIsOver) {
+TEST(Deployment, AddressesAnnouncedCanBeReachedAndAViewerEndsTheSessionWhenItsRunIsOver) {
   Deployment d;
   d.start_servers();
+  ASSERT_TRUE(d.wait_status([](const auto& s) {
+    return Deployment::of_role(s, "data").is_object() && Deployment::of_role(s, "packer").is_object();
+  }));
+  const auto status = d.status();
+  for (const auto& [role, key] :
+       {std::pair{"data", "chunks"}, {"packer", "tiles"}, {"packer", "patches"}, {"packer", "state"}})
+    EXPECT_TRUE(
+        Deployment::of_role(status, role)["endpoints"][key].template get<std::string>().starts_with("tcp://127.0.0.1:"))
+        << role << " " << key;
   EXPECT_EQ(d.start_viewer({"--frames", "20", "--end-session"}).wait(), 0) << d.service("viewer").err();
   for (const char* role : {"sampler", "packer", "data", "master"})
     EXPECT_EQ(d.service(role).wait(), 0) << role << ": " << d.service(role).err();
@@ -95,31 +104,6 @@ TEST(Deployment, ASessionThatEndsBeforeAnythingWasShownFailed) {
   EXPECT_EQ(viewer.wait(), 1);
   EXPECT_NE(viewer.err().find("before anything was shown"), std::string::npos) << viewer.err();
   EXPECT_EQ(d.service("master").wait(), 0);
-}
-
-TEST(Deployment, AddressesAnnouncedCanBeReached) {
-  Deployment d;
-  d.start_servers();
-  // As in containers: nobody says what to announce.
-  ASSERT_TRUE(d.wait_status([](const auto& s) {
-    return Deployment::of_role(s, "data").is_object() && Deployment::of_role(s, "packer").is_object();
-  }));
-  auto status = d.status();
-  for (const auto& [role, key] :
-       {std::pair{"data", "chunks"}, {"packer", "tiles"}, {"packer", "patches"}, {"packer", "state"}})
-    EXPECT_TRUE(
-        Deployment::of_role(status, role)["endpoints"][key].template get<std::string>().starts_with("tcp://127.0.0.1:"))
-        << role << " " << key;
-  d.service("packer").signal(SIGTERM);
-  EXPECT_EQ(d.service("packer").wait(), 0);
-  Program again("telesplat-packer",
-                {"--bind", "tcp://*:*", "--insecure", "--name", "unadvertised", "--master", d.master()},
-                d.folder() / "again");
-  ASSERT_TRUE(d.wait_status([](const auto& s) { return Deployment::of_role(s, "packer").is_object(); }));
-  status = d.status();
-  for (const char* key : {"tiles", "patches", "state"})
-    EXPECT_TRUE(Deployment::of_role(status, "packer")["endpoints"][key].template get<std::string>().starts_with(
-        "tcp://" + net::host_name() + ":"));
 }
 
 // Published ports, and tunnels: viewers reach a packer under another name than samplers do, at ports that are known.
@@ -147,6 +131,14 @@ TEST(Deployment, APackersPortsAreKnownBeforeItRuns) {
   Program refused("telesplat-packer", {"--bind", "tcp://127.0.0.1:65534", "--master", d.master()}, d.folder() / "high");
   EXPECT_EQ(refused.wait(), 2);
   EXPECT_NE(refused.err().find("its 3 ports end at 65535"), std::string::npos) << refused.err();
+  // As in containers: nobody says what to announce.
+  ASSERT_TRUE(d.wait_status([](const auto& s) { return !Deployment::of_role(s, "packer").is_object(); }));
+  Program unadvertised("telesplat-packer", {"--bind", "tcp://*:*", "--insecure", "--master", d.master()},
+                       d.folder() / "unadvertised");
+  ASSERT_TRUE(d.wait_status([](const auto& s) { return Deployment::of_role(s, "packer").is_object(); }));
+  const auto announced = Deployment::of_role(d.status(), "packer")["endpoints"];
+  for (const char* key : {"tiles", "patches", "state"})
+    EXPECT_TRUE(announced[key].get<std::string>().starts_with("tcp://" + net::host_name() + ":")) << announced;
 }
 
 TEST(Deployment, HealthFollowsTheProcess) {

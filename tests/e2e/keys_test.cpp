@@ -23,25 +23,6 @@ Result<std::string> ask(const std::string& master, const net::Access& access, co
   return net::ask_master(master, command, patient(5), {}, access);
 }
 
-TEST(KeysOfSessions, ThrowAwayKeysGoWithTheRun) {
-  const TemporaryFolder runtime;
-  setenv("TELESPLAT_RUNTIME", runtime.path().c_str(), 1);
-  {
-    PipelineRun run({"--duration", "0"});  // --keys auto is the default
-    ASSERT_TRUE(wait_until([&] { return run.program().err().find("session at tcp://") != std::string::npos; }));
-    // The session's file names them, so that the person who started it needs no flag.
-    Program status("telesplat", {"ctl", "status", "--json"}, runtime / "status");
-    EXPECT_EQ(status.wait(), 0) << status.err();
-    EXPECT_NE(status.out().find(runtime.path() + "/keys-"), std::string::npos) << status.out();
-    Program stop("telesplat", {"ctl", "stop"}, runtime / "stop");
-    EXPECT_EQ(stop.wait(), 0) << stop.err();
-    run.program().wait(60);
-  }
-  unsetenv("TELESPLAT_RUNTIME");
-  for (const auto& left : std::filesystem::directory_iterator(runtime.path()))
-    EXPECT_FALSE(left.path().filename().string().starts_with("keys-")) << left.path();
-}
-
 TEST(KeysOfSessions, AViewersKeyCanLookAndNothingElse) {
   const KeyFolder keys;
   ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok());
@@ -212,18 +193,8 @@ TEST(KeysOfSessions, AnotherUserIsRefusedInASentence) {
   EXPECT_EQ(run.stop(), 0) << run.program().err();
 }
 
-TEST(KeysOfSessions, WithoutKeysARunSaysWhatThatMeans) {
-  PipelineRun run({"--duration", "0", "--keys", "none"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  EXPECT_NE(
-      run.program().err().find("telesplat: --keys none: everybody on this machine can watch and end this session\n"),
-      std::string::npos)
-      << run.program().err();
-  EXPECT_TRUE(ask(run.master(), {}, "stop").ok());
-  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
-}
-
-TEST(KeysOfSessions, FilesAreTheirOwnersAloneAndGoWithKilledRuns) {
+// Keys of --keys auto, which is the default.
+TEST(KeysOfSessions, FilesAreTheirOwnersAloneAndGoWithTheirRuns) {
   namespace fs = std::filesystem;
   const TemporaryFolder folder;
   const std::string runtime = folder / "runtime";
@@ -248,8 +219,16 @@ TEST(KeysOfSessions, FilesAreTheirOwnersAloneAndGoWithKilledRuns) {
   ASSERT_TRUE(next.wait_showing()) << next.program().err();
   EXPECT_FALSE(fs::exists(left)) << "the next run removes it";
   EXPECT_TRUE(fs::exists(next.access().keys()->folder));
-  EXPECT_EQ(next.stop(), 0) << next.program().err();
+  // The session's file names them, so that the person who started it needs no flag.
+  Program status("telesplat", {"ctl", "status", "--json"}, folder / "status");
+  EXPECT_EQ(status.wait(), 0) << status.err();
+  EXPECT_NE(status.out().find(runtime + "/keys-"), std::string::npos) << status.out();
+  Program stop("telesplat", {"ctl", "stop"}, folder / "stop");
+  EXPECT_EQ(stop.wait(), 0) << stop.err();
+  EXPECT_EQ(next.program().wait(60), 0) << next.program().err();
   unsetenv("TELESPLAT_RUNTIME");
+  for (const auto& entry : fs::directory_iterator(runtime))
+    EXPECT_FALSE(entry.path().filename().string().starts_with("keys-")) << entry.path();
 }
 
 // A session whose viewer is behind a link, and viewers outside that come through a SOCKS tunnel as `ssh -D` makes it.

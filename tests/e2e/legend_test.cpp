@@ -64,10 +64,9 @@ TEST(LegendRun, PicturesOfAColouredMeshHaveItUnlessToldOtherwise) {
   TemporaryFolder folder;
   write_hill(folder / "hill.ply");
   const image::Legend expected{"height", 0, 40, *colour::find_colour_map("plasma"), {}};
-  double quality[2] = {};
   for (const std::string legend : {"on", "off"}) {
-    PipelineRun run({"--colour-by", "height:0:40", "--colour-map", "plasma", "--duration", "1.5", "--verify", "20",
-                     "--size", "640x400", "--legend", legend, "--cache", folder / "cache"},
+    PipelineRun run({"--colour-by", "height:0:40", "--colour-map", "plasma", "--duration", "1", "--size", "640x400",
+                     "--legend", legend, "--cache", folder / "cache"},
                     folder / "hill.ply");
     ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
     const double share = matches(last_picture(run), expected);
@@ -75,10 +74,7 @@ TEST(LegendRun, PicturesOfAColouredMeshHaveItUnlessToldOtherwise) {
       EXPECT_EQ(share, 1);
     else
       EXPECT_LT(share, 0.2);
-    // The best frame: the first ones, of which a short run has many, show little.
-    quality[legend == "on"] = run.summary()["quality"]["psnr_db"]["max"].get<double>();
   }
-  EXPECT_NEAR(quality[0], quality[1], 3) << "frames are verified without it";
 }
 
 TEST(LegendRun, AVolumeTellsItsTransferFunctionAndAPlainMeshNothing) {

@@ -153,7 +153,7 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
 
 TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
   PipelineRun run(
-      with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify", "10"}),
+      with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify", "30"}),
       volume());
   ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
   std::string err;
@@ -176,6 +176,14 @@ TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
   EXPECT_NE(err.find("nonesuch"), std::string::npos) << err;
   EXPECT_NE(ctl(run, {"tf", "5:#00:0"}), 0);
   EXPECT_EQ(ctl(run, {"tf"}), 2);
+  // What the master refuses is bad usage as well.
+  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"tf", "0:#000000:7"},
+                                                {"set", "volume.step=7"},
+                                                {"set", "c.y=0.3"},
+                                                {"animate", "on"}}) {
+    EXPECT_EQ(ctl(run, wrong, &err), 2) << wrong[0] << ": " << err;
+    EXPECT_TRUE(err.starts_with("telesplat: ")) << err;
+  }
   EXPECT_EQ(ctl(run, {"tf", run.folder() / "none.json"}, &err), 2);
   EXPECT_NE(err.find("none.json"), std::string::npos) << err;
   std::ofstream(run.folder() / "broken.json") << "{\"RGBPoints\": [0, 1";
@@ -193,6 +201,7 @@ TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
   const auto s = run.summary();
   EXPECT_GE(s["quality"]["views"], 2);
   EXPECT_GT(s["quality"]["psnr_db"]["median"], 30);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0) << "what was refused was no wrong message";
   EXPECT_TRUE(run.all_gone());
 }
 
@@ -278,6 +287,15 @@ TEST(VolumeFaults, ASamplerAndADataServerThatDieAreStartedAgain) {
       << run.status().dump(1);
   ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
+}
+
+TEST_F(VolumeRun, ASeriesOfAFileIsRefusedInOneLine) {
+  PipelineRun run({"--series", "1"}, volume());
+  EXPECT_EQ(run.program().wait(60), 2);
+  const std::string err = run.program().complaint();
+  EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
+  EXPECT_TRUE(err.starts_with("telesplat: --series: ")) << err;
+  EXPECT_FALSE(fs::exists(run.out())) << "a run folder was left";
 }
 
 TEST_F(VolumeRun, CtrlCEndsAWall) {

@@ -22,12 +22,9 @@ Said said(std::vector<std::string> words, const TemporaryFolder& folder) {
   return {code, p.out(), p.err()};
 }
 
-class Images : public ::testing::TestWithParam<std::string> {};
-
-TEST_P(Images, EachFrameShowsANewerPictureThatLooksAsTheSceneDoes) {
+TEST(Images, EachFrameShowsANewerPictureThatLooksAsTheSceneDoes) {
   PipelineRun run({"--coupling", "images", "--image-quality", "90", "--size", "320x200", "--duration", "6", "--frames",
-                   "60", "--samplers", "2", "--verify", "10", "--verify-samples", "1", "--record-points", "0"},
-                  GetParam() == "julia" ? "julia" : "");
+                   "60", "--samplers", "2", "--verify", "10", "--verify-samples", "1", "--record-points", "0"});
   ASSERT_EQ(run.program().wait(140), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto s = run.summary();
@@ -55,8 +52,6 @@ TEST_P(Images, EachFrameShowsANewerPictureThatLooksAsTheSceneDoes) {
   for (const double r : requests) EXPECT_TRUE(known.contains(r)) << "request " << r << " has no update";
   EXPECT_GT(*std::min_element(bytes.begin(), bytes.end()), 500);
 }
-INSTANTIATE_TEST_SUITE_P(Kinds, Images, ::testing::Values("mesh", "julia"),
-                         [](const auto& info) { return info.param; });
 
 // The last picture of a head that came to rest, against four rays a pixel, as it is drawn then.
 TEST(ImagesAtRest, AFinerPictureFollowsAndThenNothing) {

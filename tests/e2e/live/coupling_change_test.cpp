@@ -1,6 +1,7 @@
 // `telesplat ctl coupling` of a running session.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "tests/support/pipeline_run.h"
@@ -55,6 +56,11 @@ TEST(ChangedCouplings, EachFrameSaysWhichWasInForce) {
              request = run.column("frames.csv", "request");
   ASSERT_EQ(mode.size(), size_t(s["frames"]));
   ASSERT_EQ(buffers.size(), mode.size());
+  const auto waits = run.column("frames.csv", "wait_ms");
+  double longest_sync_ms = 0;
+  for (size_t i = 0; i < mode.size(); ++i)
+    if (mode[i] == 1) longest_sync_ms = std::max(longest_sync_ms, waits[i]);
+  EXPECT_GT(longest_sync_ms, 0) << "it never waited for data";
   std::vector<std::pair<double, double>> order;
   for (size_t i = 0; i < mode.size(); ++i)
     if (order.empty() || order.back() != std::pair(mode[i], buffers[i])) order.emplace_back(mode[i], buffers[i]);

@@ -375,29 +375,23 @@ TEST_F(WindowTest, QuadBuffersAreRefusedWhereThereAreNone) {
   EXPECT_NE(program.err().find("quad-buffered OpenGL"), std::string::npos) << program.err();
 }
 
-TEST_F(WindowTest, JoinsARunningSessionAndLeavesIt) {
+TEST_F(WindowTest, JoinsARunningSessionLeavesItAndIsToldWhoEndedIt) {
   PipelineRun run({"--duration", "0", "--trajectory", "still"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  Program guest("telesplat", {"view", "--master", run.master(), "--size", "320x200", "--sampling-size", "320x200"},
-                run.folder() / "guest");
-  ASSERT_NE(live_window(guest), 0u);
+  const std::vector<std::string> join{"view",    "--master",        run.master(), "--size",
+                                      "320x200", "--sampling-size", "320x200"};
+  Program leaves("telesplat", join, run.folder() / "leaves");
+  ASSERT_NE(live_window(leaves), 0u);
   display_->tap("q", "Control_L");
-  EXPECT_EQ(guest.wait(60), 0) << guest.err();
+  EXPECT_EQ(leaves.wait(60), 0) << leaves.err();
   EXPECT_TRUE(is_running(run.program().pid())) << "a guest ended the session";
+  Program stays("telesplat", join, run.folder() / "stays");
+  ASSERT_NE(live_window(stays), 0u);
   EXPECT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
-}
-
-TEST_F(WindowTest, AGuestIsToldWhoEndedTheSession) {
-  PipelineRun run({"--duration", "0", "--trajectory", "still"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  Program guest("telesplat", {"view", "--master", run.master(), "--size", "320x200", "--sampling-size", "320x200"},
-                run.folder() / "guest");
-  ASSERT_NE(live_window(guest), 0u);
-  EXPECT_EQ(run.stop(), 0) << run.program().err();
-  EXPECT_EQ(guest.wait(60), 0) << guest.err();
-  EXPECT_NE(guest.err().find("the session was ended by " + net::this_person() + " (key operator)\n"), std::string::npos)
-      << guest.err();
+  EXPECT_EQ(stays.wait(60), 0) << stays.err();
+  EXPECT_NE(stays.err().find("the session was ended by " + net::this_person() + " (key operator)\n"), std::string::npos)
+      << stays.err();
 }
 
 // It leaves nothing on disk that would tell its address, but says it, and telesplat ctl finds it.
