@@ -16,8 +16,7 @@ namespace fs = std::filesystem;
 
 struct Case {
   std::string name, file, content;  // content is written to the file; none: it is not made
-  std::vector<std::string> arguments;
-  std::string named;  // what the line must name
+  std::string named;                // what the line must name
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -28,18 +27,13 @@ TEST_P(BadInput, ExitsWithTwoAndOneLine) {
   const Case& c = GetParam();
   TemporaryFolder folder;
   const std::string path = folder / c.file, out = folder / "out";
-  if (c.content == "TERRAIN")
-    write_terrain(path, 4);
-  else if (c.content == "CUT") {
+  if (c.content == "CUT") {
     write_terrain(path, 40);
     fs::resize_file(path, fs::file_size(path) / 2);
   } else if (c.content != "NOTHING")
     std::ofstream(path, std::ios::binary) << c.content;
-  if (c.file != "trajectory.csv")
-    std::ofstream(folder / "trajectory.csv") << "t_s,px,py,pz,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n1,0,nan,1,1,0,0,0\n";
-  std::vector<std::string> arguments{"run", path, "--out", out, "--cache", folder / "cache", "--duration", "1"};
-  for (std::string a : c.arguments) arguments.push_back(a == "TRAJECTORY" ? folder / "trajectory.csv" : a);
-  Program program("telesplat", arguments, folder / "telesplat");
+  Program program("telesplat", {"run", path, "--out", out, "--cache", folder / "cache", "--duration", "1"},
+                  folder / "telesplat");
   EXPECT_EQ(program.wait(60), 2) << program.err();
   const std::string err = program.complaint();
   EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
@@ -56,10 +50,9 @@ TEST_P(BadInput, ExitsWithTwoAndOneLine) {
 }
 
 const Case kCases[] = {
-    {"MissingFile", "missing.ply", "NOTHING", {}, "missing.ply"},
-    {"UnknownKind", "text.xyz", "hello", {}, "text.xyz"},
-    {"TruncatedPly", "cut.ply", "CUT", {}, "cut.ply"},
-    {"BadTrajectory", "mesh.ply", "TERRAIN", {"--trajectory", "TRAJECTORY"}, "trajectory.csv:3"},
+    {"MissingFile", "missing.ply", "NOTHING", "missing.ply"},
+    {"UnknownKind", "text.xyz", "hello", "text.xyz"},
+    {"TruncatedPly", "cut.ply", "CUT", "cut.ply"},
 };
 // Its libraries take a second to load, and as long it is not told of its parent's end.
 TEST(Import, EndsWhereTheProcessThatWantedItDiedBefore) {

@@ -93,7 +93,7 @@ TEST_F(ColouredRun, WhatIsDisplayedIsWhatRaysSee) {
   auto flags = with({"--colour-by", by, "--colour-map", "plasma", "--verify", "60", "--sampling-size", "480x300"});
   flags.insert(flags.end(), kComesToRest.begin(), kComesToRest.end());
   PipelineRun run(flags, mesh());
-  ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
   // Frames of the next epoch are compared with rays that see its colours.
   EXPECT_EQ(ctl(run, {"colour", "temperature:20:80", "map", "viridis"}), 0);
   EXPECT_TRUE(shows_epoch(run, 2));

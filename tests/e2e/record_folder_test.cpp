@@ -70,25 +70,6 @@ TEST(RecordFolder, APathThatIsNotUtf8RecordsAllTheSame) {
     EXPECT_TRUE(has(out + file)) << file;
 }
 
-TEST(RecordFolder, WhatIsNoRecordIsNeverRemoved) {
-  const TemporaryFolder folder;
-  small(folder);
-  fs::create_directories(folder / "mine/images");
-  std::ofstream(folder / "mine/images/frame-000001.png") << "mine";
-  Program run("telesplat", short_run(folder, folder / "mine", {"--overwrite"}), folder / "run");
-  EXPECT_EQ(run.wait(30), 2);
-  EXPECT_NE(run.err().find("is no run's record"), std::string::npos) << run.err();
-  EXPECT_EQ(read_text(folder / "mine/images/frame-000001.png"), "mine");
-  // Nothing is written through a link either.
-  fs::create_directories(folder / "linked");
-  std::ofstream(folder / "precious") << "mine";
-  fs::create_symlink(folder / "precious", folder / "linked/frames.csv");
-  Program linked("telesplat", short_run(folder, folder / "linked", {"--overwrite"}), folder / "linked-run");
-  EXPECT_EQ(linked.wait(30), 2);
-  EXPECT_NE(linked.err().find("linked/frames.csv: is a symbolic link"), std::string::npos) << linked.err();
-  EXPECT_EQ(read_text(folder / "precious"), "mine");
-}
-
 TEST(RecordFolder, APersonsFolderIsRefusedAndStaysAsItIs) {
   const TemporaryFolder folder;
   small(folder);

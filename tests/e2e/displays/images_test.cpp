@@ -12,16 +12,6 @@
 namespace telesplat::test {
 namespace {
 
-struct Said {
-  int code = -1;
-  std::string out, err;
-};
-Said said(std::vector<std::string> words, const TemporaryFolder& folder) {
-  Program p("telesplat", std::move(words), folder / "said");
-  const int code = p.wait(60);
-  return {code, p.out(), p.err()};
-}
-
 TEST(Images, EachFrameShowsANewerPictureThatLooksAsTheSceneDoes) {
   PipelineRun run({"--coupling", "images", "--image-quality", "90", "--size", "320x200", "--duration", "6", "--frames",
                    "60", "--samplers", "2", "--verify", "10", "--verify-samples", "1", "--record-points", "0"});
@@ -57,6 +47,10 @@ TEST(Images, EachFrameShowsANewerPictureThatLooksAsTheSceneDoes) {
 TEST(ImagesAtRest, AFinerPictureFollowsAndThenNothing) {
   PipelineRun run({"--coupling", "images", "--image-quality", "20", "--size", "320x200", "--trajectory", "still",
                    "--duration", "3", "--verify", "1000", "--verify-samples", "4", "--record-points", "0"});
+  ASSERT_TRUE(run.wait_status([](const auto& status) { return value(status, "viewer-1", "frames") > 0; }));
+  Program change("telesplat", {"ctl", "coupling", "sync", "--master", run.master()}, run.folder() / "change");
+  EXPECT_EQ(change.wait(), 2) << change.out();
+  EXPECT_NE(change.err().find("from its beginning to its end"), std::string::npos) << change.err();
   ASSERT_EQ(run.program().wait(140), 0) << run.program().err();
   const auto s = run.summary();
   ASSERT_TRUE(s.is_object());
@@ -111,39 +105,6 @@ TEST(ImagesSwept, BesideAsyncAndByQuality) {
   EXPECT_LT(at(2, "quality.ssim.median"), at(3, "quality.ssim.median"));
   EXPECT_LT(at(2, "bytes_sent") / at(2, "frames"), at(3, "bytes_sent") / at(3, "frames"));
   EXPECT_NE(sweep.out().find("SSIM"), std::string::npos) << "couplings compare where it is equal: " << sweep.out();
-}
-
-TEST(ImagesRefused, WhatPicturesCannotBe) {
-  TemporaryFolder folder;
-  write_terrain(folder / "terrain.ply", 20);
-  write_volume(folder / "balls.mha");
-  for (const auto& [more, words] : {std::pair{std::vector<std::string>{"--stereo", "side-by-side"}, "--stereo"},
-                                    {{"--wall", "2x1"}, "--wall"},
-                                    {{"--background", "transparent"}, "no alpha"},
-                                    {{"--movie", folder / "m.mp4"}, "recorded points"},
-                                    {{"--image-quality", "0"}, "1"},
-                                    {{"--image-samples", "2"}, "1, 4, 16"}}) {
-    std::vector<std::string> all{"run", folder / "terrain.ply", "--out", folder / "run", "--coupling", "images"};
-    all.insert(all.end(), more.begin(), more.end());
-    const Said s = said(all, folder);
-    EXPECT_EQ(s.code, 2) << more.front() << ": " << s.err;
-    EXPECT_NE(s.err.find(words), std::string::npos) << s.err;
-  }
-  const Said volume = said({"run", folder / "balls.mha", "--out", folder / "run", "--coupling", "images"}, folder);
-  EXPECT_EQ(volume.code, 2);
-  EXPECT_NE(volume.err.find("is a volume, which comes as slice images"), std::string::npos) << volume.err;
-}
-
-TEST(ImagesRefused, AChangeOfCouplingWhileItRuns) {
-  for (const auto& [begin, order, words] : {std::tuple{"images", "sync", "from its beginning to its end"},
-                                            {"async", "images", "is of a session from its beginning"}}) {
-    PipelineRun run({"--coupling", begin, "--size", "160x100", "--duration", "60", "--record-points", "0"});
-    ASSERT_TRUE(run.wait_status([](const auto& status) { return value(status, "viewer-1", "frames") > 0; }));
-    const Said s = said({"ctl", "coupling", order, "--master", run.master()}, run.folder());
-    EXPECT_EQ(s.code, 2) << s.out << s.err;
-    EXPECT_NE((s.out + s.err).find(words), std::string::npos) << s.out << s.err;
-    EXPECT_EQ(run.stop(), 0);
-  }
 }
 
 }  // namespace

@@ -46,6 +46,9 @@ TEST(ChangedCouplings, EachFrameSaysWhichWasInForce) {
     EXPECT_TRUE(said.out.starts_with("viewer-1: " + words.front())) << said.out;
     EXPECT_TRUE(goes_on_with(mode, buffers)) << words.front();
   }
+  const Said refused = ctl(run, {"coupling", "images"});
+  EXPECT_EQ(refused.code, 2) << refused.out;
+  EXPECT_NE(refused.err.find("is of a session from its beginning"), std::string::npos) << refused.err;
   ASSERT_EQ(run.stop(), 0) << run.program().err();
   const auto s = run.summary();
   EXPECT_EQ(s["coupling"], "async") << "as it began";

@@ -152,6 +152,10 @@ TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
       {{"--master=tcp://127.0.0.1:1", "--c=0,0,0,0"}, "ctl set"},
       {{file("mesh.ply"), "--wall=2x1", "--viewers=3"}, "--viewers 3"},
       {{file("mesh.ply"), "--verify-samples=12"}, "--verify-samples: 12 rays"},
+      {{file("mesh.ply"), "--coupling=images", "--stereo=side-by-side"}, "--stereo"},
+      {{file("mesh.ply"), "--coupling=images", "--wall=2x1"}, "--wall"},
+      {{file("mesh.ply"), "--coupling=images", "--background=transparent"}, "no alpha"},
+      {{file("mesh.ply"), "--coupling=images", "--movie=" + file("m.mp4"), "--out=" + file("run")}, "recorded points"},
       {{}, "a scene is needed"},
   };
   for (const auto& [arguments, part] : cases) {
@@ -165,8 +169,12 @@ TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
 TEST_F(Scenes, NumbersOfARunHaveLimits) {
   RunOptions o;
   const auto rows = table(o);
-  for (const auto& [flag, text] :
-       {std::pair{"--samplers", "two"}, {"--samplers", "99"}, {"--iso", "nan"}, {"--room-size", "nan"}}) {
+  for (const auto& [flag, text] : {std::pair{"--samplers", "two"},
+                                   {"--samplers", "99"},
+                                   {"--iso", "nan"},
+                                   {"--room-size", "nan"},
+                                   {"--image-quality", "0"},
+                                   {"--image-samples", "2"}}) {
     const auto* row = options::find(rows, flag);
     ASSERT_NE(row, nullptr) << flag;
     EXPECT_FALSE(options::set(*row, text).ok()) << flag << " " << text;

@@ -26,6 +26,22 @@ class RunFolder : public testing::Test {
   std::string folder;
 };
 
+TEST_F(RunFolder, WhatIsNoRecordIsNeverRemovedNorWrittenThroughALink) {
+  put("images/frame-000001.png");
+  const auto refused = begin_folder(folder, true, Logs::kOurs);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().text.find("is no run's record"), std::string::npos) << refused.error().text;
+  EXPECT_TRUE(has("images/frame-000001.png"));
+  put("precious");
+  fs::create_directories(folder + "/linked");
+  fs::create_symlink(folder + "/precious", folder + "/linked/frames.csv");
+  const auto linked = begin_folder(folder + "/linked", true, Logs::kOurs);
+  ASSERT_FALSE(linked.ok());
+  EXPECT_NE(linked.error().text.find("linked/frames.csv: is a symbolic link"), std::string::npos)
+      << linked.error().text;
+  EXPECT_EQ(fs::file_size(folder + "/precious"), 8u);
+}
+
 TEST_F(RunFolder, ARecordWithinItIsAnotherRuns) {
   ASSERT_TRUE(begin_folder(folder, false, Logs::kOurs).ok());
   put("frames.csv");
