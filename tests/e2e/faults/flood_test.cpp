@@ -14,11 +14,7 @@
 namespace telesplat::test {
 namespace {
 
-#ifdef TELESPLAT_LONG_FAULTS
-constexpr double kFlood_s = 10;
-#else
 constexpr double kFlood_s = 3;
-#endif
 
 // All sockets that are bound, by what they are called in a hello; "control" is the master's.
 std::map<std::string, std::string> endpoints_of(PipelineRun& run) {

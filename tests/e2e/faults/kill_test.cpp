@@ -1,5 +1,5 @@
-// kill -9 of each process at each stage of a frame that can be told apart: it is started again, the display goes on,
-// and views are displayed again within seconds.
+// kill -9 of each process while a frame waits for somebody: it is started again, the display goes on, and views are
+// displayed again within seconds.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -13,12 +13,9 @@ namespace {
 
 // What a frame waits for while the process is killed. Others are stopped, so that it stays there.
 enum class Stage {
-  kStarting,  // the process itself has just come
   kFetching,  // a sampler has a lease and waits for the data server
   kLeased,    // samplers have all of it
   kSampled,   // the packer
-  kEpoch,     // everybody learns of a new epoch
-  kShown,     // nothing: views follow each other
 };
 
 struct Case {
@@ -28,18 +25,12 @@ struct Case {
 
 const char* words(Stage s) {
   switch (s) {
-    case Stage::kStarting:
-      return "as it starts";
     case Stage::kFetching:
       return "while a sampler fetches";
     case Stage::kLeased:
       return "while tiles are leased";
     case Stage::kSampled:
       return "while tiles wait for the packer";
-    case Stage::kEpoch:
-      return "while an epoch begins";
-    case Stage::kShown:
-      return "between views";
   }
   return "";
 }
@@ -79,14 +70,6 @@ class Killed : public ::testing::TestWithParam<Case> {
         held_.push_back(fault.signal("packer", SIGSTOP));
         in_flight(fault);
         return pass(0.3);  // until samplers have sent what they had
-      case Stage::kEpoch: {
-        Program ctl("telesplat", {"ctl", "--master", fault.run().master(), "epoch"}, fault.run().folder() / "ctl");
-        EXPECT_EQ(ctl.wait(), 0) << ctl.err();
-        return;
-      }
-      case Stage::kStarting:
-      case Stage::kShown:
-        return;
     }
   }
   void release(pid_t killed) {
@@ -108,60 +91,29 @@ TEST_P(Killed, AndStartedAgain) {
   const auto& [victim, stage] = GetParam();
   const std::string name = victim;
   Fault fault(fmt::format("kill -9 of {}, {}", name, words(stage)), {"--samplers", "2"});
-  const bool guest = name == "viewer-2", starting = stage == Stage::kStarting;
-  pid_t killed = 0;
-  if (starting) {
-    if (guest) {
-      ASSERT_TRUE(fault.showing());
-      fault.start_guest(false);
-    }
-    killed = fault.pid_of(name);
-  } else {
-    ASSERT_TRUE(fault.showing());
-    if (guest) fault.start_guest();
-    killed = fault.pid_of(name);
-    hold(fault);
-    fault.begins();
-  }
+  const bool guest = name == "viewer-2";
+  ASSERT_TRUE(fault.showing());
+  if (guest) fault.start_guest();
+  const pid_t killed = fault.pid_of(name);
+  hold(fault);
+  fault.begins();
   ASSERT_GT(killed, 0);
   ::kill(killed, SIGKILL);
   release(killed);
-  if (!starting) fault.ends();
+  fault.ends();
   if (guest) fault.start_guest();  // the launcher knows nothing of it
   EXPECT_TRUE(fault.wait_new_life(name, killed)) << fault.run().program().err();
-  if (starting) {
-    ASSERT_TRUE(fault.showing());
-    fault.ends();
-  }
   fault.expect_resynchronised();
   if (guest) fault.expect_updates("viewer-2");
   fault.finish();
 }
 
-// One a process beside other tests, the rest where there is time (tools/faults).
-#ifdef TELESPLAT_LONG_FAULTS
-INSTANTIATE_TEST_SUITE_P(Each, Killed,
-                         ::testing::Values(Case{"data", Stage::kStarting}, Case{"data", Stage::kLeased},
-                                           Case{"data", Stage::kSampled}, Case{"data", Stage::kEpoch},
-                                           Case{"data", Stage::kShown}, Case{"sampler-1", Stage::kStarting},
-                                           Case{"sampler-1", Stage::kFetching}, Case{"sampler-1", Stage::kSampled},
-                                           Case{"sampler-1", Stage::kEpoch}, Case{"sampler-1", Stage::kShown},
-                                           Case{"packer", Stage::kStarting}, Case{"packer", Stage::kFetching},
-                                           Case{"packer", Stage::kLeased}, Case{"packer", Stage::kEpoch},
-                                           Case{"packer", Stage::kShown}, Case{"master", Stage::kStarting},
-                                           Case{"master", Stage::kFetching}, Case{"master", Stage::kSampled},
-                                           Case{"master", Stage::kEpoch}, Case{"master", Stage::kShown},
-                                           Case{"viewer-2", Stage::kStarting}, Case{"viewer-2", Stage::kFetching},
-                                           Case{"viewer-2", Stage::kSampled}, Case{"viewer-2", Stage::kEpoch},
-                                           Case{"viewer-2", Stage::kShown}),
-                         [](const auto& info) { return test_name(info.param); });
-#else
+// Simulated sessions kill processes at any message.
 INSTANTIATE_TEST_SUITE_P(One, Killed,
                          ::testing::Values(Case{"data", Stage::kFetching}, Case{"sampler-1", Stage::kLeased},
                                            Case{"packer", Stage::kSampled}, Case{"master", Stage::kLeased},
                                            Case{"viewer-2", Stage::kLeased}),
                          [](const auto& info) { return test_name(info.param); });
-#endif
 
 }  // namespace
 }  // namespace telesplat::test

@@ -120,11 +120,7 @@ TEST(SlowLink, OfTwentyMegabitsShowsNewViews) {
   fault.finish();
 }
 
-#ifdef TELESPLAT_LONG_FAULTS
-constexpr double kReadsNothing_s = 30;
-#else
 constexpr double kReadsNothing_s = 4;
-#endif
 
 // A viewer that stands still, and a peer that asks and asks and never reads an answer.
 TEST(ReadsNothing, AViewerBesideOneThatMustNotNotice) {
