@@ -132,10 +132,19 @@ Program::Program(const std::string& name, std::vector<std::string> arguments, co
   std::vector<char*> argv;
   for (auto& a : arguments) argv.push_back(a.data());
   argv.push_back(nullptr);
+  // Emptied before it begins: what a former program of this prefix said is not this one's.
+  const auto emptied = [&](const char* suffix) {
+    return ::open((prefix + suffix).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  };
+  const int out = emptied(".out"), err = emptied(".err");
   pid_ = fork();
-  if (pid_ != 0) return;
-  dup2(::open((prefix + ".out").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), 1);
-  dup2(::open((prefix + ".err").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), 2);
+  if (pid_ != 0) {
+    ::close(out);
+    ::close(err);
+    return;
+  }
+  dup2(out, 1);
+  dup2(err, 2);
   // Sessions of tests and those of the person at this machine do not find each other.
   setenv("TELESPLAT_RUNTIME", (prefix + ".runtime").c_str(), 0);
   execv(argv[0], argv.data());
