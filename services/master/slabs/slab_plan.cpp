@@ -198,6 +198,7 @@ void SlabPlan::give_leases(Idle& idle, double now_s) {
       continue;
     }
     links_.outbox.send_lease(idle[i].id, *lease);
+    asked_.erase(idle[i].id);
     idle.served_in_place(i);
   }
 }
@@ -208,11 +209,12 @@ bool SlabPlan::done(const wire::TileDone& tile, const std::string& sampler, doub
   return schedule_.tile_done(tile, now_s);
 }
 
+// A sampler that has asked for work since is through with its slab, though the packer has not said so: it asks no more.
 Ticked SlabPlan::tick(double now_s) {
   const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
     log::warn("a slice lease of sampler {} expired; its slab goes to others until it asks again",
               links_.name_of(sampler));
-    fail(sampler, false, now_s);
+    fail(sampler, asked_.contains(sampler), now_s);
   });
   return {.expired = expired, .overdue = schedule_.overdue(now_s)};
 }
@@ -224,6 +226,7 @@ void SlabPlan::slab_ready(const std::string& sampler, const wire::SlabReady& sla
 int SlabPlan::release_sampler(const std::string& sampler) {
   partitions_.leave(sampler);
   failed_.erase(sampler);
+  asked_.erase(sampler);
   return schedule_.release_sampler(sampler);
 }
 

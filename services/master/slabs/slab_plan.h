@@ -42,6 +42,7 @@ class SlabPlan final : public Plan {
   bool hurried() const override { return schedule_.walls_here() && schedule_.view_waiting(); }
   Ticked tick(double now_s) override;
   void join(const std::string& sampler, double now_s) override;
+  void heard_of(const std::string& sampler) override { asked_.insert(sampler); }
   void slab_ready(const std::string& sampler, const wire::SlabReady& slab) override;
   int release_sampler(const std::string& sampler) override;
   size_t leases_of(const std::string& sampler) const override { return schedule_.leases_of(sampler); }
@@ -66,6 +67,7 @@ class SlabPlan final : public Plan {
   VolumeSchedule schedule_;
   SlabPartitions partitions_;
   std::map<std::string, Failed> failed_;
+  std::set<std::string> asked_;  // samplers that ask for work since their newest lease
   bool whole_ = false;        // all of the volume is known, and partitions and schedule are of it
   double since_s_ = 0;        // since when
   TokenBucket log_{10, 200};  // lines that hellos bring about: not more often than a person reads

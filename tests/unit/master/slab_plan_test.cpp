@@ -803,6 +803,31 @@ TEST_F(VolumeMaster, ASilentSamplersSlabMovesUntilItAsksAgain) {
   EXPECT_EQ(assigned[2].slabs, 2u) << "it was slow, not dead";
 }
 
+// As while nothing gets from the packer to the master.
+TEST_F(VolumeMaster, SamplersThatAskAgainKeepTheirSlabsThoughThePackerIsSilent) {
+  begin();
+  join_all();
+  ready(1);
+  ready(2);
+  view(1);
+  ask(1);
+  ask(2);
+  ASSERT_TRUE(leased(1));
+  ASSERT_TRUE(leased(2));
+  now = 0.1;
+  ask(1);
+  ask(2);
+  now = 2.3;
+  core->tick(now);
+  core->tick(now);
+  ready(1);
+  ready(2);
+  core->tick(now);
+  EXPECT_EQ(assigned[1].slabs, 2u);
+  EXPECT_TRUE(leased(1));
+  EXPECT_TRUE(leased(2));
+}
+
 TEST_F(VolumeMaster, ASamplerThatNeverDeliversHasItsSlabMoreAndMoreSeldom) {
   begin();
   join_all();
