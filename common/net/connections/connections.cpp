@@ -284,6 +284,7 @@ Connections::Counts Connections::counts() {
 
 namespace {
 
+constexpr int kUntold_ms = 500;
 constexpr int kUnread_ms = 50;  // what a fast network brings meanwhile is read into memory, whoever sends it
 
 }  // namespace
@@ -342,7 +343,8 @@ void Lookout::loop() {
       items.assign(1, {woken_, POLLIN, 0});
       for (const auto& [connections, descriptor] : watched_) items.push_back({descriptor, POLLIN, 0});
     }
-    ::poll(items.data(), items.size(), anybody ? kUnread_ms : -1);
+    // A connection that the owner's thread was told of first does not wake this one.
+    ::poll(items.data(), items.size(), anybody ? kUnread_ms : kUntold_ms);
     uint64_t count = 0;
     [[maybe_unused]] const ssize_t read = ::read(woken_, &count, sizeof count);
   }
