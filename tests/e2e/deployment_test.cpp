@@ -131,7 +131,7 @@ TEST(Deployment, APackersPortsAreKnownBeforeItRuns) {
   Program refused("telesplat-packer", {"--bind", "tcp://127.0.0.1:65534", "--master", d.master()}, d.folder() / "high");
   EXPECT_EQ(refused.wait(), 2);
   EXPECT_NE(refused.err().find("its 3 ports end at 65535"), std::string::npos) << refused.err();
-  // As in containers: nobody says what to announce.
+  // Containers give no address to announce.
   ASSERT_TRUE(d.wait_status([](const auto& s) { return !Deployment::of_role(s, "packer").is_object(); }));
   Program unadvertised("telesplat-packer", {"--bind", "tcp://*:*", "--insecure", "--master", d.master()},
                        d.folder() / "unadvertised");

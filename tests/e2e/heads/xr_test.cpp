@@ -146,7 +146,7 @@ TEST(Xr, WhoTakesTheHeadsetOffQuits) {
 TEST(Xr, ItWorksWithoutStageDepthAndHands) {
   XrRun xr("stage=off;depth=off;hands=off;every=20;hidden=0.5-1;discard=7;untracked=1.5-2");
   ASSERT_EQ(xr.run().program().wait(), 0) << xr.said();
-  EXPECT_EQ(xr.calls()["mistakes"], nlohmann::json::array()) << "nothing is drawn that nobody sees";
+  EXPECT_EQ(xr.calls()["mistakes"], nlohmann::json::array()) << "a frame that is not shown is not drawn";
   EXPECT_GT(xr.calls()["frames_shown"], 20);
   EXPECT_FALSE(xr.pictures("right").empty());
 }

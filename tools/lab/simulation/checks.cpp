@@ -23,7 +23,7 @@ constexpr double kTakesOver_s = 2;  // another sampler, from one that fails: lea
 constexpr double kOrderAnswers_s = 2.5;
 constexpr double kEpoch_s = 4;  // from an epoch's beginning until each viewer shows it
 constexpr double kLook_s = 0.1;
-constexpr double kLast_s = 1.5, kMostLateViews = 1.5;  // rays of so many views, of a head that has stood for long
+constexpr double kLast_s = 1.5, kMostLateViews = 1.5;  // views whose rays a standing head casts at the end, at most
 constexpr double kLeast_dB[] = {22, 27, 12};           // of what a standing head sees: spheres, terrain, bars
 constexpr double kMostForgets = 32e6;  // bytes of forgets that the log keeps beyond its limit, at most (event_log.h)
 constexpr double kMostHoles = 0.02, kMostWrong = 0.05;  // shares of pixels that one surface covers whole

@@ -40,7 +40,7 @@ enum class Fault : uint8_t {
   kJoin,           ///< one more of role `a`
   kStranger,       ///< a peer without a part sends valid messages of any kind to `a`, `amount` of them
   kImpostor,  ///< a peer says hello as role `b` under a name that is in use, and falls silent; amount 1: as the very
-              ///< process that was heard last; kData: with a volume that is none
+              ///< process that was heard last; kData: with a damaged volume
   kIntruder,  ///< a process of role `a` begins whose key is of role `b`, or (kMaster) no key
 };
 inline constexpr std::string_view kFaultNames[] = {
