@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/core/log.h"
+#include "tests/simulation/digests.h"
 #include "tools/lab/simulation/command.h"
 #include "tools/lab/simulation/figures/figures.h"
 
@@ -40,6 +41,7 @@ TEST_P(StandardWalks, HaveTheirGoldenFigures) {
   ASSERT_TRUE(result) << result.error().text;
   const auto& failure = result->outcome.failure;
   ASSERT_FALSE(failure) << failure->at_s << " s: " << failure->check << ": " << failure->text;
+  expect_digest(golden_digests(), walk.name, result->outcome.digest);
   const Comparison c = compare_figures(walk.name, result->figures, all[walk.name].get<WalkFigures>());
   for (const std::string& line : c.better)
     ADD_FAILURE() << line << ": better. tools/update-figures keeps that, so that it is not lost again";

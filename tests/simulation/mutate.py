@@ -8,8 +8,9 @@ Draws lines by seed from all lines of the cores (CORES) that can be mutated, and
 Lines that only log or measure are not drawn (MEASURES): no session could tell.
 All mutations are compiled into one telesplat-lab, in a worktree that has build/release; TELESPLAT_MUTANT chooses one
 of them. One that does not compile, or overlaps another, is replaced by the next draw. Looks at the figures of the
-standard walks first, those of real meshes aside, as tests/simulation/figures_test.cpp does, then at seeds. Seeds that
-fail without any mutation do not count. Prints a table: line, mutation, the check that found it, and where.
+standard walks first, those of real meshes aside, as tests/simulation/figures_test.cpp does, then at seeds: each must
+hold and have its digest. Seeds that fail without any mutation do not count. Prints a table: line, mutation, the check
+that found it ("digest" where nothing but a digest did), and where.
 """
 import argparse
 import json
@@ -23,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -297,8 +299,14 @@ def call(number, words, limit_s):
     return out, err, child.returncode
 
 
+def digests_of(text):
+    return dict(re.findall(r'^([^:\n]+): digest ([0-9a-f]+)', text, re.M))
+
+
 def walk(number, golden):
-    """('', check, text) of the first figure that differs by more than 1 %; golden: figures without any mutation."""
+    """(walk, check, text) of the first figure that differs by more than 1 %, else of the first digest that differs.
+
+    golden: figures and digests without any mutation."""
     said = call(number, ['--figures'], 600)
     if isinstance(said, float | int):
         return ('walk', 'hang', f'no end within {said:.0f} s')
@@ -309,46 +317,51 @@ def walk(number, golden):
         now = json.loads(out)
     except ValueError:
         return ('walk', 'crash', f'code {code}')
-    for name, figures in golden.items():
+    for name, figures in golden[0].items():
         for figure, was in figures.items():
             most = 0.1 if 'holes' in figure or 'psnr' in figure else 0.01 * abs(was)
             if abs(now[name].get(figure, 1e9) - was) > most + 1e-9:
                 return (name, 'figures', f'{figure} {now[name].get(figure)}, golden {was}')
+    return differing(digests_of(err), golden[1])
+
+
+def differing(now, golden):
+    """(name, 'digest', text) of the first session whose digest is not the golden one."""
+    for name, was in golden.items():
+        if now.get(name, was) != was:
+            return (name, 'digest', f'{now[name]}, golden {was}')
     return None
 
 
 def simulate(number, first, seeds, limit_s):
-    """(seed, check, text) of the first failure from seed `first` on; None: all hold."""
-    words = ['--seed', str(first), *(['--seeds', str(seeds), '--first'] if seeds > 1 else [])]
-    said = call(number, words, limit_s)
+    """(seed, check, text) of the first failure from seed `first` on, None: all hold; and the digests, by name."""
+    said = call(number, ['--seed', str(first), '--seeds', str(max(2, seeds)), '--digests'], limit_s)
     if isinstance(said, float | int):
-        return (first, 'hang', f'no end within {said:.0f} s')
+        return (first, 'hang', f'no end within {said:.0f} s'), {}
     out, _, code = said
     found = [(int(a), b, c) for a, b, c in re.findall(r'seed (\d+) FAILS at [\d.]+ s: ([\w-]+): (.*)', out)]
     if found:
-        return min(found)
-    return None if code == 0 else (first, 'crash', f'code {code}')
+        return min(found), digests_of(out)
+    return None if code == 0 else (first, 'crash', f'code {code}'), digests_of(out)
 
 
 def look_for(m, until, plain, limit_s):
-    """Runs more seeds, to `until`, unless it was found. plain: what seeds do without mutations, by seed."""
-    while not m.failures and m.seeds < until:
-        first = m.seeds + 1
-        found = simulate(m.number, first, until - m.seeds, 120 + limit_s * (until - m.seeds))
-        if not found:
-            m.seeds = until
-            break
-        m.seeds = found[0]
-        if found[0] not in plain:
-            plain[found[0]] = simulate(None, found[0], 1, 120)
-        if not plain[found[0]] or found[1] == 'hang':
-            m.failures.append(found)
+    """Runs more seeds, to `until`, unless it was found. plain: failure and digests of all of them without mutations."""
+    failure, golden = plain
+    first = m.seeds + 1
+    found, now = simulate(m.number, first, until - m.seeds, 120 + limit_s * (until - m.seeds))
+    m.seeds = until
+    if found and found[0] not in failure:
+        m.failures = [found]
+    elif not m.failures and (found := differing(now, golden)):
+        m.failures.append(found)
     m.reached = (SCRATCH / f'reached-{m.number}').exists()
 
 
 def table(chosen):
     found = sum(bool(m.failures) for m in chosen)
-    out = [f'{found} of {len(chosen)} found', '', '| line | mutation | check | seed or walk |', '|---|---|---|---|']
+    alone = sum(m.failures[0][1] == 'digest' for m in chosen if m.failures)
+    out = [f'{found} of {len(chosen)} found, {alone} of them by a digest alone', '', '| line | mutation | check | seed or walk |', '|---|---|---|---|']
     for m in sorted(chosen, key=lambda m: (m.path, m.line)):
         check, seed = (m.failures[0][1], m.failures[0][0]) if m.failures else (
             'survived' if m.reached else 'survived, never reached' if m.seeds else '', f'> {m.seeds}')
@@ -362,7 +375,7 @@ def main():
     parser.add_argument('--tree', type=Path, required=True, help='a worktree with build/release; its sources change')
     parser.add_argument('--count', type=int, default=60)
     parser.add_argument('--draw', type=int, default=1, help='the seed of the draw')
-    parser.add_argument('--rounds', default='50,200,1000', help='seeds of each round')
+    parser.add_argument('--rounds', default='20,300,1000', help='seeds of each round')
     parser.add_argument('--limit', type=float, default=20, help='seconds a session, until it is taken for dead')
     parser.add_argument('--out', type=Path, default=Path('build/mutations.md'), help='the table')
     parser.add_argument('--list', action='store_true', help='print the draw, and end')
@@ -375,17 +388,24 @@ def main():
     originals = {}
     SCRATCH.chmod(0o777)
     try:
-        chosen, plain = compile_all(a.tree, order, a.count, originals), {}
+        chosen = compile_all(a.tree, order, a.count, originals)
         shutil.copy(a.tree / 'build/release/bin/telesplat-lab', SCRATCH)
         restore(a.tree, originals)
-        golden = json.loads(call(None, ['--figures'], 600)[0])
-        for m in chosen:
-            if found := walk(m.number, golden):
-                m.failures.append(found)
-            m.reached = (SCRATCH / f'reached-{m.number}').exists()
-            print(m.path, m.line, m.number, m.what, m.failures or 'has the golden figures', flush=True)
-        for until in map(int, a.rounds.split(',')):
+        rounds = [int(r) for r in a.rounds.split(',')]
+        figures, digests, _ = call(None, ['--figures'], 600)
+        golden = json.loads(figures), digests_of(digests)
+        failing, plain = simulate(None, 1, rounds[-1], 3600)
+        plain = {failing[0]} if failing else set(), plain
+        with ThreadPoolExecutor(2) as pool:
+            for m, found in zip(chosen, pool.map(lambda m: walk(m.number, golden), chosen)):
+                m.failures += [found] if found else []
+                m.reached = (SCRATCH / f'reached-{m.number}').exists()
+                print(m.path, m.line, m.number, m.what, m.failures or 'has the golden figures', flush=True)
+        for until in rounds:
             for m in chosen:
+                # A property that fails says more than a digest: the first round looks for one.
+                if m.failures and (m.failures[0][1] != 'digest' or until != rounds[0]):
+                    continue
                 look_for(m, until, plain, a.limit)
                 print(m.path, m.line, m.number, m.what, m.failures or f'survives {m.seeds}', flush=True)
                 a.out.write_text(table(chosen))

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/core/machine.h"
+#include "tests/simulation/digests.h"
 #include "tests/support/simd_targets.h"
 #include "tools/lab/simulation/run.h"
 
@@ -107,12 +108,14 @@ TEST(Sessions, AreTheSameOnEveryInstructionSet) {
   }
 }
 
-TEST(Sessions, HoldWithFaultsOfAllKinds) {
+TEST(Sessions, HoldAndSendTheSameToTheByte) {
+  const auto golden = golden_digests();
   std::vector<Scenario> scenarios;
   for (uint64_t seed = 1; seed <= 300; ++seed) scenarios.push_back(draw_scenario(seed));
-  run_children(scenarios, usable_processors(), [](const Scenario& s, const Ran& ran) {
+  run_children(scenarios, usable_processors(), [&](const Scenario& s, const Ran& ran) {
     EXPECT_FALSE(ran.outcome.failure) << "telesplat-lab simulate --seed " << s.seed
                                       << " --trace: " << text_of(ran.outcome.failure);
+    expect_digest(golden, "seed-" + std::to_string(s.seed), ran.outcome.digest);
     return true;
   });
 }

@@ -149,6 +149,13 @@ void Checks::digest(const Passed& m) {
   mix(outcome_.digest, m.body.data(), m.body.size());
 }
 
+void Checks::digest(const viewer::DrawnFrame& drawn, const image::View& view) {
+  const uint64_t ids[2] = {drawn.update.request.value, drawn.epoch.value};
+  mix(outcome_.digest, ids, sizeof ids);
+  mix(outcome_.digest, view.colour.data(), view.colour.size() * sizeof(uint32_t));
+  mix(outcome_.digest, view.depth_m.data(), view.depth_m.size() * sizeof(float));
+}
+
 void Checks::sent(const Passed& m) {
   const auto from = parts_.find(m.from);
   if (from == parts_.end()) {  // somebody without a part
@@ -377,6 +384,7 @@ bool Checks::reshaped() const {
 
 void Checks::on_frame(Part part, SimulatedViewer& viewer, const viewer::DrawnFrame& drawn, double now_s) {
   ++outcome_.frames;
+  digest(drawn, viewer.view());
   const auto found = std::find_if(viewers_.begin(), viewers_.end(),
                                   [&](const auto& v) { return v.second.instance == viewer.instance(); });
   if (found == viewers_.end()) return;

@@ -42,7 +42,7 @@ struct Failure {
 
 /// What a session came to, the same for the same scenario.
 struct Figures {
-  uint64_t digest = 0;  ///< of all messages that were delivered, with their times
+  uint64_t digest = 0;  ///< of all messages that were delivered, with their times, and of all frames
   uint64_t messages = 0, frames = 0, updates = 0, turns = 0;
   uint64_t leases = 0, rays = 0;   ///< of tiles, and that they named
   uint64_t bytes = 0, points = 0;  ///< sent to viewers; of the packer's model at the end
@@ -99,6 +99,7 @@ class Checks final : public Observer {
   };
   void fail(std::string_view check, const std::string& text, double now_s);
   void digest(const Passed& m);
+  void digest(const viewer::DrawnFrame& drawn, const image::View& view);
   void sent(const Passed& m);
   void delivered(const Passed& m);
   void on_patch(const Passed& m, Part from);

@@ -26,7 +26,7 @@ struct SimulateOptions {
   uint64_t seed = 1, seeds = 1;
   double hours = 0;
   int threads = 1;
-  bool trace = false, shrink = false, first = false, figures = false;
+  bool trace = false, shrink = false, first = false, figures = false, digests = false;
   std::string walk;
   double from_s = 0, until_s = 1e9;
   std::string log_level = "off", simd = "best";
@@ -40,6 +40,7 @@ options::Table table(SimulateOptions& o) {
            .help = "number of sessions, from --seed on, on all processors; failures are printed",
            .limits = Range{1, 10'000'000}},
           {.flag = "--first", .value = &o.first, .help = "of --seeds: end with the first one that fails"},
+          {.flag = "--digests", .value = &o.digests, .help = "of --seeds: print each session's digest"},
           {.flag = "--hours",
            .value = &o.hours,
            .help = "length of a session with one viewer and two samplers, hours; 0: a session of 11 to 16 s",
@@ -118,6 +119,8 @@ int simulate_many(const SimulateOptions& o) {
       progress.close();
       std::printf("%s\n", text_of(s, ran.outcome).c_str());
       std::fflush(stdout);
+    } else if (o.digests) {
+      std::printf("%s\n", fmt::format("seed-{}: digest {:016x}", s.seed, ran.outcome.digest).c_str());
     }
     progress.show(fmt::format("{} of {} sessions, {} failed", done, scenarios.size(), failed));
     return !(o.first && failed > 0);
@@ -146,8 +149,8 @@ int print_figures(const SimulateOptions& o) {
                             : result->outcome.failure ? text_of(walk.scenario, result->outcome)
                                                       : "";
     if (!why.empty()) return std::fprintf(stderr, "%s: %s\n", walk.name.c_str(), why.c_str()), 1;
-    std::fprintf(stderr, "%s: digest %016llx, in %.1f s\n", walk.name.c_str(),
-                 static_cast<unsigned long long>(result->outcome.digest), monotonic_s() - begin_s);
+    const std::string digest = fmt::format("{}: digest {:016x}", walk.name, result->outcome.digest);
+    std::fprintf(stderr, "%s, in %.1f s\n", digest.c_str(), monotonic_s() - begin_s);
     all[walk.name] = result->figures;
   }
   std::fputs(json_of(all).c_str(), stdout);
