@@ -361,7 +361,8 @@ def look_for(m, until, plain, limit_s):
 def table(chosen):
     found = sum(bool(m.failures) for m in chosen)
     alone = sum(m.failures[0][1] == 'digest' for m in chosen if m.failures)
-    out = [f'{found} of {len(chosen)} found, {alone} of them by a digest alone', '', '| line | mutation | check | seed or walk |', '|---|---|---|---|']
+    out = [f'{found} of {len(chosen)} found, {alone} of them by a digest alone', '',
+           '| line | mutation | check | seed or walk |', '|---|---|---|---|']
     for m in sorted(chosen, key=lambda m: (m.path, m.line)):
         check, seed = (m.failures[0][1], m.failures[0][0]) if m.failures else (
             'survived' if m.reached else 'survived, never reached' if m.seeds else '', f'> {m.seeds}')

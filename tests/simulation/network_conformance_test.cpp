@@ -18,7 +18,7 @@
 #include "common/core/clock.h"
 #include "common/net/socket.h"
 #include "tests/support/patience.h"
-#include "tools/lab/simulation/network.h"
+#include "tools/lab/simulation/network/network.h"
 
 namespace telesplat::simulation {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
-#include "tools/lab/simulation/network.h"
-#include "tools/lab/simulation/pipes.h"
+#include "tools/lab/simulation/network/network.h"
+#include "tools/lab/simulation/network/pipes.h"
 
 namespace telesplat::simulation {
 namespace {

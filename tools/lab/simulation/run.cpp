@@ -40,6 +40,7 @@ Outcome run_scenario(const Scenario& scenario, const std::vector<Observer*>& oth
   const auto before = std::filesystem::current_path(error);
   char made[] = "/tmp/telesplat-simulation-XXXXXX";
   std::string folder;
+  std::signal(SIGXFSZ, SIG_IGN);  // as services do, which meet a full disk as an error
   if (scenario.records && mkdtemp(made) && chdir(made) == 0) folder = kFolder;
   Checks checks(scenario);
   std::vector<Observer*> observers{&checks};
@@ -79,7 +80,6 @@ Child begin_child(const Scenario& scenario, size_t number) {
   const pid_t pid = fork();
   if (pid == 0) {
     close(ends[0]);
-    std::signal(SIGXFSZ, SIG_IGN);
     limit_work(scenario.duration_s);
     log::initialise("simulation", "off");
     const Outcome outcome = run_scenario(scenario);

@@ -10,7 +10,7 @@
 #include "client/viewer/coupling/coupling.h"
 #include "common/geometry/trajectory.h"
 #include "common/wire/session_messages.h"
-#include "tools/lab/simulation/network.h"
+#include "tools/lab/simulation/network/network.h"
 
 namespace telesplat::simulation {
 

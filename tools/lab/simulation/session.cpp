@@ -1,9 +1,6 @@
 #include "tools/lab/simulation/session.h"
 
-#include <sys/resource.h>
-
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "common/core/check.h"
@@ -14,9 +11,8 @@
 namespace telesplat::simulation {
 namespace {
 
-constexpr double kTurn_s = 40e-6, kPacks_s = 300e-6;  // what a turn takes, and what packing a tile does
+constexpr double kPacks_s = 300e-6;  // that packing a tile takes
 constexpr double kRestart_s = 0.3;
-constexpr double kBootTime_s = 1000;
 
 net::Role key_of(Role role) { return net::role_named(kRoleNames[size_t(role)]).value_or(net::Role::kServer); }
 
@@ -26,7 +22,7 @@ Session::Session(const Scenario& scenario, std::vector<Observer*> observers, std
     : scenario_(scenario),
       show_(scenario.show),
       observers_(std::move(observers)),
-      folder_(std::move(folder)),
+      disk_(std::move(folder)),
       dice_(scenario.seed ^ 0x73657373),
       network_(scenario.seed ^ 0x6e6574),
       heard_(std::make_unique<Heard>()) {
@@ -34,7 +30,7 @@ Session::Session(const Scenario& scenario, std::vector<Observer*> observers, std
   network_.on_passed = [this](const Passed& m) { passed(m); };
   network_.on_ready = [this](int number) {
     for (auto& p : processes_)
-      if (p->number == number) p->ready = true;
+      if (p->number == number) p->schedule.ready = true;
   };
   network_.ahead_s = [this] { return spent_s_; };
   network_.on_rejected = [this](int number, std::string_view socket, const net::Message& m, const std::string& why) {
@@ -57,24 +53,20 @@ Session::~Session() {
 
 // ---- time -----------------------------------------------------------------------------------------------------------
 
-double Session::clock_of(const Process& p, double network_s) const {
-  return kBootTime_s + p.offset_s + network_s * (1 + p.drift);
-}
-double Session::monotonic_s() { return current_ ? clock_of(*current_, now_s_ + spent_s_) : now_s_; }
-double Session::thread_cpu_s() { return current_ ? current_->cpu_s + spent_s_ : 0; }
+double Session::monotonic_s() { return current_ ? current_->clock.at(now_s_ + spent_s_) : now_s_; }
+double Session::thread_cpu_s() { return current_ ? current_->schedule.cpu_s + spent_s_ : 0; }
 const std::string& Session::clock_id() {
   static const std::string none;
-  return current_ ? current_->clock : none;
+  return current_ ? current_->clock.id : none;
 }
 uint64_t Session::process_id() { return current_ ? uint64_t(current_->number) + 1 : 1; }
-bool Session::stop_requested() { return current_ && current_->told_to_stop; }
+bool Session::stop_requested() { return current_ && current_->fate.told_to_stop; }
 
 void Session::run_as(Process& p, const std::function<void()>& what) {
   Process* const before = std::exchange(current_, &p);
   const double spent_before_s = std::exchange(spent_s_, 0);
   what();
-  p.cpu_s += spent_s_;
-  p.busy_until_s = std::max(p.busy_until_s, now_s_ + spent_s_);
+  p.schedule.work(now_s_, spent_s_);
   current_ = before, spent_s_ = spent_before_s;
 }
 
@@ -90,10 +82,10 @@ void Session::add(Part part, double starts_s) {
   auto p = std::make_unique<Process>();
   p->part = part;
   p->name = text_of(part);
-  p->clock = scenario_.one_machine ? "machine" : p->name;
-  if (!scenario_.one_machine) p->offset_s = dice_.between(0, 1e5), p->drift = dice_.between(-60e-6, 60e-6);
-  p->starts_s = starts_s;
-  if (part.role == Role::kViewer)
+  p->clock.id = scenario_.one_machine ? "machine" : p->name;
+  if (!scenario_.one_machine) p->clock.offset_s = dice_.between(0, 1e5), p->clock.drift = dice_.between(-60e-6, 60e-6);
+  p->fate.restart(starts_s);
+  if (p->is_viewer())
     heads_[part.number] =
         size_t(part.number) < scenario_.heads.size()
             ? scenario_.heads[size_t(part.number)]
@@ -103,12 +95,12 @@ void Session::add(Part part, double starts_s) {
 
 void Session::begin(Process& p) {
   const bool first = p.number < 0;
-  p.starts_s.reset();
+  p.fate.starts_s.reset();
   p.number = int(lives_.size());
   lives_.push_back(p.part);
-  p.stopped = p.told_to_stop = p.ready = false;
+  p.fate.stopped = p.fate.told_to_stop = p.schedule.ready = false;
   ProcessOptions options;
-  options.clock = [this, &p](double network_s) { return clock_of(p, network_s); };
+  options.clock = [&p](double network_s) { return p.clock.at(network_s); };
   options.run = [this, &p, number = p.number](const std::function<void()>& what) {
     if (p.number == number && p.program) run_as(p, what);
   };
@@ -123,29 +115,29 @@ void Session::begin(Process& p) {
                               .show = show_,
                               .number = p.part.number,
                               .name = p.name,
-                              .folder = folder_,
+                              .folder = disk_.folder(),
                               .first = first,
                               .spend = [this](double s) { spend(s); },
-                              .slowness = [&p] { return p.slowness; }});
+                              .slowness = [&p] { return p.schedule.slowness; }});
     if (made) {
       p.program = *std::move(made);
-    } else if (!disk_free_s_) {  // with a full disk a master with a record cannot begin
+    } else if (!disk_.is_full()) {  // with a full disk a master with a record cannot begin
       for (Observer* o : observers_) o->on_unexpected(p.part, made.error().text, now_s_);
     }
   });
   if (!p.program) {
     p.context.reset();
-    p.starts_s = now_s_ + kRestart_s;
+    p.fate.restart(now_s_ + kRestart_s);
     return;
   }
-  p.wake_s = p.busy_until_s = p.next_frame_s = now_s_;
+  p.schedule.begin(now_s_);
 }
 
 // Messages to and from viewers go over their links.
 void Session::link(Process& p) {
   for (const auto& other : processes_) {
     if (other->number < 0 || other.get() == &p) continue;
-    const bool far = (p.part.role == Role::kViewer) != (other->part.role == Role::kViewer);
+    const bool far = p.is_viewer() != other->is_viewer();
     network_.set_link(p.number, other->number, far ? scenario_.to_viewers : scenario_.links);
     network_.set_link(other->number, p.number, far ? scenario_.to_viewers : scenario_.links);
   }
@@ -155,8 +147,8 @@ void Session::kill(Process& p, const std::string& how) {
   network_.crash(p.number);
   run_as(p, [&] { p.program.reset(); });
   p.context.reset();
-  p.stopped = false;
-  p.killed_after.reset();
+  p.fate.stopped = false;
+  p.fate.killed_after.reset();
   for (Observer* o : observers_) o->on_end(p.part, p.number, now_s_, how);
 }
 
@@ -164,7 +156,7 @@ void Session::kill(Process& p, const std::string& how) {
 void Session::ended(Process& p) {
   const int code = p.program->exit_code();
   run_as(p, [&] {
-    if (const Status s = p.program->finish(); !s && !disk_was_full_)
+    if (const Status s = p.program->finish(); !s && !disk_.was_full())
       for (Observer* o : observers_) o->on_unexpected(p.part, s.error().text, now_s_);
     p.program.reset();
     p.context.reset();
@@ -173,35 +165,32 @@ void Session::ended(Process& p) {
     o->on_end(p.part, p.number, now_s_, "ended");
     if (code != 0 && !p.key_of) o->on_unexpected(p.part, "exit code " + std::to_string(code), now_s_);
   }
-  p.gone = p.gone || p.key_of;
-  if (!p.gone && !ends_ && !p.starts_s) p.starts_s = now_s_ + kRestart_s;
+  p.fate.gone = p.fate.gone || p.key_of;
+  if (!p.fate.gone && !ends_ && !p.fate.starts_s) p.fate.restart(now_s_ + kRestart_s);
 }
 
 void Session::take_turn(Process& p) {
   ++turns_;
-  p.ready = false;
+  p.schedule.ready = false;
   std::optional<net::Wait> wait;
   run_as(p, [&] { wait = p.program->turns().turn(); });
-  if (p.dies) return;
-  p.busy_until_s = std::max(p.busy_until_s, now_s_) + kTurn_s;
+  if (p.fate.dies) return;
   if (!wait) return ended(p);
-  p.wait = *std::move(wait);
-  p.wake_s = p.busy_until_s + p.wait.for_s;
-  p.ready = p.ready || (!p.wait.sockets.empty() && net::wait_readable(p.wait.sockets, 0));
+  p.schedule.turned(now_s_, *std::move(wait));
 }
 
 void Session::display(Process& p) {
-  p.next_frame_s += 1 / scenario_.display_hz;
+  p.schedule.next_frame_s += 1 / scenario_.display_hz;
   SimulatedViewer& v = *p.program->viewer();
-  const double busy_until_s = p.busy_until_s;
+  const double busy_until_s = p.schedule.busy_until_s;
   run_as(p, [&] {
     if (const auto drawn = v.frame(head(p.part.number))) {
       ++frames_;
       for (Observer* o : observers_) o->on_frame(p.part, v, *drawn, now_s_);
     }
   });
-  p.busy_until_s = busy_until_s;  // another thread
-  if (v.over()) p.ready = true;
+  p.schedule.busy_until_s = busy_until_s;  // another thread
+  if (v.over()) p.schedule.ready = true;
 }
 
 geometry::Pose Session::head(int viewer) const { return heads_.at(viewer).at(now_s_); }
@@ -213,40 +202,29 @@ SimulatedViewer* Session::viewer(int number) {
 }
 bool Session::runs(Part part) const {
   return std::any_of(processes_.begin(), processes_.end(),
-                     [&](const auto& p) { return p->part == part && p->program && !p->stopped; });
+                     [&](const auto& p) { return p->part == part && p->program && !p->fate.stopped; });
 }
 int Session::count(Role role) const {
   return int(std::count_if(processes_.begin(), processes_.end(),
-                           [&](const auto& p) { return p->part.role == role && !p->gone && !p->key_of; }));
+                           [&](const auto& p) { return p->part.role == role && !p->fate.gone && !p->key_of; }));
 }
 
 // ---- the loop -------------------------------------------------------------------------------------------------------
 
-double Session::due_s(const Process& p) const {
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  if (p.starts_s) return std::max(*p.starts_s, now_s_);
-  if (!p.program) return kNever;
-  if (p.stopped) return p.goes_on_s.value_or(kNever);
-  double out = std::max(p.busy_until_s, p.ready ? now_s_ : p.wake_s);
-  if (p.part.role == Role::kViewer) out = std::min(out, p.next_frame_s);
-  return std::max(out, now_s_);
-}
-
 void Session::run_until(double until_s) {
   while (!stopped_) {
     for (auto& p : processes_)
-      if (std::exchange(p->dies, false) && p->program) {
+      if (std::exchange(p->fate.dies, false) && p->program) {
         kill(*p, "killed at a message");
-        p->starts_s = now_s_ + kRestart_s;
+        p->fate.restart(now_s_ + kRestart_s);
       }
-    double next_s = network_.next_s();
+    double next_s = std::min(network_.next_s(), disk_.free_s());
     if (next_event_ < scenario_.events.size()) next_s = std::min(next_s, scenario_.events[next_event_].at_s);
-    if (disk_free_s_) next_s = std::min(next_s, *disk_free_s_);
     if (!calm_) next_s = std::min(next_s, scenario_.duration_s - scenario_.calm_s);
     Process* first = nullptr;
-    double first_s = std::numeric_limits<double>::infinity();
+    double first_s = kNever_s;
     for (auto& p : processes_)
-      if (const double due = due_s(*p); due < first_s) first = p.get(), first_s = due;
+      if (const double due = p->due_s(now_s_); due < first_s) first = p.get(), first_s = due;
     next_s = std::max(now_s_, std::min(next_s, first_s));
     if (next_s > until_s) break;
     now_s_ = next_s;
@@ -254,20 +232,20 @@ void Session::run_until(double until_s) {
     network_.advance(now_s_);
     if (arrived) continue;
     if (!calm_ && now_s_ >= scenario_.duration_s - scenario_.calm_s) begin_calm();
-    if (disk_free_s_ && *disk_free_s_ <= now_s_) fill_disk(0);
+    if (disk_.free_s() <= now_s_) disk_.free();
     if (next_event_ < scenario_.events.size() && scenario_.events[next_event_].at_s <= now_s_) {
       apply(scenario_.events[next_event_++]);
       continue;
     }
     if (!first || first_s > now_s_) continue;
     Process& p = *first;
-    if (p.starts_s) {
+    if (p.fate.starts_s) {
       begin(p);
-    } else if (p.stopped) {
-      p.stopped = false, p.goes_on_s.reset();
+    } else if (p.fate.stopped) {
+      p.fate.go_on();
       network_.go_on(p.number);
-      p.next_frame_s = std::max(p.next_frame_s, now_s_);
-    } else if (p.part.role == Role::kViewer && p.next_frame_s <= now_s_) {
+      p.schedule.next_frame_s = std::max(p.schedule.next_frame_s, now_s_);
+    } else if (p.is_viewer() && p.schedule.next_frame_s <= now_s_) {
       display(p);
     } else {
       take_turn(p);
@@ -279,7 +257,7 @@ void Session::run_until(double until_s) {
 void Session::end() {
   ends_ = true;
   Process& master = process({Role::kMaster, 0});
-  master.told_to_stop = true;
+  master.fate.told_to_stop = true;
   for (const double until_s = now_s_ + 8; now_s_ < until_s && !stopped_;) {
     if (std::none_of(processes_.begin(), processes_.end(), [](const auto& p) { return p->program != nullptr; })) return;
     run_until(now_s_ + 0.05);
@@ -293,16 +271,11 @@ void Session::end() {
 
 void Session::passed(const Passed& m) {
   if (m.what == Passed::What::kSent && current_) {
-    if (current_->killed_after && --*current_->killed_after <= 0) {
-      current_->killed_after.reset();
-      current_->dies = true;
-      network_.crash(current_->number);
-      return;
-    }
+    if (current_->fate.dies_by_message()) return network_.crash(current_->number);
     if (m.type == wire::TileDone::kName) spend(kPacks_s);
     const bool sampled =
         m.type == wire::SliceImages::kName || (m.type == wire::DepthTile::kName && show_ == Show::kJulia);
-    if (sampled) spend(scenario_.tile_s * current_->slowness);
+    if (sampled) spend(scenario_.tile_s * current_->schedule.slowness);
   }
   heard_->listen(m);
   for (Observer* o : observers_) o->on_passed(m);
@@ -310,12 +283,12 @@ void Session::passed(const Passed& m) {
 
 void Session::begin_calm() {
   calm_ = true;
-  if (disk_free_s_) fill_disk(0);
+  if (disk_.is_full()) disk_.free();
   for (auto& p : processes_) {
-    p->slowness = 1;
-    p->killed_after.reset();
-    if (p->stopped) p->goes_on_s = now_s_;
-    if (p->starts_s) p->starts_s = std::min(*p->starts_s, now_s_ + kRestart_s);
+    p->schedule.slowness = 1;
+    p->fate.killed_after.reset();
+    if (p->fate.stopped) p->fate.goes_on_s = now_s_;
+    if (p->fate.starts_s) p->fate.restart(std::min(*p->fate.starts_s, now_s_ + kRestart_s));
     if (p->program) link(*p);
   }
 }
@@ -327,15 +300,15 @@ void Session::apply(const Event& e) {
   const bool runs = a && a->program;
   using enum Fault;
   const Fault f = e.fault;
-  if (f == kKill && runs) kill(*a, "killed"), a->starts_s = now_s_ + e.amount;
-  if (f == kTerminate && runs) a->told_to_stop = a->ready = true;
-  if (f == kKillAtMessage && runs) a->killed_after = e.amount;
-  if (f == kStop && runs && !a->stopped) network_.stop(a->number), a->stopped = true, a->goes_on_s = now_s_ + e.amount;
+  if (f == kKill && runs) kill(*a, "killed"), a->fate.restart(now_s_ + e.amount);
+  if (f == kTerminate && runs) a->fate.told_to_stop = a->schedule.ready = true;
+  if (f == kKillAtMessage && runs) a->fate.killed_after = e.amount;
+  if (f == kStop && runs && !a->fate.stopped) network_.stop(a->number), a->fate.stop(now_s_ + e.amount);
   if (f == kClockStep)
     for (auto& p : processes_)
-      if (p.get() == a || scenario_.one_machine) p->offset_s += e.amount;
-  if (f == kSlowWork && a) a->slowness = e.amount;
-  if (f == kDiskFull) fill_disk(e.amount);
+      if (p.get() == a || scenario_.one_machine) p->clock.offset_s += e.amount;
+  if (f == kSlowWork && a) a->schedule.slowness = e.amount;
+  if (f == kDiskFull) disk_.fill(now_s_ + e.amount);
   if (f == kLeave) leave(e.a);
   if (f == kJoin) join(e.a.role);
   if (f == kIntruder) join(e.a.role, e.b.role);
@@ -366,11 +339,11 @@ void Session::trouble_links(const Event& e) {
 
 void Session::leave(Part part) {
   for (auto& p : processes_)
-    if (p->part == part && !p->gone && count(part.role) > 1) {
-      p->gone = true;
-      p->starts_s.reset();
-      if (p->program) p->told_to_stop = p->ready = true;
-      if (p->program && part.role == Role::kViewer) kill(*p, "left");
+    if (p->part == part && !p->fate.gone && count(part.role) > 1) {
+      p->fate.gone = true;
+      p->fate.starts_s.reset();
+      if (p->program) p->fate.told_to_stop = p->schedule.ready = true;
+      if (p->program && p->is_viewer()) kill(*p, "left");
     }
 }
 
@@ -389,19 +362,8 @@ void Session::change_show(const Event& e) {
   for (auto& p : processes_) {
     if (p->part.role != Role::kData || p->key_of) continue;
     if (p->program) kill(*p, "killed");
-    p->starts_s = now_s_ + e.amount;
+    p->fate.restart(now_s_ + e.amount);
   }
-}
-
-// Files cannot grow while the disk is full; the process that simulates must be of its own.
-void Session::fill_disk(double for_s) {
-  if (folder_.empty()) return;
-  disk_was_full_ = true;
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  limit.rlim_cur = for_s > 0 ? 1 : limit.rlim_max;
-  setrlimit(RLIMIT_FSIZE, &limit);
-  disk_free_s_ = for_s > 0 ? std::optional(now_s_ + for_s) : std::nullopt;
 }
 
 void Session::speak(const Event& e) {

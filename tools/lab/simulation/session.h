@@ -13,7 +13,7 @@
 #include "common/core/machine.h"
 #include "common/net/turns.h"
 #include "tools/lab/simulation/dice.h"
-#include "tools/lab/simulation/programs.h"
+#include "tools/lab/simulation/process.h"
 
 namespace telesplat::simulation {
 
@@ -74,20 +74,7 @@ class Session final : public World {
   void spend(double seconds) { spent_s_ += seconds; }
 
  private:
-  struct Process {
-    Part part;
-    int number = -1;          // on the network, of its life
-    std::string name, clock;  // clock: its id
-    double offset_s = 0, drift = 0;
-    std::unique_ptr<net::Context> context;
-    std::unique_ptr<Program> program;  // null: it does not run
-    net::Wait wait;
-    double wake_s = 0, busy_until_s = 0, cpu_s = 0, slowness = 1;
-    bool ready = false, stopped = false, told_to_stop = false, gone = false, dies = false;
-    std::optional<Role> key_of;                               // of an intruder: the role of its key
-    std::optional<double> starts_s, goes_on_s, killed_after;  // killed_after: messages
-    double next_frame_s = 0;
-  };
+  using Process = SimulatedProcess;
   Process& process(Part part);
   void add(Part part, double starts_s);
   void begin(Process& p);
@@ -95,7 +82,6 @@ class Session final : public World {
   void ended(Process& p);
   void take_turn(Process& p);
   void display(Process& p);
-  double due_s(const Process& p) const;
   void run_as(Process& p, const std::function<void()>& what);
   void apply(const Event& event);
   void trouble_links(const Event& event);
@@ -104,15 +90,13 @@ class Session final : public World {
   void change_show(const Event& event);
   void leave(Part part);
   void begin_calm();
-  void fill_disk(double for_s);
   void passed(const Passed& message);
-  double clock_of(const Process& p, double network_s) const;
   void link(Process& p);
 
   const Scenario scenario_;
   Show show_;
   const std::vector<Observer*> observers_;
-  const std::string folder_;
+  Disk disk_;
   Dice dice_;
   SimulatedNetwork network_;
   std::vector<std::unique_ptr<Process>> processes_;
@@ -121,8 +105,7 @@ class Session final : public World {
   Process* current_ = nullptr;
   double now_s_ = 0, spent_s_ = 0;
   size_t next_event_ = 0;
-  bool stopped_ = false, ends_ = false, calm_ = false, disk_was_full_ = false;
-  std::optional<double> disk_free_s_;
+  bool stopped_ = false, ends_ = false, calm_ = false;
   uint64_t turns_ = 0, frames_ = 0;
   class Peer;
   std::unique_ptr<Heard> heard_;

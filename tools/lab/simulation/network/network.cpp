@@ -1,4 +1,4 @@
-#include "tools/lab/simulation/network.h"
+#include "tools/lab/simulation/network/network.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/core/check.h"
-#include "tools/lab/simulation/state.h"
+#include "tools/lab/simulation/network/state.h"
 
 namespace telesplat::simulation {
 

@@ -14,7 +14,7 @@
 #include "common/net/carrier.h"
 #include "common/net/connections/queued_bytes.h"
 #include "common/net/read_ahead.h"
-#include "tools/lab/simulation/network.h"
+#include "tools/lab/simulation/network/network.h"
 
 namespace telesplat::simulation {
 

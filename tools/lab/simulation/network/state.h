@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "tools/lab/simulation/pipes.h"
+#include "tools/lab/simulation/network/pipes.h"
 
 namespace telesplat::simulation {
 

@@ -8,7 +8,7 @@
 
 #include "common/core/check.h"
 #include "common/net/keys/roles.h"
-#include "tools/lab/simulation/state.h"
+#include "tools/lab/simulation/network/state.h"
 
 namespace telesplat::simulation {
 
