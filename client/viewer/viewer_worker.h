@@ -3,22 +3,20 @@
 // kind the scene is. It never holds up a display frame.
 #pragma once
 
-#include <atomic>
 #include <map>
-#include <mutex>
 #include <thread>
 
-#include "client/viewer/coupling/coupling.h"
-#include "client/viewer/coupling/stage_table.h"
-#include "client/viewer/display/frame_table.h"
 #include "client/viewer/hands/errands.h"
-#include "client/viewer/hands/meaning.h"
 #include "client/viewer/input/pose_feed.h"
-#include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
-#include "client/viewer/record/recent_values.h"
 #include "client/viewer/session_record.h"
 #include "client/viewer/succession.h"
+#include "client/viewer/worker/coupling_follower.h"
+#include "client/viewer/worker/display_news.h"
+#include "client/viewer/worker/open_updates.h"
+#include "client/viewer/worker/session_board.h"
+#include "client/viewer/worker/viewer_meter.h"
+#include "client/viewer/worker/viewer_tables.h"
 #include "common/net/service.h"
 #include "common/net/turns.h"
 #include "common/scene/session.h"
@@ -52,76 +50,73 @@ class ViewerWorker : public net::Turns {
 
   // ---- any thread ----
   /// The next turn is the last one.
-  void stop() { stop_ = true; }
+  void stop() { end_.stop(); }
 
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
-  void on_pose(double now_s, const geometry::Camera& camera);
-  /// Who tracks the head expects it here at t_s, which lies ahead (monotonic clock). Goes with the next pose or frame.
-  void on_expected(double t_s, const geometry::Pose& pose);
-  /// The next pose or frame is told in another space: how the head moved before means nothing.
-  void on_jump();
+  void on_pose(double now_s, const geometry::Camera& camera) { news_.on_pose({.t_s = now_s, .camera = camera}); }
+  /// The head's tracker expects it here at t_s, which lies ahead (monotonic clock). Goes with the next pose or frame.
+  void on_expected(double t_s, const geometry::Pose& pose) { news_.on_expected(t_s, pose); }
+  /// The next pose or frame is in another space: earlier movements of the head mean nothing.
+  void on_jump() { news_.on_jump(); }
   /// How far ahead views are asked for, seconds.
-  double horizon_s() const { return horizon_s_; }
+  double horizon_s() const { return board_.horizon_s; }
   /// Something of the scene was displayed for the first time (later calls change nothing).
-  void on_first_points(double now_s);
+  void on_first_points(double now_s) { meter_.on_first_points(now_s); }
   /// A frame of this epoch was displayed with this camera. shown: the newest update in it; waited: it waited for that.
   void on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown, bool waited);
-  /// Of a wall: ViewRequester::on_ask().
-  void on_ask(uint64_t ask, const geometry::Camera& camera);
+  /// A wall's viewers ask for views together: ViewRequester::on_ask().
+  void on_ask(uint64_t ask, const geometry::Camera& camera) { news_.on_ask({ask, camera}); }
   /// The row that the frame has in frames.csv.
-  void on_measured(const MeasuredFrame& frame);
-  /// The display has waited so long for a view update, in seconds; 0: it waits no longer, or not for long.
-  void on_waiting(double waits_s) { waits_s_ = waits_s; }
+  void on_measured(const MeasuredFrame& frame) { meter_.measured(frame); }
+  /// The display has waited this long for a view update, seconds; 0: it does not wait, or not for long.
+  void on_waiting(double waits_s) { meter_.waits(waits_s); }
   /// What to draw from, see Succession::at. Null: it is not known yet what the session shows.
   std::shared_ptr<Received> received_at(RequestId request) { return succession_.at(request); }
   /// True once one view update is complete.
-  bool first_update_complete() const { return updates_ > 0; }
-  bool shutdown_requested() const { return shutdown_; }
-  /// Once that is true: what the master says why, for people; empty: nothing.
-  const std::string& shutdown_reason() const { return why_; }
+  bool first_update_complete() const { return meter_.updates() > 0; }
+  bool shutdown_requested() const { return end_.shutdown(); }
+  /// The master's reason, for people; empty: it gave none. Precondition: shutdown_requested().
+  const std::string& shutdown_reason() const { return end_.why(); }
   /// Its thread ended by an exception, which was logged: nothing comes any more.
-  bool failed() const { return failed_; }
+  bool failed() const { return end_.failed(); }
   /// MasterLink::exit_code().
-  int link_code() const { return link_code_; }
+  int link_code() const { return end_.link_code(); }
   /// It may become another one.
-  InstanceId instance() const { return instance_; }
-  double to_master_s(double local_s) const { return local_s + offset_s_; }
+  InstanceId instance() const { return board_.instance; }
+  double to_master_s(double local_s) const { return local_s + board_.offset_s; }
 
-  /// For people who watch: what the network has of them.
+  /// The worker's share of a frame's figures.
   FrameFigures figures() const;
   /// The session as its master told it last; null before that.
-  std::shared_ptr<const wire::Welcome> session() const;
+  std::shared_ptr<const wire::Welcome> session() const { return board_.session(); }
   /// Views are sampled like this from now on.
-  void set_sampling(const SamplingWish& wish);
+  void set_sampling(const SamplingWish& wish) { news_.on_wish(wish); }
   /// What there is to show; an empty box until that is known.
-  ShownScene shown_scene() const;
+  ShownScene shown_scene() const { return board_.scene().shown; }
   /// What others ask of this viewer, for the display to carry out.
   OrderDesk& orders() { return orders_; }
   /// What the session's data are told in; null until the master told it.
-  std::shared_ptr<const SceneTerms> terms() const;
-  /// Of the frames of this epoch; null: there is nothing to tell.
-  std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return legends_.at(epoch); }
+  std::shared_ptr<const SceneTerms> terms() const { return board_.scene().terms; }
+  /// Null: frames of this epoch have no legend.
+  std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return board_.legends.at(epoch); }
 
  private:
-  static constexpr double kRecent_s = 5;  // what status reports tell of
-
   void loop();
   void receive();
   void renew(InstanceId instance);
   void follow_session();
   void follow_record(const wire::Welcome& session);
-  void follow_coupling(const wire::SessionSettings& session);
   void follow_pictures(const scene::SessionView& session);
-  void follow_depth(const metrics::StagesMs& stages, uint64_t ahead);
   void change_coupling(double now_s);
+  void set_coupling(const CouplingState& state);
   Status follow(scene::Pipeline pipeline, const wire::Welcome& session);
   void retire();
   void receive_control();
   void on_part(const ViewPart& part);
   void may_display(const ShownUpdate& update);
   void release(const std::vector<RequestId>& requests);
-  void take_poses();
+  void take_news();
   void take_sampling();
   void ask_again(double now_s);
   void request_views(double now_s);
@@ -129,65 +124,32 @@ class ViewerWorker : public net::Turns {
   void report(double now_s, bool last);
   ReceivedLinks links();
   net::MasterLink::Values status() const;
-  void add_recent(net::MasterLink::Values& values) const;
   void add_prediction(net::MasterLink::Values& values) const;
 
+  /// The session as it was followed last.
+  struct Followed {
+    int version = 0;
+    InstanceId master;
+    EpochId epoch;
+  };
+
   Options options_;
-  CouplingGate& gate_;
-  metrics::TableRecorder& frames_;
-  metrics::SpanRecorder& spans_;
-  metrics::TableRecorder updates_table_;
-  StageTable stages_table_;
+  CouplingFollower coupling_;
+  ViewerTables tables_;
   net::MasterLink link_;
   Feeds feeds_;
   ViewRequester requester_;
   std::optional<scene::Pipeline> pipeline_;
   std::shared_ptr<Received> received_;  // the newest of the succession
   Succession succession_;
-  std::map<RequestId, ShownUpdate> complete_;  // where the display waits: those that wait for earlier ones
-  int seen_version_ = 0;
+  OpenUpdates open_;
+  Followed followed_;
   bool told_coarser_ = false;
-  InstanceId master_;
-  bool all_again_ = false;       // what is open is to be asked for again
-  std::vector<RequestId> lost_;  // of these, which may be open
-  double started_s_ = 0, last_report_s_ = 0;
-  PipelineDepth depth_;  // where views come as pictures
-  EpochId session_epoch_;
-  std::optional<CouplingState> wished_;  // for the time being another one is in force
-  double wished_since_s_ = 0;
-
-  struct SeenPose {
-    double t_s = 0;
-    geometry::Camera camera;
-    /// Master's clock: when the update was requested that the frame waited for; 0: it did not.
-    double waited_since_s = 0;
-    RequestId shown;  ///< the newest update in what was displayed; 0: nothing was
-    std::optional<tracking::PosePredictor::Sample> expected{};
-    bool jumped = false;
-  };
-  LegendBook legends_;
   OrderDesk orders_;
-  mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
-  std::vector<SeenPose> poses_;
-  std::optional<tracking::PosePredictor::Sample> expected_;   // of the next one
-  bool jumped_ = false;                                       // before the next one
-  std::optional<std::pair<uint64_t, geometry::Camera>> ask_;  // the newest of on_ask(), that is not taken yet
-  std::string scene_;
-  ShownScene shown_scene_;
-  std::shared_ptr<const SceneTerms> terms_;
-  double latency_ms_ = 0;
-  std::shared_ptr<const wire::Welcome> session_;
-  std::optional<SamplingWish> sampling_;  // that is not in force yet
-  int sampled_width_ = 0, sampled_height_ = 0;
-
-  std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
-  std::string why_;  // written before shutdown_
-  std::atomic<bool> shutdown_{false}, failed_{false}, stop_{false};
-  std::atomic<int> link_code_{0};
-  std::atomic<InstanceId> instance_;
-  std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
-  std::atomic<double> longest_gap_ms_{0};  // between two displayed frames
-  RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
+  DisplayNews news_;
+  SessionBoard board_;
+  ViewerMeter meter_;
+  SessionEnd end_;
   std::thread thread_;
 };
 
