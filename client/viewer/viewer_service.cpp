@@ -171,7 +171,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const std::share
   Served served;
   const auto wall = wall_pace(o, context, worker);
   const std::function<FrameSpool*()> spool = [&] { return record.spool(); };
-  served.display = run_display(o.display, surface, make_source, gate, worker, frames, spans, spool, wall.get());
+  served.display = run_display({o.display, surface, make_source, gate, worker, frames, spans, spool, wall.get()});
   served.session_ended = worker.shutdown_requested();
   served.why = worker.shutdown_reason();
   served.link_code = worker.link_code();

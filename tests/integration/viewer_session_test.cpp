@@ -57,7 +57,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
       out.sources.push_back((*made)->drawn_name());
       return made;
     };
-    out.result = run_display(display, surface, make, gate, worker, table, spans, nullptr);
+    out.result = run_display({display, surface, make, gate, worker, table, spans, nullptr});
   }
   if (session_options.change_every == 0 && !session_options.taken) {
     EXPECT_EQ(out.sources, std::vector<std::string>{session_options.volume ? "samples" : "points"});

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/viewer/display/eyes/eye_pictures.h"
+#include "client/viewer/display/frame_rows.h"
 #include "client/viewer/hands/errands.h"
 #include "client/viewer/render/renderer.h"
 #include "common/core/clock.h"
@@ -17,7 +18,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kPicturePeriod_s = 2.5, kRestPeriod_s = 1.0 / 30, kLookAfterSurface_s = 0.1;
+constexpr double kRestPeriod_s = 1.0 / 30, kLookAfterSurface_s = 0.1;
 constexpr double kUnseen_s = 1;
 
 bool told_to_stop(const ViewerWorker& worker, const DisplaySurface& surface) {
@@ -51,32 +52,71 @@ void add(const DrawnFrame& other, DrawnFrame& sum) {
   sum.detail = std::min(sum.detail, other.detail);
 }
 
+// What frames are drawn from: what the worker received, and a source that draws it.
+class DrawnScene {
+ public:
+  DrawnScene(ViewerWorker& worker, DisplaySurface& surface, const SourceMaker& make)
+      : worker_(worker), surface_(surface), make_(make) {}
+
+  /// Draws frames that show the update of this request from now on; from the same as before, unless the session changed
+  /// between points and slice images, or a headset its pace. Error: it cannot be drawn.
+  Status use(RequestId request) {
+    auto received = worker_.received_at(request);
+    const double pictures = surface_.pictures_a_second();
+    if (received == received_ && pictures == pictures_a_second_) return ok_status();
+    source_.reset();  // its renderer's context must be gone before another one is made
+    received_ = std::move(received);
+    pictures_a_second_ = pictures;
+    auto made = make_(*received_, pictures);
+    if (!made) return made.error();
+    source_ = std::move(*made);
+    return ok_status();
+  }
+  bool can_draw() const { return source_ != nullptr; }
+  /// Precondition: can_draw().
+  ViewSource& source() const { return *source_; }
+  Received& received() const { return *received_; }
+
+ private:
+  ViewerWorker& worker_;
+  DisplaySurface& surface_;
+  const SourceMaker& make_;
+  std::shared_ptr<Received> received_;
+  std::unique_ptr<ViewSource> source_;  // draws received_
+  double pictures_a_second_ = 0;        // that source_ was made for
+};
+
+// A frame that is on display.
+struct ShownFrame {
+  geometry::Camera camera;
+  geometry::Pose head;
+  EpochId epoch;
+  EyePair eyes;  // with stereo
+};
+
 class DisplayLoop {
  public:
-  DisplayLoop(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ViewerWorker& worker,
-              metrics::TableRecorder& frames, metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
-              const SourceMaker& make_source, WallPace* wall)
-      : o_(o),
-        surface_(surface),
-        gate_(gate),
-        worker_(worker),
-        frames_(frames),
-        spans_(spans),
-        find_spool_(spool),
-        make_source_(make_source),
-        wall_(wall),
-        stereo_(o.stereo),
-        eyes_(o.stereo),
-        look_(first_look(o.render, o.shading)),
-        stall_(o.most_wait_s) {}
+  explicit DisplayLoop(const DisplayParts& parts)
+      : parts_(parts),
+        o_(parts.options),
+        surface_(parts.surface),
+        gate_(parts.gate),
+        worker_(parts.worker),
+        wall_(parts.wall),
+        rows_(parts.frames, parts.spans, parts.wall != nullptr),
+        kept_(parts.options),
+        drawn_(parts.worker, parts.surface, parts.make_source),
+        eyes_(parts.options.stereo),
+        look_(first_look(o_.render, o_.shading)),
+        stall_(o_.most_wait_s) {}
 
   DisplayResult run() {
     if (!wait_for_scene()) return stopped_early();
-    spool_ = find_spool_ ? find_spool_() : nullptr;
+    kept_.open(parts_.spool ? parts_.spool() : nullptr);
     if (!draw_from(newest_drawn()) || !rest()) return stopped_early();
     if (!surface_.paces()) {
       worker_.on_first_points(monotonic_s());
-      start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
+      clock_.start(o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s());
     }
     if (wall_) swap_with_wall();
     while (!last_)
@@ -84,7 +124,7 @@ class DisplayLoop {
         frame();
       else
         see_whether_over();
-    add_row();
+    rows_.flush();
     return result_;
   }
 
@@ -94,33 +134,14 @@ class DisplayLoop {
     return result_;
   }
 
-  // Draws from what frames are to show that show the update of this request; the same as before, unless the session
-  // changed between points and slice images, or a headset its pace. False: it cannot be drawn, result_ says why.
+  // False: what shows this request cannot be drawn, result_ says why.
   bool draw_from(RequestId request) {
-    auto received = worker_.received_at(request);
-    const double pictures = surface_.pictures_a_second();
-    if (received == received_ && pictures == pictures_a_second_) return true;
-    source_.reset();  // its renderer's context must be gone before another one is made
-    received_ = std::move(received);
-    pictures_a_second_ = pictures;
-    auto made = make_source_(*received_, pictures);
-    if (!made) {
-      result_.error = made.error().text;
-      return false;
-    }
-    source_ = std::move(*made);
-    return true;
+    const Status used = drawn_.use(request);
+    if (!used) result_.error = used.error().text;
+    return used.ok();
   }
   // The request of what is drawn next, where nothing is waited for.
   RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
-
-  // A frame that is on display.
-  struct Shown {
-    geometry::Camera camera;
-    geometry::Pose head;
-    EpochId epoch;
-    EyePair eyes;  // with stereo
-  };
 
   // Of the frame that begins; the surface knows by then what there is to show.
   geometry::Camera next_camera(double now_s, double t_s) {
@@ -129,10 +150,7 @@ class DisplayLoop {
     if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
     if (session != session_) surface_.on_session(session_ = std::move(session));
     if (const auto wish = surface_.take_sampling()) worker_.set_sampling(*wish);
-    if (const auto wish = surface_.take_stereo()) {
-      stereo_ = *wish;
-      eyes_ = EyePictures(stereo_);
-    }
+    if (const auto wish = surface_.take_stereo()) eyes_ = EyePictures(*wish);
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
@@ -161,10 +179,10 @@ class DisplayLoop {
 
   DrawnFrame draw(const FrameInput& input, bool kept) {
     if (const auto* eyes = surface_.eyes()) return draw_eyes(input, *eyes, kept);
-    if (eyes_.on()) return eyes_.draw(*source_, input, spool_ != nullptr, view_);
+    if (eyes_.on()) return eyes_.draw(drawn_.source(), input, kept_.spool() != nullptr, view_);
     // A view that may be recorded has room for depth all the time: growing it costs milliseconds.
-    fit(view_, input.camera, spool_ != nullptr);
-    return source_->draw(input, view_);
+    fit(view_, input.camera, kept_.spool() != nullptr);
+    return drawn_.source().draw(input, view_);
   }
 
   // Each eye's picture is as large as a frame, and has depth.
@@ -180,12 +198,12 @@ class DisplayLoop {
     DrawnFrame out;
     if (alike(eyes)) {
       input.camera = between(eyes);
-      out = source_->draw_pair(input, eyes, targets);
+      out = drawn_.source().draw_pair(input, eyes, targets);
     } else {
       input.camera = eyes[0];
-      out = source_->draw(input, eye_views_[0]);
+      out = drawn_.source().draw(input, eye_views_[0]);
       input.camera = eyes[1];
-      add(source_->draw(input, eye_views_[1]), out);
+      add(drawn_.source().draw(input, eye_views_[1]), out);
     }
     if (kept) view_ = eye_views_[0];  // before the surface draws over it
     return out;
@@ -236,7 +254,7 @@ class DisplayLoop {
       present(true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
       carry_out_orders({picked_with(camera), surface_.head(), drawn.epoch, eyes_.pair()});
-      surface_.report(figures_of(monotonic_s(), 0, drawn, *source_, worker_));
+      surface_.report(figures_of(monotonic_s(), 0, drawn, drawn_.source(), worker_));
     }
     return true;
   }
@@ -252,7 +270,8 @@ class DisplayLoop {
   // A display whose frames are not shown ends, too, kUnseen_s later.
   void see_whether_over() {
     if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
-    last_ = last_ || (start_s_ > 0 && o_.duration_s > 0 && monotonic_s() > start_s_ + o_.duration_s + kUnseen_s);
+    last_ = last_ ||
+            (clock_.started() && o_.duration_s > 0 && monotonic_s() > clock_.start_s() + o_.duration_s + kUnseen_s);
   }
 
   // Whether the frame that begins now is the last one.
@@ -276,9 +295,9 @@ class DisplayLoop {
     const double begin_s = monotonic_s();
     for (;;) {
       const auto [coupling, request, last_sign_s, asked_for] = gate_.take(look_after_s());
-      const double now_s = monotonic_s(), t_s = now_s - start_s_;
+      const double now_s = monotonic_s(), t_s = now_s - clock_.start_s();
       if (request || !coupling.waits()) end_stall();
-      if (request && draw_from(*request)) source_->advance(*request);
+      if (request && draw_from(*request)) drawn_.source().advance(*request);
       if (request || !coupling.waits()) return {monotonic_s() - begin_s, coupling, request.has_value()};
       if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s))
         return {now_s - begin_s, coupling};
@@ -292,7 +311,7 @@ class DisplayLoop {
       if (draws) return {now_s - begin_s, coupling};
       const geometry::Camera camera = next_camera(now_s, t_s);
       worker_.on_pose(now_s, asked(now_s, t_s, camera, surface_.head()));
-      if (source_ && shown_.epoch.value > 0)
+      if (drawn_.can_draw() && shown_.epoch.value > 0)
         carry_out_orders(shown_);
       else
         refuse_orders();
@@ -327,11 +346,11 @@ class DisplayLoop {
   // Of a wall: where to be when it goes on is this head's wish, and its master's word. Returns when the frame at hand
   // is to be presented.
   WallPace::Swapped swap_with_wall() {
-    const double now_s = monotonic_s(), t_s = now_s - start_s_;
+    const double now_s = monotonic_s(), t_s = now_s - clock_.start_s();
     next_camera(now_s, t_s);
-    const bool one_head = !gate_.waits() && received_->shows_whole_frames();
+    const bool one_head = !gate_.waits() && drawn_.received().shows_whole_frames();
     const auto swapped =
-        wall_->drawn({t_s, surface_.head(), received_->newest_state(), one_head ? worker_.horizon_s() : 0},
+        wall_->drawn({t_s, surface_.head(), drawn_.received().newest_state(), one_head ? worker_.horizon_s() : 0},
                      [this] { return told_to_stop(worker_, surface_); });
     if (swapped.ask > 0) ask_for(swapped.ask, swapped.ask_head);
     return swapped;
@@ -353,23 +372,13 @@ class DisplayLoop {
       return;
     }
     const WallPace::Turn& turn = wall_->turn();
-    if (!m.coupling.waits()) received_->show_state(turn.state);
+    if (!m.coupling.waits()) drawn_.received().show_state(turn.state);
     m.wall_frame = turn.frame;
     m.head = turn.head;
     // The display that leads took it after the frame before the last one was presented. Its clock is ours, unless
     // viewers were started by hand.
-    m.posed = {within(start_s_ + turn.t_s, seen_before_s_, m.begin_s)};
+    m.posed = {within(clock_.start_s() + turn.t_s, clock_.seen_before_s(), m.begin_s)};
     m.camera = surface_.camera_of(turn.head);
-  }
-
-  uint32_t use_of_frame(double t_s) const {
-    if (!spool_) return 0;
-    uint32_t use = 0;
-    if (o_.picture_every ? result_.frames % o_.picture_every == 0 : t_s >= next_picture_s_ || last_)
-      use |= o_.exr ? kPicture | kExr : kPicture;
-    if (o_.transparent && (use & kPicture)) use |= kTransparent;
-    if (o_.verify_every && (result_.frames % o_.verify_every < o_.verify_row || last_)) use |= kVerify;
-    return use;
   }
 
   void draw_measured(uint32_t use, bool coverage, MeasuredFrame& m) {
@@ -383,24 +392,24 @@ class DisplayLoop {
                    use != 0);
     m.end_s = monotonic_s();
     if (m.drawn.picture_of) m.posed = {m.drawn.update.posed_s - worker_.to_master_s(0)};
-    if (eyes_.on()) m.stereo = {stereo_.mode, eyes_.pair()};
+    if (eyes_.on()) m.stereo = {eyes_.mode(), eyes_.pair()};
   }
 
   void frame() {
     const Waited waited = wait_for_update();
     MeasuredFrame m{.number = result_.frames,
-                    .start_s = start_s_,
-                    .previous_s = previous_s_,
+                    .start_s = clock_.start_s(),
+                    .previous_s = clock_.previous_s(),
                     .wait_s = waited.wait_s,
                     .coupling = waited.coupling};
     if (!m.coupling.waits()) draw_from(Succession::kNewest);
-    if (!source_) {
+    if (!drawn_.can_draw()) {
       result_.interrupted = last_ = true;
       return;
     }
     m.begin_s = monotonic_s();
-    if (start_s_ == 0) start_s_ = m.start_s = m.begin_s;
-    const double t_s = wall_ ? wall_->turn().t_s : m.begin_s - start_s_;
+    if (!clock_.started()) clock_.start(m.start_s = m.begin_s);
+    const double t_s = wall_ ? wall_->turn().t_s : m.begin_s - clock_.start_s();
     see_whether_last(t_s);
     // The view of now, from what is cached now.
     begin_view(t_s, m);
@@ -408,7 +417,7 @@ class DisplayLoop {
     const geometry::Camera sampled = asked(m.begin_s, t_s, m.camera, m.head);
     if (m.coupling.mode == CouplingMode::kImages) worker_.on_pose(m.posed.taken_s, sampled);
     m.look = look_;
-    const uint32_t use = use_of_frame(t_s);
+    const uint32_t use = kept_.use_of(result_.frames, t_s, last_);
     const bool wished = surface_.wants_picture();
     const bool coverage = o_.transparent && ((use & kPicture) || wished);
     draw_measured(use, coverage, m);
@@ -419,7 +428,7 @@ class DisplayLoop {
     surface_.on_legend(legend);
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
     present(m.drawn.changed);
-    note_seen(m);
+    clock_.seen(m, monotonic_s(), std::max(surface_.refresh_s(), o_.target_fps > 0 ? 1 / o_.target_fps : 0));
     if (!m.drawn.empty) worker_.on_first_points(m.seen_s);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     take_wished_picture(m.camera);
@@ -427,7 +436,7 @@ class DisplayLoop {
     surface_.measure(m);
     if (wall_) note_swap(swapped, m);
     m.filled = gate_.filled();
-    source_->displayed();
+    drawn_.source().displayed();
     gate_.displayed();
     record(m);
     keep(use, t_s, m, o_.legend ? legend : nullptr);
@@ -436,13 +445,13 @@ class DisplayLoop {
     carry_out_orders(shown_ = {picked_with(m.camera), m.head, m.drawn.epoch, eyes_.pair()});
     if ((wall_ && !swapped.alone) || surface_.paces()) return;
     if (o_.target_fps > 0)
-      sleep_until(next_frame_s(m.begin_s));
+      sleep_until(clock_.next_s(m.begin_s, o_.target_fps));
     else if (!m.drawn.changed)
       sleep_until(m.begin_s + kRestPeriod_s / 2);
   }
 
   void tell_of(const MeasuredFrame& m) {
-    live_ = figures_of(m.presented_s, result_.frames, m.drawn, *source_, worker_);
+    live_ = figures_of(m.presented_s, result_.frames, m.drawn, drawn_.source(), worker_);
     live_.waits_s = stall_.told_s(m.presented_s);
     live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
     live_.coupling = m.coupling;
@@ -455,13 +464,13 @@ class DisplayLoop {
     if (!wish) return;
     image::View picture;
     fit(picture, camera, true);
-    source_->draw({.begin_s = monotonic_s(),
-                   .camera = camera,
-                   .look = look_,
-                   .with_depth = wish->exr,
-                   .with_coverage = o_.transparent,
-                   .resting = true},
-                  picture);
+    drawn_.source().draw({.begin_s = monotonic_s(),
+                          .camera = camera,
+                          .look = look_,
+                          .with_depth = wish->exr,
+                          .with_coverage = o_.transparent,
+                          .resting = true},
+                         picture);
     surface_.take_wished_picture(*wish, std::move(picture),
                                  o_.transparent ? image::Alpha::kCoverage : image::Alpha::kNone);
   }
@@ -471,16 +480,16 @@ class DisplayLoop {
     for (const wire::Order& order : worker_.orders().take_orders())
       worker_.orders().answer({order.number, false, order.command + ": nothing is shown yet"});
   }
-  void carry_out_orders(const Shown& frame) {
+  void carry_out_orders(const ShownFrame& frame) {
     surface_.on_terms(worker_.terms());
     if (const auto at = surface_.points_at()) {
       const auto aim = eyes_.aim(frame.camera, frame.eyes, *at);
-      surface_.on_pick(source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity), frame.epoch);
+      surface_.on_pick(drawn_.source().pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity), frame.epoch);
     }
     const geometry::Camera display = eyes_.display(frame.camera);
     const auto pick = [&](double x, double y, double opacity) {
       const auto aim = eyes_.aim(frame.camera, frame.eyes, {x / display.width, y / display.height});
-      return source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, opacity);
+      return drawn_.source().pick(aim.camera, aim.at_pix.x, aim.at_pix.y, opacity);
     };
     for (const wire::Order& order : worker_.orders().take_orders()) {
       const auto done = carry_out(
@@ -500,37 +509,16 @@ class DisplayLoop {
   void record(MeasuredFrame& m) {
     m.begin_master_s = worker_.to_master_s(m.begin_s);
     m.update_age_s = worker_.to_master_s(m.end_s) - m.drawn.update.requested_s;
-    add_row();
-    row_ = m;
-    if (!wall_) add_row();
+    rows_.add(m, m.begin_master_s - m.begin_s);
     worker_.on_measured(m);
-    if (m.wait_s > 0)
-      spans_.add("wait for update", worker_.to_master_s(m.begin_s - m.wait_s), worker_.to_master_s(m.begin_s), 0);
-    const uint64_t shown = m.drawn.update.request.value;
-    spans_.add("display frame", worker_.to_master_s(m.begin_s), worker_.to_master_s(m.end_s), 0,
-               {.request = shown ? double(shown) : -1});
-    previous_s_ = m.end_s;
-  }
-
-  // A picture that stands needs no refresh.
-  void note_seen(MeasuredFrame& m) {
-    m.seen_s = monotonic_s();
-    m.refresh_s = std::max(surface_.refresh_s(), o_.target_fps > 0 ? 1 / o_.target_fps : 0);
-    m.missed = m.drawn.still ? 0 : refreshes_missed(seen_s_, m.seen_s, m.refresh_s);
-    seen_before_s_ = std::exchange(seen_s_, m.seen_s);
+    clock_.ended(m);
   }
 
   void note_swap(const WallPace::Swapped& swapped, MeasuredFrame& m) {
     wall_->presented(m.presented_s);
     m.swap_wait_s = swapped.wait_s;
     if (swapped.alone) m.wall_frame = 0;
-    if (row_ && swapped.skew_frame > 0 && swapped.skew_frame == row_->wall_frame) row_->swap_skew_s = swapped.skew_s;
-  }
-
-  // Of a wall's frame it is known only with the next one when the others presented it.
-  void add_row() {
-    if (row_) frames_.add(frame_row(*row_));
-    row_.reset();
+    rows_.note_skew(swapped.skew_frame, swapped.skew_s);
   }
 
   // Hands the picture to the spool, if it is to be kept.
@@ -538,7 +526,7 @@ class DisplayLoop {
     if (m.drawn.between_clips) use &= ~uint32_t{kVerify};  // there is no epoch that looks like it
     view_intact_ = use == 0;
     if (!use) return;
-    if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
+    if (use & kPicture) kept_.on_picture(t_s);
     // A picture is compared with what its server was to draw; how old that is, other columns tell.
     geometry::Camera camera = m.drawn.picture_of.value_or(picked_with(m.camera));
     camera.width = view_.width, camera.height = view_.height;
@@ -546,47 +534,33 @@ class DisplayLoop {
     SpooledFrame frame{m.number, t_s,           use,    camera,
                        {},       m.drawn.epoch, legend, part_of_wall(camera.width, camera.height, o_.wall)};
     if (eyes_.on()) {
-      if (use & kVerify) eyes_.keep(*spool_, frame);
+      if (use & kVerify) eyes_.keep(*kept_.spool(), frame);
       frame.use &= ~uint32_t{kVerify};
       if (!frame.use) return;
     }
     frame.view = std::move(view_);
-    view_ = spool_->exchange(std::move(frame));
+    view_ = kept_.spool()->exchange(std::move(frame));
   }
 
-  // Frames are due at equal distances: one that began late, because sleep ended late, does not delay those after it.
-  double next_frame_s(double begin_s) {
-    const double period_s = 1.0 / o_.target_fps;
-    due_s_ = begin_s - due_s_ < period_s ? due_s_ + period_s : begin_s + period_s;
-    return due_s_;
-  }
-
+  const DisplayParts parts_;
   const DisplayOptions& o_;
   DisplaySurface& surface_;
   CouplingGate& gate_;
   ViewerWorker& worker_;
-  metrics::TableRecorder& frames_;
-  metrics::SpanRecorder& spans_;
-  const std::function<FrameSpool*()>& find_spool_;
-  FrameSpool* spool_ = nullptr;
-  const SourceMaker& make_source_;
   WallPace* const wall_;  // null: the display is by itself
-  std::optional<MeasuredFrame> row_;
-  StereoOptions stereo_;  // of eyes_
+  FrameRows rows_;
+  KeptFrames kept_;
+  FrameClock clock_;
+  DrawnScene drawn_;
   EyePictures eyes_;
-  Shown shown_;  // last
+  ShownFrame shown_;  // last
   Look look_;
   ShownScene scene_;  // as the surface knows it, and the session too
   std::shared_ptr<const wire::Welcome> session_;
-  std::shared_ptr<Received> received_;
-  std::unique_ptr<ViewSource> source_;  // draws received_; null: it cannot be drawn
   image::View view_;
   std::array<image::View, 2> eye_views_;  // of a surface that has eyes
-  double pictures_a_second_ = 0;          // that source_ was made for
   bool view_intact_ = false;              // it holds what is on display
   DisplayResult result_;
-  double due_s_ = 0;  // when the frame at hand was
-  double start_s_ = 0, previous_s_ = 0, seen_s_ = 0, seen_before_s_ = 0, next_picture_s_ = 0;
   bool last_ = false;
   StallWatch stall_;
   FrameFigures live_;  // of the newest frame
@@ -594,10 +568,6 @@ class DisplayLoop {
 
 }  // namespace
 
-DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
-                          CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
-                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool, WallPace* wall) {
-  return DisplayLoop(options, surface, gate, worker, frames, spans, spool, make_source, wall).run();
-}
+DisplayResult run_display(const DisplayParts& parts) { return DisplayLoop(parts).run(); }
 
 }  // namespace telesplat::viewer

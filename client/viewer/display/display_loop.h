@@ -24,17 +24,27 @@ struct DisplayResult {
 /// pictures_a_second: DisplaySurface's.
 using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&, double pictures_a_second)>;
 
+/// What a display is made of. All must outlive it.
+struct DisplayParts {
+  const DisplayOptions& options;
+  DisplaySurface& surface;
+  const SourceMaker& make_source;
+  CouplingGate& gate;
+  ViewerWorker& worker;
+  metrics::TableRecorder& frames;
+  metrics::SpanRecorder& spans;
+  /// Asked once the session is known. It, or what it returns, may be null: nothing is recorded.
+  const std::function<FrameSpool*()>& spool;
+  /// The display is one of several that present their frames together, from one head; null: it is by itself.
+  WallPace* wall = nullptr;
+};
+
 /// Waits until it is known what there is to show and for the first complete view update (the head rests at the
 /// trajectory's beginning), then displays frames on the surface. Where the coupling says so each frame waits for a
 /// complete view update and shows the view of now from it; meanwhile the surface is looked after ten times a second,
 /// and after options.most_wait_s frames are drawn from what is there (docs/coupling.md). The coupling may change at any
 /// time.
-/// Only the last frame, when told to stop or at the end of the duration, waits for nothing. `spool` is asked once the
-/// session is known; it, or what it returns, may be null: nothing is recorded.
-/// wall: where the display is one of several that present their frames together, from one head; null: it is not.
-DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
-                          CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
-                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
-                          WallPace* wall = nullptr);
+/// Only the last frame, when told to stop or at the end of the duration, waits for nothing.
+DisplayResult run_display(const DisplayParts& parts);
 
 }  // namespace telesplat::viewer

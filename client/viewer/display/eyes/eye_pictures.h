@@ -13,8 +13,9 @@ namespace telesplat::viewer {
 /// Used by one thread, the display's.
 class EyePictures {
  public:
-  explicit EyePictures(const StereoOptions& options) : rig_(options) {}
+  explicit EyePictures(const StereoOptions& options) : rig_(options), mode_(options.mode) {}
 
+  stereo::Mode mode() const { return mode_; }
   bool on() const { return rig_.on(); }
   /// Where the eyes of the frame that begins are; the camera to ask samplers for.
   /// turned: the head, which a wall's screens need not face. Precondition of this and sampled(): on().
@@ -48,6 +49,7 @@ class EyePictures {
   std::array<splat::FrameTarget, 2> parts_of(image::View& view) const;
 
   EyeRig rig_;
+  stereo::Mode mode_;
   EyePair pair_;
   std::array<image::View, 2> views_;
   double looked_s_ = -1e9;  // after the panel's file
