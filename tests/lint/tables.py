@@ -175,6 +175,20 @@ MOST_FUNCTION_LINES = 60
 # Functions that may be longer: (path, name) -> why.
 LONG_FUNCTIONS = {}
 
+# Patterns that comments and pages do not use, and what to write in their place.
+ENGLISH = [
+    (r"^(//[/!]?<? |# |\* )?[Oo]f (?!course)", 'begins with "of": begin with a verb or a noun of the code'),
+    (r"(?<=[.:] )Of (?!course)", 'a sentence begins with "Of": begin with its subject'),
+    (r"^(//[/!]?<? |# )(What|Whatever|Who|Whose|Which|Whether|How|Those) ", "begins with a question word"),
+    (r"\bso (many|much)\b(?! (?:more|less|as|of|that))", "name the number"),
+    (r"\b(is|are|was|were) none\b|\bnone (is|are)\b", "name a thing by what it is"),
+    (r"(?i)\b(nobody|somebody|anybody|everybody)\b", "name the process or the person"),
+    (r"(?i)\b(whoever|whomever|whatever|whichever)\b", "name the thing"),
+    (r"\bof (which|whom)\b", "make it two sentences"),
+    (r"(?i)\bwhat [\w ]{1,30} (is|are) (is|are)\b", "name the thing"),
+    (r"\bbut for\b", '"except"'),
+]
+
 MESSAGES = "common/wire/"  # files below it declare messages: kName = "..."
 PROTOCOL_PAGE = "docs/protocol.md"
 VERSION_FILE = "common/wire/limits.h"  # kProtocolVersion

@@ -149,4 +149,31 @@ def clamps(tree):
                 yield Finding(file.path, line, "clamps", "std::clamp: common/core/within.h has within()")
 
 
-RULES = (folders, cmake, widths, references, functions, widgets, clamps)
+def _texts(tree):
+    """(file, line, text) of each line of comments and of pages, code in pages aside."""
+    for file in tree.sources():
+        for number, text in file.comments:
+            yield file, number, text.strip()
+    for file in tree.files(".py", ".cmake", "CMakeLists.txt", ".sh", ".glsl"):
+        for number, line in enumerate(file.lines, 1):
+            if match := re.search(r"(?:^|\s)(# .*)", line):
+                yield file, number, match[1]
+    for file in tree.files(".md"):
+        fenced = False
+        for number, line in enumerate(file.lines, 1):
+            fenced ^= line.startswith("```")
+            if not fenced:
+                yield file, number, re.sub(r"`[^`]*`", "x", line.strip())
+
+
+def english(tree):
+    """Comments and pages begin with a verb or a noun, and name what they speak of."""
+    for file, number, text in _texts(tree):
+        if file.path.startswith("tests/lint/"):
+            continue  # the rule's own words
+        for pattern, advice in tables.ENGLISH:
+            if match := re.search(pattern, text):
+                yield Finding(file.path, number, "english", f'"{match[0].strip()}": {advice}')
+
+
+RULES = (folders, cmake, widths, references, functions, widgets, clamps, english)
