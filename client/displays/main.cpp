@@ -8,7 +8,7 @@
 
 namespace {
 
-// `telesplat-display check`: whether windows can be opened here, for the launcher. Prints why not.
+// `telesplat-display check`: tells the launcher if windows can be opened here; prints why not.
 int check() {
   const auto can = telesplat::viewer::check_display();
   if (!can) std::printf("%s\n", can.error().text.c_str());

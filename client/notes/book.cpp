@@ -19,7 +19,7 @@ constexpr const char* kMark = "telesplat_notes";
 constexpr int kVersion = 1;
 constexpr double kFarthest = 1e300;
 
-// One line that a terminal may show.
+// True if the text is one line that a terminal may show.
 bool is_line(std::string_view text, size_t most) {
   return !text.empty() && text.size() <= most && valid_utf8(text) &&
          std::none_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; });
@@ -28,7 +28,7 @@ bool is_text(std::string_view text) {
   return !text.empty() && text.size() <= kMaxText && valid_utf8(text) && text.find('\0') == text.npos;
 }
 
-// Of an entry of a list: "bookmark 3".
+// An entry of a list. what: "bookmark 3", for errors.
 struct Entry {
   const Json& json;
   std::string what;
@@ -56,7 +56,7 @@ struct Entry {
   }
 };
 
-// The keys that this program does not know, as JSON; empty: there are none.
+// Returns the keys that this program does not know, as JSON; empty: it knows all of them.
 std::string others_of(const Json& json, std::initializer_list<std::string_view> known) {
   Json out = Json::object();
   for (const auto& [key, value] : json.items())
@@ -109,8 +109,8 @@ Result<Note> read_note(const Entry& entry) {
   return out;
 }
 
-// What reading it as JSON would cost too much for; before that, for the parser keeps what is deep, and looks through an
-// object's keys for each one that it adds.
+// Refuses a text that would cost too much to read as JSON. It runs before the parser, which keeps deep lists in memory,
+// and searches all keys of an object for each key that it adds.
 Status complain_about_shape(std::string_view text) {
   int depth = 0;
   size_t keys[kMaxDepth + 1] = {};

@@ -29,7 +29,7 @@ bool exists(const std::string& path) {
   return !path.empty() && fs::exists(path, error);
 }
 
-// Nothing: there is no such file.
+// Returns nothing if there is no such file.
 Result<std::optional<Book>> read_file(const std::string& path) {
   if (!exists(path)) return std::optional<Book>();
   const auto text = read_whole(path, kMaxBytes);
@@ -39,7 +39,7 @@ Result<std::optional<Book>> read_file(const std::string& path) {
   return std::optional(*std::move(book));
 }
 
-constexpr std::chrono::seconds kLockPatience{5};  // another program holds a folder for as long as it writes a file
+constexpr std::chrono::seconds kLockPatience{5};  // another program holds a folder's lock while it writes a file
 
 // Returns 0, else errno.
 int write_all(int descriptor, const std::string& text) {
@@ -52,7 +52,7 @@ int write_all(int descriptor, const std::string& text) {
   return fsync(descriptor) != 0 ? errno : 0;
 }
 
-// A new file in this folder, of a name that nobody has, which any file system takes.
+// Makes a new file in this folder. Its name is new there, and is valid in any file system.
 int make_part(const fs::path& folder, mode_t mode, std::string& name) {
   static std::atomic<unsigned> made{0};
   for (int tries = 0; tries < 1000; ++tries) {
@@ -63,8 +63,8 @@ int make_part(const fs::path& folder, mode_t mode, std::string& name) {
   return -1;
 }
 
-// Gives a new file owner, group and mode of the one that it is to replace. Only root gives files away: else whoever was
-// its owner, or of its group, must be able to use it all the same. Returns 0, else errno.
+// Gives a new file the owner, group and mode of the file that it is to replace. Only root gives files away: if owner or
+// group change, the mode must still let the old ones use the file. Returns 0, else errno.
 int take_after(int descriptor, const struct stat& before) {
   struct stat now;
   if (fstat(descriptor, &now) != 0) return errno;
@@ -79,7 +79,7 @@ int take_after(int descriptor, const struct stat& before) {
   return (now.st_mode & 0777) != mode && fchmod(descriptor, mode) != 0 ? errno : 0;
 }
 
-// The old file stays until the new one is whole; who may read and write it may still. Returns 0, else errno.
+// The old file stays until the new one is whole; those who could read and write it still can. Returns 0, else errno.
 int replace_file(const std::string& path, const std::string& text) {
   struct stat before;
   const bool there = stat(path.c_str(), &before) == 0;
@@ -94,7 +94,7 @@ int replace_file(const std::string& path, const std::string& text) {
   return failed;
 }
 
-// Where a file lies that a link may stand for. Empty: the link leads nowhere.
+// Follows links to the file that they lead to. Empty: a link leads nowhere.
 std::string behind_links(const std::string& path) {
   std::error_code error;
   if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
@@ -109,8 +109,8 @@ bool can_write_beside(const std::string& path) {
   return access(folder.c_str(), W_OK | X_OK) == 0 && (!exists(file) || access(file.c_str(), W_OK) == 0);
 }
 
-// A folder may be one where files are written, and this file one that is not: in a folder like /tmp another person's
-// file is not replaced (EPERM).
+// True if the book must go to another folder. A folder may be writable though this file is not: in a folder like /tmp
+// another person's file cannot be replaced (EPERM).
 bool is_elsewhere(int failed) {
   return failed == ENAMETOOLONG || failed == EROFS || failed == EACCES || failed == EPERM;
 }
@@ -119,7 +119,7 @@ std::string read_path(const Shelf& shelf) {
   return exists(shelf.in_cache) || !exists(shelf.beside) ? shelf.in_cache : shelf.beside;
 }
 
-// change_book() to this file. failed: errno of a file that could not be written, else it stays.
+// Does change_book() with this one file. failed: errno if the file could not be written, else unchanged.
 Status change_in(const std::string& to, const Shelf& shelf, const std::function<Status(Book&)>& change, int& failed) {
   const std::string file = behind_links(to);
   if (file.empty()) return Error{to + ": is a link that leads nowhere"};

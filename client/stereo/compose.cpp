@@ -21,7 +21,7 @@ constexpr AnaglyphMatrices kDubois{{0.437f, 0.449f, 0.164f, -0.062f, -0.062f, -0
                                    {-0.011f, -0.032f, -0.007f, 0.377f, 0.761f, 0.009f, -0.026f, -0.093f, 1.234f},
                                    true};
 
-// Values that channels stand for, and channels of values, in steps so fine that no two channels share one.
+// Maps channels to values, and values back to channels, in steps so fine that no two channels share one.
 struct Curve {
   static constexpr int kSteps = 1 << 14;
   std::array<float, 256> value;
@@ -55,22 +55,22 @@ const T* row_of(const std::vector<T>& pixels, int width, int y) {
   return pixels.data() + size_t(y) * size_t(width);
 }
 
-// Channel by channel, rounded.
+// The mean of colours is taken for each channel, rounded; that of depths is the nearer one.
 uint32_t mean(uint32_t a, uint32_t b) { return (a | b) - ((a ^ b) >> 1 & 0x7f7f7f7fu); }
 float mean(float a, float b) { return std::min(a, b); }
 
-// Nothing is shown where a side is odd.
+// The value of pixels that get no picture because a side is odd.
 template <class T>
 constexpr T kNothing = T(0xff000000u);
 template <>
 constexpr float kNothing<float> = std::numeric_limits<float>::infinity();
 
-// What follows works on colours and depths alike.
+// The code below works on colours and depths alike.
 template <class T>
 struct Pictures {
   const std::vector<T>&left, &right;
   std::vector<T>& out;
-  int width, height;  // of an eye's picture
+  int width, height;  // an eye's picture
 
   void side_by_side() const {
     for_rows(height, [&](int y) {
@@ -107,7 +107,7 @@ struct Pictures {
       }
     });
   }
-  // The left eye's where both masks are 0; they look at the lowest bit of row and column.
+  // Takes pixels of the left eye where both masks are 0. The masks apply to the lowest bits of row and column.
   void interleave(int row_mask, int column_mask) const {
     for_rows(height, [&](int y) {
       T* to = out.data() + size_t(width) * size_t(y);

@@ -19,12 +19,12 @@ enum class Mode {
   kAnaglyphDubois,  ///< colours as near as the glasses allow (Dubois 2009)
   kRows,            ///< even rows (from the top, counted from 0) are the left eye's
   kColumns,         ///< even columns are
-  kChecker,         ///< pixels of which row + column is even are
+  kChecker,         ///< pixels where row + column is even are the left eye's
   kAutostereo,      ///< each subpixel is of the eye that sees it through a line screen (autostereo/)
   kQuadBuffer       ///< each eye has a frame buffer of its own; composed as kSideBySide of a display twice as wide
 };
 
-/// Of --stereo; by their numbers.
+/// Values of --stereo, in the order of Mode.
 const std::vector<std::string>& mode_names();
 std::string_view name_of(Mode mode);
 std::optional<Mode> mode_named(std::string_view name);
@@ -33,10 +33,10 @@ struct Size {
   int width = 0, height = 0;
   bool operator==(const Size&) const = default;
 };
-/// The picture of one eye where the display has so many pixels; 1 a side at least. Not of kAutostereo, where it is
-/// chosen freely.
+/// Returns the size of one eye's picture, in pixels, for a display of this size; at least 1 a side. With kAutostereo
+/// any other size will do as well.
 Size eye_size(Mode mode, Size display);
-/// The picture composed of two of that size.
+/// Returns the size of the picture that is composed of two of size `eye`.
 Size composed_size(Mode mode, Size eye);
 
 }  // namespace telesplat::stereo

@@ -1,4 +1,4 @@
-// Pictures by which a person sees whether each eye gets its own.
+// Test pictures that show a person if each eye gets its own.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ enum class Pattern {
   kTest  ///< a grid, numbered rows, and the eye's name, in the colours of each eye's own half of a fusable frame
 };
 
-/// "off", "calibration", "test": by their numbers.
+/// "off", "calibration", "test": in the order of Pattern.
 const std::vector<std::string>& pattern_names();
 std::optional<Pattern> pattern_named(std::string_view name);
 

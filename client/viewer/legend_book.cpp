@@ -18,7 +18,7 @@ void LegendBook::follow(const wire::Welcome& session) {
   const std::lock_guard lock(mutex_);
   const Page* before = pages_.empty() ? nullptr : &pages_.back();
   if (before && before->told == told && before->epoch <= session.epoch) return;
-  // The last epochs begin anew where another master took over.
+  // A new master counts epochs anew: pages of this epoch and later ones go.
   while (!pages_.empty() && pages_.back().epoch >= session.epoch) pages_.pop_back();
   const auto legend = scene::legend_of(session.facts, session.parameters);
   pages_.push_back({session.epoch, told, legend ? std::make_shared<const image::Legend>(*legend) : nullptr});

@@ -1,4 +1,4 @@
-// The legends of a session's epochs: frames of an epoch show its own, however soon the next one begins.
+// Keeps the legends of a session's epochs: frames of an epoch show its own, even when the next one has begun.
 #pragma once
 
 #include <deque>
@@ -14,15 +14,15 @@ namespace telesplat::viewer {
 /// Thread-safe.
 class LegendBook {
  public:
-  /// The session as its master tells of it now.
+  /// Takes the session as its master describes it now.
   void follow(const wire::Welcome& session);
-  /// The legend of this epoch, else of the newest one before it; null: there is nothing to tell.
+  /// Returns the legend of this epoch, else of the newest one before it; null: there is no legend.
   std::shared_ptr<const image::Legend> at(EpochId epoch) const;
 
  private:
   struct Page {
     EpochId epoch;
-    std::string told;  // the facts that it was made from
+    std::string told;  // facts of the session from which the legend was made
     std::shared_ptr<const image::Legend> legend;
   };
   mutable std::mutex mutex_;

@@ -1,7 +1,6 @@
-// What a viewer receives of a session, keeps and draws: points of a model, frames of slice images, or
-// pictures. One implementation for each pipeline (points/received_points.h, slices/received_slices.h,
-// pictures/received_pictures.h), each with a cache of its own.
-// Nobody else asks which it is.
+// Content that a viewer receives from a session, keeps and draws: points of a model, frames of slice images, or
+// pictures. There is one implementation for each pipeline (points/received_points.h, slices/received_slices.h,
+// pictures/received_pictures.h), each with a cache of its own. No other code asks which one it is.
 #pragma once
 
 #include <functional>
@@ -24,7 +23,7 @@
 
 namespace telesplat::viewer {
 
-/// A socket of this kind to an endpoint of wire::Welcome, as "state".
+/// A socket of this kind that connects to an endpoint of wire::Welcome, such as "state".
 struct Feed {
   net::Kind kind;
   const char* endpoint;
@@ -36,17 +35,17 @@ class Feeds {
   /// viewer: its name, for logs.
   Feeds(net::Context& context, std::string viewer) : context_(context), viewer_(std::move(viewer)) {}
 
-  /// Connects to where the session says that these are. True: anew, because it is not where it was; what was open is
-  /// closed. While the session does not know all of them everything stays as it is.
+  /// Connects to the session's endpoints of these names. Returns true if it connected anew because an endpoint moved;
+  /// old sockets are closed. While the session lacks one of the endpoints, all stays as it is.
   bool connect(std::span<const Feed> wanted, const wire::Welcome& session);
   void close() { open_.clear(); }
 
   bool connected() const { return !open_.empty(); }
-  /// Null if it is not connected.
+  /// Null if it is not connected to that endpoint.
   net::Socket* find(std::string_view endpoint);
-  /// Adds all sockets, to wait for.
+  /// Appends all sockets, for the caller to wait for.
   void add_to(std::vector<net::Socket*>& sockets);
-  /// Messages that could not be used, of the sockets that are open.
+  /// Number of messages on the open sockets that could not be used.
   uint64_t rejected() const;
 
  private:
@@ -65,57 +64,57 @@ class Received {
   virtual ~Received() = default;
 
   // ---- worker thread ----
-  /// The session as its master tells of it now. What must be received anew closes its feeds, which are to be connected
-  /// after each call. Error: it cannot be shown; names the value and its limit. All stays as it was then.
+  /// Takes the session as its master describes it now. Data that must be received anew close their feeds, so connect
+  /// feeds after each call. Error: the session cannot be shown; names the value and its limit, and all stays as it was.
   virtual Status follow(const wire::Welcome& session) = 0;
-  /// Where updates come from.
+  /// Feeds that bring updates.
   virtual std::span<const Feed> feeds() const = 0;
-  /// Its feeds were connected anew: there is another packer, which knows nothing of this viewer.
+  /// The feeds were connected anew: to another packer, which knows nothing of this viewer.
   virtual void on_connected() = 0;
-  /// Another master took over, which counts frames anew.
+  /// Another master took over, which numbers frames anew.
   virtual void on_new_master() {}
-  /// Takes at most `most` messages from each feed. Its feeds are connected.
+  /// Takes at most `most` messages from each feed. Precondition: its feeds are connected.
   virtual void receive(int most) = 0;
-  /// What is due by time alone. To be called every few milliseconds.
+  /// Does what is due by time alone. To be called every few milliseconds.
   virtual void tick(double now_s) = 0;
-  /// All parts of a view update of this viewer's are here. Only where the display waits for whole updates.
+  /// All parts of an update for this viewer are here. Called only if the display waits for whole updates.
   virtual void on_complete(RequestId) {}
-  /// A view update of this viewer's is complete. Where the display waits for whole updates: and may be displayed from
-  /// now on, since all before it may.
+  /// An update for this viewer is complete. If the display waits for whole updates, it may show this one from now on,
+  /// as all before it.
   virtual void on_update(const ShownUpdate&) {}
-  /// The coupling has other buffers from now on, 0: the display waits for nothing. What is complete and waits for the
-  /// display is shown then, the newest last. To be called after the gate has changed, if that is so, else before it.
+  /// The coupling has another number of buffers from now on; 0: the display waits for nothing. Complete updates that
+  /// wait are then shown, the newest last. Call it after the gate's change if the display waits no more, else before.
   virtual void on_coupling(int buffers) = 0;
-  /// Tells the packer what was drawn since the last call.
+  /// Reports to the packer what was drawn since the last call.
   virtual void report() {}
-  /// The session goes on with another one: nothing of the above is called any more. What is here can still be drawn.
+  /// Another Received takes over: no function above is called any more. Content that is here can still be drawn.
   virtual void on_retired() {}
-  /// Puts in what it knows better than the zeros that are there; adds to "messages_rejected".
+  /// Fills in the values that it knows; adds to "messages_rejected".
   virtual void add_status(net::MasterLink::Values& values) const = 0;
 
   // ---- display thread ----
-  /// Of a viewer that keeps in step with others (a wall), where it does not wait for whole updates: what it could show
-  /// by now, and from now on shows, or the nearest that it has. What comes after it waits.
+  /// For displays in step with others (a wall) that do not wait for whole updates: the state that it could show by now.
+  /// show_state() sets the state to show, or the nearest that it has; later content waits.
   virtual wire::ShownState newest_state() const = 0;
   virtual void show_state(const wire::ShownState& state) = 0;
-  /// What it shows is one frame that was sampled for one head, so that viewers in step ask for views of the same head.
+  /// True if each picture is one frame sampled for one head, so that viewers in step ask for views of the same head.
   virtual bool shows_whole_frames() const { return false; }
-  /// What draws it, to be used no longer than this lives. Error: no renderer could be made.
+  /// Makes the source that draws it; use it no longer than this lives. Error: no renderer could be made.
   virtual Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) = 0;
 };
 
-/// What the worker lends. References and functions are used in the worker's thread, as long as it has not retired the
-/// Received.
+/// Objects that the worker lends. References and functions are used in the worker's thread, until the worker retires
+/// the Received.
 struct ReceivedLinks {
   InstanceId viewer;
   CouplingGate& gate;
   Feeds& feeds;
   metrics::SpanRecorder& spans;
   std::function<void(const ViewPart&)>
-      on_part;                             ///< part of an update can be drawn, or is held until its update is complete
-  std::function<void(RequestId)> on_lost;  ///< its answer cannot be used: it is to be asked for again
-  std::function<void()> on_epoch;          ///< a new epoch began
-  std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester
+      on_part;  ///< a part of an update can be drawn, or is held until its update is complete
+  std::function<void(RequestId)> on_lost;                       ///< its answer cannot be used: ask for it again
+  std::function<void()> on_epoch;                               ///< a new epoch began
+  std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester::requested_s()
   std::function<double(double)> to_master_s;
 };
 

@@ -1,4 +1,4 @@
-// Data sets that were opened of late, newest first: a text file, a path a line.
+// The list of data sets that were opened lately, newest first: a text file, one path a line.
 #pragma once
 
 #include <string>
@@ -10,11 +10,11 @@ namespace telesplat::viewer {
 
 inline constexpr size_t kMostRecent = 12;
 
-/// $XDG_CONFIG_HOME/telesplat/recent, else ~/.config/telesplat/recent; empty: there is no home.
+/// $XDG_CONFIG_HOME/telesplat/recent, else ~/.config/telesplat/recent; empty: neither variable is set.
 std::string recent_files_path();
-/// At most kMostRecent; none where the file is not there or is no text of this kind.
+/// Reads at most kMostRecent; empty if there is no such file or it is not such a list.
 std::vector<std::string> read_recent(const std::string& list);
-/// Puts a data set first. Its path becomes absolute; what is no path of a file or folder, such as "julia", stays. The
+/// Puts a data set first. A path becomes absolute; a name that is not a file or folder, such as "julia", stays. The
 /// file appears whole or not at all. Error: names the file.
 Status add_recent(const std::string& list, const std::string& data_set);
 

@@ -19,12 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostViewers = 100;  // of one name in a folder
+constexpr int kMostViewers = 100;  // viewers of one name in a session's folder
 
-// Whether this process made it: of several only one did.
+// True if this process made the folder: if several try, one succeeds.
 bool made(const std::string& folder) { return mkdir(folder.c_str(), 0700) == 0; }
 
-// The folder's name came over the network: what stands there must not lead elsewhere.
+// The folder's name came over the network: links in it must not lead elsewhere.
 Status refuse_links(const std::string& folder) {
   std::error_code error;
   for (const char* name : {"/images", "/spool", "/points.events", "/slices.events"})
@@ -33,14 +33,14 @@ Status refuse_links(const std::string& folder) {
   return ok_status();
 }
 
-// A viewer's name as a folder's.
+// Makes a folder's name from a viewer's.
 std::string folder_name(const std::string& name) {
   std::string out;
   for (const char c : name) out += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '-';
   return out.starts_with("viewer-") ? out : "viewer-" + out;
 }
 
-// A folder that the person names: that of the session, one in it, or one without a record.
+// Checks a folder that the person names: the session's, one in it, or one without a record.
 Status check_own(const std::string& directory) {
   std::error_code error;
   const fs::path own = fs::absolute(directory, error).lexically_normal();
@@ -62,7 +62,7 @@ Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const Options& option
   return out;
 }
 
-// A folder with images/ is taken: whoever joins the session later makes one of its own.
+// A folder with images/ is taken: viewers that join the session later make their own.
 Status SessionRecord::open_in(const std::string& directory) {
   if (const auto error = make_private_folder(directory + "/images"))
     return Error{fmt::format("{}/images: cannot be made: {}", directory, error.message())};
@@ -126,7 +126,7 @@ void SessionRecord::follow(const wire::Welcome& session) {
   if (const Status s = join(folder, id); !s) log::warn("no pictures are kept: {}", s.error().text);
 }
 
-// The first viewer records into the folder itself, others into one of their own in it. Whoever makes images/ is first.
+// The first viewer, which makes images/, records into the folder itself, others into their own folder in it.
 Status SessionRecord::join(const std::string& folder, const std::string& id) {
   if (const Status s = refuse_links(folder); !s) return s;
   if (made(folder + "/images")) {

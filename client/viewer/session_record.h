@@ -1,5 +1,5 @@
-// Where a viewer keeps what it shows: pictures to be and what it received. The folder is the one that it was told, or
-// that of the session's own record, if this machine has it.
+// Keeps a viewer's record: frames that become pictures, and what it received. The folder is the one that it was given,
+// or that of the session's own record if this machine has it.
 #pragma once
 
 #include <atomic>
@@ -17,31 +17,31 @@ namespace telesplat::viewer {
 class SessionRecord {
  public:
   struct Options {
-    std::string out;           ///< folder; empty: that of the session, if join is set
-    bool join = true;          ///< keep a record in the session's folder
-    std::string name;          ///< the viewer's: of its folder in the session's, where that has pictures of another
-    uint64_t received_mb = 0;  ///< kept of what was received, MiB at most; 0: nothing
+    std::string out;   ///< folder; empty: the session's, if join is set
+    bool join = true;  ///< keep a record in the session's folder
+    std::string name;  ///< the viewer's name: its folder in the session's, if another viewer records there already
+    uint64_t received_mb = 0;  ///< MiB of received data to keep at most; 0: no data are kept
   };
 
-  /// Opens the folder that was told. Error: it cannot be written to, or another viewer records there.
+  /// Opens the folder that was given, if one was. Error: it cannot be written to, or another viewer records there.
   static Result<std::unique_ptr<SessionRecord>> open(const Options& options);
 
-  /// Worker's thread: the session as its master tells it, before anything of it is received. The first time it takes
-  /// the session's folder, if none was told.
+  /// Worker's thread: takes the session from its master, before any of its data are received. The first call opens the
+  /// session's folder if no folder was given.
   void follow(const wire::Welcome& session);
-  /// Where in the session's folder it records: "." or a folder's name; empty: elsewhere, or nowhere.
+  /// Place of the record in the session's folder: "." or a folder's name; empty: elsewhere, or there is no record.
   const std::string& records_in() const { return records_in_; }
   EventRecorder* events() const { return events_.get(); }
   SliceRecorder* slices() const { return slices_.get(); }
 
-  /// Display's thread, once the session is known; null: nothing is kept.
+  /// Display's thread, once the session is known; null: there is no record.
   FrameSpool* spool() const { return spool_ready_; }
-  /// After the session; empty: nothing is kept.
+  /// Call it after the session; empty: there is no record.
   const std::string& directory() const { return directory_; }
-  /// How many files could not be written to their end, the frames to be counting as one. What is waiting to be written
-  /// of them is, first. Worker's thread; after the session any.
+  /// Writes what is waiting for the record of received data, then counts files that could not be written to their end;
+  /// frames count as one file. Worker's thread; after the session any.
   uint64_t files_failed();
-  /// Those files, and why: "3 pictures, points.events: No space left on device"; empty: all was written.
+  /// Names those files and the reason: "3 pictures, points.events: No space left on device"; empty: all was written.
   std::string failure();
 
  private:
@@ -50,8 +50,8 @@ class SessionRecord {
   Status join(const std::string& folder, const std::string& id);
 
   const Options options_;
-  bool known_ = false;  // the session
-  Descriptor lock_;     // on images/, for as long as it records
+  bool known_ = false;  // follow() was called
+  Descriptor lock_;     // on images/, held while it records
   std::string directory_, records_in_;
   std::unique_ptr<FrameSpool> spool_;
   std::atomic<FrameSpool*> spool_ready_{nullptr};

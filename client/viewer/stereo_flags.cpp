@@ -56,7 +56,7 @@ options::Table stereo_table(StereoFlags& f) {
 
 namespace {
 
-constexpr double kMostLooks = 1e5;  // at a tracked head's movement
+constexpr double kMostLooks = 1e5;  // looks a second at a tracked head's movement
 
 Status read_files(const StereoFlags& f, StereoOptions& o) {
   const bool autostereo = o.mode == stereo::Mode::kAutostereo;

@@ -1,4 +1,4 @@
-// The flags of stereo displays, and what they come to.
+// The flags of stereo displays, and the options that they give.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ struct StereoFlags {
 
 options::Table stereo_table(StereoFlags& flags);
 
-/// Reads the files that they name. Error: names the flag or the file.
+/// Makes options from the flags; reads the files that they name. Error: names the flag or the file.
 Result<StereoOptions> settle(const StereoFlags& flags);
 
 }  // namespace telesplat::viewer

@@ -22,7 +22,7 @@ void Succession::on_update(RequestId request) {
 void Succession::free_dropped() {
   std::vector<std::shared_ptr<Received>> free;  // freed after the lock is released
   const std::lock_guard lock(mutex_);
-  // New holders come from at() only, so that one that nobody else holds stays that way.
+  // New holders come from at() only, so one that is held only here stays that way.
   const auto held = std::partition(dropped_.begin(), dropped_.end(), [](const auto& r) { return r.use_count() > 1; });
   free.assign(std::make_move_iterator(held), std::make_move_iterator(dropped_.end()));
   dropped_.erase(held, dropped_.end());

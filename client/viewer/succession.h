@@ -1,5 +1,5 @@
-// Where a session changes between points and slice images: which Received the display draws, and when it goes on to the
-// next one.
+// Decides which Received the display draws while a session changes between points and slice images, and when it goes on
+// to the next one.
 #pragma once
 
 #include <deque>
@@ -17,16 +17,17 @@ namespace telesplat::viewer {
 class Succession {
  public:
   // ---- worker ----
-  /// The session goes on with this one. One that has no picture yet is passed over.
+  /// Adds the session's next Received. If the one before has no picture yet, it is dropped.
   void begin(std::shared_ptr<Received> next);
-  /// The newest has a complete update that may be displayed, the answer to this request. Later calls change nothing.
+  /// The newest Received has its first complete update, the answer to this request. Later calls change nothing.
   void on_update(RequestId request);
-  /// Destroys those that nobody holds any more, outside the display's thread: to free a model takes milliseconds.
+  /// Destroys Receiveds that were dropped and that no thread holds. It takes milliseconds: not for the display's
+  /// thread.
   void free_dropped();
 
   // ---- display thread ----
-  /// What frames are drawn from that show the update of this request; kNewest: the newest that has a picture. Those
-  /// before it are given up. While none has a picture: the newest. Null before the first.
+  /// Returns the Received to draw frames from that show the update of this request; kNewest: the newest that has a
+  /// picture. Drops those before it. While none has a picture, returns the oldest. Null before the first begin().
   std::shared_ptr<Received> at(RequestId request);
   static constexpr RequestId kNewest{~uint64_t{0}};
 

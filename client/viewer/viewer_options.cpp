@@ -278,7 +278,7 @@ Status settle_eye(ViewerOptions& o) {
   return ok_status();
 }
 
-// How long it takes, once it is known what it follows.
+// Works out how long the run takes, after its movement is settled.
 void settle_duration(ViewerOptions& o) {
   auto& d = o.display;
   const double length_s = o.movement.recorded ? o.movement.recorded->duration_s() : 0;
@@ -305,7 +305,7 @@ Status settle_wall(ViewerOptions& o) {
     o.requests.adaptive = false;
   }
   if (all.anchor == wall::Anchor::kHead) return ok_status();
-  // The head stands before a wall that stands in the room, unless it is told to move.
+  // The head stands before a wall that stands in the room, unless the flags move it.
   if (o.trajectory == "orbit")
     return Error{
         fmt::format("--trajectory orbit: --wall {} stands in the room, and the data set would be seen from "
@@ -316,7 +316,7 @@ Status settle_wall(ViewerOptions& o) {
   return ok_status();
 }
 
-// Before a wall that stands in the room.
+// Places a still head before a wall that stands in the room.
 void stand_before_wall(ViewerOptions& o) {
   const auto& all = o.display.wall.described;
   if (!all || all->anchor == wall::Anchor::kHead || o.trajectory != "still" || !o.eye.empty()) return;
@@ -337,7 +337,7 @@ Status settle_head(ViewerOptions& o) {
   return ok_status();
 }
 
-// A panel's pixels are the display's, and the field of view is what it covers of a person's before it.
+// The panel sets the display's pixels, and the field of view of a person before it.
 Status settle_stereo(ViewerOptions& o) {
   auto stereo = settle(o.stereo);
   if (!stereo) return stereo.error();
@@ -361,7 +361,7 @@ Status settle_shading(ViewerOptions& o) {
   return ok_status();
 }
 
-// Pictures are flat, of one display, and have no alpha.
+// Refuses flags that pictures cannot serve: they are flat, for one display, and have no alpha.
 Status check_pictures(const ViewerOptions& o) {
   for (const auto& [given, flag, why] :
        {std::tuple{o.display.stereo.on(), "--stereo", "each picture is one eye's"},

@@ -29,7 +29,7 @@ int fail(const Error& error) {
   return 1;
 }
 
-// The launcher reads it: this is no reason to end the session for others.
+// Prints the failure for the launcher: it is no reason to end the session for others.
 int not_recorded(const std::string& directory, const std::string& why) {
   const std::string text = fmt::format("{}: not all of the record could be written: {}", directory, why);
   if (!isatty(STDOUT_FILENO)) std::printf("record failed %s\n", text.c_str());
@@ -37,13 +37,13 @@ int not_recorded(const std::string& directory, const std::string& why) {
   return fail({text});
 }
 
-// To the person: on a terminal as it is, else marked so that the launcher passes it on.
+// Prints a line for the person: on a terminal as it is, else marked so that the launcher passes it on.
 void tell(const std::string& text) {
   std::printf("%s%s\n", isatty(1) ? "" : "note ", text.c_str());
   std::fflush(stdout);
 }
 
-// Null: nobody publishes poses.
+// Null: the options name no publisher of poses.
 Result<std::shared_ptr<PoseFeed>> open_poses(const ViewerOptions& o) {
   if (o.poses.empty()) return std::shared_ptr<PoseFeed>();
   auto opened = PoseFeed::open({o.poses, o.requests.prediction, o.pose_horizon_s});
@@ -66,7 +66,7 @@ Result<std::unique_ptr<SessionRecord>> open_record(const ViewerOptions& o) {
       {.out = o.out, .join = o.join_record, .name = o.service.name, .received_mb = o.record_points_mb});
 }
 
-// The file that the head follows.
+// Adds facts about the file that the head follows.
 void add_trajectory(std::map<std::string, std::string>& facts, const ViewerOptions& o) {
   facts["trajectory"] = o.trajectory;
   if (!o.movement.recorded) return;
@@ -75,7 +75,7 @@ void add_trajectory(std::map<std::string, std::string>& facts, const ViewerOptio
   if (const auto hash = hash_of_files({o.trajectory})) facts["trajectory_hash"] = hash_text(hash->hash);
 }
 
-// What the master is told of this viewer.
+// Returns the facts about this viewer for the master.
 std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers& renderers) {
   const auto& d = o.display;
   const auto& r = o.requests;
@@ -117,10 +117,10 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
   return out;
 }
 
-// What all viewers of its wall call it.
+// Returns the name that all viewers of its wall give to it.
 std::string wall_name(const ViewerOptions& o) { return fmt::format("{} x{}", o.wall, o.wall_scale); }
 
-// What keeps the display in step with a wall's others; null: it is by itself.
+// Returns the pace that keeps the display in step with a wall's other displays; null: the display runs by itself.
 std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& context, const ViewerWorker& worker) {
   if (!in_step(o)) return nullptr;
   const auto& d = o.display;
@@ -139,12 +139,12 @@ std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& contex
 struct Served {
   DisplayResult display;
   bool session_ended = false;
-  std::string why;      // it has ended, for people
-  int link_code = 0;    // refused by the master, or it was waited for too long
-  bool failed = false;  // nothing came any more
+  std::string why;      // reason of the session's end, for people
+  int link_code = 0;    // the master refused the link, or was waited for too long
+  bool failed = false;  // the worker's thread ended
 };
 
-// Shows the session until it, the person or the clock ends it.
+// Shows the session until the session, the person or the clock ends it.
 Served serve(const ViewerOptions& o, const net::Access& access, const std::shared_ptr<PoseFeed>& poses,
              DisplaySurface& surface, Renderers& renderers, SessionRecord& record) {
   net::Context context(access);
@@ -179,12 +179,12 @@ Served serve(const ViewerOptions& o, const net::Access& access, const std::share
   return served;
 }
 
-// Recorded frames become pictures. After a signal there is a second for it; the rest stays where it is.
+// Turns recorded frames into pictures. After a signal it stops within a second; the other frames stay where they are.
 Status develop(const std::string& directory, FrameSpool& spool) {
   spool.flush();
   if (spool.dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool.dropped());
   if (spool.failed()) log::warn("{} frames to record could not be written", spool.failed());
-  // The launcher reads lines, a person one that is rewritten.
+  // The launcher reads lines; a person sees one line that is rewritten.
   const auto progress = [person = isatty(STDOUT_FILENO) != 0](size_t done, size_t of) {
     if (person)
       std::printf("\rpictures %.0f %%%s", 100.0 * double(done) / double(of), done == of ? "\n" : "");
@@ -203,7 +203,7 @@ Status develop(const std::string& directory, FrameSpool& spool) {
   return ok_status();
 }
 
-// Ends the session for everyone, if that is this viewer's part. Exit code.
+// Ends the session for all if the flags say so. Returns the exit code.
 int farewell(const ViewerOptions& o, const net::Access& asking, const Served& served) {
   if (served.link_code != 0) return served.link_code;
   const int otherwise = served.failed ? 1 : 0;
@@ -224,12 +224,12 @@ Result<int> run(ViewerOptions o, const Displays& displays) {
   net::keep_freed_memory();
   if (const Status s = settle(o); !s) return s.error();
   if (!access) return access.error();
-  // Whoever may change the session for everyone may do so at a window, too.
+  // A person who may change the session for all may do so at a window, too.
   const auto asking = net::access_of(o.service, net::asking_roles());
   if (!asking) return asking.error();
   const auto poses = open_poses(o);
   if (!poses) return poses.error();
-  // Before the renderers, whose contexts may depend on the window's.
+  // The surface comes before the renderers, whose contexts may depend on the window's.
   auto surface = open_surface(o, displays, {*asking, *poses, tell});
   if (!surface) return surface.error();
   auto renderers = Renderers::make(o.renderer, o.threads);
@@ -241,7 +241,7 @@ Result<int> run(ViewerOptions o, const Displays& displays) {
   if (!served.display.error.empty()) return fail({served.display.error});
   if (o.window && served.session_ended && !served.why.empty()) tell(served.why);
   const std::string lost = (*surface)->failure();
-  surface->reset();  // the window goes at once, however much there is to write
+  surface->reset();  // the window goes at once, before the record is written
   FrameSpool* const spool = (*record)->spool();
   const Status developed = spool ? develop((*record)->directory(), *spool) : ok_status();
   const int code = farewell(o, *asking, served);

@@ -1,6 +1,6 @@
-// The viewer process (T3.3.3): keeps what it receives, a display that never waits, measurements of itself.
-// Displays beside the headless one are functions that open them. telesplat-viewer holds none, so it builds without
-// libraries of window systems and headsets; telesplat-display holds those of client/displays.
+// The viewer process (T3.3.3): keeps what it receives, drives a display that never waits, and measures itself. Displays
+// other than the headless one are opened by functions. telesplat-viewer has none, so it builds without libraries of
+// window systems and headsets; telesplat-display has those of client/displays.
 #pragma once
 
 #include <functional>
@@ -15,31 +15,31 @@
 namespace telesplat::viewer {
 
 struct DisplayHelp {
-  net::Access asking;                            ///< may change the session for everyone, if the person may
-  std::shared_ptr<PoseFeed> poses;               ///< moves the head; null: nothing does
-  std::function<void(const std::string&)> tell;  ///< lines for the person
+  net::Access asking;                            ///< may change the session for all, if the person may
+  std::shared_ptr<PoseFeed> poses;               ///< moves the head; null: there is no feed
+  std::function<void(const std::string&)> tell;  ///< prints lines for the person
 };
 
-/// Opens a display. The options are settled; a display of another size changes them. Error: why it cannot be opened.
+/// Opens a display of settled options; a display of another size changes them. Error: why it cannot be opened.
 using OpenDisplay =
     std::function<Result<std::unique_ptr<DisplaySurface>>(ViewerOptions& options, const DisplayHelp& help)>;
 
-/// Null: the program holds no such display.
+/// Null: the program has no such display.
 struct Displays {
   OpenDisplay window, headset;
 };
 
 inline constexpr const char* kDisplayProgram = "telesplat-display";
-/// The path of kDisplayProgram beside this program. Error: it is not there; names what builds it.
+/// Returns the path of kDisplayProgram beside this program. Error: it is not there; names the target that builds it.
 Result<std::string> display_program();
-/// Becomes kDisplayProgram, with the same arguments. Returns only if it cannot: an exit code, after telling why.
+/// Becomes kDisplayProgram, with the same arguments. Returns an exit code only if it cannot, after it printed why.
 int become_display_program(char** argv);
 
-/// Exit code: 0 done, 1 failed while running (with end_session: also if the session ended before anything was shown), 2
+/// Exit code: 0 done, 1 failed while running (with end_session: also if the session ended before its first picture), 2
 /// bad usage or input. A signal ends it within 2 s: recorded frames that are not pictures by then stay in OUT/spool.
 Result<int> run(ViewerOptions options, const Displays& displays = {});
 
-/// telesplat-viewer and telesplat-display: the same flags, and one name for people and records.
+/// main() of telesplat-viewer and telesplat-display: the same flags, and one name for people and records.
 int viewer_main(int argc, char** argv, const Displays& displays);
 
 }  // namespace telesplat::viewer

@@ -14,8 +14,8 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kReportPeriod_s = 1.0;
-constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
-// How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each
+constexpr int kMessagesAtOnce = 16;  // then requests and control have their turn
+// Longest time until the worker looks at what the display did. Where the display waits, this time is lost in each
 // cycle.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
 constexpr double kWallPoll_s = 0.003;  // views of a wall wait for each other at the master
@@ -98,7 +98,7 @@ void ViewerWorker::on_measured(const MeasuredFrame& f) {
   if (f.previous_s > 0) {
     const double gap_ms = (f.end_s - f.previous_s) * 1e3;
     inter_frame_ms_.add(f.end_s, gap_ms);
-    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // one thread displays
+    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // safe: only one thread displays
   }
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
 }
@@ -125,7 +125,7 @@ void ViewerWorker::set_sampling(const SamplingWish& wish) {
   sampling_ = wish;
 }
 
-// What a person wishes goes before what the session tells.
+// A person's wish overrides the session's setting.
 void ViewerWorker::take_sampling() {
   std::optional<SamplingWish> wish;
   {
@@ -196,7 +196,7 @@ void ViewerWorker::receive_control() {
   shutdown_ = true;
 }
 
-// What was received speaks for the instance before: with the next welcome it begins anew.
+// Content received so far belongs to the old instance: the next welcome begins anew.
 void ViewerWorker::renew(InstanceId instance) {
   instance_ = instance;
   requester_.set_viewer(instance);
@@ -217,13 +217,13 @@ void ViewerWorker::follow_session() {
     requester_.on_new_epoch(to_master_s(monotonic_s()));
   requester_.set_steered(session.settings.steering);
   if (std::exchange(master_, session.master) != session.master) {
-    all_again_ = true;  // it knows nothing of what was asked for
+    all_again_ = true;  // the new master does not know the open requests
     if (received_) received_->on_new_master();
   }
   const auto pipeline = view.pipeline();
   if (!pipeline && !view.fact("kind").empty())
     log::error("the session's scene is of the kind \"{}\", which this viewer does not know", view.fact("kind"));
-  // The display hears of a session when its scene is there to be shown, or cannot be.
+  // The display gets a session when its scene can be shown, or when it is known that it cannot.
   auto copy = std::make_shared<const wire::Welcome>(session);
   const bool has_scene = !session.box_room.empty() && pipeline;
   const Status followed = has_scene ? follow(*pipeline, session) : ok_status();
@@ -243,7 +243,7 @@ void ViewerWorker::follow_session() {
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
 }
 
-// What `telesplat ctl coupling` wishes; a master that wishes nothing leaves it as it is.
+// Takes the wish of `telesplat ctl coupling`; if the master has no wish, the coupling stays.
 void ViewerWorker::follow_coupling(const wire::SessionSettings& session) {
   const auto told = coupling_told(session.coupling, session.buffers);
   if (!told) return;
@@ -252,7 +252,7 @@ void ViewerWorker::follow_coupling(const wire::SessionSettings& session) {
   wished_since_s_ = monotonic_s();
 }
 
-// Views come as pictures or not as long as the session lasts, whatever this viewer was told.
+// The session alone decides if views come as pictures, for as long as it lasts; the viewer's flags do not.
 void ViewerWorker::follow_pictures(const scene::SessionView& session) {
   const auto pipeline = session.pipeline();
   const bool pictures = pipeline == scene::Pipeline::kPictures, shows = gate_.state().mode == CouplingMode::kImages;
@@ -265,7 +265,7 @@ void ViewerWorker::follow_pictures(const scene::SessionView& session) {
   gate_.change(now);
 }
 
-// As many views are under way as keep the servers and the link busy.
+// Keeps as many views under way as servers and link need to stay busy.
 void ViewerWorker::follow_depth(const metrics::StagesMs& stages, uint64_t ahead) {
   CouplingState state = gate_.state();
   if (state.mode != CouplingMode::kImages) return;
@@ -279,8 +279,8 @@ void ViewerWorker::follow_depth(const metrics::StagesMs& stages, uint64_t ahead)
   gate_.change(state);
 }
 
-// A display that does not wait yet goes on to show what comes until the update that is on its way is complete: so none
-// is lost, and the first frame that waits waits for a request that knows of it.
+// Before the display begins to wait, the update under way is completed and shown, for kPatience_s at most. So no update
+// is lost, and the first frame that waits does so for a request made after the change.
 void ViewerWorker::change_coupling(double now_s) {
   if (!wished_) return;
   const CouplingState before = gate_.state(), after = *wished_;
@@ -296,7 +296,7 @@ void ViewerWorker::change_coupling(double now_s) {
   if (!begins_to_wait && received_) received_->on_coupling(after.buffers);
 }
 
-// Where the record lies is known before anything is received.
+// The record must have its folder before any data are received.
 void ViewerWorker::follow_record(const wire::Welcome& session) {
   if (!options_.record) return;
   const std::string before = options_.record->records_in();
@@ -317,7 +317,7 @@ Status ViewerWorker::follow(scene::Pipeline pipeline, const wire::Welcome& sessi
   return ok_status();
 }
 
-// The scene is drawn another way from now on. What was asked for is answered that way.
+// The scene is drawn by another Received from now on: requests are answered that way.
 void ViewerWorker::retire() {
   received_->on_retired();
   feeds_.close();
@@ -343,7 +343,7 @@ void ViewerWorker::on_part(const ViewPart& part) {
   const double local_s = monotonic_s(), now_s = to_master_s(local_s);
   bytes_received_ += part.bytes;
   if (part.viewer != link_.instance()) return;
-  // Rays beyond views answer no request: while they come, one that was lost must be asked for again all the same.
+  // Rays beyond views answer no request: they must not keep a lost request from being repeated.
   if (!part.extra) gate_.with([&](Coupling& c) { c.progress(local_s); });
   const auto u = requester_.on_part(part, now_s);
   if (!u) return;
@@ -371,7 +371,7 @@ void ViewerWorker::may_display(const ShownUpdate& update) {
   succession_.on_update(update.request);
 }
 
-// To be called before the display can take them: with the gate closed.
+// Call it with the gate closed, before the display can take them.
 void ViewerWorker::release(const std::vector<RequestId>& requests) {
   for (const RequestId request : requests) {
     may_display(complete_[request]);
@@ -416,7 +416,7 @@ void ViewerWorker::request_views(double now_s) {
   horizon_s_ = requester_.horizon_s();
   if (!link_.session() || !feeds_.connected()) return;
   ask_again(now_s);
-  if (wished_) return;  // nothing more is asked for until the coupling has changed
+  if (wished_) return;  // no requests until the coupling has changed
   bool may_ask = gate_.may_ask();
   while (may_ask) {
     const auto request = requester_.next(to_master_s(now_s));
@@ -431,7 +431,7 @@ void ViewerWorker::request_views(double now_s) {
   }
 }
 
-// Once: the master samples it coarser than it was asked for.
+// Warns once if the master samples coarser than the view asks for.
 void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
   const uint64_t most = link_.session()->settings.max_sampling_pixels;
   const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
@@ -451,7 +451,7 @@ void ViewerWorker::report(double now_s, bool last) {
   if (received_) received_->report();
 }
 
-// For people who watch: what was measured of late, and how the display waits.
+// Adds recent figures and how long the display waits, for people who watch.
 void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
   const double now_s = monotonic_s();
   for (const auto& [name, recent] : {std::pair{"inter_frame", &inter_frame_ms_},
@@ -474,7 +474,7 @@ void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
   values["longest_gap_ms"] = longest_gap_ms_;
 }
 
-// How well poses were predicted, means: those of view requests, and those that a tracker's poses were displayed with.
+// Adds mean errors of predicted poses: of view requests, and of displayed poses from a tracker.
 void ViewerWorker::add_prediction(net::MasterLink::Values& values) const {
   const auto add = [&](const char* what, const tracking::PredictionMeter::Figures& f) {
     if (f.count == 0) return;

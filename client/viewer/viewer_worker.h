@@ -1,6 +1,6 @@
 // The viewer's network side, on a thread of its own: keeps the link to the master, receives updates, asks for views,
-// measures updates, reports what was drawn. What it receives is a Received's business; the worker does not know of what
-// kind the scene is. It never holds up a display frame.
+// measures updates, reports what was drawn. A Received handles the content; the worker does not know what kind of scene
+// it is. It never holds up a display frame.
 #pragma once
 
 #include <map>
@@ -27,14 +27,14 @@ class ViewerWorker : public net::Turns {
  public:
   struct Options {
     net::ServiceOptions service;
-    RequestOptions requests;  ///< buffers are the gate's, as it begins
+    RequestOptions requests;  ///< requests.buffers: the gate's buffers at the start
     /// RequestOptions::min_scale. Nothing: the session's setting least_sampling.
     std::optional<double> least_sampling;
     std::map<std::string, std::string> facts;  ///< for the hello
-    ReceivedOptions received;                  ///< its recorders are the record's
-    SessionRecord* record = nullptr;           ///< null: nothing is kept. Outlives the worker
-    std::shared_ptr<const PoseFeed> poses;     ///< moves the head; null: nobody does. Its figures are reported
-    std::shared_ptr<const RendererChoice> renderer = std::make_shared<RendererChoice>();  ///< of the display
+    ReceivedOptions received;                  ///< its recorders are those of `record`
+    SessionRecord* record = nullptr;           ///< null: there is no record. Outlives the worker
+    std::shared_ptr<const PoseFeed> poses;     ///< moves the head; null: there is no feed. Its figures are reported
+    std::shared_ptr<const RendererChoice> renderer = std::make_shared<RendererChoice>();  ///< the display's renderer
     bool own_thread = true;  ///< false: its owner takes its turns
     double started_s = 0;    ///< when the session was started, on the monotonic clock; 0: now
   };

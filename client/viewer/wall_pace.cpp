@@ -11,9 +11,9 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kAsk_s = 0.1;        // whether to stop
-constexpr double kSayAgain_s = 0.25;  // what may have been lost
-constexpr double kFarAway_s = 1;      // a moment to present that lies farther ahead is none
+constexpr double kAsk_s = 0.1;        // period of the checks if it must stop
+constexpr double kSayAgain_s = 0.25;  // SwapReady may have been lost
+constexpr double kFarAway_s = 1;      // a moment to present that lies farther ahead is ignored
 
 }  // namespace
 
@@ -26,7 +26,7 @@ WallPace::WallPace(net::Context& context, const Options& options, std::function<
   if (const Status s = socket_.connect(options.master); !s) log::error("{}", s.error().text);
 }
 
-// The newest word for the frame at hand, or for a later one. waited: it has come just now.
+// Returns the newest word for the frame at hand or a later one. waited: it came in a wait; measures its delay.
 std::optional<wire::Swap> WallPace::take(bool waited) {
   std::optional<wire::Swap> out;
   while (const auto message = socket_.receive()) {
@@ -35,7 +35,7 @@ std::optional<wire::Swap> WallPace::take(bool waited) {
       continue;
     }
     auto swap = socket_.decode<wire::Swap>(*message);
-    // A master that was started again may not know how far the wall is: its numbers count from now on.
+    // A restarted master may not know how far the wall is: its numbers count from now on.
     if (!swap || (swap->master == led_by_ && swap->frame < turn_.frame)) continue;
     if (waited) late_s_ = std::clamp(to_master_s_(message->arrived_s) - swap->at_s, 0.0, kFarAway_s);
     out = std::move(swap);
@@ -100,7 +100,7 @@ WallPace::Swapped WallPace::drawn(const Wish& next, const std::function<bool()>&
     if (!alone_ && !stopped()) log::warn("the master does not say when the wall's frames are presented: alone for now");
     out.alone = alone_ = true;
     out.wait_s = monotonic_s() - begin_s;
-    // The number stays: whoever leads the wall then says where it is.
+    // The number stays: the next master to lead the wall then sends where the wall is.
     turn_ = {turn_.frame, next.t_s, next.head, next.state};
     return out;
   }

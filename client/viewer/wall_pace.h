@@ -1,5 +1,5 @@
-// A display that is one of a wall's: it presents its frames when the others do, and draws what they draw, seen by the
-// same head. The master says when and what (wire::Swap). Used by one thread, the display's.
+// Keeps one display of a wall in step: it presents its frames together with the others, and draws the same state, seen
+// by the same head. The master sends when and what (wire::Swap). Used by one thread, the display's.
 #pragma once
 
 #include <functional>
@@ -14,47 +14,47 @@ namespace telesplat::viewer {
 
 class WallPace {
  public:
-  /// Until frames are presented without a word from the master: before the first one, and later.
+  /// Seconds to wait for a word from the master before frames are presented without it: for the first frame, and later.
   static constexpr double kFirstPatience_s = 8, kPatience_s = 0.6;
 
   struct Options {
-    std::string master, name;          ///< the master's address; the viewer's name, for logs
-    std::string wall;                  ///< what all viewers of the wall call it
-    uint64_t number = 0, viewers = 1;  ///< this one's among them
-    double period_s = 0;               ///< between two frames at least
-    double asks_hz = 20;               ///< how often all ask for views of one head, at most
+    std::string master, name;          ///< the master's address; this viewer's name, for logs
+    std::string wall;                  ///< name of the wall, equal in all its viewers
+    uint64_t number = 0, viewers = 1;  ///< this viewer's number in the wall; their count
+    double period_s = 0;               ///< least time between two frames
+    double asks_hz = 20;               ///< views of one head that all ask for together, a second at most
   };
-  /// A frame as it is to be drawn.
+  /// A frame that is to be drawn.
   struct Turn {
-    uint64_t frame = 0;  ///< of the wall
+    uint64_t frame = 0;  ///< the frame's number in the wall
     double t_s = 0;      ///< on the clock of the head's movement
     geometry::Pose head;
     wire::ShownState state;
   };
-  /// What this display would draw next by itself.
+  /// State that this display would draw next by itself.
   struct Wish {
     double t_s = 0;
     geometry::Pose head;
     wire::ShownState state;
-    double horizon_s = 0;  ///< views are asked for of where the head is so much later; 0: none are, of one head
+    double horizon_s = 0;  ///< views are asked for the head this far ahead, all for one head; 0: not for one head
   };
   struct Swapped {
-    double wait_s = 0;        ///< from drawn() until it is to be presented
-    bool alone = false;       ///< no word came in time
+    double wait_s = 0;        ///< from the call of drawn() to the moment to present
+    bool alone = false;       ///< no word of the master came in time
     uint64_t skew_frame = 0;  ///< wire::Swap
     double skew_s = 0;
-    uint64_t ask = 0;  ///< of which head to ask for a view now, and its number; 0: of none
+    uint64_t ask = 0;  ///< number of the request to send now, for ask_head; 0: no request
     geometry::Pose ask_head;
   };
 
-  /// Connects. viewer: as the viewer says hello. to_master_s: this machine's monotonic time on the master's clock.
+  /// Connects. viewer: its instance. to_master_s: converts this machine's monotonic time to the master's clock.
   WallPace(net::Context& context, const Options& options, std::function<InstanceId()> viewer,
            std::function<double(double)> to_master_s);
 
-  /// The frame at hand is drawn (frame 0: there is none yet). Returns when it is to be presented; turn() is the next
-  /// one then. stopped: asked ten times a second; true: it returns at once.
+  /// The frame at hand is drawn (frame 0: there is no frame yet). Waits, and returns when it is to be presented; turn()
+  /// is then the next frame. stopped: asked ten times a second; if true, drawn() returns at once.
   Swapped drawn(const Wish& next, const std::function<bool()>& stopped);
-  /// It has been presented.
+  /// The frame has been presented.
   void presented(double now_s);
   const Turn& turn() const { return turn_; }
 
@@ -69,15 +69,15 @@ class WallPace {
   std::function<double(double)> to_master_s_;
   net::Socket socket_;
   Turn turn_;
-  InstanceId led_by_;  // whose number its frame has
+  InstanceId led_by_;  // the master that numbered turn_.frame
   bool begun_ = false, alone_ = false;
   uint64_t drawn_ = 0, presented_ = 0;
   double presented_s_ = 0;  // master's clock
   double late_s_ = 0;
-  tracking::PosePredictor predictor_;  // of the head as this display sees it
-  InstanceId asked_by_;                // who said last what to ask for
-  uint64_t asked_ = 0;                 // its number
-  double ask_due_s_ = -1e9;            // the next one
+  tracking::PosePredictor predictor_;  // predicts the head as this display sees it
+  InstanceId asked_by_;                // the master that sent the last request number
+  uint64_t asked_ = 0;                 // that number
+  double ask_due_s_ = -1e9;            // when the next request is due
 };
 
 }  // namespace telesplat::viewer

@@ -1,5 +1,5 @@
-// The keys of one table of a wall's description: each is taken by whoever knows it, with its limits; what nobody takes
-// is refused. Private to this library.
+// Takes keys from one table of a wall's description, each with its limits. Keys that were never taken are refused.
+// Private to this library.
 #pragma once
 
 #include <toml++/toml.h>
@@ -19,7 +19,7 @@ class Keys {
       : table_(table), path_(std::move(path)), where_(std::move(where)) {}
 
   bool has(const char* key) const { return table_.contains(key); }
-  /// The first error stays, and what is taken after it means nothing.
+  /// The first error stays; values that are taken after it mean nothing.
   std::string text(const char* key, const std::string& fallback);
   double number(const char* key, double fallback, double least, double most);
   int whole(const char* key, int fallback, int least, int most);
@@ -30,14 +30,14 @@ class Keys {
     for (size_t i = 0; i < N && i < values.size(); ++i) out[i] = values[i];
     return out;
   }
-  /// A list of `least_count` or `most_count` numbers; of one, the number alone does.
+  /// Takes a list of `least_count` or `most_count` numbers; a list of one may be written as the number alone.
   std::vector<double> list(const char* key, std::vector<double> fallback, size_t least_count, size_t most_count,
                            double least, double most);
-  /// The table must have it.
+  /// Refuses the table if it does not have the key.
   void require(const char* key);
   /// Refuses the table: "PATH:LINE: WHERE KEY: what".
   void refuse(const char* key, const std::string& what);
-  /// To be called when all that are known were taken: names a key that was not.
+  /// Call it after all known keys were taken. Error: names a key that was not.
   Status done();
 
  private:

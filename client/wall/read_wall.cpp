@@ -21,7 +21,7 @@ constexpr double kDegree = 3.14159265358979323846 / 180;
 
 // ---- screens that stand in rows and columns: on a plane, or on a cylinder around the head
 
-/// What all screens of an arrangement have.
+/// Values that all screens of a grid share.
 struct Panel {
   double width_m = 0, height_m = 0;
   int width = 0, height = 0;
@@ -33,7 +33,7 @@ struct Panel {
 };
 
 struct Grid {
-  std::string name;  ///< for the names of its screens
+  std::string name;  ///< prefix of its screens' names
   int columns = 1, rows = 1;
   Panel panel;
   int screens_per_node = 1;
@@ -43,11 +43,11 @@ struct Grid {
 struct Arc {
   glm::dvec3 centre{0.0};  ///< on the cylinder's axis, which is vertical, as high as the middle of its screens
   double radius_m = 0;     ///< from the axis to the middle of each picture
-  double turn_deg = 0;     ///< where the middle column stands, to the left of straight on
-  double column_deg = 0;   ///< from one column to the next; 0: outer edges touch
+  double turn_deg = 0;     ///< angle to the left of straight on at which the middle column stands
+  double column_deg = 0;   ///< angle from one column to the next; 0: outer edges touch
 };
 
-// Its place among the others is the caller's to fill in.
+// Makes a screen without its pose: the caller fills that in.
 Screen screen_of(const Grid& grid, int row, int column) {
   const Panel& p = grid.panel;
   Screen s;
@@ -57,20 +57,20 @@ Screen screen_of(const Grid& grid, int row, int column) {
   s.bezel = p.bezel;
   s.sampling = p.sampling;
   s.node = grid.first_node + (row * grid.columns + column) / grid.screens_per_node;
-  // The picture's middle, not that of the screen with its bezels.
+  // The picture's middle, which uneven bezels move away from the screen's.
   const glm::dvec2 off((p.bezel.left - p.bezel.right) / 2, (p.bezel.bottom - p.bezel.top) / 2);
   s.unrolled_m =
       glm::dvec2((column - (grid.columns - 1) / 2.0) * p.pitch_x(), ((grid.rows - 1) / 2.0 - row) * p.pitch_y()) + off;
   return s;
 }
 
-// Yaw about +y, then pitch about the turned x axis, then roll about the axis towards the viewer; degrees.
+// Yaws about +y, then pitches about the turned x axis, then rolls about the axis towards the viewer; degrees.
 glm::dquat turned(double yaw_deg, double pitch_deg, double roll_deg) {
   const auto about = [](double degrees, const glm::dvec3& axis) { return glm::angleAxis(degrees * kDegree, axis); };
   return about(yaw_deg, {0, 1, 0}) * about(pitch_deg, {1, 0, 0}) * about(roll_deg, {0, 0, 1});
 }
 
-// Screens that touch, in the plane of `middle`, around its origin, which lies at `middle_m` of the wall unrolled.
+// Places touching screens in the plane of `middle`, around its origin, which lies at `middle_m` of the unrolled wall.
 std::vector<Screen> planar_grid(const Grid& grid, const geometry::Pose& middle, const glm::dvec2& middle_m) {
   std::vector<Screen> out;
   for (int row = 0; row < grid.rows; ++row)
@@ -83,12 +83,12 @@ std::vector<Screen> planar_grid(const Grid& grid, const geometry::Pose& middle, 
   return out;
 }
 
-// The angle of an arc whose screens touch, in degrees.
+// Returns the angle between columns of an arc whose screens touch, in degrees.
 double touching_deg(const Panel& panel, double radius_m) {
   return 2 * std::atan(panel.pitch_x() / 2 / radius_m) / kDegree;
 }
 
-// Columns of screens around the axis, which they face.
+// Places columns of screens around the axis; they face it.
 std::vector<Screen> cylindrical_arc(const Grid& grid, const Arc& arc) {
   const double step = arc.column_deg > 0 ? arc.column_deg : touching_deg(grid.panel, arc.radius_m);
   std::vector<Screen> out;
@@ -119,7 +119,7 @@ geometry::Pose pose(Keys& keys, const char* position, const char* turn) {
   return {point(keys, position), turned(t[0], t[1], t[2])};
 }
 
-// [all around], [across, up and down] would be ambiguous: one number, or left, right, bottom, top.
+// Takes one number for all sides, or left, right, bottom, top; two or three numbers would be ambiguous.
 Bezel bezel(Keys& keys) {
   const auto v = keys.list("bezel", {0}, 1, 4, 0, kMostBezel_m);
   if (v.size() == 4) return {v[0], v[1], v[2], v[3]};
@@ -142,7 +142,7 @@ Panel panel(Keys& keys) {
   return out;
 }
 
-// A wall on its way from a file.
+// Builds a wall from its file.
 class Reader {
  public:
   explicit Reader(const std::string& path) : path_(path) {}
@@ -224,7 +224,7 @@ class Reader {
     for (Screen& s : screens) wall_.screens.push_back(std::move(s));
   }
 
-  // Where something lies on the wall unrolled that is not told: along a circle around the head, as far as it is away.
+  // Default place on the unrolled wall: along a circle around the head whose radius is the pose's distance.
   glm::dvec2 around_head(const geometry::Pose& pose) const {
     const glm::dvec3 from = pose.position_room - wall_.head;
     return {std::atan2(from.x, -from.z) * std::hypot(from.x, from.z), pose.position_room.y};

@@ -11,9 +11,9 @@ namespace telesplat::wall {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kWidest_rad = 50 * kPi / 180;  // of a wall that is not plane, to each side
+constexpr double kWidest_rad = 50 * kPi / 180;  // widest view to each side, for walls that are not plane
 constexpr double kMostTangent = 500;            // geometry::validate() refuses frusta that reach beyond 1000
-constexpr double kLeastTangent = 0.05;          // the middle of a view to fit into lies at least so far inside
+constexpr double kLeastTangent = 0.05;          // least distance of a fitted view's middle from its edges
 constexpr double kPlane_m = 1e-6;
 
 geometry::Pose compose(const geometry::Pose& outer, const geometry::Pose& inner) {
@@ -32,7 +32,7 @@ std::array<glm::dvec3, 4> corners(const Screen& s) {
   return out;
 }
 
-// Edges as the eye sees them; they grow.
+// Edges of a view, as tangents from the eye; hold() widens them.
 struct Edges {
   double left = std::numeric_limits<double>::max(), right = -left, bottom = left, top = -left;
   void hold(double u, double v) {
@@ -52,7 +52,7 @@ Edges edges_of_plane(const Wall& wall) {
   return out;
 }
 
-// A screen beside the head shows nothing that a plane before it could: heights are those along the screens.
+// The width counts angles, so that screens beside the head have a place; heights are measured along the screens.
 Edges edges_around(const Wall& wall) {
   Edges out;
   for (const Screen& s : wall.screens)

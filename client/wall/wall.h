@@ -27,28 +27,28 @@ struct Bezel {
 
 struct Screen {
   std::string name;                  ///< "planar 1, row 2, column 1", for people
-  geometry::Pose pose;               ///< of the middle of its picture, in the wall's axes
-  double width_m = 0, height_m = 0;  ///< of its picture
+  geometry::Pose pose;               ///< the middle of its picture, in the wall's axes
+  double width_m = 0, height_m = 0;  ///< its picture's size
   int width = 0, height = 0;         ///< pixels
   Bezel bezel;
-  int node = 0;  ///< which computer drives it, from 0
-  /// What is sampled for it, width x height; nothing: as the viewer's flags say.
+  int node = 0;  ///< number of the computer that drives it, from 0
+  /// Pixels to sample for it, width x height; nothing: as the viewer's flags say.
   std::optional<std::pair<int, int>> sampling;
   /// Where the middle of its picture lies on the wall unrolled, metres to the right and up.
   glm::dvec2 unrolled_m{0.0};
 };
 
-/// What the wall stands still against.
+/// The frame in which the wall stands still.
 enum class Anchor {
-  kRoom,  ///< it stands in the room; the head moves before it, and its position alone tells what screens show
-  kHead   ///< the head takes it along, and is always at Wall::head: as if the wall were one large display before it
+  kRoom,  ///< it stands in the room; the head moves before it, and only the head's position changes the pictures
+  kHead   ///< it moves with the head, which is always at Wall::head: as if the wall were one large display before it
 };
 
 struct Wall {
   std::string name;
   Anchor anchor = Anchor::kRoom;
-  geometry::Pose in_room;       ///< Anchor::kRoom: where its axes are
-  glm::dvec3 head{0.0};         ///< where the eyes are unless they are tracked, in its axes
+  geometry::Pose in_room;       ///< Anchor::kRoom: pose of the wall's axes
+  glm::dvec3 head{0.0};         ///< the eyes' place unless they are tracked, in the wall's axes
   std::vector<Screen> screens;  ///< in the order of their names in the file; grids by rows from the upper left
 
   int nodes() const;
@@ -61,7 +61,7 @@ Result<Wall> read_wall(const std::string& path);
 /// The same from a text; `path` is named by errors.
 Result<Wall> parse_wall(const std::string& text, const std::string& path);
 
-/// All screens with so many times the pixels on each axis, at least 16 a side: to try a wall on a small machine.
+/// Multiplies the pixels of all screens by `scale` on each axis, at least 16 a side: to try a wall on a small machine.
 /// Precondition: 0 < scale <= 1.
 Wall scaled(Wall wall, double scale);
 

@@ -8,7 +8,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// The first row of a frame is the uppermost one, that of a texture the lowest.
+// The first row of a frame is the uppermost one, the first row of a texture the lowest.
 constexpr const char* kVertexShader = R"(#version 330 core
 uniform vec2 part;  // of the frame's width: where it begins, how much it is
 out vec2 place;
@@ -81,7 +81,7 @@ void FramePresenter::load_overlays(const Overlays& overlays) {
   overlay_version_ = overlays.version();
 }
 
-// With the frame's program and vertices.
+// Precondition: the frame's program and vertices are bound.
 void FramePresenter::draw_overlays(const Overlays& overlays, int width, int height, int hidden) {
   if (overlays.version() != overlay_version_) load_overlays(overlays);
   if (overlay_textures_.empty()) return;
@@ -114,10 +114,10 @@ void FramePresenter::draw(const image::View& view, int width, int height, const 
     draw_part(begin, 0.5f, width, height, overlays, hidden);
     glBindTexture(GL_TEXTURE_2D, texture_);
   }
-  glDrawBuffer(GL_BACK);  // both: what comes over the frame
+  glDrawBuffer(GL_BACK);  // both buffers, for drawing over the frame
 }
 
-// A part of the frame's width, over all of the buffer.
+// Draws a part of the frame's width over the whole buffer.
 void FramePresenter::draw_part(float begin, float share, int width, int height, const Overlays& overlays, int hidden) {
   glViewport(0, 0, width, height);
   glDisable(GL_DEPTH_TEST);

@@ -1,4 +1,4 @@
-// Brings finished frames from host memory onto a window, with OpenGL.
+// Draws finished frames from host memory onto a window, with OpenGL.
 #pragma once
 
 #include <map>
@@ -12,7 +12,7 @@
 
 namespace telesplat::viewer {
 
-/// A texture that takes each frame, and a triangle that covers the window. All calls with the same context current,
+/// A texture that takes each frame, and a triangle that covers the window. All calls need the same current context,
 /// OpenGL 3.3 core or later.
 class FramePresenter {
  public:
@@ -22,11 +22,11 @@ class FramePresenter {
   FramePresenter& operator=(const FramePresenter&) = delete;
 
   /// Draws the frame over the whole default framebuffer of width x height pixels; scales it if it has another size.
-  /// What lies over it is blended on.
-  /// hidden: so many columns at the left will be covered by something else and are left out; overlays lie beside them.
+  /// Overlays are blended onto it.
+  /// hidden: columns at the left that will be covered: they are not drawn, and overlays lie beside them.
   void draw(const image::View& view, int width, int height, const Overlays& overlays, int hidden = 0);
-  /// From now on frames are two eyes' pictures side by side, and each goes into a buffer of its own. Precondition: the
-  /// context has them (GL_STEREO).
+  /// From now on frames are two eyes' pictures side by side, and each goes into its own buffer. Precondition: the
+  /// context has buffers for two eyes (GL_STEREO).
   void draw_two_eyes() { two_eyes_ = true; }
 
  private:

@@ -26,7 +26,7 @@ void WindowLegend::build(ColourControls& colours, double now_s, double hidden) {
   part_ = show_legend(shown, view_, hidden, editable ? change : nullptr);
 }
 
-// As an overlay: in the wall's tile at the lower right.
+// As an overlay, it is in the wall's tile at the lower right.
 void WindowLegend::show() {
   const WallTile& wall = display_.wall;
   const int tiles = wall.described ? int(wall.described->screens.size()) : wall.columns * wall.rows;

@@ -1,4 +1,4 @@
-// A window's legend: what colours mean, over the frame and in pictures that are saved.
+// A window's legend: shows what colours mean, over the frame and in saved pictures.
 #pragma once
 
 #include <memory>
@@ -12,23 +12,23 @@
 
 namespace telesplat::viewer {
 
-/// One thread. What it is made of must live longer.
+/// Used by one thread. The constructor's arguments must live longer.
 class WindowLegend {
  public:
   WindowLegend(const Window& window, const DisplayOptions& display, Overlays& overlays)
       : window_(window), display_(display), overlays_(overlays) {}
 
   void on_legend(const std::shared_ptr<const image::Legend>& legend);
-  /// The display's options have changed.
+  /// Call it after the display's options have changed.
   void show();
-  /// Whether Dear ImGui draws it. If not, it is an overlay where one is shown.
+  /// True if Dear ImGui draws it. Else it is an overlay.
   bool built() const;
-  /// Between Dear ImGui's frames, if built(). hidden: as show_legend() has it.
+  /// Builds it between Dear ImGui's frames. Precondition: built(). hidden: as in show_legend().
   void build(ColourControls& colours, double now_s, double hidden);
   void not_built() { part_ = {}; }
-  /// What Dear ImGui's legend covers.
+  /// Part of the window that Dear ImGui's legend covers.
   const WindowPart& part() const { return part_; }
-  /// Over a picture that is saved, if it is shown. wall: which tile it is.
+  /// Draws it into a picture that is saved, if it is shown. wall: the display's tile.
   void draw_into(image::View& picture, const WallTile& wall) const;
 
  private:
@@ -36,7 +36,7 @@ class WindowLegend {
   const DisplayOptions& display_;
   Overlays& overlays_;
   std::shared_ptr<const image::Legend> legend_;
-  int width_ = 0, height_ = 0;  // of the window that the legend on display suits
+  int width_ = 0, height_ = 0;  // the window's size for which the overlay was made
   LegendViewState view_;
   WindowPart part_;
 };

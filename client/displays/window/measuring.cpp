@@ -14,7 +14,7 @@ namespace telesplat::viewer {
 
 constexpr double kPoint_s = 0.1;
 
-// The cursor's overlay follows it a few times a second.
+// The cursor's overlay is updated only a few times a second.
 std::optional<glm::dvec2> Measuring::points_at() {
   tells_pick_ = interaction_.take(Wish::kPick);
   centres_ = centres_ || interaction_.take(Wish::kCentre);
@@ -44,7 +44,7 @@ void Measuring::clear() {
   hands_.on_pick(std::nullopt);
 }
 
-// Only while it looks otherwise than before.
+// Draws the marks anew only if they have changed.
 void Measuring::show_marks(const geometry::Camera& camera, bool seen) {
   const auto& [p, q] = camera.pose;
   const bool shown = !places_.empty() && seen;

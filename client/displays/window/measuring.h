@@ -1,4 +1,4 @@
-// What a person points at in a window, and the places that were measured: marks over the picture, and their file.
+// Picks in a window, and the measured places: marks over the picture, and their file.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace telesplat::viewer {
 
-/// One thread. What it is made of must live longer.
+/// Used by one thread. The constructor's arguments must live longer.
 class Measuring {
  public:
   using Tell = std::function<void(const std::string& line)>;
@@ -21,12 +21,12 @@ class Measuring {
       : window_(window), interaction_(interaction), hands_(hands), overlays_(overlays), tell_(std::move(tell)) {}
 
   Measurements& places() { return places_; }
-  /// DisplaySurface::points_at() and on_pick(). terms: null: nothing is shown yet.
+  /// DisplaySurface::points_at() and on_pick(). terms: null: the session is not known yet.
   std::optional<glm::dvec2> points_at();
   void on_pick(const std::optional<Pick>& pick, EpochId epoch, const SceneTerms* terms);
-  /// Takes places away: another data set is shown.
+  /// Removes all places: another data set is shown.
   void clear();
-  /// Marks of the places as this camera sees them. seen: they can be drawn.
+  /// Shows marks of the places for this camera. seen: marks can be drawn.
   void show_marks(const geometry::Camera& camera, bool seen);
   void save(const std::string& folder) const;
 
@@ -37,9 +37,9 @@ class Measuring {
   Overlays& overlays_;
   Tell tell_;
   Measurements places_;
-  std::string marks_shown_;  // the state that the overlay of their marks shows; empty: no mark
-  bool tells_pick_ = false;  // the person asked for it, not the cursor's overlay
-  bool centres_ = false;     // a double click
+  std::string marks_shown_;  // state of the marks in their overlay; empty: no mark
+  bool tells_pick_ = false;  // the person wants the pick, not the cursor's overlay
+  bool centres_ = false;     // after a double click
   double pointed_s_ = -1e9;
 };
 

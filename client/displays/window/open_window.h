@@ -1,11 +1,11 @@
-// What telesplat-display needs of windows.
+// Functions of windows that telesplat-display calls.
 #pragma once
 
 #include "client/viewer/viewer_service.h"
 
 namespace telesplat::viewer {
 
-/// Whether windows can be opened here; else why not, naming DISPLAY and WAYLAND_DISPLAY. Opens none.
+/// Checks if windows can be opened here, without opening one. Error: why not; names DISPLAY and WAYLAND_DISPLAY.
 Status check_display();
 
 /// Displays::window.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr uintmax_t kMostDropped_bytes = 64'000'000;
 
-// Whole, by the display's thread: what is no file of a sensible size is not opened.
+// Checks a file that the display's thread reads as a whole: it must be a regular file of at most kMostDropped_bytes.
 Status readable(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return Error{path + ": is no regular file"};
@@ -36,7 +36,7 @@ std::vector<std::string> LauncherLines::read() {
   while (fd_ >= 0) {
     const ssize_t n = ::read(fd_, buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
-    if (n == 0) fd_ = -1;  // the launcher has gone
+    if (n == 0) fd_ = -1;  // the launcher has ended
     if (n <= 0) break;
     for (ssize_t i = 0; i < n; ++i) {
       if (buffer[i] == '\n')
@@ -68,7 +68,7 @@ void Opening::open(const std::string& path) {
   ask_(path);
 }
 
-// What it is, its ending tells: a path of the camera, a transfer function, else a data set.
+// The name's ending decides what it is: a path of the camera, a transfer function, else a data set.
 void Opening::take_dropped(Window& window) {
   const auto dropped = window.take_dropped();
   if (dropped.empty()) return;

@@ -1,4 +1,4 @@
-// How a window comes to show something else: the dialog, files that are dropped on it, and what the launcher says.
+// Opens other data in a window: the dialog, files that are dropped on it, and lines from the launcher.
 #pragma once
 
 #include <functional>
@@ -12,17 +12,17 @@
 
 namespace telesplat::viewer {
 
-/// Lines from a file descriptor, read without waiting. The launcher sends
-///   progress TEXT   what goes on, for people: "reading a.ply 43 %, 12 s left"; without TEXT: nothing
-///   problem TEXT    why a data set could not be opened
-/// One thread.
+/// Reads lines from a file descriptor without waiting. The launcher sends
+/// progress TEXT   the present step, for people: "reading a.ply 43 %, 12 s left"; without TEXT: none
+/// problem TEXT    why a data set could not be opened
+/// Used by one thread.
 class LauncherLines {
  public:
-  static constexpr size_t kLongest = 4096;  ///< bytes of a line; what is longer is cut
+  static constexpr size_t kLongest = 4096;  ///< bytes of a line; the rest of it is cut off
 
-  /// Reads from `fd`, which becomes non-blocking; negative: no process reports.
+  /// Reads from `fd`, which becomes non-blocking; negative: there is no launcher.
   explicit LauncherLines(int fd);
-  /// Whole lines that came since the last call.
+  /// Returns whole lines that came since the last call.
   std::vector<std::string> read();
   bool open() const { return fd_ >= 0; }
 
@@ -31,11 +31,11 @@ class LauncherLines {
   std::string part_;
 };
 
-/// One thread. What it is made of must live longer.
+/// Used by one thread. The constructor's arguments must live longer.
 class Opening {
  public:
   using Tell = std::function<void(const std::string& line)>;
-  /// ask: asks the launcher for another data set; null: the session is somebody else's.
+  /// ask: asks the launcher for another data set; null: another person's session, which this window may not replace.
   Opening(std::function<void(const std::string& path)> ask, int launcher_fd, Interaction& interaction, Panel& panel,
           SceneControls& scene, Tell tell)
       : ask_(std::move(ask)),
@@ -46,10 +46,10 @@ class Opening {
         tell_(std::move(tell)) {}
 
   bool shows_dialog() const { return view_.shown; }
-  /// has_scene: there is a data set, or is about to be one. seen: it is on display.
+  /// has_scene: there is a data set, or one is being opened. seen: it is on display.
   void take_launcher_lines(double now_s, bool has_scene, bool seen);
   void take_dropped(Window& window);
-  /// The dialog, if it is shown; between Dear ImGui's frames.
+  /// Builds the dialog, if it is shown, between Dear ImGui's frames.
   void build(bool has_scene);
 
  private:

@@ -1,4 +1,4 @@
-// Pictures of what is on display, taken when the person asks, written in the background.
+// Saves pictures of what is on display when the person asks; writes them in the background.
 #pragma once
 
 #include <deque>
@@ -10,19 +10,19 @@
 
 namespace telesplat::viewer {
 
-/// FOLDER/WHAT-DATE-TIME.ENDING, a name that no file has. Makes the folder; where that fails, writing will.
+/// Returns FOLDER/WHAT-DATE-TIME.ENDING, a name that no file has. Makes the folder; if it cannot, writing will fail.
 std::string new_file(const std::string& folder, const std::string& what, const std::string& ending);
 
 class Screenshots {
  public:
-  /// Into `directory` (made if need be). tell: what became of each picture, a line for the person; called from any
-  /// thread, never from two at once.
+  /// Writes into `directory` (made if need be). tell: gets a line for the person on the result of each picture; called
+  /// from any thread, never from two at once.
   Screenshots(std::string directory, std::function<void(const std::string&)> tell);
-  /// Waits until all are written.
+  /// Waits until all pictures are written.
   ~Screenshots();
 
   /// Copies the view and writes it as telesplat-YYYYMMDD-HHMMSS-NNN.png; no file is overwritten. exr: as .exr with its
-  /// depth, which it must have.
+  /// depth, which the view must have.
   void take(const image::View& view, image::Alpha alpha = image::Alpha::kNone, bool exr = false);
 
  private:

@@ -91,7 +91,7 @@ struct Row {
   const char* order;
   Change change;
   std::string (*text)(const ViewSettings& v);
-  bool of_pictures = false;  ///< pictures that servers drew change with it, or what lies over them
+  bool of_pictures = false;  ///< it changes pictures that servers drew, or overlays on them
 };
 
 std::string switch_text(bool on) { return on ? "on" : "off"; }

@@ -1,4 +1,4 @@
-// What a person can change of a display while it shows: settings of scene::settings() that a viewer keeps, as texts.
+// Settings of a display that a person can change while it shows: scene::settings() that a viewer keeps, as texts.
 #pragma once
 
 #include <map>
@@ -18,16 +18,16 @@ struct ViewSettings {
   StereoOptions stereo;
   bool quad_buffers = false;  ///< the window has a buffer for each eye
   bool legend = true;
-  bool pictures = false;  ///< views come as pictures: what changes nothing in these is refused
+  bool pictures = false;  ///< views come as pictures: settings that cannot change these are refused
 };
 
-/// Gives the setting of this order a value, as its flag takes it. Error: what is wrong, or that no setting has this
-/// order; then nothing changes.
+/// Sets the setting of this order to a value, written as for its flag. Error: what is wrong, or that no setting has
+/// this order; then nothing changes.
 Status change(ViewSettings& settings, const std::string& order, const std::string& value);
-/// All of them as they are, by their orders.
+/// Returns the values of all settings, by their orders.
 std::map<std::string, std::string> values_of(const ViewSettings& settings);
 
-/// "on" or "off".
+/// Reads "on" or "off".
 Result<bool> read_switch(const std::string& value);
 
 }  // namespace telesplat::viewer

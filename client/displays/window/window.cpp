@@ -26,7 +26,7 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr int kSmallestSide = 120;
-constexpr int kSmallestPicture = 16;  // pixels a side: window managers need not keep to the size above
+constexpr int kSmallestPicture = 16;  // pixels a side: window managers need not respect kSmallestSide
 
 std::string last_error() {
   const char* text = nullptr;
@@ -34,7 +34,7 @@ std::string last_error() {
   return text ? text : "no reason given";
 }
 
-// Initialises GLFW for as long as it lives.
+// Keeps GLFW initialised while it lives.
 struct Library {
   const bool ready = glfwInit() == GLFW_TRUE;
   ~Library() {
@@ -44,9 +44,9 @@ struct Library {
 
 std::atomic<bool> connection_lost{false};
 
-// The driver sends pictures over Xlib's connection with XCB, and does not tell Xlib what it finds out: Xlib's next
-// request would be written to no memory. And Mesa, which draws without a GPU, cuts a picture into parts of no size once
-// XCB knows, for minutes or for ever. So XCB and its socket are asked before requests. Null: another window system.
+// The driver sends pictures over Xlib's connection with XCB, and does not report a broken one to Xlib, whose next
+// request would write through a bad pointer. And Mesa, which draws without a GPU, then cuts a picture into parts of
+// size 0, for minutes or for ever. So XCB and its socket are checked before requests. Null: another window system.
 struct Xcb {
   void* connection = nullptr;
   int socket = -1;
@@ -59,10 +59,9 @@ struct Xcb {
   }
 } xcb;
 
-// What Xlib does when its connection breaks, or a request is refused, is to write a line and end the process. Instead
-// the window is lost and the viewer ends in order, or the window goes on. GLFW loads Xlib by itself; so its functions
-// are looked up where they are loaded, and a window of another system needs none. Displays are only passed on, so they
-// need no type.
+// When its connection breaks, or a request is refused, Xlib writes a line and ends the process. With these handlers the
+// window is lost and the viewer ends in order, or the window goes on. GLFW loads Xlib at run time; so its functions are
+// looked up after that, and other window systems do not need it. Displays are only passed on, so they need no type.
 void survive_broken_connection() {
   connection_lost = false;
   xcb = {};
@@ -84,7 +83,7 @@ void survive_broken_connection() {
   if (bridge) dlclose(bridge);
   const auto set_handler = reinterpret_cast<Handler (*)(Handler)>(dlsym(xlib, "XSetIOErrorHandler"));
   const auto set_exit = reinterpret_cast<void (*)(void*, ExitHandler, void*)>(dlsym(xlib, "XSetIOErrorExitHandler"));
-  // Another program that drops a file here and ends at once is no reason to end, either.
+  // If another program drops a file here and ends at once, its requests fail: the viewer must not end because of that.
   using ErrorHandler = int (*)(void* display, void* event);
   const auto set_error = reinterpret_cast<ErrorHandler (*)(ErrorHandler)>(dlsym(xlib, "XSetErrorHandler"));
   if (set_error)
@@ -119,12 +118,12 @@ std::optional<Key> key_of(int glfw_key) {
   return glfw_key >= GLFW_KEY_A && glfw_key <= GLFW_KEY_Z ? letter_key(char(glfw_key)) : std::nullopt;
 }
 
-// What is printed on a key, in upper case; 0: no Latin letter.
+// Returns the print on a key, in upper case; 0: no Latin letter.
 char letter_of(int glfw_key, int scancode) {
   const char* name = glfwGetKeyName(glfw_key, scancode);
   const char c = name && *name && !name[1] ? *name : '\0';
   if (c >= 'a' && c <= 'z') return char(c - 'a' + 'A');
-  // A keyboard of another script has control letters where a US one has them.
+  // A keyboard of another script has control letters where a US keyboard has them.
   return glfw_key >= GLFW_KEY_A && glfw_key <= GLFW_KEY_Z && (!c || (c & 0x80)) ? char(glfw_key) : '\0';
 }
 
@@ -173,12 +172,12 @@ struct Window::Impl {
   std::unique_ptr<FramePresenter> presenter;
   Interaction* interaction = nullptr;  // while poll() runs
   bool pointer_caught = false, draws_without_gpu = false;
-  std::optional<glm::dvec2> pointer;  // where it was last told to be, in screen coordinates; nothing: not told yet
-  int hidden = 0;       // pixels at the left
-  bool writes = false;  // the key that was pressed last is meant for a text
+  std::optional<glm::dvec2> pointer;  // place from the last event, in screen coordinates; nothing: no event yet
+  int hidden = 0;                     // columns of pixels at the left
+  bool writes = false;                // the key pressed last belongs to a text
   std::unique_ptr<Gui> gui;
   Place before_fullscreen;
-  bool moved = false;  // since it was asked how often its screen is refreshed
+  bool moved = false;  // since its screen's refresh rate was last asked for
   std::vector<std::string> dropped;
 
   ~Impl() {
@@ -193,14 +192,14 @@ struct Window::Impl {
 
   static Impl& of(GLFWwindow* w) { return *static_cast<Impl*>(glfwGetWindowUserPointer(w)); }
 
-  // Screen coordinates to window heights.
+  // Factor from screen coordinates to window heights.
   double per_height() const {
     int width = 0, height = 0;
     glfwGetWindowSize(window, &width, &height);
     return 1.0 / std::max(1, height);
   }
 
-  // Whether an event is meant for the panel: the pointer's place is that of the event, for it may have moved on since.
+  // True if the panel gets this event. Tests the pointer's place at the event, because the pointer may have moved on.
   bool gui_takes_pointer() const {
     if (pointer_caught) return false;
     if (pointer) return gui->takes_pointer(pointer->x, pointer->y);
@@ -210,11 +209,11 @@ struct Window::Impl {
   }
 
   // A letter goes to the text that has the focus or that the dialog waits for, else it is a command, never both: the
-  // letter that opens the dialog is not the first of its path.
+  // letter that opens the dialog must not be the first of its path.
   void on_key(int key, int scancode, int action, int mods) {
     if (!interaction) return;
     const bool dialog = interaction->shows_dialog(), field = gui->takes_text();
-    if (action == GLFW_PRESS) writes = dialog || field;  // a key that is held goes on as it began
+    if (action == GLFW_PRESS) writes = dialog || field;  // a held key goes on as it began
     if (action == GLFW_PRESS && key == GLFW_KEY_ESCAPE && gui->close_popup()) return;
     gui->on_key(key, scancode, action, mods);
     if (action == GLFW_REPEAT) return;
@@ -292,8 +291,8 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
   const GLFWvidmode* mode = monitor ? glfwGetVideoMode(monitor) : nullptr;
   if (o.fullscreen && !mode) return Error{"there is no screen to fill: " + last_error()};
   std::string tried;
-  // EGL first: a renderer's context without a window is EGL's too, and one thread can have current contexts of one of
-  // them only.
+  // EGL comes first: a renderer's context without a window is EGL's too, and a thread can have current contexts of one
+  // API only.
   for (const auto& [minor, api] : {std::pair{43, GLFW_EGL_CONTEXT_API},
                                    {43, GLFW_NATIVE_CONTEXT_API},
                                    {33, GLFW_EGL_CONTEXT_API},
@@ -307,7 +306,7 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
     glfwWindowHintString(GLFW_X11_CLASS_NAME, "telesplat");
     glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "telesplat");
     if (mode) glfwWindowHint(GLFW_REFRESH_RATE, mode->refreshRate);
-    if (o.two_eyes && api == GLFW_EGL_CONTEXT_API) continue;  // it has none
+    if (o.two_eyes && api == GLFW_EGL_CONTEXT_API) continue;  // EGL has no such buffers
     glfwWindowHint(GLFW_STEREO, o.two_eyes);
     impl->window = glfwCreateWindow(mode ? mode->width : o.width, mode ? mode->height : o.height, o.title.c_str(),
                                     monitor, nullptr);
@@ -346,7 +345,7 @@ Window::Window(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { read_size(
 
 Window::~Window() {
   if (lost()) {
-    // Libraries would ask the server that is gone. Leaks are looked for, so it is known where this is.
+    // Libraries would send requests to the server that is gone. `kept` lets leak checkers find the object.
     [[maybe_unused]] static Impl* volatile kept;
     kept = impl_.release();
     return;
@@ -426,7 +425,7 @@ void Window::toggle_fullscreen() {
   if (best) glfwSetWindowMonitor(impl_->window, best, 0, 0, mode->width, mode->height, mode->refreshRate);
 }
 
-// Asking takes a way to the window system and back.
+// A question to the window system takes a round trip, so it is asked only after a move.
 double Window::refresh_s() {
   if (lost()) return 0;
   if (refresh_s_ >= 0 && !std::exchange(impl_->moved, false)) return refresh_s_;
@@ -438,7 +437,7 @@ double Window::refresh_s() {
 }
 
 std::string Window::key_name(Key key) const {
-  // Keyboards of other scripts have Latin letters too, and the window's letters are ASCII.
+  // Keyboards of other scripts have Latin letters too, and the window's font has only ASCII.
   if (key < Key::k1 && !lost())
     if (const char* name = glfwGetKeyName(us_name(key)[0], 0); name && *name && is_ascii(name)) return upper_case(name);
   return us_name(key);
@@ -466,7 +465,7 @@ void Window::present(const image::View& view, const Overlays& overlays, const st
   const int hidden = impl_->hidden = impl_->gui->prepare(place, monotonic_s(), gui);
   impl_->presenter->draw(view, width, height, overlays, hidden);
   impl_->gui->show(place);
-  if (impl_->draws_without_gpu) glFinish();  // which the swap would do; the display may go away until it is done
+  if (impl_->draws_without_gpu) glFinish();  // as the swap would; it takes time in which the display may go away
   if (lost()) return;
   glfwSwapBuffers(impl_->window);
 }

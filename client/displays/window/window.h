@@ -1,4 +1,4 @@
-// A window with an OpenGL context, through GLFW, and the person's keys and mouse. All calls from the main thread.
+// A window with an OpenGL context, through GLFW, and the person's keys and mouse. All calls come from the main thread.
 #pragma once
 
 #include <functional>
@@ -17,20 +17,20 @@ namespace telesplat::viewer {
 class Window {
  public:
   struct Options {
-    int width = 1280, height = 800;  ///< of the content, in screen coordinates; ignored if fullscreen
+    int width = 1280, height = 800;  ///< size of the content, in screen coordinates; ignored if fullscreen
     bool fullscreen = false;
     std::string title = "Telesplat";
-    bool two_eyes = false;  ///< frames are two eyes' pictures, side by side, for a buffer each (quad-buffered OpenGL)
+    bool two_eyes = false;  ///< frames are two eyes' pictures, side by side, one for each buffer (quad-buffered OpenGL)
   };
-  /// One at a time in a process. The context is OpenGL 4.3 core, or 3.3 where that is not to be had. Nothing is left
-  /// current.
+  /// Opens a window; one at a time in a process. The context is OpenGL 4.3 core, or 3.3 if that is not available. No
+  /// context is left current.
   static Result<std::unique_ptr<Window>> open(const Options& options);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// Its context, current in this thread for a scope; then what was current before, also where that is of another API
-  /// (a renderer's own context).
+  /// Makes the window's context current in this thread for a scope; then the one before becomes current again, even if
+  /// it belongs to another API (a renderer's own context).
   class Current {
    public:
     explicit Current(const Window& window);
@@ -39,37 +39,37 @@ class Window {
     Current& operator=(const Current&) = delete;
 
    private:
-    void *display_, *context_, *draw_, *read_;  // EGL's; nothing to go back to: the context stays
+    void *display_, *context_, *draw_, *read_;  // EGL's; null: the window's context stays current
   };
 
   /// Delivers keys, mouse and wheel since the last call; catches the pointer while the person flies.
   void poll(Interaction& interaction);
-  /// The person closed it, or it is lost.
+  /// True if the person closed it, or it is lost.
   bool closing() const;
-  /// The connection to the window system broke: nothing is shown any more, and nothing of it can be freed.
+  /// True if the connection to the window system broke: it shows nothing any more, and nothing of it can be freed.
   bool lost() const;
-  /// Pixels of the content, 16 at least, which on fine screens are more than screen coordinates; the last ones while it
-  /// is minimised.
+  /// Pixels of the content, at least 16 a side; on fine screens more than screen coordinates. While the window is
+  /// minimised they keep their values.
   int width() const { return width_; }
   int height() const { return height_; }
   void set_title(const std::string& title);
-  /// Fills the screen that it lies on for the most part, or becomes the window again that it was.
+  /// Fills the screen that it mostly lies on, or becomes the window again that it was.
   void toggle_fullscreen();
-  /// Seconds between refreshes of that screen; 0: it does not tell.
+  /// Seconds between refreshes of that screen; 0: not known.
   double refresh_s();
   bool fullscreen() const;
-  /// What is printed on a key of this keyboard.
+  /// Returns the print on a key of this keyboard.
   std::string key_name(Key key) const;
-  /// How much larger than on a plain display texts should be, in pixels: 2 on one of twice the density.
+  /// Scale of texts beside a plain display, in pixels: 2 for twice the density.
   double content_scale() const;
-  /// Files that were dropped onto the window since the last call.
+  /// Returns files that were dropped onto the window since the last call.
   std::vector<std::string> take_dropped();
-  /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised. gui:
-  /// builds what lies over all (Gui::prepare()); null: nothing.
+  /// Shows a frame and its overlays, in time with the screen; does nothing while the window is minimised. gui: builds
+  /// the layer above all (Gui::prepare()); null: there is no such layer.
   void present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui = {});
-  /// How many columns of pixels at the left of what was presented nothing shines through.
+  /// Columns of pixels at the left of the last frame that are fully covered.
   int hidden() const;
-  /// Whether what `gui` builds has changed since it was presented.
+  /// True if the things that `gui` builds have changed since they were presented.
   bool gui_due(double now_s) const;
 
  private:

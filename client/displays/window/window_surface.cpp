@@ -20,23 +20,23 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kShowAgain_s = 0.1;
-constexpr double kSteps = 32;         // of the window's width
-constexpr double kMostCovered = 0.6;  // of the window's width; else its first view is that of all of it
+constexpr double kSteps = 32;         // the legend's share of the window's width counts in such steps
+constexpr double kMostCovered = 0.6;  // share of the window's width that may be covered; else the first view uses all
 constexpr size_t kMostPicture_pixels = 100'000'000;
 
-// What plays from the beginning. An orbit is fitted once it is known around what.
+// Returns the movement that plays from the beginning. An orbit is fitted later, when its centre is known.
 std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement) {
   if (movement.recorded) return *movement.recorded;
   return movement.orbits ? std::optional(geometry::Trajectory::orbit()) : std::nullopt;
 }
 
-// As large as the keys fit into the window.
+// Returns the largest scale at which the keys fit into the window.
 int help_scale(const std::vector<std::string>& lines, int width, int height) {
   const image::View smallest = text_panel(lines, 1);
   return within(std::min(width / (smallest.width + 12), height / (2 * smallest.height)), 1, 4);
 }
 
-// The launcher reads it.
+// Prints the request for the launcher.
 void ask_to_open(const std::string& path) {
   if (path.find('\n') != path.npos) return;
   std::printf("open %s\n", path.c_str());
@@ -53,7 +53,7 @@ geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int w
   return camera;
 }
 
-// Screenshots tell from a thread of theirs.
+// Collects lines for the person; screenshots send theirs from another thread.
 struct WindowSurface::Lines {
   std::mutex mutex;
   std::function<void(const std::string&)> tell;  // never from two threads at once
@@ -109,7 +109,7 @@ WindowSurface::~WindowSurface() {
   keep_path();
 }
 
-// Of all tiles of a wall.
+// Returns the camera of all tiles of a wall.
 geometry::Camera WindowSurface::whole(const geometry::Pose& pose) const {
   const auto& o = options_.display;
   if (o.wall.described) return wall::fitting_frustum(*o.wall.described, o.near_m);
@@ -123,13 +123,13 @@ void WindowSurface::on_scene(const ShownScene& scene) {
   fitted_ = {};
 }
 
-// What panel and legend leave free. Walls and two eyes have no part that is.
+// Returns the part that panel and legend leave free. Walls and two eyes use the whole window.
 WindowSurface::FreePart WindowSurface::free_part() const {
   const auto& o = options_.display;
   FreePart out{whole({}), 0};
   if (o.wall.described || o.wall.tiles() > 1 || o.stereo.on()) return out;
   const double left = double(window_->hidden()) / window_->width();
-  // A legend that was dragged to the left is the person's own matter. In steps, as its numbers change.
+  // A legend that was dragged to the left is ignored. Its width counts in steps, since it changes with its numbers.
   const bool at_right = legend_.built() && legend_.part().left > 0.5;
   const double right = at_right ? std::ceil((1 - legend_.part().left) * kSteps) / kSteps : 0;
   if (!(left + right <= kMostCovered)) return out;
@@ -139,7 +139,7 @@ WindowSurface::FreePart WindowSurface::free_part() const {
   return out;
 }
 
-// The first view suits the window as it is; the camera follows it until the person takes it.
+// Fits the first view to the window; the camera follows it until the person takes it.
 void WindowSurface::fit_views() {
   if (scene_.box_room.empty()) return;
   const FreePart part = free_part();
@@ -153,7 +153,7 @@ void WindowSurface::fit_views() {
   if (movement.orbits) interaction_.set_recorded(movement.trajectory(scene_.box_room, whole({})));
 }
 
-// Along an axis of the data, from its positive or its negative end.
+// Looks along an axis of the data, from its positive or its negative end.
 void WindowSurface::look_from(const Side& side) {
   if (scene_.box_room.empty()) return;
   glm::dvec3 back(0.0);
@@ -200,7 +200,7 @@ geometry::Camera WindowSurface::camera_of(const geometry::Pose& head) const {
   return camera;
 }
 
-// What is asked for goes out, what came is taken in; nothing here waits.
+// Sends the panel's orders and takes their answers, without waiting.
 void WindowSurface::run_panel(double now_s, Look& look) {
   panel_.show(interaction_.shows_panel());
   for (const Key key : panel_.take_pressed()) interaction_.press(key);
@@ -245,7 +245,7 @@ void WindowSurface::give(Order order, bool undoes) {
   desk_->give(std::move(order));
 }
 
-// What a person should know who does not see the panel.
+// Shows news to a person who does not see the panel.
 void WindowSurface::show_news(double now_s) {
   auto news = panel_.shown() ? std::vector<std::string>() : panel_.news(now_s);
   if (news == news_) return;
@@ -255,7 +255,7 @@ void WindowSurface::show_news(double now_s) {
                           Overlay::Corner::kUpperRight});
 }
 
-// The panel has a list of its own, beside it.
+// The panel has its own list of keys beside it.
 void WindowSurface::show_help() {
   const bool here = interaction_.shows_help() && !panel_.shown();
   const int scale = here ? help_scale(key_lines(), window_->width(), window_->height()) : 0;
@@ -268,7 +268,7 @@ std::vector<std::string> WindowSurface::key_lines() const {
   return key_help([this](Key key) { return window_->key_name(key); });
 }
 
-// What keys led to: lines for the person, and a path that is complete.
+// Prints lines that keys led to, and writes a path that is complete.
 void WindowSurface::keep_path() {
   if (poses_)
     if (const auto news = poses_->take_news(monotonic_s())) tell(*news);
@@ -284,7 +284,7 @@ void WindowSurface::keep_path() {
            : written.error().text);
 }
 
-// A window system may want it again at any time, without telling.
+// Shows an unchanged frame every kShowAgain_s, too: a window system may need it again without a notice.
 void WindowSurface::present(const image::View& view, bool changed) {
   const Shown now{monotonic_s(), window_->width(), window_->height(), overlays_.version(),
                   panel_.shown() || opening_.shows_dialog() || legend_.built()};
@@ -352,7 +352,7 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
   return ok_status();
 }
 
-// By the person, who can take it back. What comes through set() alone is somebody else's.
+// Sets a setting for the person, who can undo it. Calls of set() from elsewhere are other people's.
 void WindowSurface::choose(double now_s, const std::string& name, const std::string& value) {
   const std::string before = values()[name];
   if (const Status s = set(name, value); !s) return panel_.tell(now_s, name + ": " + s.error().text, true);
@@ -365,7 +365,7 @@ void WindowSurface::choose(double now_s, const std::string& name, const std::str
   interaction_.undo().did(now_s, {name, becomes(before), becomes(value), name});
 }
 
-// How much of the left side it covers.
+// Returns the width that it covers at the left.
 double WindowSurface::build_panel(double now_s) {
   const LoggedBuild logged(widget_log_);
   double width = 0;
@@ -389,7 +389,7 @@ void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& sessi
   scene_controls_.on_session(monotonic_s(), *session);
   panel_.on_kind(scene_controls_.kind());
   order_undo_.on_session(session);
-  // Another data set is looked at from its own first view, by who has the camera, and has nothing picked yet.
+  // Another data set begins with its own first view and without measured places; the camera's owner stays.
   const scene::SessionView facts(*session);
   const std::string name =
       facts.fact("scene") + '\n' + facts.fact("data_file") + '\n' + facts.fact(scene::kPlacementFact);
@@ -416,8 +416,8 @@ void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
   screenshots_.take(copy, alpha);
 }
 
-// The same view, of the wished size: the field of view spans its longer side. Of a wall it is this screen's part, as
-// wide as it is. Two eyes' is the head's between them.
+// The same view in the wished size: the field of view spans its longer side. On a wall it is this screen's part, in its
+// full width. With two eyes it is the view of the head between them.
 std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& camera) {
   const auto wish = panel_.take_picture();
   if (!wish || !wish->own_size()) return wish;
@@ -447,7 +447,7 @@ notes::Shelf WindowSurface::shelf() const {
   return notes::shelf_of(terms_->data_file, terms_->scene, notes::user_cache_folder());
 }
 
-// What the panel asked for.
+// Carries out the panel's wishes for notes.
 void WindowSurface::follow_notes() {
   const NotesWish wish = std::exchange(notes_wish_, {});
   if (!terms_) return;
@@ -486,7 +486,7 @@ void WindowSurface::report(const FrameFigures& figures) {
   if (title != title_shown_) window_->set_title(title_shown_ = title);
 }
 
-// A window may be given another size than it asked for: the options follow.
+// A window may get another size than it asked for: the options follow.
 Result<std::unique_ptr<DisplaySurface>> open_window(ViewerOptions& o, const DisplayHelp& help) {
   auto opened = WindowSurface::open(o, help);
   if (!opened) return opened.error();

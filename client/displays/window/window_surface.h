@@ -30,7 +30,7 @@ class WindowSurface final : public DisplaySurface {
  public:
   /// The options' movement plays, unless it stands still, until the person takes the camera.
   static Result<std::unique_ptr<WindowSurface>> open(const ViewerOptions& options, const DisplayHelp& help);
-  /// A path that is being recorded is written.
+  /// Writes a path that is being recorded.
   ~WindowSurface() override;
 
   int width() const { return window_->width(); }
@@ -71,10 +71,10 @@ class WindowSurface final : public DisplaySurface {
   std::string failure() const override { return window_->lost() ? "the display went away" : ""; }
 
  private:
-  struct Lines;  // for the person, from any thread
+  struct Lines;  // lines for the person, from any thread
   WindowSurface(const ViewerOptions& options, const DisplayHelp& help, std::unique_ptr<Window> window);
   geometry::Camera whole(const geometry::Pose& pose) const;
-  // The window's frustum; its middle lies at a tangent from the view's axis.
+  // Frustum of the window's free part; its middle lies at a tangent from the view's axis.
   struct FreePart {
     geometry::Camera frustum;
     double middle_x;
@@ -95,16 +95,16 @@ class WindowSurface final : public DisplaySurface {
   void save_transfer();
   void give(Order order, bool undoes);
   std::string path_folder() const { return options_.out.empty() ? "." : options_.out; }
-  // Or is about to have one.
+  // True if there is a data set, or if one will come.
   bool has_scene() const { return !options_.begins_empty || !scene_.box_room.empty(); }
   void follow_bookmarks(const geometry::Pose& pose);
   void follow_notes();
   notes::Shelf shelf() const;  // precondition: terms_
 
-  ViewerOptions options_;            // display: as the person chose since
-  std::shared_ptr<PoseFeed> poses_;  // moves the camera until the person takes it; null: nothing does
-  SamplingWish sampling_;            // as the person chose
-  bool sampling_chosen_;             // its least sampling
+  ViewerOptions options_;            // options_.display: with the person's changes
+  std::shared_ptr<PoseFeed> poses_;  // moves the camera until the person takes it; null: there is no feed
+  SamplingWish sampling_;            // the person's choice
+  bool sampling_chosen_;             // the person chose its least sampling
   std::optional<SamplingWish> sampling_wish_;
   std::optional<StereoOptions> stereo_wish_;
   std::unique_ptr<Window> window_;
@@ -120,19 +120,19 @@ class WindowSurface final : public DisplaySurface {
   ShownScene scene_;
   std::string scene_name_;
   bool had_scene_ = false;
-  geometry::Pose head_;             // of the frame at hand
-  bool tracked_ = false;            // a tracker told it
-  std::array<double, 4> fitted_{};  // what the first view suits; zeros: nothing yet
+  geometry::Pose head_;             // the frame at hand's
+  bool tracked_ = false;            // head_ is from a tracker
+  std::array<double, 4> fitted_{};  // values for which the first view was made; zeros: none yet
   WindowLegend legend_{*window_, options_.display, overlays_};
   struct Shown {
     double at_s = -1e9;
-    int width = 0, height = 0;  // of the window
-    uint64_t overlays = 0;      // their version
+    int width = 0, height = 0;  // the window's
+    uint64_t overlays = 0;      // Overlays::version()
     bool panel = false;
   };
-  Shown shown_;                    // what is in the window
-  int help_scale_ = 0;             // of the overlay's letters; 0: it is not shown
-  std::vector<std::string> news_;  // that an overlay shows
+  Shown shown_;                    // state that the window shows
+  int help_scale_ = 0;             // size of the help's letters; 0: it is hidden
+  std::vector<std::string> news_;  // shown by an overlay
   Panel panel_;
   SceneControls scene_controls_{[this](Order order) { panel_.order(std::move(order)); }};
   OrderUndo order_undo_;
@@ -143,12 +143,12 @@ class WindowSurface final : public DisplaySurface {
   NotesWish notes_wish_;
   WidgetLog widget_log_ = WidgetLog::from_environment();
   std::unique_ptr<ControlDesk> desk_;
-  bool quad_buffers_ = false;  // the window has them
+  bool quad_buffers_ = false;  // the window has quad buffers
   Screenshots screenshots_;
 };
 
-/// A camera whose field of view `fov_deg` spans the longer side of the image: a window that is made narrow does not
-/// become a tunnel.
+/// Returns a camera whose field of view `fov_deg` spans the longer side of the image: a window that is made narrow does
+/// not become a tunnel.
 geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int width, int height, double near_m);
 
 }  // namespace telesplat::viewer

@@ -15,7 +15,7 @@ constexpr const char* kHands[]{"/user/hand/left", "/user/hand/right"};
 constexpr XrSpaceLocationFlags kLocated =
     XR_SPACE_LOCATION_POSITION_VALID_BIT | XR_SPACE_LOCATION_ORIENTATION_VALID_BIT;
 
-// Kinds of controllers, and what of each selects. A runtime shows others as one of these.
+// Kinds of controllers, and the control that selects on each. A runtime presents others as one of these.
 struct Profile {
   const char *name, *press;
 };
@@ -27,10 +27,10 @@ constexpr Profile kProfiles[]{
     {"/interaction_profiles/microsoft/motion_controller", "/input/trigger/value"},
 };
 
-constexpr int kSteps = 512;            // along a ray
-constexpr int kHalvings = 12;          // of the step in which it meets something
-constexpr double kThick_m = 0.1;       // behind what is seen; a ray farther behind passes it
-constexpr double kOnSurface_m = 2e-3;  // a line that ends there is not hidden by it
+constexpr int kSteps = 512;            // steps along a ray
+constexpr int kHalvings = 12;          // halvings of the step in which it hits something
+constexpr double kThick_m = 0.1;       // thickness behind visible points; a ray farther behind passes them
+constexpr double kOnSurface_m = 2e-3;  // a surface does not hide a line that ends on it
 
 struct Pixel {
   size_t at;
@@ -119,7 +119,7 @@ Status Hands::attach() {
 Result<std::unique_ptr<Hands>> Hands::make(const XrSystem& system, XrSession session) {
   std::unique_ptr<Hands> out(new Hands(system, session));
   if (const Status s = out->make_actions(); !s) return s.error();
-  // A runtime need not know all kinds; the first, which all know, must work.
+  // A runtime need not know all kinds; the first kind must work, because all runtimes know it.
   for (const Profile& profile : kProfiles)
     if (const Status s = out->suggest(profile.name, profile.press); !s && &profile == kProfiles) return s.error();
   if (const Status s = out->attach(); !s) return s.error();
@@ -142,7 +142,7 @@ Result<HandRays> Hands::locate(XrSpace space, const glm::dvec3& origin, XrTime t
   sync.activeActionSets = &active;
   const XrResult synced = xrSyncActions(session_, &sync);
   if (const Status s = system_.check("xrSyncActions", synced); !s) return s.error();
-  if (synced == XR_SESSION_NOT_FOCUSED) return out;  // the hands are somebody else's
+  if (synced == XR_SESSION_NOT_FOCUSED) return out;  // another application has the hands
   for (size_t hand = 0; hand < hands_.size(); ++hand) {
     XrActionStateGetInfo get{XR_TYPE_ACTION_STATE_GET_INFO};
     get.subactionPath = hands_[hand];
@@ -190,19 +190,19 @@ void draw_line(image::View& picture, const geometry::Camera& camera, const glm::
                uint32_t colour) {
   const auto transform = camera.room_to_pixel();
   const auto w_of = [&](const glm::dvec3& p) { return glm::dot(transform.w, glm::dvec4(p, 1)); };
-  // The part before the picture plane.
+  // Cuts off the part behind the near plane.
   glm::dvec3 a = from, b = to;
   const double near_m = 1.001 * camera.near_m, wa = w_of(a), wb = w_of(b);
   if (!(wa > near_m) && !(wb > near_m)) return;
   if (!(wa > near_m)) a = glm::mix(a, b, (near_m - wa) / (wb - wa));
   if (!(wb > near_m)) b = glm::mix(b, a, (near_m - wb) / (wa - wb));
-  // A step a pixel, as if it crossed the picture: even steps of the picture are uneven ones of the room.
+  // One step a pixel, as if the line crossed the whole picture: even steps on the picture are uneven ones in the room.
   const int steps = 2 * std::max(picture.width, picture.height);
   const double w0 = w_of(a), w1 = w_of(b);
   const auto place = [&](const glm::dvec3& p, double w) {
     return glm::dvec2(glm::dot(transform.x, glm::dvec4(p, 1)), glm::dot(transform.y, glm::dvec4(p, 1))) / w;
   };
-  // Only the part of it that lies in the picture.
+  // Only its part inside the picture is drawn.
   const glm::dvec2 at_a = place(a, w0), along = place(b, w1) - at_a, size(picture.width, picture.height);
   double begin = 0, end = 1;
   for (int axis = 0; axis < 2; ++axis) {

@@ -1,4 +1,4 @@
-// Controllers: where they point, whether they are pressed, and their rays in the pictures.
+// Controllers: their directions, their triggers, and their rays in the pictures.
 #pragma once
 
 #include <array>
@@ -14,20 +14,20 @@ namespace telesplat::viewer {
 /// A controller points along its own -z.
 struct HandRay {
   geometry::Pose pose;   ///< in the room
-  bool pressed = false;  ///< its trigger, or what selects there
+  bool pressed = false;  ///< its trigger, or another control that selects
 };
-/// Left, right; nothing: there is no controller, or nobody knows where it is.
+/// Left, right; nothing: there is no controller, or its place is not known.
 using HandRays = std::array<std::optional<HandRay>, 2>;
 
 class Hands {
  public:
-  /// Of a session that has no other actions. Error: what failed.
+  /// Makes actions for a session that has no other actions. Error: the call that failed.
   static Result<std::unique_ptr<Hands>> make(const XrSystem& system, XrSession session);
   ~Hands();
   Hands(const Hands&) = delete;
   Hands& operator=(const Hands&) = delete;
 
-  /// In `space`, where the room's origin is at `origin`. Error: what failed.
+  /// Locates the hands in `space`, where the room's origin is at `origin`. Error: the call that failed.
   Result<HandRays> locate(XrSpace space, const glm::dvec3& origin, XrTime time);
 
  private:
@@ -46,14 +46,13 @@ class Hands {
   std::array<XrSpace, 2> spaces_{};
 };
 
-/// The first point of what the picture shows on the ray from `from` along `direction` (unit length), at most
-/// kFarthest_m away; nothing: it meets nothing that the picture shows. Precondition: the picture has depth, and the
-/// camera's size.
+/// Returns the first visible point of the picture on the ray from `from` along `direction` (unit length), at most
+/// kFarthest_m away; nothing: it hits no visible point. Precondition: the picture has depth, and the camera's size.
 std::optional<glm::dvec3> first_hit(const image::View& picture, const geometry::Camera& camera, const glm::dvec3& from,
                                     const glm::dvec3& direction);
 
-/// A line in the room, three pixels wide, where nothing in the picture is before it; `colour` 0x00RRGGBB. Its depth
-/// goes into the picture's.
+/// Draws a line of the room, three pixels wide, where the picture shows nothing in front of it; `colour` 0x00RRGGBB.
+/// Its depth goes into the picture's.
 void draw_line(image::View& picture, const geometry::Camera& camera, const glm::dvec3& from, const glm::dvec3& to,
                uint32_t colour);
 

@@ -10,10 +10,10 @@
 namespace telesplat::viewer {
 namespace {
 
-const glm::dvec3 kOnStage(0, 1.1, -1.0);        // a table before who stands in the middle of the stage
-const glm::dvec3 kBeforeHead(0, -0.35, -0.75);  // where the space begins at the eyes
-constexpr double kFar_m = 100;                  // of depth as layers have it; nothing is farther than that
-constexpr double kMostDepthStep_m = 1.5e-3;     // at a metre: coarser ones are seen in pictures that are moved by depth
+const glm::dvec3 kOnStage(0, 1.1, -1.0);        // a table in front of a person in the middle of the stage
+const glm::dvec3 kBeforeHead(0, -0.35, -0.75);  // if the space begins at the eyes
+constexpr double kFar_m = 100;                  // far end of the layers' depth; content is always nearer
+constexpr double kMostDepthStep_m = 1.5e-3;     // at one metre: coarser steps show in pictures that are moved by depth
 constexpr XrPosef kNoOffset{{0, 0, 0, 1}, {0, 0, 0}};
 constexpr XrSpaceLocationFlags kHeadLocated =
     XR_SPACE_LOCATION_POSITION_VALID_BIT | XR_SPACE_LOCATION_ORIENTATION_VALID_BIT;
@@ -23,7 +23,7 @@ int scaled(int recommended, int most, double scale) {
   return std::clamp(int(std::lround(recommended * scale)), 16, std::max(16, most));
 }
 
-// The first of `wanted` that is among `there`; 0: none.
+// Returns the first of `wanted` that is in `there`; 0: there is no such format.
 int64_t chosen(std::span<const int64_t> there, std::initializer_list<int64_t> wanted) {
   for (const int64_t format : wanted)
     if (std::find(there.begin(), there.end(), format) != there.end()) return format;
@@ -53,7 +53,7 @@ Status HeadsetSession::make_session(const gl::EglContext& context) {
   return system_.check("xrCreateSession", xrCreateSession(system_.instance(), &info, &session_));
 }
 
-// A stage has a floor; where there is none, the space begins where the eyes are at first.
+// A stage has a floor; without one, the space begins at the eyes' first place.
 Status HeadsetSession::make_spaces() {
   XrReferenceSpaceType types[16];
   uint32_t count = 0;
@@ -72,7 +72,7 @@ Status HeadsetSession::make_spaces() {
   return system_.check("xrCreateReferenceSpace", xrCreateReferenceSpace(session_, &info, &head_));
 }
 
-// Colours are sRGB; depth goes where the runtime takes it.
+// Colours are sRGB; depth is made only if the runtime takes it.
 Status HeadsetSession::make_chains() {
   uint32_t count = 0;
   if (const Status s =
@@ -83,7 +83,7 @@ Status HeadsetSession::make_chains() {
   const XrResult listed = xrEnumerateSwapchainFormats(session_, count, &count, formats.data());
   if (const Status s = system_.check("xrEnumerateSwapchainFormats", listed); !s) return s;
   const int64_t colour = chosen(formats, {GL_SRGB8_ALPHA8, GL_SRGB8, GL_RGBA8});
-  // Drivers take 16 bits as they are, and work on floats one by one.
+  // Drivers take 16 bits as they are, but convert floats one by one.
   const bool few_bits_do = step_of_depth_m(near_m_, kFar_m) <= kMostDepthStep_m;
   const int64_t depth = few_bits_do
                             ? chosen(formats, {GL_DEPTH_COMPONENT16, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24})
@@ -213,7 +213,8 @@ std::optional<HeadsetSession::Eyes> HeadsetSession::locate_eyes(XrTime time) {
 
 std::optional<geometry::Pose> HeadsetSession::locate_head(XrTime time) const {
   XrSpaceLocation location{XR_TYPE_SPACE_LOCATION};
-  if (XR_FAILED(xrLocateSpace(head_, stage_, time, &location)) || (location.locationFlags & kHeadLocated) != kHeadLocated)
+  if (XR_FAILED(xrLocateSpace(head_, stage_, time, &location)) ||
+      (location.locationFlags & kHeadLocated) != kHeadLocated)
     return std::nullopt;
   return room_pose(location.pose, origin_);
 }

@@ -1,4 +1,4 @@
-// A session with a headset: its states, its spaces, its frames. Whatever fails ends it; the display opens another one.
+// A session with a headset: its states, its spaces, its frames. Any failure ends it; the display then opens another.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace telesplat::viewer {
 
-/// Used by one thread, in which the context of open() is current in all calls.
+/// Used by one thread; open()'s context must be current there in all calls.
 class HeadsetSession {
  public:
   static Result<std::unique_ptr<HeadsetSession>> open(const XrSystem& system, const gl::EglContext& context,
@@ -27,26 +27,26 @@ class HeadsetSession {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// Looks at what happened. Between frames, and while it shows nothing, to be called many times a second.
+  /// Handles the runtime's events. To be called between frames, and many times a second while it shows nothing.
   void poll();
-  /// Frames are to be shown.
+  /// True while frames are to be shown.
   bool running() const { return running_; }
-  /// Over: lost, or failed. Why stands in the news.
+  /// True after it was lost or failed. The news have the reason.
   bool over() const { return over_; }
-  /// The person is done with the application.
+  /// True if the person has quit the application.
   bool quits() const { return quits_; }
-  /// The headset's space was set anew, so poses have jumped. Once.
+  /// True once after the headset's space was set anew, so that poses have jumped.
   bool take_recentring() { return std::exchange(recentred_, false); }
-  /// Lines for the person, since the last call.
+  /// Returns lines for the person since the last call.
   std::vector<std::string> take_news() { return std::exchange(news_, {}); }
-  /// The runtime shows the application that it is done; states follow.
+  /// Asks the runtime to end the session; states follow.
   void request_exit();
 
   struct Frame {
     XrTime display_time = 0;
-    double display_s = 0;    ///< the same on the monotonic clock: when it is seen
-    double period_s = 0;     ///< of the display's refreshes
-    bool renders = false;    ///< somebody sees it
+    double display_s = 0;    ///< when it is seen, on the monotonic clock
+    double period_s = 0;     ///< time between the display's refreshes
+    bool renders = false;    ///< a person sees it
     bool discarded = false;  ///< the frame before it was begun and is never shown
   };
   /// Waits until a frame is to be drawn, and begins it. Nothing: the session is over.
@@ -56,17 +56,17 @@ class HeadsetSession {
     std::array<geometry::Camera, 2> cameras;
     std::array<XrView, 2> views;
   };
-  /// Where the eyes will be at that time; nothing: the headset does not know.
+  /// Returns the eyes at that time; nothing: the headset cannot locate them.
   std::optional<Eyes> locate_eyes(XrTime time);
-  /// The head, in the room.
+  /// Returns the head, in the room.
   std::optional<geometry::Pose> locate_head(XrTime time) const;
   Hands& hands() { return *hands_; }
   HandRays locate_hands(XrTime time);
 
-  /// The picture of an eye, left 0, right 1. It has the size of its camera, and depth if the session takes it.
+  /// Takes the picture of an eye, left 0, right 1. It has its camera's size, and depth if takes_depth().
   void put(int eye, const image::View& picture);
   bool takes_depth() const { return !depth_.empty(); }
-  /// Ends the frame. eyes: what the pictures show; null: there is no picture.
+  /// Ends the frame. eyes: the pictures' cameras; null: there are no pictures.
   void end_frame(const Frame& frame, const Eyes* eyes);
 
  private:
@@ -76,7 +76,7 @@ class HeadsetSession {
   Status make_spaces();
   Status make_chains();
   void on_state(const XrEventDataSessionStateChanged& event);
-  /// False, and the session is over: it failed.
+  /// Returns false if the call failed; then the session is over.
   bool done(const char* what, XrResult result);
   bool done(const Status& status);
 
@@ -87,7 +87,7 @@ class HeadsetSession {
   XrSpace stage_ = XR_NULL_HANDLE, head_ = XR_NULL_HANDLE;
   glm::dvec3 origin_{0.0};
   int width_ = 0, height_ = 0;
-  std::vector<PictureChain> colour_, depth_;  // an eye each
+  std::vector<PictureChain> colour_, depth_;  // one for each eye
   std::unique_ptr<Hands> hands_;
   bool running_ = false, over_ = false, quits_ = false, recentred_ = false;
   std::optional<XrTime> recentres_at_;

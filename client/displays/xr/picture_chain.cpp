@@ -11,7 +11,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// Without branches, so that the compiler makes vectors of it.
+// Has no branches, so that the compiler can vectorise it.
 template <class T>
 void half_depth(const float* above, const float* below, const DepthRange& range, size_t pixels, T* out) {
   const auto near = float(1 / range.near_m), scale = float(1 / (1 / range.near_m - 1 / range.far_m));
@@ -92,8 +92,8 @@ Status PictureChain::put_with(Upload upload) {
   return system_->check("xrReleaseSwapchainImage", xrReleaseSwapchainImage(handle_, nullptr));
 }
 
-// OpenGL begins with the lowest row. Each pixel is brought into the texture's own order here, by all threads: drivers
-// that do it take one, and several times as long.
+// OpenGL begins with the lowest row. All threads convert pixels to the texture's order here: drivers would do so in one
+// thread, and take several times as long.
 template <class T, class Row>
 void PictureChain::turn(std::vector<T>& turned, Row row) {
   turned.resize(size_t(width_) * size_t(height_));

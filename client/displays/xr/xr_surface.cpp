@@ -17,7 +17,7 @@ namespace {
 // Share of a refresh period that both eyes may take to draw.
 constexpr double kDrawingShare = 0.6, kShortest_s = 1.0 / 1000;
 constexpr double kIdle_s = 0.02, kOpenAgain_s = 1.0, kLeave_s = 2.0;
-constexpr uint32_t kHandColours[]{0x56b4e9, 0xe69f00};  // left, right; told apart by everyone
+constexpr uint32_t kHandColours[]{0x56b4e9, 0xe69f00};  // left, right; all people can tell them apart
 constexpr const char* kHandNames[]{"left", "right"};
 
 void sleep_s(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
@@ -60,7 +60,7 @@ Status XrSurface::open_system() {
 void XrSurface::open_session() {
   if (monotonic_s() < open_at_s_) return;
   open_at_s_ = monotonic_s() + kOpenAgain_s;
-  // The same trouble every second is told once.
+  // The same trouble is reported once, not every second.
   const auto fails = [&](const std::string& text) {
     if (text != std::exchange(trouble_, text)) tell_(fmt::format("no headset: {}; trying again every second", text));
   };
@@ -80,7 +80,7 @@ void XrSurface::open_session() {
   last_display_s_ = 0;
 }
 
-// Whether the session shows frames.
+// Serves the session. True if it shows frames.
 bool XrSurface::follow_session() {
   if (!session_) open_session();
   if (!session_) return false;
@@ -102,7 +102,7 @@ bool XrSurface::ready() {
   return false;
 }
 
-// Waits for the runtime. Ends a frame at once that has no eyes or is not shown.
+// Waits for the runtime. A frame without eyes, or one that is not shown, ends at once.
 bool XrSurface::begin() {
   const gl::EglContext::Current current(*context_);
   const auto begun = session_->begin_frame();
@@ -125,7 +125,7 @@ bool XrSurface::begin() {
   return true;
 }
 
-// A pair has another share of a frame's time than two pictures. Runtimes' periods differ a little from frame to frame.
+// A pair takes another share of a frame's time than two pictures. Runtimes' periods differ a little between frames.
 void XrSurface::follow_pace() {
   const bool pair = alike(located_->cameras);
   if (pictures_a_second_ > 0 && (pair || !as_pair_)) return;
@@ -133,13 +133,13 @@ void XrSurface::follow_pace() {
   pictures_a_second_ = (pair ? 1 : 2) / (kDrawingShare * std::max(frame_.period_s, kShortest_s));
 }
 
-// Where the head will be when an answer can be there is the runtime's to say: it has more to tell it from than poses.
+// The runtime predicts the head better than poses do: it knows more about it.
 std::optional<ExpectedHead> XrSurface::expected(double at_s) {
   if (!session_ || at_s <= frame_.display_s) return std::nullopt;
   const auto head = session_->locate_head(frame_.display_time);
   const auto then = session_->locate_head(system_->to_time(at_s));
   if (!head || !then) return std::nullopt;
-  // camera_ stands still beside the head.
+  // camera_ keeps its place beside the head.
   const glm::dquat turn = then->orientation * glm::conjugate(head->orientation);
   return ExpectedHead{at_s,
                       {then->position_room + turn * (camera_.pose.position_room - head->position_room),
@@ -149,7 +149,7 @@ std::optional<ExpectedHead> XrSurface::expected(double at_s) {
 void XrSurface::present_eyes(std::array<image::View, 2>& views) {
   const gl::EglContext::Current current(*context_);
   const HandRays rays = session_->locate_hands(frame_.display_time);
-  point(rays, views[0]);  // both eyes see rays that end in one place
+  point(rays, views[0]);  // both eyes see rays that end at one place
   for (size_t eye = 0; eye < 2; ++eye) {
     for (size_t hand = 0; hand < rays.size(); ++hand)
       if (rays[hand])
@@ -159,7 +159,7 @@ void XrSurface::present_eyes(std::array<image::View, 2>& views) {
   session_->end_frame(frame_, &*located_);
 }
 
-// What controllers point at; a person who presses one is told where that is.
+// Finds the rays' ends; after a press it prints the place for the person.
 void XrSurface::point(const HandRays& rays, const image::View& view) {
   for (size_t hand = 0; hand < rays.size(); ++hand) {
     const bool pressed = rays[hand] && rays[hand]->pressed, before = std::exchange(pressed_[hand], pressed);
@@ -186,7 +186,7 @@ void XrSurface::measure(MeasuredFrame& m) {
   m.seen_s = frame_.display_s + late_s;
 }
 
-// A headset wants pictures of another size than the options tell: they follow. Eyes never stand still.
+// The options take over the size of a headset's pictures. Eyes never stand still, so there are no still pictures.
 Result<std::unique_ptr<DisplaySurface>> open_headset(ViewerOptions& o, const DisplayHelp& help) {
   auto opened = XrSurface::open(o.xr_options, o.display.near_m, help.tell);
   if (!opened) return Error{"--xr: " + opened.error().text};

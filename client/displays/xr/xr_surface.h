@@ -1,5 +1,5 @@
-// The display in a headset: every refresh shows what is cached to both eyes, from where the runtime says that they will
-// be then, even if the server is late.
+// The display in a headset: every refresh shows the cached scene to both eyes, from where the runtime predicts them,
+// even if the server is late.
 #pragma once
 
 #include <array>
@@ -15,15 +15,14 @@
 
 namespace telesplat::viewer {
 
-/// The runtime's clock paces frames. A session that is lost is opened anew every second. Pictures that are recorded are
-/// the left eye's.
+/// The runtime's clock paces frames. A lost session is opened anew every second. Recorded pictures are the left eye's.
 class XrSurface final : public DisplaySurface {
  public:
   using Tell = std::function<void(const std::string&)>;
 
-  /// tell: lines for the person. Error: what of a runtime, a headset or OpenGL there is not.
+  /// tell: prints lines for the person. Error: the part of runtime, headset or OpenGL that is missing.
   static Result<std::unique_ptr<XrSurface>> open(const XrOptions& options, double near_m, Tell tell);
-  /// Tells the runtime that the application goes: states follow, for which there is little time.
+  /// Reports to the runtime that the application ends: states follow, for which there is little time.
   ~XrSurface() override;
 
   /// Pixels of an eye's picture that the runtime recommends.
@@ -66,21 +65,21 @@ class XrSurface final : public DisplaySurface {
   const XrOptions options_;
   const double near_m_;
   const Tell tell_;
-  std::unique_ptr<gl::EglContext> context_;  // of the pictures' textures
+  std::unique_ptr<gl::EglContext> context_;  // for the pictures' textures
   std::unique_ptr<XrSystem> system_;
   std::unique_ptr<HeadsetSession> session_;
   bool lost_ = false, quits_ = false, jumped_ = false;
   double open_at_s_ = 0;
-  std::string trouble_;  // that was told last
-  // The frame at hand.
+  std::string trouble_;  // the last one that was reported
+  // Values of the frame at hand.
   HeadsetSession::Frame frame_;
   std::optional<HeadsetSession::Eyes> located_;
-  geometry::Camera camera_;  // sees all that both eyes see
+  geometry::Camera camera_;  // covers the views of both eyes
   geometry::Pose head_;
   double located_s_ = 0, last_display_s_ = 0, pictures_a_second_ = 0;
   int missed_ = 0;
-  bool as_pair_ = true;               // one choice of points has served both eyes so far
-  std::array<glm::dvec3, 2> ends_{};  // of the hands' rays
+  bool as_pair_ = true;               // so far one choice of points served both eyes
+  std::array<glm::dvec3, 2> ends_{};  // ends of the hands' rays
   std::array<bool, 2> pressed_{};
 };
 

@@ -13,7 +13,7 @@ int pixels(double focal, double extent) {
   return std::clamp(int(std::lround(focal * extent)), 1, geometry::kMaxImageSide);
 }
 
-constexpr XrVersion kOpenGl = XR_MAKE_VERSION(4, 3, 0);  // what contexts here are made for
+constexpr XrVersion kOpenGl = XR_MAKE_VERSION(4, 3, 0);  // contexts here are made for this version
 
 const char* meaning(XrResult result) {
   switch (result) {
@@ -63,7 +63,7 @@ geometry::Camera both_eyes(const std::array<geometry::Camera, 2>& eyes) {
   out.pose.orientation = glm::normalize(glm::slerp(eyes[0].pose.orientation, eyes[1].pose.orientation, 0.5));
   const glm::dvec3 middle = 0.5 * (eyes[0].pose.position_room + eyes[1].pose.position_room);
   const glm::dquat to_head = glm::conjugate(out.pose.orientation);
-  // All directions that either eye sees, as tangents of the head's own axes.
+  // Covers all directions of either eye, as tangents on the head's own axes.
   glm::dvec2 lo(1e9), hi(-1e9);
   glm::dvec3 apexes[2];
   for (int e = 0; e < 2; ++e) {
@@ -101,7 +101,7 @@ Error XrSystem::error(const char* what, XrResult result) const {
 }
 
 Status XrSystem::check(const char* what, XrResult result) const {
-  if (result == XR_ERROR_SESSION_LOST) return Error{"the runtime lost the headset"};  // an event says so, too
+  if (result == XR_ERROR_SESSION_LOST) return Error{"the runtime lost the headset"};  // an event reports it, too
   return XR_FAILED(result) ? Status(error(what, result)) : ok_status();
 }
 
@@ -118,7 +118,7 @@ Status XrSystem::make_instance() {
   };
   std::vector<const char*> wanted{XR_KHR_OPENGL_ENABLE_EXTENSION_NAME, XR_MNDX_EGL_ENABLE_EXTENSION_NAME,
                                   XR_KHR_CONVERT_TIMESPEC_TIME_EXTENSION_NAME};
-  if (!there.empty())  // else xrCreateInstance says why
+  if (!there.empty())  // otherwise xrCreateInstance reports why
     for (const char* name : wanted)
       if (!has(name)) return Error{fmt::format("the OpenXR runtime has no {}, which --xr needs", name)};
   takes_depth_ = has(XR_KHR_COMPOSITION_LAYER_DEPTH_EXTENSION_NAME);
@@ -155,7 +155,7 @@ Status XrSystem::read_sizes() {
   const XrResult result = xrEnumerateViewConfigurationViews(instance_, system_, kTwoEyes, 2, &count, views);
   if (const Status s = check("xrEnumerateViewConfigurationViews", result); !s) return s;
   if (count != 2) return Error{fmt::format("{} has {} views instead of two", name_, count)};
-  // Both eyes have pictures of one size: what is drawn for each takes as long.
+  // Both eyes have pictures of one size, so that each takes equally long to draw.
   eye_size_ = {int(std::max(views[0].recommendedImageRectWidth, views[1].recommendedImageRectWidth)),
                int(std::max(views[0].recommendedImageRectHeight, views[1].recommendedImageRectHeight)),
                int(std::min(views[0].maxImageRectWidth, views[1].maxImageRectWidth)),
@@ -174,7 +174,7 @@ Status XrSystem::read_blend_mode() {
   return ok_status();
 }
 
-// The call itself is what OpenXR demands before a session.
+// OpenXR requires this call before a session.
 Status XrSystem::check_opengl() {
   PFN_xrGetOpenGLGraphicsRequirementsKHR requirements = nullptr;
   if (const Status s = load("xrGetOpenGLGraphicsRequirementsKHR", requirements); !s) return s;

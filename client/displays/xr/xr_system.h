@@ -1,5 +1,5 @@
-// A headset as an OpenXR runtime offers it: an instance, a system, what it wants pictures to be like. OpenXR as it is
-// used here (OpenGL through EGL, depth of layers, times of the monotonic clock), and its types as those of cameras.
+// A headset of an OpenXR runtime: an instance, a system, the sizes of its pictures. It uses OpenXR with OpenGL through
+// EGL, layers with depth and times of the monotonic clock, and converts its types to poses and cameras.
 #pragma once
 
 #include <epoxy/egl.h>
@@ -22,21 +22,21 @@
 
 namespace telesplat::viewer {
 
-/// Both are right-handed, in metres, +y up, looking along -z. origin: the room's, in the headset's space.
+/// Converts a pose: both are right-handed, metres, +y up, looking along -z. origin: the room's, in the headset's space.
 geometry::Pose room_pose(const XrPosef& pose, const glm::dvec3& origin);
-/// The camera of an eye; width x height pixels.
+/// Returns the camera of an eye; width x height pixels.
 geometry::Camera eye_camera(const XrView& view, const glm::dvec3& origin, int width, int height, double near_m);
 
-/// How far apart two depths are at a metre, of pictures with 16 bits for depths from near_m to far_m, metres.
+/// Step between depths at one metre, for pictures with 16 bits of depth from near_m to far_m, metres.
 double step_of_depth_m(double near_m, double far_m);
 
-/// One camera that sees all that both eyes see, in the middle of their directions and so far behind them that its
-/// frustum holds both, with as many pixels a radian as they have. What is asked for is chosen once, for it.
+/// Returns one camera for both eyes' views: in the middle of their directions, and so far behind them that its frustum
+/// covers both, with as many pixels a radian. One choice of points, and one request, is made for it.
 geometry::Camera both_eyes(const std::array<geometry::Camera, 2>& eyes);
 
 class XrSystem {
  public:
-  /// Finds the runtime (XR_RUNTIME_JSON, else the system's) and a headset with two eyes. Error: what there is not.
+  /// Finds the runtime (XR_RUNTIME_JSON, else the system's) and a headset with two eyes. Error: what is missing.
   static Result<std::unique_ptr<XrSystem>> open();
   ~XrSystem();
   XrSystem(const XrSystem&) = delete;
@@ -46,16 +46,16 @@ class XrSystem {
   XrSystemId system() const { return system_; }
   /// "RUNTIME 1.2.3, HEADSET"
   const std::string& name() const { return name_; }
-  /// Pixels of an eye's picture that the runtime recommends, and takes at most.
+  /// Size of an eye's picture that the runtime recommends, and its upper limit, pixels.
   struct EyeSize {
     int width, height, most_width, most_height;
   };
   const EyeSize& eye_size() const { return eye_size_; }
-  /// Whether layers may have depth.
+  /// True if layers may have depth.
   bool takes_depth() const { return takes_depth_; }
   XrEnvironmentBlendMode blend_mode() const { return blend_mode_; }
 
-  /// Between the runtime's clock and monotonic_s().
+  /// Convert between the runtime's clock and monotonic_s().
   double to_monotonic_s(XrTime time) const;
   XrTime to_time(double monotonic_s) const;
 

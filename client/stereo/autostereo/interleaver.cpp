@@ -14,16 +14,16 @@ namespace {
 
 constexpr int kRowsOfTask = 16;
 
-constexpr size_t kSpare = 48;  // pixels that rows.h writes beyond a row, and a cell that ends there
+constexpr size_t kSpare = 48;  // pixels that rows.h writes beyond a row, and the part of a cell beyond it
 
-// Where the n-th of `of` pixels lies among `among`: a whole pixel and 256ths of the way to the next one.
+// Maps pixel n of `of` to a picture of `among` pixels: a whole pixel and 256ths of the way to the next one.
 std::array<uint32_t, 2> place_among(int n, int of, int among) {
   const double at = std::clamp((n + 0.5) * among / of - 0.5, 0.0, double(among - 1));
   const double whole = std::floor(at);
   return {uint32_t(whole), uint32_t(std::lround((at - whole) * 256))};
 }
 
-// How much of the way from line 0 to `line` is open.
+// Integrates the open width from line 0 to `line`, in lines.
 double opened(double line, double half_opening) {
   const double nearest = std::nearbyint(line);
   return 2 * half_opening * nearest + std::clamp(line - nearest, -half_opening, half_opening);
@@ -31,7 +31,7 @@ double opened(double line, double half_opening) {
 
 }  // namespace
 
-// Light is refracted differently in each place, but very evenly: within a cell lines are straight to a few
+// The plate refracts light differently at each place, but very evenly: within a cell lines are straight to a few
 // thousandths of a line.
 void Interleaver::find_lines(const Eyes& eyes) {
   if (lines_known_ && eyes == eyes_) return;
@@ -62,7 +62,7 @@ void Interleaver::share_out(int row, uint32_t* left, uint32_t* right) const {
       const double* u = lines_[eye].data();
       const double begin = u[at] + (u[at + columns] - u[at]) * down;
       const double end = u[at + 1] + (u[at + 1 + columns] - u[at + 1]) * down;
-      // Whole lines do not matter; half of one more, so that cutting off finds the nearest.
+      // Only the fraction counts; half a line is added, so that cutting off finds the nearest line.
       sharing.eyes[eye] = {float(begin - std::floor(begin) + 0.5), float((end - begin) / kCell)};
     }
     detail::share_pixels(sharing, kCell, left + x0, right + x0);
@@ -90,7 +90,7 @@ void Interleaver::prepare_stretch(int width) {
   }
 }
 
-// A row of the panel.
+// Stretches one row of the picture to the panel's width.
 void Interleaver::stretch(const image::View& from, int row, uint32_t* to) const {
   const auto [y, below] = place_among(row, panel_.height, from.height);
   const uint32_t* a = from.colour.data() + size_t(y) * size_t(from.width);
@@ -102,7 +102,7 @@ void Interleaver::stretch(const image::View& from, int row, uint32_t* to) const 
   thread_local std::vector<uint32_t> line, pairs, ends;
   line.resize(size_t(from.width) + kSpare);
   pairs.resize(2 * (size_t(panel_.width) + kSpare));
-  // Whole vectors are read: the last pixels of a picture come from a copy.
+  // Whole vectors are read: the last pixels of a row come from a copy.
   const size_t sure = size_t(from.width) / kSpare * kSpare, rest = size_t(from.width) - sure;
   ends.resize(4 * kSpare);
   std::copy_n(a + sure, rest, ends.data());
@@ -156,7 +156,7 @@ image::View seen_by(const Panel& panel, const glm::dvec3& eye, const image::View
   const int reach = std::max(1, int(std::ceil(panel.lines.pitch_m / panel.pixel_m)));
   const auto width = size_t(panel.width);
   in_parallel(0, panel.height, [&](int y) {
-    // Each channel's sums from the row's beginning.
+    // Running sums of each channel, from the row's beginning.
     std::vector<double> light(width + 1), visible(width + 1);
     const uint32_t* row = picture.colour.data() + size_t(y) * width;
     uint32_t* to = out.colour.data() + size_t(y) * width;

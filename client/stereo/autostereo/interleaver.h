@@ -9,7 +9,7 @@
 
 namespace telesplat::stereo {
 
-/// Keeps its memory from one picture to the next. Used by one thread; draws with all that TBB has.
+/// Keeps its memory from one picture to the next. Used by one thread; draws with all threads of TBB.
 class Interleaver {
  public:
   /// Precondition: the panel validates.
@@ -17,17 +17,17 @@ class Interleaver {
 
   const Panel& panel() const { return panel_; }
 
-  /// `out` gets the panel's size, without depth. The eyes' pictures have one size, any; they are stretched over the
-  /// panel, linearly between their pixels. Subpixels of guard bands are black. Preconditions: the eyes validate
+  /// `out` gets the panel's size, without depth. Both pictures have one size, which may be any; they are stretched over
+  /// the panel, linearly between their pixels. Subpixels of guard bands are black. Precondition: the eyes validate
   /// (panel.h).
   void compose(const Eyes& eyes, const image::View& left, const image::View& right, image::View& out);
 
-  /// Whose each subpixel is: 0xff in the bits of the left eye's colours (0x00RRGGBB); the same of the right's. For one
-  /// row of the panel.
+  /// Fills the masks of one row of the panel: 0xff in the bits of the colours (0x00RRGGBB) that belong to the left eye,
+  /// and the same for the right one.
   void masks(const Eyes& eyes, int row, std::vector<uint32_t>& left, std::vector<uint32_t>& right);
 
  private:
-  static constexpr int kCell = 32;  // pixels a side, within which lines are taken to be straight and even
+  static constexpr int kCell = 32;  // pixels a side; within a cell lines count as straight and even
 
   void find_lines(const Eyes& eyes);
   void share_out(int row, uint32_t* left, uint32_t* right) const;
@@ -39,27 +39,27 @@ class Interleaver {
   // line_at() of each eye in the corners of cells, by rows, for the middle of the first subpixel of the pixel there.
   std::vector<double> lines_[2];
   bool lines_known_ = false;
-  // Of each column of the panel: where it lies in an eye's picture, left pixel and how much of the one beside it (of
-  // 256).
+  // For each column of the panel: the pixel of an eye's picture to the left of it, and the weight of the pixel after
+  // that (0 to 256).
   std::vector<uint32_t> column_, beside_;
   int stretched_width_ = 0;
 };
 
-/// How much of a subpixel an eye sees, 0 to 1: the share of its width from which light reaches the eye through a slit
-/// (or by way of a lens).
+/// Returns the share of a subpixel that an eye sees, 0 to 1: the part of its width from which light reaches the eye
+/// through a slit (or a lens).
 double visible_share(const Panel& panel, const glm::dvec3& eye, int x, int y, int subpixel);
 
-/// What an eye at this place sees of the picture on the panel. Eyes do not resolve lines: a pixel's channel is the mean
-/// of that channel around it, over a pitch to each side of its row, weighted by what is visible of it; as bright as if
-/// all of it were. Preconditions: the panel and the eye validate; the picture has the panel's size.
+/// Returns what an eye at this place sees of the picture on the panel. Eyes do not resolve lines: a pixel's channel is
+/// the mean of that channel over a pitch to each side in its row, weighted by visible_share(), as bright as if all of
+/// it were visible. Preconditions: the panel and the eye validate; the picture has the panel's size.
 image::View seen_by(const Panel& panel, const glm::dvec3& eye, const image::View& picture);
 
-/// What eyes see of a panel through its line screen: simulated, for calibration, documents and tests.
+/// Figures of eyes that see a panel through its line screen: simulated, for calibration, documents and tests.
 struct SeenShares {
-  double crosstalk = 0;  ///< of the light that an eye sees: how much is of subpixels that belong to the other one
-  double dark = 0;       ///< of the subpixels: how many belong to nobody
+  double crosstalk = 0;  ///< share of an eye's light that comes from the other eye's subpixels
+  double dark = 0;       ///< share of subpixels in guard bands
 };
-/// For a picture that was made for `made_for`, seen from there: rows about the middle of the panel.
+/// Computes them for a picture made for these eyes, which look from there; over rows about the panel's middle.
 SeenShares seen_shares(const Panel& panel, const Eyes& made_for);
 
 }  // namespace telesplat::stereo

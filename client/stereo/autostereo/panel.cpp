@@ -12,7 +12,7 @@ namespace telesplat::stereo {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-constexpr int kSteps = 4;  // of Newton's method; the first guess is the paraxial one
+constexpr int kSteps = 4;  // steps of Newton's method; the first guess is the paraxial one
 
 constexpr double kPanelDegree = 3.14159265358979323846 / 180;
 
@@ -36,8 +36,8 @@ Status validate(const LineScreen& s) {
 glm::dvec2 through(const LineScreen& s, const glm::dvec3& eye, const glm::dvec2& place) {
   const glm::dvec2 aside = glm::dvec2(eye) - place;
   const double distance = glm::length(aside), air_m = eye.z - s.thickness_m;
-  // tan: of the ray's angle in air. In the plate sin is 1 / index of that in air, so its tangent is
-  // tan / sqrt(index^2 + (index^2 - 1) tan^2).
+  // tangent is that of the ray's angle in air. In the plate the sine is 1 / index of that in air, so the tangent there
+  // is tan / sqrt(index^2 + (index^2 - 1) tan^2).
   const double n2 = s.index * s.index;
   double tangent = distance / (air_m + s.thickness_m / s.index);
   for (int i = 0; i < kSteps; ++i) {

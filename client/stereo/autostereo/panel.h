@@ -1,4 +1,4 @@
-// An autostereo display: its pixels, and the line screen before them.
+// Describes an autostereo display: its pixels, and the line screen before them.
 #pragma once
 
 #include <array>
@@ -12,28 +12,28 @@
 
 namespace telesplat::stereo {
 
-/// A line screen before a display: a parallax barrier (opaque, with slits) or a sheet of cylindrical lenses. From
-/// each place of the display light reaches an eye through it or not, and that decides which eye's picture belongs
-/// there (Sandin et al. 2005).
+/// A line screen before a display: a parallax barrier (opaque, with slits) or a sheet of cylindrical lenses. Light from
+/// a place of the display reaches an eye through it or not, and that decides which eye's picture belongs there (Sandin
+/// et al. 2005).
 ///
-/// Lengths are metres on the display's own axes: x to the right and y up from its middle, z towards the person;
-/// pixels lie at z = 0. Next to them comes air, `gap_m` thick, then a plate of `thickness_m` with refractive index
-/// `index`; the lines lie on its far side. Which of the two comes first makes no difference.
+/// Lengths are metres on the display's own axes: x to the right and y up from its middle, z towards the person; pixels
+/// lie at z = 0. Air lies before them, `gap_m` thick, then a plate of `thickness_m` with refractive index `index`; the
+/// lines are on its far side. The order of air and plate makes no difference.
 ///
-/// Line k is where (x cos tilt + y sin tilt - shift) / pitch = k, so lines lean to the left with a tilt above 0. Of
-/// a barrier it is the middle of a slit, of lenses that of a lens: there the light of a place passes as through a
-/// slit, because the lens makes it parallel (the display lies in its focal plane) in the direction of the ray
-/// through its middle. So one map serves both.
+/// Line k is where (x cos tilt + y sin tilt - shift) / pitch = k, so lines lean to the left with a tilt above 0. It is
+/// the middle of a barrier's slit, or of a lens. A lens makes the light of a place parallel (the display lies in its
+/// focal plane), in the direction of the ray through its middle: so light passes there as through a slit, and one map
+/// serves both.
 struct LineScreen {
   double pitch_m = 0.9e-3;  ///< from line to line, across them
-  double tilt_deg = 0;      ///< of the lines against the vertical
-  double shift_m = 0;       ///< of line 0 from the display's middle, across the lines
+  double tilt_deg = 0;      ///< angle between the lines and the vertical
+  double shift_m = 0;       ///< distance of line 0 from the display's middle, across the lines
   double gap_m = 0, thickness_m = 3e-3;
-  double index = 1.5;     ///< refractive, of the plate
-  double opening = 0.25;  ///< of a barrier: how much of the pitch is a slit; of lenses: how much of it the light of a
-                          ///< place covers seen from afar
-  /// Guard band: where an eye's line of sight is nearer to the middle of a line than the other eye's by less than this
-  /// share of the pitch, nothing is shown. 0: none.
+  double index = 1.5;     ///< refractive index of the plate
+  double opening = 0.25;  ///< barrier: share of the pitch that is a slit; lenses: share of it that the light of a place
+                          ///< covers seen from afar
+  /// Guard band, as a share of the pitch: a place is black if both eyes' distances from the middle of a line differ by
+  /// less than this. 0: no place is black.
   double guard = 0.05;
   bool operator==(const LineScreen&) const = default;
 };
@@ -41,36 +41,36 @@ struct LineScreen {
 /// Error: names the value and its limits.
 Status validate(const LineScreen& screen);
 
-/// Where the eye's line of sight to a place of the display meets the plane of the lines, metres on the display's axes;
-/// the plate refracts it (Snell's law). Precondition: the eye lies before the lines.
+/// Returns where the eye's line of sight to a place of the display meets the plane of the lines, metres on the
+/// display's axes. The plate refracts it (Snell's law). Precondition: the eye lies before the lines.
 glm::dvec2 through(const LineScreen& screen, const glm::dvec3& eye, const glm::dvec2& place);
 
-/// A place in the plane of the lines, in lines: a whole number in the middle of one.
+/// Converts a place in the plane of the lines to lines: a whole number is the middle of a line.
 double line_at(const LineScreen& screen, const glm::dvec2& in_plane);
 
-/// How far from the middle of the nearest line, 0 to 0.5 lines.
+/// Distance from the middle of the nearest line, 0 to 0.5 lines.
 double off_line(double line);
 
-/// The distance from the lines, paraxially, that air of this depth would have.
+/// Thickness of air that shifts paraxial rays as much as gap and plate do.
 double optical_depth_m(const LineScreen& screen);
 
 enum class Shown { kNothing, kLeft, kRight };
-/// Whose picture belongs to a place that the eyes see at these distances from the middles of lines.
+/// Returns the eye whose picture belongs to a place. left_off, right_off: off_line() of each eye's line of sight to it.
 Shown whose(const LineScreen& screen, double left_off, double right_off);
 
-/// How a pixel's colours lie in it, from left to right.
+/// Order of a pixel's colours from left to right.
 enum class Subpixels {
   kRgb,
   kBgr,
-  kWhole  ///< in one place: whole pixels are shared out
+  kWhole  ///< all colours at one place: whole pixels belong to one eye
 };
 
 struct Panel {
   int width = 2560, height = 1600;  ///< pixels
   double pixel_m = 0.25e-3;         ///< from pixel to pixel, both ways
   Subpixels subpixels = Subpixels::kRgb;
-  Size eye{};               ///< the picture of one eye; 0: as many pixels as the display has
-  double distance_m = 0.7;  ///< of a person before it whose head is not tracked
+  Size eye{};               ///< size of one eye's picture; 0: as many pixels as the display has
+  double distance_m = 0.7;  ///< distance of a person whose head is not tracked
   LineScreen lines;
   bool operator==(const Panel&) const = default;
 
@@ -82,32 +82,32 @@ struct Panel {
 /// Error: names the value and its limits.
 Status validate(const Panel& panel);
 
-/// Where the eyes are on the panel's axes (LineScreen).
+/// The eyes' places on the panel's axes (LineScreen).
 using Eyes = std::array<glm::dvec3, 2>;
-/// Straight before its middle.
+/// Eyes straight before the panel's middle.
 Eyes eyes_before(const Panel& panel, double separation_m, double distance_m);
-/// Of eyes whose cameras see through a window that is the panel: where they are to it. The window's width is that of
-/// the panel, whatever it is in the room.
+/// Returns the places of eyes whose cameras see through a window that is the panel. The window is scaled to the panel's
+/// width, so its size in the room does not matter.
 Eyes eyes_of(const Panel& panel, const std::array<geometry::Camera, 2>& cameras);
-/// Error: an eye is behind the lines or not before the panel, within 0.05 m and 100 m.
+/// Error: an eye is nearer than nearest_eye_m(), or farther than 100 m.
 Status validate(const Panel& panel, const Eyes& eyes);
-/// How far before the display's pixels an eye is at least, metres: beyond the plate.
+/// Least distance of an eye from the display's pixels, metres: 0.05, or 0.01 beyond the plate.
 double nearest_eye_m(const Panel& panel);
 
-/// Middle of a subpixel on the panel's axes. subpixel: 0 to 2 from left to right; 1 is the pixel's middle.
+/// Returns the middle of a subpixel on the panel's axes. subpixel: 0 to 2 from left to right; 1 is the pixel's middle.
 glm::dvec2 place_of(const Panel& panel, int x, int y, int subpixel);
-/// Bits of the colour of a subpixel, from left to right; 16: red, 8: green, 0: blue.
+/// Bit shifts of the subpixels' colours, from left to right; 16: red, 8: green, 0: blue.
 std::array<int, 3> shifts_of(Subpixels subpixels);
 
-/// What its figures come to, for people.
+/// Figures of a panel, for people.
 struct PanelFigures {
-  double best_distance_m = 0;  ///< where eyes of that separation see neighbouring halves of what lies behind a line
-  double repeat_m = 0;         ///< at distance_m the picture repeats itself after so much to the side
+  double best_distance_m = 0;  ///< distance at which both eyes see neighbouring halves of what lies behind a line
+  double repeat_m = 0;         ///< step to the side after which the picture repeats, at distance_m
   double pixels_a_line = 0;    ///< pixels from line to line, across the picture
-  double crosstalk = 0;        ///< share of an eye's light that is meant for the other one, of eyes that are tracked
+  double crosstalk = 0;        ///< share of an eye's light that is meant for the other one, if eyes are tracked
   double dark = 0;             ///< share of subpixels in guard bands
 };
-/// Eyes straight before it at distance_m. crosstalk and dark are counted over its middle.
+/// Computes them for eyes straight before the panel at distance_m. crosstalk and dark are counted over its middle.
 PanelFigures figures_of(const Panel& panel, double separation_m);
 
 }  // namespace telesplat::stereo

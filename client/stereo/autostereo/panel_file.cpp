@@ -17,7 +17,7 @@ Error wrong(const std::string& path, const toml::node& node, const std::string& 
   return Error{fmt::format("{}:{}: {}", path, node.source().begin.line, what)};
 }
 
-// Whole numbers of pixels: [width, height].
+// Reads whole numbers of pixels: [width, height].
 Status read_size(const toml::node& node, int& width, int& height) {
   const toml::array* pair = node.as_array();
   if (!pair || pair->size() != 2 || !pair->get(0)->is_integer() || !pair->get(1)->is_integer())
@@ -48,7 +48,7 @@ Reader number(double& to, double factor = 1) {
   };
 }
 
-// What a panel is made of: "table.key" -> how it is read.
+// Maps "table.key" to the function that reads it.
 std::map<std::string, Reader> readers(Panel& p) {
   LineScreen& l = p.lines;
   return {{"panel.pixels", [&](const toml::node& n) { return read_size(n, p.width, p.height); }},

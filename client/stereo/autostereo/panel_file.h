@@ -1,4 +1,4 @@
-// Autostereo displays as TOML files describe them (docs/stereo.md).
+// Reads autostereo displays from TOML files (docs/stereo.md).
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace telesplat::stereo {
 
-/// Error: names file, line, key and limits. Keys that are not known are refused.
+/// Error: names file, line, key and limits. Unknown keys are refused.
 Result<Panel> read_panel(const std::string& path);
 
 }  // namespace telesplat::stereo

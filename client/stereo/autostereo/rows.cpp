@@ -9,7 +9,7 @@ HWY_BEFORE_NAMESPACE();
 namespace telesplat::stereo::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// How far from the middle of a line, where lines are half of one too large.
+// Distance from the middle of the nearest line, for lines that are half a line too large.
 template <class D, class V>
 HWY_INLINE V Off(D d, V line) {
   const hn::RebindToSigned<D> di;
@@ -41,8 +41,7 @@ void SharePixels(const Sharing& s, int pixels, uint32_t* HWY_RESTRICT left, uint
   }
 }
 
-// Two channels at a time, which are 16 bits apart: a * 256 + (b - a) * weight, modulo 2^32 as the sum of both products
-// is.
+// Computes a * 256 + (b - a) * weight for two channels at a time, 16 bits apart. The sum is taken modulo 2^32.
 template <class V, class W>
 HWY_INLINE V Between(V a, V b, W weight) {
   const hn::DFromV<V> d;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kIdle = 0.82, kLeastShare = 0.4;
 constexpr double kSmallStep = 0.02, kLargeStep = 0.06;
-constexpr double kRise = 0.35, kFall = 0.2;  // the smoothed load takes over this share of what was measured
+constexpr double kRise = 0.35, kFall = 0.2;                              // weight of a new value in the smoothed load
 constexpr double kHalfFrom = 1.15, kHalfUntil = 0.7, kHalfSmooth = 0.1;  // HalfSize
 constexpr int kHalfLearns = 20, kHalfLeast = 60;                         // frames
 constexpr double kFollow_s = 0.07;  // time constant of SpeedDetail: after 0.3 s 1.4 % of a change is left
@@ -22,7 +22,7 @@ double median(double a, double b, double c) { return std::max(std::min(a, b), st
 void FrameBudget::frame_done(double select_ms, double draw_ms, double points, double detail_drawn) {
   const auto sound = [](double ms) { return std::isfinite(ms) && ms >= 0; };
   if (!(budget_ms_ > 0) || !sound(select_ms) || !sound(draw_ms) || !(points > 0)) return;
-  // A single slow frame (another process, an upload) says nothing about the next one.
+  // One slow frame (another process, an upload) does not predict the next: take the median of three.
   const double now = std::min(draw_ms / std::max(budget_ms_ - select_ms, kLeastShare * budget_ms_), 3.0);
   const bool first = load_ == 0;
   const double load = first ? now : median(now, last_[0], last_[1]);
@@ -32,8 +32,8 @@ void FrameBudget::frame_done(double select_ms, double draw_ms, double points, do
 
   double step = 0;
   if (load_ > 1) {
-    // Where time is quadratic in detail the root of the load closes the gap. An eighth of it a frame does not
-    // overshoot, though the load that we see is a few frames old and time may rise with the fourth power where levels
+    // If time is quadratic in detail, the root of the load closes the gap. An eighth of that a frame does not
+    // overshoot, though the load is known a few frames late and time may rise with the fourth power where levels
     // change.
     step = -std::min(load_ > 2 ? kLargeStep : kSmallStep, 0.125 * 0.5 * std::log(load_) + 0.001);
   } else if (load_ < kIdle && detail_drawn > 0.999 * detail_) {
@@ -56,7 +56,7 @@ void HalfSize::frame_done(double draw_ms, bool least) {
 }
 
 double screen_movement(const geometry::Pose& from, const geometry::Pose& to, double depth_m, double focal_px) {
-  // Unit quaternions of rotations that differ by an angle a are 2 sin(a / 4) apart; q and -q are the same rotation.
+  // Unit quaternions of rotations that differ by angle a are 2 sin(a / 4) apart; q and -q are the same rotation.
   const glm::dquat& a = from.orientation;
   const glm::dquat b = glm::dot(a, to.orientation) < 0 ? -to.orientation : to.orientation;
   const double apart = std::sqrt((a.w - b.w) * (a.w - b.w) + (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y) +

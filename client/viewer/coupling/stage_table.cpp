@@ -19,7 +19,7 @@ constexpr metrics::Column<UpdateStages> kBefore[] = {
     {"requested_s", [](Stages u) { return u.requested_s; }},
     {"complete_s", [](Stages u) { return u.complete_s; }},
 };
-// The stages come between.
+// The columns of the stages stand between the two lists.
 constexpr metrics::Column<UpdateStages> kAfter[] = {
     {"latency_ms", [](Stages u) { return (u.complete_s - u.requested_s) * 1e3; }},
     {"patches", [](Stages u) { return double(u.patches); }},
@@ -64,7 +64,7 @@ StageTable::StageTable()
 
 std::optional<metrics::StagesMs> StageTable::complete(const MeasuredUpdate& m) {
   const ViewRequester::Update& u = m.update;
-  if (m.last.moments == wire::Moments{}) return std::nullopt;  // it was sent again later, and its moments are not known
+  if (m.last.moments == wire::Moments{}) return std::nullopt;  // a replay sent it again: its moments are not known
   const metrics::UpdateMoments moments{.requested_s = u.requested_s,
                                        .arrived_s = m.last.arrived_s,
                                        .decode_begin_s = m.last.decode_begin_s,
@@ -84,7 +84,7 @@ std::optional<metrics::StagesMs> StageTable::complete(const MeasuredUpdate& m) {
 
 void StageTable::displayed(RequestId request, double end_s) { finish(waiting_.upper_bound(request), end_s); }
 
-// The rows before `end`.
+// Finishes the rows before `end`.
 void StageTable::finish(std::map<RequestId, UpdateStages>::iterator end, double shown_s) {
   for (auto w = waiting_.begin(); w != end; w = waiting_.erase(w)) {
     UpdateStages& u = w->second;

@@ -1,5 +1,5 @@
-// stages.csv (docs/metrics.md): a row for each complete view update, where its time went. A row waits until a frame has
-// shown its update.
+// stages.csv (docs/metrics.md): one row for each complete view update, with the time of each stage. A row waits until a
+// frame has shown its update.
 #pragma once
 
 #include <map>
@@ -13,7 +13,7 @@
 
 namespace telesplat::viewer {
 
-/// A row.
+/// A row of the table.
 struct UpdateStages {
   RequestId request;
   FrameId frame;
@@ -23,7 +23,7 @@ struct UpdateStages {
   double display_ms = -1;  ///< -1: no frame showed it
 };
 
-/// last: the part that made the update complete.
+/// last: the part that completed the update.
 struct MeasuredUpdate {
   const ViewRequester::Update& update;
   const ViewPart& last;
@@ -36,11 +36,11 @@ std::vector<double> update_row(const MeasuredUpdate& measured);
 class StageTable {
  public:
   StageTable();
-  /// The update is complete; where its time went. One that a replay of events completed has no row.
+  /// The update is complete; returns the time of each stage. An update that a replay of events completed has no row.
   std::optional<metrics::StagesMs> complete(const MeasuredUpdate& measured);
-  /// A frame that ended at this moment of the master's clock shows this update, and all before it.
+  /// A frame that ended at end_s (master's clock) shows this update, and all before it.
   void displayed(RequestId request, double end_s);
-  /// The rows that are finished; `all`: also those whose updates no frame has shown.
+  /// Returns the finished rows; `all`: also those whose updates no frame has shown.
   std::optional<wire::MetricRows> flush(InstanceId instance, bool all);
   uint64_t gone() const { return table_.gone(); }
 

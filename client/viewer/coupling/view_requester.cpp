@@ -12,18 +12,19 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr size_t kMaxOpen = 256;
-constexpr double kMostBeyond_s = 0.02;   // what is expected of later than this after the time asked for is of no use
-constexpr double kEpochSettles_s = 1.0;  // without a new epoch the scene counts as unchanging again
-constexpr double kFirstPixels = 1280 * 800;  // what adaptive sampling begins with
-constexpr double kMotionOfRest = 0.002;      // radians, or as much of 0.6 m, until a view would be displayed
-// Steered: another resolution makes much of the model too coarse or needlessly fine, so it changes by octaves of pixels
-// and after some updates that agree.
+constexpr double kMostBeyond_s = 0.02;       // a tracker's pose for a later time than asked for plus this is not used
+constexpr double kEpochSettles_s = 1.0;      // without a new epoch the scene counts as unchanging again
+constexpr double kFirstPixels = 1280 * 800;  // adaptive sampling begins with this size
+constexpr double kMotionOfRest = 0.002;      // radians, or metres / 0.6, until a view would be displayed
+// Steered: another resolution makes much of the model too coarse or needlessly fine, so it changes by octaves of
+// pixels, and only after several updates that agree.
 constexpr double kScaleStep = 0.70710678118654752;
 constexpr int kSlowUpdates = 3, kFastUpdates = 2;
-constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;  // of the target, of that
+constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;  // shares of the target; the
+                                                                                     // others: of that time
 constexpr double kWholePart = 4;  // a view with samples in more than 1 of 4 pixels counts as sampled whole
 
-// Side of a sampled image: a multiple of 8 in range.
+// Returns the side of a sampled image: a multiple of 8, in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
 
 }  // namespace
@@ -57,21 +58,21 @@ double ViewRequester::horizon_s() const {
   return latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
 }
 
-// What the tracker expects holds as long as no pose of that time or later is known; the rest of the way, if it is one,
-// is the head's velocity.
+// Uses the tracker's expectation until a pose of that time or later is known; from there on, the head's velocity
+// carries it.
 geometry::Pose ViewRequester::expected_at(double t_s) const {
   const auto newest = predictor_.newest();
   const bool ahead = expected_ && newest && expected_->t_s > newest->t_s && expected_->t_s - t_s < kMostBeyond_s;
   return ahead ? predictor_.carried(expected_->pose, std::max(0.0, t_s - expected_->t_s)) : predictor_.predict(t_s);
 }
 
-// Whether what one sees from there looks as it does from here.
+// True if content kNearest_m away looks alike from both poses.
 bool ViewRequester::rests_at(const geometry::Pose& there, const geometry::Pose& here) const {
   return screen_movement(there, here, kNearest_m, display_->focal_x()) < kDeadBand_px;
 }
 
 geometry::Camera ViewRequester::wanted(double now_s, bool& still, const geometry::Camera* asked) {
-  return wire::shortened(exactly_wanted(now_s, still, asked));  // every update says its camera
+  return wire::shortened(exactly_wanted(now_s, still, asked));  // each update carries its camera in this short form
 }
 
 geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const geometry::Camera* asked) {
@@ -86,19 +87,19 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
     camera.pose = expected_at(now_s + horizon_s);
     meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
   }
-  // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
-  // Steered views of known space come at once; the next one takes longer if something unseen comes into sight.
+  // The faster the head, the wider the sampled view; a still head gets exactly what it looks at. Steered views of known
+  // space come at once; the next one takes longer if something unseen comes into sight.
   const double ahead_s = steered_ ? std::max(horizon_s, options_.target_latency_s) : horizon_s;
   const double motion = predictor_.turn_rad_s() * ahead_s + predictor_.speed_m_s() * ahead_s / 0.6;
   const double margin = motion < kMotionOfRest ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
-  // The first view is wanted soon rather than sharp, and so is each of an epoch that may not last.
+  // The first view must come soon rather than be sharp, and so must each view of an epoch that may not last.
   changing_ = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
   still = margin == 0 && latency_s_ > 0 && !changing_;
   if (options_.adaptive) {
     if (scale_ == 0)
       scale_ = std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), min_scale(), 1.0);
     scale_ = std::clamp(scale_, min_scale(), 1.0);
-    // A wider view is sampled as finely; a still head sees every pixel's own sample.
+    // A wider view keeps the sampling density; a still head gets a sample for each pixel.
     const double per_pixel = scale_ * (1 + margin);
     camera.width = still ? display_->width : whole_side(display_->width * per_pixel);
     camera.height = still ? display_->height : whole_side(display_->height * per_pixel);
@@ -116,7 +117,7 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
   return camera;
 }
 
-// There is nothing new to see from this camera, as far as is known.
+// True if this camera sees nothing new, as far as is known.
 bool ViewRequester::quiet(const geometry::Camera& camera) const {
   const bool seen = quiet_ == camera, on_its_way = sent_ == camera && open_.contains(sent_id_);
   return steered_ && !changing_ && (seen || on_its_way);
@@ -135,7 +136,7 @@ void ViewRequester::set_sampling(const SamplingWish& wish) {
     options_.sampling_height = wish.height;
   }
   scale_ = 0;
-  quiet_.reset();  // a head that rests sees it too
+  quiet_.reset();  // a head that rests must see the new sampling, too
 }
 
 void ViewRequester::on_epoch(double now_s) {
@@ -145,14 +146,14 @@ void ViewRequester::on_epoch(double now_s) {
 
 void ViewRequester::set_buffers(uint64_t buffers) {
   if (options_.buffers == 0) std::erase_if(open_, [&](const auto& o) { return o.first != sent_id_; });
-  // How long it takes until an update is displayed is another thing now.
+  // The latency until an update is displayed differs in the new mode.
   if ((options_.buffers == 0) != (buffers == 0)) displayed_latency_s_ = 0;
   options_.buffers = buffers;
-  due_s_ = std::min(due_s_, last_sent_s_ + 1.0 / options_.max_rate_hz);  // credits knew no rate
+  due_s_ = std::min(due_s_, last_sent_s_ + 1.0 / options_.max_rate_hz);  // credits ignored this rate
 }
 
-// A head that moves sees its newest view; of one that rests the same view is asked for once more, which samplers draw
-// finer. What is the same view in another epoch is another one.
+// A head that moves gets its newest view. A head that rests asks for the same view once more, and samplers draw it
+// finer. In another epoch the same view counts as a new one.
 bool ViewRequester::picture_due(double now_s) {
   bool still = false;
   if (!sent_ || *sent_ != wanted(now_s, still) || epoch_began_s_ > last_sent_s_) {
@@ -202,7 +203,7 @@ wire::ViewRequest ViewRequester::request(RequestId id, const geometry::Camera& c
 
 std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> requests, double now_s) {
   std::vector<wire::ViewRequest> out;
-  // There may be more of them than buffers, where these became fewer: the master shall keep them all.
+  // If buffers became fewer, there may be more requests than buffers: the master must keep them all.
   const uint64_t buffers = std::min(std::max<uint64_t>(options_.buffers, requests.size()), wire::kMaxBuffers);
   for (const RequestId id : requests) {
     const auto it = open_.find(id);
@@ -241,22 +242,22 @@ ViewPart part_of(const wire::Patch& p) {
           .moments = p.moments};
 }
 
-// By small steps, since views differ.
+// The step is small, since views differ.
 void ViewRequester::follow_latency(const Update& u, double latency_s) {
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
   if (!options_.adaptive || u.still) return;
-  // Requests that were sent before it took their share.
+  // Requests that were sent before it took their share of the time.
   const double own_s = latency_s / double(1 + u.ahead);
   if (steered_) return step_scale(own_s, u);
-  // Time goes with the number of pixels, hence the root. On a slow link a few large views would take seconds.
+  // Time is proportional to the number of pixels, hence the root. On a slow link a few large views would take seconds.
   slow_ = own_s > 2 * options_.target_latency_s ? slow_ + 1 : 0;
   const double least = slow_ >= 2 ? 0.5 : 0.85;
   scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / own_s), least, 1.1), min_scale(), 1.0);
 }
 
-// Rays are few however many pixels a view has, and what is cast stays: views that come often show more than fine ones.
-// On a terrain at 2560x1600, aiming at the whole gave the same PSNR and a quarter fewer updates.
-// The time of a view that was sampled whole goes with its pixels: one that took far too long is enough.
+// Steered views need few rays, however many pixels they have, and results stay: frequent views show more than fine
+// ones. On a terrain at 2560x1600, aiming at the whole target gave the same PSNR and a quarter fewer updates. The
+// time of a view that was sampled whole is proportional to its pixels: one that took far too long is enough.
 void ViewRequester::step_scale(double own_s, const Update& u) {
   const double aim_s = kSteeredAim * options_.target_latency_s;
   slow_ = own_s > kTooSlow * aim_s ? slow_ + 1 : 0;
@@ -290,11 +291,11 @@ std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part
   u.extra_points = std::exchange(extra_points_, 0);
   u.extra_bytes = std::exchange(extra_bytes_, 0);
   quiet_ = u.points == 0 && part.left_out == 0 ? std::optional(u.camera) : std::nullopt;
-  // The master's clock as seen from here may be set back when the connection is made anew.
+  // A new connection may set back the master's clock as this machine sees it.
   follow_latency(u, std::max(now_s - u.requested_s, 1e-3));
   const Update done = u;
-  // Asynchronous requests before this one were replaced at the master and will never be answered; others may still be.
-  // So does a newer picture make the older ones void.
+  // Asynchronous requests before this one were replaced at the master and will never be answered; a newer picture makes
+  // older ones void, too. With credits, others may still be answered.
   open_.erase(options_.buffers && !options_.pictures ? it : open_.begin(), std::next(it));
   return done;
 }

@@ -1,5 +1,4 @@
-// Which view to ask for next, and when (T6.3-6.5): what it shows, by poses of the past, and whether the display and the
-// server wait for each other.
+// Decides which view to ask for next, and when (T6.3-6.5), from past poses and from the coupling of display and server.
 #pragma once
 
 #include <algorithm>
@@ -22,37 +21,37 @@
 
 namespace telesplat::viewer {
 
-/// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's
-/// aspect, sides multiples of 8 and at least 16.
+/// Returns the size to sample for a display of width x height pixels: that of the options, or as many pixels in the
+/// display's aspect; sides are multiples of 8 and at least 16.
 std::pair<int, int> sampling_size(const RequestOptions& options, int width, int height);
 
-/// What came of an answer: a tile of points, or a whole volume frame.
+/// A part of an answer: a tile of points, or a whole volume frame.
 struct ViewPart {
   InstanceId viewer;
   RequestId request;
   EpochId epoch;
   FrameId frame;
   bool complete = false;  ///< the last part of the frame of full resolution
-  bool extra = false;     ///< of rays beyond what the view asked for: it belongs to no update
+  bool extra = false;     ///< from rays beyond the view's: it belongs to no update
   uint64_t tiles = 1, points = 0, samples = 0, bytes = 0;
-  geometry::Camera camera;  ///< that was sampled
-  uint64_t eliminated = 0;  ///< samples of which no points came, because the model has them already
+  geometry::Camera camera;  ///< the sampled camera
+  uint64_t eliminated = 0;  ///< samples that gave no points, because the model has them already
   uint64_t tile = 0;        ///< its number in the frame
-  uint64_t left_out = 0;    ///< of a last part: tiles that are not sampled, because a newer view overtook this one
-  wire::Moments moments;    ///< as far as it was published
-  /// Master's clock: it reached this machine; decoding began and was over.
+  uint64_t left_out = 0;    ///< in a last part: tiles that are not sampled, because a newer view overtook this one
+  wire::Moments moments;    ///< moments up to its publication
+  /// Master's clock: when it reached this machine, and when decoding began and ended.
   double arrived_s = 0, decode_begin_s = 0, decoded_s = 0;
 };
 ViewPart part_of(const wire::Patch& patch);
 
 class ViewRequester {
  public:
-  static constexpr double kDeadBand_px = 0.25;  ///< of anything that is kNearest_m away or farther
+  static constexpr double kDeadBand_px = 0.25;  ///< movement that counts as rest, of content at kNearest_m
   static constexpr double kNearest_m = 0.3;
-  static constexpr double kQuietPeriod_s = 1.0;  ///< what has changed without a word is found by asking again
-  static constexpr double kPatience_s = 0.5;     ///< with a view on its way
-  static constexpr double kSettles_s = 0.25;     ///< pictures: a head that rests so long is asked for once more
-  static constexpr double kAskPatience_s = 0.5;  ///< until views are asked for of the own head again
+  static constexpr double kQuietPeriod_s = 1.0;  ///< period of requests that find unannounced changes
+  static constexpr double kPatience_s = 0.5;     ///< with a view under way
+  static constexpr double kSettles_s = 0.25;     ///< pictures: a head that rests this long asks once more
+  static constexpr double kAskPatience_s = 0.5;  ///< without a word from the wall, before it asks for its own head
 
   ViewRequester(const RequestOptions& options, InstanceId viewer)
       : options_(options), viewer_(viewer), predictor_(options.prediction) {}
@@ -60,74 +59,74 @@ class ViewRequester {
   /// The viewer is another instance from now on.
   void set_viewer(InstanceId viewer) { viewer_ = viewer; }
 
-  /// A displayed pose; display: the camera it was shown with.
+  /// A displayed pose; display: the camera that showed it.
   void on_pose(double t_s, const geometry::Camera& display);
-  /// Poses from now on are told in another space, or of another head: how it moved before means nothing.
+  /// Poses are given in another space, or belong to another head, from now on: past movement means nothing there.
   void on_jump();
-  /// Who tracks the head expects it here at t_s, which lies ahead: better than what its poses alone tell.
+  /// The head's tracker expects it here at t_s, which lies ahead: this is better than a prediction from poses.
   void on_expected(double t_s, const geometry::Pose& pose) { expected_ = {t_s, pose}; }
-  /// Of a wall: all of its viewers ask for views of one head now, this one with this camera. While such words come,
-  /// nothing else is asked for asynchronously. ask: wire::ViewRequest.
+  /// All viewers of a wall ask for views of one head now, this viewer with this camera. While such words come, nothing
+  /// else is asked for asynchronously. ask: ViewRequest::ask.
   void on_ask(double now_s, uint64_t ask, const geometry::Camera& camera);
-  /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
+  /// Sets RequestOptions::min_scale from the session; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
-  /// The size of views from now on, as a person wishes it.
+  /// Sets the size of views from now on, by a person's wish.
   void set_sampling(const SamplingWish& wish);
-  /// Whether samplers cast only the rays that the model lacks: then a view that was seen already costs next to nothing,
+  /// True: samplers cast only the rays that the model lacks. Then a view that was seen already costs next to nothing,
   /// and its size is no measure of its time.
   void set_steered(bool steered) { steered_ = steered; }
-  /// RequestOptions::buffers from now on. Where that was 0, nothing but the newest request is answered any more.
+  /// Sets RequestOptions::buffers. If it was 0, only the newest request is still answered.
   void set_buffers(uint64_t buffers);
-  /// RequestOptions::pictures from now on.
+  /// Sets RequestOptions::pictures.
   void set_pictures(bool pictures) { options_.pictures = pictures; }
-  /// Whether the newest request waits for its answer.
+  /// True if the newest request waits for its answer.
   bool answer_open() const { return open_.contains(sent_id_); }
-  /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full
-  /// resolution.
+  /// The scene changed: it may soon change again, and a still head would wait long for each of its views at full
+  /// resolution. So views stay coarse for a while.
   void on_epoch(double now_s);
-  /// Another epoch began: of pictures, the view of a head that rests is another one.
+  /// Another epoch began: if views are pictures, a head that rests needs a new one.
   void on_new_epoch(double now_s) {
     if (options_.pictures) on_epoch(now_s);
   }
-  /// The next request; asynchronously, if one is due. A head that rests asks for exactly the same view again while it
-  /// moves by less than kDeadBand_px. Where sampling is steered, it asks only every kQuietPeriod_s while its view is on
-  /// its way, and after an update of it that brought no points.
-  ///   Requests keep to their rate: one that is late does not make the following ones late. Where sampling is steered,
-  ///   a viewer's views are sampled one after the other, so the next one is asked for when the last one is complete, or
-  ///   has been on its way for kPatience_s: then the head is known best.
+  /// Returns the next request; asynchronously, if one is due. A head that rests asks for exactly the same view again
+  /// while it moves by less than kDeadBand_px. If sampling is steered, it asks only every kQuietPeriod_s while that
+  /// view is under way, and after its update brought no points.
+  /// Requests keep to their rate: a late one does not delay those after it. If sampling is steered, a viewer's views
+  /// are sampled one after the other, so the next request goes out when the last view is complete, or has been under
+  /// way for kPatience_s: then the head is known best.
   std::optional<wire::ViewRequest> next(double now_s);
-  /// Asynchronously: when the next request may go out, if that is not yet.
+  /// Asynchronously: time until the next request may go out; nothing: it may go out now.
   std::optional<double> due_in_s(double now_s) const {
     return due_s_ > now_s ? std::optional(due_s_ - now_s) : std::nullopt;
   }
-  /// These requests once more, for the view that is wanted now.
+  /// Repeats these requests, for the view that is wanted now.
   std::vector<wire::ViewRequest> again(std::span<const RequestId> requests, double now_s);
-  /// A frame that waited for its update was displayed so long after the update had been requested: predictions reach to
-  /// there.
+  /// A frame that waited for its update was displayed `latency_s` after the update's request: predictions reach that
+  /// far from now on.
   void on_displayed(double latency_s);
-  /// When it was requested; nothing: not by us, or it has been answered.
+  /// Returns when it was requested; nothing: it is not ours, or has been answered.
   std::optional<double> requested_s(RequestId request) const;
 
   struct Update {
     RequestId request;
-    uint64_t ahead = 0;  ///< requests that were open when it was sent: it is answered after them
-    /// first_s: the first part, of the coarse pass if there is one.
+    uint64_t ahead = 0;  ///< requests that were open when it was sent: those are answered first
+    /// first_s: the first part's time; it may be of the coarse pass.
     double requested_s = 0, first_s = 0, complete_s = 0;
-    double posed_s = 0;  ///< the displayed pose was new then
+    double posed_s = 0;  ///< when the displayed pose was new
     geometry::Camera camera;
-    bool still = false;  ///< asked for at full resolution, while the head rested
-    /// The coarse pass included.
+    bool still = false;  ///< requested at full resolution, while the head rested
+    /// Sums over all parts, with the coarse pass.
     uint64_t points = 0, samples = 0, bytes = 0, tiles = 0, eliminated = 0;
-    uint64_t extra_points = 0, extra_bytes = 0;  ///< of extra rays that came since the update before
+    uint64_t extra_points = 0, extra_bytes = 0;  ///< from extra rays since the update before
   };
-  /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution
-  /// and asked for by us; a coarse pass may come before it, with the same request.
+  /// A part of a frame was applied. Returns the finished update if it was the last part at full resolution of our
+  /// request; a coarse pass may come before it, with the same request.
   std::optional<Update> on_part(const ViewPart& part, double now_s);
 
   double latency_s() const { return latency_s_; }
-  /// How far ahead poses are predicted.
+  /// Time that poses are predicted ahead, seconds.
   double horizon_s() const;
-  /// How well they were.
+  /// Errors of these predictions.
   tracking::PredictionMeter::Figures prediction() const { return meter_.figures(); }
 
  private:
@@ -137,7 +136,7 @@ class ViewRequester {
   tracking::PredictionMeter meter_;
   std::optional<tracking::PosePredictor::Sample> expected_;
   std::optional<geometry::Camera> display_;
-  double posed_s_ = 0;  // since when it is that
+  double posed_s_ = 0;  // since when display_ has this pose
   RequestId next_{1};
   double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
   double min_scale() const {
@@ -145,7 +144,7 @@ class ViewRequester {
   }
 
   geometry::Pose expected_at(double t_s) const;
-  /// asked: where the head will be is known.
+  /// asked: a camera whose pose needs no prediction; else null.
   geometry::Camera wanted(double now_s, bool& still, const geometry::Camera* asked = nullptr);
   geometry::Camera exactly_wanted(double now_s, bool& still, const geometry::Camera* asked);
   wire::ViewRequest request(RequestId id, const geometry::Camera& camera, double now_s, uint64_t buffers,
@@ -161,39 +160,39 @@ class ViewRequester {
     uint64_t number = 0;
     geometry::Camera camera;
   };
-  std::optional<Ask> asked_;  // that is not sent yet
-  double asked_s_ = -1e9;     // the newest
+  std::optional<Ask> asked_;  // until it is sent
+  double asked_s_ = -1e9;     // time of the newest on_ask()
 
   bool steered_ = false;
-  std::optional<geometry::Camera> sent_, quiet_;  // of the last request; of the last update, if it brought no points
+  std::optional<geometry::Camera> sent_, quiet_;  // last request's; last update's, if it brought no points
   RequestId sent_id_;
-  bool settled_ = false;                         // pictures: of the view that was sent a finer one has been asked for
+  bool settled_ = false;  // pictures: the finer picture has been requested for the view that was sent
   uint64_t extra_points_ = 0, extra_bytes_ = 0;  // since the last update
-  int slow_ = 0, fast_ = 0;                      // updates in a row that took too long, that left time
-  bool changing_ = false;                        // the scene; as of the last request
+  int slow_ = 0, fast_ = 0;                      // updates in a row that took too long; that left time
+  bool changing_ = false;                        // the scene changes, as of the last request
   double last_sent_s_ = -1e9, due_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0, epoch_began_s_ = -1e9,
          last_update_s_ = -1e9;
   std::map<RequestId, Update> open_;
 };
 
-/// Requests, updates and frames go in as they happen, decisions come out; no sockets, no clocks, no threads.
-///   Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that
-/// shows its update has been displayed. Updates are displayed in the order of their requests, each in exactly one
-/// frame.
+/// Counts credits of a viewer that waits (sync, loose). Requests, updates and frames go in as they happen, decisions
+/// come out; no sockets, no clocks, no threads.
+/// A request holds a credit from its sending until the frame that shows its update has been displayed. Updates are
+/// displayed in the order of their requests, each in exactly one frame.
 class Coupling {
  public:
-  /// Without any sign of an answer for so long the master may have forgotten the requests (it was restarted) or found
-  /// nothing to sample.
+  /// After this long without any sign of an answer, the master may have forgotten the requests (it was restarted) or
+  /// found nothing to sample.
   static constexpr double kPatience_s = 2;
 
-  /// buffers: as buffers_of(); 0: asynchronous, nothing below applies and may_ask() is always true.
+  /// buffers: as from buffers_of(); 0: asynchronous, nothing below applies and may_ask() is always true.
   /// newest: an update that comes makes those before it void, and holds no credit: it is displayed unless a newer one
   /// comes before.
   explicit Coupling(int buffers, bool newest = false) : buffers_(buffers), newest_(newest) {}
   int buffers() const { return buffers_; }
   bool waits() const { return buffers_ > 0; }
-  /// From now on there are so many. Credits that are out stay out: with fewer buffers than before nothing may be asked
-  /// for until enough updates were displayed. 0: what is open or complete is forgotten, nothing is waited for any more.
+  /// Changes the number of buffers. Credits that are out stay out: with fewer buffers no request may go out until
+  /// enough updates were displayed. 0: forgets all that is open or complete, and waits for nothing.
   void set_buffers(int buffers);
   void set_newest(bool newest) { newest_ = newest; }
 
@@ -202,36 +201,35 @@ class Coupling {
     const size_t here = newest_ ? 0 : ready_.size() + (displaying_ ? 1 : 0);
     return !waits() || open_.size() + here < size_t(buffers_);
   }
-  /// Ids ascend.
+  /// Ids ascend from call to call.
   void asked(RequestId request, double now_s);
   bool is_open(RequestId request) const;
-  /// Part of an answer came.
+  /// A part of an answer came.
   void progress(double now_s) { heard_s_ = sign_s_ = now_s; }
-  /// When the newest part of an answer came; 0: none ever.
+  /// Returns when the newest part of an answer came; 0: no part has come yet.
   double last_sign_s() const { return sign_s_; }
-  /// Answers come in the order of requests: those before this one will not be answered any more. Their credits are
-  /// free.
+  /// Answers come in the order of requests: those before this one will never be answered. Their credits become free.
   void skip_before(RequestId request);
-  /// The update is complete. Returns the requests whose updates can be displayed from now on, in order: none while an
-  /// earlier one is open. One that is not open changes nothing.
+  /// The update is complete. Returns the requests whose updates can be displayed from now on, in order; empty while an
+  /// earlier one is open. A request that is not open changes nothing.
   std::vector<RequestId> completed(RequestId request, double now_s);
-  /// Nothing came for kPatience_s: the open requests, which are to be sent again - the master knows them by their ids,
-  /// if it does. The patience begins anew. Empty: it is not over, or nothing is open. Where a later update is complete,
-  /// the earlier ones are given up instead: `released` gets those that can be displayed now.
+  /// After kPatience_s without an answer: returns the open requests, to be sent again; the master recognises their ids
+  /// if it still has them. The patience begins anew. Empty: it is not over, or no request is open. If a later update is
+  /// complete, the earlier requests are given up instead: `released` gets those that can be displayed now.
   std::vector<RequestId> overdue(double now_s, std::vector<RequestId>& released);
-  /// What is complete and waits for earlier ones will not be displayed: its credits are free.
+  /// Complete updates that wait for earlier ones will not be displayed: their credits become free.
   void drop_complete() {
     std::erase_if(open_, [](const Open& o) { return o.complete; });
   }
-  /// Another master: it knows nothing of what is open. All of it is to be sent again.
+  /// Returns all open requests, to be sent again: another master took over, which does not know them.
   std::vector<RequestId> open() const;
 
   // ---- display ----
-  /// The next update that is complete, if one is; its frame begins. Precondition: no frame is being displayed.
+  /// Returns the next complete update, if there is one; its frame begins. Precondition: no frame is being displayed.
   std::optional<RequestId> take();
-  /// The frame that take() began has been displayed: its credit is free. Without one: no effect.
+  /// The frame that take() began has been displayed: its credit becomes free. Without such a frame it does nothing.
   void displayed() { displaying_ = false; }
-  /// Complete updates that wait to be displayed.
+  /// Number of complete updates that wait to be displayed.
   int filled() const { return int(ready_.size()); }
 
  private:
@@ -246,16 +244,16 @@ class Coupling {
   std::deque<Open> open_;
   std::deque<RequestId> ready_;
   bool displaying_ = false;
-  double heard_s_ = 0;  // a part of an answer, or the requests were sent again
+  double heard_s_ = 0;  // when a part of an answer came, or requests were sent again
   double sign_s_ = 0;
 };
 
-/// Where the worker and the display thread meet: Coupling behind a lock, with a condition that the display waits on.
+/// Connects the worker and the display thread: Coupling behind a lock, with a condition that the display waits on.
 class CouplingGate {
  public:
   explicit CouplingGate(const CouplingState& state)
       : state_(state), coupling_(state.buffers, state.mode == CouplingMode::kImages) {}
-  /// What has so many buffers: 0 async, 1 sync, else loose.
+  /// A coupling with this number of buffers: 0 async, 1 sync, else loose.
   explicit CouplingGate(int buffers)
       : CouplingGate({buffers == 0   ? CouplingMode::kAsync
                       : buffers == 1 ? CouplingMode::kSync
@@ -273,9 +271,9 @@ class CouplingGate {
   // ---- worker ----
   /// Coupling::may_ask().
   bool may_ask();
-  /// Coupling::asked(). Returns whether another view may be asked for at once.
+  /// Does Coupling::asked(). Returns true if another view may be asked for at once.
   bool asked(RequestId request, double now_s);
-  /// Another coupling from now on (Coupling::set_buffers). A display that waits is woken.
+  /// Changes the coupling (Coupling::set_buffers). Wakes a display that waits.
   void change(const CouplingState& state) {
     {
       const std::lock_guard lock(mutex_);
@@ -286,7 +284,7 @@ class CouplingGate {
     changed_.notify_one();
   }
 
-  /// Runs f(Coupling&) alone; wakes the display if an update is there for it afterwards.
+  /// Runs f(Coupling&) under the lock, then wakes the display if an update is there for it.
   template <class F>
   auto with(F&& f) {
     struct Wake {
@@ -304,12 +302,12 @@ class CouplingGate {
   // ---- display ----
   struct Taken {
     CouplingState coupling;            ///< in force when the wait ended
-    std::optional<RequestId> request;  ///< the next complete update; none: there was none in time
+    std::optional<RequestId> request;  ///< the next complete update; nothing: no update came in time
     double last_sign_s = 0;            ///< Coupling::last_sign_s()
-    bool asked = false;                ///< some request waits for its answer
+    bool asked = false;                ///< a request waits for its answer
   };
-  /// The next complete update, waited for at most `timeout_s`; not at all where the coupling is asynchronous, also if
-  /// that is changed meanwhile.
+  /// Takes the next complete update; waits for it for at most `timeout_s`. It does not wait while the coupling is
+  /// asynchronous, also if that changes during the wait.
   Taken take(double timeout_s) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::duration<double>(timeout_s),

@@ -25,12 +25,12 @@ bool told_to_stop(const ViewerWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
 }
 
-// Samples that are finer than what is drawn would come late and show nothing.
+// Samples that are finer than the drawn picture would come late and show nothing more.
 geometry::Camera drawn_size(const geometry::Camera& camera, const DrawnFrame& drawn) {
   return drawn.halved ? geometry::half_size(camera) : camera;
 }
 
-// What the worker knows, and what the frame shows.
+// Joins the worker's figures with those of the frame.
 FrameFigures figures_of(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
                         const ViewerWorker& worker) {
   FrameFigures out = worker.figures();
@@ -44,7 +44,7 @@ FrameFigures figures_of(double now_s, uint64_t frames, const DrawnFrame& drawn, 
   return out;
 }
 
-// Both eyes of a headset are one frame of the tables.
+// Sums the views of a headset's eyes: both are one frame of the tables.
 void add(const DrawnFrame& other, DrawnFrame& sum) {
   sum.empty = sum.empty && other.empty;
   sum.stats += other.stats;
@@ -140,12 +140,12 @@ class DisplayLoop {
     if (!used) result_.error = used.error().text;
     return used.ok();
   }
-  // The request of what is drawn next, where nothing is waited for.
+  // Returns the request to draw next if the display does not wait.
   RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
 
   // Of the frame that begins; the surface knows by then what there is to show.
   geometry::Camera next_camera(double now_s, double t_s) {
-    auto session = worker_.session();  // first: so a session's scene is never told after it
+    auto session = worker_.session();  // first, so that the surface gets a session's scene before the session
     const ShownScene scene = worker_.shown_scene();
     if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
     if (session != session_) surface_.on_session(session_ = std::move(session));
@@ -154,14 +154,14 @@ class DisplayLoop {
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
-  // Whether a frame can be shown now. A headset that is not worn makes no frame wait.
+  // True if a frame can be shown now. While a headset is not worn, no frame waits for it.
   bool ready() {
     const bool ready = surface_.ready();
     if (!ready) refuse_orders();
     if (surface_.take_jump()) worker_.on_jump();
     return ready;
   }
-  // Until the next frame of a head that rests; a surface that paces frames waits by itself.
+  // Sleeps until the next frame of a head that rests; a surface that paces frames waits by itself.
   void rest_until_next() const {
     if (!surface_.paces()) sleep_until(monotonic_s() + kRestPeriod_s);
   }
@@ -172,7 +172,7 @@ class DisplayLoop {
       surface_.present(view_, changed);
   }
 
-  // What samplers are to be asked for: what the camera sees, or its eyes.
+  // Returns the camera to ask samplers for: this one, or one that covers what its eyes see.
   geometry::Camera asked(double now_s, double t_s, const geometry::Camera& camera, const geometry::Pose& head) {
     return eyes_.on() ? eyes_.begin(now_s, camera, head.orientation, t_s, scene_.box_room) : camera;
   }
@@ -185,7 +185,7 @@ class DisplayLoop {
     return drawn_.source().draw(input, view_);
   }
 
-  // Each eye's picture is as large as a frame, and has depth.
+  // Draws each eye's picture at the size of a frame, with depth.
   DrawnFrame draw_eyes(FrameInput input, const std::array<geometry::Camera, 2>& eyes, bool kept) {
     input.with_depth = true;
     input.intact = false;
@@ -215,7 +215,7 @@ class DisplayLoop {
     std::fill(view.depth_m.begin(), view.depth_m.end(), std::numeric_limits<float>::infinity());
   }
 
-  // Until it is known what there is to show.
+  // Shows an empty picture until the scene is known.
   bool wait_for_scene() {
     for (; !worker_.received_at({}) || worker_.shown_scene().box_room.empty(); rest_until_next()) {
       if (told_to_stop(worker_, surface_)) return false;
@@ -233,8 +233,8 @@ class DisplayLoop {
     return true;
   }
 
-  // The head rests until the first view is complete; what comes of it is shown as it comes, unless the display waits
-  // for whole updates.
+  // Lets the head rest until the first view is complete. Its parts are shown as they come, unless the display waits for
+  // whole updates.
   bool rest() {
     for (; !worker_.first_update_complete(); rest_until_next()) {
       if (told_to_stop(worker_, surface_)) return false;
@@ -259,7 +259,7 @@ class DisplayLoop {
     return true;
   }
 
-  // Places are the left eye's, where each has a display of its own.
+  // If each eye has a display of its own, places are those in the left eye's.
   geometry::Camera picked_with(const geometry::Camera& camera) const {
     return surface_.eyes() ? (*surface_.eyes())[0] : camera;
   }
@@ -267,14 +267,14 @@ class DisplayLoop {
     if (const auto head = surface_.expected(now_s + worker_.horizon_s())) worker_.on_expected(head->at_s, head->pose);
   }
 
-  // A display whose frames are not shown ends, too, kUnseen_s later.
+  // Ends a display whose frames are not shown, kUnseen_s after its duration.
   void see_whether_over() {
     if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
     last_ = last_ ||
             (clock_.started() && o_.duration_s > 0 && monotonic_s() > clock_.start_s() + o_.duration_s + kUnseen_s);
   }
 
-  // Whether the frame that begins now is the last one.
+  // Sets last_ if the frame that begins now is the last one.
   void see_whether_last(double t_s) {
     if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
     last_ = last_ || (o_.duration_s > 0 && t_s >= o_.duration_s) || (o_.frames > 0 && result_.frames + 1 >= o_.frames);
@@ -283,10 +283,10 @@ class DisplayLoop {
   struct Waited {
     double wait_s = 0;
     CouplingState coupling;
-    bool for_update = false;  // and it came
+    bool for_update = false;  // the wait was for an update, and it came
   };
-  // Where the display waits for updates: until the next one is there, the wait has become too long, the coupling
-  // changed, or the end has come.
+  // If the display waits for updates: waits until the next one is there, the wait has become too long, the coupling has
+  // changed, or the run is at its end.
   Waited wait_for_update() {
     if (const CouplingState coupling = gate_.state(); !coupling.waits()) {
       end_stall();
@@ -301,7 +301,7 @@ class DisplayLoop {
       if (request || !coupling.waits()) return {monotonic_s() - begin_s, coupling, request.has_value()};
       if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s))
         return {now_s - begin_s, coupling};
-      // A head that rests sees its picture; there is nothing to wait for.
+      // A head that rests shows its picture; no request is open to wait for.
       if (coupling.mode == CouplingMode::kImages && !asked_for && now_s - begin_s >= kRestPeriod_s) {
         end_stall();
         return {now_s - begin_s, coupling};
@@ -319,7 +319,7 @@ class DisplayLoop {
     }
   }
 
-  // Where servers draw, views are asked for of where the head is at each of the display's refreshes, also of those that
+  // If servers draw, views are asked for at each refresh of the display with the head's pose, also at refreshes that
   // bring no new picture.
   double look_after_s() const {
     if (gate_.state().mode != CouplingMode::kImages) return kLookAfterSurface_s;
@@ -332,7 +332,7 @@ class DisplayLoop {
     tell_stall(now_s);
   }
 
-  // To the log, the window and the master.
+  // Reports to the log, the window and the master.
   void tell_stall(double now_s) {
     if (const auto news = stall_.take_news()) log::warn("{}", *news);
     const double waits_s = stall_.told_s(now_s);
@@ -343,8 +343,8 @@ class DisplayLoop {
     surface_.report(live_);
   }
 
-  // Of a wall: where to be when it goes on is this head's wish, and its master's word. Returns when the frame at hand
-  // is to be presented.
+  // Sends the wall's master this head's wish for the next frame, and takes its word. Returns when the frame at hand is
+  // to be presented.
   WallPace::Swapped swap_with_wall() {
     const double now_s = monotonic_s(), t_s = now_s - clock_.start_s();
     next_camera(now_s, t_s);
@@ -356,14 +356,14 @@ class DisplayLoop {
     return swapped;
   }
 
-  // All viewers of a wall ask for views of this head now.
+  // All viewers of the wall ask for views of this head now.
   void ask_for(uint64_t ask, const geometry::Pose& head) {
     geometry::Camera camera = surface_.camera_of(head);
     if (eyes_.on()) camera = eyes_.sampled(camera, head.orientation, wall_->turn().t_s, scene_.box_room);
     worker_.on_ask(ask, camera);
   }
 
-  // What the frame that begins is drawn from, and its camera.
+  // Sets the frame's camera, and the wall's state that it draws.
   void begin_view(double t_s, MeasuredFrame& m) {
     if (!wall_) {
       m.camera = next_camera(m.begin_s, t_s);
@@ -375,7 +375,7 @@ class DisplayLoop {
     if (!m.coupling.waits()) drawn_.received().show_state(turn.state);
     m.wall_frame = turn.frame;
     m.head = turn.head;
-    // The display that leads took it after the frame before the last one was presented. Its clock is ours, unless
+    // The display that leads took this pose after the frame before the last was presented. Its clock is ours, unless
     // viewers were started by hand.
     m.posed = {within(clock_.start_s() + turn.t_s, clock_.seen_before_s(), m.begin_s)};
     m.camera = surface_.camera_of(turn.head);
@@ -411,7 +411,7 @@ class DisplayLoop {
     if (!clock_.started()) clock_.start(m.start_s = m.begin_s);
     const double t_s = wall_ ? wall_->turn().t_s : m.begin_s - clock_.start_s();
     see_whether_last(t_s);
-    // The view of now, from what is cached now.
+    // The present view of what is cached now.
     begin_view(t_s, m);
     tell_expected(m.begin_s);
     const geometry::Camera sampled = asked(m.begin_s, t_s, m.camera, m.head);
@@ -423,7 +423,7 @@ class DisplayLoop {
     draw_measured(use, coverage, m);
     worker_.on_frame(surface_.seen_s(m.end_s), drawn_size(sampled, m.drawn), m.drawn.epoch, m.drawn.update,
                      waited.for_update);
-    // A flat legend would lie in one eye's picture, or be torn by the other's.
+    // A flat legend would lie in one eye's picture only, or be torn between both.
     const auto legend = eyes_.on() ? nullptr : worker_.legend_at(m.drawn.epoch);
     surface_.on_legend(legend);
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
@@ -458,7 +458,7 @@ class DisplayLoop {
     surface_.report(live_);
   }
 
-  // A picture that is not the display's. It is drawn with all detail, and holds up the frames after it for so long.
+  // Draws a picture that is not the display's, with all detail. The frames after it wait that long.
   void take_wished_picture(geometry::Camera camera) {
     const auto wish = surface_.take_picture_wish(camera);
     if (!wish) return;
@@ -475,7 +475,7 @@ class DisplayLoop {
                                  o_.transparent ? image::Alpha::kCoverage : image::Alpha::kNone);
   }
 
-  // What others ask of this viewer, of the frame that was just displayed.
+  // Refuses orders from others that came before the first frame.
   void refuse_orders() {
     for (const wire::Order& order : worker_.orders().take_orders())
       worker_.orders().answer({order.number, false, order.command + ": nothing is shown yet"});
@@ -521,9 +521,9 @@ class DisplayLoop {
     rows_.note_skew(swapped.skew_frame, swapped.skew_s);
   }
 
-  // Hands the picture to the spool, if it is to be kept.
+  // Hands the picture to the spool if it is to be kept.
   void keep(uint32_t use, double t_s, const MeasuredFrame& m, const std::shared_ptr<const image::Legend>& legend) {
-    if (m.drawn.between_clips) use &= ~uint32_t{kVerify};  // there is no epoch that looks like it
+    if (m.drawn.between_clips) use &= ~uint32_t{kVerify};  // no epoch looks like it
     view_intact_ = use == 0;
     if (!use) return;
     if (use & kPicture) kept_.on_picture(t_s);
@@ -555,7 +555,7 @@ class DisplayLoop {
   EyePictures eyes_;
   ShownFrame shown_;  // last
   Look look_;
-  ShownScene scene_;  // as the surface knows it, and the session too
+  ShownScene scene_;  // the surface has it, and the session too
   std::shared_ptr<const wire::Welcome> session_;
   image::View view_;
   std::array<image::View, 2> eye_views_;  // of a surface that has eyes
@@ -563,7 +563,7 @@ class DisplayLoop {
   DisplayResult result_;
   bool last_ = false;
   StallWatch stall_;
-  FrameFigures live_;  // of the newest frame
+  FrameFigures live_;  // figures of the newest frame
 };
 
 }  // namespace

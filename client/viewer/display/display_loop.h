@@ -1,4 +1,4 @@
-// The display: every frame shows what is cached from where the head is now, even if the server is late (T6.5).
+// Runs the display: every frame shows the cached scene from where the head is now, even if the server is late (T6.5).
 #pragma once
 
 #include <functional>
@@ -15,13 +15,13 @@ namespace telesplat::viewer {
 
 struct DisplayResult {
   uint64_t frames = 0;
-  bool interrupted = false;  ///< told to stop, or the person was done, before duration or frames were reached
-  std::string error;         ///< what made a display impossible; empty: nothing
+  bool interrupted = false;  ///< a stop was requested, or the person was done, before duration or frames were reached
+  std::string error;         ///< reason why nothing could be displayed; empty: no error
 };
 
-/// Makes what the display draws from. Called in the display's thread: when it is known what the session shows, and
-/// again when the session goes on with something that is drawn another way; what was made before is destroyed by then.
-/// pictures_a_second: DisplaySurface's.
+/// Makes the source that the display draws. Called in the display's thread: when the session's scene is known, and
+/// again when the session goes on with one that is drawn another way; the source before it is destroyed by then.
+/// pictures_a_second: DisplaySurface::pictures_a_second().
 using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&, double pictures_a_second)>;
 
 /// What a display is made of. All must outlive it.

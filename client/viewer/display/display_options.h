@@ -1,4 +1,4 @@
-// What a display is told before it begins: its size, its pace, how it draws and what it keeps.
+// Options of a display that are set before it begins: its size, its pace, how it draws and what it keeps.
 #pragma once
 
 #include <cstdint>
@@ -14,49 +14,47 @@
 
 namespace telesplat::viewer {
 
-/// What a headset's display is told before it begins.
+/// Options of a headset's display that are set before it begins.
 struct XrOptions {
-  /// Where the room's origin, around which the data set stands, lies in the headset's space: metres, +y up. Nothing:
-  /// what suits that space.
+  /// Place of the room's origin, around which the data set stands, in the headset's space: metres, +y up. Nothing: a
+  /// place that suits that space.
   std::optional<glm::dvec3> origin_m;
-  double scale = 1;   ///< pixels drawn for each that the runtime recommends, on each axis
+  double scale = 1;   ///< pixels drawn for each pixel that the runtime recommends, on each axis
   bool depth = true;  ///< submit depth, if the runtime takes it
 };
 
 struct DisplayOptions {
-  int width = 1280, height = 800;      ///< of a window: at first
-  double fov_deg = 90, near_m = 0.02;  ///< the field of view is that of the whole wall
+  int width = 1280, height = 800;      ///< a window's first size
+  double fov_deg = 90, near_m = 0.02;  ///< the field of view covers the whole wall
   WallTile wall;
   StereoOptions stereo;       ///< two eyes; the field of view is that of each eye's picture
   double target_fps = 60;     ///< frames are paced to this; 0: as fast as possible
-  bool detail_budget = true;  ///< lower detail where a view takes longer to construct than target_fps leaves time for
-  /// The budget lowers detail no further. Fewer, larger splats save little (bench lod_detail: discs at 2560x1600 take
-  /// as long at 0.7 as at 1) and cost much: along walk-around-a.csv a head had 31.3 dB with 0.5 and 32.2 to 32.8 with
-  /// 0.8.
+  bool detail_budget = true;  ///< lower detail if a view takes longer to construct than target_fps allows
+  /// Lower limit of the budget's detail. Fewer, larger splats save little (bench lod_detail: discs at 2560x1600 take as
+  /// long at 0.7 as at 1) and cost much: along walk-around-a.csv a head had 31.3 dB with 0.5 and 32.2 to 32.8 with 0.8.
   double least_detail = 0.8;
   bool speed_detail = false;  ///< lower detail while the head moves fast (T4.4.3.1)
-  /// The monotonic clock when the head's movement, and the duration, begin, for several viewers that follow one head;
-  /// 0: with the first displayed frame.
+  /// Time on the monotonic clock at which the head's movement and the duration begin, for several viewers that follow
+  /// one head; 0: with the first displayed frame.
   double clock_from_s = 0;
-  double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
+  double duration_s = 10;  ///< seconds from the first displayed frame; 0: until a stop is requested
   uint64_t frames = 0;     ///< frames to display; 0: no limit
-  /// Where the display waits for view updates: seconds without any sign of one until frames are drawn from what is
-  /// there.
+  /// If the display waits for view updates: seconds without any sign of one until frames are drawn from what is there.
   double most_wait_s = StallWatch::kMost_s;
-  double hold_s = 0;  ///< the head stands still for so long at the end of duration_s
-  /// Samples a pixel of a still picture: 4 or 16; 1: it is drawn as all others are. Only where pictures are antialiased
-  /// and not transparent.
+  double hold_s = 0;  ///< the head stands still this long at the end of duration_s
+  /// Samples a pixel of a still picture: 4 or 16; 1: it is drawn as all others are. Used only if pictures are
+  /// antialiased and not transparent.
   int still_samples = 16;
   splat::RenderOptions render;
   splat::SelectionOptions selection;
-  float splat_scale = 0;  ///< selection.scale; 0: what suits the kernel
+  float splat_scale = 0;  ///< selection.scale; 0: that which suits the kernel
   image::ShadingParameters shading;
-  bool legend = true;          ///< pictures and the window show what colours mean, where there is something to tell
+  bool legend = true;          ///< pictures and the window show what colours mean, if the session says so
   bool transparent = false;    ///< pictures have the coverage as alpha; shading.background is black then
   uint64_t picture_every = 0;  ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
   uint64_t verify_every = 0;   ///< keep every N-th frame for verification; 0: none
-  uint64_t verify_row = 2;     ///< so many frames in a row each time
-  bool exr = false;            ///< pictures as EXR with depth too
+  uint64_t verify_row = 2;     ///< frames in a row that are kept each time
+  bool exr = false;            ///< write pictures as EXR with depth, too
 };
 
 }  // namespace telesplat::viewer

@@ -15,13 +15,13 @@ double angle_deg(const glm::dquat& a, const glm::dquat& b) {
 }
 
 const glm::dvec3& position(F f) { return f.camera.pose.position_room; }
-// Of the left eye (0) or the right one; of one picture for both the camera's.
+// Position of the left eye (0) or the right one; without stereo the camera's.
 const glm::dvec3& eye(F f, size_t i) {
   return f.stereo.mode == stereo::Mode::kOff ? position(f) : f.stereo.pair.eyes[i].pose.position_room;
 }
 const glm::dquat& orientation(F f) { return f.camera.pose.orientation; }
 
-// Nothing moves in a picture that stands: -1. Clocks of several machines may differ by more than a frame takes.
+// -1: nothing moves in a picture that stands. Clocks of several machines may differ by more than a frame takes.
 double motion_to_photon_ms(F f) { return f.drawn.still ? -1.0 : std::max(0.0, (f.seen_s - f.posed.taken_s) * 1e3); }
 
 constexpr metrics::Column<MeasuredFrame> kColumns[] = {

@@ -1,4 +1,4 @@
-// No window: the head follows a trajectory or a publisher of poses, frames are measured and recorded only.
+// A display without a window: the head follows a trajectory or a publisher of poses; frames are measured and recorded.
 #pragma once
 
 #include <algorithm>
@@ -19,16 +19,16 @@ class HeadlessSurface final : public DisplaySurface {
  public:
   using Tell = std::function<void(const std::string&)>;
 
-  /// tell: lines for the person.
+  /// tell: prints lines for the person.
   HeadlessSurface(const DisplayOptions& options, HeadMovement movement, Tell tell = {})
       : options_(options), movement_(std::move(movement)), tell_(std::move(tell)) {
     if (movement_.recorded) trajectory_ = *movement_.recorded;
   }
 
-  /// These poses move the head as soon as they come.
+  /// Poses of this feed move the head as soon as they come.
   void follow(std::shared_ptr<PoseFeed> poses) { poses_ = std::move(poses); }
 
-  /// A head that moves already stays on its way.
+  /// A head that moves already stays on its trajectory.
   void on_scene(const ShownScene& scene) override {
     if (!moves_) trajectory_ = movement_.trajectory(scene.box_room, fitting_camera(options_));
     if (told_ || !tell_) return;

@@ -24,7 +24,7 @@ Result<std::unique_ptr<Renderer>> Renderers::for_points() {
 }
 
 Result<std::unique_ptr<VolumeRenderer>> Renderers::for_slices() {
-  first_.reset();  // its context must be gone
+  first_.reset();  // its context must be gone first
   return make_volume_renderer(kind_, threads_, choice_);
 }
 

@@ -1,4 +1,4 @@
-// Where a display's sources get their renderers: made when a source needs one, on the CPU or with OpenGL.
+// Makes renderers for a display's sources when a source needs one, on the CPU or with OpenGL.
 #pragma once
 
 #include <memory>
@@ -12,15 +12,15 @@ namespace telesplat::viewer {
 /// destroyed first.
 class Renderers {
  public:
-  /// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl". Makes the first one of points
-  /// at once, so that what cannot be is found out before the session begins. Error: what was tried.
+  /// kind: "auto" (the quicker one if there is a hardware GPU, else cpu), "cpu", "gl". Makes the first renderer of
+  /// points at once, so that failures are known before the session begins. Error: names what was tried.
   static Result<Renderers> make(const std::string& kind, int threads);
 
-  /// What draws points: "cpu" or "gl"; "auto": both are timed on the session's first frames.
+  /// Name of the renderer of points: "cpu" or "gl"; "auto": both are timed on the session's first frames.
   const char* name() const { return name_; }
-  /// What OpenGL calls the device that draws; empty: the processor does.
+  /// OpenGL's name for the device that draws; empty: the processor draws.
   const std::string& device() const { return device_; }
-  /// What is kept after that, and why.
+  /// The renderer that is kept after that, and the reason.
   std::shared_ptr<const RendererChoice> choice() const { return choice_; }
   Result<std::unique_ptr<Renderer>> for_points();
   Result<std::unique_ptr<VolumeRenderer>> for_slices();
@@ -32,7 +32,7 @@ class Renderers {
   int threads_;
   const char* name_;
   std::string device_;
-  std::unique_ptr<Renderer> first_;  // until somebody needs one
+  std::unique_ptr<Renderer> first_;  // until a source needs one
   std::shared_ptr<RendererChoice> choice_;
 };
 

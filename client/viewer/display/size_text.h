@@ -1,4 +1,4 @@
-// Pairs of whole numbers as flags write them: "1280x800".
+// Reads pairs of whole numbers as flags have them: "1280x800".
 #pragma once
 
 #include <optional>
@@ -9,10 +9,10 @@
 
 namespace telesplat::viewer {
 
-/// "AxB" with both in least..most; nothing: it is not.
+/// Reads "AxB" with both in least..most; nothing: the text is not such a pair.
 std::optional<std::pair<int, int>> parse_pair(const std::string& text, int least, int most);
 
-/// "WxH" with both in 16..16384. flag: named by the error.
+/// Reads "WxH" with both in 16..16384. The error names `flag`.
 Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag);
 
 }  // namespace telesplat::viewer

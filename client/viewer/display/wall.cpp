@@ -47,7 +47,7 @@ Result<WallTile> wall_tile(const std::string& text, int tile, double scale) {
 }
 
 geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall) {
-  if (wall.columns == 1 && wall.rows == 1) return whole;  // to the last bit
+  if (wall.columns == 1 && wall.rows == 1) return whole;  // exact to the last bit
   const int width = whole.width / wall.columns, height = whole.height / wall.rows;
   return geometry::crop(whole, {wall.tile % wall.columns * width, wall.tile / wall.columns * height, width, height});
 }

@@ -20,37 +20,37 @@ struct WallLayout {
   bool operator==(const WallLayout&) const = default;
 };
 
-/// "2x1": columns x rows, 1 to 16 of each. Error: not of that form, or more than `most_tiles` tiles.
+/// "2x1": columns x rows, 1 to 16 of each. Error: another form, or more than `most_tiles` tiles.
 Result<WallLayout> parse_wall(const std::string& text, int most_tiles = 16 * 16);
 
-/// Whether --wall names a description: FILE.toml.
+/// True if --wall names a description: FILE.toml.
 bool is_description(const std::string& wall);
 
-/// Which part of a wall a display is.
+/// A display's part of a wall.
 struct WallTile {
   int columns = 1, rows = 1, tile = 0;
-  std::shared_ptr<const wall::Wall> described;  ///< null: tiles of one picture; else `tile` is its screen
+  std::shared_ptr<const wall::Wall> described;  ///< null: tiles of one picture; else `tile` is the number of a screen
   int tiles() const { return described ? int(described->screens.size()) : columns * rows; }
 };
 
-/// What --wall, --wall-tile and --wall-scale come to. An empty text is a wall of one. Error: names flag, value and
-/// limit, or file, line and key.
+/// Reads --wall, --wall-tile and --wall-scale. An empty text is a wall of one tile. Error: names flag, value and limit,
+/// or file, line and key.
 Result<WallTile> wall_tile(const std::string& wall, int tile, double scale);
 
-/// The camera of this display, one of a wall's tiles: its part of the off-axis frustum of the whole.
+/// Returns the camera of this display, a tile of the wall: its part of the off-axis frustum of the whole.
 geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall);
 
-/// The same in pixels, of a display of width x height. Of a described wall: unrolled.
+/// Returns that part in pixels, for a display of width x height. A described wall is unrolled.
 image::DisplayPart part_of_wall(int width, int height, const WallTile& wall);
 
 struct DisplayOptions;
-/// What a display of these options shows a head.
+/// Returns the camera of a display with these options for a head.
 geometry::Camera display_camera(const DisplayOptions& options, const geometry::Pose& head);
-/// What the whole wall shows, for data to be fitted into.
+/// Returns a camera for the whole wall, for data to be fitted into.
 geometry::Camera fitting_camera(const DisplayOptions& options);
 
-/// Returns what a person can do where a wall that stands in the room does not show all of the data to the head. Looks
-/// at its first screen. Nothing: the wall shows all, or the data are fitted into the display anyway.
+/// Returns advice for the person if a wall that stands in the room does not show all of the data to the head. Looks at
+/// its first screen. Nothing: the wall shows all, or the data are fitted into the display anyway.
 std::optional<std::string> cut_off_by_wall(const DisplayOptions& options, const geometry::Pose& head,
                                            const geometry::Box& box_room);
 

@@ -11,7 +11,7 @@ namespace {
 
 using Part = geometry::Clip::Part;
 
-// Kernels read whole vectors from where a level's last points are.
+// Kernels read whole vectors beyond the last points of a level.
 constexpr size_t kPadding = 64;
 
 struct Copy {
@@ -19,7 +19,7 @@ struct Copy {
   std::vector<uint32_t> colours;
 };
 
-// The planes in a leaf's own steps: a point (x, y, z) is kept where a x + b y + c z >= least.
+// The planes in a leaf's own steps: a point (x, y, z) stays if a x + b y + c z >= least.
 struct LeafPlanes {
   struct Plane {
     float a, b, c, least;
@@ -40,7 +40,7 @@ struct LeafPlanes {
   }
 };
 
-// The item's points that are kept. Nothing changes where that is all of them. Returns how many there are.
+// Copies the points of the item that stay, and returns their number. If all stay, nothing changes.
 uint32_t keep_inside(const LeafPlanes& planes, splat::DrawItem& item, splat::DrawList& list) {
   const points::Mosaic::Level& from = item.level;
   std::vector<uint32_t> kept;
@@ -61,7 +61,7 @@ uint32_t keep_inside(const LeafPlanes& planes, splat::DrawItem& item, splat::Dra
   item.level = {uint32_t(kept.size()), shorts, shorts + pitch, shorts + 2 * pitch, shorts + 3 * pitch,
                 copy->colours.data()};
   item.first = item.of = 0;
-  item.sequence = {};  // renderers keep no copies of it
+  item.sequence = {};  // renderers keep no copies of this item
   list.held.push_back(std::move(copy));
   return item.level.count;
 }
@@ -73,7 +73,7 @@ void clip_list(const geometry::Clip& clip, splat::DrawList& list) {
   if (clip.empty()) return;
   const points::Cluster* cluster = nullptr;
   Part part = Part::kAll;
-  std::optional<LeafPlanes> planes;  // of the cluster
+  std::optional<LeafPlanes> planes;  // the planes on the cluster's steps
   list.points = 0;
   std::erase_if(list.items, [&](splat::DrawItem& item) {
     if (std::exchange(cluster, item.cluster) != item.cluster) {

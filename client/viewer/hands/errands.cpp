@@ -32,7 +32,7 @@ std::vector<std::string_view> split(std::string_view text, char at) {
   }
 }
 
-// Pixels, or a share of them.
+// Reads pixels, or a percentage of them.
 std::optional<double> coordinate(std::string_view text, int size) {
   if (!text.ends_with('%')) return number(text);
   const auto share = number(text.substr(0, text.size() - 1));
@@ -56,7 +56,7 @@ struct Pointed {
   std::optional<Pick> pick;
 };
 
-// What lies at the places that an order names.
+// Picks at the places that an order names.
 Result<std::vector<Pointed>> point(const wire::Order& order, const FrameHands& hands, double& opacity) {
   if (!hands.terms) return Error{"pick: nothing is shown yet"};
   if (hands.pictures) return Error{"pick: views come as pictures (--coupling images), which have no depth"};

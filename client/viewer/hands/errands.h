@@ -1,5 +1,4 @@
-// What a viewer does when somebody asks it: picks, tells where its head is, goes elsewhere. One for a display, in its
-// thread.
+// Carries out orders of people to a viewer: picks, reports the head's pose, moves it. One for a display, in its thread.
 #pragma once
 
 #include <deque>
@@ -15,12 +14,12 @@
 
 namespace telesplat::viewer {
 
-// Orders of people to this viewer, on their way from the worker to the display, and their answers on their way back.
+// Orders of people to this viewer wait here between the worker and the display, and so do the answers.
 
 /// Thread-safe.
 class OrderDesk {
  public:
-  static constexpr size_t kMost = 64;  ///< that wait; the oldest goes, and its sender hears nothing
+  static constexpr size_t kMost = 64;  ///< orders that wait; beyond it the oldest is dropped, without an answer
 
   struct Answer {
     uint64_t number = 0;
@@ -54,33 +53,33 @@ class OrderDesk {
   std::vector<Answer> answers_;
 };
 
-/// What the display lends for one frame.
+/// Things that the display lends for one frame.
 struct FrameHands {
-  geometry::Camera camera;  ///< of the frame that was displayed
-  geometry::Pose head;      ///< that it was drawn for: a wall's screens look elsewhere
+  geometry::Camera camera;  ///< the displayed frame's camera
+  geometry::Pose head;      ///< the head that it was drawn for; a wall's screen looks elsewhere
   EpochId epoch;
   std::shared_ptr<const SceneTerms> terms;  ///< null: the session is not known yet
-  /// What lies at a pixel; opacity: of volumes.
+  /// Returns the content at a pixel. opacity: for volumes.
   std::function<std::optional<Pick>(double x_pix, double y_pix, double opacity)> pick;
   /// Puts the camera there. False: the head follows a trajectory.
   std::function<bool(const geometry::Pose&)> go;
-  /// Changes a setting of this viewer (scene::settings()), or shows and hides what lies over the picture ("axes", ...:
-  /// on or off). Error: it cannot have this value, or nobody sees it.
+  /// Changes a setting of this viewer (scene::settings()), or switches something over the picture ("axes", ...: on or
+  /// off). Error: it cannot have this value, or no person sees this display.
   std::function<Status(const std::string& name, const std::string& value)> set;
-  bool pictures = false;  ///< what is displayed are pictures that servers drew: nothing is known of what lies there
-  Measurements* measurements = nullptr;  ///< null: there is no window that shows some
+  bool pictures = false;                 ///< servers drew the displayed pictures: they have no depth to pick from
+  Measurements* measurements = nullptr;  ///< null: this display shows no measurements
 };
 
-/// JSON. Error: what is wrong with the order, for the person.
-///   pick   "at": "X,Y" or "X%,Y%", up to three separated by blanks, pixels of the display from its upper left corner;
-///          "opacity" (0.25): of volumes. {"picks": [null or as to_json(ToldPlace), "colour", "depth_m", "spacing_m",
-///          "pixel", "probe": arguments of the order that asks the data server], "epoch", "placement"}
-///   where  {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
-///   go     "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
-///   overlay  "name", "on": on or off. {}
-///   an order of scene::settings() that a viewer keeps   "value". {}
-///   measure  "do": "list", "add" ("at" and "opacity" as pick has them: a row of places), "remove" ("number"), "clear",
-///            "csv". Measurements::list(), or {"csv": Measurements::csv()}
+/// Returns JSON. Error: what is wrong with the order, for the person.
+/// pick     "at": "X,Y" or "X%,Y%", up to three separated by blanks, pixels of the display from its upper left corner;
+/// "opacity" (0.25): for volumes. {"picks": [null or as to_json(ToldPlace), "colour", "depth_m", "spacing_m",
+/// "pixel", "probe": arguments of the order that asks the data server], "epoch", "placement"}
+/// where    {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
+/// go       "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
+/// overlay  "name", "on": on or off. {}
+/// an order of scene::settings() that a viewer keeps   "value". {}
+/// measure  "do": "list", "add" ("at" and "opacity" as in pick: a row of places), "remove" ("number"), "clear",
+/// "csv". Measurements::list(), or {"csv": Measurements::csv()}
 Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands);
 
 inline constexpr double kPickOpacity = volume::kSolid;

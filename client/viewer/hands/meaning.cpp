@@ -9,7 +9,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// A colour that is farther from all of a map's is none of them: the largest difference of a channel.
+// A colour belongs to a map if a colour of the map is this near: largest difference in a channel.
 constexpr int kNearColour = 3;
 
 int difference(uint32_t a, uint32_t b) {

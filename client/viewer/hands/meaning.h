@@ -1,4 +1,4 @@
-// What a pick means in the data's own terms, as far as the viewer knows.
+// Converts a pick to the data's own terms, as far as the viewer knows them.
 #pragma once
 
 #include <optional>
@@ -11,27 +11,27 @@
 
 namespace telesplat::viewer {
 
-/// What of a session is needed to say so.
+/// Facts of a session that this needs.
 struct SceneTerms {
-  scene::Placement placement;                 ///< not told: metres of the room
-  std::string data_file, scene;               ///< the data set's path, empty: it has none; its name
-  std::optional<scene::Colouring> colouring;  ///< what a mesh is coloured by; nothing: by its own colours
+  scene::Placement placement;                 ///< missing: metres of the room
+  std::string data_file, scene;               ///< the data set's path, or empty; its name
+  std::optional<scene::Colouring> colouring;  ///< colouring of a mesh; nothing: its own colours
 };
-/// What cannot be read counts as not told.
+/// Facts that cannot be read count as missing.
 SceneTerms terms_of(const wire::Welcome& session);
 
-/// The value of an array that a colour stands for: the colour map undone within its range. Colours have 8 bits a
-/// channel, and maps may have the same colour twice, so it is a range.
+/// Range of an array's values that a colour stands for: the colour map undone within its range. It is a range because
+/// colours have 8 bits a channel, and maps may have the same colour twice.
 struct ValueRange {
   double lo, hi;
 };
 /// Nothing: no colour of the map is near (a missing value is grey).
 std::optional<ValueRange> value_of_colour(const scene::Colouring& colouring, uint32_t colour);
 
-/// What the viewer's own pick says: an estimate, without bounds.
+/// Describes the place by the viewer's own pick: an estimate, without bounds.
 scene::ToldPlace meaning_of(const Pick& pick, const SceneTerms& terms);
 
-/// The question to the data server what lies there.
+/// Makes the question to the data server about that place.
 scene::Probe probe_of(const Pick& pick, EpochId epoch, double opacity);
 
 }  // namespace telesplat::viewer

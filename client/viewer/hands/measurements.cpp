@@ -19,7 +19,7 @@ scene::Measured measured(const Measurements::Row& row, const scene::Placement& p
   return scene::measure(places, placement);
 }
 
-// A field of a table: in quotes where it has a comma or quotes.
+// Makes a field of a table: in quotes if it has a comma, quotes or a line break.
 std::string quoted(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == text.npos) return text;
   std::string out = "\"";

@@ -14,12 +14,12 @@
 namespace telesplat::viewer {
 namespace {
 
-// Points within so much of the nearest one's depth are of the same surface.
+// Points whose depth is within this share of the nearest one's are on the same surface.
 constexpr double kSameSurface = 0.01;
-// A tangent plane that is seen more edge-on tells little of where the ray meets the surface.
+// A tangent plane seen more edge-on than this says too little about where the ray meets the surface.
 constexpr double kLeastLean = 0.15;
-// Points count as near the pixel within this part of their splat's size and a pixel more: between four samples of a
-// lattice the farthest place is 0.71 of their distance away, and the finish fills what splats leave.
+// Points count as near the pixel within this share of their splat's size plus a pixel: between four samples of a
+// lattice the farthest place is 0.71 of their distance away, and the finish fills the gaps between splats.
 constexpr double kReach = 0.75;
 
 struct Candidate {
@@ -30,7 +30,7 @@ struct Candidate {
   double distance2_px, reach_px;
 };
 
-// The points of an item that lie near the pixel.
+// Adds the points of an item that lie near the pixel.
 void add_candidates(const splat::DrawItem& item, const geometry::Camera& camera, double x_pix, double y_pix,
                     std::vector<Candidate>& out) {
   const geometry::Box& leaf = item.cluster->leaf_room;
@@ -54,7 +54,7 @@ void add_candidates(const splat::DrawItem& item, const geometry::Camera& camera,
   }
 }
 
-// Where the pixel's ray meets the candidate's tangent plane; its own depth where that is too far off.
+// Returns the depth at which the pixel's ray meets the candidate's tangent plane; its own depth if that is too far off.
 double depth_on_plane(const Candidate& c, const geometry::Camera& camera, double x_pix, double y_pix) {
   const glm::dvec3 eye = camera.pose.position_room, ray = camera.unproject(x_pix, y_pix, 1) - eye;
   const double lean = glm::dot(c.normal_room, ray);
@@ -65,12 +65,12 @@ double depth_on_plane(const Candidate& c, const geometry::Camera& camera, double
 
 double channel(uint32_t texel, int shift) { return double(texel >> shift & 255); }
 
-// A layer's texel between four, as red, green, blue, alpha in 0 to 255, premultiplied.
+// Interpolates a layer between four texels: red, green, blue, alpha in 0 to 255, premultiplied.
 glm::dvec4 look_up(const volume::LayerImage& image, double x, double y) {
   const double left = std::floor(x - 0.5), top = std::floor(y - 0.5);
   const double from_left = left - image.rect.x, from_top = top - image.rect.y;
   glm::dvec4 out(0);
-  // A ray along the layer meets it as far away as numbers go.
+  // A ray along the layer meets it at places as large as numbers go.
   if (!(from_left >= -1 && from_top >= -1 && from_left < image.rect.width && from_top < image.rect.height)) return out;
   const int x0 = int(from_left), y0 = int(from_top);
   for (int n = 0; n < 4; ++n) {
@@ -90,7 +90,7 @@ uint32_t packed(const glm::dvec4& premultiplied) {
   return out;
 }
 
-// Depths along the camera's axis at which the ray is in the slices of a layer, [near, far).
+// Depths along the camera's axis between which the ray is in the slices of a layer, [near, far).
 struct Depths {
   double near_m, far_m;
 };
@@ -142,7 +142,7 @@ std::optional<Pick> pick_point(const splat::DrawList& list, const geometry::Came
 std::optional<Pick> pick_volume(const volume::VolumeFrame& frame, const geometry::Camera& camera, double x_pix,
                                 double y_pix, double opacity) {
   const glm::dvec3 eye_index(frame.grid.room_to_index() * glm::dvec4(camera.pose.position_room, 1));
-  glm::dvec4 sum(0);  // colours times what was seen of them, and how much is hidden, in 1/255
+  glm::dvec4 sum(0);  // visible part of the colours, and the hidden share, in 1/255
   for (const int at : volume::front_to_back(frame, eye_index)) {
     const volume::LayerImage& image = frame.layers[size_t(at)];
     const volume::Layer& layer = frame.shear.layers[size_t(image.layer)];

@@ -10,7 +10,7 @@ namespace {
 constexpr char kLetters[] = "ABCDEFHINOPQRSTWX";  // in the order of Key
 static_assert(sizeof kLetters - 1 == size_t(Key::k1));
 
-// "[" and "]" hold the letter of a key, or a function key's number.
+// "[" and "]" enclose the letter of a key, or a function key's number.
 struct HelpLine {
   const char *keys, *what;
 };

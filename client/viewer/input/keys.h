@@ -1,4 +1,4 @@
-// The keys and mouse buttons that mean something in a window, what they are called, and the list of what they do.
+// The keys and mouse buttons that a window uses, their names, and the list of what they do.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace telesplat::viewer {
 
-/// Keys that mean something here. They are places on the keyboard, named by what is printed there on a US one: W A S D
-/// lie under one hand on every keyboard.
+/// Keys that a window uses. They are places on the keyboard, named by their print on a US keyboard: W A S D lie under
+/// one hand on every keyboard.
 enum class Key {
   kA,
   kB,
@@ -56,16 +56,16 @@ struct Side {
 /// "+X"
 std::string side_name(const Side& side);
 
-/// What a key is called: what is printed on it where the person sits.
+/// Returns a key's name: its print on the person's keyboard.
 using KeyNames = std::function<std::string(Key)>;
-/// As it is printed on a US keyboard.
+/// Returns a key's print on a US keyboard.
 std::string us_name(Key key);
-/// The key that has this letter there, A to Z; nothing: it means nothing here.
+/// Returns the key with this letter there, A to Z; nothing: a window does not use it.
 std::optional<Key> letter_key(char letter);
 
-/// Keys and mouse, a line each: for F1, for --help and for documentation.
+/// Lists keys and mouse, one line each: for F1, for --help and for documentation.
 std::vector<std::string> key_help(const KeyNames& name = us_name);
-/// The ones to begin with, in one line.
+/// Lists the most important keys, in one line.
 std::string first_keys();
 
 }  // namespace telesplat::viewer

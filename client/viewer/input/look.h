@@ -1,4 +1,4 @@
-// How frames are drawn, as far as a person can change it while looking: keys and panel write it, sources read it.
+// Drawing options that a person can change while looking: keys and panel write them, sources read them.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@ struct Look {
 
   splat::RenderOptions render;
   bool lit = true;
-  bool head_light = false;                                      ///< what is lit: by the head light alone
+  bool head_light = false;                                      ///< if lit: by the head light alone
   uint32_t background = image::ShadingParameters{}.background;  ///< 0x00RRGGBB
-  double most_detail = 1;  ///< splat::SelectionOptions::detail is no more, kLeastDetail to 1
+  double most_detail = 1;  ///< upper limit of splat::SelectionOptions::detail, kLeastDetail to 1
 };
 
 inline bool operator==(const Look& a, const Look& b) {
@@ -24,7 +24,7 @@ inline bool operator==(const Look& a, const Look& b) {
          a.head_light == b.head_light && a.background == b.background && a.most_detail == b.most_detail;
 }
 
-/// `now` with what differs between two looks as the second one has it.
+/// Copies into `now` the values that differ between two looks, as the second one has them.
 inline Look changed(Look now, const Look& from, const Look& to) {
   const auto take = [](auto& at, const auto& before, const auto& after) {
     if (before != after) at = after;
@@ -42,7 +42,7 @@ inline Look changed(Look now, const Look& from, const Look& to) {
   return now;
 }
 
-/// The lights and the background of a look.
+/// Puts the lights and the background of a look into `shading`.
 inline void put_into(const Look& look, image::ShadingParameters& shading) {
   const auto lights = image::shading_named(look.head_light ? "head" : "lit");
   shading.ambient = lights->ambient;
@@ -60,9 +60,9 @@ inline Look first_look(const splat::RenderOptions& render, const image::ShadingP
           .background = shading.background};
 }
 
-/// A picture that a person wants of what is on display.
+/// A person's wish for a picture of the scene on display.
 struct PictureWish {
-  int width = 0, height = 0;  ///< pixels; 0: as the display has them
+  int width = 0, height = 0;  ///< pixels; 0: the display's
   bool exr = false;           ///< EXR with depth, else PNG
   bool own_size() const { return width > 0 && height > 0; }
   bool operator==(const PictureWish&) const = default;

@@ -16,10 +16,10 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr int kPoll_ms = 50;
-constexpr double kTurn_s = 0.01;  // in which a hundredth of kMost_s messages is taken
+constexpr double kTurn_s = 0.01;  // a turn takes at most a hundredth of kMost_s messages
 constexpr int kMostATurn = int(PoseFeed::kMost_s * kTurn_s);
-constexpr double kSilence_s = 1;      // after which the publisher is asked anew
-constexpr double kMostFrame_s = 0.1;  // a frame that took longer waited for something: no reason to look far ahead
+constexpr double kSilence_s = 1;      // after this silence it connects to the publisher anew
+constexpr double kMostFrame_s = 0.1;  // longer frames waited for something: no reason to look farther ahead
 
 }  // namespace
 
@@ -53,7 +53,7 @@ PoseFeed::~PoseFeed() {
 void PoseFeed::listen() {
   log::RateLimiter refusals;
   double turn_s = monotonic_s(), heard_s = turn_s;
-  int taken = 0;  // in this turn
+  int taken = 0;  // messages in this turn
   while (!stop_) {
     const bool there = socket_->wait(kPoll_ms);
     const double began_s = monotonic_s();

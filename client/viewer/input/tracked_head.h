@@ -1,4 +1,4 @@
-// A head whose poses another program tells: its clock, its silence, its mistakes. Without sockets and clocks.
+// Follows a head whose poses another program sends: its clock, its silence, its mistakes. Without sockets and clocks.
 #pragma once
 
 #include <cstdint>
@@ -11,31 +11,31 @@
 
 namespace telesplat::viewer {
 
-/// Seconds; taken_s on the monotonic clock.
+/// Seconds; taken_s is on the monotonic clock.
 struct PoseMoment {
-  double taken_s = 0;  ///< the newest pose that it was made from was taken
-  double ahead_s = 0;  ///< it was predicted so far beyond that
+  double taken_s = 0;  ///< when the newest pose behind it was taken
+  double ahead_s = 0;  ///< how far beyond that it was predicted
 };
 
-/// One thread, or one at a time. Times are those of our monotonic clock where nothing else is said.
+/// Used by one thread, or by one at a time. Times are on our monotonic clock unless a comment says otherwise.
 class TrackedHead {
  public:
   explicit TrackedHead(tracking::Prediction method)
       : predicts_(method != tracking::Prediction::kNone), predictor_(method) {}
 
-  /// A pose that arrived. Poses that are older than the newest are passed over and counted; where all are for
-  /// kRestart_s, their sender counts time anew and is followed.
+  /// Takes a pose that arrived. A pose older than the newest is counted and dropped; if all are for kRestart_s, their
+  /// sender has begun to count time anew and is followed.
   void told(const wire::HeadPose& pose, double arrived_s);
-  /// What arrived was no pose.
+  /// A message arrived that is not a pose.
   void refused() { ++refused_; }
 
-  /// Where the head is at now_s + ahead_s. Predictions reach kMostAhead_s beyond the newest pose; of a silent tracker
-  /// the head stays there. Nothing: no pose has come yet.
+  /// Returns the head at now_s + ahead_s. Predictions reach kMostAhead_s beyond the newest pose; if the tracker is
+  /// silent, the head stays there. Nothing: no pose has come yet.
   std::optional<geometry::Pose> at(double now_s, double ahead_s);
-  /// Of the pose that at() returned last.
+  /// When the pose that at() returned last was taken, and how far it was predicted.
   PoseMoment moment() const { return moment_; }
 
-  /// A line for the person where something changed: poses come, no longer come, come again, cannot be read.
+  /// Returns a line for the person after a change: poses come, stop, come again, cannot be read.
   std::optional<std::string> take_news(double now_s);
 
   struct Figures {
@@ -54,7 +54,7 @@ class TrackedHead {
   tracking::PoseClock clock_;
   uint64_t poses_ = 0, late_ = 0, refused_ = 0, refused_told_ = 0;
   std::optional<double> late_since_s_;
-  double arrived_s_ = -1e9;  // the newest pose
+  double arrived_s_ = -1e9;  // when the newest pose arrived
   double refusal_told_s_ = -1e9;
   enum class Told { kNothing, kPoses, kSilence } told_ = Told::kNothing;
 };

@@ -16,7 +16,7 @@ constexpr double kIntroductionPeriod_s = 1;
 
 constexpr uint32_t kColour = 0xffffff;
 
-// Between a and b, share of b in 1/256.
+// Mixes a and b; share: weight of b in 1/256.
 uint32_t mixed(uint32_t a, uint32_t b, uint32_t share) {
   const auto channel = [&](int shift) {
     return ((a >> shift & 255) * (256 - share) + (b >> shift & 255) * share + 128) >> 8 << shift;
@@ -24,7 +24,7 @@ uint32_t mixed(uint32_t a, uint32_t b, uint32_t share) {
   return channel(16) | channel(8) | channel(0);
 }
 
-// Where a pixel's centre lies between those of `from` pixels.
+// Place of a pixel's centre between the centres of `from` pixels.
 struct Place {
   int before, after;
   uint32_t share;
@@ -187,7 +187,7 @@ DrawnFrame PictureSource::draw(const FrameInput& input, image::View& view) {
   out.changed = !input.intact || !out.still;
   if (out.changed) scale_into(picture.view, view);
   drawn_ = shown.picture;
-  // A picture has no depth: who compares it takes that of the data (kPictureOnly of the spool).
+  // A picture has no depth: a comparison takes that of the data (kPictureOnly of the spool).
   if (input.with_depth) std::ranges::fill(view.depth_m, 1.0f);
   out.picture_of = picture.camera;
   out.selected = out.drawn = out.cached = picture.view.colour.size();

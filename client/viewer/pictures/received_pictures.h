@@ -1,4 +1,4 @@
-// Pictures that the servers drew of a session: those that are complete and wait for the display, and the one that is on
+// Pictures of a session that the servers drew: those that are complete and wait for the display, and the one on
 // display.
 #pragma once
 
@@ -26,42 +26,42 @@ struct ShownPicture {
   image::View view;  ///< without depth
 };
 
-/// Puts the tiles of pictures together, decoded. Of several pictures the newest wins: what is older than one that
-/// is complete is not decoded any more. No sockets, no clocks.
+/// Joins the decoded tiles of pictures. The newest picture wins: tiles of pictures older than the newest complete one
+/// are not decoded. No sockets, no clocks.
 class PictureGatherer {
  public:
-  static constexpr size_t kMostOpen = wire::kMaxBuffers;  ///< pictures that lack tiles; of more the oldest goes
-  static constexpr int64_t kMaxPixels = 1 << 26;          ///< of a picture: a few bytes may claim many
+  static constexpr size_t kMostOpen = wire::kMaxBuffers;  ///< pictures that lack tiles; beyond it the oldest is dropped
+  static constexpr int64_t kMaxPixels = 1 << 26;          ///< pixels of a picture: a few bytes may claim many
 
-  /// The picture, if this tile completes it; nothing: it lacks tiles yet, or is older than one that was complete.
+  /// Returns the picture if this tile completes it; nothing: it still lacks tiles, or is older than a complete one.
   /// Error: what is wrong with the tile, which is dropped. Bytes come from outside.
   Result<std::shared_ptr<const ShownPicture>> add(const wire::Picture& tile);
-  /// Requests, frames and epochs begin anew.
+  /// Call it when requests, frames and epochs begin anew.
   void clear() { open_.clear(), newest_ = {}; }
 
  private:
   struct Open {
     std::shared_ptr<ShownPicture> picture;
-    uint64_t tiles = 0;  // that it has when it is complete
+    uint64_t tiles = 0;  // number of its tiles when it is complete
     std::set<uint64_t> here;
   };
   Open& open(const wire::Picture& tile);
 
-  std::deque<Open> open_;  // the oldest first
-  RequestId newest_;       // that is complete
+  std::deque<Open> open_;  // oldest first
+  RequestId newest_;       // newest complete picture
 };
 
-/// A picture, and the update that it is.
+/// A picture, and the update that it shows.
 struct DisplayedPicture {
-  std::shared_ptr<const ShownPicture> picture;  ///< null: none yet
+  std::shared_ptr<const ShownPicture> picture;  ///< null: no picture yet
   ShownUpdate update;
 };
 
-/// Shared by the worker, which puts pictures in, and the display. Pictures change hands as pointers.
+/// Shared by the worker, which puts pictures in, and the display. Only pointers change hands.
 class PictureShelf {
  public:
   void put(DisplayedPicture picture);
-  /// The newest of the pictures up to this request goes on display; those before it are passed over.
+  /// Puts the newest of the pictures up to this request on display; those before it are dropped.
   void advance(RequestId request);
   DisplayedPicture displayed() const;
 
@@ -80,11 +80,11 @@ class ReceivedPictures final : public Received {
   void on_connected() override { introduced_s_ = -1e9; }
   void on_new_master() override { gatherer_.clear(), complete_.clear(); }
   void receive(int most) override;
-  /// Says once a second that it is here.
+  /// Sends a receipt to the packer once a second, so that it knows this viewer.
   void tick(double now_s) override;
   void on_update(const ShownUpdate& update) override;
   void on_coupling(int) override {}
-  // No viewer of a wall shows pictures.
+  // Pictures are not shown on walls.
   wire::ShownState newest_state() const override { return {}; }
   void show_state(const wire::ShownState&) override {}
   void add_status(net::MasterLink::Values& values) const override;
@@ -96,34 +96,34 @@ class ReceivedPictures final : public Received {
   ReceivedLinks links_;
   PictureGatherer gatherer_;
   PictureShelf shelf_;
-  std::map<RequestId, std::shared_ptr<const ShownPicture>> complete_;  // that the display may not go on to yet
+  std::map<RequestId, std::shared_ptr<const ShownPicture>> complete_;  // the display may not show these yet
   double introduced_s_ = -1e9;
   uint64_t decode_errors_ = 0;
   log::RateLimiter log_limit_;
 };
 
-/// The display's source where views come as pictures: the picture as it came, for the pose that was asked for. It
-/// is scaled where the display has another size by now.
+/// The display's source if views come as pictures: the picture as it came, for the requested pose. It is scaled if the
+/// display has another size by now.
 class PictureSource final : public ViewSource {
  public:
   explicit PictureSource(PictureShelf& shelf) : shelf_(shelf) {}
 
   void advance(RequestId request) override { shelf_.advance(request); }
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
-  /// Both eyes see the same.
+  /// Both eyes get the same picture.
   DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                        const std::array<splat::FrameTarget, 2>& targets) override;
-  /// A picture tells of no place.
+  /// A picture has no depth to pick from.
   std::optional<Pick> pick(const geometry::Camera&, double, double, double) override { return std::nullopt; }
   const char* drawn_name() const override { return "pixels"; }
   const char* cached_name() const override { return " pixels"; }
 
  private:
   PictureShelf& shelf_;
-  std::shared_ptr<const ShownPicture> drawn_;  // last
+  std::shared_ptr<const ShownPicture> drawn_;  // the picture drawn last
 };
 
-/// Colours of `from` at the size of `to`, between its four nearest pixels each.
+/// Scales the colours of `from` to the size of `to`, each between its four nearest pixels.
 void scale_into(const image::View& from, image::View& to);
 
 }  // namespace telesplat::viewer

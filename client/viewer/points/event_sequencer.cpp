@@ -6,7 +6,7 @@
 
 namespace telesplat::viewer {
 namespace {
-// More than this is not kept while an answer is awaited; the gap that dropping leaves is asked for afterwards.
+// Limits of events kept while an answer is awaited; more are dropped, and the gap is requested afterwards.
 constexpr size_t kMaxKeptEvents = 8192, kMaxKeptBytes = 256u << 20;
 }  // namespace
 
@@ -42,7 +42,7 @@ void EventSequencer::ask() {
 
 void EventSequencer::retry() {
   if (!waiting_) return;
-  answered_ |= ++retries_ > 1;  // the packer may take what never came for received
+  answered_ |= ++retries_ > 1;  // the packer may count an answer that never came as received
   ask();
 }
 
@@ -55,7 +55,7 @@ void EventSequencer::follow(InstanceId packer) {
   callbacks_.begin_replica();
 }
 
-// Who has asked for everything, of whoever would answer, need not ask again.
+// If everything was requested already, from any packer, the request also reaches this one.
 void EventSequencer::meet(InstanceId packer) {
   const bool asked = waiting_ && !packer_;
   follow(packer);
@@ -70,7 +70,7 @@ void EventSequencer::keep(ModelEvent event) {
 
 void EventSequencer::on_published(ModelEvent event) {
   if (event.packer() != packer_) {
-    // The very first event of a new packer needs no history.
+    // The first event of a new packer needs no history.
     if (event.sequence().value != 1) {
       meet(event.packer());
       return keep(std::move(event));
@@ -105,7 +105,7 @@ void EventSequencer::on_replayed(const ModelEvent& event) {
 
 void EventSequencer::on_mark(const wire::StateMark& mark) {
   if (mark.answer) {
-    if (!taking_ || mark.packer != packer_) return;  // who waits, waits for the answer to a newer question
+    if (!taking_ || mark.packer != packer_) return;  // while waiting, only the answer to the newest request counts
     applied_ = std::max(applied_, mark.sequence);
     taking_ = waiting_ = false;
     return drain();

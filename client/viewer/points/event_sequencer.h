@@ -1,5 +1,5 @@
-// Puts point-model events in order (the "clone" pattern of the ZeroMQ guide, chapter 5): applies what follows, drops
-// what is known, notices gaps and new packers, and asks for what is missing. No sockets, no clocks.
+// Puts point-model events in order (the "clone" pattern of the ZeroMQ guide, chapter 5): applies the next ones, drops
+// known ones, notices gaps and new packers, and asks for missing ones. No sockets, no clocks.
 #pragma once
 
 #include <deque>
@@ -14,7 +14,7 @@
 
 namespace telesplat::viewer {
 
-/// A received event; bulk fields point into what `owner` keeps alive.
+/// A received event; bulk fields point into memory that `owner` keeps alive.
 struct ModelEvent {
   std::variant<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin> body;
   std::shared_ptr<const void> owner;
@@ -31,34 +31,34 @@ struct ModelEvent {
 class EventSequencer {
  public:
   struct Callbacks {
-    std::function<void(const ModelEvent&)> apply;                  ///< the next event of the current packer
-    std::function<void()> begin_replica;                           ///< a packer we have nothing of: start from nothing
-    std::function<void(const wire::StateRequest&)> request_state;  ///< whose viewer is not filled in
+    std::function<void(const ModelEvent&)> apply;  ///< the next event of the current packer
+    std::function<void()> begin_replica;           ///< a new packer, whose model is not known: begin an empty replica
+    std::function<void(const wire::StateRequest&)> request_state;  ///< the caller fills in the viewer
   };
   explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}
 
-  /// Forgets which packer was followed. Asks the one that is there for everything: at the start, or when its endpoint
+  /// Forgets which packer it followed, and asks the present one for everything: at the start, or when its endpoint
   /// changes.
   void start();
-  /// What came is thrown away: everything again, over the same connection.
+  /// Throws the replica away and asks for everything again, over the same connection.
   void start_anew();
   /// An event from the publisher.
   void on_published(ModelEvent event);
-  /// An answer to request_state begins. One that begins elsewhere than where the replica stands is not taken.
+  /// An answer to request_state begins. If it begins elsewhere than where the replica stands, it is not taken.
   void on_answer(const wire::StateBegin& begin);
-  /// An event of that answer; they come in order and may skip what has been forgotten since.
+  /// An event of that answer; they come in order and may skip patches that have been forgotten since.
   void on_replayed(const ModelEvent& event);
-  /// The publisher's or the answer's mark.
+  /// A mark from the publisher, or at an answer's end.
   void on_mark(const wire::StateMark& mark);
-  /// An answer takes too long (a packer that died): ask again.
+  /// An answer takes too long (the packer may have died): asks again.
   void retry();
 
-  /// start() was called: events may have come.
+  /// True after start(): events may have come.
   bool begun() const { return waiting_ || packer_; }
   bool synchronised() const { return !waiting_ && packer_; }
   bool waiting() const { return waiting_; }
   Sequence applied() const { return applied_; }
-  /// That is followed; 0: none yet.
+  /// The packer that it follows; 0: none yet.
   InstanceId packer() const { return packer_.value_or(InstanceId{}); }
   uint64_t gaps() const { return gaps_; }
 
@@ -70,23 +70,23 @@ class EventSequencer {
   void drain();
 
   Callbacks callbacks_;
-  std::optional<InstanceId> packer_;  // none is followed yet
+  std::optional<InstanceId> packer_;  // nothing: it follows no packer yet
   Sequence applied_;
   bool waiting_ = false;
-  // An answer leaves out what was forgotten since it begins. Who has gone on since they asked may hold some of that.
-  bool taking_ = false;          // the answer that comes in
-  bool answered_ = false;        // an answer has begun since one was asked for; the packer takes it for received
-  int retries_ = 0;              // and none has begun since
+  // An answer omits what was forgotten since it begins. A viewer that went on after its request may hold some of it.
+  bool taking_ = false;          // the answer that comes in is used
+  bool answered_ = false;        // an answer has begun since the last request; the packer counts it as received
+  int retries_ = 0;              // repeated requests since an answer began
   std::deque<ModelEvent> kept_;  // published while an answer is awaited
   size_t kept_bytes_ = 0;
   uint64_t gaps_ = 0;
 };
 
-/// Rays finer than a viewer's views, of its own patches; and of all others what they found where those had met nothing.
-/// image: the patch's, decoded. Error: the mask cannot be decoded; nothing was added.
+/// Adds rays that are finer than a viewer's views: from its own patches all, from those of others only hits where its
+/// own rays missed. image: the patch's, decoded. Error: the mask cannot be decoded; nothing was added.
 Status add_rays(const wire::Patch& patch, const image::DepthImage& image, FineRays& rays);
 
-/// What points::prepare_patch() is told of the patch's frame.
+/// Frame tag of the patch for points::prepare_patch().
 inline FrameId tag_of(const wire::Patch& patch) { return points::tagged(patch.frame, patch.step, patch.rest); }
 
 }  // namespace telesplat::viewer

@@ -9,9 +9,9 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr size_t kMaxSeen =
-    1u << 21;  // 16 MiB; a display that draws more until the next report tells of the first frames only
+    1u << 21;  // 16 MiB; if the display draws more until the next report, only the first frames are reported
 
-// More changes than this between two frames are told as a change of everything: 1.5 MB.
+// More changes than this between two frames count as a change everywhere: 1.5 MB.
 constexpr size_t kMostChanges = 1u << 16;
 
 template <class T>
@@ -145,11 +145,11 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
     const std::lock_guard lock(mutex_);
     std::swap(wanted, wanted_);
   }
-  if (wanted.size() > most) wanted.resize(most);  // the display asks again
+  if (wanted.size() > most) wanted.resize(most);  // the display asks for the others again
   for (const points::ClusterKey key : wanted) {
     const auto brick = newest_.model->bricks().find(key);
     if (brick == newest_.model->bricks().end()) continue;
-    // The display may have asked again while this one was made.
+    // The display may have asked again while this summary was made.
     const auto held = newest_.summaries.find(key);
     if (held != newest_.summaries.end() && held->second->changes == brick->second->changes &&
         held->second->removals == brick->second->removals)

@@ -14,9 +14,9 @@ namespace {
 
 constexpr Feed kPointFeeds[] = {{net::Kind::kSub, "patches"}, {net::Kind::kDealer, "state"}};
 constexpr size_t kSummariesAtOnce = 8;
-// Between two receipts: while events come, and while none do.
+// Time between two receipts: while events come, and while no event comes.
 constexpr double kReceipts_s = 0.03, kQuietReceipts_s = 0.5;
-constexpr uint64_t kReceiptBytes = 32 << 10;  // are told of at once
+constexpr uint64_t kReceiptBytes = 32 << 10;  // bytes that are reported at once
 
 }  // namespace
 
@@ -44,8 +44,8 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
     const std::lock_guard lock(mutex_);
     cut_ = {std::make_shared<const geometry::Clip>(*std::move(clip)), cut_.version + 1, session.epoch};
   }
-  // The packer's first event for another model may have come before this, and a replica of the old one with it. On
-  // another connection nothing comes that was sent to the old one.
+  // The packer's first event for another model may have come before this, and with it a replica of the old model. A new
+  // connection does not bring what was sent on the old one.
   if (config_ != config && receiver_.begun()) links_.feeds.close();
   config_ = config;
   keeps_redundant_ = keep;
@@ -62,11 +62,11 @@ void ReceivedPoints::receive(int most) {
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
   send_receipt(now_s);
-  if (!waits_ && !in_step_) summarise();  // held changes are applied by the display's thread
+  if (!waits_ && !in_step_) summarise();  // otherwise the display's thread applies the held changes
   cache_.free_dropped();
 }
 
-// So the packer knows how much is on its way to this viewer, and how fast it arrives.
+// Reports to the packer how much has arrived, so that it knows how much is under way, and how fast it arrives.
 void ReceivedPoints::send_receipt(double now_s) {
   const auto received = receiver_.figures();
   const double period_s = received.sequence == receipted_ ? kQuietReceipts_s : kReceipts_s;
@@ -107,7 +107,7 @@ void ReceivedPoints::show_state(const wire::ShownState& state) {
   if (const auto update = batches_.apply_until(state, cache_)) show(*update);
 }
 
-// The other thread may have shown a newer one by now.
+// The other thread may have shown a newer update by now.
 void ReceivedPoints::show(const ShownUpdate& update) {
   const std::lock_guard lock(mutex_);
   if (shown_.request < update.request) shown_ = update;
@@ -119,7 +119,7 @@ ShownUpdate ReceivedPoints::shown() const {
 }
 
 void ReceivedPoints::on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames) {
-  if (retired_) return;  // nobody takes the log any more
+  if (retired_) return;  // the worker takes the log no more
   const std::lock_guard lock(mutex_);
   seen_.add(clusters, frames);
 }
@@ -147,7 +147,7 @@ void ReceivedPoints::add_status(net::MasterLink::Values& values) const {
   values["digests_different"] = double(received.digests_different);
   values["messages_rejected"] += double(received.decode_errors);
   if (waits_ || in_step_) return;
-  // Where nothing is held back it is the receiver that knows when an epoch is shown.
+  // If updates are not held back, only the receiver knows when an epoch is shown.
   values["epochs_shown"] = std::max(values["epochs_shown"], double(received.epochs_shown));
   values["epoch"] = double(received.epoch.value);
 }

@@ -1,4 +1,4 @@
-// Points of a session: a replica of the packer's model, kept up to date by its events.
+// Points of a session: a replica of the packer's model, kept up to date by events.
 #pragma once
 
 #include <atomic>
@@ -35,19 +35,19 @@ class ReceivedPoints final : public Received {
   // ---- for its source, in the display's thread ----
   ModelCache& cache() { return cache_; }
   FineRays& fine_rays() { return fine_rays_; }
-  /// Where the display waits: shows this update, which is complete.
+  /// If the display waits: shows this update, which is complete.
   void advance(RequestId request);
-  /// The newest update that what is on display contains.
+  /// The newest update contained in what is on display.
   ShownUpdate shown() const;
-  /// What a frame drew.
+  /// Logs what a frame drew.
   void on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames);
-  /// The session packs without eliminating redundancy: of each cluster the best patches are to be drawn (T4.4.3.3).
+  /// True if the session packs without eliminating redundancy: then each cluster's best patches are drawn (T4.4.3.3).
   bool keeps_redundant() const { return keeps_redundant_; }
-  /// What the session cuts away now. What is on display may be of an epoch before.
+  /// The session's present clip. The points on display may be from an epoch before it.
   struct Cut {
     std::shared_ptr<const geometry::Clip> clip = std::make_shared<const geometry::Clip>();
-    uint64_t version = 0;  ///< changes with it
-    EpochId epoch;         ///< the first one that is cut so
+    uint64_t version = 0;  ///< changes with the clip
+    EpochId epoch;         ///< first epoch that is cut like this
   };
   Cut cut() const {
     const std::lock_guard lock(mutex_);
@@ -60,23 +60,23 @@ class ReceivedPoints final : public Received {
   void send_receipt(double now_s);
 
   ReceivedLinks links_;
-  bool waits_;                   // the display, for whole updates; worker's
-  const bool in_step_;           // it shows what other viewers show, too (a wall)
-  EventRecorder* const events_;  // null: nothing is kept
+  bool waits_;                   // the display waits for whole updates; used by the worker
+  const bool in_step_;           // the display shows what other viewers show, too (a wall)
+  EventRecorder* const events_;  // null: there is no record
   ModelCache cache_;
   FineRays fine_rays_;
   UpdateBatches batches_;
   PointReceiver receiver_;
   points::ModelConfig config_;  // valid once the feeds are connected
   AccessLog reported_;          // takes turns with seen_
-  /// What was drawn last is on display, also while the display waits and draws nothing.
+  /// The last report stays valid while the display waits and draws nothing.
   std::vector<AccessLog::Report> on_display_;
-  Sequence receipted_;          // the newest event that the packer was told of, and when
+  Sequence receipted_;  // the newest event that was reported to the packer; below: when
   double receipt_s_ = -1e9;
   uint64_t receipt_bytes_ = 0;
   std::atomic<bool> keeps_redundant_{false}, retired_{false};
 
-  mutable std::mutex mutex_;  // guards what both threads use, below
+  mutable std::mutex mutex_;  // guards the members below, which both threads use
   AccessLog seen_;
   ShownUpdate shown_;
   Cut cut_;

@@ -46,7 +46,7 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
   }
 }
 
-// Changes that are held for the display are in the cache later: then there is nothing to compare.
+// Held changes reach the cache later: while there are any, there is nothing to compare.
 void PointReceiver::on_published_mark(const wire::StateMark& mark) {
   sequencer_.on_mark(mark);
   if (mark.digest == 0 || options_.hold || !sequencer_.synchronised() || mark.packer != sequencer_.packer() ||
@@ -66,7 +66,7 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = state.receive();
     if (!message) return;
-    asked_s_ = monotonic_s();  // an answer that is coming in is not late
+    asked_s_ = monotonic_s();  // an answer that still comes in is not late
     using namespace wire;
     net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark>(state, *message, [&](auto& m) {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, StateMark>)
@@ -81,7 +81,7 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
 
 void PointReceiver::tick(double now_s) {
   if (sequencer_.waiting() && now_s - asked_s_ > kAnswerPatience_s) sequencer_.retry();
-  if (options_.hold || !switch_.due(now_s)) return;  // held: what is shown is decided update by update
+  if (options_.hold || !switch_.due(now_s)) return;  // held: each update decides what is shown
   cache_.show_newest();
   if (const auto since_s = switch_.waiting_since_s()) {
     ++epochs_shown_;
@@ -93,7 +93,7 @@ void PointReceiver::tick(double now_s) {
 std::optional<ShownUpdate> PointReceiver::release() {
   options_.hold = false;
   const double now_s = monotonic_s();
-  // The replica of an update that is complete is on display: what the switch had to decide before is decided.
+  // A complete update's replica is on display, so the switch has nothing left to decide about it.
   return batches_.release(
       cache_, [&] { switch_.begin(cache_.epoch(), false, now_s); },
       [&](const UpdateBatches::Begin& b, bool held) { switch_.begin(b.epoch, held, now_s); });
@@ -120,11 +120,11 @@ void PointReceiver::apply(const ModelEvent& event) {
         return true;
       },
       event.body);
-  // After it: points are shown first. What could not be applied could not be replayed either.
+  // Record after display: points are shown first. Events that cannot be applied could not be replayed either.
   if (applied && options_.events) record(event);
 }
 
-// Without what finer rays of others' views missed.
+// The record omits the misses of finer rays of other viewers' views.
 void PointReceiver::record(const ModelEvent& event) {
   const auto* patch = std::get_if<wire::Patch>(&event.body);
   if (!patch || patch->missed.empty() || patch->viewer == options_.viewer) return options_.events->add(event);
@@ -146,7 +146,7 @@ void PointReceiver::begin_replica(const points::ModelConfig& config, EpochId epo
 
 bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   const double begin = monotonic_s();
-  // Events in order always tell of an epoch before its first patch; a replica is never of two.
+  // Events in order always name an epoch before its first patch; a replica has one epoch.
   if (epoch_.value != 0 && patch.epoch != epoch_) {
     ++decode_errors_;
     log::warn("patch {} is of epoch {} while the model is of epoch {}: dropped", patch.sequence.value,
@@ -162,7 +162,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
     return false;
   }
   if (patch.viewer == options_.viewer && !patch.extra) rays_.follow(patch.camera);
-  // What finer rays of others' views missed is not shown here; what they met counts.
+  // Finer rays of other viewers' views: their misses are not shown here, their hits are.
   if (!patch.missed.empty() && patch.viewer != options_.viewer) {
     rays_.revise(patch.camera, patch.rect, tile_);
   } else if (const Status rays = add_rays(patch, tile_, rays_); !rays) {
@@ -197,7 +197,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   return true;
 }
 
-// What a patch left out of which nothing is held is not needed either.
+// If nothing is held of the refined patch, the refinement is empty.
 bool PointReceiver::apply_refinement(const wire::Refine& refine) {
   const double begin = monotonic_s();
   const auto bytes = std::span(reinterpret_cast<const uint8_t*>(refine.image.data()), refine.image.size());

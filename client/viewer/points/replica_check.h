@@ -1,5 +1,5 @@
-// Whether the replica is the packer's model, by their digests: marks of the packer tell its digest now and then. No
-// clock: times come in.
+// Compares the replica with the packer's model by their digests: marks of the packer bring its digest from time to
+// time. No clock: times come in.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@ namespace telesplat::viewer {
 
 class ReplicaCheck {
  public:
-  /// After a difference the replica is made anew at once, and again after this time, twice this time, up to kMostAnew
-  /// times in a row of one packer: what never comes out equal shall not cost a link all it has.
+  /// After a difference the replica is made anew at once, and again after this time, twice this time, ..., at most
+  /// kMostAnew times in a row with one packer: a replica that never becomes equal must not use up a link.
   static constexpr double kPatience_s = 20;
   static constexpr int kMostAnew = 3;
 
   enum class Verdict {
     kGoOn,
-    kAskAnew,  ///< the replica is to be made anew from everything
-    kGiveUp,   ///< told once: it was, kMostAnew times, and is not asked for any more until digests are equal
+    kAskAnew,  ///< make the replica anew from everything
+    kGiveUp,   ///< returned once: kMostAnew attempts failed, and there are no more until digests are equal
   };
-  /// Both digests are of the same event.
+  /// Both digests are for the same event.
   Verdict compare(InstanceId packer, uint64_t packers, uint64_t ours, double now_s) {
     if (std::exchange(packer_, packer) != packer || packers == ours) anew_ = 0, again_s_ = -1e300;
     if (packers == ours) return ++equal_, Verdict::kGoOn;
@@ -37,7 +37,7 @@ class ReplicaCheck {
  private:
   uint64_t equal_ = 0, different_ = 0;
   InstanceId packer_;
-  int anew_ = 0;  // times in a row, and one more once it is given up
+  int anew_ = 0;  // attempts in a row; one more after giving up
   double again_s_ = -1e300;
 };
 

@@ -9,18 +9,18 @@
 namespace telesplat::viewer {
 namespace {
 
-// What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
+// Share of a frame's time for drawing. The rest is for the worker, and the sampler of a small machine.
 constexpr double kBudgetShare = 0.85;
-// Of a frame's time, for sub-pixels. The samplers of a small machine need the rest: a head that has just come to rest
-// is when they have the most to do.
+// Share of a frame's time for sub-pixels. The samplers of a small machine need the rest: they have the most to do when
+// a head has just come to rest.
 constexpr double kStillShare = 0.5;
-// A camera that is the same for so many frames stands still.
+// A camera that is the same for this many frames stands still.
 constexpr int kStillFrames = 4;
-// Where frames are not paced.
+// Frame period if frames are not paced.
 constexpr double kStillPeriod_s = 1.0 / 60;
-// A frame whose time is over all the same saves so much for the next tile.
+// Least time that a frame saves for the next tile, even if its own time is over.
 constexpr double kLeastRefining_s = 0.5e-3;
-// What is on display but is not drawn again is told so often as seen: packers forget what nobody sees.
+// Period at which a picture that is not drawn again is reported as seen: packers forget points that no viewer sees.
 constexpr double kSeenPeriod_s = 0.5;
 
 int still_side(const DisplayOptions& o) { return o.still_samples >= 16 ? 4 : 2; }
@@ -36,7 +36,7 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
       half_size_(budget_.budget_ms()),
       supersampler_(*renderer_, still_side(options)) {}
 
-// Splats that soften their edges let the background through; which is known from drawing the same over another one.
+// Splats that soften their edges let the background through; drawing the same over another background shows how much.
 void PointSource::find_coverage(const FrameInput& input, const geometry::Camera& camera, image::View& view) {
   auto shading = options_.shading;
   shading.background = 0xffffff;
@@ -47,7 +47,7 @@ void PointSource::find_coverage(const FrameInput& input, const geometry::Camera&
   image::find_coverage(over_white_, view);
 }
 
-// For how many frames camera, look and clips have been the same.
+// Counts the frames for which camera, look and clips have been the same.
 void PointSource::count_same(const FrameInput& input) {
   const uint64_t cut_before = cut_.version;
   cut_ = received_.cut();
@@ -107,7 +107,7 @@ double PointSource::wanted_detail(const FrameInput& input) {
   return std::min(budget_.detail(), speed_.detail());
 }
 
-// What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
+// Measures the cost of this frame alone: a core that samplers held for a while is no reason for a coarser picture.
 void PointSource::measure(const FrameInput& input, double detail, const DrawnFrame& out) {
   const double end_s = monotonic_s();
   const splat::SplatStats& s = out.stats;
@@ -131,7 +131,7 @@ void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFr
   out.chosen_s = input.begin_s;
   if (changes_.any) {
     select(input, 1, out);
-    base_stale_ |= splat::names_of(list_) != base_;  // finer points are no part of it
+    base_stale_ |= splat::names_of(list_) != base_;  // the picture does not have finer points yet
   }
   const bool base = input.with_depth || (!still_.covers_all() && (base_stale_ || !input.intact));
   if (base && !changes_.any) select(input, 1, out);
@@ -151,7 +151,7 @@ void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFr
 void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame& out) {
   const double period_s = options_.target_fps > 0 ? 1 / options_.target_fps : kStillPeriod_s;
   const double begin_s = monotonic_s(), until_s = input.begin_s + kStillShare * period_s;
-  // Tiles that take longer than there is time in a frame are drawn in every second frame, or more seldom.
+  // Tiles that take longer than a frame allows are drawn in every second frame, or less often.
   saved_s_ = std::min(saved_s_ + std::max(until_s - begin_s, kLeastRefining_s), tile_s_);
   const Supersampler::Scene scene{
       [this](const geometry::Camera& camera, const splat::SelectionOptions& selection, splat::DrawList& list) {
@@ -174,7 +174,7 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
       out.still = false;
       tile_s_ = tile_s_ == 0 ? end_s - now_s : 0.8 * tile_s_ + 0.2 * (end_s - now_s);
     }
-    base_stale_ |= still_.share() < share;  // it has lost its pixels: the picture below is to be seen again
+    base_stale_ |= still_.share() < share;  // the tile has lost its pixels: draw the picture below it again
     now_s = end_s;
     out.refine_ms = (end_s - begin_s) * 1e3;
   }
@@ -196,7 +196,7 @@ void PointSource::add_figures(DrawnFrame& out) const {
   out.between_clips = list_.epoch.value < cut_.epoch.value;
 }
 
-// Before anything is drawn: what comes meanwhile may not be in the picture.
+// Runs before anything is drawn: the picture may lack changes that come later.
 DrawnFrame PointSource::begin_frame(const FrameInput& input) {
   auto& o = options_;
   put_into(input.look, o.shading);
@@ -227,13 +227,13 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   return out;
 }
 
-// A pair of a head that stands still is drawn with all detail, and again only where something has changed.
+// If the head stands still, a pair is drawn at full detail, and again only after a change.
 DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                                   const std::array<splat::FrameTarget, 2>& targets) {
   DrawnFrame out = begin_frame(input);
   options_.selection.eyes = eyes;
   count_same(input);
-  // A head that turns on the spot moves its eyes and not the place between them.
+  // A head that turns on the spot moves its eyes, but not the place between them.
   if (std::exchange(eyes_, eyes) != eyes) same_frames_ = 0;
   const bool still = same_frames_ >= kStillFrames;
   if (still && pair_sharp_ && input.intact && !changes_.any && !input.with_depth && !input.with_coverage) {
@@ -251,7 +251,7 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
   select(input, detail, out);
   pair_sharp_ = still;
   if (list_.points > 0 || input.even_empty) {
-    const image::Shading shading(options_.shading, input.camera);  // both look the same way
+    const image::Shading shading(options_.shading, input.camera);  // both eyes look the same way
     out.stats = renderer_->render_pair(list_, eyes, input.look.render, shading, targets);
     drawn_ = out.stats.points_drawn;
     for (size_t i = 0; i < eyes.size() && input.with_coverage; ++i) find_coverage(input, eyes[i], targets[i]);
@@ -261,7 +261,7 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
   return out;
 }
 
-// As finely as there are points, whatever the frame had time for.
+// Picks at full detail, which the frame may not have had time for.
 std::optional<Pick> PointSource::pick(const geometry::Camera& camera, double x_pix, double y_pix, double) {
   splat::SelectionOptions selection = options_.selection;
   selection.detail = 1;

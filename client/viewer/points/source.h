@@ -1,4 +1,4 @@
-// The display's source for scenes of points: selects from the model cache, splats.
+// The display's source for scenes of points: selects from the model cache, and splats.
 #pragma once
 
 #include "client/viewer/coupling/frame_budget.h"
@@ -11,7 +11,7 @@
 namespace telesplat::viewer {
 
 /// While the camera and the look stay the same, the picture is refined with sub-pixels, tile by tile, within a share of
-/// each frame's time, and nothing is drawn that is in the view already.
+/// each frame's time. Parts that are in the view already are not drawn again.
 class PointSource final : public ViewSource {
  public:
   PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ReceivedPoints& received);
@@ -19,7 +19,7 @@ class PointSource final : public ViewSource {
   void advance(RequestId request) override { received_.advance(request); }
   std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) override;
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
-  /// Without sub-pixels.
+  /// Draws without sub-pixels.
   DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                        const std::array<splat::FrameTarget, 2>& targets) override;
   bool draws_into_parts() const override { return true; }
@@ -50,23 +50,23 @@ class PointSource final : public ViewSource {
   HalfSize half_size_;
   SpeedDetail speed_;
   splat::DrawList list_;
-  uint64_t drawn_ = 0;  // points of it
+  uint64_t drawn_ = 0;  // number of its points that were drawn
   ReceivedPoints::Cut cut_;
 
-  // Since when the camera stands still, and what was drawn since then.
+  // The resting camera, its look, and what was drawn since it came to rest.
   geometry::Camera camera_;
-  std::optional<std::array<geometry::Camera, 2>> eyes_;  // of the last pair
+  std::optional<std::array<geometry::Camera, 2>> eyes_;  // the last pair's
   Look look_;
   int same_frames_ = 0;
   ModelCache::Changes changes_;
-  std::vector<geometry::Rect> ray_changes_;  // of the picture
+  std::vector<geometry::Rect> ray_changes_;  // rectangles of the picture
   StillPicture still_;
   Supersampler supersampler_;
-  std::optional<image::Shading> still_shading_;  // none: no still picture has begun
-  uint64_t base_ = 0;                            // what it shows: splat::names_of()
-  bool base_stale_ = true;  // the picture without sub-pixels, wherever the view shows it, is not of the model as it is
+  std::optional<image::Shading> still_shading_;  // nothing: no still picture has begun
+  uint64_t base_ = 0;                            // splat::names_of() the picture without sub-pixels
+  bool base_stale_ = true;  // the picture without sub-pixels, where the view shows it, is older than the model
   double tile_s_ = 0, saved_s_ = 0, seen_s_ = 0;
-  bool pair_sharp_ = false;  // the pair on display was drawn with all detail
+  bool pair_sharp_ = false;  // the pair on display was drawn at full detail
 };
 
 }  // namespace telesplat::viewer

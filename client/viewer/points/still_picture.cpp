@@ -7,8 +7,8 @@
 namespace telesplat::viewer {
 namespace {
 
-// How far outside of its cluster's cube a point's splat can show, pixels: half of splat::kMaxSplatSide sub-pixels, at
-// two of them a pixel, and what the finish looks at.
+// Pixels by which a point's splat can reach beyond its cluster's cube: half of splat::kMaxSplatSide sub-pixels, at two
+// sub-pixels a pixel, plus the reach of the finish.
 constexpr double kOverhang = 6;
 
 }  // namespace
@@ -39,7 +39,7 @@ void StillPicture::on_changes(std::span<const geometry::Rect> rects) {
          std::min(r.y + r.height, camera_.height - 1));
 }
 
-// The tiles that the box's eight corners span.
+// Marks the tiles that the box's eight corners span.
 void StillPicture::want(const geometry::Camera::PixelTransform& to_pixel, const geometry::Box& box) {
   double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;
   int behind = 0;

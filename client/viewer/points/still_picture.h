@@ -1,4 +1,4 @@
-// The picture of a camera that rests, refined tile by tile: which tiles there are, which is next, and their pixels.
+// The picture of a camera that rests, refined tile by tile: keeps the tiles and their pixels, and chooses the next one.
 #pragma once
 
 #include <optional>
@@ -10,42 +10,43 @@
 
 namespace telesplat::viewer {
 
-/// Tiles go through three states: to be drawn; drawn, with pixels of its own; left alone, because its points are no
-/// finer than pixels. Where points come or go a tile is to be drawn again; it keeps its pixels until then.
-/// Times come as arguments; no clocks, no renderer.
+/// A tile has one of three states: to be drawn; drawn, with pixels of its own; left alone, because its points are no
+/// finer than pixels. If points come or go in a tile, it is to be drawn again, and keeps its pixels until then. Times
+/// come as arguments; no clocks, no renderer.
 class StillPicture {
  public:
   static constexpr int kTileWidth = 128, kTileHeight = 96;  ///< pixels
-  /// A tile that was drawn or left alone waits so long before it is looked at again: points come in many small patches.
+  /// Time before a tile that was drawn or left alone is looked at again: points come in many small patches.
   static constexpr double kTileRest_s = 0.25;
 
-  /// Another camera: all tiles are to be drawn, none has pixels.
+  /// Begins for another camera: all tiles are to be drawn, and have no pixels.
   void begin(const geometry::Camera& camera);
-  /// Tiles in which points came or went are to be drawn (again). Another replica may be another scene: all begins anew.
+  /// Marks tiles in which points came or went as to be drawn. Another replica may be another scene: all begins anew.
   void on_changes(const ModelCache::Changes& changes);
-  /// So are those that these rectangles of the picture touch.
+  /// Marks tiles that these rectangles of the picture touch.
   void on_changes(std::span<const geometry::Rect> rects);
 
-  /// The next one: those without pixels come first, from the centre outwards; then those that waited longest.
+  /// Returns the next tile to draw: first one without pixels, from the centre outwards; then the one that waited
+  /// longest.
   std::optional<size_t> next(double now_s) const;
   geometry::Rect rect(size_t tile) const { return tiles_[tile].rect; }
-  /// Where the tile's pixels go: of its upper left one, rows camera.width apart.
+  /// Returns the place of the tile's upper left pixel; rows are camera.width apart.
   uint32_t* pixels(size_t tile);
-  /// has_pixels: it was drawn; else it is left alone, also where it had pixels before.
+  /// has_pixels: it was drawn; else it is left alone, even if it had pixels before.
   void done(size_t tile, bool has_pixels, double now_s);
 
-  /// Puts the pixels that there are over a picture of the camera's size.
+  /// Puts the tiles' pixels over a picture of the camera's size.
   void put_over(image::View& picture) const;
   void put_over(image::View& picture, size_t tile) const;
-  /// Share of the picture's pixels that tiles have.
+  /// Share of the picture's pixels that come from tiles.
   double share() const;
-  /// Whether tiles cover the whole picture.
+  /// True if tiles cover the whole picture.
   bool covers_all() const { return covered_ == tiles_.size(); }
 
  private:
   struct Tile {
     geometry::Rect rect;
-    double distance = 0;  // of its centre from the picture's, pixels
+    double distance = 0;  // distance of its centre from the picture's, pixels
     double done_s = -1e9;
     bool wanted = true, has_pixels = false;
   };
@@ -54,7 +55,7 @@ class StillPicture {
 
   geometry::Camera camera_;
   int columns_ = 0;
-  std::vector<Tile> tiles_;  // by rows
+  std::vector<Tile> tiles_;  // ordered by rows
   size_t covered_ = 0;       // tiles that have pixels
   std::vector<uint32_t> colour_;
 };

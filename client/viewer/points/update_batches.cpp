@@ -62,7 +62,7 @@ wire::ShownState UpdateBatches::newest(double now_s) const {
   return out;
 }
 
-// Of a replica that begins: whether an older one stays on display.
+// If the change begins a replica, returns true if an older one stays on display.
 bool UpdateBatches::apply_front(ModelCache& cache) {
   bool held = false;
   std::visit(
@@ -130,9 +130,9 @@ std::optional<ShownUpdate> UpdateBatches::apply_until(const wire::ShownState& st
       if (sequence > state.newest) break;
     } else if (std::none_of(changes_.begin(), changes_.end(),
                             [&](const Held& h) { return h.packer == state.source; })) {
-      break;  // it is of a packer that the others do not show yet
+      break;  // the others do not show this packer's model yet
     }
-    // The replica before, if that was to be shown, would be passed over.
+    // Show the replica before first, else it would be skipped.
     if (std::holds_alternative<Begin>(next.change)) show();
     apply_front(cache);
   }

@@ -69,8 +69,8 @@ struct EventReplay::Impl {
   FineRays rays;
   Sequence applied;
   bool at_end = false;
-  bool pending = false;     // the file's record was read but not applied
-  bool has_events = false;  // of the replica at hand
+  bool pending = false;     // a record was read and not applied yet
+  bool has_events = false;  // the replica at hand has an event
   image::DepthImage tile;
   refinement::BoundedPatches bounded;
 
@@ -78,7 +78,7 @@ struct EventReplay::Impl {
   const std::string& body() const { return file.body(); }
   Error wrong(const std::string& what) const { return file.wrong(what); }
 
-  // Makes sure that there is a record to look at; false at the end.
+  // Makes sure that there is a record; false at the end.
   bool have_record() {
     if (!pending && !file.next()) at_end = true;
     pending = !at_end;
@@ -134,7 +134,7 @@ struct EventReplay::Impl {
     return ok_status();
   }
 
-  // Makes the pending summary if it is not a later one than number `until`; false if it is.
+  // Makes the pending summary if its number is at most `until`; else returns false.
   Result<bool> apply_summary(uint64_t until) {
     SummaryBody b;
     if (body().size() != sizeof b) return wrong(fmt::format("{} bytes instead of {}", body().size(), sizeof b));
@@ -148,7 +148,7 @@ struct EventReplay::Impl {
     return true;
   }
 
-  // Applies the pending event if it is not newer than `until`; false if it is.
+  // Applies the pending event if it is not newer than `until`; else returns false.
   template <class E>
   Result<bool> apply_as(Sequence until) {
     const auto event = wire::decode<E>({reinterpret_cast<const std::byte*>(body().data()), body().size()});
@@ -177,7 +177,7 @@ Status EventReplay::advance(const Moment& moment) {
   while (i.have_record()) {
     Result<bool> applied = true;
     if (i.type() == kReplica) {
-      // Numbers begin again with another packer: what was asked for has been reached.
+      // Numbers begin again with another packer: the moment asked for has been reached.
       if (i.model && i.applied >= moment.sequence) return ok_status();
       if (const Status s = i.begin_replica(); !s) return s;
     } else if (i.type() == kSummary) {

@@ -1,10 +1,10 @@
-// The point-model events that a viewer applied, kept as they came. They are all that is needed to make any displayed
-// frame's model again: a replica is its packer's events in their order ("Replication" in docs/architecture.md).
+// Records the point-model events that a viewer applied, as they came. They suffice to rebuild the model of any
+// displayed frame: a replica is its packer's events in their order ("Replication" in docs/architecture.md).
 //
 // File (record_file.h): "TSEVENT4". Types: "replica" (six floats: the box in room space, lo then hi; u32: octree depth;
 // u32: 1 if mosaics are merged) where a replica begins, the wire's "patch", "forget", "refine", "epoch_begin", and
 // "summary" (u64: its number, u32: key of its brick) where the viewer made a summary of a brick
-// (common/points/summary.h) from the model as it was then. "TSEVENT3", of earlier versions, has no refinements, and
+// (common/points/summary.h) from the model as it was then. "TSEVENT3", from earlier versions, has no refinements, and
 // "TSEVENT2" no summaries either.
 #pragma once
 
@@ -25,9 +25,9 @@ class EventRecorder {
 
   void begin_replica(const points::ModelConfig& config);
   void add(const ModelEvent& event);
-  /// number: of all summaries that the viewer made, this one included.
+  /// number: counts all summaries that the viewer made, with this one.
   void add_summary(uint64_t number, points::ClusterKey brick);
-  /// Everything so far is on disk.
+  /// Returns when all events so far are on disk.
   void flush() { file_.flush(); }
   bool failed() const { return file_.failed(); }
   int error() const { return file_.error(); }  ///< as RecordWriter's
@@ -40,12 +40,12 @@ class EventRecorder {
 /// Plays a record into a model, event by event.
 class EventReplay {
  public:
-  /// Refuses files that are not a record. A record that ends in mid-event (a viewer that was killed) ends before that
-  /// event. with_summaries: summaries are made again too, which takes time.
+  /// Refuses files that are not a record. A record that ends in mid-event (the viewer was killed) ends before that
+  /// event. with_summaries: makes summaries again, too, which takes time.
   static Result<std::unique_ptr<EventReplay>> open(const std::string& path, bool with_summaries = false);
   ~EventReplay();
 
-  /// A displayed frame's state: its newest event, and how many summaries there were.
+  /// State of a displayed frame: its newest event, and its number of summaries.
   struct Moment {
     Sequence sequence;
     uint64_t summaries = ~uint64_t{0};
@@ -55,14 +55,14 @@ class EventReplay {
   Status advance(const Moment& moment);
   Status advance(Sequence sequence) { return advance(Moment{sequence}); }
   /// Goes on to where the viewer began its next replica, because another packer took over and numbers began again. A
-  /// replica that holds no event does not count. Fails if there is none.
+  /// replica without events does not count. Fails if there is no such replica.
   Status next_replica();
   /// Null before the first event. Pointers into it hold until the next advance().
   const points::PointModel* model() const;
-  /// Of the model's bricks; empty unless they are made.
+  /// Summaries of the model's bricks; empty unless they are made.
   const points::Summaries& summaries() const;
   Sequence applied() const;
-  /// What rays finer than the viewer's views met.
+  /// Hits of rays that are finer than the viewer's views.
   const FineRays& fine_rays() const;
   bool at_end() const;
 

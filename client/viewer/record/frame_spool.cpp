@@ -35,7 +35,7 @@ struct FileHeader {
 using FilePtr = std::unique_ptr<FILE, int (*)(FILE*)>;
 FilePtr open_file(const std::string& path, const char* mode) { return {std::fopen(path.c_str(), mode), std::fclose}; }
 
-// 0, or errno.
+// Returns 0, or errno.
 int write_frame(const std::string& directory, const SpooledFrame& f) {
   FileHeader h;
   const auto& c = f.camera;
@@ -58,11 +58,11 @@ int write_frame(const std::string& directory, const SpooledFrame& f) {
   constexpr const char* kEyes[] = {"", "-left", "-right"};
   const std::string path = fmt::format("{}/{:08d}{}.frame", directory, f.number, kEyes[f.eye]);
   unlink((path + ".part").c_str());
-  FilePtr out = open_file(path + ".part", "wbx");  // never through a link
+  FilePtr out = open_file(path + ".part", "wbx");  // never follows a link
   if (!out) return errno;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
   ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();
-  if (h.has_depth)  // else there is no array to point to
+  if (h.has_depth)  // otherwise there is no array to point to
     ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
   ok = ok && std::fwrite(legend.data(), 1, legend.size(), out.get()) == legend.size();
   int failed = ok ? 0 : errno;
@@ -152,7 +152,7 @@ void FrameSpool::write_loop() {
   }
 }
 
-// The disk may have room again later.
+// Later frames may succeed: the disk may have room again.
 void FrameSpool::on_failure(int error) {
   if (failed_++ > 0) return;
   error_ = error;

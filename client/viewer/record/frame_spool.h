@@ -1,5 +1,5 @@
-// Recorded frames: taken from the display thread without copying, written raw by a thread of their own, turned into
-// pictures after the run, so that recording never stalls the display.
+// Records frames: takes them from the display thread without copying, writes them raw in a thread of its own, and turns
+// them into pictures after the run, so that recording never stalls the display.
 #pragma once
 
 #include <atomic>
@@ -21,13 +21,13 @@
 
 namespace telesplat::viewer {
 
-/// Why a frame is kept: any combination.
+/// Reasons to keep a frame: any combination.
 enum FrameUse : uint32_t {
   kPicture = 1,
   kVerify = 2,
   kExr = 4,
   kTransparent = 8,  ///< its pictures have alpha: colours have the coverage in their upper byte
-  kPictureOnly = 16  ///< a server drew it: its depth says nothing
+  kPictureOnly = 16  ///< a server drew it: it has no depth
 };
 
 struct SpooledFrame {
@@ -36,17 +36,17 @@ struct SpooledFrame {
   uint32_t use = 0;
   geometry::Camera camera;
   image::View view;
-  EpochId epoch;  ///< of all points in it
-  /// Drawn onto the pictures alone: what is verified stays as it was displayed. Null: none.
+  EpochId epoch;  ///< epoch of all its points
+  /// Drawn onto pictures only: frames for verification stay as displayed. Null: no legend.
   std::shared_ptr<const image::Legend> legend;
-  image::DisplayPart part;  ///< of a legend: what the frame is of the display
+  image::DisplayPart part;  ///< for a legend: the frame's place in the display
   uint32_t eye = 0;         ///< 1: the left eye's picture, 2: the right one's, 0: all of the display
 };
 
 class FrameSpool {
  public:
-  /// Spools into `directory` (made if need be); at most `max_waiting` frames wait to be written, more are dropped and
-  /// counted.
+  /// Spools into `directory` (made if need be). At most `max_waiting` frames wait to be written; further ones are
+  /// dropped and counted.
   static Result<std::unique_ptr<FrameSpool>> open(const std::string& directory, size_t max_waiting = 8);
   ~FrameSpool();
 
@@ -54,11 +54,11 @@ class FrameSpool {
   image::View exchange(SpooledFrame frame);
   /// Waits until everything is on disk.
   void flush();
-  /// Frames that came faster than the disk takes them.
+  /// Frames that were dropped because they came faster than the disk could take them.
   uint64_t dropped() const { return dropped_; }
-  /// Frames that could not be written, which was logged once.
+  /// Frames that could not be written; the first one was logged.
   uint64_t failed() const { return failed_; }
-  int error() const { return error_; }  ///< errno of the first of them
+  int error() const { return error_; }  ///< errno of the first of those
 
  private:
   FrameSpool() = default;
@@ -77,13 +77,13 @@ class FrameSpool {
   std::thread thread_;
 };
 
-/// Paths of the spooled frames of a folder, by frame number.
+/// Paths of a folder's spooled frames, by frame number.
 std::vector<std::string> spooled_frames(const std::string& directory);
-/// Reads one spooled frame; refuses files that are not one, or were written by an earlier version.
+/// Reads one spooled frame; refuses other files, and those of an earlier version.
 Result<SpooledFrame> read_spooled_frame(const std::string& path);
-/// Turns frames marked kPicture into directory/frame-NNNNNN.png with their legends (kExr: .exr too, without) and
-/// deletes spooled frames that are not also marked kVerify. progress: done, of. go_on: asked before each frame; once it
-/// says no, the remaining ones are left as they are.
+/// Turns frames marked kPicture into directory/frame-NNNNNN.png with their legends (kExr: also .exr, without legend)
+/// and deletes spooled frames that are not also marked kVerify. progress: done, of. go_on: asked before each frame;
+/// once it returns false, the remaining ones are left as they are.
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
                       const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on = {});
 

@@ -1,4 +1,4 @@
-// What was measured in the last seconds, for people who watch: a bounded number of values. Thread-safe.
+// Values measured in the last seconds, for people who watch: a bounded number. Thread-safe.
 #pragma once
 
 #include <array>
@@ -9,16 +9,16 @@ namespace telesplat::viewer {
 
 class RecentValues {
  public:
-  static constexpr size_t kMost = 1024;  ///< values that are remembered; then the oldest goes
+  static constexpr size_t kMost = 1024;  ///< values kept; beyond it the oldest is dropped
 
   /// Values older than window_s do not count.
   explicit RecentValues(double window_s) : window_s_(window_s) {}
-  /// now_s rises.
+  /// Precondition: now_s does not fall from call to call.
   void add(double now_s, double value);
 
   struct Figures {
     size_t count = 0;
-    double median = 0, p95 = 0;  ///< as metrics::distribution() has them; 0 of nothing
+    double median = 0, p95 = 0;  ///< as metrics::distribution() has them; 0 without values
   };
   /// Cost: that of sorting kMost values.
   Figures figures(double now_s) const;

@@ -1,6 +1,6 @@
-// The files of what a viewer received, as it came: records, one after the other, of which the last may be cut off.
+// Files of received data as they came: records, one after the other; the last one may be cut off.
 //
-// File: 8 letters that say what it is and its version, then records  u32 type length, u64 body length, type, body
+// File: 8 letters that name its kind and version, then records  u32 type length, u64 body length, type, body
 // (little-endian).
 #pragma once
 
@@ -22,17 +22,17 @@ using RecordFile = std::unique_ptr<FILE, CloseFile>;
 
 class RecordWriter {
  public:
-  /// Makes the file anew. magic: 8 letters. At most max_bytes are written, then a warning is logged and the rest is
-  /// left out. what: for that warning, "point-model events".
+  /// Makes the file anew. magic: 8 letters. Writes at most max_bytes, then logs a warning and omits the rest. what:
+  /// kind of records, for that warning: "point-model events".
   static Result<RecordWriter> open(const std::string& path, std::string_view magic, uint64_t max_bytes,
                                    const char* what);
   void write(std::string_view type, std::string_view body);
-  /// Nothing more is written: the limit was reached, or the disk is full.
+  /// True if no more is written: the limit was reached, or the disk is full.
   bool full() const { return full_; }
-  /// Something could not be written, which was logged once; the file ends before it.
+  /// True if a record could not be written, which was logged once; the file ends before it.
   bool failed() const { return error_ != 0; }
   int error() const { return error_; }  ///< errno of that; 0: all was written
-  /// Everything so far is on disk, unless it failed.
+  /// Returns when all records so far are on disk, unless writing failed.
   void flush();
 
  private:
@@ -48,13 +48,13 @@ class RecordWriter {
 
 class RecordReader {
  public:
-  /// magics: what the file may begin with. what: for errors, "a record of point-model events". Error: the file is not
-  /// there, or is something else.
+  /// magics: possible beginnings of the file. what: kind of file, for errors: "a record of point-model events". Error:
+  /// there is no such file, or it begins otherwise.
   static Result<RecordReader> open(const std::string& path, const std::vector<std::string_view>& magics,
                                    const char* what);
 
-  /// Reads the next record. False at the end, also if the last one is cut off. Nothing is allocated that the file does
-  /// not hold.
+  /// Reads the next record. False at the end, also if the last one is cut off. Never allocates more than the file
+  /// holds.
   bool next();
   const std::string& type() const { return type_; }
   const std::string& body() const { return body_; }

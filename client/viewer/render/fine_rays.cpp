@@ -7,19 +7,19 @@
 namespace telesplat::viewer {
 namespace {
 
-// Depths are kept as steps of a 2730th of an octave (0.025 %) from the nearest one on, 24 octaves of them.
+// Depths are kept as steps of a 2730th of an octave (0.025 %), from near_m on, 24 octaves of them.
 constexpr double kSteps = 2730;
 constexpr uint16_t kNothing = 0xffff;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// The eyes of rays and of pixels are the same if what is nearest does not move by more than this between them, pixels.
+// Rays and pixels have the same eye if the nearest content moves by at most this between them, pixels.
 constexpr double kParallax = 1;
-// What is nearest may have been known before, and be no hit of finer rays.
+// Nearest content that is assumed at least: points that were known before are no hits of finer rays.
 constexpr double kNearest_m = 0.3;
-// What is about another surface is forgotten so many rays around.
+// Rays around a hit on another surface that are forgotten, on each side.
 constexpr int kRevised = 3;
-// More changes than this are told as one of everything.
+// More changes than this are reported as one change of everything.
 constexpr size_t kMostChanges = 4096;
-// Depths that differ by less are of one surface.
+// Depths that differ by a smaller factor are of one surface.
 constexpr float kBehind = 1.03f;
 
 uint16_t code(double depth_m, double near_m) {
@@ -44,14 +44,14 @@ bool same_frustum(const geometry::Camera& a, geometry::Camera b) {
   return a == b;
 }
 
-// From pixels of one camera to those of another with the same eye, as rows of a 3x3 matrix; the third one gives the
-// depth there of what has depth 1 here.
+// Maps pixels of one camera to those of another with the same eye, as rows of a 3x3 matrix; the third row gives the
+// depth there of a place at depth 1 here.
 class PixelMap {
  public:
   PixelMap(const geometry::Camera& from, const geometry::Camera& to) {
     const auto t = to.room_to_pixel();
     const auto at = [&](double x, double y) {
-      // From the other eye: they are as good as the same.
+      // From the other camera's eye: both are nearly the same.
       const glm::dvec3 d = from.unproject(x, y, 1) - from.pose.position_room;
       return glm::dvec3(glm::dot(glm::dvec3(t.x), d), glm::dot(glm::dvec3(t.y), d), glm::dot(glm::dvec3(t.w), d));
     };
@@ -65,8 +65,8 @@ class PixelMap {
   glm::dvec3 origin_, x_, y_;
 };
 
-// The rectangle of the other picture that holds a rectangle of this one, cut to its size. Empty: it lies outside, or
-// its corners do not all lie before the eye.
+// Returns the rectangle of the other picture that covers a rectangle of this one, cut to its size. Empty: it lies
+// outside, or its corners do not all lie before the eye.
 geometry::Rect around(const PixelMap& map, const geometry::Rect& r, const geometry::Camera& to) {
   double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;
   for (int corner = 0; corner < 4; ++corner) {
@@ -149,7 +149,7 @@ void FineRays::add(const Tile& tile) {
   note_change(tile.camera, m);
 }
 
-// Whether all that is known of the rays at most one beside is that they went farther than this.
+// True if this ray and all known rays beside it went farther than this depth.
 bool FineRays::went_farther(Layer& layer, int x, int y, float depth_m) {
   const uint16_t* own = layer.at(x, y);
   if (!own || *own == 0) return false;
@@ -188,7 +188,7 @@ void FineRays::revise(const geometry::Camera& camera, const geometry::Rect& rect
 
 void FineRays::note_change(const geometry::Camera& camera, const geometry::Rect& rect) {
   changes_.emplace_back(camera, rect);
-  // Nobody takes them.
+  // No caller takes the changes: join them.
   if (changes_.size() > kMostChanges) changes_ = {{camera, whole(camera)}};
 }
 
@@ -221,7 +221,7 @@ bool FineRays::look_up(const Layer& layer, const geometry::Camera& camera, std::
   for (int y = 0; y < camera.height; ++y) {
     glm::dvec3 at = map.at(0.5, y + 0.5);
     for (int x = 0; x < camera.width; ++x, ++met, at += map.step()) {
-      if (*met != 0) continue;  // a finer layer knows
+      if (*met != 0) continue;  // a finer layer knows it
       const double u = at.x / at.z, v = at.y / at.z;
       if (!(u >= there.x && v >= there.y && u < there.x + there.width && v < there.y + there.height)) continue;
       const int i = static_cast<int>(u), j = static_cast<int>(v);

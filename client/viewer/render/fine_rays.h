@@ -1,4 +1,4 @@
-// What finer rays of a view have met while its head stands still: where they met nothing, no point says so.
+// Keeps hits and misses of finer rays while a view's head stands still: no point of the model shows a miss.
 #pragma once
 
 #include <array>
@@ -17,37 +17,37 @@
 
 namespace telesplat::viewer {
 
-/// One eye's, of one place and orientation: rays of another begin anew. Written by one thread, looked up by another.
+/// Rays from one eye, at one place and orientation; another eye begins anew. One thread writes, another looks up.
 class FineRays {
  public:
   /// Rays a side of a block; blocks that no ray looked into take no memory.
   static constexpr int kBlock = 64;
-  /// More are not kept: 128 MiB. What is left out is shown as points alone do.
+  /// Limit of memory: 128 MiB. Where rays are omitted, the picture shows what points alone show.
   static constexpr size_t kMostBlocks = 16384;
-  /// Of different sizes: with two and four rays a side of a pixel. One more makes all begin anew.
+  /// Layers have different sizes: two and four rays a side of a pixel. With one more all begin anew.
   static constexpr size_t kMostLayers = 2;
 
-  /// Of a tile of finer rays.
+  /// A tile of finer rays.
   struct Tile {
     EpochId epoch;
-    geometry::Camera camera;         ///< of the whole frame
-    geometry::Rect missed_rect;      ///< where `missed` lies
+    geometry::Camera camera;         ///< the whole frame's camera
+    geometry::Rect missed_rect;      ///< place of `missed`
     const image::PixelMask* missed;  ///< rays that met nothing
-    geometry::Rect rect;             ///< where `image` lies
-    const image::DepthImage* image;  ///< what the others met, without what was known
+    geometry::Rect rect;             ///< place of `image`
+    const image::DepthImage* image;  ///< hits of the other rays, without those known before
   };
-  /// Precondition: both rectangles lie in the frame, and mask and image are of their sizes.
+  /// Precondition: both rectangles lie in the frame, and mask and image have their sizes.
   void add(const Tile& tile);
-  /// Other rays met something where finer ones had gone farther, and so had those beside them: data that change. What
-  /// is around it is forgotten. Precondition: rect lies in the camera's picture, and the image is of its size.
+  /// Other rays met something that finer rays, and those beside them, had passed: the data have changed. Forgets the
+  /// rays around it. Precondition: rect lies in the camera's picture, and the image has its size.
   void revise(const geometry::Camera& camera, const geometry::Rect& rect, const image::DepthImage& image);
   void clear();
-  /// The viewer's newest view: rays of another eye are forgotten.
+  /// Takes the viewer's newest view: rays of another eye are forgotten.
   void follow(const geometry::Camera& view);
 
-  /// What the rays nearest to the camera's pixels have met, by rows: depth in metres, infinity: nothing, 0: not known.
-  /// Less than 0: it was not of the finest rays that there are, so samples between them may tell more.
-  /// False: nothing is known at all, and met_m is undefined.
+  /// Returns the hits of the rays nearest to the camera's pixels, by rows: depth in metres, infinity: a miss, 0: not
+  /// known. A negative depth is from a coarser layer, so samples between its rays may show more. False: nothing is
+  /// known, and met_m is undefined.
   bool look_up(const geometry::Camera& camera, EpochId epoch, std::vector<float>& met_m) const;
   /// Adds the rectangles of the camera's picture in which rays were added or forgotten since the last call.
   void take_changes(const geometry::Camera& camera, std::vector<geometry::Rect>& out);
@@ -56,10 +56,10 @@ class FineRays {
   using Block = std::array<uint16_t, size_t{kBlock} * kBlock>;  // by rows: code()
   struct Layer {
     geometry::Camera camera;
-    std::unordered_map<int, std::unique_ptr<Block>> blocks;  // by row, then column
+    std::unordered_map<int, std::unique_ptr<Block>> blocks;  // key: row * columns() + column
     int columns() const { return (camera.width + kBlock - 1) / kBlock; }
     const Block* find(int block_x, int block_y) const;
-    uint16_t* at(int x, int y);  // null: nothing is known around
+    uint16_t* at(int x, int y);  // null: no ray of this block is known
   };
   using Changes = std::vector<std::pair<geometry::Camera, geometry::Rect>>;
   void forget();
@@ -70,11 +70,11 @@ class FineRays {
   bool same_eye(const geometry::Camera& camera) const;
   bool look_up(const Layer& layer, const geometry::Camera& camera, std::vector<float>& met_m) const;
 
-  mutable std::mutex mutex_;  // guards all
+  mutable std::mutex mutex_;  // guards all members
   EpochId epoch_;
-  std::vector<Layer> layers_;  // of one frustum, the finest first
+  std::vector<Layer> layers_;  // all of one frustum, the finest first
   size_t blocks_ = 0;
-  double nearest_m_ = std::numeric_limits<double>::infinity();  // of what was met
+  double nearest_m_ = std::numeric_limits<double>::infinity();  // depth of the nearest hit
   Changes changes_;
 };
 

@@ -99,7 +99,7 @@ class TriedVolumeRenderer final : public VolumeRenderer {
   TriedRenderers<VolumeRenderer> tried_;
 };
 
-// Gl: the renderer that draws by OpenGL. what: it does, for the log.
+// Gl: the class of the OpenGL renderer. what: the work that is done, for the log.
 template <class Gl, class R>
 Result<std::unique_ptr<R>> choose(const std::string& kind, int threads, std::unique_ptr<R> (*make_cpu)(int threads),
                                   const std::function<std::unique_ptr<R>(std::unique_ptr<R>, std::unique_ptr<R>)>& both,

@@ -1,5 +1,5 @@
-// The one interface of both display renderers, and that of both renderers of volumes: the warp of slice images into the
-// view of now.
+// Interfaces of both display renderers of points, and of both renderers of volumes, which warp slice images into the
+// present view.
 #pragma once
 
 #include <array>
@@ -20,24 +20,24 @@ class Renderer {
   virtual ~Renderer() = default;
   /// "cpu" or "gl"; "auto": both are still timed.
   virtual const char* name() const = 0;
-  /// Threads that the times of stages are summed over.
+  /// Number of threads over which stage times are summed.
   virtual int threads() const { return 1; }
-  /// What OpenGL calls the device that draws; empty: none does.
+  /// OpenGL's name for the device that draws; empty: it does not draw by OpenGL.
   virtual const std::string& device() const {
     static const std::string none;
     return none;
   }
-  /// Whether it draws halved frames faster (splat::RenderOptions::halved); else it takes no notice of it.
+  /// True if it draws halved frames faster (splat::RenderOptions::halved); else it ignores that option.
   virtual bool halves() const { return false; }
-  /// Draws one frame into target (host memory). Called from one thread, the one that made the renderer.
+  /// Draws one frame into target (host memory). Called only from the thread that made the renderer.
   virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                                    const splat::RenderOptions& options, const image::Shading& shading,
                                    const splat::FrameTarget& target) = 0;
-  /// Two views of one list (CpuSplatter::render_pair). Counts and times are those of both; points_drawn too.
+  /// Draws two views of one list (CpuSplatter::render_pair). Counts and times are sums over both, points_drawn too.
   virtual splat::SplatStats render_pair(const splat::DrawList& list, const std::array<geometry::Camera, 2>& cameras,
                                         const splat::RenderOptions& options, const image::Shading& shading,
                                         const std::array<splat::FrameTarget, 2>& targets);
-  /// Without any finish.
+  /// Draws without any finish.
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                            const image::Shading& shading, const splat::FrameTarget& target) {
     return render(list, camera, splat::RenderOptions{kernel, {false, false, false}}, shading, target);
@@ -45,23 +45,23 @@ class Renderer {
 };
 
 std::unique_ptr<Renderer> make_cpu_renderer(int threads);
-/// Draws with both by turns until `choice` says which is kept.
+/// Draws with both by turns until `choice` has the one that is kept.
 std::unique_ptr<Renderer> try_renderers(std::unique_ptr<Renderer> cpu, std::unique_ptr<Renderer> gl,
                                         std::shared_ptr<RendererChoice> choice,
                                         std::function<double()> now_s = monotonic_s);
-/// kind: "auto" (the quicker one where there is a hardware GPU, else cpu), "cpu", "gl": EGL, off-screen (device or Mesa
-/// surfaceless platform), OpenGL 4.3 or later. Fails with what was tried.
+/// kind: "auto" (the quicker one if there is a hardware GPU, else cpu), "cpu", "gl": EGL, off-screen (device or Mesa
+/// surfaceless platform), OpenGL 4.3 or later. Error: names what was tried.
 Result<std::unique_ptr<Renderer>> make_renderer(
     const std::string& kind, int threads,
     const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
 
-/// The one interface of both renderers of volumes: the warp of slice images into the view of now.
+/// Interface of both renderers of volumes, which warp slice images into the present view.
 class VolumeRenderer {
  public:
   virtual ~VolumeRenderer() = default;
   /// "cpu" or "gl"; "auto": both are still timed.
   virtual const char* name() const = 0;
-  /// As volume::Warper::render. Called from one thread, the one that made the renderer.
+  /// As volume::Warper::render. Called only from the thread that made the renderer.
   virtual volume::WarpStats render(const volume::VolumeFrame* frame, const geometry::Camera& camera,
                                    uint32_t background, const volume::WarpTarget& target) = 0;
 };
@@ -72,7 +72,7 @@ Result<std::unique_ptr<VolumeRenderer>> make_volume_renderer(
     const std::string& kind, int threads,
     const std::shared_ptr<RendererChoice>& choice = std::make_shared<RendererChoice>());
 
-/// Makes room for a frame of this camera, with depth or without. What it held is void.
+/// Makes room for a frame of this camera, with depth or without. Old content becomes void.
 inline void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
   const size_t pixels = size_t(camera.width) * size_t(camera.height);
   view.width = camera.width;

@@ -14,12 +14,12 @@
 
 namespace telesplat::viewer {
 
-/// The renderer that a session keeps, and why. The display's thread writes it, others read it.
+/// The renderer that a session keeps, and the reason. The display's thread writes it, others read it.
 class RendererChoice {
  public:
   struct Figures {
     std::string kept;              ///< "cpu" or "gl"; empty: both are still timed
-    double cpu_ms = 0, gl_ms = 0;  ///< medians of the timed frames; 0: only one renderer could be had
+    double cpu_ms = 0, gl_ms = 0;  ///< medians of the timed frames; 0: there was only one renderer
   };
   void set(Figures figures);
   Figures get() const;
@@ -31,8 +31,8 @@ class RendererChoice {
 
 /// Times two renderers, 0 and 1. Times come as arguments.
 ///
-/// Frames count that show something and are as large as the largest so far; a larger one begins anew. The first
-/// kWarmUp frames of each renderer do not count, for they upload points and compile shaders. The trial ends kSpan_s
+/// A frame counts if it shows something and is as large as the largest so far; a larger one begins anew. The first
+/// kWarmUp frames of each renderer do not count, because they upload points and compile shaders. The trial ends kSpan_s
 /// after its first frame, once each renderer has kLeast frames; after kFew frames of each it ends if one renderer takes
 /// kClear times as long as the other.
 class RendererTrial {
@@ -42,11 +42,11 @@ class RendererTrial {
 
   /// The renderer that draws the next frame.
   size_t next() const { return frames_[0] <= frames_[1] ? 0 : 1; }
-  /// Renderer next() has drawn a frame of that size in ms, at now_s.
+  /// Renderer next() has drawn a frame of this size in `ms`, until now_s.
   void add(size_t pixels, double ms, double now_s);
   /// The quicker one; nothing: the trial goes on.
   std::optional<size_t> quicker() const { return quicker_; }
-  /// Median of a renderer's timed frames, milliseconds; 0: it has none.
+  /// Median of a renderer's timed frames, milliseconds; 0: it has no timed frames.
   double median_ms(size_t renderer) const;
 
  private:
@@ -57,7 +57,7 @@ class RendererTrial {
   std::optional<size_t> quicker_;
 };
 
-/// Two renderers under trial, the processor's first; afterwards the one that is kept. Destroys the other.
+/// Two renderers under trial, the processor's first; afterwards the one that is kept. The other is destroyed.
 /// R: Renderer or VolumeRenderer. now_s: the clock that times frames.
 template <class R>
 class TriedRenderers {
@@ -69,7 +69,7 @@ class TriedRenderers {
   /// The renderer that is kept; null: both are still timed.
   const R* kept() const { return kept_; }
   R& next() const { return kept_ ? *kept_ : *renderers_[trial_.next()]; }
-  /// Calls draw(renderer). pixels: of the frame, 0 if it shows nothing.
+  /// Calls draw(renderer). pixels: size of the frame; 0 if it shows nothing.
   template <class Draw>
   auto draw(size_t pixels, const Draw& draw) {
     if (kept_ || pixels == 0) return draw(next());

@@ -12,18 +12,18 @@
 namespace telesplat::viewer {
 namespace {
 
-// Splats hang over into a rectangle from as far outside of it, in sub-pixels.
+// Splats reach into a rectangle from this far outside of it, in sub-pixels.
 constexpr int kOverhang = splat::kMaxSplatSide;
-// Samples closer than this, in pixels, count as finer than pixels: those of twice the resolution are 0.5 apart.
+// Samples closer than this, in pixels, count as finer than pixels: samples of twice the resolution are 0.5 apart.
 constexpr float kFiner = 0.75f;
-// So many of them, a pixel of the rectangle, are worth sub-pixels: an edge across a rectangle of 128 x 96 pixels, four
-// samples a pixel, has 0.03.
+// Sub-pixels pay from this many such samples for each pixel of the rectangle: an edge across a rectangle of 128 x 96
+// pixels, with four samples a pixel, has 0.03.
 constexpr double kWorthwhile = 0.01;
-// Splats that are cut may stand for as much surface as the others, which may hide them all, and a little more.
+// Surface of cut splats, as a share of that of the others, at most: so the others may hide all of them.
 constexpr double kMostCut = 1.2;
 // Samples closer than this, in sub-pixels, are as fine as sub-pixels.
 constexpr float kFinest = 1.5f;
-// Farther than what the view shows by this factor: about splat::kEdge steps of a depth code.
+// A depth larger by this factor is behind: about splat::kEdge steps of a depth code.
 constexpr float kBehindRays = 1.03f;
 
 geometry::Rect grown(const geometry::Rect& r, int by) {
@@ -44,7 +44,7 @@ void box_filter(const uint32_t* from, size_t from_pitch, int side, int width, in
   const auto samples = uint32_t(side * side), half = samples / 2;
   for (int y = 0; y < height; ++y, from += from_pitch * size_t(side), to += pitch)
     for (int x = 0; x < width; ++x) {
-      // Sums of 16 channels of 8 bits stay within 12.
+      // Sums of 16 channels of 8 bits fit into 12 bits.
       uint32_t red_blue = 0, green = 0;
       for (int j = 0; j < side; ++j)
         for (int i = 0; i < side; ++i) {
@@ -84,10 +84,10 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
   const geometry::Rect sub = scaled(grown(rect, 1), side_);
   splat::SelectionOptions selection = scene.selection;
   selection.detail = 1, selection.rests = true;
-  // Finer samples cover parts of a cluster only, as often as not edges that were sampled twice: coarser splats beside
-  // them must not shrink. Over them the nearest centre wins a sub-pixel anyway.
+  // Finer samples cover only parts of a cluster, often edges that were sampled twice: coarser splats beside them must
+  // not shrink. Where both lie, the nearest centre wins a sub-pixel anyway.
   selection.hide_ratio = std::numeric_limits<float>::infinity();
-  selection.max_splat_px = float(splat::kMaxSplatSide * side_);  // so that those that are cut are known
+  selection.max_splat_px = float(splat::kMaxSplatSide * side_);  // so that cut splats can be counted
   scene.select(crop(fine, grown(sub, kOverhang)), selection, list_);
   const Fineness fineness = this->fineness(rect);
   const geometry::Camera around = crop(fine, sub);
@@ -104,7 +104,7 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
   return true;
 }
 
-// With two pixels around.
+// Draws the rectangle and two pixels around it, without sub-pixels.
 void Supersampler::render_coarse(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect) {
   const geometry::Rect around = grown(rect, 2);
   splat::SelectionOptions selection = scene.selection;
@@ -113,7 +113,7 @@ void Supersampler::render_coarse(const Scene& scene, const geometry::Camera& cam
   render(scene, coarse_list_, crop(camera, around), coarse_);
 }
 
-// Whether some sub-pixels show something and others nothing.
+// Counts the sub-pixels that show something. True if some do and some do not.
 bool Supersampler::count_covered(const geometry::Rect& rect) {
   const size_t width = size_t(rect.width) + 2, height = size_t(rect.height) + 2;
   covered_.assign(width * height, 0), known_.assign(width * height, 0);
@@ -129,7 +129,7 @@ bool Supersampler::count_covered(const geometry::Rect& rect) {
   return all > 0 && all < fine_.depth_m.size();
 }
 
-// By what stands in covered_ and known_. Whether there are any.
+// Marks pixels at silhouettes, from covered_ and known_. True if there are any.
 bool Supersampler::find_silhouettes(const geometry::Rect& rect) {
   const size_t row = size_t(rect.width) + 2;
   const int whole = side_ * side_;
@@ -146,7 +146,7 @@ bool Supersampler::find_silhouettes(const geometry::Rect& rect) {
   return any;
 }
 
-// Of list_, which keeps these points alone.
+// Draws the points of list_ that are closer than `spacing`; list_ keeps only these.
 void Supersampler::render_closer(const Scene& scene, const geometry::Camera& around, float spacing, image::View& view) {
   std::erase_if(list_.items, [&](const splat::DrawItem& item) { return item.splat_px / list_.scale >= spacing; });
   render(scene, list_, around, view);
@@ -163,8 +163,8 @@ void Supersampler::show_antialiased(const Scene& scene, const geometry::Camera& 
     }
 }
 
-// Where rays are known, what they met. Splats before it are of coarser samples, or of those beside it; and coarser ones
-// at the same depth hide what the finest say of it.
+// Shows the hits of known rays. Splats in front of a hit come from coarser samples, or from samples beside it; coarser
+// samples at the same depth hide the finest ones.
 void Supersampler::show_met(const Scene& scene, const geometry::Camera& around) {
   const auto behind = [&](const image::View& view, size_t i) {
     return kBehindRays * view.depth_m[i] >= std::abs(met_m_[i]);
@@ -199,7 +199,7 @@ void Supersampler::close_gaps(const geometry::Rect& rect, bool with_depths) {
   const size_t w = size_t(rect.width) + 4;
   farthest_.resize(size_t(rect.width));
   for (int y = 0; y < rect.height; ++y) {
-    const size_t first = (size_t(y) + 1) * w + 1;  // upper left of the 3x3 around the row's first pixel
+    const size_t first = (size_t(y) + 1) * w + 1;  // upper left pixel of the 3x3 around the row's first pixel
     for (int x = 0; x < rect.width; ++x) {
       float far = 0;
       for (size_t j = 0; j < 3; ++j)

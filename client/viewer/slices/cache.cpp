@@ -17,7 +17,7 @@ geometry::Rect hull(const geometry::Rect& a, const geometry::Rect& b) {
 
 uint64_t pixels_of(const geometry::Rect& r) { return uint64_t(r.width) * uint64_t(r.height); }
 
-// Pixels that all images have, and the layers that they are merged to.
+// Counts the pixels of all images, and of the layers into which they are merged.
 uint64_t pixels_claimed(std::span<const volume::EncodedSlice> slices, const volume::ShearFrame& shear) {
   uint64_t pixels = 0;
   std::map<int, geometry::Rect> layers;
@@ -99,7 +99,7 @@ SliceCache::Newest SliceCache::newest() const {
 void SliceCache::free_dropped() {
   std::vector<std::shared_ptr<const volume::VolumeFrame>> free;  // freed after the lock is released
   const std::lock_guard lock(mutex_);
-  // New holders come from displayed() only, so that a frame that nobody else holds stays that way.
+  // New holders come from displayed() only, so a frame that is held only here stays that way.
   const auto held = std::partition(dropped_.begin(), dropped_.end(), [](const auto& f) { return f.use_count() > 1; });
   free.assign(std::make_move_iterator(held), std::make_move_iterator(dropped_.end()));
   dropped_.erase(held, dropped_.end());

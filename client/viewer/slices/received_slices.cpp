@@ -46,10 +46,10 @@ void ReceivedSlices::receive(int most) {
 void ReceivedSlices::on(const wire::SliceFrame& f, double arrived_s, net::Socket& state) {
   const double begin_s = monotonic_s();
   heard_s_ = begin_s;
-  acknowledge_left(state);  // before this one: packers see frames let go in their order
-  // What is not put into a buffer has left it.
+  acknowledge_left(state);  // before this one: the packer must see frames leave their buffers in order
+  // A frame that is not put into a buffer counts as having left it.
   const bool again = f.packer == packer_ && f.frame <= newest_;
-  // A request may be repeated by a link, or by somebody else.
+  // A link or another process may repeat a request.
   const bool overtaken = buffers_ == 0 && f.request.value > 0 && f.request < newest_request_;
   if (again || overtaken || f.viewer != links_.viewer || !grid_ ||
       (buffers_ > 0 && !links_.gate.with([&](Coupling& c) { return c.is_open(f.request); })))
@@ -73,9 +73,9 @@ void ReceivedSlices::on(const wire::SliceFrame& f, double arrived_s, net::Socket
   links_.spans.add("decode", links_.to_master_s(begin_s), links_.to_master_s(decoded_s), 1,
                    {.frame = double(f.frame.value), .request = double(f.request.value)});
   cache_.put(std::move(*frame));
-  if (record_) record_->add(*grid_, f);  // after it: it is shown first
+  if (record_) record_->add(*grid_, f);  // the record comes last: the frame is shown first
   if (buffers_ == 0) acknowledge(f.frame, state);
-  // The packer sends frames in order.
+  // The packer sends frames in order: earlier requests get no answer.
   links_.gate.with([&](Coupling& c) { c.skip_before(f.request); });
   links_.on_part({.viewer = f.viewer,
                   .request = f.request,
@@ -99,7 +99,7 @@ void ReceivedSlices::acknowledge(FrameId frame, net::Socket& state, bool damaged
   state.send(wire::SliceAck{links_.viewer, frame, in_order ? buffers_ : kAsyncBuffers, in_order, damaged});
 }
 
-// Frames that have left their buffers since the last call.
+// Acknowledges the frames that have left their buffers since the last call.
 void ReceivedSlices::acknowledge_left(net::Socket& state) {
   for (const FrameId frame : cache_.take_left()) acknowledge(frame, state);
 }
@@ -108,7 +108,7 @@ void ReceivedSlices::tick(double now_s) {
   net::Socket& state = *links_.feeds.find("state");
   acknowledge_left(state);
   cache_.free_dropped();
-  // The same acknowledgement once more changes nothing but what it says of the buffers.
+  // Repeats the last acknowledgement: only its number of buffers is new.
   if (std::exchange(tell_buffers_, false)) acknowledge(acknowledged_, state);
   const double period_s = heard_s_ > 0 ? kSilence_s : kSliceIntroduction_s;
   if (now_s - std::max(heard_s_, introduced_s_) < period_s) return;

@@ -1,4 +1,4 @@
-// Frames of slice images of a session: the newest one, or those that wait for the display, in order.
+// Receives a session's frames of slice images: keeps the newest one, or those that wait for the display, in order.
 #pragma once
 
 #include <optional>
@@ -17,19 +17,19 @@ class SliceRecorder;
 
 class ReceivedSlices final : public Received {
  public:
-  /// Frames on their way to an asynchronous viewer: while one is decoded the next one travels.
+  /// Frames under way to an asynchronous viewer: while one is decoded the next one travels.
   static constexpr uint64_t kAsyncBuffers = 2;
 
   ReceivedSlices(const ReceivedOptions& options, const ReceivedLinks& links);
 
-  /// Without a valid grid no frame is taken.
+  /// Without a valid grid it takes no frames.
   Status follow(const wire::Welcome& session) override;
   std::span<const Feed> feeds() const override;
   void on_connected() override { heard_s_ = introduced_s_ = -1e9, newest_ = acknowledged_ = {}; }
   void on_new_master() override { on_connected(); }
   void receive(int most) override;
-  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come, and when
-  /// none came for long: a packer that was restarted where it was does not know this viewer.
+  /// Acknowledges frames that have left their buffers. Introduces this viewer every second until a frame has come, and
+  /// when no frame came for long: a packer that was restarted at the same address does not know this viewer.
   void tick(double now_s) override;
   void on_coupling(int buffers) override;
   wire::ShownState newest_state() const override;
@@ -44,23 +44,23 @@ class ReceivedSlices final : public Received {
   void acknowledge_left(net::Socket& state);
 
   ReceivedLinks links_;
-  uint64_t buffers_;             // of the coupling; 0: asynchronous
-  SliceRecorder* const record_;  // keeps every frame that goes into the cache; null: nothing is kept
+  uint64_t buffers_;             // the coupling's; 0: asynchronous
+  SliceRecorder* const record_;  // keeps every frame that goes into the cache; null: there is no record
   SliceCache cache_;
   std::optional<volume::Grid> grid_;
   std::vector<volume::SliceImage> images_;
   InstanceId packer_, master_;
   FrameId newest_, acknowledged_;
-  RequestId newest_request_;  // that a frame answered
-  bool tell_buffers_ = false;  // to the packer
+  RequestId newest_request_;   // newest request that a frame has answered
+  bool tell_buffers_ = false;  // the packer must get the new number of buffers
   EpochId epoch_;
-  double introduced_s_ = -1e9, heard_s_ = -1e9;  // -1e9: nothing came yet
+  double introduced_s_ = -1e9, heard_s_ = -1e9;  // -1e9: nothing came or went yet
   uint64_t decode_errors_ = 0;
   log::RateLimiter log_limit_;
 };
 
-/// The display's source for slice images: warps the newest complete frame of slice images, or where the display
-/// waits the next one, into the view of now.
+/// The display's source for slice images: warps the newest complete frame into the present view, or the next one if the
+/// display waits.
 class SliceSource final : public ViewSource {
  public:
   SliceSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache)

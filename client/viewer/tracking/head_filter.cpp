@@ -6,13 +6,13 @@
 namespace telesplat::tracking {
 namespace {
 
-// What is not known of a head that is seen for the first time: how fast it is.
+// Standard deviation of the rate of a head that is seen for the first time.
 constexpr double kFirstRate = 1.0;
-// Beyond this the terms of the noise, which hold for steps that are short beside the acceleration's memory, only grow.
+// The terms of the noise hold for steps that are short beside the acceleration's memory; longer steps count as this.
 constexpr double kLongestStep_s = 0.2;
 
-// What `dt_s` makes of a rate and an acceleration that are forgotten with their time constants: by how much the value
-// changes for each, what of the acceleration becomes rate, what is left of both.
+// Effect of `dt_s` on a rate and an acceleration that decay with their time constants: value_of_X: change of the value
+// for each unit of X; rate_of_acceleration: part of the acceleration that becomes rate; X_left: part of X that is left.
 struct Passed {
   double value_of_rate, value_of_acceleration, rate_of_acceleration, rate_left, acceleration_left;
 };
@@ -23,8 +23,8 @@ Passed passed(double dt_s, const MotionNoise& n) {
   return {of_rate, k * (of_rate - n.memory_s * (1 - left)), k * (rate_left - left), rate_left, left};
 }
 
-// What the acceleration's noise adds to the covariance within `dt_s`: where that is short beside its memory (Singer
-// 1970, eq. 19), and where it is not and the noise is as good as white.
+// Returns the covariance that the acceleration's noise adds within `dt_s`: for times that are short beside its memory
+// (Singer 1970, eq. 19), or longer ones, for which the noise is nearly white.
 glm::dmat3 noise_within(double dt_s, const MotionNoise& n) {
   const double dt = std::min(dt_s, kLongestStep_s), dt2 = dt * dt, dt3 = dt2 * dt;
   const double a2 = n.acceleration * n.acceleration;

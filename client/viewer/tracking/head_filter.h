@@ -1,10 +1,10 @@
-// A Kalman filter of a head: position with its velocity and acceleration, orientation as the error of a rotation with
+// A Kalman filter for a head: position with its velocity and acceleration, orientation as the error of a rotation with
 // its angular velocity and acceleration (an error-state filter).
 //
-// Both are the same filter of one axis. Motion: the acceleration is a noise that forgets itself with a time constant
-// (R. A. Singer, "Estimating optimal tracking filter performance for manned maneuvering targets", 1970), and so does
-// the velocity, with a longer one: heads that turn come to rest. Noise is the same along all axes and so are the gains:
-// one covariance of 3 x 3 serves three axes.
+// Both use the same filter for one axis. Motion model: the acceleration is noise that decays with a time constant (R.
+// A. Singer, "Estimating optimal tracking filter performance for manned maneuvering targets", 1970), and the velocity
+// decays with a longer one: heads that turn come to rest. Noise is the same along all axes and so are the gains: one
+// covariance of 3 x 3 serves three axes.
 #pragma once
 
 #include <glm/matrix.hpp>
@@ -13,21 +13,21 @@
 
 namespace telesplat::tracking {
 
-/// Of a unit quaternion; the shorter way round, so at most pi long.
+/// Converts a unit quaternion to axis times angle; the shorter way round, so at most pi long.
 glm::dvec3 rotation_vector(glm::dquat q);
-/// The unit quaternion that turns about `v` by its length in radians.
+/// Returns the unit quaternion that turns about `v` by its length in radians.
 glm::dquat rotation(const glm::dvec3& v);
 /// Radians between two orientations, 0 to pi.
 double angle_between(const glm::dquat& a, const glm::dquat& b);
-/// `v`, or a vector of its direction that is `limit` long where it is longer.
+/// Returns `v`, shortened to `limit` if it is longer.
 glm::dvec3 clamp_length(const glm::dvec3& v, double limit);
 
-/// Of one axis; metres or radians.
+/// Noise of one axis; metres or radians.
 struct MotionNoise {
   double acceleration = 1;    ///< its standard deviation, 1/s^2
   double memory_s = 0.05;     ///< the acceleration's time constant
-  double persistence_s = 1;   ///< the velocity's; longer than the acceleration's
-  double measurement = 1e-3;  ///< standard deviation of what is measured
+  double persistence_s = 1;   ///< the velocity's time constant; longer than memory_s
+  double measurement = 1e-3;  ///< standard deviation of measurements
 };
 
 /// Value, rate and acceleration of a measured motion along three axes.
@@ -35,13 +35,13 @@ class MotionFilter {
  public:
   explicit MotionFilter(const MotionNoise& noise) : noise_(noise) {}
 
-  /// Begins anew, at rest as far as is known.
+  /// Begins anew, assumed to be at rest.
   void begin();
-  /// `dt_s` passes: returns how much the value changes.
+  /// Advances by `dt_s`; returns the change of the value.
   glm::dvec3 step(double dt_s);
-  /// The value was found to be this much away from where the filter has it; returns by how much it is to be corrected.
+  /// Takes a measurement that differs from the filter's value by this much; returns the correction of the value.
   glm::dvec3 correct(const glm::dvec3& difference);
-  /// How much the value will change within `dt_s`.
+  /// Predicts the change of the value within `dt_s`.
   glm::dvec3 change_within(double dt_s) const;
   const glm::dvec3& rate() const { return rate_; }
 
@@ -51,7 +51,7 @@ class MotionFilter {
   glm::dmat3 covariance_{0.0};
 };
 
-/// What the filter takes heads to be like; docs/tracking.md tells how these were found.
+/// Noise that the filter assumes for heads; docs/tracking.md shows how it was found.
 struct HeadNoise {
   MotionNoise position{.acceleration = 4, .memory_s = 0.05, .persistence_s = 1, .measurement = 5e-3};
   MotionNoise orientation{.acceleration = 30, .memory_s = 0.01, .persistence_s = 0.15, .measurement = 8e-3};
@@ -61,11 +61,11 @@ class HeadFilter {
  public:
   explicit HeadFilter(const HeadNoise& noise = {}) : position_(noise.position), orientation_(noise.orientation) {}
 
-  /// Everything before is forgotten; the next pose begins anew.
+  /// Forgets all poses; the next one begins anew.
   void forget() { begun_ = false; }
-  /// Precondition: t_s is later than at the last call, unless that is forgotten.
+  /// Precondition: t_s is later than in the last call, except after forget().
   void add(double t_s, const geometry::Pose& pose);
-  /// The pose at t_s, which is not before the newest one that was added. Nothing was: the identity.
+  /// Predicts the pose at t_s, which is not before the newest added pose. Before the first pose: the identity.
   geometry::Pose at(double t_s) const;
   /// m/s and rad/s in room space.
   const glm::dvec3& velocity() const { return position_.rate(); }
@@ -73,7 +73,7 @@ class HeadFilter {
 
  private:
   MotionFilter position_, orientation_;
-  geometry::Pose pose_;  // as the filter has it
+  geometry::Pose pose_;  // filtered
   double t_s_ = 0;
   bool begun_ = false;
 };

@@ -8,9 +8,9 @@ namespace telesplat::tracking {
 namespace {
 
 constexpr double kVelocityWindow_s = 0.15;
-// A jump is both: farther than predictions ever reach, and faster than heads are.
+// A jump is both farther than predictions ever reach, and faster than heads are.
 constexpr double kFastest_m_s = 8, kFastest_rad_s = 40;
-constexpr double kLongestGap_s = 0.5;  // nothing is known of how a head moves that was not seen for longer
+constexpr double kLongestGap_s = 0.5;  // after a longer gap the head's movement counts as unknown
 
 }  // namespace
 

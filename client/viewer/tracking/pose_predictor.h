@@ -1,4 +1,4 @@
-// Where a head will be: from the poses of its past, by its velocity or by a Kalman filter.
+// Predicts a head's pose from past poses, by its velocity or by a Kalman filter.
 #pragma once
 
 #include <array>
@@ -24,12 +24,12 @@ class PosePredictor {
  public:
   explicit PosePredictor(Prediction method = Prediction::kKalman) : method_(method) {}
 
-  /// Poses that are not later than the newest are passed over. One that no head can have come to (recentring, another
+  /// Poses that are not later than the newest are ignored. A pose that no head can have reached (recentring, another
   /// person, a broken tracker) begins anew.
   void add(double t_s, const geometry::Pose& pose);
-  /// At most kMaxMove_m and kMaxTurn_rad away from the newest pose.
+  /// Returns a pose at most kMaxMove_m and kMaxTurn_rad away from the newest one.
   geometry::Pose predict(double t_s) const;
-  /// `pose`, moved on for dt_s as this head moves now, within the same limits.
+  /// Returns `pose` after dt_s of this head's present movement, within the same limits.
   geometry::Pose carried(const geometry::Pose& pose, double dt_s) const;
   /// The newest pose and its time.
   struct Sample {
@@ -39,7 +39,7 @@ class PosePredictor {
   std::optional<Sample> newest() const { return samples_.empty() ? std::nullopt : std::optional(samples_.back()); }
   double speed_m_s() const;
   double turn_rad_s() const;
-  /// What came before means nothing any more.
+  /// Forgets all poses.
   void forget();
 
   static constexpr double kMaxMove_m = 0.3, kMaxTurn_rad = 0.6;
@@ -52,7 +52,7 @@ class PosePredictor {
   geometry::Pose unbounded(double t_s) const;
 
   Prediction method_;
-  std::deque<Sample> samples_;  // of the last 0.15 s
+  std::deque<Sample> samples_;  // the last 0.15 s
   HeadFilter filter_;
 };
 

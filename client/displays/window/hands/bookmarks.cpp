@@ -42,7 +42,7 @@ void Bookmarks::put(std::function<void()> task) {
   wake_.notify_one();
 }
 
-// how: returns what was done, for the person.
+// how: changes the book, and returns a line for the person.
 void Bookmarks::change(const notes::Shelf& shelf, std::function<Result<std::string>(notes::Book&)> how) {
   put([this, shelf, how = std::move(how)] {
     std::string done, path;
@@ -131,7 +131,7 @@ void Bookmarks::run() {
   }
 }
 
-// name: empty: the one after the last.
+// name: empty: the bookmark after the last one.
 void Bookmarks::find_now(const notes::Shelf& shelf, const std::string& name) {
   const auto book = notes::read_book(shelf);
   if (!book) return tell_(book.error().text);

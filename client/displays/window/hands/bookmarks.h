@@ -1,5 +1,5 @@
 // A window's bookmarks and notes: kept beside the data set and read from there, by a thread of their own, because disks
-// and locks take their time.
+// and locks take time.
 #pragma once
 
 #include <condition_variable>
@@ -17,27 +17,27 @@ namespace telesplat::viewer {
 
 class Bookmarks {
  public:
-  /// tell: lines for the person, from the thread.
+  /// tell: gets lines for the person, called from the thread.
   explicit Bookmarks(std::function<void(const std::string&)> tell);
   /// Finishes what was begun.
   ~Bookmarks();
 
-  /// Keeps a view; without a name under one that no other has: "view 3".
+  /// Keeps a view; without a name it gets a new one: "view 3".
   void keep(const notes::Shelf& shelf, const geometry::Pose& pose, const std::string& name = {});
-  /// Looks for the bookmark after the one that was found last, round and round; take_found() has it when it is there.
+  /// Looks for the bookmark after the one found last, in a circle; take_found() then returns it.
   void next(const notes::Shelf& shelf);
-  /// The same with the one of this name.
+  /// Looks for the one of this name.
   void find(const notes::Shelf& shelf, const std::string& name);
   void remove(const notes::Shelf& shelf, const std::string& name);
-  /// Its time is filled in.
+  /// Fills in the note's time.
   void add(const notes::Shelf& shelf, const notes::Note& note);
   void remove_note(const notes::Shelf& shelf, uint64_t number);
-  /// Reads what is there, for book().
+  /// Reads the book, for book().
   void look(const notes::Shelf& shelf);
 
-  /// Once.
+  /// Returns the bookmark once.
   std::optional<notes::Bookmark> take_found();
-  /// As it was read last; null: it was not, or cannot be.
+  /// The book as read last; null: it was not read, or cannot be.
   std::shared_ptr<const notes::Book> book() const;
 
  private:
@@ -48,7 +48,7 @@ class Bookmarks {
   void put(std::function<void()> task);
 
   std::function<void(const std::string&)> tell_;
-  std::string last_;  // the bookmark that was found last
+  std::string last_;  // name of the bookmark found last
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<std::function<void()>> tasks_;

@@ -1,4 +1,4 @@
-// Measurements in the picture: a cross a place, a line between neighbours, numbers beside them.
+// Draws measurements into the picture: a cross at each place, a line between neighbours, numbers beside them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct Line {
   glm::dvec2 from, to;
 };
 struct Label {
-  glm::dvec2 at;  // of its middle
+  glm::dvec2 at;  // its middle
   std::string text;
 };
 struct Marks {
@@ -30,7 +30,7 @@ struct Marks {
   std::vector<Label> labels;
 };
 
-// What is in front of the near plane, in pixels.
+// Projects a place in front of the near plane to pixels. Nothing: it lies behind that plane.
 std::optional<glm::dvec2> seen(const geometry::Camera& camera, const glm::dvec3& room) {
   const auto [x, y, w] = camera.room_to_pixel();
   const glm::dvec4 h(room, 1);
@@ -39,7 +39,7 @@ std::optional<glm::dvec2> seen(const geometry::Camera& camera, const glm::dvec3&
   return glm::dvec2(glm::dot(x, h), glm::dot(y, h)) / depth_m;
 }
 
-// The part of a line that lies in a rectangle from 0 to `size` (Liang and Barsky 1984).
+// Returns the part of a line in a rectangle from 0 to `size` (Liang and Barsky 1984).
 std::optional<Line> clipped(const Line& line, const glm::dvec2& size) {
   const glm::dvec2 along = line.to - line.from;
   double begin = 0, end = 1;
@@ -69,7 +69,7 @@ Marks marks_of(const Measurements& measurements, const geometry::Camera& camera,
       if (at && glm::all(glm::greaterThanEqual(*at, glm::dvec2(0))) && glm::all(glm::lessThan(*at, size))) {
         out.places.push_back(*at);
         std::string text = std::to_string(row[i].number);
-        // The angle at a place belongs to it and to both of its neighbours.
+        // The angle at a place belongs to it and both of its neighbours.
         if (i > 0 && i + 1 < row.size() && std::isfinite(m.angles_deg[i - 1]))
           text += fmt::format("  {:.1f} deg", m.angles_deg[i - 1]);
         out.labels.push_back({*at + glm::dvec2(0, -aside), text});
@@ -91,7 +91,7 @@ Marks marks_of(const Measurements& measurements, const geometry::Camera& camera,
 MarksPicture draw_marks(const Measurements& measurements, const geometry::Camera& camera, int scale) {
   const Marks marks = marks_of(measurements, camera, scale);
   const int padding = 2 * scale, text_height = image::kGlyphHeight * scale + 2 * padding;
-  // The rectangle that holds all of them, within the window.
+  // The rectangle that holds all marks, within the window.
   glm::dvec2 lo(1e9), hi(-1e9);
   const auto add = [&](const glm::dvec2& at, const glm::dvec2& half) {
     lo = glm::min(lo, at - half), hi = glm::max(hi, at + half);
@@ -103,7 +103,7 @@ MarksPicture draw_marks(const Measurements& measurements, const geometry::Camera
   lo = glm::floor(glm::max(lo, glm::dvec2(0))), hi = glm::ceil(glm::min(hi, glm::dvec2(camera.width, camera.height)));
   if (lo.x >= hi.x || lo.y >= hi.y) return {};
   MarksPicture out{image::Canvas(int(hi.x - lo.x), int(hi.y - lo.y), 0).view(), int(lo.x), int(lo.y)};
-  for (const int part : {3, 1})  // a dark rim below, so that they are seen on every ground
+  for (const int part : {3, 1})  // a dark rim below, for contrast on every ground
     for (const auto& line : marks.lines)
       draw_line(out.view, line.from - lo, line.to - lo, part * scale, part == 1 ? kMark : kRim);
   for (const int part : {3, 1})

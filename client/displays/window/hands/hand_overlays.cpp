@@ -17,7 +17,7 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr uint32_t kMarkGround = 0xa0101418, kMarkInk = 0xfff0f0f0, kMarkRim = 0xff101418;
-// Told apart by people who do not see red or green, too (Okabe and Ito 2008: vermillion, bluish green, sky blue).
+// People who do not see red or green can tell them apart (Okabe and Ito 2008: vermillion, bluish green, sky blue).
 constexpr uint32_t kAxes[3] = {0xffd55e00, 0xff009e73, 0xff56b4e9};
 constexpr int kPadding = 4;  // dots of a letter
 
@@ -25,7 +25,7 @@ constexpr const char* kNames[] = {"axes", "scale", "cursor", "fps"};
 constexpr double kDraw_s = 0.05, kCount_s = 0.5;
 constexpr int kGap = 4;  // pixels between pictures
 
-// One under the other, at the left.
+// Stacks pictures one below the other, at the left.
 image::View stack(const std::vector<image::View>& pictures) {
   int width = 1, height = -kGap;
   for (const auto& p : pictures) width = std::max(width, p.width), height += p.height + kGap;
@@ -45,7 +45,7 @@ void draw_line(image::View& view, glm::dvec2 a, glm::dvec2 b, double thickness, 
   const double length2 = std::max(glm::dot(along, along), 1e-9), length = std::sqrt(length2);
   const double lo_y = std::min(a.y, b.y) - thickness, hi_y = std::max(a.y, b.y) + thickness;
   const double lo_x = std::min(a.x, b.x) - thickness, hi_x = std::max(a.x, b.x) + thickness;
-  // In a row, only the pixels near where the line crosses it.
+  // In each row, only pixels near the crossing with the line are tested.
   const bool level = std::abs(along.y) <= 1e-6 * length;
   const double reach = level ? hi_x - lo_x : thickness * length / std::abs(along.y);
   for (int y = std::max(int(lo_y), 0); y < std::min(int(hi_y) + 1, view.height); ++y) {
@@ -159,7 +159,7 @@ void HandOverlays::on_frame(double now_s, uint64_t frames) {
   counted_ = frames;
 }
 
-// Two pictures of the same state are the same.
+// Equal states mean equal pictures.
 std::string HandOverlays::state(const geometry::Camera& camera) const {
   std::string out;
   for (const auto& name : shown_) out += name + " ";

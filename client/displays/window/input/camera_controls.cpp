@@ -10,14 +10,14 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kLag_s = 0.05;  // of the camera behind its goal: three frames
+constexpr double kLag_s = 0.05;  // lag of the camera behind its goal: three frames
 constexpr double kMaxStep_s = 0.25;
-constexpr double kOrbit_rad = kPi, kLook_rad = 1.5;  // a window height
-constexpr double kDollySteps = 30;                   // a window height
+constexpr double kOrbit_rad = kPi, kLook_rad = 1.5;  // turn for a window height
+constexpr double kDollySteps = 30;                   // steps for a window height
 constexpr double kDollyStep = 0.9, kSpeedStep = 1.2, kFast = 4;
-constexpr double kMaxDrag = 4, kMaxWheel = 50;  // window heights, steps: at once
+constexpr double kMaxDrag = 4, kMaxWheel = 50;  // limits of one input: window heights, steps
 
-// Within +-limit; what is not finite becomes nothing.
+// Limits v to +-limit; a value that is not finite becomes 0.
 double sane(double v, double limit) { return std::isfinite(v) ? within(v, -limit, limit) : 0.0; }
 
 }  // namespace
@@ -42,7 +42,7 @@ CameraControls::View CameraControls::view_at(const geometry::Pose& pose, double 
   const glm::dvec3 forward = pose.orientation * glm::dvec3(0, 0, -1);
   View s;
   s.pitch = std::asin(within(forward.y, -1.0, 1.0));
-  // Looking straight up or down, the direction in which the head's top points tells the heading.
+  // If the camera looks straight up or down, the direction of the head's top gives the heading.
   const glm::dvec3 level =
       std::abs(forward.y) < 0.9999 ? forward : -forward.y * (pose.orientation * glm::dvec3(0, 1, 0));
   s.yaw = std::atan2(-level.x, -level.z);
@@ -54,7 +54,7 @@ CameraControls::View CameraControls::view_at(const geometry::Pose& pose, double 
   return s;
 }
 
-// Depths, along the ray through the middle.
+// Distances are depths along the ray through middle_x.
 std::optional<double> CameraControls::distance_to_axis(const geometry::Pose& pose, double middle_x) const {
   const glm::dvec3 to_centre = centre_ - pose.position_room, forward = pose.orientation * glm::dvec3(middle_x, 0, -1);
   const double level = forward.x * forward.x + forward.z * forward.z;
@@ -70,7 +70,7 @@ double CameraControls::distance_of_interest(const geometry::Pose& pose, double m
   return within(distance_to_axis(pose, middle_x).value_or(ahead), 0.25 * extent_m_, farthest_m_);
 }
 
-// Where the pose shows the data set's vertical axis.
+// Returns the tangent at which the pose shows the data set's vertical axis.
 double CameraControls::middle_of(const geometry::Pose& pose) const {
   return !distance_to_axis(pose, home_middle_x_) && distance_to_axis(pose, 0) ? 0 : home_middle_x_;
 }
@@ -93,7 +93,7 @@ void CameraControls::set_scene(const geometry::Box& box, const geometry::Pose& h
   const View to = home_view();
   pivot_m_ = std::max(Limits::kPivot * extent_m_, glm::distance(to.anchor, centre_));
   if (touched_) return clamp_goal();
-  // As it is: it may look past the limits. On its way there it does not jump.
+  // The home pose is used as it is, even beyond the limits. A camera on its way there does not jump.
   const bool another = !std::exchange(has_scene_, true) || centre != before.centre || extent_m_ != before.extent_m;
   if (another && glm::distance(pose_of(now_).position_room, pose_of(goal_).position_room) < 1e-3 * extent_m_)
     now_ = goal_ = to;
@@ -142,7 +142,7 @@ void CameraControls::set_flying(bool flying) {
   if (flying == flying_) return;
   touched_ = true;
   flying_ = flying;
-  // Goal and camera keep their poses; only what they turn about moves.
+  // Goal and camera keep their poses; only their anchors move.
   const auto move_anchor = [&](View& s, double distance) {
     s.anchor += rotation(s) * glm::dvec3(-s.middle_x, 0, 1) * (s.distance - distance);
     s.distance = distance;
@@ -223,7 +223,7 @@ geometry::Pose CameraControls::advance(double dt_s) {
   goal_.anchor += flight_velocity() * dt;
   if (touched_) clamp_goal();
   const double keep = std::exp(-dt / kLag_s);
-  const glm::dvec3 trail = (goal_.anchor - before) / dt * kLag_s;  // how far a camera trails a goal of this velocity
+  const glm::dvec3 trail = (goal_.anchor - before) / dt * kLag_s;  // a camera's distance behind a goal of this velocity
   const bool moving = flying_ && trail != glm::dvec3(0);
   now_.anchor = moving ? goal_.anchor - trail + (now_.anchor - before + trail) * keep
                        : goal_.anchor + (now_.anchor - goal_.anchor) * keep;
@@ -232,7 +232,7 @@ geometry::Pose CameraControls::advance(double dt_s) {
   follow(now_.pitch, goal_.pitch);
   follow(now_.roll, goal_.roll);
   follow(now_.middle_x, goal_.middle_x);
-  // Distances by ratio, so that coming near is as smooth as going away.
+  // Distances change by ratio, so that approach is as smooth as retreat.
   if (!flying_) now_.distance = goal_.distance * std::pow(now_.distance / goal_.distance, keep);
   return pose();
 }

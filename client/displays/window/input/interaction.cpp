@@ -6,12 +6,12 @@
 namespace telesplat::viewer {
 namespace {
 
-// Between the poses of a recorded path, so that their times differ in the file too.
+// Least time between poses of a recorded path, so that their times also differ in the file.
 constexpr double kLeastStep_s = 1e-5;
 constexpr double kDoubleClick_s = 0.4, kDoubleClick = 0.01;  // between the clicks; window heights
 constexpr double kQuitWithin_s = 3;                          // between the two presses of Q
 
-// What a letter is part of, where a path is typed.
+// True if the key writes a letter when a path is typed.
 bool writes(Key key) { return key < Key::kF1; }
 
 }  // namespace
@@ -47,7 +47,7 @@ void Interaction::show_dialog(bool shown) {
   shows_dialog_ = shown;
 }
 
-// What lies above the rest first. The program goes on: who closes one thing too many loses nothing.
+// Closes the topmost thing first. It never ends the program, so one press too many does no harm.
 void Interaction::close_what_is_open() {
   if (shows_dialog_ && can_close_)
     shows_dialog_ = false;
@@ -67,7 +67,7 @@ void Interaction::quit_or_ask() {
   if (!quit_) notes_.push_back("press " + key_names_(Key::kQ) + " once more to quit");
 }
 
-// A person takes back what keys did, not what others changed since.
+// Undo takes back the change by keys, but not later changes by others.
 void Interaction::change_look(const Look& look) {
   if (look == look_) return;
   const auto become = [this](const Look& from, const Look& to) {
@@ -144,7 +144,7 @@ void Interaction::end_path() {
   playback_s_ = 0;
 }
 
-// Whether the key is one that changes how points are drawn.
+// Changes how points are drawn. True if the key does that.
 bool Interaction::choose_look(Key key) {
   if (key < Key::k1 || key > Key::k8) return false;
   const int number = int(key) - int(Key::k1) + 1;
@@ -181,7 +181,7 @@ void Interaction::show_help() {
   for (auto& line : key_help(key_names_)) notes_.push_back(std::move(line));
 }
 
-// Whether the key asks others for something.
+// Makes a wish. True if the key stands for one.
 bool Interaction::make_wish(Key key) {
   static constexpr std::pair<Key, Wish> kKeyWishes[] = {{Key::kP, Wish::kScreenshot},   {Key::kF12, Wish::kScreenshot},
                                                         {Key::kF11, Wish::kFullscreen}, {Key::kB, Wish::kBookmark},
@@ -289,7 +289,7 @@ geometry::Pose Interaction::advance(double now_s, bool playback) {
   return pose;
 }
 
-// The head stands where it ended.
+// True if the head stands at the end of its path.
 bool Interaction::path_is_over() const {
   const bool plays = playing_ && (!tracked_ || plays_path_);
   return plays && recorded_->ends() && playback_s_ >= recorded_->duration_s();

@@ -1,4 +1,4 @@
-// What a person did to the picture, so that it can be taken back and done again.
+// Changes that a person made to the picture, so that they can be undone and redone.
 #pragma once
 
 #include <cstddef>
@@ -10,21 +10,21 @@
 
 namespace telesplat::viewer {
 
-/// Something that was done.
+/// A change that was made.
 struct Deed {
   std::string what;  ///< for people: "first view"
   std::function<void()> undo, redo;
-  /// A later deed of the same subject within kOne_s makes one with this: a slider that is dragged. Empty: none does.
+  /// A later deed of the same subject within kOne_s joins this one: a slider that is dragged. Empty: deeds do not join.
   std::string subject;
 };
 
-/// Deeds in their order, the newest kMost. One thread.
+/// Deeds in their order, the newest kMost. Used by one thread.
 class UndoStack {
  public:
   static constexpr size_t kMost = 200;
   static constexpr double kOne_s = 1;
 
-  /// It is done already. What was taken back before cannot be done again then.
+  /// Adds a deed that was done already. Deeds that were undone before cannot be redone any more.
   void did(double now_s, Deed deed) {
     deeds_.resize(done_);
     const bool goes_on = !deeds_.empty() && !deed.subject.empty() && deeds_.back().subject == deed.subject &&
@@ -41,7 +41,7 @@ class UndoStack {
 
   bool can_undo() const { return done_ > 0; }
   bool can_redo() const { return done_ < deeds_.size(); }
-  /// Takes the newest deed back, or does again what was taken back last. Returns a line that tells it.
+  /// Undoes the newest deed, or redoes the one that was undone last. Returns a line about it.
   std::string undo() {
     if (!can_undo()) return "there is nothing to undo";
     const Deed deed = deeds_[--done_];
@@ -59,7 +59,7 @@ class UndoStack {
 
  private:
   std::deque<Deed> deeds_;
-  size_t done_ = 0;  // of them; those after it were taken back
+  size_t done_ = 0;  // number of deeds in force; those after them are undone
   double newest_s_ = -1e9;
 };
 

@@ -14,7 +14,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kLook_s = 0.05;  // how long it takes at most until an end is noticed
+constexpr double kLook_s = 0.05;  // longest time until a stop is noticed
 
 std::chrono::duration<double> seconds(double s) { return std::chrono::duration<double>(s); }
 
@@ -75,7 +75,7 @@ std::optional<ControlDesk::News> ControlDesk::take_news() {
   return std::exchange(news_, std::nullopt);
 }
 
-// Until there is an order to take, or a status to ask for. False: the end.
+// Waits for an order to send, or until a status is due. False: stop.
 bool ControlDesk::waits_for_work(std::optional<Order>& order, bool& status) {
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -97,9 +97,9 @@ bool ControlDesk::waits_for_work(std::optional<Order>& order, bool& status) {
   }
 }
 
-// nullopt: the end came. An answer does not say what it answers: where one may still come, the line is given up.
+// nullopt: stop. An answer does not name its question: if one may still come, the connection is given up.
 std::optional<OrderAnswer> ControlDesk::ask(std::optional<Line>& to, Order order) {
-  // A connection over which nothing is said counts at the master as a message that it rejected.
+  // The connection is made late: the master counts one without messages as a rejected message.
   if (!to) to.emplace(master_, access_);
   Line& line = *to;
   const auto failed = [&](std::string why) {

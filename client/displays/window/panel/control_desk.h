@@ -1,4 +1,4 @@
-// Takes orders of the panel to the session's master, on a thread of its own: the display never waits for an answer.
+// Sends the panel's orders to the session's master, in a thread of its own: the display never waits for an answer.
 #pragma once
 
 #include <condition_variable>
@@ -16,29 +16,29 @@ namespace telesplat::viewer {
 
 class ControlDesk {
  public:
-  static constexpr double kPatience_s = 5;      ///< for an answer
-  static constexpr double kStatusPeriod_s = 1;  ///< while somebody watches
+  static constexpr double kPatience_s = 5;      ///< time to wait for an answer
+  static constexpr double kStatusPeriod_s = 1;  ///< while watch() is on
 
-  /// access: orders that change the session for everyone need an operator's key, where there are keys.
+  /// access: orders that change the session for all need an operator's key, if there are keys.
   ControlDesk(std::string master, net::Access access, double patience_s = kPatience_s);
-  /// Does not wait for answers that are due.
+  /// Does not wait for open answers.
   ~ControlDesk();
 
   // ---- any thread; none of these waits ----
-  /// Orders go out in their order, one at a time (Order::subject).
+  /// Orders go out in the order of the calls, one at a time (Order::subject).
   void give(Order order);
-  /// Whether the session's status is asked for.
+  /// watches: ask for the session's status every kStatusPeriod_s.
   void watch(bool watches);
   std::vector<OrderAnswer> take_answers();
   struct News {
     std::optional<SessionStatus> status;
-    std::string problem;  ///< without a status: why there is none
+    std::string problem;  ///< without a status: the reason
   };
-  /// What came since the last call.
+  /// Returns the newest status since the last call.
   std::optional<News> take_news();
 
  private:
-  struct Line;  // to the master
+  struct Line;  // connection to the master
   void loop();
   bool waits_for_work(std::optional<Order>& order, bool& status);
   std::optional<OrderAnswer> ask(std::optional<Line>& to, Order order);

@@ -13,7 +13,7 @@ namespace telesplat::viewer {
 
 namespace fs = std::filesystem;
 
-// A thread that a file system holds up is left to itself: it keeps this alive, and nothing else.
+// If a file system blocks a thread, the thread is abandoned: it keeps only this object alive.
 struct FileList::Shared {
   std::mutex mutex;
   uint64_t asked = 0, read = 0;
@@ -61,7 +61,7 @@ void FileList::go(const std::string& folder) {
         guarded("reading a folder", [&] { listing = std::make_shared<const Listing>(read_folder(folder)); });
     if (!read) listing = std::make_shared<const Listing>(Listing{.folder = folder, .problem = read.error().text});
     const std::lock_guard lock(shared->mutex);
-    if (number < shared->read) return;  // a later one is there already
+    if (number < shared->read) return;  // a later listing is there already
     shared->read = number;
     shared->listing = std::move(listing);
   }).detach();

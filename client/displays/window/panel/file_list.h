@@ -1,4 +1,4 @@
-// What is in a folder, read in the background: a file system that does not answer holds up nobody.
+// Lists a folder in the background: if its file system does not answer, the window goes on.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace telesplat::viewer {
 
 class FileList {
  public:
-  static constexpr size_t kMost = 4000;  ///< entries; the rest is left out
+  static constexpr size_t kMost = 4000;  ///< entries; further ones are omitted
 
   struct Entry {
     std::string name;
@@ -20,17 +20,17 @@ class FileList {
   };
   struct Listing {
     std::string folder;               ///< absolute
-    std::vector<Entry> entries;       ///< folders first, each by name; nothing whose name begins with a dot
-    bool whole = true;                ///< false: there are more
-    std::string problem;              ///< why it cannot be read
-    std::vector<std::string> recent;  ///< read_recent() of then
+    std::vector<Entry> entries;       ///< folders first, each by name; without names that begin with a dot
+    bool whole = true;                ///< false: there are more entries
+    std::string problem;              ///< reason why it cannot be read
+    std::vector<std::string> recent;  ///< read_recent() at that time
   };
 
-  /// Reads this folder; what was asked for before is forgotten. "" is the current folder.
+  /// Reads this folder; an earlier folder that is not read yet is dropped. "" is the current folder.
   void go(const std::string& folder);
-  /// The folder that was read last; null before the first.
+  /// The folder read last; null before the first.
   std::shared_ptr<const Listing> listing() const;
-  /// Whether one is being read.
+  /// True while a folder is being read.
   bool busy() const;
 
  private:
@@ -38,7 +38,7 @@ class FileList {
   std::shared_ptr<Shared> shared_;
 };
 
-/// Reads a folder, in this thread. Error in Listing::problem.
+/// Reads a folder in this thread. Listing::problem has the error.
 FileList::Listing read_folder(const std::string& folder);
 
 }  // namespace telesplat::viewer

@@ -44,7 +44,7 @@ std::optional<Order> OrderUndo::back_of(const Order& order) const {
   return out.arguments.empty() || out.arguments == order.arguments ? std::nullopt : std::optional(out);
 }
 
-// Of those that wait one of the same subject takes the place of an earlier one, which is never answered.
+// A later order replaces a waiting one of the same subject, which gets no answer: so it takes over that one's `back`.
 void OrderUndo::given(const Order& order, bool undoes) {
   Given now{order, undoes ? std::nullopt : back_of(order)};
   if (!order.subject.empty()) {

@@ -1,4 +1,4 @@
-// Takes back what the panel ordered: the same order with what the session had before.
+// Undoes orders of the panel: gives the same order with the session's earlier value.
 #pragma once
 
 #include <deque>
@@ -11,17 +11,17 @@
 
 namespace telesplat::viewer {
 
-/// One thread.
+/// Used by one thread.
 class OrderUndo {
  public:
   void on_session(std::shared_ptr<const wire::Welcome> session) { session_ = std::move(session); }
 
-  /// The order that would take this one back now. Nothing: it does not change the picture, or it is not known what
-  /// there was before.
+  /// Returns the order that would undo this one now. Nothing: it does not change the picture, or the earlier value is
+  /// not known.
   std::optional<Order> back_of(const Order& order) const;
-  /// It is given. undoes: it takes another one back, or gives it again.
+  /// The order is given. undoes: it undoes or redoes another one.
   void given(const Order& order, bool undoes = false);
-  /// It was answered. Returns the order that takes it back, if it was obeyed and is a deed of its own.
+  /// The order was answered. Returns the order that undoes it, if it was obeyed and is a deed of its own.
   std::optional<Order> answered(const OrderAnswer& answer);
 
  private:
@@ -30,7 +30,7 @@ class OrderUndo {
     std::optional<Order> back;
   };
   std::shared_ptr<const wire::Welcome> session_;
-  std::deque<Given> given_;  // and not answered, in their order
+  std::deque<Given> given_;  // without an answer yet, in their order
 };
 
 }  // namespace telesplat::viewer

@@ -23,13 +23,13 @@ std::vector<Panel::Plot> make_plots() {
 
 }  // namespace
 
-constexpr double kMostValue = 1e30;  // what a plot is drawn with has float coordinates
+constexpr double kMostValue = 1e30;  // plots are drawn with float coordinates
 
 void History::add(double t_s, double value) {
   if (!std::isfinite(t_s) || !(std::abs(value) < kMostValue)) return;
   if (!samples_.empty() && t_s < samples_.back().t_s) samples_.clear();
   samples_.push_back({t_s, value});
-  // One that is older stays: the plot's left edge goes on from it.
+  // One older sample stays: the plot's left edge goes on from it.
   while (samples_.size() > 2 && (samples_[1].t_s < t_s - span_s_ || samples_.size() > kMost)) samples_.pop_front();
 }
 
@@ -37,7 +37,7 @@ std::vector<float> History::columns(double now_s, size_t count) const {
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
   std::vector<float> out(count, kNone);
   const double from_s = now_s - span_s_;
-  float before = kNone;  // what the first column goes on from
+  float before = kNone;  // value with which the first column begins
   for (const auto& s : samples_) {
     if (s.t_s < from_s) {
       before = float(s.value);
@@ -53,7 +53,7 @@ std::vector<float> History::columns(double now_s, size_t count) const {
 
 Panel::Panel(Setup setup) : setup_(std::move(setup)), shown_(setup_.shown), plots_(make_plots()) {}
 
-// Means of half a second: single frames say nothing about them.
+// Rates are means over half a second: single frames vary too much.
 void Panel::count_rates(const FrameFigures& f) {
   const double dt_s = f.now_s - rated_.now_s;
   if (dt_s >= 0 && dt_s < kRatePeriod_s) return;
@@ -77,7 +77,7 @@ void Panel::on_figures(const FrameFigures& f) {
 
 void Panel::on_answer(double now_s, const OrderAnswer& answer) {
   if (!answer.obeyed && answer.order.command == "coupling") wished_coupling_.reset();
-  // Sliders tell by what is seen; what is refused is told always.
+  // Results of sliders are seen in the picture; refusals are always reported.
   if (!answer.obeyed)
     tell(now_s, answer.order.command + ": " + answer.text, true);
   else if (answer.order.subject.empty())

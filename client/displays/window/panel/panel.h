@@ -1,5 +1,5 @@
-// What the panel of a window shows and what a person does with it, without any window system, OpenGL or sockets:
-// figures come in, wishes and orders go out.
+// Contents of a window's panel and a person's actions in it, without any window system, OpenGL or sockets: figures come
+// in, wishes and orders go out.
 #pragma once
 
 #include <deque>
@@ -18,10 +18,10 @@
 
 namespace telesplat::viewer {
 
-/// Values as they come, each with its time; those older than the span are forgotten. One thread.
+/// Values in order of arrival, each with its time; values older than the span are dropped. Used by one thread.
 class History {
  public:
-  static constexpr size_t kMost = 4096;  ///< values; more in the span push out the oldest
+  static constexpr size_t kMost = 4096;  ///< values; beyond it the oldest in the span are dropped
 
   explicit History(double span_s) : span_s_(span_s) {}
 
@@ -32,8 +32,8 @@ class History {
   double newest() const { return samples_.empty() ? 0 : samples_.back().value; }
   double span_s() const { return span_s_; }
 
-  /// The span before `now_s` in `count` columns, the oldest first: the largest value of each, so that a single peak is
-  /// seen; where none falls into a column the one before goes on; NaN before the first.
+  /// Divides the span before `now_s` into `count` columns, the oldest first. Each is its largest value, so that a
+  /// single peak shows; an empty column repeats the one before; NaN before the first value.
   std::vector<float> columns(double now_s, size_t count) const;
 
  private:
@@ -44,28 +44,28 @@ class History {
   std::deque<Sample> samples_;
 };
 
-/// One thread, the display's.
+/// Used by one thread, the display's.
 class Panel {
  public:
   struct Setup {
-    bool transparent = false;  ///< the background is not the person's to choose
-    std::string viewer;        ///< this viewer's name, for orders that are meant for it alone
+    bool transparent = false;  ///< the person cannot choose the background
+    std::string viewer;        ///< this viewer's name, for orders to this viewer only
     bool shown = false;
     bool opens = false;  ///< other data sets can be opened here
   };
   explicit Panel(Setup setup);
 
-  static constexpr double kSpan_s = 20;  ///< of the plots
-  static constexpr double kGrace_s = 3;  ///< for so long a service may be missing before that is told
-  static constexpr double kTold_s = 6;   ///< for so long the newest message is told outside the panel too
+  static constexpr double kSpan_s = 20;  ///< width of the plots
+  static constexpr double kGrace_s = 3;  ///< time that a service may be missing without a message
+  static constexpr double kTold_s = 6;   ///< time that the newest message is shown outside the panel too
   static constexpr size_t kMostMessages = 100;
 
   struct Plot {
     std::string name, unit;
     History history;
     uint32_t colour;  ///< 0x00RRGGBB, of Okabe and Ito's palette, which colour-blind people tell apart
-    int digits;       ///< after the point
-    double floor;     ///< the plot's top is no lower
+    int digits;       ///< digits after the point
+    double floor;     ///< least value of the plot's top
   };
   struct Message {
     double t_s = 0;
@@ -73,7 +73,7 @@ class Panel {
     bool problem = false;
   };
 
-  /// What is done with paths of the camera.
+  /// State of camera paths.
   struct PathState {
     bool records = false, plays = false, can_play = false;
     double recorded_s = 0;
@@ -81,7 +81,7 @@ class Panel {
 
   // ---- facts ----
   void on_path(const PathState& path) { path_ = path; }
-  /// What the session's processes are busy with, such as reading; empty: nothing.
+  /// The present work of the session's processes, such as reading; empty: they are idle.
   void on_progress(const std::string& progress) { progress_ = progress; }
   void on_figures(const FrameFigures& figures);
   /// The session shows a scene of this kind.
@@ -90,7 +90,7 @@ class Panel {
   /// The window's settings as texts, by their orders (scene::settings()).
   void on_values(std::map<std::string, std::string> values) { values_ = std::move(values); }
   void on_answer(double now_s, const OrderAnswer& answer);
-  /// Nothing: the master did not answer; then `problem` says why.
+  /// Nothing: the master did not answer; then `problem` has the reason.
   void on_status(double now_s, const std::optional<SessionStatus>& status, const std::string& problem);
   void tell(double now_s, std::string text, bool problem = false);
 
@@ -104,30 +104,30 @@ class Panel {
   scene::Pipeline pipeline() const { return pipeline_; }
   std::optional<scene::Kind> kind() const { return kind_; }
   const Setup& setup() const { return setup_; }
-  /// Empty: it is not known.
+  /// Empty: the value is not known.
   std::string value(const std::string& order) const;
-  /// The coupling in force, or the one that was ordered and is not in force yet.
+  /// The coupling in force, or one that was ordered and is not in force yet.
   const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.coupling; }
   bool coupling_pending() const { return wished_coupling_.has_value(); }
   const std::optional<SessionStatus>& status() const { return status_; }
-  /// The oldest first.
+  /// The oldest message comes first.
   const std::deque<Message>& messages() const { return messages_; }
-  /// What a person should know though the panel is hidden: what goes on, else what is missing, else
-  /// the newest message if it is young.
+  /// Lines for a person while the panel is hidden: progress, else missing services, else the newest message if it is at
+  /// most kTold_s old.
   std::vector<std::string> news(double now_s) const;
 
   // ---- the person ----
-  /// As an order of `telesplat ctl` to this window.
+  /// Chooses a value, as an order of `telesplat ctl` to this window would.
   void choose(const std::string& order, const std::string& value);
   void choose_coupling(const CouplingState& coupling);
-  /// As if the person pressed this key.
+  /// Acts as if the person pressed this key.
   void press(Key key) { pressed_.push_back(key); }
-  /// To see the data from there.
+  /// Wishes to see the data from this side.
   void choose_side(const Side& side) { side_ = side; }
   void choose_picture(const PictureWish& wish) { wished_picture_ = wish; }
   void order(Order order) { orders_.push_back(std::move(order)); }
 
-  // ---- what comes of it, once each ----
+  // ---- results, once each ----
   std::vector<std::pair<std::string, std::string>> take_chosen() { return std::exchange(chosen_, {}); }
   std::optional<Side> take_side() { return std::exchange(side_, std::nullopt); }
   std::vector<Key> take_pressed() { return std::exchange(pressed_, {}); }
@@ -141,7 +141,7 @@ class Panel {
   bool shown_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
   std::optional<scene::Kind> kind_;
-  FrameFigures figures_, rated_;  // the newest; those that rates were last counted from
+  FrameFigures figures_, rated_;  // the newest; the one at the last count of rates
   double frames_a_second_ = 0;
   std::vector<Plot> plots_;
   std::optional<CouplingState> wished_coupling_;
@@ -155,7 +155,7 @@ class Panel {
   std::string progress_;
   std::optional<SessionStatus> status_;
   std::vector<std::string> missing_;
-  double missing_since_s_ = 0;  // what the newest status lacks; 0: nothing
+  double missing_since_s_ = 0;  // begin of the gap in the status; 0: no service is missing
   std::deque<Message> messages_;
 };
 

@@ -27,7 +27,7 @@ std::vector<std::string> names_of(const std::vector<scene::ArrayInfo>& infos) {
 
 constexpr double kSameTime_s = 0.05;
 
-// Ten seconds with the value that it has, then the new one, then back: what repeats should not jump.
+// Length of a new track whose key frame is at 0 s. Others are twice as long as the time of their key frame.
 constexpr double kFirstLength_s = 10;
 
 }  // namespace
@@ -188,7 +188,7 @@ void SceneControls::edit(const std::function<bool(TransferEditor&)>& change) {
 }
 
 void SceneControls::choose_preset(std::string_view name) {
-  transfer_.on_refusal();  // what the session tells next is the preset
+  transfer_.on_refusal();  // the session's next function is the preset
   give_({"tf", {{"transfer", std::string(name)}}, "transfer"});
 }
 
@@ -249,7 +249,7 @@ void SceneControls::add_key(const julia::ParameterInfo& info, double t_s, double
               {t_s, value});
 }
 
-// A track without two key frames is none.
+// Removes a key frame; a track with fewer than two goes, too.
 void SceneControls::remove_key(size_t track, size_t key) {
   if (track >= timeline_.tracks.size() || key >= timeline_.tracks[track].keys.size()) return;
   auto& keys = timeline_.tracks[track].keys;

@@ -1,6 +1,5 @@
-// What a person can change of a session's scene: its colours, what is cut away, a volume's transfer function and step,
-// a Julia set's parameters and timeline. Orders come out, as `telesplat ctl` gives them. No window, no OpenGL, no
-// sockets.
+// A person's controls of a session's scene: its colours, its clip, a volume's transfer function and step, a Julia set's
+// parameters and timeline. They give orders as `telesplat ctl` does. No window, no OpenGL, no sockets.
 #pragma once
 
 #include <array>
@@ -22,36 +21,36 @@
 
 namespace telesplat::viewer {
 
-/// What a person cuts away of the data: a box along the data's axes that sliders move, or any order of `telesplat ctl
-/// clip`. One thread.
+/// A person's clip of the data: a box along the data's axes that sliders move, or any order of `telesplat ctl clip`.
+/// Used by one thread.
 class CutControls {
  public:
   using Give = std::function<void(Order)>;
-  static constexpr double kPatience_s = 3;  ///< what was set is shown until the session has it, so long
+  static constexpr double kPatience_s = 3;  ///< how long a wish is shown while the session does not have it
 
   explicit CutControls(Give give) : give_(std::move(give)) {}
 
   void on_session(double now_s, const wire::Welcome& session);
   void on_refusal() { wished_.reset(); }
 
-  /// The order in force, or the one that was given and is not yet; empty: nothing is cut away.
+  /// The order in force, or one that was given and is not in force yet; empty: the data are not clipped.
   const std::string& order() const { return wished_ ? wished_->order : order_; }
-  /// Whether the data server told the box that sliders move in.
+  /// True if the data server sent the box in which sliders move.
   bool knows_box() const { return !placement_.box_data.empty(); }
   std::string unit() const { return placement_.unit; }
 
-  /// What is kept along an axis, per cent of the data's box.
+  /// The part that is kept along an axis, per cent of the data's box.
   struct Kept {
     double from = 0, to = 100;
     bool operator==(const Kept&) const = default;
   };
-  /// As far as the order is of planes across the axes.
+  /// Reads this from the order, as far as its planes are across the axes.
   std::array<Kept, 3> kept() const;
-  /// The same in the data's own coordinates.
+  /// Converts per cent to the data's own coordinates.
   double value(int axis, double percent) const;
-  /// At least a hundredth of the box is kept.
+  /// Gives the order. At least a hundredth of the box is kept.
   void keep(double now_s, int axis, Kept kept);
-  /// Takes any order. Error: it is not valid.
+  /// Gives any order. Error: it is not valid.
   Status give(double now_s, const std::string& order);
 
  private:
@@ -65,46 +64,46 @@ class CutControls {
   std::optional<Wish> wished_;
 };
 
-/// What a person can change of a mesh's colours: the array, its range, the map; and the value of an isosurface. One
+/// A person's controls of a mesh's colours: the array, its range, the map; and of an isosurface's value. Used by one
 /// thread.
 class ColourControls {
  public:
   using Give = std::function<void(Order)>;
-  static constexpr double kPatience_s = 3;  ///< a range that was set is shown until the session has it, so long
+  static constexpr double kPatience_s = 3;  ///< how long a chosen range is shown while the session does not have it
 
   explicit ColourControls(Give give) : give_(std::move(give)) {}
 
   void on_session(double now_s, const wire::Welcome& session);
   void on_refusal() { wished_.reset(); }
 
-  /// What the mesh can be coloured by: arrays, and of vectors their components too; empty: nothing.
+  /// Names of arrays that can colour the mesh, and of components of vectors; empty: there are no arrays.
   const std::vector<std::string>& arrays() const { return arrays_; }
-  /// Nothing: by its own colours.
+  /// Nothing: the mesh has its own colours.
   const std::optional<scene::Colouring>& colouring() const { return colouring_; }
-  /// Returns the range of the colouring in force, or the range that was ordered and has not come yet.
+  /// Returns the range of the colouring in force, or one that was ordered and is not in force yet.
   std::pair<double, double> range() const;
-  /// All values of its array; empty: not known.
+  /// Range of all values of its array; empty: not known.
   scene::ValueSpan whole_range() const;
 
-  /// By its whole range, in the colours of now. scene::kNoArray: the file's own colours.
+  /// Colours by this array, over its whole range, in the present map. scene::kNoArray: the file's own colours.
   void choose_array(const std::string& name);
-  /// lo below hi; else nothing happens.
+  /// Does nothing unless lo is below hi.
   void choose_range(double now_s, double lo, double hi);
   void reset_range();
   void choose_map(const colour::ColourMap& map);
 
-  /// The value of the isosurface that is shown; nothing: none is.
+  /// Value of the isosurface on display; nothing: the scene has no isosurface.
   std::optional<double> iso() const { return iso_; }
-  /// Returns the values of the isosurface's volume; empty: not known.
+  /// Range of values in the isosurface's volume; empty: not known.
   scene::ValueSpan iso_range() const { return iso_range_; }
-  /// How often they are in it; empty: not known.
+  /// Histogram of these values; empty: not known.
   std::vector<HistogramBar> iso_bars() const;
   void choose_iso(double value);
 
  private:
   Give give_;
   std::vector<scene::ArrayInfo> infos_;
-  std::string infos_text_;  // that they came from
+  std::string infos_text_;  // source of infos_
   std::vector<std::string> arrays_;
   std::optional<scene::Colouring> colouring_;
   struct Wish {
@@ -113,21 +112,21 @@ class ColourControls {
   std::optional<Wish> wished_;
   std::optional<double> iso_;
   scene::ValueSpan iso_range_;
-  std::optional<volume::Histogram> histogram_;  // of the isosurface's volume
+  std::optional<volume::Histogram> histogram_;  // the isosurface's volume
 };
 
-/// One thread.
+/// Used by one thread.
 class SceneControls {
  public:
   using Give = std::function<void(Order)>;
-  static constexpr double kPatience_s = 3;    ///< a value that was set is shown until the session has it, so long
-  static constexpr double kLongest_s = 3600;  ///< of a timeline
+  static constexpr double kPatience_s = 3;    ///< how long a chosen value is shown while the session does not have it
+  static constexpr double kLongest_s = 3600;  ///< longest timeline
 
   explicit SceneControls(Give give) : give_(std::move(give)), colours_(give_), cut_(give_) {}
 
   // ---- facts ----
   void on_session(double now_s, const wire::Welcome& session);
-  /// The timeline that plays, as the master tells it; empty: none.
+  /// Takes the timeline that plays, from the master; empty: no timeline plays.
   void on_animation(const std::string& timeline) { playing_ = timeline; }
   void on_answer(const OrderAnswer& answer);
 
@@ -139,10 +138,10 @@ class SceneControls {
 
   // ---- volumes ----
   const TransferEditor& transfer() const { return transfer_; }
-  /// Takes what `change` does to the editor to the session, if it changes the function.
+  /// Lets `change` edit the function, and orders the result if it differs.
   void edit(const std::function<bool(TransferEditor&)>& change);
   void choose_preset(std::string_view name);
-  /// "" if it was written, else why not.
+  /// Error: why it could not be written.
   Status save_transfer(const std::string& path) const { return transfer_.save(path, "telesplat"); }
   const std::optional<volume::Session>& volume() const { return volume_; }
   void choose_step(double now_s, int step);
@@ -150,15 +149,15 @@ class SceneControls {
   void play_series(bool plays);
 
   // ---- Julia sets ----
-  /// As it is, or was set and is not yet.
+  /// The value in force, or one that was chosen and is not in force yet.
   double value(std::string_view name) const;
-  /// Of parameter_infos() that may change. A whole one is rounded.
+  /// Sets a parameter of parameter_infos() that may change. Whole ones are rounded.
   void set(double now_s, const julia::ParameterInfo& info, double value);
-  /// The timeline that the person makes; play() makes it the session's.
+  /// The timeline that the person edits; play() gives it to the session.
   const julia::Timeline& timeline() const { return timeline_; }
   double timeline_s() const;
-  /// A key frame of a parameter that is not whole, in place of one at the same time (to 0.05 s). The first one of a
-  /// track brings one at 0 s with it.
+  /// Adds a key frame of a parameter that is not whole; replaces one at the same time (within 0.05 s). The first one of
+  /// a track also adds one at 0 s.
   void add_key(const julia::ParameterInfo& info, double t_s, double value);
   void remove_key(size_t track, size_t key);
   void clear_timeline() { timeline_ = {}; }

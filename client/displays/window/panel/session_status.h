@@ -1,5 +1,5 @@
-// What passes between the panel and a session's master: orders, which are the commands of `telesplat ctl`, and who
-// takes part, as `telesplat ctl status` has it, and what is missing.
+// Data that pass between the panel and a session's master: orders, which are commands of `telesplat ctl`; the
+// processes, as in `telesplat ctl status`; and missing services.
 #pragma once
 
 #include <map>
@@ -10,12 +10,12 @@
 
 namespace telesplat::viewer {
 
-/// What the panel orders of a session's master: the commands of `telesplat ctl`.
+/// An order of the panel to a session's master: a command of `telesplat ctl`.
 struct Order {
   std::string command;  ///< wire::Control
   std::map<std::string, std::string> arguments;
-  /// A later order of the same subject replaces one that waits: a slider that is dragged orders often. Empty: it
-  /// replaces none.
+  /// A later order of the same subject replaces one that waits: a dragged slider gives many orders. Empty: it replaces
+  /// no order.
   std::string subject;
   bool operator==(const Order&) const = default;
 };
@@ -23,7 +23,7 @@ struct Order {
 struct OrderAnswer {
   Order order;
   bool obeyed = false;
-  std::string text;  ///< what the master said, or why it said nothing; a line for the person
+  std::string text;  ///< the master's answer, or why there is no answer; a line for the person
 };
 
 struct SessionStatus {
@@ -34,15 +34,14 @@ struct SessionStatus {
     bool operator==(const Process&) const = default;
   };
   std::vector<Process> processes;
-  std::string animation;  ///< the timeline that plays; empty: none
+  std::string animation;  ///< the timeline that plays; empty: no timeline plays
   bool operator==(const SessionStatus&) const = default;
 };
 
-/// Reads the master's JSON. Error: it is no status. What is strange in it is left out.
+/// Reads the master's JSON. Error: it is not a status. Unknown parts are left out.
 Result<SessionStatus> read_status(const std::string& json);
 
-/// A line for each service that nothing can be shown without and that is not here or has been silent for long; empty:
-/// all are here.
+/// Returns a line for each necessary service that is missing or has been silent for long; empty: all are here.
 std::vector<std::string> missing_services(const SessionStatus& status);
 
 }  // namespace telesplat::viewer

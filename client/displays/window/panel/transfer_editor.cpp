@@ -13,7 +13,7 @@ namespace {
 bool has_width(const volume::ValueRange& range) { return range.hi / 2 - range.lo / 2 > 0; }
 double room_around(double value) { return std::max(0.5, std::abs(value) / 1000); }
 
-// Halves: a difference of two finite numbers need not be finite.
+// Computes with halves: the difference of two finite numbers may be infinite.
 double share_of(double value, double lo, double hi) {
   return within((value / 2 - lo / 2) / (hi / 2 - lo / 2), -1.0, 2.0);
 }
@@ -34,14 +34,14 @@ void TransferEditor::on_refusal() {
   changed_s_ = -1e9;
 }
 
-// One value alone is given some room around it.
+// A range of one value gets some room around it.
 double TransferEditor::lo() const { return has_width(range_) ? range_.lo : range_.lo - room_around(range_.lo); }
 double TransferEditor::hi() const { return has_width(range_) ? range_.hi : range_.lo + room_around(range_.lo); }
 
 double TransferEditor::share(double value) const { return share_of(value, lo(), hi()); }
 double TransferEditor::value_at(double share) const { return std::lerp(lo(), hi(), share); }
 
-// Logarithmic, since backgrounds have thousands of times as many voxels as the rest.
+// logarithmic: because backgrounds have thousands of times as many voxels as the rest.
 std::vector<HistogramBar> bars_of(const volume::Histogram& histogram, double lo, double hi, bool logarithmic) {
   std::vector<HistogramBar> out;
   const auto& counts = histogram.counts;

@@ -1,5 +1,5 @@
-// Which widgets the panel and dialogs show, where, and how often each was used: for programs that test the window from
-// outside. No window, no OpenGL, no Dear ImGui.
+// Lists the widgets of panel and dialogs, their places, and how often each was used: for programs that test the window
+// from outside. No window, no OpenGL, no Dear ImGui.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace telesplat::viewer {
 
-/// One thread.
+/// Used by one thread.
 class WidgetLog {
  public:
   static constexpr const char* kVariable = "TELESPLAT_WIDGET_LOG";  ///< names the file
@@ -24,27 +24,27 @@ class WidgetLog {
     Rect rect;
     bool here = false;       ///< the newest build has it
     bool reachable = false;  ///< it is here, and its middle is not scrolled out of view
-    bool on = false;         ///< it was used in the build where it was seen last
+    bool on = false;         ///< it was used in the newest build that had it
     uint64_t uses = 0;
   };
 
-  /// path: a file that holds the list as it is now, renamed into place after each build that changes it; empty: no log.
+  /// path: a file with the present list, renamed into place after each build that changes it; empty: no log.
   explicit WidgetLog(std::string path) : path_(std::move(path)) {}
-  /// The log that the environment asks for.
+  /// Makes the log that the environment asks for.
   static WidgetLog from_environment();
   bool on() const { return !path_.empty(); }
 
   void begin_build();
   /// All widgets until the next call lie in this part of a window: their names begin with it.
   void enter(std::string_view part) { part_ = part; }
-  /// used: the person uses it in this build; several builds in a row are one use. visible: what of the window's area
-  /// shows it. Of two widgets of one name in a build the first one counts.
+  /// used: the person uses it in this build; several builds in a row are one use. visible: part of the window's area in
+  /// which it can be seen. If two widgets of a build have one name, the first one counts.
   void seen(std::string_view kind, std::string_view name, const Rect& rect, const Rect& visible, bool used);
   void end_build();
 
-  /// By name: "Display/splats", "Display/splats=disc".
+  /// Keys are names: "Display/splats", "Display/splats=disc".
   const std::map<std::string, Widget, std::less<>>& widgets() const { return widgets_; }
-  /// A line a widget: name, kind, left, top, right, bottom, here, reachable, uses; tabs between.
+  /// One line for each widget: name, kind, left, top, right, bottom, here, reachable, uses; tabs between.
   std::string text() const;
 
  private:
@@ -52,7 +52,7 @@ class WidgetLog {
   std::map<std::string, Widget, std::less<>> widgets_;
 };
 
-/// A build of the panel that a log follows. Without a log it costs a comparison a widget.
+/// A build of the panel that a log follows. Without a log it costs one comparison a widget.
 class LoggedBuild {
  public:
   explicit LoggedBuild(WidgetLog& log) {
@@ -69,7 +69,7 @@ class LoggedBuild {
   static WidgetLog* log() { return log_; }
 
  private:
-  inline static WidgetLog* log_ = nullptr;  // of the build that goes on
+  inline static WidgetLog* log_ = nullptr;  // log of the present build
 };
 
 }  // namespace telesplat::viewer

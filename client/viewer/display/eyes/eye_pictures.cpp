@@ -14,7 +14,7 @@ constexpr double kLookAfterPanel_s = 0.5;
 
 }  // namespace
 
-// Whoever calibrates a panel edits its file and sees what comes of it.
+// A person who calibrates a panel edits its file and sees the result at once.
 void EyePictures::follow_panel_file(double now_s) {
   const auto& o = rig_.options();
   if (!o.panel || o.panel_file.empty() || now_s - looked_s_ < kLookAfterPanel_s) return;
@@ -43,7 +43,7 @@ geometry::Camera EyePictures::sampled(const geometry::Camera& head, const glm::d
   return EyeRig::sampled(rig_.eyes(head, turned, t_s, scene_room), scene_room);
 }
 
-// The places of both pictures in a display that has one beside or above the other.
+// Places of both pictures in a display that has one beside or above the other.
 std::array<splat::FrameTarget, 2> EyePictures::parts_of(image::View& view) const {
   const int width = pair_.head.width, height = pair_.head.height;
   const bool beside = rig_.options().mode != stereo::Mode::kTopBottom;

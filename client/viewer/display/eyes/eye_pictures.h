@@ -1,4 +1,4 @@
-// Both eyes' pictures of a frame: drawn from one choice, composed, kept for verification.
+// Makes both eyes' pictures of a frame: draws them from one choice, composes them, keeps them for verification.
 #pragma once
 
 #include <array>
@@ -17,29 +17,29 @@ class EyePictures {
 
   stereo::Mode mode() const { return mode_; }
   bool on() const { return rig_.on(); }
-  /// Where the eyes of the frame that begins are; the camera to ask samplers for.
-  /// turned: the head, which a wall's screens need not face. Precondition of this and sampled(): on().
+  /// Sets the eyes of the frame that begins; returns the camera to ask samplers for. turned: the head's orientation,
+  /// which a wall's screens need not have. Precondition of this and sampled(): on().
   geometry::Camera begin(double now_s, const geometry::Camera& head, const glm::dquat& turned, double t_s,
                          const geometry::Box& scene_room);
-  /// The camera to ask samplers for where a head is to be.
+  /// Returns the camera to ask samplers for, for a head that is to be there.
   geometry::Camera sampled(const geometry::Camera& head, const glm::dquat& turned, double t_s,
                            const geometry::Box& scene_room);
   const EyePair& pair() const { return pair_; }
 
-  /// Draws both and composes them into `view`, which gets the display's size. input: of the head's camera. spooled:
+  /// Draws both and composes them into `view`, which gets the display's size. input: for the head's camera. spooled:
   /// frames may be kept, so room for depth is made at once. Precondition: begin().
   DrawnFrame draw(ViewSource& source, FrameInput input, bool spooled, image::View& view);
-  /// What a place of the display shows: a camera, and a pixel of its picture. Where both eyes' pictures lie in each
-  /// other it is the head's.
+  /// The view at a place of the display: a camera, and a pixel of its picture. If both eyes' pictures are interleaved,
+  /// it is the head's camera.
   struct Aim {
     geometry::Camera camera;
     glm::dvec2 at_pix;
   };
-  /// head: the display's camera. pair: of the frame that is on display. share: of the display's width and height, from
-  /// its upper left corner.
+  /// head: the display's camera. pair: eyes of the frame on display. share: of the display's width and height, from its
+  /// upper left corner.
   Aim aim(const geometry::Camera& head, const EyePair& pair, const glm::dvec2& share) const;
-  /// The display's camera, of as many pixels as the display has: of quad buffers those of one eye's picture, as each
-  /// fills it.
+  /// Returns the display's camera with the display's pixels; with quad buffers those of one eye's picture, since each
+  /// picture fills the display.
   geometry::Camera display(const geometry::Camera& head) const;
   /// Keeps both pictures for verification.
   void keep(FrameSpool& spool, const SpooledFrame& frame);
@@ -52,8 +52,8 @@ class EyePictures {
   stereo::Mode mode_;
   EyePair pair_;
   std::array<image::View, 2> views_;
-  double looked_s_ = -1e9;  // after the panel's file
-  int64_t panel_time_ = 0;  // when it was written
+  double looked_s_ = -1e9;  // when the panel's file was last looked at
+  int64_t panel_time_ = 0;  // when that file was written
   bool panel_changed_ = false;
 };
 

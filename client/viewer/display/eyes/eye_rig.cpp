@@ -13,13 +13,13 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kLeastScreen_m = 0.05;  // else eyes would squint
-constexpr double kNearestEye_m = 0.01;   // to a wall's screen: a head may turn one eye behind it
+constexpr double kLeastScreen_m = 0.05;  // eyes would squint at a nearer screen
+constexpr double kNearestEye_m = 0.01;   // before a wall's screen: a turned head may put one eye behind it
 constexpr double kFarthestEye_m = 99;    // before a panel
-// Of the scene, for what is sampled: nearer parts are nobody's to look at, farther ones make no difference.
+// Depths of the scene that widen the sampled view: no eye looks at nearer parts, farther ones make no difference.
 constexpr double kNearest_m = 0.1, kFarthest_m = 10, kStepsAnOctave = 4;
 
-// Of a panel the height follows from its pixels, whatever the eyes' pictures have.
+// Returns the screen before the head. A panel's height comes from its pixels, not from the shape of eyes' pictures.
 geometry::Screen screen_before(const StereoOptions& o, const geometry::Camera& head, double screen_m) {
   geometry::Screen screen = geometry::screen_before(head, screen_m);
   if (o.panel) screen.height_m = screen.width_m * o.panel->height_m() / o.panel->width_m();
@@ -30,7 +30,7 @@ geometry::Camera through(const geometry::Screen& screen, const glm::dvec3& eye_r
   return geometry::camera_through(screen, eye_room, head.width, head.height, head.near_m);
 }
 
-// How far before the camera the nearest corner of the box is, along its line of sight.
+// Returns the depth of the box's nearest corner along the camera's line of sight.
 double nearest_depth(const geometry::Camera& camera, const geometry::Box& box) {
   const glm::dvec3 forward = camera.pose.orientation * glm::dvec3(0, 0, -1);
   double nearest = std::numeric_limits<double>::infinity();
@@ -57,14 +57,14 @@ double EyeRig::screen_distance(const geometry::Camera& head, double t_s, const g
   return screen_m;
 }
 
-// A panel is as wide in the room as what the head's camera sees there: the room is a model of it, scaled.
+// In the room a panel is as wide as the view of the head's camera there: the room is a scaled model of it.
 EyePair EyeRig::eyes(const geometry::Camera& head, const glm::dquat& turned, double t_s,
                      const geometry::Box& scene_room) {
   const double screen_m = screen_distance(head, t_s, scene_room);
   const geometry::Screen screen = screen_before(options_, head, screen_m);
   const double scale = options_.panel ? screen.width_m / options_.panel->width_m() : 1;
   const glm::dvec3 half(0.5 * options_.eye_separation_m, 0, 0);
-  // On the screen's axes.
+  // The vectors below are on the screen's axes.
   glm::dvec3 middle = geometry::seen_from(screen, head.pose.position_room) / scale;
   glm::dvec3 to_right = glm::conjugate(screen.pose.orientation) * (turned * half);
   if (options_.panel && options_.tracked_head) {
@@ -82,7 +82,7 @@ EyePair EyeRig::eyes(const geometry::Camera& head, const glm::dquat& turned, dou
 
 geometry::Camera EyeRig::sampled(const EyePair& pair, const geometry::Box& scene_room) {
   const double depth_m = scene_room.empty() ? pair.screen_m : nearest_depth(pair.head, scene_room);
-  // By steps: a head that all but rests asks for one and the same view.
+  // The depth changes in steps, so that a head that nearly rests asks for one and the same view.
   const double steps = std::floor(kStepsAnOctave * std::log2(within(depth_m, kNearest_m, kFarthest_m)));
   return geometry::widened_for(pair.head, pair.eyes, std::exp2(steps / kStepsAnOctave));
 }

@@ -1,4 +1,4 @@
-// How a display shows two eyes' pictures.
+// Options of a display that shows two eyes' pictures.
 #pragma once
 
 #include <optional>
@@ -14,19 +14,19 @@ namespace telesplat::viewer {
 struct StereoOptions {
   stereo::Mode mode = stereo::Mode::kOff;
   double eye_separation_m = 0.064;
-  /// How far before the head the plane is whose points lie in one place of both pictures; 0: as far as the data set's
-  /// middle is when the first frame is drawn.
+  /// Distance from the head to the plane whose points have the same place in both pictures; 0: that of the data set's
+  /// middle when the first frame is drawn.
   double screen_m = 0;
-  /// Of a screen of a described wall: its picture's width. How far it is follows from the head's camera then.
+  /// Width of a described wall's screen; its distance then follows from the head's camera. 0: another screen.
   double screen_width_m = 0;
-  bool swap_eyes = false;                            ///< each eye gets the other one's place
-  stereo::Pattern pattern = stereo::Pattern::kNone;  ///< shown in place of the scene
-  std::optional<stereo::Panel> panel;                ///< of kAutostereo
-  std::string panel_file;                            ///< that it was read from; read again when it changes
-  std::optional<geometry::Trajectory> tracked_head;  ///< of kAutostereo: poses on the panel's axes (panel.h)
+  bool swap_eyes = false;                            ///< each eye's picture takes the other one's place
+  stereo::Pattern pattern = stereo::Pattern::kNone;  ///< shown instead of the scene
+  std::optional<stereo::Panel> panel;                ///< with kAutostereo
+  std::string panel_file;                            ///< file of `panel`; read again when it changes
+  std::optional<geometry::Trajectory> tracked_head;  ///< with kAutostereo: poses on the panel's axes (panel.h)
 
   bool on() const { return mode != stereo::Mode::kOff; }
-  /// The picture of one eye, of a display of so many pixels.
+  /// Returns the size of one eye's picture, for a display of width x height pixels.
   stereo::Size eye_size(int width, int height) const {
     return panel ? panel->eye_size() : stereo::eye_size(mode, {width, height});
   }

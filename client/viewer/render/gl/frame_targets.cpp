@@ -86,7 +86,7 @@ Status FrameTargets::make_sums() {
   make_texture(kSums0, GL_RGBA32F, true);
   make_texture(kSums1, GL_RGBA32F, true);
   const Status made = make_framebuffer(kSumming, &textures_[kSums0], 2, false);
-  if (!made) release();  // otherwise the next frame would take them for complete
+  if (!made) release();  // otherwise the next frame would count them as complete
   return made;
 }
 

@@ -1,4 +1,4 @@
-// The images that a frame passes through on the GPU, and its way to host memory.
+// Holds the images that a frame passes through on the GPU, and copies them to host memory.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace telesplat::viewer {
 
-/// Textures and the frame buffers that they are attached to. "Padded" ones have kMargin more pixels on all sides, since
-/// GL drops points of any size whose centre is outside. Every member function needs a current GL context.
+/// Textures and their frame buffers. "Padded" ones have kMargin more pixels on all sides, since GL drops points of any
+/// size whose centre is outside. Every member function needs a current GL context.
 class FrameTargets {
  public:
   static constexpr int kMargin = 16;  // splat::kMaxSplatSide: no splat reaches farther from its centre
@@ -19,10 +19,9 @@ class FrameTargets {
   FrameTargets(const FrameTargets&) = delete;
   FrameTargets& operator=(const FrameTargets&) = delete;
 
-  /// Does nothing if the size is the same. Fails, saying the limit, where the GPU cannot hold such a frame; then
-  /// width() is 0.
+  /// Does nothing if the size is the same. Error: the GPU cannot hold such a frame; names the limit, and width() is 0.
   Status resize(int width, int height);
-  /// The accumulators of kernels that add up (splat::Passes::kSums), made when first asked for.
+  /// Makes the accumulators of kernels that add up (splat::Passes::kSums), at the first call.
   Status make_sums();
 
   int width() const { return width_; }
@@ -32,13 +31,13 @@ class FrameTargets {
 
   // Textures.
   uint32_t keys() const { return textures_[kKeys]; }            ///< padded, RG32UI: low and high half of a pixel's key
-  uint32_t visible() const { return textures_[kVisible]; }      ///< padded, depth component: the depth test's
+  uint32_t visible() const { return textures_[kVisible]; }      ///< padded, depth component of the depth test
   uint32_t sums(int i) const { return textures_[kSums0 + i]; }  ///< padded, RGBA32F: weighted sums, 2 of them
   uint32_t pairs(int i) const { return textures_[kPairs0 + i]; }  ///< padded, RG32UI: colour and info, 2 of them
 
   // Frame buffers.
   enum Buffer { kSplat, kVisibility, kSumming, kPair0, kPair1, kOutput, kOutputColour, kBuffers };
-  /// Binds it for drawing and sets the viewport.
+  /// Binds the buffer for drawing and sets the viewport.
   void draw_to(Buffer buffer) const;
   uint32_t framebuffer(Buffer buffer) const { return framebuffers_[buffer]; }
 
@@ -70,7 +69,7 @@ class ReadBack {
 
   bool pack_buffers_;
   uint32_t buffers_[2] = {};
-  size_t bytes_ = 0;  // of each buffer
+  size_t bytes_ = 0;  // size of each buffer
 };
 
 }  // namespace telesplat::viewer

@@ -19,8 +19,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// Pictures of no more pixels may be parts of a still picture: 128 x 96 pixels, one more on each
-// side, of 4 x 4 sub-pixels.
+// Largest picture that may be a part of a still picture: 128 x 96 pixels, one more on each side, of 4 x 4 sub-pixels.
 constexpr int64_t kPartPixels = 130 * 98 * 16;
 
 Status check_limits() {
@@ -50,9 +49,9 @@ struct GlRenderer::Parts {
   ~Parts() { glDeleteVertexArrays(1, &no_vertices); }
 
   Programs programs;
-  // Frames, and parts of still pictures, which come between them: neither makes the other's anew.
+  // Frames, and parts of still pictures, come by turns: each has its own targets, so they are not remade.
   FrameTargets frame_targets, part_targets;
-  FrameTargets* targets = &frame_targets;  // of the frame at hand
+  FrameTargets* targets = &frame_targets;  // targets of the frame at hand
   SplatPasses splatting;
   ReadBack read_back;
   gl::StageTimer timer;
@@ -89,7 +88,7 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
   struct Step {
     const FramePass* pass;
     Stage stage;
-    int reach;  // how far it looks
+    int reach;  // pixels around its own that the step reads
   };
   const bool sums = splat::traits_of(options.kernel).passes == splat::Passes::kSums;
   const Programs& programs = parts_->programs;
@@ -168,7 +167,7 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
   const gl::EglContext::Current current(*context_);
   const double start = monotonic_s();
   if (const Status drawn = draw(list, camera, options, shading, target.depth_m != nullptr); !drawn) {
-    // A frame that the GPU cannot hold shows nothing, rather than ending the viewer.
+    // If the GPU cannot hold a frame, the frame is empty, and the viewer goes on.
     if (refusals_.allow(start)) log::error("{}", drawn.error().text);
     for (size_t y = 0; y < static_cast<size_t>(target.height); ++y) {
       std::fill_n(target.colour + y * target.row(), target.width, 0xff000000u | shading.background());

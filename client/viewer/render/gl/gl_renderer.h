@@ -1,4 +1,4 @@
-// Splatting by OpenGL points. The pixels are the CPU splatter's, except for ties in depth and rounding of divisions.
+// Splats by OpenGL points. The pixels are the CPU splatter's, except for ties in depth and rounding of divisions.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,16 @@ namespace telesplat::viewer {
 
 class GlRenderer final : public Renderer {
  public:
-  /// With a context of its own, off-screen, which is current during its calls only. pack_buffers: frames are read back
-  /// through them; not told: unless the renderer is software.
+  /// Makes an off-screen context of its own, current only during calls. pack_buffers: read frames back through them;
+  /// not given: yes, unless the renderer is software.
   static Result<std::unique_ptr<GlRenderer>> make(std::optional<bool> pack_buffers = {});
   ~GlRenderer() override;
 
   const char* name() const override { return "gl"; }
   using Renderer::render;
-  /// points_drawn counts every point sent: only the GPU knows which of them reach the screen. project_ms: preparing
+  /// points_drawn counts every point sent: only the GPU knows which ones reach the screen. project_ms: preparing
   /// (processor) and splatting. resolve_ms: shading, reading back and waiting. The GPU's own clock times its stages;
-  /// without one, project_ms is all of drawing.
+  /// without one, project_ms covers all of drawing.
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                            const splat::RenderOptions& options, const image::Shading& shading,
                            const splat::FrameTarget& target) override;
@@ -32,7 +32,7 @@ class GlRenderer final : public Renderer {
 
  private:
   enum Stage { kSplatting, kResolving, kFilling, kSmoothing, kAntialiasing, kStages };
-  struct Parts;  // what lives in the context
+  struct Parts;  // objects that live in the context
   GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device);
   static Result<std::unique_ptr<Parts>> make_parts(std::optional<bool> pack_buffers);
   Status draw(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,

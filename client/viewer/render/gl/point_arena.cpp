@@ -53,7 +53,7 @@ void PointArenas::end_frame() {
   for (const Entry& e : transient_) release(e.range, e.words);
   transient_.clear();
   ++frame_;
-  if (frame_ % 16 != 0) return;  // looking through all entries takes too long for every frame
+  if (frame_ % 16 != 0) return;  // to look through all entries would take too long for every frame
   std::erase_if(entries_, [&](const auto& item) {
     const Entry& e = item.second;
     if (e.last_frame + kKeptFrames >= frame_) return false;

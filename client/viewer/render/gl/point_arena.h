@@ -1,4 +1,4 @@
-// Points kept in GPU memory: a few large buffers, each with a free list, and a table of what lies where.
+// Keeps points in GPU memory: a few large buffers, each with a free list, and a table of the points' places.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace telesplat::viewer {
 
-/// Where a level's points lie: 32-bit words from `word` on in buffer `arena`, laid out as
+/// Place of a level's points: 32-bit words from `word` on in buffer `arena`, laid out as
 ///   uint16 x[n], y[n], z[n], normal[n]; uint32 colour[n]      (3 n words)
 struct PointRange {
   uint32_t arena = 0, word = 0;
 };
 
-/// Needs a current GL context for all it does.
+/// All functions need a current GL context.
 class PointArenas {
  public:
   PointArenas();
@@ -24,11 +24,11 @@ class PointArenas {
   PointArenas(const PointArenas&) = delete;
   PointArenas& operator=(const PointArenas&) = delete;
 
-  /// The place of item.arrays(), uploaded now if it is not there. An uploaded copy is used again only if replica
+  /// Returns the place of item.arrays(), uploaded now if it is not there. An uploaded copy is reused only if replica
   /// (DrawList::replica), cluster, sequence, count and address are equal: a freed mosaic's address may come back with
   /// other points, and so may its sequence from another packer. Items without a sequence are uploaded every frame.
   PointRange place(const splat::DrawItem& item, uint64_t replica);
-  /// Frees what was not placed during the last kKeptFrames frames (and items without a sequence at once).
+  /// Frees points that were not placed during the last kKeptFrames frames (items without a sequence at once).
   void end_frame();
 
   uint32_t count() const { return static_cast<uint32_t>(arenas_.size()); }

@@ -10,7 +10,7 @@ const char* stage_name(uint32_t kind) {
   return kind == GL_VERTEX_SHADER ? "vertex" : kind == GL_FRAGMENT_SHADER ? "fragment" : "compute";
 }
 
-// Attaches the compiled stage to `program`, where it lives on until the program dies.
+// Attaches the compiled stage to `program`, where it lives until the program is deleted.
 Status attach(std::string_view name, const ShaderSource& source, GLuint program) {
   const GLuint shader = glCreateShader(source.kind);
   std::vector<const char*> texts;

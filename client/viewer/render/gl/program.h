@@ -11,7 +11,7 @@
 
 namespace telesplat::gl {
 
-/// One stage: its source is the concatenation of the parts, of which the first starts with #version.
+/// One stage: its source is the concatenation of the parts; the first part begins with #version.
 struct ShaderSource {
   uint32_t kind = 0;  ///< GL_VERTEX_SHADER, GL_FRAGMENT_SHADER, GL_COMPUTE_SHADER
   std::vector<std::string_view> parts;
@@ -20,7 +20,7 @@ struct ShaderSource {
 /// A linked program, deleted with this object: the context that made it must be current then.
 class Program {
  public:
-  /// Fails with the program's name and the compiler's or linker's words. `name` is for that text.
+  /// Error: `name`, and the text of the compiler or linker.
   static Result<Program> link(std::string_view name, const std::vector<ShaderSource>& stages);
 
   Program() = default;
@@ -32,7 +32,7 @@ class Program {
   }
 
   void use() const;
-  /// Location of a uniform, -1 where the compiler has found it to have no effect.
+  /// Location of a uniform; -1 if the compiler found that it has no effect.
   int32_t uniform(const char* name) const;
 
  private:

@@ -20,14 +20,14 @@ namespace {
 
 using namespace shaders;
 
-// The constants that both renderers share, as macros.
+// Returns the constants that both renderers share, as macros.
 std::string constants() {
   std::string out;
   const auto add = [&](std::string_view name, const std::string& value) {
     out += fmt::format("#define {} {}\n", name, value);
   };
   const auto add_uint = [&](std::string_view name, uint32_t value) { add(name, fmt::format("{}u", value)); };
-  // All digits, and a decimal point always: the shader's constant has the same bits.
+  // Writes all digits, and always a decimal point: so the shader's constant has the same bits.
   const auto add_float = [&](std::string_view name, float value) { add(name, fmt::format("{:.9e}", value)); };
   add("DEPTH_SHIFT", std::to_string(splat::kDepthCodeShift));
   add_uint("FILL_SUPPORTS", splat::kFillSupports);
@@ -65,12 +65,12 @@ Parts joined(Parts parts, const Parts& more) {
   return parts;
 }
 
-// The shaders of one kernel, without what all shaders share. A row of the table below.
+// The shaders of one kernel, without the parts that all shaders share. A row of the table below.
 struct KernelShaders {
   splat::Kernel kernel;
-  Parts vertex, fragment;          // of KernelPrograms::splat
-  Parts sum_vertex, sum_fragment;  // of KernelPrograms::sum
-  Parts resolve;                   // of KernelPrograms::resolve
+  Parts vertex, fragment;          // for KernelPrograms::splat
+  Parts sum_vertex, sum_fragment;  // for KernelPrograms::sum
+  Parts resolve;                   // for KernelPrograms::resolve
 };
 
 // distance2: the body of KernelTraits::flat_distance2 for an offset d.
@@ -94,10 +94,10 @@ std::vector<KernelShaders> kernel_shaders() {
   };
 }
 
-// Links programs. A failure leaves an empty program and its text; the first one is reported.
+// Links programs. A failure leaves an empty program and its text; the first failure is reported.
 class Linker {
  public:
-  // Splats: points that cover squares of pixels.
+  // Links a program of splats: points that cover squares of pixels.
   gl::Program splats(const std::string& name, const Parts& vertex, const Parts& fragment) {
     return link(name, joined({kVersion, shared_, kView, kKeys, kPoints}, vertex),
                 joined({kVersion, shared_, kView, kKeys}, fragment));

@@ -9,15 +9,15 @@
 
 namespace telesplat::viewer {
 
-/// A whole-frame pass: the last one of a frame writes the output, the others pairs.
+/// A whole-frame pass: the last pass of a frame writes the output, the others write pairs.
 struct FramePass {
   gl::Program to_pairs, to_output;
 };
 
-/// What draws the splats of one kernel. Passes::kKeys needs `splat` alone.
+/// Programs that draw the splats of one kernel. Passes::kKeys needs only `splat`.
 struct KernelPrograms {
   gl::Program splat;  ///< writes keys, or (Passes::kSums) the depth of opaque splats
-  gl::Program sum;    ///< adds up what is visible
+  gl::Program sum;    ///< adds up visible splats
   FramePass resolve;  ///< shades the sums
 };
 
@@ -29,7 +29,7 @@ struct Programs {
   const FramePass& fill(splat::Gaps gaps) const { return gaps == splat::Gaps::kAll ? fill_all : fill_pin_holes; }
   const KernelPrograms& of(splat::Kernel kernel) const { return kernels[static_cast<size_t>(kernel)]; }
 
-  /// Fails with the compiler's words.
+  /// Error: the compiler's text.
   static Result<Programs> make();
 };
 

@@ -12,7 +12,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// What does not depend on where the item's points lie.
+// Fills in the values that do not depend on the place of the item's points.
 DrawRecord record(const splat::ItemFigures& item) {
   DrawRecord d{};
   d.spacing = item.spacing;
@@ -66,7 +66,7 @@ SplatPasses::~SplatPasses() {
 }
 
 void SplatPasses::send(Stream stream, const void* data, size_t bytes) {
-  glBindBuffer(GL_COPY_WRITE_BUFFER, streams_[stream]);  // no other state hangs on this binding
+  glBindBuffer(GL_COPY_WRITE_BUFFER, streams_[stream]);  // no other state depends on this binding
   glBufferData(GL_COPY_WRITE_BUFFER, static_cast<GLsizeiptr>(bytes), data, GL_STREAM_DRAW);
 }
 

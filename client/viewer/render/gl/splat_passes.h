@@ -1,4 +1,4 @@
-// From draw lists to keys on the GPU: the records that shaders read, and the passes that splat.
+// Turns draw lists into keys on the GPU: the records that shaders read, and the passes that splat.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@
 
 namespace telesplat::viewer {
 
-/// The view, as all shaders see it (std140, uniform block 0; shaders/common.h).
+/// The view in all shaders (std140, uniform block 0; shaders/common.h).
 struct ViewRecord {
   float right[4], down[4], forward[4];
   float focal[2], centre[2], step[2];
@@ -30,27 +30,27 @@ struct ViewRecord {
 };
 static_assert(sizeof(ViewRecord) == 176);
 
-/// What the draws of one cluster share (std430).
+/// Values shared by the draws of one cluster (std430).
 struct ClusterRecord {
   float row_x[4], row_y[4], row_w[4];  ///< splat::LeafTransform
   float facing[4];                     ///< splat::facing_vector
 };
 
-/// What one draw needs (std430).
+/// Values of one draw (std430).
 struct DrawRecord {
-  uint32_t word;      ///< of the points, in their arena
-  uint32_t count;     ///< of the points that lie there: the distance of its arrays
-  uint32_t cluster;   ///< its ClusterRecord
+  uint32_t word;      ///< begin of the points in their arena
+  uint32_t count;     ///< number of the points there: the distance between their arrays
+  uint32_t cluster;   ///< number of its ClusterRecord
   uint32_t spacing;   ///< class of the samples' distance on the screen
   float size;         ///< square, disc: side or diameter, pixels
   float bias_growth;  ///< splat::splat_bias_growth
-  int32_t side;       ///< of the square of pixels drawn
+  int32_t side;       ///< side of the square of pixels drawn
   int32_t sub_steps;  ///< 2^sub_bits of the splat's shape
   float source[4];    ///< splat::SurfelSource: direction towards the sampling eye in camera axes, radius in metres
 };
 static_assert(sizeof(DrawRecord) == 48);
 
-/// Needs a current GL context for all it does.
+/// All functions need a current GL context.
 class SplatPasses {
  public:
   SplatPasses();
@@ -58,20 +58,20 @@ class SplatPasses {
   SplatPasses(const SplatPasses&) = delete;
   SplatPasses& operator=(const SplatPasses&) = delete;
 
-  /// Uploads points that are not there yet, and writes and binds what shaders read in this frame: uniform block 0,
-  /// storage buffers 1 (draws), 2 (clusters), 3 (intensities).
+  /// Uploads points that are not there yet, and writes and binds the data that shaders read in this frame: uniform
+  /// block 0, storage buffers 1 (draws), 2 (clusters), 3 (intensities).
   void prepare(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                const image::Shading& shading);
-  /// Clears and writes targets.keys() or, for a kernel of Passes::kSums, targets.sums().
+  /// Clears and fills targets.keys() or, for a kernel of Passes::kSums, targets.sums().
   void splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel);
-  /// After the frame's last pass.
+  /// Call it after the frame's last pass.
   void end_frame() { arenas_.end_frame(); }
 
  private:
   struct DrawCommand {
     uint32_t count, instances, first, base_instance;
   };
-  /// What is written anew every frame, each in a buffer; up to kIntensities in the order of shader bindings.
+  /// Data written anew every frame, each in a buffer; up to kIntensities in the order of shader bindings.
   enum Stream { kView, kDraws, kClusters, kIntensities, kCommands, kStreams };
   void send(Stream stream, const void* data, size_t bytes);
   splat::RimBias write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
@@ -89,7 +89,7 @@ class SplatPasses {
   splat::ItemRuns runs_;
   std::vector<ClusterRecord> clusters_;
   std::vector<DrawRecord> draws_;
-  std::vector<std::vector<DrawCommand>> commands_by_arena_;  // as kCommands holds them, one arena after the other
+  std::vector<std::vector<DrawCommand>> commands_by_arena_;  // as in kCommands, one arena after the other
 };
 
 }  // namespace telesplat::viewer

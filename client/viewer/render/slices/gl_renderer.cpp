@@ -19,7 +19,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// One layer, as the shader sees it (std140).
+// One layer in the shader (std140).
 struct LayerRecord {
   float row_x[4], row_y[4], row_w[4], range[4];
 };
@@ -69,9 +69,9 @@ struct VolumeGlRenderer::Parts {
   uint32_t framebuffer = 0, targets[2] = {};  // colour, depth
   int width = 0, height = 0;
 
-  uint32_t images = 0;  // array texture, a slice a layer
+  uint32_t images = 0;  // array texture, one slice for each layer
   int images_width = 0, images_height = 0, slices = 0;
-  // What it holds.
+  // The frame that `images` holds.
   const volume::VolumeFrame* held = nullptr;
   FrameId held_frame;
   EpochId held_epoch;
@@ -119,7 +119,7 @@ Status VolumeGlRenderer::Parts::upload(const volume::VolumeFrame& frame) {
     glDeleteTextures(1, &images);
     glGenTextures(1, &images);
     glBindTexture(GL_TEXTURE_2D_ARRAY, images);
-    // Sizes vary a little from frame to frame.
+    // Rounded up, since sizes vary a little from frame to frame.
     const auto roomy = [&](int side) { return std::min((side + 255) / 256 * 256, static_cast<int>(largest_side)); };
     images_width = roomy(most_x), images_height = roomy(most_y), slices = count;
     while (glGetError() != GL_NO_ERROR) {
@@ -151,7 +151,7 @@ void VolumeGlRenderer::Parts::draw(const volume::VolumeFrame* frame, const geome
                                    uint32_t background) {
   std::vector<LayerRecord> layers;
   for (const auto& placed : frame ? volume::place_layers(*frame, camera) : std::vector<volume::PlacedLayer>()) {
-    // W is at most about 1, as the shader's limit supposes.
+    // w is at most about 1, as the shader's limit assumes.
     double most = 0;
     for (const auto& [x, y] : {std::pair{0, 0}, {width, 0}, {0, height}, {width, height}})
       most = std::max(most, glm::dot(placed.to_texel[2], glm::dvec3(x, y, 1)));

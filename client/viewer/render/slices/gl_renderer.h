@@ -1,4 +1,4 @@
-// Warping by OpenGL: each pixel of the display looks through the layers, which lie in one array texture. The pixels are
+// Warps by OpenGL: each pixel of the display looks through the layers, which lie in one array texture. The pixels are
 // the CPU's, except for rounding.
 #pragma once
 
@@ -13,14 +13,14 @@ namespace telesplat::viewer {
 
 class VolumeGlRenderer final : public VolumeRenderer {
  public:
-  /// With a context of its own, off-screen, which is current during its calls only.
+  /// Makes an off-screen context of its own, current only during calls.
   static Result<std::unique_ptr<VolumeGlRenderer>> make();
   ~VolumeGlRenderer() override;
 
   const char* name() const override { return "gl"; }
-  /// A frame's layers are uploaded when it is first drawn: frames are told apart by their ids, epochs and addresses.
-  /// warp_cpu_ms is the calling thread's time, waiting included. samples counts all layers in all pixels, although an
-  /// eye far away needs few of them. A frame that the GPU cannot hold is drawn as the background alone, and logged.
+  /// A frame's layers are uploaded when it is first drawn: ids, epochs and addresses tell frames apart. warp_cpu_ms is
+  /// the calling thread's time, waiting included. samples counts all layers in all pixels, although a far eye needs
+  /// few of them. A frame that the GPU cannot hold is drawn as the background only, and logged.
   volume::WarpStats render(const volume::VolumeFrame* frame, const geometry::Camera& camera, uint32_t background,
                            const volume::WarpTarget& target) override;
 
@@ -28,7 +28,7 @@ class VolumeGlRenderer final : public VolumeRenderer {
   bool is_software() const { return context_->software(); }
 
  private:
-  struct Parts;  // what lives in the context
+  struct Parts;  // objects that live in the context
   VolumeGlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts);
 
   std::unique_ptr<gl::EglContext> context_;

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kOwnColours = "none (the file's own colours)";
 
-// A bar of a colour map as wide as the next item.
+// Draws a bar of a colour map as wide as the next item.
 void draw_map(const colour::ColourMap& map) {
   const ImVec2 from = ImGui::GetCursorScreenPos();
   const ImVec2 size(ImGui::GetContentRegionAvail().x, ImGui::GetFontSize() * 0.7f);
@@ -28,7 +28,7 @@ void draw_map(const colour::ColourMap& map) {
   ImGui::Dummy(size);
 }
 
-// Both ends are dragged, or typed after a double click.
+// Shows both ends, which can be dragged, or typed after a double click.
 void show_range(ColourControls& colours, double now_s) {
   const auto whole = colours.whole_range();
   const auto [lo, hi] = colours.range();
@@ -115,17 +115,17 @@ void show_cut(CutControls& cut, ColourViewState& state, double now_s) {
     if (const Status s = cut.give(now_s, "off"); !s) state.complaint = s.error().text;
 }
 
-// Below the slider, on its axis.
+// Draws the histogram below the slider, on its axis.
 void draw_values(const ColourControls& colours) {
   const auto bars = colours.iso_bars();
   if (bars.empty()) return;
   const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
-  const float rim = ImGui::GetStyle().GrabMinSize / 2 + 2, height = ImGui::GetFontSize() * 4;  // the grab's half
+  const float rim = ImGui::GetStyle().GrabMinSize / 2 + 2, height = ImGui::GetFontSize() * 4;  // half the grab
   ImGui::Dummy({0, height});
   draw_bars({{from.x + rim, to.y}, {to.x - from.x - 2 * rim, height}}, bars);
 }
 
-// A surface is made anew when the person lets go: that takes a moment.
+// The surface is made anew only when the person lets go, because that takes a moment.
 void show_isosurface(ColourControls& colours, ColourViewState& state) {
   const double now = *colours.iso();
   double value = state.iso.value_or(now);

@@ -20,9 +20,9 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kPeriod_s = 0.1;  // of plots and figures while nothing happens
+constexpr double kPeriod_s = 0.1;  // plots and figures are rebuilt this often without events
 constexpr size_t kMostWaiting = 4096;
-constexpr int kAfterEvent = 2;  // builds: hovering and layouts settle in the second
+constexpr int kAfterEvent = 2;  // builds after an event: hovering and layouts settle in the second
 
 // The texture has the window's size; both have their first row at the bottom.
 constexpr const char* kVertexShader = R"(#version 330 core
@@ -36,13 +36,13 @@ out vec4 colour;
 void main() { colour = texelFetch(drawn, ivec2(gl_FragCoord.xy), 0); }
 )";
 
-// A key, or a character, which has code alone.
+// A key, or a character, which sets only `code`.
 struct Typed {
   int code = 0, scancode = 0, action = 0, mods = 0;
   bool character = false;
 
   bool releases() const { return !character && action == GLFW_RELEASE; }
-  // Whether the key does something with the letters that were typed before it.
+  // True if the key acts on the letters typed before it.
   bool acts() const {
     return !character && action == GLFW_PRESS &&
            ((code >= GLFW_KEY_ESCAPE && code <= GLFW_KEY_END) || code == GLFW_KEY_KP_ENTER ||
@@ -50,7 +50,7 @@ struct Typed {
   }
 };
 
-// Of the window, screen coordinates.
+// Part of the window, screen coordinates.
 struct Area {
   double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
   bool empty() const { return right <= left || bottom <= top; }
@@ -61,7 +61,7 @@ struct Area {
   }
 };
 
-// What a list of triangles covers.
+// Returns the area that a list of triangles covers.
 Area area_of(const ImDrawList& list) {
   Area out;
   for (const ImDrawVert& v : list.VtxBuffer) {
@@ -76,17 +76,17 @@ Area area_of(const ImDrawList& list) {
 struct Gui::Impl {
   GLFWwindow* window = nullptr;
   ImGuiContext* context = nullptr;
-  bool glfw = false, gl = false;  // parts of Dear ImGui that are to be ended
+  bool glfw = false, gl = false;  // parts of Dear ImGui that must be shut down
   gl::Program program;
   GLuint vertex_array = 0, texture = 0, framebuffer = 0;
-  int width = 0, height = 0;  // of the texture
+  int width = 0, height = 0;  // the texture's
   GuiStyle style;
-  std::vector<Area> areas;  // of what is shown, a window each
-  Area shown;               // their union: the texture holds nothing elsewhere
-  int opaque = 0;           // pixels at the window's left that nothing shines through
+  std::vector<Area> areas;  // areas of the ImGui windows that are shown
+  Area shown;               // their union: the texture is empty elsewhere
+  int opaque = 0;           // fully covered columns of pixels at the window's left
   double built_at_s = -1e9;
   int builds_due = kAfterEvent;
-  std::deque<Typed> typed;  // that builds have not taken yet, in their order
+  std::deque<Typed> typed;  // not taken by a build yet, in their order
   bool expects_text = false, popup = false, closes_popup = false;
 
   ~Impl() {
@@ -110,12 +110,11 @@ struct Gui::Impl {
     if (!framebuffer) glGenFramebuffers(1, &framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture, 0);
-    shown = {0, 0, 1e9, 1e9};  // whatever the new one holds
+    shown = {0, 0, 1e9, 1e9};  // all, since the new texture's content is unknown
     builds_due = kAfterEvent;
   }
 
-  // Drawing is confined to an area, a rim for soft edges included, as far as it lies right of this column. False:
-  // nothing is left of it.
+  // Confines drawing to an area, with a rim for soft edges, to the right of column `from`. False: it is empty.
   bool scissor(const Area& area, int from) const {
     const ImGuiIO& io = ImGui::GetIO();
     const double sx = io.DisplayFramebufferScale.x, sy = io.DisplayFramebufferScale.y;
@@ -151,7 +150,7 @@ Result<std::unique_ptr<Gui>> Gui::make(GLFWwindow* window) {
 
 void Gui::stir() { impl_->builds_due = kAfterEvent; }
 
-// What happens while nothing is shown would be taken for new when it is: releases alone may not be missed.
+// Keys pressed while nothing is shown would count as new later: so only releases are kept then.
 void Gui::on_key(int key, int scancode, int action, int mods) {
   stir();
   if (action == GLFW_REPEAT) return;  // Dear ImGui repeats keys by itself
@@ -181,7 +180,7 @@ void Gui::on_focus(bool focused) {
   stir();
   if (focused) return;
   ImGuiIO& io = ImGui::GetIO();
-  std::fill(std::begin(io.KeysDown), std::end(io.KeysDown), false);  // released elsewhere
+  std::fill(std::begin(io.KeysDown), std::end(io.KeysDown), false);  // keys may be released elsewhere
   io.KeyCtrl = io.KeyShift = io.KeyAlt = io.KeySuper = false;
 }
 void Gui::on_enter(bool entered) {
@@ -194,7 +193,7 @@ bool Gui::takes_pointer(double x, double y) const {
   return std::any_of(impl_->areas.begin(), impl_->areas.end(), [&](const Area& a) { return a.has(x, y); });
 }
 bool Gui::shows() const { return !impl_->areas.empty(); }
-// As the last build left it: WantTextInput tells of the build before.
+// State after the last build: WantTextInput is from the build before.
 bool Gui::takes_text() const {
   return shows() && GImGui->WantTextInputNextFrame == 1 && GImGui->ActiveId &&
          GImGui->ActiveId == GImGui->InputTextState.ID;
@@ -202,9 +201,9 @@ bool Gui::takes_text() const {
 
 bool Gui::due(double now_s) const { return impl_->builds_due > 0 || now_s - impl_->built_at_s >= kPeriod_s; }
 
-// Dear ImGui takes all letters of a build before its keys, and sees keys as they are when a build begins. So a build
-// takes what was typed up to the first key that acts, and none that acts again. Letters wait for the text that they
-// are meant for, and what was typed after them waits with them. Returns whether the next build has more to take.
+// Dear ImGui takes all letters of a build before its keys, and reads key states when a build begins. So a build takes
+// what was typed up to the first key that acts, and no key that acts twice. Letters wait for their text's focus, and
+// all that was typed after them waits, too. Returns true if the next build has more to take.
 bool Gui::take_typed() {
   Impl& m = *impl_;
   const bool takes = takes_text();
@@ -246,7 +245,7 @@ void Gui::build_texture(const Place& place, const std::function<double()>& build
     glClear(GL_COLOR_BUFFER_BIT);
   }
   glDisable(GL_SCISSOR_TEST);
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());  // colours come to be premultiplied: over nothing
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());  // blended over nothing, so colours become premultiplied
   m.areas.clear();
   m.shown = {};
   for (int i = 0; i < drawn->CmdListsCount; ++i) {
@@ -265,7 +264,7 @@ int Gui::prepare(const Place& place, double now_s, const std::function<double()>
     if (!m.expects_text)
       for (const Typed& t : std::exchange(m.typed, {}))
         if (t.releases()) ImGui_ImplGlfw_KeyCallback(m.window, t.code, t.scancode, t.action, t.mods);
-    m.builds_due = kAfterEvent;  // for when it is shown again
+    m.builds_due = kAfterEvent;  // for the next time that it is shown
     return 0;
   }
   if (due(now_s) || place.width != m.width || place.height != m.height) {
@@ -276,7 +275,7 @@ int Gui::prepare(const Place& place, double now_s, const std::function<double()>
   return m.opaque;
 }
 
-// Blending reads what is there, which costs most where a processor does the work of OpenGL.
+// Blending reads the frame, which costs most on software OpenGL: so opaque parts are drawn without it.
 void Gui::show(const Place& place) {
   Impl& m = *impl_;
   if (!shows()) return;

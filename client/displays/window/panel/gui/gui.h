@@ -1,4 +1,4 @@
-// Dear ImGui in a window of GLFW's: gets its events, draws over its frames.
+// Runs Dear ImGui in a GLFW window: passes events to it, and draws it over frames.
 #pragma once
 
 #include <functional>
@@ -11,9 +11,9 @@ struct GLFWwindow;
 
 namespace telesplat::viewer {
 
-/// What is built is drawn into a texture, only when something happened or a tenth of a second is over, and that texture
-/// is blended over each frame: so a panel costs little while nobody touches it. One at a time in a process. The
-/// window's context is current in make(), prepare(), show() and the destructor. One thread.
+/// Widgets are drawn into a texture after an event, or every tenth of a second; each frame only blends that texture: so
+/// an idle panel costs little. One at a time in a process. The window's context is current in make(), prepare(), show()
+/// and the destructor. Used by one thread.
 class Gui {
  public:
   /// Error: the context's OpenGL cannot draw it.
@@ -31,26 +31,26 @@ class Gui {
   void on_enter(bool entered);
   void on_move();
 
-  /// Whether what happens with the pointer at a place (screen coordinates of the window) is meant for what is drawn.
+  /// True if pointer events at this place (screen coordinates of the window) belong to a widget.
   bool takes_pointer(double x, double y) const;
-  /// Whether keys are meant for a text that is being written.
+  /// True if keys belong to a text that is being typed.
   bool takes_text() const;
-  /// Letters that come from now on are meant for a text, though it does not have the focus yet: they wait for it.
+  /// expected: letters belong to a text that does not have the focus yet: they wait for it.
   void expect_text(bool expected);
-  /// Closes the list or the colours that an item opened. False: nothing is open.
+  /// Closes the list or colour picker that an item opened. False: there is no open one.
   bool close_popup();
-  /// Whether it has something else to show than before.
+  /// True if a new build may differ from the last one.
   bool due(double now_s) const;
 
   struct Place {
-    int width = 0, height = 0;  ///< of the default framebuffer, pixels
-    double content_scale = 1;   ///< of the display; 2 where texts should have twice as many pixels
+    int width = 0, height = 0;  ///< the default framebuffer, pixels
+    double content_scale = 1;   ///< the display's; 2: texts should have twice as many pixels
   };
-  /// Makes what is to be shown, if that is due: `build` does it with Dear ImGui's functions, and says how much of the
-  /// window's left side nothing shines through, in screen coordinates. Null: nothing is shown, and nothing takes the
-  /// pointer. Returns that part in pixels: what lies below need not be drawn.
+  /// Builds the texture if that is due. build: calls Dear ImGui's functions, and returns the width at the window's left
+  /// side that is fully covered, in screen coordinates. Null: there are no widgets, and the pointer belongs to the
+  /// scene. Returns that width in pixels: the frame below it need not be drawn.
   int prepare(const Place& place, double now_s, const std::function<double()>& build);
-  /// Draws it over the default framebuffer.
+  /// Draws the texture over the default framebuffer.
   void show(const Place& place);
 
  private:

@@ -20,7 +20,7 @@ constexpr ImGuiWindowFlags kFlags = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFla
                                     ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoFocusOnAppearing |
                                     ImGuiWindowFlags_NoBringToFrontOnFocus;
 
-// The values' colours from below; where there are opacities, as far as they reach.
+// Draws the values' colours from the bottom up; opacities are the widths, if there are any.
 void draw_bar(const image::Legend& legend, const ImVec2& from, const ImVec2& size) {
   auto& list = *ImGui::GetWindowDrawList();
   list.AddRectFilled(from, {from.x + size.x, from.y + size.y}, ink(0x101418, 144));
@@ -35,13 +35,13 @@ void draw_bar(const image::Legend& legend, const ImVec2& from, const ImVec2& siz
   list.AddRect(from, {from.x + size.x, from.y + size.y}, ink(0xf4f4f4));
 }
 
-// Numbers at the right of the bar; returns how wide they are.
+// Draws numbers at the right of the bar; returns their width.
 float draw_numbers(const image::Legend& legend, const image::Ticks& ticks, const ImVec2& from, const ImVec2& size) {
   auto& list = *ImGui::GetWindowDrawList();
   const float letter = ImGui::GetFontSize(), right = from.x + size.x;
   float width = 0;
   for (const auto& tick : ticks.all) {
-    // In halves, because the difference of large numbers may be infinite.
+    // Computes with halves, because the difference of large numbers may be infinite.
     const double share =
         legend.hi > legend.lo ? (tick.value / 2 - legend.lo / 2) / (legend.hi / 2 - legend.lo / 2) : 0.5;
     const float y = from.y + size.y * float(1 - within(share, 0.0, 1.0));
@@ -52,7 +52,7 @@ float draw_numbers(const image::Legend& legend, const image::Ticks& ticks, const
   return width + letter * 0.45f;
 }
 
-// The upper half of the bar moves the upper end, the lower half the lower one.
+// Dragging in the bar's upper half moves the upper end, in its lower half the lower end.
 void drag_range(const image::Legend& legend, float middle, float height,
                 const std::function<void(double, double)>& change) {
   const ImGuiIO& io = ImGui::GetIO();
@@ -82,7 +82,7 @@ void type_range(const image::Legend& legend, LegendViewState& state, bool opens,
   ImGui::EndPopup();
 }
 
-// It stays at its distance from the nearest corner, whatever the window's size becomes.
+// Keeps its distance from the nearest corner when the window's size changes.
 void place(const LegendViewState& state, double hidden) {
   const ImVec2 window = ImGui::GetIO().DisplaySize;
   const float margin = ImGui::GetFontSize() * kMargin;

@@ -12,7 +12,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kLookAgain_s = 2;  // others may keep something, too
+constexpr double kLookAgain_s = 2;  // other people may change the book, too
 
 bool line_with_button(const std::string& line, const char* label) {
   text(line);
@@ -31,7 +31,7 @@ void wrapped(const std::string& line) {
   ImGui::PopTextWrapPos();
 }
 
-// True: it is to be taken away.
+// Returns true if the place is to be removed.
 bool show_place(const Measurements& measurements, const Measurements::Row& row, size_t index) {
   const Measurements::Place& place = row[index];
   const bool gone = small_button(fmt::format("remove {}", place.number).c_str());

@@ -1,4 +1,4 @@
-// The parts of the panel that show what is kept beside the data set, bookmarks and notes, and measurements.
+// Parts of the panel: bookmarks and notes, which are kept beside the data set, and measurements.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,22 @@
 
 namespace telesplat::viewer {
 
-/// What the person wants of it, once: at most one of these.
+/// The person's wish, returned once: at most one of these.
 struct NotesWish {
   bool keep = false, look = false;
-  std::string name;        ///< of keep; empty: a new one
+  std::string name;        ///< for keep; empty: a new name
   std::string go, remove;  ///< a bookmark's name
-  std::string text;        ///< of a new note
-  bool here = false;       ///< the note is about what was picked last
+  std::string text;        ///< a new note's text
+  bool here = false;       ///< the note is about the place picked last
   uint64_t remove_note = 0;
 };
 
 struct NotesViewState {
-  std::string name, text;  ///< as they are typed
+  std::string name, text;  ///< as typed
   double looked_s = -1e9;
 };
 
-/// book: null: not read, or it cannot be. picked: something was picked, so a note can be about it.
+/// book: null: not read yet, or it cannot be read. picked: there is a picked place, so a note can be about it.
 NotesWish show_notes(const notes::Book* book, NotesViewState& state, bool picked, double now_s);
 
 /// Builds the list of measurements, between Dear ImGui's frames. save: writes the table to a file.

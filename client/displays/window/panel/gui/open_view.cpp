@@ -16,7 +16,7 @@ std::string size_text(uint64_t bytes) {
   return bytes < 10'000'000 ? fmt::format("{} kB", (bytes + 999) / 1000) : fmt::format("{} MB", bytes / 1'000'000);
 }
 
-// What the person chose in a folder's list; empty: nothing.
+// Returns the person's choice in a folder's list; empty: there is no choice.
 std::string show_entries(const FileList::Listing& listing) {
   std::string chosen;
   if (!listing.problem.empty()) ImGui::TextWrapped("%s", listing.problem.c_str());
@@ -61,7 +61,7 @@ void show_open(OpenViewState& state, bool can_close, const std::function<void(co
     dialog("Open", can_close ? &state.shown : nullptr);
     ImGui::TextDisabled("a mesh, a volume, a folder of slices, or julia; files can be dropped on the window too");
     ImGui::SetNextItemWidth(-letter * 9);
-    // Unless the panel has it.
+    // Takes the focus unless the panel has it.
     const bool has_focus = ImGui::IsWindowFocused(ImGuiFocusedFlags_RootAndChildWindows) ||
                            !ImGui::IsWindowFocused(ImGuiFocusedFlags_AnyWindow);
     if (ImGui::IsWindowAppearing() || (has_focus && !ImGui::IsAnyItemActive() && !ImGui::IsMouseDown(0)))

@@ -1,4 +1,4 @@
-// The dialog that opens a data set, as Dear ImGui draws it.
+// The dialog that opens a data set, drawn by Dear ImGui.
 #pragma once
 
 #include <functional>
@@ -8,16 +8,16 @@
 
 namespace telesplat::viewer {
 
-/// What the dialog keeps between frames.
+/// The dialog's state between frames.
 struct OpenViewState {
   bool shown = false;
-  bool begun = false;  ///< a folder was asked for
+  bool begun = false;  ///< a folder was requested
   FileList files;
-  std::string path;  ///< as it is typed
+  std::string path;  ///< as typed
 };
 
-/// Builds it, if it is shown. Between Dear ImGui's frames. open: the person chose this data set. can_close: there is
-/// something else to look at.
+/// Builds the dialog, if it is shown, between Dear ImGui's frames. open: takes the data set that the person chose.
+/// can_close: there is something else to see.
 void show_open(OpenViewState& state, bool can_close, const std::function<void(const std::string&)>& open);
 
 }  // namespace telesplat::viewer

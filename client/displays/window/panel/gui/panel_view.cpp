@@ -16,12 +16,12 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr float kWidth = 24, kPlotHeight = 2.4f;              // in letters' heights
-constexpr size_t kColumns = 160;                              // of a plot
+constexpr size_t kColumns = 160;                              // columns of a plot
 constexpr ImU32 kProblem = IM_COL32(0xd5, 0x5e, 0x00, 0xff);  // Okabe and Ito's vermilion
 constexpr std::array<std::pair<int, int>, 4> kPictures{{{1920, 1080}, {2560, 1600}, {3840, 2160}, {7680, 4320}}};
 std::string picture_size(const PictureWish& wish) { return fmt::format("{} x {}", wish.width, wish.height); }
 
-// From 0 to a round number above all values.
+// Returns a round number above all values.
 double round_top(double most) {
   const double step = std::pow(10, std::floor(std::log10(most)));
   for (const double factor : {1.0, 2.0, 5.0})
@@ -29,7 +29,7 @@ double round_top(double most) {
   return 10 * step;
 }
 
-// Name and newest value above, one curve below, so that nobody has to tell curves apart by their colours.
+// Draws name and newest value above one curve, so that no person must tell curves apart by their colours.
 void show_plot(const Panel::Plot& plot, double now_s) {
   const auto columns = plot.history.columns(now_s, kColumns);
   double most = plot.floor;
@@ -72,7 +72,7 @@ void show_figures(const Panel& panel, double now_s) {
   for (const auto& plot : panel.plots()) show_plot(plot, now_s);
 }
 
-// Buttons are keys: both do the same.
+// Buttons act as their keys do.
 void show_pictures(Panel& panel, PanelViewState& state) {
   row("picture");
   if (begin_list("picture", state.picture.own_size() ? picture_size(state.picture).c_str() : "as the window")) {
@@ -180,7 +180,7 @@ double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::
   return double(width);
 }
 
-// What stands in the first column ends where two blanks are.
+// The first column ends at two blanks.
 void show_keys(const std::vector<std::string>& lines) {
   const float letter = ImGui::GetFontSize(), left = letter * (kWidth + 1);
   ImGui::SetNextWindowPos({left, letter});

@@ -13,7 +13,7 @@ namespace {
 
 constexpr float kTimelineHeight = 6;  // in letters' heights
 
-// Where values of a plot lie on the screen.
+// Maps values of a plot to the screen.
 struct Plane {
   ImVec2 from, size;
   double left = 0, right = 1, low = 0, high = 1;
@@ -56,7 +56,7 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
       ImGui::EndCombo();
     }
   } else {
-    // Sets lie within 2 of 0: the whole range would leave a slider too coarse. Ctrl and click takes any number.
+    // Sets lie within 2 of 0: the whole range would make a slider too coarse. Ctrl and click takes any number.
     const bool wide = info.most - info.least > 4 && info.least < 0 && !info.whole && info.most < 100;
     const double least = wide ? std::max(info.least, -2.0) : info.least,
                  most = wide ? std::min(info.most, 2.0) : info.most;
@@ -70,7 +70,7 @@ void show_parameter(SceneControls& controls, const julia::ParameterInfo& info, d
   hint(std::string(info.text).c_str());
 }
 
-// Each track in a colour of its own and between its limits' values.
+// Draws each track in a colour of its own, between its parameter's limits.
 void draw_timeline(const SceneControls& controls) {
   constexpr std::array<uint32_t, 6> kColours{0x56b4e9, 0xe69f00, 0x009e73, 0xcc79a7, 0xf0e442, 0xd55e00};
   const PlotArea area = plot_area("curves", kTimelineHeight);

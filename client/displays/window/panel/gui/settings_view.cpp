@@ -25,14 +25,14 @@ constexpr int kMostSamplers = 64;
 const std::array<std::string, 7> kSizes{"auto",      "640x400",   "960x600",  "1280x800",
                                         "1600x1000", "1920x1200", "2560x1600"};
 const std::array<std::string, 6> kUps{"x", "y", "z", "-x", "-y", "-z"};
-// Backgrounds that data of any colour stands out from.
+// Backgrounds on which data of any colour can be seen.
 constexpr std::array<std::pair<const char*, const char*>, 4> kBackgrounds{
     {{"night", "#141820"}, {"black", "#000000"}, {"grey", "#777777"}, {"white", "#ffffff"}}};
 
-// An order to the launcher.
+// Gives an order to the launcher.
 void ask(Panel& panel, const char* order, const std::string& value) { panel.order({order, {{"value", value}}, order}); }
 
-// A number that is typed; Enter gives it.
+// Shows a field for a number; Enter gives the order.
 void typed_number(Panel& panel, const char* name, const char* now, std::string& text) {
   setting_row(name);
   const std::string id = fmt::format("##{}", name);
@@ -75,7 +75,7 @@ void show_background(Panel& panel) {
   }
 }
 
-// Of one order with three stages.
+// Shows one order that has three stages.
 void show_finish(Panel& panel) {
   auto finish = splat::finish_named(panel.value("finish")).value_or(splat::Finish{});
   bool changed = false;

@@ -9,11 +9,11 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";  // Debian's fonts-dejavu-core
-constexpr double kLetters = 15, kOwnLetters = 13;  // height in pixels at scale 1; of the font that ImGui brings
+constexpr double kLetters = 15, kOwnLetters = 13;  // height in pixels at scale 1; kOwnLetters: for ImGui's own font
 
 ImVec4 grey(float value, float alpha = 1) { return {value, value * 1.04f, value * 1.1f, alpha}; }
 
-// Text on ground at 12:1, what is chosen in a blue that all people tell from grey.
+// Text has a contrast of 12:1 to the ground; selections are of a blue that all people can tell from grey.
 void set_colours(ImGuiStyle& style) {
   ImGui::StyleColorsDark(&style);
   const ImVec4 accent(0.0f, 0.447f, 0.698f, 1), bright(0.337f, 0.706f, 0.914f, 1);  // Okabe and Ito's blues

@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kEditorHeight = 9, kGrab = 0.5f;  // in letters' heights
 
-// Values beyond the axis lie at its ends.
+// Values beyond the axis are drawn at its ends.
 ImVec2 at(const PlotArea& area, double share, double height) {
   return {area.from.x + area.size.x * float(within(share, 0.0, 1.0)), area.from.y + area.size.y * float(1 - height)};
 }
@@ -26,7 +26,7 @@ ImU32 ink(const TransferEditor::Point& p, int alpha) {
   return IM_COL32(int(p.r * 255), int(p.g * 255), int(p.b * 255), alpha);
 }
 
-// The colour of each value below its opacity.
+// Fills the area below the opacity with each value's colour.
 void draw_function(const PlotArea& area, const TransferEditor& editor) {
   auto& list = *ImGui::GetWindowDrawList();
   constexpr int kSteps = 96;
@@ -40,7 +40,7 @@ void draw_function(const PlotArea& area, const TransferEditor& editor) {
   list.AddPolyline(line.data(), int(line.size()), viewer::ink(0xf0f0f0), ImDrawFlags_None, 1.5f);
 }
 
-// The point under the pointer; of several at an end of the axis the nearest to it; -1: none.
+// Returns the point under the pointer; if several lie at an end of the axis, the nearest to it; -1: there is no point.
 int point_at(const PlotArea& area, const TransferEditor& editor, const ImVec2& pointer) {
   int best = -1;
   std::pair<float, double> least{ImGui::GetFontSize() * kGrab, 0};
@@ -65,7 +65,7 @@ void draw_points(const PlotArea& area, const TransferEditor& editor, int chosen)
   }
 }
 
-// A click chooses a point and leaves it where it is.
+// A click alone chooses a point and does not move it.
 void edit_points(SceneControls& controls, TransferViewState& state, const PlotArea& area, double now_s) {
   const ImVec2 pointer = ImGui::GetIO().MousePos;
   const auto& editor = controls.transfer();
@@ -114,7 +114,7 @@ void show_window(SceneControls& controls, double now_s) {
   const auto& editor = controls.transfer();
   double values[2] = {editor.window(), editor.level()};
   row("window, level");
-  const double least = (editor.hi() - editor.lo()) / 1000;  // a function of no width has lost its form
+  const double least = (editor.hi() - editor.lo()) / 1000;  // a function of width 0 would have lost its form
   const float speed = float(2 * least);
   if (seen("drag", "window, level",
            ImGui::DragScalarN("##window", ImGuiDataType_Double, values, 2, speed, nullptr, nullptr, "%.5g")))

@@ -1,5 +1,5 @@
-// Small things that the parts of the panel share, between Dear ImGui's frames. Every widget that a person can use goes
-// through one of these functions, so that a WidgetLog lists it and tools/lab/monkey reaches it.
+// Small functions that the parts of the panel share, between Dear ImGui's frames. Every widget that a person can use
+// goes through one of these, so that a WidgetLog lists it and tools/lab/monkey reaches it.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline ImU32 ink(uint32_t rgb, int alpha = 255) {
 
 inline void text(const std::string& line) { ImGui::TextUnformatted(line.data(), line.data() + line.size()); }
 
-/// Tells of the item before it while the pointer lies on that.
+/// Shows a line while the pointer lies on the item before it.
 inline void hint(const char* line) {
   if (!ImGui::IsItemHovered()) return;
   ImGui::BeginTooltip();
@@ -28,7 +28,7 @@ inline void hint(const char* line) {
   ImGui::EndTooltip();
 }
 
-/// A row of a form: the name at the left, then what the next item fills.
+/// Begins a row of a form: the name at the left; the next item fills the rest.
 inline void row(const char* name) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(name);
@@ -36,15 +36,15 @@ inline void row(const char* name) {
   ImGui::SetNextItemWidth(-1);
 }
 
-/// What of the window shows the items that come next.
+/// Returns the part of the window in which the next items can be seen.
 inline WidgetLog::Rect visible_part() {
   const auto& list = *ImGui::GetWindowDrawList();
   const ImVec2 from = list.GetClipRectMin(), to = list.GetClipRectMax();
   return {from.x, from.y, to.x, to.y};
 }
 
-/// Tells the log of the item before it, and returns `used`: what Dear ImGui's function returned for it. kind: "slider",
-/// "number", "text", "colour" and "plot" (dragged, clicked); buttons, boxes, lists and sections have functions below.
+/// Reports the item before it to the log, and returns `used`: Dear ImGui's result for it. kind: "slider", "number",
+/// "text", "colour" and "plot" (dragged, clicked); buttons, boxes, lists and sections have functions below.
 inline bool seen(const char* kind, const char* name, bool used) {
   if (auto* log = LoggedBuild::log()) {
     const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
@@ -56,7 +56,7 @@ inline bool seen(const char* kind, const char* name, bool used) {
 struct PlotArea {
   ImVec2 from, size;
 };
-/// An empty rectangle as wide as the panel that takes the pointer. height: in letters' heights.
+/// Makes an empty rectangle as wide as the panel that takes the pointer. height: in letters' heights.
 inline PlotArea plot_area(const char* name, float height) {
   const PlotArea out{ImGui::GetCursorScreenPos(),
                      {std::max(40.0f, ImGui::GetContentRegionAvail().x), ImGui::GetFontSize() * height}};
@@ -71,7 +71,7 @@ inline bool button(const char* label) { return seen("button", label, ImGui::Butt
 inline bool small_button(const char* label) { return seen("button", label, ImGui::SmallButton(label)); }
 inline bool checkbox(const char* label, bool* on) { return seen("box", label, ImGui::Checkbox(label, on)); }
 
-/// A list that drops down, its name hidden. True: it is open, its choices come next, and ImGui::EndCombo after them.
+/// Begins a drop-down list; its name is hidden. True: it is open; add its choices, then call ImGui::EndCombo.
 inline bool begin_list(const char* name, const char* shown) {
   const ImVec2 from = ImGui::GetCursorScreenPos();
   const WidgetLog::Rect rect{from.x, from.y, from.x + ImGui::CalcItemWidth(), from.y + ImGui::GetFrameHeight()};
@@ -80,8 +80,8 @@ inline bool begin_list(const char* name, const char* shown) {
   if (auto* log = LoggedBuild::log()) log->seen("list", name, rect, visible, open);
   return open;
 }
-/// A line that can be chosen, of the list with that name. The label is shown as it is, whatever it holds: Dear ImGui
-/// takes "##" for the end of one, and ends the program at an empty one.
+/// Makes a line of the list with that name. The label may hold any text: Dear ImGui alone would cut it at "##", and
+/// would end the program if it is empty.
 inline bool choice(const char* list, const std::string& label, bool chosen = false) {
   ImGui::PushID(label.data(), label.data() + label.size());
   const bool used = ImGui::Selectable("##choice", chosen);
@@ -93,7 +93,7 @@ inline bool choice(const char* list, const std::string& label, bool chosen = fal
   return seen("choice", (std::string(list) + "=" + label).c_str(), used);
 }
 
-/// The widgets that come next lie in this section.
+/// The next widgets lie in this section.
 inline bool section(const char* name, bool open) {
   if (auto* log = LoggedBuild::log()) log->enter("panel");
   const bool shown = ImGui::CollapsingHeader(name, open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
@@ -102,12 +102,12 @@ inline bool section(const char* name, bool open) {
   return shown;
 }
 
-/// The widgets that come next lie in this dialog, whose ImGui::Begin came before. open: it has a button that closes it,
-/// which was pressed if it is false.
+/// The next widgets lie in this dialog, whose ImGui::Begin came before. open: it has a button that closes it; false:
+/// the button was pressed.
 inline void dialog(const char* name, const bool* open) {
   if (!LoggedBuild::log()) return;
   LoggedBuild::log()->enter(name);
-  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();  // of the title
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();  // the title's
   if (open)
     LoggedBuild::log()->seen("button", "close", {to.x - (to.y - from.y), from.y, to.x, to.y}, {0, 0, 1e9f, 1e9f},
                              !*open);

@@ -1,17 +1,16 @@
-// What all shaders share: the view, the coding of pixels (common/splat/pixel_key.h), points and how they are projected.
-// Arithmetic stands in the same order as on the CPU, and `precise` forbids fusing it, so that both draw the same
-// picture.
+// Parts of all shaders: the view, the coding of pixels (common/splat/pixel_key.h), points and their projection.
+// Arithmetic has the same order as on the CPU, and `precise` forbids fusing it, so that both draw the same picture.
 #pragma once
 
 #include <string_view>
 
 namespace telesplat::viewer::shaders {
 
-/// The first part of every shader.
+/// First part of every shader.
 inline constexpr std::string_view kVersion = R"(#version 430 core
 )";
 
-/// ViewRecord in splat_passes.h, in the same order.
+/// ViewRecord of splat_passes.h, in the same order.
 inline constexpr std::string_view kView = R"(
 layout(std140, binding = 0) uniform View {
   vec4 right, down, forward;  // axes of the camera in room space
@@ -29,7 +28,7 @@ layout(std140, binding = 0) uniform View {
 } view;
 )";
 
-/// Pixels while splatting: a key of 64 bits in two halves, .x = low, .y = high.
+/// A pixel while splatting: a key of 64 bits in two halves, .x = low, .y = high.
 inline constexpr std::string_view kKeys = R"(
 const uvec2 kEmptyKey = uvec2(0xffffffffu);
 const uint kEmptyInfo = 0xffffffffu;
@@ -60,7 +59,7 @@ uint unbiased_depth_code(uint info) {
 float depth_test_value(uint high) { return float(high >> 7) * (1.0 / 16777216.0); }
 )";
 
-/// The vertex stage's view of points and of what draws them. DrawRecord and ClusterRecord in splat_passes.h.
+/// Points, and the draws that send them, in the vertex stage. DrawRecord and ClusterRecord of splat_passes.h.
 inline constexpr std::string_view kPoints = R"(
 struct Cluster { vec4 row_x, row_y, row_w, facing; };
 struct Draw {
@@ -109,7 +108,7 @@ void place_square(ivec2 first, int side, bool seen) {
 }
 )";
 
-/// One triangle that covers the frame.
+/// Draws one triangle that covers the frame.
 inline constexpr std::string_view kWholeFrame = R"(
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }
 )";

@@ -1,5 +1,4 @@
-// Where a sample's footprint on the surface appears on the screen: common/splat/surfel/surfel-inl.h, operation by
-// operation.
+// Computes a sample's footprint on the screen: common/splat/surfel/surfel-inl.h, operation by operation.
 // Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics
 // Interface 2004.
 #pragma once

@@ -1,4 +1,4 @@
-// Elliptical weighted average: visibility, weighted sums of what is visible, and their means
+// Elliptical weighted average: visibility, weighted sums of visible splats, and their means
 // (common/splat/ewa/ewa-inl.h).
 #pragma once
 
@@ -6,7 +6,7 @@
 
 namespace telesplat::viewer::shaders {
 
-/// Pass 1: depth alone, of opaque ellipses.
+/// Pass 1: depth of opaque ellipses only.
 inline constexpr std::string_view kEwaVisibilityVertex = R"(
 void main() {
   Draw d = draws[draw_number];

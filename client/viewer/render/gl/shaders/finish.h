@@ -1,6 +1,5 @@
-// The finish, as common/splat/finish.h defines it: fill, smooth, antialias. Integers throughout: the same pixels as on
-// the CPU. Each stage takes the pairs that the stage before it left. It defines uvec2 resolve(ivec2 at), `at` with
-// margin.
+// The finish, as common/splat/finish.h defines it: fill, smooth, antialias. All in integers: the same pixels as on the
+// CPU. Each stage reads the pairs of the stage before it, and defines uvec2 resolve(ivec2 at), `at` with margin.
 #pragma once
 
 #include <string_view>
@@ -15,8 +14,8 @@ uvec3 split(uint colour) { return uvec3(colour >> 16, colour >> 8, colour) & 255
 uint join(uvec3 rgb) { return rgb.r << 16 | rgb.g << 8 | rgb.b; }
 )";
 
-/// ENOUGH: whether supports suffice (common/splat/finish.h, Gaps), by their `count`, their `weights`, and whether they
-/// are `even`. BETWEEN: whether nearer neighbours of these `weights` do.
+/// ENOUGH: true if supports suffice (common/splat/finish.h, Gaps), by their `count`, their `weights`, and if they are
+/// `even`. BETWEEN: true if nearer neighbours of these `weights` suffice.
 inline constexpr std::string_view kPinHoles = R"(
 #define ENOUGH(count, weights, even) (weights >= ((even) ? FLAT_SUPPORTS : PIN_HOLE_SUPPORTS))
 #define BETWEEN(weights) (weights >= BETWEEN_SUPPORTS)

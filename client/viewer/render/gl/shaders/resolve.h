@@ -1,4 +1,4 @@
-// From keys to pairs (colour, info), and how passes over the whole frame end. Empty pixels have the background's
+// Turns keys into pairs (colour, info), and ends passes over the whole frame. Empty pixels have the background's
 // colour.
 #pragma once
 
@@ -6,7 +6,7 @@
 
 namespace telesplat::viewer::shaders {
 
-/// Shading by the intensity of each of the 65536 normals, packed four to a word.
+/// Shades by the intensity of each of the 65536 normals, packed four to a word.
 inline constexpr std::string_view kResolve = R"(
 layout(binding = 0) uniform usampler2D keys;
 layout(std430, binding = 3) readonly buffer Intensities { uint intensities[]; };
@@ -26,13 +26,13 @@ uvec2 resolve(ivec2 at) {
 }
 )";
 
-/// How a whole-frame pass ends, after a part that has uvec2 resolve(ivec2 at).
+/// Ends a whole-frame pass, after a part that has uvec2 resolve(ivec2 at).
 inline constexpr std::string_view kToPairs = R"(
 layout(location = 0) out uvec2 pair;
 void main() { pair = resolve(ivec2(gl_FragCoord.xy)); }
 )";
 
-/// Without the margin. A frame buffer without depth has no second attachment.
+/// Writes the output, without the margin. A frame buffer without depth has no second attachment.
 inline constexpr std::string_view kToOutput = R"(
 layout(location = 0) out vec4 out_colour;
 layout(location = 1) out float out_depth_m;

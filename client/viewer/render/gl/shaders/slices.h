@@ -1,4 +1,4 @@
-// The warp of a volume's layers: one pass over the display, each pixel looking through all layers
+// Warps a volume's layers: one pass over the display; each pixel looks through all layers
 // (common/volume/warp/warper.h).
 #pragma once
 
@@ -11,7 +11,7 @@ inline constexpr std::string_view kVolumeVertex = R"(
 void main() { gl_Position = vec4(4 * (gl_VertexID & 1) - 1, 4 * (gl_VertexID >> 1) - 1, 0, 1); }
 )";
 
-/// MAX_LAYERS, NEAREST_W, SOLID, DONE: as the processor's.
+/// MAX_LAYERS, NEAREST_W, SOLID, DONE: the same values as on the processor.
 inline constexpr std::string_view kVolumeFragment = R"(
 struct Layer {
   vec4 row_x, row_y, row_w;  // of xyz: to texels, whole numbers at their centres

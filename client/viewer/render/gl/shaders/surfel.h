@@ -1,11 +1,11 @@
-// Ellipse and ewa: contours become pixels (common/splat/surfel/splat.h, operation by operation).
+// Ellipse and ewa: turns contours into pixels (common/splat/surfel/splat.h, operation by operation).
 #pragma once
 
 #include <string_view>
 
 namespace telesplat::viewer::shaders {
 
-/// After kContour.
+/// Stands after kContour.
 inline constexpr std::string_view kSurfel = R"(
 // Depth codes before rounding, and how they change as depth changes by its own size.
 float depth_code_linear(float w) {
@@ -95,7 +95,7 @@ void place_conic(Conic c, bool seen) {
 }
 )";
 
-/// What fragments need of a conic, as the vertex stage sends it and as the fragment stage has it.
+/// Values of a conic for fragments: outputs of the vertex stage, inputs of the fragment stage.
 #define TELESPLAT_CONIC_VARYINGS(direction)                                  \
   "flat " direction                                                          \
   " vec4 conic_place;\n" /* its centre, pixels of the image; form.xy */      \
