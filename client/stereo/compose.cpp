@@ -70,7 +70,7 @@ template <class T>
 struct Pictures {
   const std::vector<T>&left, &right;
   std::vector<T>& out;
-  int width, height;  // an eye's picture
+  int width, height;  // size of an eye's picture
 
   void side_by_side() const {
     for_rows(height, [&](int y) {

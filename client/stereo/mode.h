@@ -18,9 +18,9 @@ enum class Mode {
   kAnaglyphColour,  ///< the left picture's red, the right one's green and blue
   kAnaglyphDubois,  ///< colours as near as the glasses allow (Dubois 2009)
   kRows,            ///< even rows (from the top, counted from 0) are the left eye's
-  kColumns,         ///< even columns are
+  kColumns,         ///< even columns are the left eye's
   kChecker,         ///< pixels where row + column is even are the left eye's
-  kAutostereo,      ///< each subpixel is of the eye that sees it through a line screen (autostereo/)
+  kAutostereo,      ///< each subpixel belongs to the eye that sees it through a line screen (autostereo/)
   kQuadBuffer       ///< each eye has a frame buffer of its own; composed as kSideBySide of a display twice as wide
 };
 

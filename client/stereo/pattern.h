@@ -1,4 +1,4 @@
-// Test pictures that show a person if each eye gets its own.
+// Test pictures by which a person sees that each eye gets its own.
 #pragma once
 
 #include <array>

@@ -21,8 +21,7 @@ class Succession {
   void begin(std::shared_ptr<Received> next);
   /// The newest Received has its first complete update, the answer to this request. Later calls change nothing.
   void on_update(RequestId request);
-  /// Destroys Receiveds that were dropped and that no thread holds. It takes milliseconds: not for the display's
-  /// thread.
+  /// Destroys Receiveds that were dropped and that no thread holds. Takes milliseconds: not for the display's thread.
   void free_dropped();
 
   // ---- display thread ----

@@ -28,7 +28,7 @@ struct ViewerOptions {
   std::string eye, look_at;  ///< "x,y,z" of the first view, metres in the room; empty: fitted to the data set
   std::string poses;         ///< endpoint of a publisher of poses that moves the head; empty: none
   std::string prediction = "kalman";  ///< predictor for poses: "none", "velocity" or "kalman"
-  double pose_horizon_s = 0;          ///< how far ahead displayed poses of `poses` are predicted; 0: as long as a frame
+  double pose_horizon_s = 0;          ///< how far ahead displayed poses of `poses` are predicted; 0: by a frame's time
   bool loop = false;                  ///< the trajectory of a file begins again where it ends
   HeadMovement movement;              ///< made from trajectory, eye, look_at and loop
   /// Seconds from the first displayed frame, 0: until stopped; not given: as long as the trajectory of a file (and

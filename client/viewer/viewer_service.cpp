@@ -140,7 +140,7 @@ struct Served {
   DisplayResult display;
   bool session_ended = false;
   std::string why;      // reason of the session's end, for people
-  int link_code = 0;    // the master refused the link, or was waited for too long
+  int link_code = 0;    // exit code if the master refused the link or did not answer in time; else 0
   bool failed = false;  // the worker's thread ended
 };
 

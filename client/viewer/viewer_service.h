@@ -15,8 +15,8 @@
 namespace telesplat::viewer {
 
 struct DisplayHelp {
-  net::Access asking;                            ///< may change the session for all, if the person may
-  std::shared_ptr<PoseFeed> poses;               ///< moves the head; null: there is no feed
+  net::Access asking;               ///< for orders that change the session for all, if the person may give these
+  std::shared_ptr<PoseFeed> poses;  ///< moves the head; null: there is no feed
   std::function<void(const std::string&)> tell;  ///< prints lines for the person
 };
 

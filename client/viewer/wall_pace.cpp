@@ -11,7 +11,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kAsk_s = 0.1;        // period of the checks if it must stop
+constexpr double kAsk_s = 0.1;        // period of checks for a stop
 constexpr double kSayAgain_s = 0.25;  // SwapReady may have been lost
 constexpr double kFarAway_s = 1;      // a moment to present that lies farther ahead is ignored
 

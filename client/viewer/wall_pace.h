@@ -22,7 +22,7 @@ class WallPace {
     std::string wall;                  ///< name of the wall, equal in all its viewers
     uint64_t number = 0, viewers = 1;  ///< this viewer's number in the wall; their count
     double period_s = 0;               ///< least time between two frames
-    double asks_hz = 20;               ///< views of one head that all ask for together, a second at most
+    double asks_hz = 20;               ///< requests a second, at most, that all make for views of one head
   };
   /// A frame that is to be drawn.
   struct Turn {
@@ -36,7 +36,7 @@ class WallPace {
     double t_s = 0;
     geometry::Pose head;
     wire::ShownState state;
-    double horizon_s = 0;  ///< views are asked for the head this far ahead, all for one head; 0: not for one head
+    double horizon_s = 0;  ///< all ask for views of one head, predicted this far ahead; 0: not of one head
   };
   struct Swapped {
     double wait_s = 0;        ///< from the call of drawn() to the moment to present

@@ -43,7 +43,7 @@ struct Grid {
 struct Arc {
   glm::dvec3 centre{0.0};  ///< on the cylinder's axis, which is vertical, as high as the middle of its screens
   double radius_m = 0;     ///< from the axis to the middle of each picture
-  double turn_deg = 0;     ///< angle to the left of straight on at which the middle column stands
+  double turn_deg = 0;     ///< direction of the middle column, to the left of straight on
   double column_deg = 0;   ///< angle from one column to the next; 0: outer edges touch
 };
 

@@ -52,7 +52,7 @@ Edges edges_of_plane(const Wall& wall) {
   return out;
 }
 
-// The width counts angles, so that screens beside the head have a place; heights are measured along the screens.
+// Screens farther aside than kWidest_rad do not widen the view. Heights are tangents at the screen's own distance.
 Edges edges_around(const Wall& wall) {
   Edges out;
   for (const Screen& s : wall.screens)

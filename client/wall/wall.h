@@ -16,7 +16,7 @@
 
 namespace telesplat::wall {
 
-/// Screens of a wall at most.
+/// Most screens that a wall may have.
 inline constexpr int kMostScreens = 256;
 
 /// Metres from the picture's edges to the outer edges of the screen.

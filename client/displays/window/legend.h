@@ -28,7 +28,7 @@ class WindowLegend {
   void not_built() { part_ = {}; }
   /// Part of the window that Dear ImGui's legend covers.
   const WindowPart& part() const { return part_; }
-  /// Draws it into a picture that is saved, if it is shown. wall: the display's tile.
+  /// Draws the legend, if it is shown, into a picture that is saved. wall: the display's tile.
   void draw_into(image::View& picture, const WallTile& wall) const;
 
  private:

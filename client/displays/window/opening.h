@@ -13,8 +13,8 @@
 namespace telesplat::viewer {
 
 /// Reads lines from a file descriptor without waiting. The launcher sends
-/// progress TEXT   the present step, for people: "reading a.ply 43 %, 12 s left"; without TEXT: none
-/// problem TEXT    why a data set could not be opened
+///   progress TEXT   the present step, for people: "reading a.ply 43 %, 12 s left"; without TEXT: none
+///   problem TEXT    why a data set could not be opened
 /// Used by one thread.
 class LauncherLines {
  public:

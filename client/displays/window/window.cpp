@@ -465,7 +465,7 @@ void Window::present(const image::View& view, const Overlays& overlays, const st
   const int hidden = impl_->hidden = impl_->gui->prepare(place, monotonic_s(), gui);
   impl_->presenter->draw(view, width, height, overlays, hidden);
   impl_->gui->show(place);
-  if (impl_->draws_without_gpu) glFinish();  // as the swap would; it takes time in which the display may go away
+  if (impl_->draws_without_gpu) glFinish();  // the swap would wait here, too; meanwhile the display may go away
   if (lost()) return;
   glfwSwapBuffers(impl_->window);
 }

@@ -60,7 +60,7 @@ class Window {
   bool fullscreen() const;
   /// Returns the print on a key of this keyboard.
   std::string key_name(Key key) const;
-  /// Scale of texts beside a plain display, in pixels: 2 for twice the density.
+  /// Size of texts relative to a plain display, in pixels: 2 for twice the density.
   double content_scale() const;
   /// Returns files that were dropped onto the window since the last call.
   std::vector<std::string> take_dropped();

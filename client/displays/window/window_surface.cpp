@@ -365,7 +365,7 @@ void WindowSurface::choose(double now_s, const std::string& name, const std::str
   interaction_.undo().did(now_s, {name, becomes(before), becomes(value), name});
 }
 
-// Returns the width that it covers at the left.
+// Builds panel, legend and dialogs. Returns the width that the panel covers at the left.
 double WindowSurface::build_panel(double now_s) {
   const LoggedBuild logged(widget_log_);
   double width = 0;
@@ -416,8 +416,8 @@ void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
   screenshots_.take(copy, alpha);
 }
 
-// The same view in the wished size: the field of view spans its longer side. On a wall it is this screen's part, in its
-// full width. With two eyes it is the view of the head between them.
+// Sets the camera of this view in the wished size: the field of view spans its longer side. On a wall it shows this
+// screen's part, in its full width; with two eyes, the view of the head between them.
 std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& camera) {
   const auto wish = panel_.take_picture();
   if (!wish || !wish->own_size()) return wish;

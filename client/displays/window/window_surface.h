@@ -120,13 +120,13 @@ class WindowSurface final : public DisplaySurface {
   ShownScene scene_;
   std::string scene_name_;
   bool had_scene_ = false;
-  geometry::Pose head_;             // the frame at hand's
+  geometry::Pose head_;             // for the frame at hand
   bool tracked_ = false;            // head_ is from a tracker
   std::array<double, 4> fitted_{};  // values for which the first view was made; zeros: none yet
   WindowLegend legend_{*window_, options_.display, overlays_};
   struct Shown {
     double at_s = -1e9;
-    int width = 0, height = 0;  // the window's
+    int width = 0, height = 0;  // the window's size, pixels
     uint64_t overlays = 0;      // Overlays::version()
     bool panel = false;
   };

@@ -11,7 +11,7 @@ namespace telesplat::viewer {
 namespace {
 
 const glm::dvec3 kOnStage(0, 1.1, -1.0);        // a table in front of a person in the middle of the stage
-const glm::dvec3 kBeforeHead(0, -0.35, -0.75);  // if the space begins at the eyes
+const glm::dvec3 kBeforeHead(0, -0.35, -0.75);  // the same if the space begins at the eyes
 constexpr double kFar_m = 100;                  // far end of the layers' depth; content is always nearer
 constexpr double kMostDepthStep_m = 1.5e-3;     // at one metre: coarser steps show in pictures that are moved by depth
 constexpr XrPosef kNoOffset{{0, 0, 0, 1}, {0, 0, 0}};

@@ -1,4 +1,4 @@
-// One picture of two eyes' pictures for a panel with a line screen: each subpixel gets the eye that sees it.
+// Composes two eyes' pictures for a panel with a line screen: a subpixel shows the picture of the eye that sees it.
 #pragma once
 
 #include <cstdint>

@@ -119,7 +119,8 @@ PanelFigures figures_of(const Panel& p, double separation_m) {
   PanelFigures out;
   const double depth_m = optical_depth_m(p.lines),
                pitch_x_m = p.lines.pitch_m / std::cos(p.lines.tilt_deg * kPanelDegree);
-  // At distance z from the pixels eyes that are e apart see a place's lines e * depth / z apart: half a pitch is best.
+  // At distance z from the pixels, eyes e apart see a place through the lines e * depth / z apart: half a pitch is
+  // best.
   out.best_distance_m = separation_m * depth_m / (0.5 * pitch_x_m);
   out.repeat_m = pitch_x_m * p.distance_m / depth_m;
   out.pixels_a_line = pitch_x_m / p.pixel_m;

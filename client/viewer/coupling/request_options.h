@@ -11,8 +11,8 @@ namespace telesplat::viewer {
 struct RequestOptions {
   int sampling_width = 1280, sampling_height = 800;
   double max_rate_hz = 20;          ///< requests a second at most; the master keeps only the newest
-  double max_margin = 0.3;          ///< assumed until a latency is measured
-  double initial_latency_s = 0.25;  ///< assumed until one was measured
+  double max_margin = 0.3;          ///< the sampled frustum is at most this fraction wider than the displayed one
+  double initial_latency_s = 0.25;  ///< assumed until a latency is measured
   /// Sample as finely as updates of target_latency_s allow, and a still view exactly; the size above is not used.
   bool adaptive = false;
   double target_latency_s = 0.15;  ///< adaptive: longer updates make sampling coarser, shorter ones finer

@@ -36,7 +36,8 @@ std::vector<double> update_row(const MeasuredUpdate& measured);
 class StageTable {
  public:
   StageTable();
-  /// The update is complete; returns the time of each stage. An update that a replay of events completed has no row.
+  /// The update is complete; returns the time of each stage. Nothing: a replay of events completed it, so it has no
+  /// row.
   std::optional<metrics::StagesMs> complete(const MeasuredUpdate& measured);
   /// A frame that ended at end_s (master's clock) shows this update, and all before it.
   void displayed(RequestId request, double end_s);

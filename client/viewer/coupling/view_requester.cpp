@@ -12,7 +12,7 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr size_t kMaxOpen = 256;
-constexpr double kMostBeyond_s = 0.02;       // a tracker's pose for a later time than asked for plus this is not used
+constexpr double kMostBeyond_s = 0.02;       // a tracker's pose for a time this much later is not used
 constexpr double kEpochSettles_s = 1.0;      // without a new epoch the scene counts as unchanging again
 constexpr double kFirstPixels = 1280 * 800;  // adaptive sampling begins with this size
 constexpr double kMotionOfRest = 0.002;      // radians, or metres / 0.6, until a view would be displayed
@@ -20,8 +20,8 @@ constexpr double kMotionOfRest = 0.002;      // radians, or metres / 0.6, until 
 // pixels, and only after several updates that agree.
 constexpr double kScaleStep = 0.70710678118654752;
 constexpr int kSlowUpdates = 3, kFastUpdates = 2;
-constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;  // shares of the target; the
-                                                                                     // others: of that time
+// kSteeredAim is a share of the target latency, the others are shares of that time.
+constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;
 constexpr double kWholePart = 4;  // a view with samples in more than 1 of 4 pixels counts as sampled whole
 
 // Returns the side of a sampled image: a multiple of 8, in range.

@@ -46,12 +46,12 @@ ViewPart part_of(const wire::Patch& patch);
 
 class ViewRequester {
  public:
-  static constexpr double kDeadBand_px = 0.25;  ///< movement that counts as rest, of content at kNearest_m
+  static constexpr double kDeadBand_px = 0.25;  ///< content at kNearest_m moves by less at rest
   static constexpr double kNearest_m = 0.3;
-  static constexpr double kQuietPeriod_s = 1.0;  ///< period of requests that find unannounced changes
+  static constexpr double kQuietPeriod_s = 1.0;  ///< period of repeated requests, which find unannounced changes
   static constexpr double kPatience_s = 0.5;     ///< with a view under way
   static constexpr double kSettles_s = 0.25;     ///< pictures: a head that rests this long asks once more
-  static constexpr double kAskPatience_s = 0.5;  ///< without a word from the wall, before it asks for its own head
+  static constexpr double kAskPatience_s = 0.5;  ///< without a wall's request, until it asks for its own head
 
   ViewRequester(const RequestOptions& options, InstanceId viewer)
       : options_(options), viewer_(viewer), predictor_(options.prediction) {}
@@ -65,8 +65,8 @@ class ViewRequester {
   void on_jump();
   /// The head's tracker expects it here at t_s, which lies ahead: this is better than a prediction from poses.
   void on_expected(double t_s, const geometry::Pose& pose) { expected_ = {t_s, pose}; }
-  /// All viewers of a wall ask for views of one head now, this viewer with this camera. While such words come, nothing
-  /// else is asked for asynchronously. ask: ViewRequest::ask.
+  /// All viewers of a wall ask for views of one head now, this viewer with this camera. While such requests come,
+  /// nothing else is asked for asynchronously. ask: ViewRequest::ask.
   void on_ask(double now_s, uint64_t ask, const geometry::Camera& camera);
   /// Sets RequestOptions::min_scale from the session; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
@@ -91,9 +91,9 @@ class ViewRequester {
   /// Returns the next request; asynchronously, if one is due. A head that rests asks for exactly the same view again
   /// while it moves by less than kDeadBand_px. If sampling is steered, it asks only every kQuietPeriod_s while that
   /// view is under way, and after its update brought no points.
-  /// Requests keep to their rate: a late one does not delay those after it. If sampling is steered, a viewer's views
-  /// are sampled one after the other, so the next request goes out when the last view is complete, or has been under
-  /// way for kPatience_s: then the head is known best.
+  ///   Requests keep to their rate: a late one does not delay those after it. If sampling is steered, a viewer's views
+  ///   are sampled one after the other, so the next request goes out when the last view is complete, or has been under
+  ///   way for kPatience_s: then the head is known best.
   std::optional<wire::ViewRequest> next(double now_s);
   /// Asynchronously: time until the next request may go out; nothing: it may go out now.
   std::optional<double> due_in_s(double now_s) const {
@@ -177,8 +177,8 @@ class ViewRequester {
 
 /// Counts credits of a viewer that waits (sync, loose). Requests, updates and frames go in as they happen, decisions
 /// come out; no sockets, no clocks, no threads.
-/// A request holds a credit from its sending until the frame that shows its update has been displayed. Updates are
-/// displayed in the order of their requests, each in exactly one frame.
+///   A request holds a credit from its sending until the frame that shows its update has been displayed. Updates are
+///   displayed in the order of their requests, each in exactly one frame.
 class Coupling {
  public:
   /// After this long without any sign of an answer, the master may have forgotten the requests (it was restarted) or

@@ -475,7 +475,7 @@ class DisplayLoop {
                                  o_.transparent ? image::Alpha::kCoverage : image::Alpha::kNone);
   }
 
-  // Refuses orders from others that came before the first frame.
+  // Orders of other processes: refused while there is no frame, else carried out on the displayed one.
   void refuse_orders() {
     for (const wire::Order& order : worker_.orders().take_orders())
       worker_.orders().answer({order.number, false, order.command + ": nothing is shown yet"});
@@ -555,7 +555,7 @@ class DisplayLoop {
   EyePictures eyes_;
   ShownFrame shown_;  // last
   Look look_;
-  ShownScene scene_;  // the surface has it, and the session too
+  ShownScene scene_;  // as given to the surface; so is session_
   std::shared_ptr<const wire::Welcome> session_;
   image::View view_;
   std::array<image::View, 2> eye_views_;  // of a surface that has eyes

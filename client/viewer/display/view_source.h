@@ -1,4 +1,4 @@
-// Source of the display's pictures: points of the model, or frames of a volume. The display loop knows no difference.
+// Source of the display's pictures: points of the model, or frames of a volume. The display loop treats both alike.
 #pragma once
 
 #include <array>
@@ -37,7 +37,7 @@ struct DrawnFrame {
   double refined = 0, refine_ms = 0;  ///< still picture: share of pixels drawn with sub-pixels; time for that
   int sub_pixels = 1;                 ///< sub-pixels of such a pixel, on each axis
   EpochId epoch;
-  bool between_clips = false;  ///< it is cut as the session is now, and its points are from an epoch before that
+  bool between_clips = false;  ///< it has the session's present clip, and points from an epoch before it
   ShownUpdate update;          ///< newest view update in the frame
   /// Camera of a picture that a server drew; such a picture has no depth.
   std::optional<geometry::Camera> picture_of;

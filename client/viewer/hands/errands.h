@@ -71,15 +71,15 @@ struct FrameHands {
 };
 
 /// Returns JSON. Error: what is wrong with the order, for the person.
-/// pick     "at": "X,Y" or "X%,Y%", up to three separated by blanks, pixels of the display from its upper left corner;
-/// "opacity" (0.25): for volumes. {"picks": [null or as to_json(ToldPlace), "colour", "depth_m", "spacing_m",
-/// "pixel", "probe": arguments of the order that asks the data server], "epoch", "placement"}
-/// where    {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
-/// go       "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
-/// overlay  "name", "on": on or off. {}
-/// an order of scene::settings() that a viewer keeps   "value". {}
-/// measure  "do": "list", "add" ("at" and "opacity" as in pick: a row of places), "remove" ("number"), "clear",
-/// "csv". Measurements::list(), or {"csv": Measurements::csv()}
+///   pick   "at": "X,Y" or "X%,Y%", up to three separated by blanks, pixels of the display from its upper left corner;
+///          "opacity" (0.25): for volumes. {"picks": [null or as to_json(ToldPlace), "colour", "depth_m", "spacing_m",
+///          "pixel", "probe": arguments of the order that asks the data server], "epoch", "placement"}
+///   where  {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
+///   go     "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
+///   overlay  "name", "on": on or off. {}
+///   an order of scene::settings() that a viewer keeps   "value". {}
+///   measure  "do": "list", "add" ("at" and "opacity" as for pick: a row of places), "remove" ("number"), "clear",
+///            "csv". Measurements::list(), or {"csv": Measurements::csv()}
 Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands);
 
 inline constexpr double kPickOpacity = volume::kSolid;

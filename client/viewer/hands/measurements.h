@@ -34,8 +34,7 @@ class Measurements {
   void clear();
 
   std::vector<Probe> take_probes() { return std::exchange(probes_, {}); }
-  /// Takes the data server's answer, or why it gave no answer. Returns a line for the person; empty: no place waits for
-  /// it.
+  /// Takes the data server's answer, or why it gave none. Returns a line for the person; empty: no place waits for it.
   std::string on_answer(const Probe& asked, bool found, const std::string& text);
 
   const std::vector<Row>& rows() const { return rows_; }

@@ -70,7 +70,7 @@ glm::dvec4 look_up(const volume::LayerImage& image, double x, double y) {
   const double left = std::floor(x - 0.5), top = std::floor(y - 0.5);
   const double from_left = left - image.rect.x, from_top = top - image.rect.y;
   glm::dvec4 out(0);
-  // A ray along the layer meets it at places as large as numbers go.
+  // For a ray along the layer, these numbers may be too large for int.
   if (!(from_left >= -1 && from_top >= -1 && from_left < image.rect.width && from_top < image.rect.height)) return out;
   const int x0 = int(from_left), y0 = int(from_top);
   for (int n = 0; n < 4; ++n) {

@@ -12,7 +12,7 @@ namespace telesplat::viewer {
 
 struct HeadMovement {
   bool orbits = false;                                   ///< around the data set, as near as shows all of it
-  std::shared_ptr<const geometry::Trajectory> recorded;  ///< from a file; else, without orbits, the head stands still
+  std::shared_ptr<const geometry::Trajectory> recorded;  ///< from a file; without this and orbits the head stands still
   /// Place and aim of the first view, metres in the room; nothing: fitted to the data set, its centre.
   std::optional<glm::dvec3> eye, look_at;
 

@@ -56,7 +56,7 @@ class PoseFeed {
   TrackedHead head_;
   std::optional<geometry::Pose> shown_;
   std::optional<PoseMoment> moment_;
-  double began_s_ = 0, frame_s_ = 0;  // begin of the frame at hand; mean time until a frame is on display
+  double began_s_ = 0, frame_s_ = 0;  // start of the frame at hand; mean time until a frame is on display
   std::atomic<bool> flooded_{false}, failed_{false}, stop_{false};
   bool flood_told_ = false, failure_told_ = false;
   std::thread thread_;

@@ -80,7 +80,7 @@ class ReceivedPictures final : public Received {
   void on_connected() override { introduced_s_ = -1e9; }
   void on_new_master() override { gatherer_.clear(), complete_.clear(); }
   void receive(int most) override;
-  /// Sends a receipt to the packer once a second, so that it knows this viewer.
+  /// Introduces this viewer to the packer once a second.
   void tick(double now_s) override;
   void on_update(const ShownUpdate& update) override;
   void on_coupling(int) override {}

@@ -10,9 +10,9 @@
 namespace telesplat::viewer {
 
 /// One replica is on display; at most one newer replica grows behind it. The newer one is shown
-/// - as soon as it has a complete frame of full resolution that this viewer asked for, or
-/// - when `patience_s` have passed since the first epoch began that has not been shown, and it has something that
-/// covers a view: a complete frame, also a coarse one or another viewer's; if frames have no coarse pass, any part.
+///   - as soon as it has a complete frame of full resolution that this viewer asked for, or
+///   - when `patience_s` have passed since the first epoch began that has not been shown, and it has something that
+///     covers a view: a complete frame, also a coarse one or another viewer's; if frames have no coarse pass, any part.
 /// An epoch that is superseded before it was shown does not start the clock again: even if epochs follow each other
 /// fast, something newer is shown after the patience and the time to a coarse frame.
 /// A replica of the displayed epoch (the packer was restarted, the scene is the same) has no hurry: it waits for a

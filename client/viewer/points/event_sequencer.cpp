@@ -55,7 +55,7 @@ void EventSequencer::follow(InstanceId packer) {
   callbacks_.begin_replica();
 }
 
-// If everything was requested already, from any packer, the request also reaches this one.
+// If a request of start() is still open, which any packer answers, it is not repeated.
 void EventSequencer::meet(InstanceId packer) {
   const bool asked = waiting_ && !packer_;
   follow(packer);

@@ -33,7 +33,7 @@ class EventSequencer {
   struct Callbacks {
     std::function<void(const ModelEvent&)> apply;  ///< the next event of the current packer
     std::function<void()> begin_replica;           ///< a new packer, whose model is not known: begin an empty replica
-    std::function<void(const wire::StateRequest&)> request_state;  ///< the caller fills in the viewer
+    std::function<void(const wire::StateRequest&)> request_state;  ///< its viewer is not filled in
   };
   explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}
 

@@ -15,7 +15,7 @@
 
 namespace telesplat::viewer {
 
-/// Distinct clusters, or, if packing keeps redundant patches, distinct patches of clusters.
+/// Log of what was drawn: distinct clusters, or, if packing keeps redundant patches, distinct patches of clusters.
 class AccessLog {
  public:
   /// Entries of one report at most: well below the size of a message.
@@ -33,8 +33,7 @@ class AccessLog {
   std::vector<Report> reports();
 
  private:
-  std::vector<uint64_t> seen_;  // cluster << 32
-                                // frame tag, as added
+  std::vector<uint64_t> seen_;  // upper half: cluster, lower half: frame tag
   bool with_frames_ = false;
 };
 
@@ -103,7 +102,7 @@ class ModelCache {
   };
   struct Dropped {
     std::vector<std::unique_ptr<points::Cluster>>
-        clusters;  // removed clusters, at their old addresses or parts of them: draw lists point to them
+        clusters;                         // removed clusters and parts of clusters: draw lists point to them
     std::vector<points::Mosaic> mosaics;  // merged into others
     std::vector<std::unique_ptr<points::Summary>> summaries;
     std::vector<std::unique_ptr<points::PointModel>> models;

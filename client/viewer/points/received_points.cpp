@@ -16,7 +16,7 @@ constexpr Feed kPointFeeds[] = {{net::Kind::kSub, "patches"}, {net::Kind::kDeale
 constexpr size_t kSummariesAtOnce = 8;
 // Time between two receipts: while events come, and while no event comes.
 constexpr double kReceipts_s = 0.03, kQuietReceipts_s = 0.5;
-constexpr uint64_t kReceiptBytes = 32 << 10;  // bytes that are reported at once
+constexpr uint64_t kReceiptBytes = 32 << 10;  // this many new bytes are reported without delay
 
 }  // namespace
 

@@ -46,7 +46,7 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
   }
 }
 
-// Held changes reach the cache later: while there are any, there is nothing to compare.
+// Compares digests, except while changes are held: those reach the cache later.
 void PointReceiver::on_published_mark(const wire::StateMark& mark) {
   sequencer_.on_mark(mark);
   if (mark.digest == 0 || options_.hold || !sequencer_.synchronised() || mark.packer != sequencer_.packer() ||

@@ -50,7 +50,7 @@ class PointSource final : public ViewSource {
   HalfSize half_size_;
   SpeedDetail speed_;
   splat::DrawList list_;
-  uint64_t drawn_ = 0;  // number of its points that were drawn
+  uint64_t drawn_ = 0;  // points of list_ that were drawn
   ReceivedPoints::Cut cut_;
 
   // The resting camera, its look, and what was drawn since it came to rest.
@@ -63,7 +63,7 @@ class PointSource final : public ViewSource {
   StillPicture still_;
   Supersampler supersampler_;
   std::optional<image::Shading> still_shading_;  // nothing: no still picture has begun
-  uint64_t base_ = 0;                            // splat::names_of() the picture without sub-pixels
+  uint64_t base_ = 0;                            // splat::names_of() for the picture without sub-pixels
   bool base_stale_ = true;  // the picture without sub-pixels, where the view shows it, is older than the model
   double tile_s_ = 0, saved_s_ = 0, seen_s_ = 0;
   bool pair_sharp_ = false;  // the pair on display was drawn at full detail

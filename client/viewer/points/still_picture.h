@@ -26,7 +26,7 @@ class StillPicture {
   /// Marks tiles that these rectangles of the picture touch.
   void on_changes(std::span<const geometry::Rect> rects);
 
-  /// Returns the next tile to draw: first one without pixels, from the centre outwards; then the one that waited
+  /// Returns the next tile to draw: those without pixels first, from the centre outwards; then those that waited
   /// longest.
   std::optional<size_t> next(double now_s) const;
   geometry::Rect rect(size_t tile) const { return tiles_[tile].rect; }

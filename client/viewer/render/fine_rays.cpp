@@ -13,13 +13,13 @@ constexpr uint16_t kNothing = 0xffff;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Rays and pixels have the same eye if the nearest content moves by at most this between them, pixels.
 constexpr double kParallax = 1;
-// Nearest content that is assumed at least: points that were known before are no hits of finer rays.
+// Content counts as at least this near: points that were known before are no hits of finer rays.
 constexpr double kNearest_m = 0.3;
 // Rays around a hit on another surface that are forgotten, on each side.
 constexpr int kRevised = 3;
 // More changes than this are reported as one change of everything.
 constexpr size_t kMostChanges = 4096;
-// Depths that differ by a smaller factor are of one surface.
+// Depths that differ by a smaller factor belong to one surface.
 constexpr float kBehind = 1.03f;
 
 uint16_t code(double depth_m, double near_m) {

@@ -24,7 +24,7 @@ class FineRays {
   static constexpr int kBlock = 64;
   /// Limit of memory: 128 MiB. Where rays are omitted, the picture shows what points alone show.
   static constexpr size_t kMostBlocks = 16384;
-  /// Layers have different sizes: two and four rays a side of a pixel. With one more all begin anew.
+  /// Layers of different sizes: with two and four rays a side of a pixel. A third one makes all begin anew.
   static constexpr size_t kMostLayers = 2;
 
   /// A tile of finer rays.

@@ -38,7 +38,7 @@ class Supersampler {
     Select select;
     splat::SelectionOptions selection;  ///< its detail is not used: all points are drawn
     splat::RenderOptions render;        ///< without its antialiasing
-    const image::Shading& shading;      ///< the view's
+    const image::Shading& shading;      ///< shading of the view
     const FineRays* rays = nullptr;     ///< rays from the camera's place; null: not known
   };
 

@@ -26,7 +26,7 @@ class Bookmarks {
   void keep(const notes::Shelf& shelf, const geometry::Pose& pose, const std::string& name = {});
   /// Looks for the bookmark after the one found last, in a circle; take_found() then returns it.
   void next(const notes::Shelf& shelf);
-  /// Looks for the one of this name.
+  /// Looks for the bookmark of this name.
   void find(const notes::Shelf& shelf, const std::string& name);
   void remove(const notes::Shelf& shelf, const std::string& name);
   /// Fills in the note's time.

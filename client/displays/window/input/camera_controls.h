@@ -37,8 +37,8 @@ class CameraControls {
   /// changes nothing.
   void set_scene(const geometry::Box& box_room, const geometry::Pose& home, double middle_x = 0);
 
-  /// Turns around the pivot (the data set's centre until panned), half a turn a window height; the picture follows the
-  /// pointer, however the head is tilted. In flight: looks around.
+  /// Turns around the pivot (the data set's centre until panned), half a turn for each window height; the picture
+  /// follows the pointer, however the head is tilted. In flight: looks around.
   void orbit(double dx, double dy);
   /// Moves the pivot with the pointer; height_tangent: height of the window's view at distance 1.
   void pan(double dx, double dy, double height_tangent);
@@ -46,7 +46,7 @@ class CameraControls {
   void wheel(double steps);
   /// Moves to the pivot (upwards) or away (downwards): a window height is 30 steps of the wheel. Not in flight.
   void dolly(double dy);
-  /// Tilts the head: half a turn a window height.
+  /// Tilts the head: half a turn for each window height.
   void roll(double dx);
   /// Brings this place of the room to the middle; the camera then turns about it. Leaves flight.
   void centre_on(const glm::dvec3& place_room);
@@ -66,7 +66,7 @@ class CameraControls {
   void reset();
   /// Goes on from this pose, at once; a head that is tilted to the side straightens up, unless `tilted` is set.
   void take_over(const geometry::Pose& pose, bool tilted = false);
-  /// The view to which the person's inputs lead; in flight, the one after leaving it.
+  /// The view to which the person's inputs lead; in flight, the view that follows when flight ends.
   View view() const;
   /// Goes to a pose or an earlier view, on the shortest way. Leaves flight.
   void travel(const geometry::Pose& pose);
@@ -90,7 +90,7 @@ class CameraControls {
 
   geometry::Pose home_;
   double home_middle_x_ = 0;
-  glm::dvec3 centre_{0.0};               // the data set's
+  glm::dvec3 centre_{0.0};               // centre of the data set
   double extent_m_ = 0.8;                // its largest extent
   double farthest_m_ = 8;                // eye to pivot
   double pivot_m_ = 1.6, flight_m_ = 8;  // pivot to centre, eye to centre in flight

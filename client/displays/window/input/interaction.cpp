@@ -144,7 +144,7 @@ void Interaction::end_path() {
   playback_s_ = 0;
 }
 
-// Changes how points are drawn. True if the key does that.
+// If the key sets how points are drawn, sets that and returns true.
 bool Interaction::choose_look(Key key) {
   if (key < Key::k1 || key > Key::k8) return false;
   const int number = int(key) - int(Key::k1) + 1;
@@ -181,7 +181,7 @@ void Interaction::show_help() {
   for (auto& line : key_help(key_names_)) notes_.push_back(std::move(line));
 }
 
-// Makes a wish. True if the key stands for one.
+// If the key stands for a wish, makes it and returns true.
 bool Interaction::make_wish(Key key) {
   static constexpr std::pair<Key, Wish> kKeyWishes[] = {{Key::kP, Wish::kScreenshot},   {Key::kF12, Wish::kScreenshot},
                                                         {Key::kF11, Wish::kFullscreen}, {Key::kB, Wish::kBookmark},

@@ -104,7 +104,7 @@ class Interaction {
   bool take(Wish wish) { return std::exchange(wishes_[size_t(wish)], false); }
   /// Place of the pointer, in window heights; nothing: not known yet, or the pointer is caught.
   std::optional<glm::dvec2> pointer() const { return wants_pointer() ? std::nullopt : pointer_; }
-  /// Returns the side from which the person wants to see the data, once after each press of its keys.
+  /// Returns the side from which the person wants to see the data, once after each press of a side's keys.
   std::optional<Side> take_side_wish() { return std::exchange(side_wish_, std::nullopt); }
   /// Moves the person's camera to this pose at once; it goes on from there.
   void go_to(const geometry::Pose& pose);

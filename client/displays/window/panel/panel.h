@@ -155,7 +155,7 @@ class Panel {
   std::string progress_;
   std::optional<SessionStatus> status_;
   std::vector<std::string> missing_;
-  double missing_since_s_ = 0;  // begin of the gap in the status; 0: no service is missing
+  double missing_since_s_ = 0;  // since when the status lacks a service; 0: all are there
   std::deque<Message> messages_;
 };
 

@@ -27,7 +27,8 @@ std::vector<std::string> names_of(const std::vector<scene::ArrayInfo>& infos) {
 
 constexpr double kSameTime_s = 0.05;
 
-// Length of a new track whose key frame is at 0 s. Others are twice as long as the time of their key frame.
+// Length of a new track whose key frame is at 0 s. Others end at twice their key frame's time, with their first value,
+// so that a repeat does not jump.
 constexpr double kFirstLength_s = 10;
 
 }  // namespace

@@ -44,7 +44,7 @@ class CutControls {
     double from = 0, to = 100;
     bool operator==(const Kept&) const = default;
   };
-  /// Reads this from the order, as far as its planes are across the axes.
+  /// Reads the kept parts from the order's planes; planes that are not across an axis are ignored.
   std::array<Kept, 3> kept() const;
   /// Converts per cent to the data's own coordinates.
   double value(int axis, double percent) const;

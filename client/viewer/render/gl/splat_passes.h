@@ -38,7 +38,7 @@ struct ClusterRecord {
 
 /// Values of one draw (std430).
 struct DrawRecord {
-  uint32_t word;      ///< begin of the points in their arena
+  uint32_t word;      ///< start of the points in their arena
   uint32_t count;     ///< number of the points there: the distance between their arrays
   uint32_t cluster;   ///< number of its ClusterRecord
   uint32_t spacing;   ///< class of the samples' distance on the screen

@@ -36,7 +36,7 @@ out vec4 colour;
 void main() { colour = texelFetch(drawn, ivec2(gl_FragCoord.xy), 0); }
 )";
 
-// A key, or a character, which sets only `code`.
+// A key, or a character (then only `code` is set).
 struct Typed {
   int code = 0, scancode = 0, action = 0, mods = 0;
   bool character = false;
@@ -114,7 +114,8 @@ struct Gui::Impl {
     builds_due = kAfterEvent;
   }
 
-  // Confines drawing to an area, with a rim for soft edges, to the right of column `from`. False: it is empty.
+  // Confines drawing to an area, with a rim for soft edges, to the right of column `from`. False: nothing of it is
+  // left.
   bool scissor(const Area& area, int from) const {
     const ImGuiIO& io = ImGui::GetIO();
     const double sx = io.DisplayFramebufferScale.x, sy = io.DisplayFramebufferScale.y;
