@@ -33,7 +33,7 @@ Status refuse_links(const std::string& folder) {
   return ok_status();
 }
 
-// Makes a folder's name from a viewer's.
+// Turns a viewer's name into the name of its folder.
 std::string folder_name(const std::string& name) {
   std::string out;
   for (const char c : name) out += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '-';

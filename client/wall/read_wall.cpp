@@ -57,7 +57,7 @@ Screen screen_of(const Grid& grid, int row, int column) {
   s.bezel = p.bezel;
   s.sampling = p.sampling;
   s.node = grid.first_node + (row * grid.columns + column) / grid.screens_per_node;
-  // The picture's middle, which uneven bezels move away from the screen's.
+  // Middle of the picture; uneven bezels move it away from the middle of the screen.
   const glm::dvec2 off((p.bezel.left - p.bezel.right) / 2, (p.bezel.bottom - p.bezel.top) / 2);
   s.unrolled_m =
       glm::dvec2((column - (grid.columns - 1) / 2.0) * p.pitch_x(), ((grid.rows - 1) / 2.0 - row) * p.pitch_y()) + off;

@@ -39,7 +39,7 @@ class Window {
     Current& operator=(const Current&) = delete;
 
    private:
-    void *display_, *context_, *draw_, *read_;  // EGL's; null: the window's context stays current
+    void *display_, *context_, *draw_, *read_;  // contexts of EGL; null: the window's context stays current
   };
 
   /// Delivers keys, mouse and wheel since the last call; catches the pointer while the person flies.

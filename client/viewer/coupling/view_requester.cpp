@@ -58,8 +58,8 @@ double ViewRequester::horizon_s() const {
   return latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
 }
 
-// Uses the tracker's expectation until a pose of that time or later is known; from there on, the head's velocity
-// carries it.
+// Uses the tracker's expected pose until a pose of that time or later is known. Beyond its time, the head's velocity
+// carries it on.
 geometry::Pose ViewRequester::expected_at(double t_s) const {
   const auto newest = predictor_.newest();
   const bool ahead = expected_ && newest && expected_->t_s > newest->t_s && expected_->t_s - t_s < kMostBeyond_s;

@@ -62,7 +62,7 @@ inline Look first_look(const splat::RenderOptions& render, const image::ShadingP
 
 /// A person's wish for a picture of the scene on display.
 struct PictureWish {
-  int width = 0, height = 0;  ///< pixels; 0: the display's
+  int width = 0, height = 0;  ///< pixels; 0: size of the display
   bool exr = false;           ///< EXR with depth, else PNG
   bool own_size() const { return width > 0 && height > 0; }
   bool operator==(const PictureWish&) const = default;

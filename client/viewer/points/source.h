@@ -55,7 +55,7 @@ class PointSource final : public ViewSource {
 
   // The resting camera, its look, and what was drawn since it came to rest.
   geometry::Camera camera_;
-  std::optional<std::array<geometry::Camera, 2>> eyes_;  // the last pair's
+  std::optional<std::array<geometry::Camera, 2>> eyes_;  // cameras of the last pair
   Look look_;
   int same_frames_ = 0;
   ModelCache::Changes changes_;

@@ -44,7 +44,7 @@ class ReceivedSlices final : public Received {
   void acknowledge_left(net::Socket& state);
 
   ReceivedLinks links_;
-  uint64_t buffers_;             // the coupling's; 0: asynchronous
+  uint64_t buffers_;             // buffers of the coupling; 0: asynchronous
   SliceRecorder* const record_;  // keeps every frame that goes into the cache; null: there is no record
   SliceCache cache_;
   std::optional<volume::Grid> grid_;

@@ -156,7 +156,7 @@ class Interaction {
     double s = 0;
     glm::dvec2 at{0.0};
   };
-  std::optional<Click> click_;            // the left button's; the next may make it a double click
+  std::optional<Click> click_;            // last click of the left button; the next may make it a double click
   std::optional<Side> side_wish_, side_;  // side_: the last wish
   UndoStack undo_;
   std::vector<std::string> notes_;

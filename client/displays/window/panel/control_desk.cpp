@@ -99,7 +99,7 @@ bool ControlDesk::waits_for_work(std::optional<Order>& order, bool& status) {
 
 // nullopt: stop. An answer does not name its question: if one may still come, the connection is given up.
 std::optional<OrderAnswer> ControlDesk::ask(std::optional<Line>& to, Order order) {
-  // The connection is made late: the master counts one without messages as a rejected message.
+  // Connect only for an order: the master counts a connection without messages as a rejected message.
   if (!to) to.emplace(master_, access_);
   Line& line = *to;
   const auto failed = [&](std::string why) {

@@ -79,7 +79,7 @@ struct Gui::Impl {
   bool glfw = false, gl = false;  // parts of Dear ImGui that must be shut down
   gl::Program program;
   GLuint vertex_array = 0, texture = 0, framebuffer = 0;
-  int width = 0, height = 0;  // the texture's
+  int width = 0, height = 0;  // size of the texture
   GuiStyle style;
   std::vector<Area> areas;  // areas of the ImGui windows that are shown
   Area shown;               // their union: the texture is empty elsewhere

@@ -44,7 +44,7 @@ class Gui {
 
   struct Place {
     int width = 0, height = 0;  ///< the default framebuffer, pixels
-    double content_scale = 1;   ///< the display's; 2: texts should have twice as many pixels
+    double content_scale = 1;   ///< scale of the display; 2: texts should have twice as many pixels
   };
   /// Builds the texture if that is due. build: calls Dear ImGui's functions, and returns the width at the window's left
   /// side that is fully covered, in screen coordinates. Null: there are no widgets, and the pointer belongs to the

@@ -107,7 +107,7 @@ inline bool section(const char* name, bool open) {
 inline void dialog(const char* name, const bool* open) {
   if (!LoggedBuild::log()) return;
   LoggedBuild::log()->enter(name);
-  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();  // the title's
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();  // corners of the title
   if (open)
     LoggedBuild::log()->seen("button", "close", {to.x - (to.y - from.y), from.y, to.x, to.y}, {0, 0, 1e9f, 1e9f},
                              !*open);
