@@ -164,8 +164,7 @@ class ViewRequester {
   double asked_s_ = -1e9;     // time of the newest on_ask()
 
   bool steered_ = false;
-  std::optional<geometry::Camera> sent_, quiet_;  // camera of the last request; of the last update, if it brought no
-                                                  // points
+  std::optional<geometry::Camera> sent_, quiet_;  // camera of the last request; of the last update without points
   RequestId sent_id_;
   bool settled_ = false;  // pictures: the finer picture has been requested for the view that was sent
   uint64_t extra_points_ = 0, extra_bytes_ = 0;  // since the last update

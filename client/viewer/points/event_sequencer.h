@@ -82,8 +82,8 @@ class EventSequencer {
   uint64_t gaps_ = 0;
 };
 
-/// Adds rays that are finer than a viewer's views: all of those from its own patches; from others' patches only hits
-/// where its own rays missed. image: the patch's, decoded. Error: the mask cannot be decoded; nothing was added.
+/// Adds the patch's finer rays, if it has any (Patch::missed); else its hits revise known rays that had passed them.
+/// image: the patch's, decoded. Error: the mask cannot be decoded; nothing was added.
 Status add_rays(const wire::Patch& patch, const image::DepthImage& image, FineRays& rays);
 
 /// Frame tag of the patch for points::prepare_patch().
