@@ -43,7 +43,7 @@ Result<std::string> bind_of(const std::string& bind, int n) {
   const char *begin = bind.data() + colon + 1, *end = bind.data() + bind.size();
   int port = 0;
   const auto read = std::from_chars(begin, end, port);
-  if (read.ec != std::errc() || read.ptr != end || port == 0) return bind;  // a free one, or for bind() to refuse
+  if (read.ec != std::errc() || read.ptr != end || port == 0) return bind;  // a free port, or one that bind() refuses
   if (port + n > 65535) return Error{fmt::format("{}: its {} ports end at 65535", bind, n + 1)};
   return fmt::format("{}:{}", bind.substr(0, colon), port + n);
 }

@@ -22,10 +22,10 @@ namespace telesplat::packer {
 namespace {
 
 constexpr double kSpanFlush_s = 1, kLongestWait_s = 0.05;
-constexpr int kRecordedImages = 50;   // of --record-depth
-constexpr double kKeepFreed_s = 10;   // memory that was not needed for that long goes back to the system
-constexpr double kOnTheirWay_s = 30;  // messages of the data set before, after a change
-constexpr int kSampledAtOnce = 8;     // then control and viewers get their turn
+constexpr int kRecordedImages = 50;   // at most, for --record-depth
+constexpr double kKeepFreed_s = 10;   // memory unused for this long goes back to the system
+constexpr double kOnTheirWay_s = 30;  // after a change, messages of the previous data set may still arrive
+constexpr int kSampledAtOnce = 8;     // then control messages and viewers get their turn
 constexpr int kStateAtOnce = 64;
 constexpr int kStateQueue = 1 << 16;  // messages that wait for a viewer: more than StateAnswers has under way
 
@@ -149,27 +149,27 @@ class PackerTurns final : public PackerService {
     if (packing_) packing_->end_frame(end, now_s);
   }
 
-  // Rays beyond a view wait for spare time: to plan them takes as long as to plan a view.
+  // Requests for rays beyond a view wait for spare time: planning them takes as long as planning a view.
   void on(const wire::PlanRequest& request, double now_s) {
     if (request.extra && packing_) return spare_.keep(request);
     if (!request.extra) spare_.follow(request);
     link_->socket().send(packing_ ? packing_->plan(request, now_s) : all_rays(request));
   }
 
-  // Until something is due that no message tells of.
+  // Returns the time until work is due that no message announces, s.
   double longest_wait_s() const {
     const auto due_s = packing_ ? packing_->due_s() : std::nullopt;
     if (!due_s) return kLongestWait_s;
-    // Whole milliseconds: a message ends the wait at any moment of those.
+    // Rounded up to whole milliseconds: a message ends the wait at any moment within them.
     return std::ceil(std::clamp(*due_s - monotonic_s(), 0.001, kLongestWait_s) * 1e3) * 1e-3 + 1e-6;
   }
 
-  // One piece of what can wait. False: there is none, or it waits.
+  // Does one piece of deferrable work. False: no such work, or it must wait.
   bool use_spare_time(double now_s) {
     const bool hurried = packing_ && packing_->hurried(now_s);
     if (!packing_ || !spare_.begins(now_s, hurried)) return false;
     const wire::PlanRequest* question = spare_.question(now_s);
-    // Where some view is always under way there always is something to learn, too.
+    // Where a view is always under way, the packer also always has something to learn: the two take turns.
     const bool questions_turn = question && hurried && settled_;
     if (settled_ = !questions_turn && packing_->idle(now_s); settled_) return true;
     if (!question) return false;
@@ -180,7 +180,7 @@ class PackerTurns final : public PackerService {
     return true;
   }
 
-  // A session may change from one kind of scene to another, and with it how the data travel.
+  // A session may change to another kind of scene, and with it to another pipeline.
   void follow(const wire::Welcome& session, double now_s) {
     if (packing_ && packing_->follow(session, now_s)) return;
     const auto pipeline = scene::SessionView(session).pipeline();
@@ -191,7 +191,7 @@ class PackerTurns final : public PackerService {
     for (const auto& early : early_.take()) ((*packing_).*early.item.take)(*early.item.from, early.item.message, now_s);
   }
 
-  // Samplers and viewers learn later that another data set is shown.
+  // True for a message of the previous kind of scene: samplers and viewers learn of a change later than the packer.
   bool is_of_the_kind_before(std::string_view type) const {
     return before_ && monotonic_s() - changed_s_ < kOnTheirWay_s && belongs(type, *before_) &&
            !belongs(type, *pipeline_);
@@ -221,7 +221,7 @@ class PackerTurns final : public PackerService {
     for (int n = 0; n < most; ++n) {
       const auto message = from.receive();
       if (!message) return;
-      // Samplers are held up by what is not read yet; viewers ask.
+      // Unread messages hold samplers back; viewers are limited by rate.
       if (&from == &state_ && !rates_.admit(message->peer, monotonic_s())) {
         from.reject(*message, "its peer sends more than --max-messages");
         continue;
@@ -232,7 +232,7 @@ class PackerTurns final : public PackerService {
         continue;
       }
       const double begin_s = thread_cpu_s();
-      receive_control();  // what came on another socket at the same time may tell of its epoch
+      receive_control();  // a control message that came meanwhile may announce this message's epoch
       if (is_of_the_kind_before(message->type)) continue;
       if (packing_)
         ((*packing_).*take)(from, *message, monotonic_s());
@@ -257,7 +257,7 @@ class PackerTurns final : public PackerService {
     return v;
   }
 
-  // Where nothing is to be done. More viewers than usual, or a view that was larger, need more memory for a while.
+  // Runs when the packer is idle. More viewers than usual, or a larger view, need more memory for a while.
   void return_freed_memory(double now_s) {
     if (now_s - last_return_s_ < kKeepFreed_s) return;
     last_return_s_ = now_s;
@@ -272,17 +272,17 @@ class PackerTurns final : public PackerService {
 
   const PackerOptions& options_;
   net::Socket tiles_, patches_, state_;
-  net::PeerRates rates_;  // of viewers
-  net::WorkShares work_;  // of viewers
+  net::PeerRates rates_;  // message rates of viewers
+  net::WorkShares work_;  // viewers' shares of the packer's time
   std::optional<net::MasterLink> link_;
   std::optional<DepthRecorder> recorder_;
   metrics::SpanRecorder spans_;
-  std::unique_ptr<Packing> packing_;  // none before the session's kind is known
+  std::unique_ptr<Packing> packing_;  // null until the session's kind is known
   std::optional<scene::Pipeline> pipeline_, before_;
   double changed_s_ = 0;
-  EpochHold<Early> early_;  // what came before
+  EpochHold<Early> early_;  // messages that came before the session was known
   SpareTime spare_;
-  bool settled_ = false;  // what the last piece of spare time was for
+  bool settled_ = false;  // the last piece of spare time went into packing_->idle()
   int seen_version_ = 0;
   double last_flush_s_ = 0, last_return_s_ = 0;
 };

@@ -1,4 +1,4 @@
-// The packer process (T4.3): takes what samplers send and gives viewers what they do not have yet.
+// The packer process (T4.3): takes the samplers' messages and sends viewers the points that they lack.
 #pragma once
 
 #include <memory>
@@ -12,8 +12,8 @@ namespace telesplat::packer {
 
 class PackerService : public net::Turns {
  public:
-  /// Binds its sockets. Error: that cannot be done, or what it shall record to cannot be written. Context and options
-  /// must outlive it.
+  /// Binds its sockets. Error: a socket cannot be bound, or the folder for recordings cannot be written. Context and
+  /// options must outlive the service.
   static Result<std::unique_ptr<PackerService>> open(net::Context& context, const PackerOptions& options);
   virtual int exit_code() const = 0;
 };
@@ -21,29 +21,29 @@ class PackerService : public net::Turns {
 /// Serves until told to stop. Exit code 0, or 2 if it cannot bind.
 Result<int> run(const PackerOptions& options);
 
-/// What the packer does when nobody waits for it: the question about rays beyond views. No sockets, no clocks.
+/// Decides when the packer plans rays beyond views: while no view is under way. No sockets, no clocks.
 class SpareTime {
  public:
-  /// What can wait does so while a view is under way, but no longer than this: where many viewers look, one always is.
+  /// Deferrable work waits while a view is under way, but at most this long: with many viewers one always is.
   static constexpr double kLongestHurry_s = 0.25;
-  /// Where views come as fast as they are answered, questions beyond them take a quarter of the time at most.
+  /// Where views come as fast as they are answered, planning beyond them takes at most 1 / (1 + kPause) of the time.
   static constexpr double kPause = 3;
 
-  /// Whether a piece of work that can wait may begin. hurried: a view is under way.
+  /// True if deferrable work may begin. hurried: a view is under way.
   bool begins(double now_s, bool hurried);
 
-  /// A question about rays beyond a view. The master waits for one at a time: an older one is no longer waited for.
+  /// Keeps a request for rays beyond a view. The master waits for the newest answer alone: this one replaces the older.
   void keep(const wire::PlanRequest& extra) { question_ = extra; }
-  /// A viewer's next view is planned: the question about its views is about this one from now on.
+  /// A viewer's next view is planned: its request for rays beyond views continues with this view.
   void follow(const wire::PlanRequest& view);
-  /// Null: there is none, or it waits. A head that rests does not wait for views.
+  /// Returns the request to work on. Null: none, or it pauses (kPause), which a resting head's does not.
   const wire::PlanRequest* question(double now_s) const;
-  /// A piece of the work for question() was done. done: it has its answer.
+  /// Notes that a piece of the work for question() took from_s to until_s. done: the request is answered.
   void worked(double from_s, double until_s, bool done);
 
  private:
   std::optional<wire::PlanRequest> question_;
-  double rested_s_ = 0, next_s_ = 0;  // when there last was time; when the next piece for the question may begin
+  double rested_s_ = 0, next_s_ = 0;  // when deferrable work last could begin; when the next piece may
 };
 
 }  // namespace telesplat::packer

@@ -1,5 +1,5 @@
-// What a packer does with what samplers send, one implementation a pipeline (points, slices, pictures). The service
-// around it owns the sockets and follows the master; everything here happens in its thread, and nothing here may wait.
+// A packer's work on the samplers' messages, one implementation per pipeline (points, slices, pictures). The service
+// around it owns the sockets and follows the master; everything here runs in its thread, and nothing here may block.
 #pragma once
 
 #include <algorithm>
@@ -19,17 +19,17 @@
 
 namespace telesplat::packer {
 
-/// Ways out of a packing. Messages are encoded already.
+/// Outgoing channels of a packing. Messages are encoded already.
 struct Outlets {
-  std::function<void(const wire::TileDone&)> tell;                          ///< the master
-  std::function<void(const wire::TileRefused&)> refuse;                     ///< the master; null: it is not told
-  std::function<void(std::string_view type, std::string body)> to_viewers;  ///< to all of them
-  /// To one viewer. False: dropped, because its queue is full or it is gone.
+  std::function<void(const wire::TileDone&)> tell;                          ///< to the master
+  std::function<void(const wire::TileRefused&)> refuse;                     ///< to the master; null: not reported
+  std::function<void(std::string_view type, std::string body)> to_viewers;  ///< to all viewers
+  /// Sends to one viewer. False: dropped, because its queue is full or it is gone.
   std::function<bool(std::string_view peer, std::string_view type, std::string body)> to_viewer;
-  std::function<uint64_t(const std::string& peer)> waiting;  ///< bytes that wait for this viewer; null: none do
-  std::function<void(const wire::LinkReport&)> tell_link;    ///< the master
+  std::function<uint64_t(const std::string& peer)> waiting;  ///< bytes queued for this viewer; null: no queue
+  std::function<void(const wire::LinkReport&)> tell_link;    ///< to the master
   std::function<double()> master_now;                        ///< seconds on the master's clock
-  std::function<double(double local_s)> to_master_s;         ///< monotonic_s() of this machine on the master's clock
+  std::function<double(double local_s)> to_master_s;         ///< monotonic_s() of this machine -> master's clock
 
   template <class M>
   void publish(const M& message) const {
@@ -41,7 +41,7 @@ struct Outlets {
   }
 };
 
-/// The answer of those who cannot plan: a view needs all of its rays, and none beyond.
+/// The answer of packings that cannot plan: a view needs all of its rays, and no rays beyond it.
 inline wire::Plan all_rays(const wire::PlanRequest& request) {
   return {.frame = request.frame, .epoch = request.epoch, .camera = request.camera, .full = !request.extra};
 }
@@ -50,58 +50,58 @@ class Packing {
  public:
   virtual ~Packing() = default;
 
-  /// A welcome of the master came: every one is told, in order. False: the session is of another pipeline, or it is not
-  /// known yet of which; nothing has changed then. A session that cannot be packed is told in the log, once a welcome.
+  /// Takes a welcome of the master; each one is passed on, in order. False: the session's pipeline is another or not
+  /// known yet; nothing has changed then. A session that cannot be packed is logged once per welcome.
   virtual bool follow(const wire::Welcome& session, double now_s) = 0;
 
-  /// A message of a sampler. What makes no sense, or is of no type for this packing, is refused: `from` counts it. What
-  /// is of an epoch that no welcome told yet waits for it a while. `from` outlives the packing.
+  /// Takes a sampler's message. `from`, which outlives the packing, refuses and counts it if it is invalid or of a type
+  /// that this packing does not take. A message whose epoch no welcome has announced yet waits a while.
   virtual void take_sampled(net::Socket& from, const net::Message& message, double now_s) = 0;
-  /// A message of a viewer: likewise.
+  /// Takes a viewer's message, with the same rules.
   virtual void take_state(net::Socket& from, const net::Message& message, double now_s) = 0;
 
-  /// No more tiles of that frame come.
+  /// No more tiles of this frame come.
   virtual void end_frame(const wire::FrameEnd& /*end*/, double /*now_s*/) {}
-  /// The master asks which rays of a view are needed.
+  /// Answers the master, which asks which rays of a view are needed.
   virtual wire::Plan plan(const wire::PlanRequest& request, double /*now_s*/) { return all_rays(request); }
-  /// The same for rays beyond a view, by a piece of work of some tens of milliseconds. nullopt: there is no answer yet,
-  /// the next call with this request goes on.
+  /// The same for rays beyond a view, in pieces of work of some tens of milliseconds. nullopt: no answer yet, the next
+  /// call with this request goes on.
   virtual std::optional<wire::Plan> plan_piece(const wire::PlanRequest& request, double now_s) {
     return plan(request, now_s);
   }
 
-  /// Somebody waits for a view that is being sampled: its parts will come soon, and should find the packer free.
+  /// True while a viewer waits for a view that is being sampled: its parts come soon and should find the packer free.
   virtual bool hurried(double /*now_s*/) const { return false; }
-  /// Nothing has come: does a piece of work that can wait, of some milliseconds. False: there is none.
+  /// Called when no message has come: does a piece of deferrable work, of some milliseconds. False: no such work.
   virtual bool idle(double /*now_s*/) { return false; }
 
-  /// To be called at least every 100 ms: what happens by time.
+  /// Does the work that depends on time. To be called at least every 100 ms.
   virtual void tick(double now_s) = 0;
-  /// When tick() has something to do, at the latest; nothing: within 50 ms.
+  /// Returns when tick() is next due, at the latest; nullopt: within 50 ms.
   virtual std::optional<double> due_s() const { return std::nullopt; }
-  /// Adds what it counts to a status report.
+  /// Adds the packing's counters to a status report.
   virtual void add_status(net::MasterLink::Values& values) const = 0;
 };
 
-// Keeps what came ahead of the announcement of its epoch: tiles and announcements travel on different sockets.
+// Keeps messages that came before their epoch was announced: tiles and announcements travel on different sockets.
 
 template <class T>
 class EpochHold {
  public:
   struct Limits {
-    size_t items = 256, bytes = 64u << 20;  ///< beyond them the oldest of who has most are dropped
-    double patience_s = 1;                  ///< what waited longer is dropped
+    size_t items = 256, bytes = 64u << 20;  ///< beyond them, the oldest item of the key that holds most is dropped
+    double patience_s = 1;                  ///< items that waited longer are dropped
   };
   EpochHold() = default;
   explicit EpochHold(const Limits& limits) : limits_(limits) {}
 
-  /// since_s: when it came, on the clock of expire(). user: whose key it came by (net::Message::user).
+  /// since_s: when the item came, on the clock of expire(). user: the key it was sent with (net::Message::user).
   void add(T item, size_t bytes, double since_s, std::string user = {}) {
     items_.push_back({std::move(item), bytes, since_s, std::move(user)});
     bytes_ += bytes;
     while (items_.size() > limits_.items || bytes_ > limits_.bytes) drop(oldest_of_largest());
   }
-  /// Everything that waits, in the order in which it came; what must wait on is added again.
+  /// Items that wait, in the order in which they came; the caller adds again those that must wait on.
   struct Waiting {
     T item;
     size_t bytes;
@@ -121,7 +121,7 @@ class EpochHold {
 
  private:
   using At = typename std::deque<Waiting>::iterator;
-  // Seals cannot be checked yet, so one key's tiles must not push out another's. Counts what there is too much of.
+  // Seals cannot be checked yet, so one key's tiles must not push out another's. Weighs by the limit that is exceeded.
   At oldest_of_largest() {
     const bool counts = items_.size() > limits_.items;
     std::map<std::string_view, size_t> held;
@@ -141,13 +141,13 @@ class EpochHold {
   uint64_t dropped_ = 0;
 };
 
-// Who may speak for a viewer on the `state` socket: the key that spoke for it first.
+// Holds each viewer's id on the `state` socket to one key: the first that spoke for it.
 
 class StateSenders {
  public:
-  static constexpr size_t kMost = 4096;  ///< viewers that are remembered; further ones may be anybody's
+  static constexpr size_t kMost = 4096;  ///< viewers that are remembered; any key may speak for further ones
 
-  /// Without keys, and with other keys than viewers', anybody may. viewer: as the message names it.
+  /// Always true without keys, and for keys of other roles. viewer: as the message names it.
   bool may_speak(const net::Message& message, InstanceId viewer) {
     if (message.role != net::Role::kViewer) return true;
     const auto owner = owners_.find(viewer);
@@ -160,7 +160,7 @@ class StateSenders {
   std::unordered_map<InstanceId, std::string> owners_;
 };
 
-/// Why a message is refused.
+/// Reason given when a message is refused.
 inline constexpr const char* kNotItsViewer = "it speaks for a viewer of another key";
 
 }  // namespace telesplat::packer

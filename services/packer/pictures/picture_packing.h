@@ -1,4 +1,4 @@
-// The packer's part where views come as pictures: tiles of pictures come in, and go at once to the viewer that asked.
+// The packer's part where views come as pictures: each tile goes at once to the viewer that asked for it.
 #pragma once
 
 #include <deque>
@@ -12,23 +12,23 @@ namespace telesplat::packer {
 
 class PicturePacking final : public Packing {
  public:
-  static constexpr size_t kMostFrames = 64;    ///< whose tiles are remembered, so that none goes out twice
-  static constexpr size_t kMostViewers = 256;  ///< with one more, another has to say again that it is here
+  static constexpr size_t kMostFrames = 64;    ///< frames whose tiles are remembered, so that no tile goes out twice
+  static constexpr size_t kMostViewers = 256;  ///< with one more, the packer forgets another viewer
 
   /// Keeps a reference to the spans.
   PicturePacking(Outlets outlets, metrics::SpanRecorder& spans) : outlets_(std::move(outlets)), spans_(spans) {}
 
   bool follow(const wire::Welcome& session, double now_s) override;
-  /// Tiles of an epoch that is not announced yet wait for it; those of earlier ones are dropped.
+  /// Tiles of an epoch that is not announced yet wait for it; those of earlier epochs are dropped.
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
-  /// A viewer says with a slice_ack that it is here.
+  /// A viewer introduces itself with a slice_ack.
   void take_state(net::Socket& from, const net::Message& message, double now_s) override;
   void tick(double now_s) override;
   void add_status(net::MasterLink::Values& values) const override;
 
-  /// As take_sampled(). Error: what makes no sense.
+  /// Takes a decoded tile, with the rules of take_sampled(). Error: the tile is invalid.
   Status receive(const net::Message& message, const wire::PictureTile& tile, double now_s);
-  /// As take_state().
+  /// Notes the viewer's address, as take_state() does.
   void meet(const std::string& peer, InstanceId viewer);
 
  private:
@@ -36,7 +36,7 @@ class PicturePacking final : public Packing {
     net::Message message;
     wire::PictureTile tile;  // its image lies in the message
   };
-  // For a viewer that has not said yet that it is here.
+  // A tile for a viewer that has not introduced itself yet.
   struct Unmet {
     InstanceId viewer;
     std::string body;
@@ -53,10 +53,10 @@ class PicturePacking final : public Packing {
   metrics::SpanRecorder& spans_;
   InstanceId instance_ = net::make_instance_id(), master_;
   EpochId epoch_;
-  std::vector<uint32_t> lease_key_;  // of the master
+  std::vector<uint32_t> lease_key_;  // the master's
   EpochHold<Ahead> ahead_{{.items = 64, .bytes = 64u << 20}};
   EpochHold<Unmet> unmet_{{.items = 64, .bytes = 64u << 20}};
-  std::map<InstanceId, std::string> peers_;  // of viewers
+  std::map<InstanceId, std::string> peers_;  // viewers' addresses
   StateSenders senders_;
   std::deque<Frame> frames_;  // the newest last
   uint64_t tiles_ = 0, duplicate_ = 0, other_epoch_ = 0, unsealed_ = 0, bytes_sent_ = 0;

@@ -29,7 +29,7 @@ Status check(const FramePart& block, const geometry::Rect& rect) {
   return ok_status();
 }
 
-// What an earlier tile of the same frame said.
+// Checks that a block agrees with an earlier tile of its frame.
 Status check_frame(const FramePart& block, const FramePart& earlier) {
   if (block.tiles_in_frame != earlier.tiles_in_frame)
     return Error{fmt::format("{} says its frame has {} blocks, earlier ones said {}", name_of(block),
@@ -49,7 +49,7 @@ BlockGatherer::Frame* BlockGatherer::find(FrameId id) {
   return found == frames_.end() ? nullptr : &*found;
 }
 
-// Drops the oldest frames, but not this one, until a block of `pixels` pixels fits in.
+// Drops the oldest frames, except `frame`, until a block of `pixels` pixels fits in.
 void BlockGatherer::make_room(FrameId frame, size_t pixels) {
   const bool is_new = find(frame) == nullptr;
   for (auto oldest = frames_.begin(); oldest != frames_.end();) {
@@ -99,7 +99,7 @@ Result<std::optional<BlockGatherer::Gathered>> BlockGatherer::add(SampledTile bl
       return std::optional<Gathered>();
     }
   }
-  // Before anything is allocated for it: the stream must hold the tile.
+  // The stream must hold the tile before a block is allocated for it.
   if (const Status decoded = codec::decode_into(tile_, stream, rect.width, rect.height); !decoded) {
     ++statistics_.tiles_refused;
     return decoded.error();
@@ -122,7 +122,7 @@ Result<std::optional<BlockGatherer::Gathered>> BlockGatherer::add(SampledTile bl
   return take(*frame, *open, rect);
 }
 
-// Puts the rows of tile_ that are new in their place.
+// Copies those rows of tile_ into the block that have not come before.
 std::optional<BlockGatherer::Gathered> BlockGatherer::take(Frame& frame, Block& block, const geometry::Rect& rect) {
   ++statistics_.tiles;
   Gathered out;

@@ -13,7 +13,7 @@
 
 namespace telesplat::packer {
 namespace {
-constexpr size_t kMaxOpen = 4;  // frames being composed
+constexpr size_t kMaxOpen = 4;  // frames that are composed at once
 constexpr const char* kCameraColumns = "frame,width,height,px,py,pz,qw,qx,qy,qz,left,right,bottom,top,near_m";
 
 std::string row_of(FrameId id, const geometry::Camera& c) {
@@ -67,7 +67,7 @@ Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geom
   }
   if (out && cameras) return ok_status();
   Error error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};
-  std::filesystem::remove(path, ignored);  // what is there is whole
+  std::filesystem::remove(path, ignored);  // remove the incomplete file
   return error;
 }
 

@@ -1,4 +1,4 @@
-// Keeps whole sampled depth images on disk: composed from their tiles, as codec streams that `telesplat inspect` reads.
+// Records whole sampled depth images, composed from their tiles, as codec streams that `telesplat inspect` reads.
 #pragma once
 
 #include <map>
@@ -13,11 +13,11 @@ namespace telesplat::packer {
 
 class DepthRecorder {
  public:
-  /// Writes into `directory` (made if need be) as frame-NNNNNN.depth, at most `max_frames` of them, and into its
-  /// cameras.csv where each was seen from: without the near plane, codes are not metres.
+  /// Writes frame-NNNNNN.depth files into `directory` (created if missing), at most `max_frames`, and the camera of
+  /// each frame into its cameras.csv: without the near plane, codes cannot be converted to metres.
   static Result<DepthRecorder> open(const std::string& directory, int max_frames);
 
-  /// Adds a tile as sampled; the frame is written when its last tile is here. Frames never completed are dropped.
+  /// Adds a sampled tile; the frame is written when its last tile has come. Incomplete frames are dropped.
   Status add(FrameId frame, const geometry::Camera& camera, const geometry::Rect& rect, size_t tiles_in_frame,
              const image::DepthImage& tile);
 

@@ -10,13 +10,13 @@
 namespace telesplat::packer {
 namespace {
 
-// A map node's links and the allocator's headers of node and blob.
+// Memory of a map node's links and of the allocator's headers for node and blob.
 constexpr uint64_t kNodeBytes = 96;
 constexpr uint64_t kForgetBytes = 40;  // a hash node and its bucket
 
 bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequence; }
 
-// The same without what it brought.
+// Returns the event without its points and missed rays.
 Event bare(const Event& event) {
   static const auto kNothing = std::make_shared<const std::vector<uint8_t>>(codec::encode(image::DepthImage(1, 1)));
   Event out = event;
@@ -49,7 +49,7 @@ void EventLog::add_patch(const Event& event, std::span<const points::ClusterKey>
 
 void EventLog::drop_part(Sequence sequence_of_patch, points::ClusterKey key, Sequence sequence, bool patch_alone) {
   const auto found = patches_.find(sequence_of_patch);
-  CHECK(found != patches_.end());  // a patch stays as long as it has points in the model
+  CHECK(found != patches_.end());  // a patch stays in the log as long as it has points in the model
   Patch& patch = found->second;
   patch_bytes_ -= patch.bytes();
   if (--patch.alive == 0) {
@@ -148,7 +148,7 @@ EventLog::Replay EventLog::replay(Sequence after, Sequence until) const {
   return out;
 }
 
-// One sequence is of one event. A patch that was put among the others, without what it brought, gives way to itself.
+// Each sequence names one event. A point-free copy of a patch in `others` is skipped if the patch is in the log.
 std::optional<Event> EventLog::next(Replay& replay) const {
   auto patch = patches_.upper_bound(replay.after);
   if (patch != patches_.end() && patch->first > replay.until) patch = patches_.end();
@@ -167,7 +167,7 @@ std::optional<Event> EventLog::next(Replay& replay) const {
   return out;
 }
 
-// from_nothing: the replica holds nothing but what it will get from the patches kept.
+// from_nothing: the replica is empty apart from the kept patches that it will get.
 std::vector<Event> EventLog::forgets(Sequence after, bool from_nothing) const {
   std::vector<std::pair<Sequence, points::ClusterKey>> keys;
   if (from_nothing) {

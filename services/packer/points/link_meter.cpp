@@ -13,7 +13,7 @@ void LinkMeter::published(Sequence sequence, uint64_t bytes, double now_s) {
   published_.pop_front();
 }
 
-// The newest that is not newer.
+// Returns the newest remembered event that is not newer than `sequence`.
 std::deque<LinkMeter::Published>::const_iterator LinkMeter::find(Sequence sequence) const {
   const auto after = std::upper_bound(published_.begin(), published_.end(), sequence,
                                       [](Sequence s, const Published& p) { return s < p.sequence; });
@@ -34,9 +34,9 @@ void LinkMeter::learn_rtt(Viewer& v, double rtt_s, double now_s) {
   if (rtt_s > 0) v.least_rtt_s = v.least_rtt_s == 0 ? rtt_s : std::min(v.least_rtt_s, rtt_s);
 }
 
-// From one receipt to the next the link was busy if the newest that arrived in between had been published before the
-// earlier one was given: then it, and all before it, waited for the link or were on it. Times in which the link had
-// nothing to do say nothing of what it can.
+// From one receipt to the next the link was busy if the newest event that arrived in between had been published before
+// the earlier receipt was given: then this event, and all before it, waited for the link or were on it. Times in which
+// the link was idle say nothing about its rate.
 void LinkMeter::learn_rate(Viewer& v, const Receipt& now, double published_s) {
   const double span_s = now.viewer_s - v.last.viewer_s;
   const uint64_t bytes = now.bytes_so_far - v.last.bytes_so_far;
@@ -48,10 +48,10 @@ void LinkMeter::learn_rate(Viewer& v, const Receipt& now, double published_s) {
 }
 
 void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, double now_s) {
-  // A model without events, such as another data set's, leaves nobody behind; that is worth telling, too.
+  // A model without events, such as another data set's, leaves no viewer behind; its receipts count, too.
   const Sequence last = published_.empty() ? Sequence{} : published_.back().sequence;
   if (newest > last || !std::isfinite(viewer_s)) return;
-  const auto event = find(newest);  // none: it has nothing that is remembered
+  const auto event = find(newest);  // end(): the viewer has no event that is remembered
   const Receipt receipt{newest, event == published_.end() ? forgotten_bytes_ : event->bytes_so_far, viewer_s, now_s};
   const double rtt_s = event == published_.end() ? 0 : now_s - event->at_s;
   auto known = viewers_.find(viewer);
@@ -70,7 +70,7 @@ void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, do
   }
   Viewer& v = known->second;
   if (newest > v.last.newest) {
-    // From a receipt within a replay on, or to one, nothing can be learnt.
+    // Receipts during a replay, and the first one after it, measure nothing.
     if (v.last.newest >= v.replayed_until) {
       learn_rtt(v, rtt_s, now_s);
       learn_rate(v, receipt, now_s - rtt_s);
@@ -78,7 +78,7 @@ void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, do
     v.last = receipt;
     v.moved_s = now_s;
   } else if (newest == v.last.newest) {
-    // Nothing came meanwhile: what comes next is counted from here.
+    // No event came meanwhile: the next interval starts here.
     v.last.viewer_s = viewer_s;
     v.last.arrived_s = now_s;
   }
@@ -92,7 +92,7 @@ void LinkMeter::replayed(InstanceId viewer) {
     return;
   }
   std::erase_if(replays_, [&](const auto& r) { return r.first == viewer; });
-  if (replays_.size() >= kMostViewers) replays_.pop_front();  // most likely it never tells what it has
+  if (replays_.size() >= kMostViewers) replays_.pop_front();  // its viewer most likely never sends a receipt
   replays_.emplace_back(viewer, until);
 }
 

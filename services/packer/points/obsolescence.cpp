@@ -21,7 +21,7 @@ std::vector<points::ClusterKey> Obsolescence::choose(const points::PointModel& m
   std::vector<std::pair<double, points::ClusterKey>> oldest_first;
   for (const auto& [key, access_s] : access_s_) oldest_first.emplace_back(access_s, key);
   std::sort(oldest_first.begin(), oldest_first.end());
-  // Times ascend: first those that are obsolete, then, if there are too many points, the next ones.
+  // Times ascend: first come the obsolete clusters, then, if there are too many points, the next ones.
   uint64_t limit = ~uint64_t{0};
   for (const auto& [access_s, key] : oldest_first) {
     if (!(after_s > 0 && now_s - access_s > after_s)) {
@@ -122,7 +122,7 @@ std::vector<PatchKey> PatchObsolescence::choose(const PatchLimits& limits, doubl
   std::vector<Scored> of_cluster, left;
   const bool may_be_too_many = limits.max_points > 0 && points_ > limits.max_points;
   for (const auto& [key, patches] : clusters_) {
-    // Most clusters, most of the time, have nothing to be scored for.
+    // Most of the time no limit applies to a cluster: skip its scores.
     const bool too_many_patches = limits.patches_per_cluster > 0 && patches.size() > limits.patches_per_cluster;
     if (!too_many_patches && !may_be_too_many && !(limits.obsolete_after_s > 0)) continue;
     of_cluster.clear();
@@ -131,7 +131,7 @@ std::vector<PatchKey> PatchObsolescence::choose(const PatchLimits& limits, doubl
       of_cluster.push_back({0, p.first, {key, p.frame}, p.points});
       if (limits.obsolete_after_s > 0 && now_s - p.access_s > limits.obsolete_after_s) {
         drop(of_cluster.back());
-        of_cluster.back().points = 0;  // gone; no other patch has none
+        of_cluster.back().points = 0;  // marks it as dropped; every other patch has points
       } else {
         best_range = std::max(best_range, p.pixel_range);
       }
@@ -151,7 +151,7 @@ std::vector<PatchKey> PatchObsolescence::choose(const PatchLimits& limits, doubl
   }
 
   if (limits.max_points > 0 && points > limits.max_points) {
-    // A heap: of many patches few go at a time.
+    // A heap, since few of many patches go at a time.
     const uint64_t enough = limits.max_points / 10 * 9 + limits.max_points % 10 * 9 / 10;
     const auto stays_longer = [](const Scored& a, const Scored& b) { return b.goes_before(a); };
     std::make_heap(left.begin(), left.end(), stays_longer);

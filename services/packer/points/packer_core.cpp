@@ -22,13 +22,13 @@ namespace telesplat::packer {
 namespace {
 
 constexpr uint32_t kMostRestNumber = points::kRestTag - 1;
-// Viewers whose rests are kept: those of one person and a few guests.
+// Viewers whose rests are kept: those of one user and a few guests.
 constexpr size_t kMaxRests = 16;
-constexpr double kUnheard_s = 60;  // without a report of any viewer: what was drawn is out of date
+constexpr double kUnheard_s = 60;  // older reports of drawn clusters count as out of date
 
 uint32_t rest_tag(uint32_t rest) { return static_cast<uint32_t>(points::tagged({}, 1, rest).value); }
 
-// Defence in depth: what came over the network was checked there, too.
+// Defence in depth: the network code has checked tiles already.
 Status check_tile(const SampledTile& t) {
   if (const Status part = check(t, "tile"); !part) return part;
   const size_t pixels = static_cast<size_t>(t.rect.width) * t.rect.height;
@@ -44,14 +44,14 @@ Status check_tile(const SampledTile& t) {
   return ok_status();
 }
 
-// decoded: unless it is null, it becomes what viewers decode.
+// decoded: unless null, it becomes the image that viewers decode.
 std::shared_ptr<const std::vector<uint8_t>> encoded(const SampledTile& tile, const codec::ErrorBounds& bounds,
                                                     image::DepthImage* decoded) {
   return std::make_shared<const std::vector<uint8_t>>(
       codec::encode(tile.image, bounds, decoded, geometry::ray_axes(tile.camera, tile.rect)));
 }
 
-// The smallest rectangle of the tile that holds all of its samples; of none a pixel.
+// Returns the smallest rectangle of the tile that holds all of its samples; one pixel if it has none.
 geometry::Rect kept_in(const image::DepthImage& image) {
   int left = image.width, right = 0, top = image.height, bottom = 0;
   for (int y = 0; y < image.height; ++y) {
@@ -66,7 +66,7 @@ geometry::Rect kept_in(const image::DepthImage& image) {
   return bottom == 0 ? geometry::Rect{0, 0, 1, 1} : geometry::Rect{left, top, right - left, bottom - top};
 }
 
-// What was eliminated need not be coded, decoded and looked through: most of a planned tile's rays only check.
+// Eliminated pixels need not be coded, decoded and searched: most rays of a planned tile only confirm the model.
 void crop_to_kept(SampledTile& tile) {
   const geometry::Rect kept = kept_in(tile.image);
   if (kept.width == tile.rect.width && kept.height == tile.rect.height) return;
@@ -88,13 +88,13 @@ struct PackerCore::Impl {
   const Config config;
   const Hooks hooks;
   EpochId epoch;
-  Sequence sequence;  // of the newest event
+  Sequence sequence;  // the newest event's
   points::PointModel model{config.model};
   EventLog log{};
   FrameBook frames;
-  Obsolescence obsolescence;             // of clusters, kEliminate
+  Obsolescence obsolescence;             // kEliminate
   PatchObsolescence patch_obsolescence;  // kKeep
-  std::optional<double> reported_s;      // when a viewer last told what it drew
+  std::optional<double> reported_s;      // last time a viewer reported the clusters that it drew
   Statistics statistics;
   ModelWatcher* watcher = nullptr;
   std::vector<float> reference_depth_m;               // kept for its memory
@@ -105,23 +105,23 @@ struct PackerCore::Impl {
     RequestId request;
     std::vector<PatchKey> patches;
   };
-  /// What is kept of a head that rests.
+  /// A place where a head rests, and the points that were cast for it.
   struct Rest {
-    uint32_t number = 0;  // of 1 and more
+    uint32_t number = 0;  // at least 1
     geometry::Pose pose;
     RequestId request;                      // the newest of its views
-    std::set<points::ClusterKey> clusters;  // that have its points
+    std::set<points::ClusterKey> clusters;  // clusters that have its points
   };
   struct Refinable {
-    std::shared_ptr<const std::vector<uint8_t>> stream;  // of the refinement
+    std::shared_ptr<const std::vector<uint8_t>> stream;  // the refinement's
     std::vector<points::ClusterKey> clusters;
   };
   AllowedErrors allowed;
   refinement::RefinableBook<Refinable> refinables;
-  std::deque<CoarsePass> coarse;     // coarse frames whose complete ones are not there yet, oldest first
-  std::map<InstanceId, Rest> rests;  // of viewers
+  std::deque<CoarsePass> coarse;     // coarse frames that no complete frame has replaced yet, oldest first
+  std::map<InstanceId, Rest> rests;  // by viewer
   uint32_t newest_rest = 0;
-  std::vector<PatchKey> superseded;  // what complete frames made superfluous
+  std::vector<PatchKey> superseded;  // patches that complete frames made superfluous
 
   Event next_event(Event::Kind kind) {
     Event event;
@@ -141,9 +141,9 @@ struct PackerCore::Impl {
     if (known)
       return splat::eliminate_where_cast(tile.camera, tile.rect, known->cast, known->nearest_m, config.relative_epsilon,
                                          tile.image, config.nearest_sample);
-    // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters
-    // outside the tile's frustum cost next to nothing. It has a pixel more on each side, inside the frame, for the
-    // tile's border.
+    // The reference is rendered for this tile alone and as of now: it includes what other frames added or forgot
+    // meanwhile, and clusters outside the tile's frustum cost next to nothing. It has one pixel more on each side,
+    // inside the frame, for the tile's border.
     const geometry::Rect& r = tile.rect;
     const int left = std::min(r.x, 1), top = std::min(r.y, 1);
     const int right = std::min(tile.camera.width - r.x - r.width, 1),
@@ -161,13 +161,13 @@ struct PackerCore::Impl {
     superseded.insert(superseded.end(), pass.patches.begin(), pass.patches.end());
   }
 
-  // A coarse frame is over when a complete one answers the same request of its viewer, or a later one.
+  // A coarse frame ends when a complete one answers the same request of its viewer, or a later one.
   void note_pass(const Event& event, const points::PreparedPatch& patch) {
     if (event.step > 1) {
       if (coarse.empty() || coarse.back().frame != event.frame)
         coarse.push_back({event.frame, event.viewer, event.request, {}});
       if (coarse.size() > kMaxOpenFrames) {
-        if (!keeps()) supersede(coarse.front());  // provisional points are not kept for good
+        if (!keeps()) supersede(coarse.front());  // provisional points must not stay
         coarse.pop_front();
       }
       auto& patches = coarse.back().patches;
@@ -181,8 +181,8 @@ struct PackerCore::Impl {
     }
   }
 
-  // Finer rays show a head that rests more than its display does. Each place to rest has its own, so their points are
-  // kept until the head has moved on.
+  // Finer rays show a resting head more than its display resolves. Each resting place has its own number, and its
+  // points are kept until the head has moved on.
   uint32_t rest_of(const SampledTile& tile) {
     const auto [at, is_new] = rests.try_emplace(tile.viewer);
     Rest& rest = at->second;
@@ -194,7 +194,7 @@ struct PackerCore::Impl {
     newest_rest = newest_rest % kMostRestNumber + 1;
     rest = {newest_rest, tile.camera.pose, tile.request, {}};
     if (rests.size() <= kMaxRests) return newest_rest;
-    // Viewers leave without a word.
+    // Viewers leave without notice.
     const auto oldest = std::min_element(rests.begin(), rests.end(), [&](const auto& a, const auto& b) {
       return newest_rest - a.second.number > newest_rest - b.second.number;
     });
@@ -203,7 +203,7 @@ struct PackerCore::Impl {
     return newest_rest;
   }
 
-  // Its head rests elsewhere by now.
+  // True if the viewer's head rests elsewhere by now.
   bool comes_too_late(const SampledTile& tile) const {
     const auto at = rests.find(tile.viewer);
     return at != rests.end() && tile.request < at->second.request && !(at->second.pose == tile.camera.pose);
@@ -213,7 +213,7 @@ struct PackerCore::Impl {
     for (const points::ClusterKey key : rest.clusters) superseded.push_back({key, rest_tag(rest.number)});
   }
 
-  // The view from elsewhere is complete.
+  // A view from elsewhere is complete: end the viewer's old rest.
   void move_on(const SampledTile& tile) {
     const auto at = rests.find(tile.viewer);
     if (at == rests.end() || at->second.pose == tile.camera.pose) return;
@@ -221,8 +221,8 @@ struct PackerCore::Impl {
     rests.erase(at);
   }
 
-  // The event's stream of the tile, which becomes what decoders make of it. stream: of the exact tile, or null.
-  // Returns the tile as it was sampled, if a refinement can tell viewers of it.
+  // Writes the tile's stream into the event, and replaces the tile's image by the decoded one. stream: of the exact
+  // tile, or null. Returns the tile as sampled if a later refinement can use it.
   image::DepthImage code(Event& event, SampledTile& tile, Stream stream) {
     event.bounds = event.kept > 0 ? bounds_of(allowed, tile.camera) : codec::ErrorBounds{};
     uint32_t farthest = image::kMaxDepthCode;
@@ -235,14 +235,14 @@ struct PackerCore::Impl {
     }
     image::DepthImage decoded;
     event.blob = encoded(tile, event.bounds, &decoded);
-    // What stands in for a frame that is coming is soon forgotten.
+    // A coarse pass is soon forgotten: it is not refined.
     event.refinable = tile.step == 1;
     ++statistics.patches_bounded;
     return std::exchange(tile.image, std::move(decoded));
   }
 
   std::optional<Event> refine(double drawn_since_s) {
-    // What was forgotten may have come again, alike: that is not this patch's.
+    // Forgotten points may have come again unchanged, by another patch: only patches that are still whole are refined.
     auto next = refinables.take_newest([&](Sequence of, const Refinable& r) {
       if (!log.is_whole(of)) return false;
       return keeps() || std::any_of(r.clusters.begin(), r.clusters.end(), [&](points::ClusterKey key) {
@@ -268,7 +268,7 @@ struct PackerCore::Impl {
     return event;
   }
 
-  // Of a tile that viewers need not hear of: more than a third of all, where most is known.
+  // Returns the unpublished event of a tile that changes nothing for viewers: over a third of all, where most is known.
   Event untold(const SampledTile& tile, const splat::Elimination& elimination, const FrameBook::Frame& frame) {
     static const auto nothing = std::make_shared<const std::vector<uint8_t>>();
     Event event;
@@ -356,7 +356,7 @@ struct PackerCore::Impl {
     }
   }
 
-  // Of these clusters single patches were forgotten: some have none left.
+  // Notes those of the clusters that have no patch left, after single patches were forgotten.
   void forget_emptied(std::span<const points::ClusterKey> keys) {
     if (keeps()) return;
     std::vector<points::ClusterKey> emptied;
@@ -391,7 +391,7 @@ struct PackerCore::Impl {
 PackerCore::PackerCore(const Config& config, EpochId epoch) : PackerCore(config, epoch, Hooks{}) {}
 PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
     : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {
-  // Single patches are forgotten by their mosaics.
+  // kKeep forgets single patches by their mosaics, so these must not be merged.
   CHECK(!(config.redundancy == Redundancy::kKeep && config.model.compact));
 }
 PackerCore::~PackerCore() = default;
@@ -465,7 +465,7 @@ std::vector<Event> PackerCore::tick(double now_s) {
   Impl& i = *impl_;
   const Config& c = i.config;
   std::vector<Event> out;
-  // While no report gets through, what is drawn is not known.
+  // While no report gets through, it is unknown which clusters viewers draw: their time stops.
   const double known_s = i.reported_s ? std::max(*i.reported_s, now_s - kUnheard_s) : now_s;
   if (i.keeps()) {
     const PatchLimits limits{c.obsolete_after_s, c.patches_per_cluster, c.max_points};

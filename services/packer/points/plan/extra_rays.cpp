@@ -1,5 +1,5 @@
-// Rays beyond what a view asks for: from beside it, so that a movement of the head uncovers nothing unknown, and finer
-// ones.
+// Plans rays beyond what a view asks for: from beside it, so that a movement of the head uncovers nothing unknown, and
+// finer ones.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -12,34 +12,34 @@
 namespace telesplat::packer {
 namespace {
 
-constexpr double kMostFull = 0.85;  // of the points that the model may hold
+constexpr double kMostFull = 0.85;  // share of the model's limit of points from which on no extra rays are planned
 constexpr unsigned kDirections = 8;
 // Rays from beside a view while the head moves, as a share of its pixels: the next view has edges of its own.
 constexpr double kMovingCells = 0.05;
-// Tiles that have not come for so long were given up.
+// Tiles that have not come after this time are planned again.
 constexpr double kLost_s = 0.5;
-// Of a view from beside: as much more on each side, and what is so near to a sample is good enough.
+// Views from beside: they reach this share farther on each side, and a sample this near, in pixels, suffices.
 constexpr double kWider = 0.04;
 constexpr float kNearestFromBeside = 1.5f;
-// And what lies so little behind what is shown, as a fraction of its depth: coarse splats stand out that far before the
-// samples that they hide, and rays at them brought nothing but what was known.
+// Tolerance of depth there, as a fraction: coarse splats stand out that far before the samples that they hide, and rays
+// at them brought only known points.
 constexpr float kEpsilonFromBeside = 0.02f;
-// A head moves no farther than this at once, in distances to the nearest that it sees. With half of it a
-// model grows a little less, and moving bones have holes in 0.095 % of their pixels instead of 0.059 %.
+// Longest step aside, in distances to the nearest surface in view: a head moves no farther at once. With 0.5 a model
+// grows a little less, and moving bones have holes in 0.095 % of their pixels instead of 0.059 %.
 constexpr double kStepAside = 1;
-// What is shown there is cast if the view sees its place no more than so many times as coarsely.
+// Shown pixels are cast from beside only if the view itself sees their place at most this many times as coarsely.
 constexpr double kCloser = 1.5;
-constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide
-// The surfaces of a view that stands still are judged again when all of its finer rays are cast, so many times: what
-// these rays found has edges of its own.
+constexpr int kNearEdge = 32;  // pixels around an edge; a word of a mask is twice as wide
+// The surfaces of a view that stands still are judged at most this often: again each time all of its finer rays are
+// cast, since the points found by these have edges of their own.
 constexpr int kMostLooks = 3;
-// Tiles of a finer view that are looked at before rays are counted again.
+// Tiles of a finer view that are searched before rays are counted again.
 constexpr size_t kTilesAtOnce = 8;
-// Sides of the parts of a finer view whose points are chosen and binned at once: those of all of it are so many that to
-// choose them takes longer than to look at what a plan has room for.
+// Size of the parts of a finer view whose points are chosen and binned at once: for the whole view, choosing its points
+// takes longer than searching as much as one plan has room for.
 constexpr int kRegionWidth = 8 * kPlanTileWidth, kRegionHeight = 8 * kPlanTileHeight;
 
-// In the camera's plane, to the sides first.
+// Returns the i-th direction in the camera's plane, the sides first.
 glm::dvec3 direction(unsigned i) {
   constexpr double kDiagonal = 0.70710678;
   constexpr glm::dvec3 kTable[kDirections] = {{1, 0, 0},
@@ -61,15 +61,15 @@ geometry::Camera widened(const geometry::Camera& camera) {
   return geometry::crop(camera, {-x, -y, camera.width + 2 * x, camera.height + 2 * y});
 }
 
-// The same frustum with `times` as many pixels a side.
+// Returns the same frustum with `times` as many pixels on each axis.
 geometry::Camera finer_camera(const geometry::Camera& camera, int times) {
   geometry::Camera out = camera;
   out.width *= times, out.height *= times;
   return out;
 }
 
-// What a movement uncovers lies beside an edge. Elsewhere there is but space that no view has looked into so far,
-// between the eye and surfaces that are known: the next view that looks there will tell.
+// A movement uncovers places beside edges. Elsewhere the unknown is only space between the eye and known surfaces that
+// no view has looked into: the next view that looks there will find out.
 void drop_far_from_edges(const ViewMap& map, image::PixelMask& cast) {
   const auto word_of = [&](const image::PixelMask& mask, int y, size_t w) {
     return y < mask.height() ? mask.row(y)[w] : 0;
@@ -83,10 +83,10 @@ void drop_far_from_edges(const ViewMap& map, image::PixelMask& cast) {
     }
 }
 
-// Of a view from beside, what is shown is cast if its place lies in the view's own frustum, hidden there or not, and at
-// a like distance. The rest is known, only not as finely as from where nobody stands. Each place beside a walk is
-// another one and much nearer to something: of the bones, walked around again and again, nine tenths of the new points
-// came from there.
+// Drops shown pixels from the rays of a view from beside, unless their place lies in the view's own frustum (hidden
+// there or not) and at a similar distance. They are known, only not as finely as from where no viewer stands. Each
+// place beside a walk is another one and much nearer to some surface: walking around the bones again and again, nine
+// tenths of the new points came from there.
 void drop_beyond_view(const ViewMap& map, const geometry::Camera& view, image::PixelMask& cast) {
   const auto t = view.room_to_pixel();
   for (int y = 0; y < cast.height(); ++y)
@@ -111,13 +111,13 @@ bool any(const image::PixelMask& mask, const geometry::Rect& r) {
 }  // namespace
 
 void Planner::plan_extra(Question& q, ViewerView& view) {
-  // A view that this planner has not planned, as after a restart.
+  // This planner has not planned this view, as after a restart.
   if (!view.known || !(view.camera == q.request.camera)) {
     follow(q.request.camera, view);
     view.still = q.request.still;
   }
   if (q.model.points() == 0) return;
-  // Near its limit the model would forget for them what the view needs.
+  // Near its limit the model would forget points that the view needs to make room for extra ones.
   if (config_.max_points > 0 &&
       static_cast<double>(q.model.points()) > kMostFull * static_cast<double>(config_.max_points))
     return;
@@ -130,8 +130,7 @@ void Planner::plan_extra(Question& q, ViewerView& view) {
   if (!cells_first) plan_cells(q, view);
 }
 
-// Tiles of extra frames that were given up for the view's are asked for again: each was planned once and is not found
-// again.
+// Plans tiles of extra frames again that were given up for the view's tiles: the search plans each tile only once.
 bool Planner::plan_lost(Question& q, ViewerView& view) {
   for (PlannedFrame& frame : shelf_.frames()) {
     if (frame.viewer != view.viewer || frame.kind == PlannedFrame::Kind::kView || frame.complete()) continue;
@@ -139,11 +138,11 @@ bool Planner::plan_lost(Question& q, ViewerView& view) {
     LostTiles lost{frame.camera, frame.kind, {}};
     for (size_t i = 0; i < frame.tiles.size(); ++i)
       if (!frame.returned[i]) lost.tiles.push_back(std::exchange(frame.tiles[i], {frame.tiles[i].rect, {}, 0}));
-    // What comes late has no mask any more: it is compared with the model.
+    // Tiles that come late have no mask any more: their samples are compared with the model.
     frame.returned.assign(frame.tiles.size(), true);
     frame.map = nullptr;
     frame.left = 0;
-    frame.came_m.clear();  // settled with nothing to tell
+    frame.came_m.clear();  // settled: there is nothing to learn from it
     if (frame.kind == PlannedFrame::Kind::kFine && frame.base == view.camera) view.lost.push_back(std::move(lost));
   }
   if (view.lost.empty()) return false;
@@ -175,8 +174,8 @@ bool Planner::plan_cells(Question& q, ViewerView& view) {
   return false;
 }
 
-// From beside what is near the surface is another world: a head close to a mesh that was looked at from 20 cm aside
-// added 400,000 points a round, on and on.
+// From beside, the surroundings of a near surface look entirely different: a head close to a mesh that was looked at
+// from 20 cm aside added 400,000 points a round, on and on.
 double Planner::step_aside_m(const ViewerView& view) const {
   if (!view.map) return config_.view_cell_m;
   const auto& depth_m = view.map->depth_m;
@@ -185,16 +184,16 @@ double Planner::step_aside_m(const ViewerView& view) const {
 }
 
 bool Planner::plan_cell(Question& q, ViewerView& view, unsigned turn) {
-  // As many rays a side as the view has: with half of them points beyond silhouettes are larger there than what they
-  // belong to, which took 1.1 dB from a moving head.
+  // As many rays on each axis as the view has: with half of them points beyond silhouettes are larger there than the
+  // surfaces they belong to, which cost a moving head 1.1 dB.
   geometry::Camera camera = widened(view.camera);
   const double moved = glm::length(view.movement_m);
-  // Every other time towards where the head goes.
+  // Every other view from beside lies where the head is going.
   const bool ahead = !view.still && moved > 1e-4 && turn % 2 == 0;
   camera.pose.position_room +=
       step_aside_m(view) * (ahead ? view.movement_m / moved : camera.pose.orientation * direction(turn));
   camera = wire::shortened(camera);
-  // A head does not go where nobody has looked: into what is solid, whose inside is another surface, and near.
+  // A head does not go into unseen space, as inside a solid: the inside shows another surface, and near.
   if (!geometry::validate(camera) || known_empty_.unseen_at(camera.pose.position_room)) return false;
   q.look_at(camera);
   const std::shared_ptr<ViewMap> map = new_map();
@@ -217,7 +216,7 @@ bool Planner::plan_cell(Question& q, ViewerView& view, unsigned turn) {
   uint64_t rays = 0;
   size_t count = 0;
   while (count < tiles.size() && !q.enough(rays)) rays += tiles[count++].rays;
-  // The rest is found again when it is this direction's turn.
+  // The rest is found again when this direction has its next turn.
   if (count < tiles.size()) view.cells_done &= ~(1u << turn);
   tiles.resize(count);
   view.cell_rays += rays;
@@ -236,7 +235,7 @@ bool Planner::plan_fine(Question& q, ViewerView& view) {
   return plan_stages(q, view);
 }
 
-// First at the view, then at what finer rays have added to it.
+// Maps the view first, then the surfaces that finer rays have added to it.
 void Planner::look_closer(Question& q, ViewerView& view) {
   if (view.looks++ == 0) {
     map_view(q, view);
@@ -253,11 +252,11 @@ void Planner::look_closer(Question& q, ViewerView& view) {
 bool Planner::plan_stages(Question& q, ViewerView& view) {
   const std::shared_ptr<const ViewMap> map = view.fine_map;
   const int most = config_.still_rays;
-  // What differs little gets all of its rays at once: what waits for them shows little of it, and each pass more is
-  // another patch of each cluster for packer and viewers to merge.
+  // Pixels with weak contrast get all of their rays at once: each further pass would change them little, but makes
+  // another patch per cluster for packer and viewers to merge.
   const int weak = most >= 16 ? 2 : 1;
-  // Of pixels at edges all of the finest rays are cast, also where the model has samples: where a ray passes beside a
-  // sample, none tells.
+  // Pixels at edges get all of the finest rays, also where the model has samples: a sample does not say where a ray
+  // passes beside its surface.
   const FineStage stages[] = {{0, map->edge, 1, most < 16},
                               {1, map->edge, 2, true},
                               {2, map->strong, 1, false},
@@ -273,10 +272,10 @@ namespace {
 // Part of a finer view whose points are chosen together.
 struct Region {
   geometry::Rect rect;  // in the finer view
-  double distance2;     // from its middle
+  double distance2;     // to the view's middle, squared, in pixels
 };
 
-// Those in which pixels have not had these rays, from the middle outwards.
+// Returns the regions with pixels that have not had these rays, from the middle outwards.
 std::vector<Region> regions_of(const image::PixelMask& open, const geometry::Camera& fine, int times) {
   const splat::TileGrid grid{fine.width, fine.height, kRegionWidth, kRegionHeight};
   std::vector<Region> regions;
@@ -291,13 +290,13 @@ std::vector<Region> regions_of(const image::PixelMask& open, const geometry::Cam
   return regions;
 }
 
-// Part of a view, looked at with more rays.
+// Part of a view that is searched with finer rays.
 struct Part {
   geometry::Rect rect;  // in the view
-  int tile;             // of the region
+  int tile;             // number of its tile in the region
 };
 
-// The pixels of a region that have not had these rays, part by part.
+// Returns the parts of a region with pixels that have not had these rays.
 std::vector<Part> parts_of(const image::PixelMask& open, const geometry::Rect& region, int times) {
   const splat::TileGrid grid{region.width, region.height, kPlanTileWidth, kPlanTileHeight};
   std::vector<Part> parts;
@@ -309,7 +308,7 @@ std::vector<Part> parts_of(const image::PixelMask& open, const geometry::Rect& r
   return parts;
 }
 
-// Rays of a finer tile in the pixels `wanted` of the view (of the part's size): all, or where the model has no sample.
+// Returns the rays in the pixels `wanted` of a part (a mask as large). all: every ray; else those without a sample.
 image::PixelMask fine_rays(const splat::ViewKeys::Tile& tile, const PixelJudge& judge, const image::PixelMask& wanted,
                            int times, bool all) {
   ViewMap local;
@@ -331,7 +330,7 @@ image::PixelMask fine_rays(const splat::ViewKeys::Tile& tile, const PixelJudge& 
 
 }  // namespace
 
-// Of one region: until there are enough rays, or the piece ends. Its tiles are cut from what was found in all of it:
+// Searches one region until there are enough rays, or the piece ends. Its tiles are cut from all rays found in it:
 // packer and viewers pay for each tile.
 void Planner::look_into(Question& q, const geometry::Rect& region, FineSearch& search) {
   const int times = search.camera.width / search.open.width();

@@ -11,10 +11,10 @@ namespace telesplat::packer {
 namespace {
 
 constexpr int kBlocksASide = 1 << KnownEmpty::kBlockLevel;
-constexpr int kMostReach = 8;  // blocks around a point that are seen with it
+constexpr int kMostReach = 8;  // largest distance, in blocks, up to which a point marks space as seen
 constexpr int kRefillBlocks = 3;
 
-// Bits of v at every third place.
+// Returns v with its bits at every third place.
 constexpr uint32_t spread(uint32_t v) {
   uint32_t out = 0;
   for (int bit = 0; bit < KnownEmpty::kBlockLevel; ++bit) out |= (v >> bit & 1) << (3 * bit);
@@ -35,7 +35,7 @@ glm::ivec3 leaf_of(points::ClusterKey key) {
   return {static_cast<int>(key & 1023), static_cast<int>(key >> 10 & 1023), static_cast<int>(key >> 20 & 1023)};
 }
 
-// Samples of a mosaic lie this far apart.
+// Returns the distance between neighbouring samples of a mosaic.
 double spacing_m(const points::Mosaic& mosaic, double leaf_m) {
   return leaf_m / std::max(static_cast<double>(mosaic.pixel_range()), 1e-3);
 }
@@ -109,7 +109,7 @@ void KnownEmpty::see(points::ClusterKey key, const points::Mosaic& mosaic) {
     set_block_range(block - reach, block + reach, 0);
     return;
   }
-  // Each block once, however many points are in it.
+  // Each block is set once, however many points lie in it.
   occupied_.assign((size_t{1} << (3 * shift)) / 64 + 1, 0);
   const points::Mosaic::Level points = mosaic.level(0);
   for (uint32_t i = 0; i < points.count; ++i) {
@@ -148,7 +148,7 @@ void KnownEmpty::forget(std::span<const points::ClusterKey> clusters) {
 void KnownEmpty::refill(std::span<const glm::vec3> points_room) {
   for (const glm::vec3& p : points_room) {
     const glm::dvec3 at = (glm::dvec3(p) - grid_.lo) / (2 * cell_m());
-    // Not a number is outside, too.
+    // NaN counts as outside, too.
     const auto inside = [](double v) { return v >= 0 && v < kBlocksASide; };
     if (!inside(at.x) || !inside(at.y) || !inside(at.z)) continue;
     set_block_range(glm::ivec3(at) - kRefillBlocks, glm::ivec3(at) + kRefillBlocks, 0xff);
@@ -158,7 +158,7 @@ void KnownEmpty::refill(std::span<const glm::vec3> points_room) {
 
 namespace {
 
-// One bit for each of eight bytes, the first one in the lowest: whether it is not 0, whether it is 255.
+// Eight bits, one per byte, the first byte's lowest. some_of: byte != 0; each_of: byte == 255.
 uint8_t some_of(uint64_t bytes) {
   constexpr uint64_t kLow = 0x7f7f7f7f7f7f7f7f;
   const uint64_t tops = (((bytes & kLow) + kLow) | bytes) & ~kLow;
@@ -166,7 +166,7 @@ uint8_t some_of(uint64_t bytes) {
 }
 uint8_t each_of(uint64_t bytes) { return static_cast<uint8_t>(~some_of(~bytes)); }
 
-// The bits of `count` nodes from `first` on, a multiple of 8, or of the one at the top, from their children's bytes.
+// Computes the bits of `count` nodes (a multiple of 8, or the root alone) from `first` on, from their children's.
 template <class Bits>
 void fold(const std::vector<uint8_t>& children, std::vector<uint8_t>& level, size_t first, size_t count, Bits bits) {
   if (count == 1) {

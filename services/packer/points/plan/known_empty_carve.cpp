@@ -1,4 +1,4 @@
-// KnownEmpty::carve: down the octree, to cells only where what was seen and what was not meet.
+// KnownEmpty::carve: descends the octree, down to cells only where seen and unseen space meet.
 #include <tbb/task_arena.h>
 
 #include <cstring>
@@ -13,13 +13,13 @@ namespace telesplat::packer {
 namespace {
 
 constexpr int kFirstBits = 2, kFirstSide = 1 << kFirstBits;  // pixels a side of the finest squares of the pyramid
-constexpr int kMostRays = 16;  // pixels a side: through larger nodes not every ray is looked at
+constexpr int kMostRays = 16;  // pixels a side: for larger nodes single rays are not compared
 constexpr float kFarthest = std::numeric_limits<float>::infinity();
 
-// Depths of some pixels: the least one, the greatest one of new rays.
+// Depths of some pixels: the least of all rays, and the greatest of new rays.
 struct Range {
   float lo = kFarthest, hi = 0;
-  void add(float v) {  // not a number counts as 0
+  void add(float v) {  // NaN counts as 0
     const float depth = std::abs(v);
     lo = std::min(lo, depth > 0 ? depth : 0.0f);
     hi = std::max(hi, v > 0 ? v : 0.0f);
@@ -27,7 +27,7 @@ struct Range {
   void add(const Range& r) { lo = std::min(lo, r.lo), hi = std::max(hi, r.hi); }
 };
 
-// The last ones are included.
+// Last column and row included.
 struct PixelRect {
   int x0, y0, x1, y1;
 };
@@ -55,13 +55,13 @@ class DepthRanges {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// Whether the pixel that a point (homogeneous pixels) lies in is clear farther than it; false outside the image.
+  /// True if the pixel that holds the point (homogeneous pixels) is clear beyond it; false outside the image.
   bool behind(const glm::vec3& point) const {
     const float inverse = 1 / point.z, x = point.x * inverse, y = point.y * inverse;
     if (!(x >= 0 && x < static_cast<float>(width_) && y >= 0 && y < static_cast<float>(height_))) return false;
     return std::abs(depth_m_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)]) > point.z;
   }
-  /// Whether all of these pixels are clear farther than that.
+  /// True if all of these pixels are clear beyond depth_m.
   bool all_behind(float depth_m, const PixelRect& r) const {
     for (int y = r.y0; y <= r.y1; ++y) {
       const float* row = depth_m_.data() + static_cast<size_t>(y) * width_;
@@ -71,7 +71,7 @@ class DepthRanges {
     return true;
   }
   static int longest(const PixelRect& r) { return std::max(r.x1 - r.x0, r.y1 - r.y0) + 1; }
-  /// Of these pixels, and of some around them where this is not exact.
+  /// Returns the range of these pixels; for large rectangles it includes some around.
   Range of(const PixelRect& r) const {
     const auto [x0, y0, x1, y1] = r;
     Range out;
@@ -131,7 +131,7 @@ class EmptyCarver {
                             to_pixel(view.right, clear_.width() - 1), to_pixel(view.bottom, clear_.height() - 1)};
     const bool whole = view.left >= 0 && view.right <= width && view.top >= 0 && view.bottom <= height;
     // A short block or cell at the image's border is judged by its part inside. A long one, as near the eye, is not:
-    // its part beyond the image was not seen.
+    // the view did not see its part beyond the image.
     const bool decides =
         whole || view.small() || (level >= KnownEmpty::kBlockLevel && view.length() <= KnownEmpty::kFewPixels);
     if (level == KnownEmpty::kCellLevel) {
@@ -139,7 +139,7 @@ class EmptyCarver {
       return;
     }
     const Range range = clear_.of(touched);
-    if (!(range.hi > view.nearest_m)) return;  // no new ray came as far
+    if (!(range.hi > view.nearest_m)) return;  // no new ray reached it
     if (decides && (range.lo > view.farthest_m || passed(view, touched)))
       see(level, node);
     else if (!view.small())
@@ -154,7 +154,7 @@ class EmptyCarver {
   }
 
  private:
-  // Of a small node: whether all rays through it, or if there are none the one nearest its middle, go on behind it.
+  // True if all rays through a small node go on behind it; without such rays, the one nearest its middle decides.
   bool passed(const NodeView& view, const PixelRect& touched) const {
     if (DepthRanges::longest(touched) > kMostRays) return clear_.of(touched).lo > view.farthest_m;
     PixelRect rays{to_pixel(view.left + 0.5f, clear_.width()), to_pixel(view.top + 0.5f, clear_.height()),
@@ -165,7 +165,7 @@ class EmptyCarver {
     return clear_.all_behind(view.farthest_m, rays);
   }
 
-  // Nodes that different threads visit have cells in different bytes.
+  // Threads visit different nodes, whose cells lie in different bytes.
   void see(int level, uint32_t node) const {
     auto& cells = space_.any_[KnownEmpty::kCellLevel];
     if (level == KnownEmpty::kCellLevel) {

@@ -1,4 +1,4 @@
-// KnownEmpty::project: tile by tile, down the octree, only where pixels are left that a node could still set.
+// KnownEmpty::project: for each tile, descends the octree only where a node can still set pixels.
 #include <tbb/task_arena.h>
 
 #include <array>
@@ -16,16 +16,16 @@ namespace {
 constexpr int kTile = 256;                                  // pixels a side: 256 KiB of depths; a multiple of 64
 constexpr int kSquareBits = 3, kSquare = 1 << kSquareBits;  // pixels a side of the finest squares of a tile's pyramid
 constexpr int kTileLevels = 6;                              // squares of 8, 16, ..., 256 pixels
-constexpr float kSet = -1;                                  // instead of the depth of a pixel that is set
+constexpr float kSet = -1;                                  // replaces the depth of a pixel that is set
 
-constexpr int kSmall = 6;  // pixels: of nodes up to this long, the rectangle around stands for the node
+constexpr int kSmall = 6;  // pixels: up to this size, a node's bounding rectangle stands for the node
 
 struct Span {
   int first = 0, last = -1;
 };
 
-// The depths of a tile's pixels that are not set yet, and the greatest one of each square. Positions are pixels within
-// the tile.
+// Depths of a tile's pixels that are not set yet, and the greatest one of each square. Positions are pixels within the
+// tile.
 class TileDepths {
  public:
   TileDepths(const geometry::Camera& camera, std::span<const float> shown_m, const geometry::Rect& rect)
@@ -43,7 +43,7 @@ class TileDepths {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// Whether any pixel that is not set, of these and, if they are many, some around, shows something behind depth_m.
+  /// True if an unset pixel here shows a surface behind depth_m. Large rectangles include some pixels around.
   bool any_behind(float depth_m, int x0, int y0, int x1, int y1) const {
     const int longest = std::max(x1 - x0, y1 - y0) + 1;
     int level = 0;
@@ -55,7 +55,7 @@ class TileDepths {
           return longest > kSquare || any_pixel_behind(depth_m, x0, y0, x1, y1);
     return false;
   }
-  /// Sets those of the pixels first..last of a row that show something behind depth_m.
+  /// Sets those pixels of a row, first to last, that show a surface behind depth_m. True if it set any.
   bool set(int y, Span span, float depth_m) {
     float* row = depth_.data() + static_cast<size_t>(y) * kTile;
     bool any = false;
@@ -67,7 +67,7 @@ class TileDepths {
     any_set_ |= any;
     return any;
   }
-  /// After set() in this rectangle.
+  /// Updates the squares of this rectangle after set().
   void refresh(int x0, int y0, int x1, int y1) {
     for (int y = y0 / kSquare; y <= y1 / kSquare; ++y)
       for (int x = x0 / kSquare; x <= x1 / kSquare; ++x)
@@ -121,7 +121,7 @@ class TileDepths {
   std::array<std::vector<float>, kTileLevels> greatest_;
 };
 
-// The rows of the convex hull of a node's corners, within a tile: pixels that it touches.
+// Rows of pixels, within a tile, that the convex hull of a node's corners touches.
 class HullRows {
  public:
   HullRows(const NodeCorners& corners, int width, int height) : width_(width) {
@@ -134,7 +134,7 @@ class HullRows {
         if (!(from & bit)) add_edge(corners, static_cast<size_t>(from), static_cast<size_t>(from | bit));
   }
   int first() const { return first_; }
-  int last() const { return last_; }  ///< before first(): there is none
+  int last() const { return last_; }  ///< before first(): no row
   Span row(int y) const { return rows_[static_cast<size_t>(y)]; }
 
  private:
@@ -150,7 +150,7 @@ class HullRows {
         to = x0 + (std::min(y1, static_cast<float>(y + 1)) - y0) * slope;
       }
       if (from > to) std::swap(from, to);
-      // What lies outside counts too: the hull's other side may lie inside or beyond.
+      // Parts beyond the left or right border count, too: the hull's other side may lie inside or beyond.
       Span& row = rows_[static_cast<size_t>(y)];
       if (from < static_cast<float>(width_)) row.first = std::min(row.first, to_pixel(from, width_ - 1));
       if (to >= 0) row.last = std::max(row.last, to_pixel(to, width_ - 1));
@@ -181,7 +181,7 @@ class EmptyProjector {
               y0 = to_pixel(view.top, height - 1), y1 = to_pixel(view.bottom, height - 1);
     if (!depths_.any_behind(view.nearest_m, x0, y0, x1, y1)) return;
     const auto l = static_cast<size_t>(level);
-    // What the near plane cuts off is too thin to matter.
+    // A part cut off by the near plane is too thin to matter.
     if (!view.crosses_near && (space_.all_[l][node >> 3] >> (node & 7) & 1)) fill(level, corner, view.farthest_m);
     if (level == KnownEmpty::kBlockLevel || view.small()) return;
     const uint8_t children = space_.hides_[l + 1][node];
@@ -191,14 +191,14 @@ class EmptyProjector {
   }
 
  private:
-  // From the frame's pixels to the tile's.
+  // Converts from the frame's pixels to the tile's.
   void move(NodeView& view) const {
     const auto dx = static_cast<float>(rect_.x), dy = static_cast<float>(rect_.y);
     view.left -= dx, view.right -= dx, view.top -= dy, view.bottom -= dy;
   }
 
-  // Rays that pass no more than the outer quarter of a block do not count: beside an edge of what is shown there are
-  // always blocks that some rays pass and others do not reach.
+  // Rays that pass only the outer quarter of a block do not count: beside each edge of a shown surface there are blocks
+  // that some rays pass and others do not reach.
   void fill(int level, const glm::vec3& corner, float farthest_m) {
     NodeView inside = projection_.look_inside(level, corner);
     move(inside);

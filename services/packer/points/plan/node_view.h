@@ -1,4 +1,4 @@
-// How the nodes of an octree lie in a view: for known_empty_carve.cpp and known_empty_project.cpp.
+// Projects the nodes of an octree into a view: for known_empty_carve.cpp and known_empty_project.cpp.
 #pragma once
 
 #include <algorithm>
@@ -12,23 +12,23 @@
 
 namespace telesplat::packer {
 
-/// What bounds a cube's projection. Of a cube that reaches before the near plane: the part behind the plane.
+/// Bounds of a cube's projection. If a cube reaches before the near plane: bounds of the part behind the plane.
 struct NodeView {
   float left = 0, right = 0, top = 0, bottom = 0;  ///< pixels
   float nearest_m = 0, farthest_m = 0;
-  bool crosses_near = false, behind = false;  ///< behind: all of it is before the near plane, so that nobody sees it
+  bool crosses_near = false, behind = false;  ///< behind: it lies wholly before the near plane, invisible
 
-  /// About half a pixel: its parts are not looked at one by one.
+  /// True if about half a pixel large: its children are not visited.
   bool small() const { return length() <= 0.6f; }
   float length() const { return std::max(right - left, bottom - top); }
 };
 
-/// A cube's corners, in pixels. Two differ in one bit of their number if an edge joins them.
+/// A cube's corners, in pixels. Numbers of corners that an edge joins differ in one bit.
 struct NodeCorners {
   std::array<float, 8> x, y;
 };
 
-/// A pixel position as a number in [0, limit]; not a number gives 0.
+/// Returns a pixel position as an integer in [0, limit]; NaN gives 0.
 inline int to_pixel(float v, int limit) {
   if (!(v > 0)) return 0;
   return v < static_cast<float>(limit) ? static_cast<int>(v) : limit;
@@ -59,7 +59,7 @@ class NodeProjection {
     }
   }
 
-  /// False: the camera is too far away or too long for floats.
+  /// False: the camera is too far away, or its focal length too great, for floats.
   bool usable() const {
     const auto sane = [](const glm::vec3& v) {
       return std::abs(v.x) < 1e12f && std::abs(v.y) < 1e12f && std::abs(v.z) < 1e12f;
@@ -68,19 +68,19 @@ class NodeProjection {
   }
   /// Lower corner of the whole cube, homogeneous pixels (x w, y w, w).
   const glm::vec3& root() const { return root_; }
-  /// The same of a node's child: bit 0 of `child` says x, bit 1 y, bit 2 z.
+  /// Returns the corner of a node's child: bit 0 of `child` stands for x, bit 1 for y, bit 2 for z.
   glm::vec3 child(const glm::vec3& corner, int child_level, int child) const {
     return add(corner, levels_[static_cast<size_t>(child_level)].edges, child);
   }
-  /// Of a node's middle, homogeneous pixels.
+  /// Returns a node's middle, homogeneous pixels.
   glm::vec3 middle(int level, const glm::vec3& corner) const {
     return corner + levels_[static_cast<size_t>(level)].middle;
   }
   NodeView look(int level, const glm::vec3& corner) const {
     return look(corner + levels_[static_cast<size_t>(level)].middle, levels_[static_cast<size_t>(level)]);
   }
-  /// Of what is left of a node without a quarter of a node of level kLast on each side. Precondition: the node does not
-  /// cross the near plane.
+  /// Returns the view of a node without a quarter of a node of level kLast on each side. Precondition: the node does
+  /// not cross the near plane.
   NodeView look_inside(int level, const glm::vec3& corner) const {
     return look(corner + levels_[static_cast<size_t>(level)].middle, inner_[static_cast<size_t>(level)]);
   }
@@ -110,7 +110,7 @@ class NodeProjection {
   std::array<Level, kLevels> levels_, inner_;
 };
 
-// A corner is off the middle, in homogeneous pixels, by d; in pixels by (d.x - x d.w) / (w + d.w), where x is the
+// In homogeneous pixels a corner differs from the middle by d; in pixels by (d.x - x d.w) / (w + d.w), where x is the
 // middle's position.
 inline NodeView NodeProjection::look(const glm::vec3& middle, const Level& level) const {
   NodeView out;
@@ -131,7 +131,7 @@ inline NodeView NodeProjection::look(const glm::vec3& middle, const Level& level
   return out;
 }
 
-// Bounds of x / w for x and w in intervals of their own.
+// Bounds x / w for x and w in separate intervals.
 inline void NodeProjection::look_through(const glm::vec3& middle, const glm::vec3& reach, NodeView& out) const {
   out.crosses_near = true;
   out.behind = out.farthest_m <= near_m_;
