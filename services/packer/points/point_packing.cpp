@@ -12,7 +12,7 @@
 namespace telesplat::packer {
 namespace {
 
-// Viewers tell once a second what they drew: what is forgotten sooner may be on display.
+// Viewers report once a second what they drew: a point forgotten sooner may be on display.
 constexpr double kLeastObsolete_s = 3;
 
 Config config_of(const wire::Welcome& session, const PointPacking::Options& options) {
@@ -39,7 +39,7 @@ PlanConfig plan_config_of(const wire::SessionSettings& settings, const Config& p
           .threads = packing.threads};
 }
 
-// The block that a leased tile belongs to.
+// Returns the label of the block that a leased tile belongs to.
 FramePart block_of(const wire::Lease& l) {
   return {.frame = l.frame,
           .epoch = l.epoch,
@@ -74,16 +74,16 @@ metrics::SpanOf of(const wire::TileDone& tile) {
   return {double(tile.frame.value), double(tile.tile), double(tile.request.value)};
 }
 
-// About as many bytes as the event has as a message.
+// Returns about the event's size as a message, bytes.
 uint64_t size_on_wire(const Event& e) {
-  constexpr uint64_t kRest = 320;  // camera, moments, numbers, names: BriefMessages of the tests of wire holds it below
+  constexpr uint64_t kRest = 320;  // camera, moments, numbers, names; tests/unit/wire (BriefMessages) guards it
   return kRest + (e.blob ? e.blob->size() : 0) + 4 * (e.missed.size() + e.clusters.size() + e.frames.size());
 }
 
-// Whose moments tell how an update came about (metrics/stages.h): who is sent other patches has no use for them.
+// True if viewers use the event's moments, to show how an update came about (metrics/stages.h).
 bool completes_update(const Event& e) { return e.frame_complete && !e.extra && e.step <= 1; }
 
-// The event as messages: calls send(message).
+// Converts the event to messages: calls send(message) for each.
 void with_message(InstanceId packer, const Event& e, const wire::Moments& moments, auto&& send) {
   switch (e.kind) {
     case Event::Kind::kPatch:
@@ -122,7 +122,7 @@ void with_message(InstanceId packer, const Event& e, const wire::Moments& moment
 
 bool PointPacking::follow(const wire::Welcome& session, double now_s) {
   if (scene::SessionView(session).pipeline() != scene::Pipeline::kPoints) return false;
-  if (session.box_room.empty()) return true;  // no data server said yet what there is
+  if (session.box_room.empty()) return true;  // no data server has reported its scene yet
   const Config config = config_of(session, options_);
   if (const Status valid = points::validate(config.model); !valid) {
     log::error("the master's session cannot be packed: {}", valid.error().text);
@@ -135,7 +135,7 @@ bool PointPacking::follow(const wire::Welcome& session, double now_s) {
 
 // The model's box comes with the data server; another box means another model.
 void PointPacking::begin(const Config& config, const wire::Welcome& session) {
-  // Another master counts frames from 1 again, so it says nothing which tiles of the old one's frames came. Where
+  // Another master counts frames from 1 again: the tiles of the old master's frames no longer count as packed. Where
   // patches are told apart by their frames, the model starts anew, too.
   const bool another_master = core_ && master_ != session.master;
   master_ = session.master;
@@ -164,7 +164,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   begin_planner(plan_config_of(settings, config));
 }
 
-// Another configuration means another planner, which knows what the model knows.
+// Another configuration means another planner; it learns the model anew.
 void PointPacking::begin_planner(const PlanConfig& config) {
   if (core_->redundancy() == Redundancy::kKeep) return core_->watch(nullptr), planner_.reset();
   if (planner_ && plan_config_ == config) return;
@@ -180,13 +180,13 @@ void PointPacking::take_sampled(net::Socket& from, const net::Message& message, 
   });
 }
 
-// since_s: when it came.
+// since_s: time when the message came.
 void PointPacking::pack(const Received& received, double since_s, double now_s) {
   const auto& [from, message, m] = received;
   const wire::Lease& lease = m.lease;
   if (!core_) return;
-  // The announcement of its epoch, or of its master, comes on another socket and may be about to. A tile that an
-  // earlier master leased waits in vain: what it is of, this one may have numbered the same.
+  // The announcement of its epoch, or of its master, comes on another socket and may follow. A tile that an earlier
+  // master leased waits in vain: this master may use its frame number for another frame.
   if (lease.master != master_ || lease.epoch > core_->epoch())
     return ahead_.add(received, message.body.size(), since_s, message.user);
   if (!wire::is_sealed(lease, m.sampler, lease_key_)) {
@@ -196,7 +196,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   if (lease.epoch != core_->epoch()) return void(++other_epoch_);
   const double begin_s = outlets_.master_now();
   wire::TileDone done = done_of(m, outlets_.to_master_s(received.message.arrived_s), outlets_.to_master_s(since_s));
-  // A tile that is here already is done. The master may not know; if it does, it takes no notice.
+  // A tile that came before is done. The master may not know; if it does, it ignores the message.
   if (core_->has(lease.frame, uint32_t(lease.block))) {
     ++duplicates_;
     return tell_taken(done);
@@ -231,9 +231,9 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   if (!block.extra) heads_.seen(block.viewer, block.camera.pose, now_s);
   if (planner_) planner_->take(block, whole, now_s), block.missed = planner_->missed(block);
   const auto reference = planner_ ? planner_->reference(block) : std::nullopt;
-  // What a block gives is counted to the tile that completed it.
+  // The counts of a block go to the tile that completed it.
   const auto announce = [&](const Event& event) {
-    // Taken before it is sent: a viewer may have it in its replica before the send returns.
+    // The moment is taken before sending: a viewer may have the event in its replica before the send returns.
     done.moments.packed_s = outlets_.master_now();
     if (event.is_told()) {
       done.moments.published_s = done.moments.packed_s;
@@ -319,7 +319,7 @@ void PointPacking::tell_taken(wire::TileDone& done) {
   outlets_.tell(done);
 }
 
-// Whole views only, as sampled.
+// Records whole views, as sampled.
 void PointPacking::record(const SampledTile& block) {
   if (!options_.recorder || block.step != 1) return;
   const Status s = options_.recorder->add(block.frame, block.camera, block.rect, block.tiles_in_frame, block.image);
@@ -349,10 +349,10 @@ void PointPacking::answer(const wire::StateRequest& request, const net::Message&
   const bool known = after <= core_->sequence() && core_->remembers(after);
   const bool follows = request.packer == instance_ || request.packer.value == 0;
   if (known && answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
-  if (!beginnings_.admit(peer, now_s)) return;  // it takes a look at all events; whoever it is asks again
+  if (!beginnings_.admit(peer, now_s)) return;  // an answer searches all events; the viewer asks again
   if (answers_.is_full(peer)) return;           // likewise
   if (!known) {
-    // A mark of a packer that the viewer does not know: it then asks for everything.
+    // A mark with an unknown packer id makes the viewer ask for all events.
     answers_.drop(peer);
     outlets_.send(wire::StateMark{.packer = net::make_instance_id(), .epoch = core_->epoch()}, peer);
     if (told_of_viewers_.allow(now_s)) log::info("a viewer that stopped after {} starts anew", after.value);
@@ -370,7 +370,7 @@ void PointPacking::answer(const wire::StateRequest& request, const net::Message&
   send_answers();
 }
 
-// A mark that says less than was sent would leave a viewer with a wrong replica: who misses an event gets none.
+// After a failed send no mark goes out: it would cover events that the viewer lacks, and leave its replica wrong.
 void PointPacking::send_answers() {
   answers_.pump([&](EventLog::Replay& left) { return core_->next(left); },
                 [&](const std::string& peer, const Event& event) {
@@ -413,14 +413,14 @@ wire::StateMark PointPacking::mark(bool answer) const {
 
 uint64_t PointPacking::due_digest(double now_s) {
   if (now_s < next_digest_s_) return 0;
-  const double begin_s = thread_cpu_s();  // what others do meanwhile is not its time
+  const double begin_s = thread_cpu_s();  // time of other threads does not count
   const uint64_t digest = core_->model().digest();
   next_digest_s_ = now_s + std::max(kDigestPeriod_s, (thread_cpu_s() - begin_s) / kDigestShare);
   digests_told_ += digest != 0;
   return digest;
 }
 
-// Messages wait meanwhile, so it may take a quarter of the time at most, unless it saves more than it takes.
+// Messages wait meanwhile, so settling takes at most a quarter of the time, unless it saves more than it takes.
 bool PointPacking::idle(double now_s) {
   constexpr double kPause = 3;
   if (!planner_ || (now_s < next_settle_s_ && !planner_->settles_soon())) return false;

@@ -1,5 +1,5 @@
-// Brings viewers up to date piece by piece: what a viewer lacks goes out as fast as its receipts come, so that neither
-// memory nor the packer's time is spent on one that joins while others wait. No sockets, no clocks.
+// Brings viewers up to date in pieces: missing events go out as fast as the viewer's receipts come, so that a joining
+// viewer takes neither memory nor the packer's time from others. No sockets, no clocks.
 #pragma once
 
 #include <algorithm>
@@ -15,28 +15,28 @@
 
 namespace telesplat::packer {
 
-/// Answers to state requests, one a connection.
+/// Answers to state requests, one per connection.
 class StateAnswers {
  public:
   struct Limits {
-    uint64_t window_bytes = 8u << 20;   ///< sent to a viewer and not received, about
-    uint64_t bytes_in_all = 64u << 20;  ///< the same of all: each person has a part of it, and of that each connection
-    uint64_t bytes_at_once = 1u << 20;  ///< to all, in one turn
-    size_t viewers = 256;               ///< beyond, the one that was begun first is dropped: it asks again
+    uint64_t window_bytes = 8u << 20;   ///< sent to a viewer and not yet received, about
+    uint64_t bytes_in_all = 64u << 20;  ///< in all: shared among payers, then connections
+    uint64_t bytes_at_once = 1u << 20;  ///< to all viewers, in one turn
+    size_t viewers = 256;               ///< beyond, the answer begun first is dropped: its viewer asks again
   };
   struct Answer {
     InstanceId viewer;
-    std::string payer;  ///< net::payer(), who asks
+    std::string payer;  ///< net::payer() of the viewer
     EventLog::Replay left;
-    wire::StateMark mark;  ///< at the end
-    uint64_t events = 0;   ///< sent
+    wire::StateMark mark;  ///< sent at the end
+    uint64_t events = 0;   ///< number of events sent
   };
 
   StateAnswers() = default;
   explicit StateAnswers(const Limits& limits) : limits_(limits) {}
 
-  /// A viewer asks over this connection for what follows `after`. follows: it has what was sent so far, if it has
-  /// received it; false: it begins anew. True: it is being answered already; what it lacks is under way or will be.
+  /// A viewer asks over this connection for the events after `after`. follows: it has the events sent so far, up to its
+  /// last receipt; false: it begins anew. True: it is being answered already; missing events are under way or follow.
   bool goes_on(const std::string& peer, InstanceId viewer, Sequence after, bool follows) {
     for (auto& [other, entry] : answers_)
       if (entry.answer.viewer == viewer && other != peer) entry.stop();
@@ -49,7 +49,7 @@ class StateAnswers {
     found->stop();
     return false;
   }
-  /// As much waits for this connection as may: another answer to it is not begun.
+  /// True if the connection's queue has reached its limit: another answer to it is not begun.
   bool is_full(const std::string& peer) const {
     const auto found = answers_.find(peer);
     return found != answers_.end() && found->second.waiting > 0 && found->second.waiting >= found->second.window;
@@ -62,7 +62,7 @@ class StateAnswers {
     Entry& entry = answers_[peer];
     entry = {.answer = std::move(answer), .received = after, .number = ++begun_, .waiting = entry.waiting};
   }
-  /// Whoever is at this connection has applied everything up to `newest`.
+  /// The viewer at this connection has applied all events up to `newest`.
   void received(const std::string& peer, Sequence newest) {
     Entry* const a = find(peer);
     if (!a) return;
@@ -71,7 +71,7 @@ class StateAnswers {
       a->bytes -= a->under_way.front().second;
     if (a->all_sent && a->under_way.empty()) a->stop();
   }
-  /// What was left for this connection is not sent.
+  /// Drops the rest of the answer to this connection.
   void drop(const std::string& peer) {
     if (Entry* const a = find(peer)) a->stop();
   }
@@ -79,9 +79,9 @@ class StateAnswers {
     for (auto& [peer, a] : answers_) a.stop();
   }
 
-  /// Sends some of what is left, in turn. next(Replay&): its next event, if there is one. send(peer, Event) and
-  /// end(peer, Answer), after the last event: false if it could not be sent; who could not be sent to asks again.
-  /// bytes_of(Event): on the wire. waiting(peer): bytes that wait to be sent to it, also of answers that were stopped.
+  /// Sends some of the remaining events, connection by connection. next(Replay&): its next event, or nullopt.
+  /// send(peer, Event), and end(peer, Answer) after the last event: false if sending failed; that viewer asks again.
+  /// bytes_of(Event): its size on the wire. waiting(peer): bytes in its queue, also from stopped answers.
   template <class Next, class Send, class End, class BytesOf, class Waiting>
   void pump(const Next& next, const Send& send, const End& end, const BytesOf& bytes_of, const Waiting& waiting) {
     share_out(waiting);
@@ -105,7 +105,7 @@ class StateAnswers {
       if (!there || (a.all_sent && a.under_way.empty())) a.stop();
     }
   }
-  /// pump() would send something.
+  /// True if pump() would send an event.
   bool can_go_on() const {
     return std::any_of(answers_.begin(), answers_.end(), [this](const auto& a) { return may_send(a.second); });
   }
@@ -113,7 +113,7 @@ class StateAnswers {
   size_t size() const {
     return size_t(std::ranges::count_if(answers_, [](const auto& a) { return !a.second.stopped; }));
   }
-  /// Of all viewers.
+  /// Sum over all viewers.
   uint64_t bytes_under_way() const {
     uint64_t out = 0;
     for (const auto& [peer, a] : answers_) out += a.held();
@@ -121,18 +121,18 @@ class StateAnswers {
   }
 
  private:
-  // What a message takes in queues, beside its bytes.
+  // Memory that a message takes in queues beside its bytes.
   static constexpr uint64_t kMessageBytes = 2048;
   struct Entry {
     Answer answer;
-    Sequence received;  // the newest that it is known to have
+    Sequence received;  // newest event that the viewer is known to have
     std::deque<std::pair<Sequence, uint64_t>> under_way{};
-    uint64_t bytes = 0;  // of these
+    uint64_t bytes = 0;  // sum over `under_way`
     bool all_sent = false;
-    uint64_t number = 0;   // in the order in which they were begun
-    uint64_t waiting = 0;  // bytes for this connection, as the last pump() left it, whatever its receipts say
-    uint64_t window = 0;   // for `held`; as of the last pump()
-    bool stopped = false;  // nothing is left of it but what waits
+    uint64_t number = 0;   // order of beginning
+    uint64_t waiting = 0;  // bytes in the connection's queue at the last pump(), independent of receipts
+    uint64_t window = 0;   // limit for held(), set by the last pump()
+    bool stopped = false;  // nothing is left of the answer but queued bytes
 
     uint64_t held() const { return std::max(bytes, waiting); }
     void stop() {
@@ -144,10 +144,10 @@ class StateAnswers {
     const auto found = answers_.find(peer);
     return found == answers_.end() || found->second.stopped ? nullptr : &found->second;
   }
-  // A person's many connections, and what waits for those that read nothing, leave the others their parts.
+  // Divides the window, so that a payer with many connections, or queues that are not read, leave others their shares.
   template <class Waiting>
   void share_out(const Waiting& waiting) {
-    std::map<std::string_view, uint64_t> connections;  // of each payer
+    std::map<std::string_view, uint64_t> connections;  // by payer
     for (auto at = answers_.begin(); at != answers_.end();) {
       Entry& a = at->second;
       a.waiting = waiting(at->first);
@@ -162,7 +162,7 @@ class StateAnswers {
           std::min(limits_.window_bytes, limits_.bytes_in_all / connections.size() / connections[a.answer.payer]);
   }
   bool may_send(const Entry& a) const { return !a.stopped && !a.all_sent && a.held() < a.window; }
-  // The next one after that which was served last.
+  // Returns the next connection after the one that was served last.
   std::map<std::string, Entry>::iterator next_turn() {
     auto at = answers_.upper_bound(turn_);
     for (size_t n = 0; n < answers_.size(); ++n, ++at) {

@@ -10,7 +10,7 @@ namespace telesplat::packer {
 
 namespace {
 
-constexpr size_t kMaxWaiting = 2 * wire::kMaxBuffers;  // frames of a viewer that wants all; the master begins no more
+constexpr size_t kMaxWaiting = 2 * wire::kMaxBuffers;  // for a viewer that wants all its frames: the master's limit
 
 bool same_frame(const wire::SliceLease& a, const wire::SliceLease& b) {
   const auto same_view = [](const wire::SliceView& x, const wire::SliceView& y) {
@@ -66,7 +66,7 @@ void SliceGatherer::drop(Frames::iterator frame) {
   open_.erase(frame);
 }
 
-// For a frame's first slab, and for its bytes.
+// Drops the oldest frames until a frame's first slab, of `bytes` bytes, fits in.
 void SliceGatherer::make_room(size_t bytes) {
   size_t held = bytes;
   for (const auto& f : open_) held += f->bytes;
@@ -98,7 +98,7 @@ bool SliceGatherer::is_here(const wire::SliceLease& lease) {
   return std::find(closed_.begin(), closed_.end(), lease.frame) != closed_.end();
 }
 
-// Contradictions to the slabs of the frame that came before.
+// Checks that a lease does not contradict the frame's earlier slabs.
 Status SliceGatherer::check_beside_others(const wire::SliceLease& lease) {
   const auto open = find_open(lease.frame);
   if (open == open_.end()) return ok_status();
@@ -209,7 +209,7 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   if (ack.damaged && sent != v.unacknowledged.end()) look_at(*std::shared_ptr(sent->frame), now_s);
   if (!begins && ack.frame.value == 0 && seems_lost(v, now_s)) begins = v.sent_again = true;
   if (begins) {
-    // What was under way on a connection that broke is lost.
+    // Frames under way on a broken connection are lost.
     v.waiting.insert(v.waiting.begin(), v.unacknowledged.begin(), v.unacknowledged.end());
     v.unacknowledged.clear();
     v.pace.lost();
@@ -228,7 +228,7 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   return ok_status();
 }
 
-// Every slab is decoded: the viewer may have said anything.
+// Decodes every slab: the viewer's report may be false.
 void SliceGatherer::look_at(Frame& frame, double now_s) {
   if (frame.looked_at || !looks_.take(now_s)) return;
   frame.looked_at = true;
@@ -248,7 +248,7 @@ void SliceGatherer::look_at(Frame& frame, double now_s) {
   for (auto& [id, v] : viewers_) std::erase_if(v.waiting, [&](const Waiting& w) { return w.frame.get() == &frame; });
 }
 
-// Of a viewer in order, frames may stay in its buffers for as long as it likes.
+// A viewer in order may keep frames in its buffers as long as it likes: no frame of it seems lost.
 bool SliceGatherer::seems_lost(const Viewer& v, double now_s) {
   if (v.in_order || v.sent_again || v.unacknowledged.empty()) return false;
   const double rate = v.pace.rate_bytes_s();
@@ -284,7 +284,7 @@ std::optional<double> SliceGatherer::due_s() const {
 }
 
 std::optional<SliceGatherer::Outgoing> SliceGatherer::take_outgoing(double now_s) {
-  // The viewers after the one that was served last come first.
+  // The viewer after the one served last comes first.
   auto next = viewers_.upper_bound(turn_);
   for (size_t n = 0; n < viewers_.size(); ++n, ++next) {
     if (next == viewers_.end()) next = viewers_.begin();
@@ -339,8 +339,8 @@ void SlicePace::sent(FrameId frame, uint64_t bytes, double now_s) {
   if (wished_ > 0) wish_s_ = std::max(wish_s_, now_s) + static_cast<double>(bytes) / wished_;
 }
 
-// A frame that followed another one closely took the link from the end of that one on; any other one also took a round
-// trip, so that what it tells is no more than the link carries.
+// A frame that closely followed another one took the link from the other one's end on. Any other frame also took a
+// round trip, so its rate is at most the link's.
 void SlicePace::acknowledged(FrameId frame, double now_s) {
   const auto found =
       std::find_if(under_way_.begin(), under_way_.end(), [&](const Sent& s) { return s.frame == frame; });

@@ -1,5 +1,5 @@
-// Puts the slabs of a volume's frames together and deals complete frames out to viewers, to each what its camera may
-// see (T4.5.2). No sockets, no clocks. One thread.
+// Gathers the slabs of a volume's frames and hands complete frames to viewers: each viewer gets the images that its
+// camera may see (T4.5.2). No sockets, no clocks. One thread.
 #pragma once
 
 #include <algorithm>
@@ -20,36 +20,36 @@
 
 namespace telesplat::packer {
 
-// When the next frame may go to an asynchronous viewer, so that it does not wait behind another one on the link: from
-// how long the frames before it took to be acknowledged. No sockets, no clocks.
+// Times an asynchronous viewer's next frame so that it does not queue behind another one on the link, by the time that
+// earlier frames took to be acknowledged. No sockets, no clocks.
 
 class SlicePace {
  public:
-  /// A link that needs less for what is under way holds up nobody: the next frame goes at once.
+  /// A link that needs less than this for the frames under way delays no viewer: the next frame goes at once.
   static constexpr double kShort_s = 0.05;
-  /// Of the time that the frames under way should need, what passes before the next one follows. Less than all of it,
-  /// so that the link is never idle, and that a rate that was taken for too low is found to be higher.
+  /// The next frame follows after this share of the time that the frames under way should need. Less than 1, so that
+  /// the link is never idle, and a rate that was estimated too low is found to be higher.
   static constexpr double kShare = 0.8;
-  static constexpr double kWindow_s = 5;  ///< for the highest rate, and the window before
-  /// Two acknowledgements that are nearer than this were read together.
+  static constexpr double kWindow_s = 5;  ///< length of a window for the highest rate; the one before counts, too
+  /// Two acknowledgements nearer than this were read together.
   static constexpr double kLeast_s = 0.002;
 
-  /// Bytes a second that are wished at most; 0: no wish.
+  /// Sets the user's limit, bytes per second; 0: no limit.
   void set_most(double bytes_s) { wished_ = bytes_s; }
 
-  /// Times never fall.
+  /// A frame goes out. Times never fall.
   void sent(FrameId frame, uint64_t bytes, double now_s);
-  /// Frames that were not sent change nothing.
+  /// A frame was acknowledged; ignored if it was not sent.
   void acknowledged(FrameId frame, double now_s);
-  /// What is under way is lost, or seems to be: it is sent again. The rate stays known; what is sent twice tells
-  /// nothing of it, for the first copy may be acknowledged.
+  /// The frames under way are lost, or seem to be: they are sent again. The rate stays known; frames sent twice do not
+  /// count for it, since the first copy may be acknowledged.
   void lost() { under_way_.clear(); }
 
-  /// The next frame may go out then; in the past: at once.
+  /// Returns when the next frame may go out; in the past: at once.
   double next_s() const { return std::max(link_free_s(), wish_s_); }
-  /// As far as the wished rate goes.
+  /// The same, by the user's limit alone.
   double wished_s() const { return wish_s_; }
-  /// What the link carried at most, in the last 5 to 10 s; 0: not known.
+  /// Highest rate of the link in the last 5 to 10 s; 0: not known.
   double rate_bytes_s() const { return std::max(most_, before_); }
 
  private:
@@ -62,88 +62,87 @@ class SlicePace {
   double link_free_s() const;
 
   std::deque<Sent> under_way_;                   // oldest first
-  FrameId newest_;                               // that was sent
-  double last_s_ = 0;                            // acknowledgement
-  double most_ = 0, before_ = 0, window_s_ = 0;  // bytes a second; in this window and the one before; its begin
-  double wished_ = 0, wish_s_ = 0;               // a link of the wished rate would be done by then
+  FrameId newest_;                               // the newest frame sent
+  double last_s_ = 0;                            // time of the last acknowledgement
+  double most_ = 0, before_ = 0, window_s_ = 0;  // bytes per second, in this and the last window; this one's begin
+  double wished_ = 0, wish_s_ = 0;               // limit; when a link of that rate would be done
 };
 
-inline constexpr size_t kMaxOpenVolumeFrames = 8;        ///< unfinished ones remembered; then the oldest is dropped
-inline constexpr size_t kMaxOpenVolumeBytes = 1u << 30;  ///< all unfinished ones together
-inline constexpr size_t kMaxClosedFrames = 256;          ///< complete ones remembered, to tell duplicates
+inline constexpr size_t kMaxOpenVolumeFrames = 8;        ///< unfinished frames held; then the oldest is dropped
+inline constexpr size_t kMaxOpenVolumeBytes = 1u << 30;  ///< all unfinished frames together
+inline constexpr size_t kMaxClosedFrames = 256;          ///< complete frames remembered, to recognise duplicates
 inline constexpr size_t kMaxSliceViewers = 256;
-/// A viewer that was sent something and acknowledges nothing for this long is forgotten.
+/// A viewer with frames under way that acknowledges none for this long is forgotten.
 inline constexpr double kViewerPatience_s = 10;
-/// A frame that is not acknowledged for so many times what its link should need, and kViewerPatience_s, seems lost. The
-/// newest frame is sent then, once.
+/// A frame seems lost if it is not acknowledged for this many times the time its link should need, and for
+/// kViewerPatience_s. Then the newest frame is sent, once.
 inline constexpr double kLostAfter = 4;
-/// Images are kept this far beyond a camera's edges, as a part of its width and height.
+/// Images are kept this far beyond a camera's edges, as a fraction of its width and height.
 inline constexpr double kViewMargin = 0.1;
 
 class SliceGatherer {
  public:
-  /// A slab as it came. data of `images` points to memory that `owner` keeps alive.
+  /// A slab as received. data of `images` points to memory that `owner` keeps alive.
   struct Slab {
     wire::SliceImages images;
     std::shared_ptr<const void> owner;
   };
-  /// A frame for a viewer. frame.data points into `bytes`; packer and moments.published_s are the service's to
-  /// fill in.
+  /// A frame for a viewer. frame.data points into `bytes`; the service fills in packer and moments.published_s.
   struct Outgoing {
-    std::string peer;  ///< of the socket on which the viewer acknowledges
+    std::string peer;  ///< address on the socket on which the viewer acknowledges
     wire::SliceFrame frame;
     std::shared_ptr<const std::vector<uint8_t>> bytes;
   };
   struct Added {
-    bool is_new = false;          ///< false: it was here already
-    bool frame_complete = false;  ///< it was the last one lacking
+    bool is_new = false;          ///< false: it is a duplicate
+    bool frame_complete = false;  ///< it was the last missing one
     uint64_t blocks = 0;          ///< coded blocks in it
   };
   struct Statistics {
     uint64_t slabs = 0;            ///< taken
-    uint64_t slabs_duplicate = 0;  ///< dropped: was here already
+    uint64_t slabs_duplicate = 0;  ///< dropped: they had come before
     uint64_t slabs_other_epoch = 0;
-    uint64_t slabs_refused = 0;  ///< dropped: contradict themselves or their frame, or cannot be decoded
+    uint64_t slabs_refused = 0;  ///< dropped: contradict themselves or their frame, or not decodable
     uint64_t frames_complete = 0;
-    uint64_t frames_dropped = 0;  ///< never completed
-    uint64_t frames_sent = 0;     ///< to viewers, each counted
-    uint64_t frames_skipped = 0;  ///< a newer one was there before the viewer was ready for them
+    uint64_t frames_dropped = 0;  ///< dropped before they were complete
+    uint64_t frames_sent = 0;     ///< counted per viewer
+    uint64_t frames_skipped = 0;  ///< replaced by a newer one before the viewer was ready for them
     uint64_t viewers_forgotten = 0;
   };
 
-  /// The volume that frames are of and the epoch that is shown. With another one unfinished frames are dropped, and
-  /// newcomers get none of the old complete ones; who waits for such a frame still gets it.
+  /// Sets the frames' volume and the shown epoch. If either changes, unfinished frames are dropped, and newcomers get
+  /// no earlier complete frame; a viewer that waits for such a frame still gets it.
   void set_scene(const volume::Grid& grid, EpochId epoch);
   bool ready() const { return grid_.has_value(); }
   EpochId epoch() const { return epoch_; }
-  /// Frames are numbered anew (another master), or are of another volume. Viewers stay known; nothing is under way to
-  /// them any more.
+  /// Frames are numbered anew (another master), or show another volume. Viewers stay known; no frame counts as under
+  /// way to them any more.
   void clear_frames();
 
-  /// Bytes a second to each viewer that are wished at most; 0: no wish.
+  /// Sets the user's limit to each viewer, bytes per second; 0: no limit.
   void set_most(double bytes_s);
 
-  /// Takes a slab; the last one that its frame lacked makes the frame ready for take_outgoing(). Error: lease or images
-  /// make no sense, or contradict the frame's other slabs; nothing has changed then. Precondition: ready().
+  /// Takes a slab; the last missing one makes its frame ready for take_outgoing(). Error: lease or images are invalid,
+  /// or contradict the frame's other slabs; nothing has changed then. Precondition: ready().
   Result<Added> add(Slab slab, double now_s);
-  /// The frame that add() has just completed is packed, at this moment of the master's clock.
+  /// Notes when the frame that add() has just completed was packed, on the master's clock.
   void packed(double master_s);
-  /// A viewer is there (frame 0), or has let a frame go. One that was there before and now speaks over another
-  /// connection gets what was under way to it once more; over the same one frame 0 is a sign of life, since nothing is
-  /// lost on it. One that comes late gets the newest complete frame, unless it wants its own in order. A frame that it
-  /// could not decode is looked at (take_refused()). Error: a number of buffers beyond its limits.
+  /// A viewer introduces itself (frame 0) or has shown a frame. A known one that speaks over another connection gets
+  /// the frames under way once more; over the same one frame 0 is a sign of life: no frame is lost there. A newcomer
+  /// gets the newest complete frame, unless it wants its own in order. The slabs of a frame that it could not decode
+  /// are checked (take_refused()). Error: a number of buffers beyond its limits.
   Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
-  /// Slabs that cannot be decoded, of frames that viewers say to be damaged: each once.
+  /// Returns slabs that cannot be decoded, from frames that viewers reported as damaged; each slab once.
   std::vector<wire::TileRefused> take_refused() { return std::exchange(refused_, {}); }
-  /// It could not be sent to.
+  /// Sending to it failed: forgets the viewers at `peer`.
   void unreachable(const std::string& peer);
   /// Forgets viewers that do not answer.
   void expire(double now_s);
-  /// The next frame to send: in order for each viewer, never more unacknowledged than it has buffers, and to an
-  /// asynchronous viewer none that would wait on its link (SlicePace): a newer one takes its place. It counts as sent.
+  /// Returns the next frame to send; it counts as sent. In order for each viewer, never more unacknowledged than it has
+  /// buffers; an asynchronous viewer gets none that would queue on its link (SlicePace), but a newer one later.
   std::optional<Outgoing> take_outgoing(double now_s);
 
-  /// When a frame that waits for a link may go out; nothing: none waits for one.
+  /// Returns when a frame that waits for a link may go out; nullopt: no frame waits for a link.
   std::optional<double> due_s() const;
 
   const Statistics& statistics() const { return statistics_; }
@@ -151,33 +150,33 @@ class SliceGatherer {
   size_t viewers() const { return viewers_.size(); }
 
  private:
-  /// All slabs of a frame, or those that have come.
+  /// The slabs of a frame that have come.
   struct Frame {
-    wire::SliceLease lease;                                 // of the first slab that came
-    std::vector<Slab> slabs;                                // by their numbers; without an owner: not here yet
-    std::vector<std::vector<volume::EncodedSlice>> slices;  // of each slab
+    wire::SliceLease lease;                                 // the first slab's
+    std::vector<Slab> slabs;                                // by number; without an owner: not come
+    std::vector<std::vector<volume::EncodedSlice>> slices;  // one list per slab
     size_t missing = 0;
     size_t bytes = 0;
-    wire::Moments moments;  // of the slab that completed it
+    wire::Moments moments;  // those of the slab that completed it
     uint64_t voxels = 0;
-    bool looked_at = false;  // whether its slabs can be decoded
+    bool looked_at = false;  // its slabs were checked to be decodable
   };
   using Frames = std::deque<std::shared_ptr<Frame>>;
   struct Waiting {
     std::shared_ptr<Frame> frame;
     wire::SliceView view;
-    bool whole = false;  // the camera is another viewer's: nothing is left out
-    double sent_s = 0;   // 0: it waits
-    size_t bytes = 0;    // that were sent
+    bool whole = false;  // the camera is another viewer's: no image is left out
+    double sent_s = 0;   // 0: not sent
+    size_t bytes = 0;    // sent bytes
   };
   struct Viewer {
-    std::string peer;  // empty: frames are made for it, but it did not introduce itself yet
+    std::string peer;  // empty: it has frames, but has not introduced itself yet
     uint64_t buffers = 1;
     bool in_order = false;
-    std::deque<Waiting> unacknowledged, waiting;  // in order of frames
-    FrameId newest;                               // that ever waited: older ones come too late
-    double heard_s = 0;                           // or when it was first sent something since
-    bool sent_again = false;                      // since it acknowledged a frame: one seemed lost
+    std::deque<Waiting> unacknowledged, waiting;  // both in order of frames
+    FrameId newest;                               // the newest frame that ever waited: older ones come too late
+    double heard_s = 0;                           // last acknowledgement, or first frame sent since
+    bool sent_again = false;                      // a frame seemed lost since the last acknowledgement
     SlicePace pace;
   };
 
@@ -185,7 +184,7 @@ class SliceGatherer {
   Status check_beside_others(const wire::SliceLease& lease);
   Frames::iterator find_open(FrameId id);
   bool is_here(const wire::SliceLease& lease);
-  /// The frame's entry among the open ones, made if `lease` is of its first slab. bytes: of the slab.
+  /// Returns the frame's entry among the open ones, made for its first slab. bytes: the slab's.
   std::shared_ptr<Frame> frame_of(const wire::SliceLease& lease, size_t bytes);
   void drop(Frames::iterator frame);
   void make_room(size_t bytes);
@@ -200,11 +199,11 @@ class SliceGatherer {
 
   std::optional<volume::Grid> grid_;
   EpochId epoch_;
-  double most_bytes_s_ = 0;  // wished
+  double most_bytes_s_ = 0;  // the user's limit
   Frames open_;              // oldest first
   std::deque<FrameId> closed_;
-  std::shared_ptr<Frame> completed_;  // the last one
-  std::shared_ptr<Frame> newest_;     // complete
+  std::shared_ptr<Frame> completed_;  // the frame completed last
+  std::shared_ptr<Frame> newest_;     // the newest complete frame
   std::map<InstanceId, Viewer> viewers_;
   InstanceId turn_;  // the viewer served last
   TokenBucket looks_{4, 4};

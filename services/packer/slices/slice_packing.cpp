@@ -15,8 +15,8 @@ bool SlicePacking::follow(const wire::Welcome& session, double now_s) {
     log::error("the master's volume cannot be packed: {}", valid.error().text);
     return true;
   }
-  // Frames are told apart by their numbers. Another master counts from 1 again: viewers must see that its frames are
-  // others.
+  // Frames are told apart by their numbers, and another master counts from 1 again: a new packer id shows viewers that
+  // its frames are others.
   if (master_ != session.master || grid_ != read->grid) {
     gatherer_.clear_frames();
     instance_ = net::make_instance_id();
@@ -54,7 +54,7 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
     return ok_status();
   }
   if (m.lease.epoch != gatherer_.epoch()) {
-    (void)gatherer_.add({m, message.owner}, now_s);  // which counts it
+    (void)gatherer_.add({m, message.owner}, now_s);  // add() counts it
     return ok_status();
   }
   if (!wire::is_sealed(m.lease, m.sampler, lease_key_)) {
@@ -82,12 +82,11 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
                       .kept = added->blocks * volume::kSliceBlock * volume::kSliceBlock,
                       .bytes_sampled = m.data.size(),
                       .moments = moments};
-  // What a frame gives is counted to the slab that completed it. A slab that is here already is done: the master may
-  // not know.
+  // The figures of a frame go to the slab that completed it. A slab that came before is done: the master may not know.
   if (added->frame_complete) {
     gatherer_.packed(outlets_.master_now());
     send_out(now_s, &done.moments.published_s);
-    // What went out later, when its viewer was ready, is counted to the next frame.
+    // Frames that go out later, when their viewer is ready, count for the next frame.
     done.bytes_sent = bytes_sent_ - bytes_told_;
     bytes_told_ = bytes_sent_;
     spans_.add("pack", receive_s, outlets_.master_now(), 0, {.frame = double(done.frame.value)});
@@ -100,7 +99,7 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
 void SlicePacking::send_out(double now_s, double* first_s) {
   while (auto out = gatherer_.take_outgoing(now_s)) {
     out->frame.packer = instance_;
-    // Taken before it is sent: a viewer may have it before the send returns.
+    // The moment is taken before sending: a viewer may have the frame before the send returns.
     out->frame.moments.published_s = outlets_.master_now();
     if (first_s && *first_s == 0) *first_s = out->frame.moments.published_s;
     if (!outlets_.send(out->frame, out->peer)) {
@@ -121,7 +120,7 @@ Status SlicePacking::acknowledged(const std::string& peer, const wire::SliceAck&
 
 void SlicePacking::tick(double now_s) {
   gatherer_.expire(now_s);
-  send_out(now_s);  // what was kept back while a link was busy
+  send_out(now_s);  // frames that were held back while a link was busy
   ahead_.expire(now_s);
 }
 

@@ -21,20 +21,20 @@ class SlicePacking final : public Packing {
   std::optional<double> due_s() const override { return gatherer_.due_s(); }
   void add_status(net::MasterLink::Values& values) const override;
 
-  /// As take_sampled(): slabs of an epoch that is not announced yet wait for it. Error: what makes no sense.
+  /// As take_sampled(): slabs of an epoch that is not announced yet wait for it. Error: the slab is not valid.
   Status receive(const net::Message& message, const wire::SliceImages& images, double now_s);
-  /// As take_state().
+  /// Takes a viewer's acknowledgement, as take_state() does.
   Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
 
  private:
   struct Received {
     net::Message message;
-    wire::SliceImages images;  // its data lie in the message
+    wire::SliceImages images;  // its data lie in `message`
   };
   bool is_ahead(const wire::SliceImages& images) const {
     return !gatherer_.ready() || images.lease.master != master_ || images.lease.epoch > gatherer_.epoch();
   }
-  /// first_s: when the first was sent, on the master's clock; stays as it is if nobody takes one now.
+  /// first_s: receives the time when the first frame was sent, on the master's clock; unchanged if none was sent.
   void send_out(double now_s, double* first_s = nullptr);
 
   Outlets outlets_;
@@ -44,9 +44,9 @@ class SlicePacking final : public Packing {
   EpochHold<Received> ahead_{{.items = 64, .bytes = 256u << 20}};
   InstanceId instance_ = net::make_instance_id(), master_;
   std::optional<volume::Grid> grid_;
-  std::vector<uint32_t> lease_key_;  // of the master
+  std::vector<uint32_t> lease_key_;  // the master's
   uint64_t bytes_received_ = 0, bytes_sent_ = 0, bytes_told_ = 0,
-           unsealed_ = 0;  // told: of those sent, the master knows
+           unsealed_ = 0;  // bytes_told_: those of bytes_sent_ that were reported to the master
 };
 
 }  // namespace telesplat::packer

@@ -14,7 +14,7 @@ namespace telesplat::packer {
 
 namespace {
 
-// 64 pixels of a row from x on; those beyond the row's words are zero.
+// Returns 64 pixels of a row from x on; those beyond the row's words are zero.
 uint64_t bits_at(const uint64_t* row, size_t words, int x) {
   const auto word = static_cast<size_t>(x) >> 6;
   const int shift = x & 63;
@@ -24,7 +24,7 @@ uint64_t bits_at(const uint64_t* row, size_t words, int x) {
 
 uint64_t first_bits(int n) { return n >= 64 ? ~uint64_t{0} : (uint64_t{1} << n) - 1; }
 
-// How many rays a rectangle has, and their box.
+// Number of rays in a rectangle, and their box.
 struct Content {
   uint64_t rays = 0;
   geometry::Rect box;
@@ -49,12 +49,12 @@ Content content_of(const image::PixelMask& mask, const geometry::Rect& r) {
   return out;
 }
 
-// Where to cut a box that is wider than high: so that about `share` of its rays lie on the left. At a word of the
-// mask, where there is one.
+// Returns where to cut a box that is wider than high, so that about `share` of its rays lie on the left: between two
+// words of the mask, if possible.
 int cut_across(const image::PixelMask& mask, const geometry::Rect& box, double share, uint64_t rays) {
   const int first = box.x / 64 + 1, last = (box.x + box.width - 1) / 64;
   if (first > last) return box.x + box.width / 2;
-  std::vector<uint64_t> before(static_cast<size_t>(last - first + 1));  // rays of the word before each place
+  std::vector<uint64_t> before(static_cast<size_t>(last - first + 1));  // rays in the word before each possible cut
   for (int y = box.y; y < box.y + box.height; ++y) {
     const uint64_t* const row = mask.row(y);
     before[0] += static_cast<uint64_t>(std::popcount(row[first - 1] >> (box.x & 63)));
@@ -71,7 +71,7 @@ int cut_across(const image::PixelMask& mask, const geometry::Rect& box, double s
   return best * 64;
 }
 
-// The same of one that is higher than wide: about `share` of its rays above.
+// The same for a box that is higher than wide: about `share` of its rays lie above.
 int cut_down(const image::PixelMask& mask, const geometry::Rect& box, double share, uint64_t rays) {
   const double wanted = share * static_cast<double>(rays);
   int best = box.y + 1;
@@ -217,7 +217,7 @@ PlannedFrame* FrameShelf::find(FrameId id) {
   return found == frames_.end() ? nullptr : &*found;
 }
 
-// Masks have a bit a pixel, and depths come of each ray.
+// Masks have one bit per pixel, and depths come only for rays.
 size_t FrameShelf::held(const PlannedFrame& frame) {
   size_t pixels = frame.whole_m.size() + (frame.map ? frame.map->depth_m.size() : 0);
   for (const RayTile& t : frame.tiles)
@@ -255,10 +255,10 @@ bool tells_much(const FrameShelf& shelf) {
 }
 
 void note_inserted(const points::PreparedPatch& patch, const points::ModelConfig& model, FrameShelf& shelf) {
-  constexpr int kMostFollowed = 4;  // more than viewers most often have under way
+  constexpr int kMostFollowed = 4;  // most often, viewers have fewer frames under way
   if (patch.mosaics.empty()) return;
   const uint32_t tag = patch.mosaics.front().second.frame_tag();
-  if (points::group_of(tag) != 0) return;  // its points will be gone
+  if (points::group_of(tag) != 0) return;  // a temporary group's points will be gone
   int followed = 0;
   for (auto frame = shelf.frames().rbegin(); frame != shelf.frames().rend(); ++frame) {
     if (!frame->map || !frame->nearest_known || frame->complete()) continue;
@@ -276,7 +276,7 @@ size_t pixels_of(const geometry::Camera& camera) {
   return static_cast<size_t>(camera.width) * static_cast<size_t>(camera.height);
 }
 
-// Of its maps.
+// Returns the number of pixels in a view's maps.
 size_t pixels_in(const ViewerView& v) {
   const size_t each = pixels_of(v.camera);
   return (v.map ? each : 0) + (v.fine_map && v.fine_map != v.map ? each : 0);

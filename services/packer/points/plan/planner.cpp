@@ -9,14 +9,14 @@
 namespace telesplat::packer {
 namespace {
 
-// The pixels of a view are checked in turn, 1 / (validation * kSets) of them at a time: up to kSets such sets in a
-// plan, fewer where plans follow each other in less than kTurn_s, and where the head stands still.
+// The pixels of a view are checked in turn, in sets of 1 / (validation * kSets) of them: up to kSets sets per plan,
+// fewer where plans follow each other in less than kTurn_s, and where the head stands still.
 constexpr int kSets = 8, kStillSets = 4;
 constexpr double kTurn_s = 0.25;
-// Where nothing is known to be, so many times fewer rays look whether something came.
+// Known empty pixels are checked in one set of every kEmptyShare sets of a plan.
 constexpr int kEmptyShare = 4;
 
-// Sampling, coding and packing a ray of a mask takes about four times as long as one of a whole tile.
+// Sampling, coding and packing one ray of a mask takes about four times as long as one of a whole tile.
 constexpr uint64_t kScattered = 4;
 
 bool never_cast(RayClass c) { return c == RayClass::kGood || c == RayClass::kKnownEmpty; }
@@ -25,13 +25,13 @@ uint64_t last_word_mask(int width) { return (width & 63) == 0 ? ~uint64_t{0} : (
 
 }  // namespace
 
-// Which pixels of a view are cast, and why: each for one reason.
+// The pixels of a view that are cast, each for one reason.
 struct Planner::ViewClasses {
   image::PixelMask cast, firm;
-  // What of `cast` only refines surfaces that are shown, with nothing unseen before them; and what of that is put off.
+  // Rays of `cast` that only refine shown surfaces, with nothing unseen before them; and those that are put off.
   image::PixelMask sparse, edge, put_off;
   std::map<std::string, double> figures;
-  uint64_t needed = 0;  // rays that are no validation
+  uint64_t needed = 0;  // rays cast for other reasons than validation
 };
 
 Planner::Planner(const PlanConfig& c)
@@ -58,7 +58,7 @@ size_t Planner::issue(Question& q, std::vector<RayTile> tiles, PlannedFrame fram
   return count;
 }
 
-// Memory of maps that nobody looks at any more is used again: to get it anew costs as much as to fill it.
+// Reuses the memory of maps that are no longer in use: allocating it anew costs as much as filling it.
 std::shared_ptr<ViewMap> Planner::new_map() {
   size_t pixels = 0;
   std::erase_if(maps_, [&](const auto& map) {
@@ -71,7 +71,7 @@ std::shared_ptr<ViewMap> Planner::new_map() {
   return std::make_shared<ViewMap>();
 }
 
-// The same view of the same model looks as it did.
+// Renders the view's map, unless neither view nor model has changed.
 void Planner::map_view(Question& q, ViewerView& view) {
   if (view.map && view.map_changes == changes_) return;
   view.map = new_map();
@@ -117,7 +117,7 @@ Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
         rays[c] += static_cast<uint64_t>(std::popcount(members & chosen));
         cast |= members & chosen;
       };
-      // Also where it is doubted: rays there are evidence.
+      // Doubted pixels are included: rays there are evidence.
       const uint64_t good = covered & ~lacking & ~holds, empty = ~covered & ~holds & inside;
       take(RayClass::kStale, old, ~uint64_t{0});
       take(RayClass::kNothing, ~covered & holds, ~done);
@@ -147,15 +147,15 @@ Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
   return out;
 }
 
-// The master samples all of it. What its tiles tell is learned as they come.
+// The master samples the whole view. The planner learns from its tiles as they come.
 void Planner::plan_full(Question& q, const ViewerView& view) {
   q.plan.full = true;
   q.plan.camera = view.camera;
 }
 
-// What is shown already, though coarsely, can wait; edges less than what lies between them.
+// Puts off rays at surfaces that are shown already, though coarsely; fewer of those at edges than of those between.
 void Planner::put_off(uint64_t most_rays, ViewClasses& classes) {
-  constexpr uint64_t kEdges = 4;  // times as many (PlanRequest::most_rays)
+  constexpr uint64_t kEdges = 4;  // times as many rays may stay at edges (PlanRequest::most_rays)
   const uint64_t sparse = put_off_rays(classes.sparse, most_rays, classes.cast);
   const uint64_t edge = put_off_rays(classes.edge, kEdges * std::min(most_rays, ~uint64_t{0} / kEdges), classes.cast);
   if (sparse + edge == 0) return;
@@ -222,7 +222,7 @@ void Planner::inserted(const points::PreparedPatch& patch) {
 }
 
 void Planner::forgotten(std::span<const points::ClusterKey> clusters) {
-  ++changes_;  // single patches may have gone, and no cluster with them
+  ++changes_;  // single patches may be gone without a whole cluster
   if (clusters.empty()) return;
   known_empty_.forget(clusters);
   validation_.forgotten(clusters);

@@ -1,5 +1,5 @@
-// Which rays of a view the model lacks: sampling is steered by it. No sockets, no clocks: requests and sampled tiles
-// come in, plans come out. One thread at a time.
+// Finds the rays of a view that the model lacks: sampling is steered by it. No sockets, no clocks: requests and sampled
+// tiles come in, plans come out. One thread at a time.
 #pragma once
 
 #include <array>
@@ -20,12 +20,12 @@
 
 namespace telesplat::packer {
 
-// Why a pixel of a view is cast; or why not.
+// Reasons to cast a pixel of a view, or not to.
 
 enum class RayClass : uint8_t { kNothing, kUnproven, kSparse, kEdge, kStale, kValidation, kGood, kKnownEmpty };
 inline constexpr int kRayClasses = 8;
 
-/// As in figures of plans: "nothing", "known_empty".
+/// Names as in figures of plans: "nothing", "known_empty".
 inline const char* name_of(RayClass c) {
   constexpr std::array<const char*, kRayClasses> kNames{"nothing", "unproven",   "sparse", "edge",
                                                         "stale",   "validation", "good",   "known_empty"};
@@ -36,10 +36,10 @@ struct PlanConfig {
   points::ModelConfig model;
   float relative_epsilon = 0.004f;  ///< Config::relative_epsilon
   float nearest_sample = 0.6f;      ///< Config::nearest_sample
-  double view_cell_m = 0.2;         ///< a head movement this long shall uncover nothing unknown; 0: no such rays
-  int validation = 32;              ///< every good pixel is cast once in so many plans of a view; 0: never
-  int still_rays = 16;              ///< rays a pixel everywhere while it stands still: 1, 4 or 16
-  uint64_t max_points = 0;          ///< of the model: near it no extra rays are planned; 0: no limit
+  double view_cell_m = 0.2;         ///< a head movement this long shall uncover nothing unknown; 0: no rays from beside
+  int validation = 32;              ///< every good pixel is cast once in this many plans of a view; 0: never
+  int still_rays = 16;              ///< rays per pixel everywhere while the head stands still: 1, 4 or 16
+  uint64_t max_points = 0;          ///< the model's limit: near it no extra rays are planned; 0: no limit
   int threads = 1;                  ///< 0: all cores
   bool operator==(const PlanConfig&) const = default;
 };
@@ -49,48 +49,48 @@ class Planner final : public ModelWatcher {
   /// Precondition: points::validate(config.model).
   explicit Planner(const PlanConfig& config);
 
-  /// What a model holds already.
+  /// Learns the points that a model holds already.
   void learn(const points::PointModel& model) { known_empty_.add(model); }
 
-  /// The tiles of a view, or of rays beyond it (request.extra): which of its rays the model lacks.
+  /// Plans a view, or rays beyond it (request.extra): returns tiles of the rays that the model lacks.
   ///   model: as of the event `sequence`; the same one in all calls, and of request.epoch. The planner watches it
   ///   (PackerCore::watch).
   ///   now_s: any steady clock; the same one in all calls.
-  /// Numbers in the request may come from outside: what makes no sense gives a plan without tiles, or a full one.
+  /// Numbers in the request may come from outside: invalid ones give a plan without tiles, or a full one.
   wire::Plan plan(const points::PointModel& model, Sequence sequence, const wire::PlanRequest& request, double now_s);
-  /// The same in pieces, so that others can be answered in between: what is beyond a view takes seconds to look for
-  /// where little is left. nullopt: extra rays were looked for in kPiecePixels or a little more, and fewer found than
-  /// the plan may have; the same request goes on from there.
+  /// The same in pieces, so that others can be answered in between: where little is left to find beyond a view,
+  /// searching takes seconds. nullopt: kPiecePixels or a little more were searched for extra rays, and fewer found than
+  /// the plan may have; a call with the same request goes on from there.
   std::optional<wire::Plan> plan_piece(const points::PointModel& model, Sequence sequence,
                                        const wire::PlanRequest& request, double now_s);
 
-  static constexpr uint64_t kMaxPixels = uint64_t{1} << 23;  ///< larger views are not planned: they are full
+  static constexpr uint64_t kMaxPixels = uint64_t{1} << 23;  ///< larger views are not planned: all of their pixels are
+                                                             ///< cast
   static constexpr uint64_t kPiecePixels = uint64_t{1} << 20;
 
-  /// A tile of a frame as it was sampled, before elimination and before its points are inserted. Whether its frame was
-  /// planned or not does not matter: of frames that are not known (any more) only what is certain is learned.
-  ///   whole: every pixel of the tile was cast.
+  /// Takes a frame's sampled tile, before elimination and before its points are inserted. Its frame may be planned or
+  /// not: from a frame that is not known (any more) the planner learns only certain facts.
   void take(const SampledTile& tile, bool whole, double now_s);
-  /// No more tiles of this frame come: what came of it is all that it tells.
+  /// No more tiles of this frame come: it counts as complete.
   void end_frame(FrameId id);
-  /// What the model shows where the tile of a planned frame was cast, as of now: PackerCore::submit() takes it in place
-  /// of rendering the model. nullopt: it is not known. Valid until the planner or the model changes.
+  /// Returns the model as seen where a planned tile was cast, as of now: PackerCore::submit() then need not render it.
+  /// nullopt: not known. Valid until the planner or the model changes.
   std::optional<KnownReference> reference(const SampledTile& tile);
-  /// Of a tile of rays finer than a view's: those that met nothing, of its size. Empty: it is no such tile, or that is
-  /// not known any more.
+  /// Returns the rays of a tile finer than a view that met nothing, as large as the tile. Empty: the tile is not of
+  /// that kind, or its plan is no longer known.
   image::PixelMask missed(const SampledTile& tile);
-  /// Learns from a frame that is complete: where nothing is. To be called when there is time, after its points are
-  /// inserted, until nothing is left to do (false). plan() does it where it has waited for long.
+  /// Learns from a complete frame which space is empty. To be called in spare time, after the frame's points are
+  /// inserted, until no work is left (false). plan() calls it for frames that have waited long.
   bool settle();
-  /// settle() should not wait: else a view's rays into empty space are cast again.
+  /// True if settle() should not wait: else a view's rays into empty space are cast again.
   bool settles_soon() const { return tells_much(shelf_); }
-  /// Planned, and not forgotten yet: their maps are most of what planning keeps in memory.
+  /// Planned frames that are not forgotten yet: their maps are most of the planner's memory.
   size_t frames() const { return shelf_.frames().size(); }
 
-  /// A view was planned, or began to come, a moment ago, and is not complete.
+  /// True if a view was planned, or began to come, a moment ago, and is not complete.
   bool view_under_way(double now_s) const { return packer::view_under_way(shelf_, now_s); }
 
-  /// What the rays since the last call have disproved: clusters whose points are to be forgotten. Ascending.
+  /// Returns the clusters that rays since the last call have disproved: their points are to be forgotten. Ascending.
   std::vector<points::ClusterKey> disproved() { return validation_.disproved(); }
 
   /// Frames are numbered anew from here.
@@ -101,7 +101,7 @@ class Planner final : public ModelWatcher {
   void cleared() override;
 
  private:
-  /// One question, and what answers it.
+  /// A request, with the plan that answers it.
   struct Question {
     const points::PointModel& model;
     Sequence sequence;
@@ -114,11 +114,11 @@ class Planner final : public ModelWatcher {
     uint64_t most_rays = ~uint64_t{0};
     bool enough(uint64_t rays) const { return rays >= most_rays; }
 
-    /// Extra rays are looked for in pieces: pixels that this one has looked at, and whether it broke off.
+    /// Extra rays are searched for in pieces: pixels that this piece has searched, and whether it broke off.
     uint64_t looked_at = 0;
     bool unfinished = false;
     void look_at(const geometry::Camera& camera) { looked_at += uint64_t(camera.width) * uint64_t(camera.height); }
-    /// To be asked where more is left to be looked at: true ends the piece. What was looked at is not again.
+    /// To be asked while pixels are left to be searched: true ends the piece. Searched pixels are not searched again.
     bool breaks_off() { return unfinished = looked_at >= Planner::kPiecePixels; }
   };
 
@@ -142,7 +142,7 @@ class Planner final : public ModelWatcher {
   bool plan_fine(Question& q, ViewerView& view);
   void look_closer(Question& q, ViewerView& view);
   bool plan_stages(Question& q, ViewerView& view);
-  /// Pixels that shall have 2^finer rays a side; all: also where the model has samples. number: of the stage.
+  /// Pixels that shall have 2^finer rays on each axis; all: also where the model has samples. number: the stage's.
   struct FineStage {
     size_t number;
     const image::PixelMask& wanted;
@@ -150,22 +150,22 @@ class Planner final : public ModelWatcher {
     bool all;
   };
   bool plan_fine(Question& q, ViewerView& view, const FineStage& stage);
-  /// Pixels of a view that have not had such rays; what was looked at, and found there.
+  /// Pixels of a view that have not had such rays; the pixels searched since, and the tiles found there.
   struct FineSearch {
-    geometry::Camera camera;  ///< of the finer view
-    bool all;                 ///< rays are wanted wherever the model has samples, too
+    geometry::Camera camera;  ///< the finer view's
+    bool all;                 ///< rays are wanted also where the model has samples
     image::PixelMask open;
     image::PixelMask& refined;
     std::vector<RayTile>& tiles;
-    uint64_t rays = 0;  ///< of the tiles
+    uint64_t rays = 0;  ///< number of rays in `tiles`
   };
   void look_into(Question& q, const geometry::Rect& region, FineSearch& search);
 
-  /// Puts the tiles into the plan and on the shelf. Those that a message does not hold are left out. Returns their
-  /// number.
+  /// Puts the tiles into the plan and the frame on the shelf. Tiles beyond a message's limit are left out. Returns the
+  /// number of tiles.
   size_t issue(Question& q, std::vector<RayTile> tiles, PlannedFrame frame);
 
-  // planned tiles come back: take_tile.cpp
+  // take_tile.cpp: planned tiles come back.
   void take_whole(const SampledTile& tile, double now_s);
   void take_planned(PlannedFrame& frame, const SampledTile& tile, double now_s);
   void note_done(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask* cast);
@@ -182,9 +182,9 @@ class Planner final : public ModelWatcher {
   Validation validation_;
   ViewerViews viewers_;
   FrameShelf shelf_;
-  std::vector<std::shared_ptr<ViewMap>> maps_;  // kept for their memory, some of them in use
+  std::vector<std::shared_ptr<ViewMap>> maps_;  // kept for their memory; some are in use
   std::vector<float> clear_m_, coarse_m_;       // kept for their memory
-  uint64_t changes_ = 0;                        // of the model: patches that brought nothing are none
+  uint64_t changes_ = 0;                        // counts changes of the model, except patches that brought no points
 };
 
 }  // namespace telesplat::packer

@@ -1,4 +1,4 @@
-// What sampled tiles tell the planner.
+// Planner: learns from sampled tiles.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace telesplat::packer {
 namespace {
 
-// Whether no other pixels are covered. Samplers keep to masks; what comes from outside may not.
+// True if no pixels outside `cast` are covered. Samplers keep to masks; tiles from outside may not.
 bool only_cast(const SampledTile& tile, const image::PixelMask& cast) {
   const auto& depth = tile.image.depth;
   if (cast.width() != tile.rect.width || cast.height() != tile.rect.height ||
@@ -67,7 +67,7 @@ image::PixelMask Planner::missed(const SampledTile& tile) {
   return out;
 }
 
-// A frame that nobody planned, or that was to be sampled whole.
+// Takes a tile of a frame that was not planned, or that was planned to be sampled whole.
 void Planner::take_whole(const SampledTile& tile, double now_s) {
   const auto pixels = static_cast<uint64_t>(tile.camera.width) * static_cast<uint64_t>(tile.camera.height);
   PlannedFrame* frame = shelf_.find(tile.frame);
@@ -112,7 +112,7 @@ void Planner::take_planned(PlannedFrame& frame, const SampledTile& tile, double 
   refill_empty(frame, tile, contradicted);
 }
 
-// The viewer that still looks from there needs these pixels no more.
+// A viewer that still looks from there does not need these pixels again.
 void Planner::note_done(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask* cast) {
   ViewerView* view = viewers_.find(frame.viewer);
   if (!view || !view->known || !(view->camera == frame.camera)) return;
@@ -121,7 +121,7 @@ void Planner::note_done(const PlannedFrame& frame, const SampledTile& tile, cons
     for (int x = tile.rect.x; x < tile.rect.x + tile.rect.width; ++x) view->done.set(x, y);
 }
 
-// Hits where nothing was: other rays shall look around there.
+// Rays hit a surface in space known as empty: other rays shall search around it.
 void Planner::refill_empty(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask& contradicted) {
   std::vector<glm::vec3> hits;
   for (int y = 0; y < contradicted.height(); ++y)
@@ -135,8 +135,8 @@ void Planner::refill_empty(const PlannedFrame& frame, const SampledTile& tile, c
   if (!hits.empty()) known_empty_.refill(hits);
 }
 
-// Pixels of large views are smaller than cells: half as many on each axis tell nearly as much, in a fourth of the time,
-// and later views look closer where that leaves something open.
+// Pixels of large views are smaller than cells: half as many on each axis clear nearly as many cells, in a fourth of
+// the time, and later views look closer where cells are left.
 void Planner::carve(const geometry::Camera& full, const std::vector<float>& all_m) {
   const int width = full.width / 2, height = full.height / 2;
   if (all_m.size() < kCoarseCarve || width < 1 || height < 1) return known_empty_.carve(full, all_m, config_.threads);
@@ -147,7 +147,7 @@ void Planner::carve(const geometry::Camera& full, const std::vector<float>& all_
     for (int x = 0; x < width; ++x) {
       const float* upper = &all_m[static_cast<size_t>(2 * y) * full.width + 2 * x];
       const float* lower = upper + full.width;
-      // As far as all four are clear; it is new if one of them is.
+      // Clear as far as all four are; new if one of them is.
       const float clear = std::min({std::abs(upper[0]), std::abs(upper[1]), std::abs(lower[0]), std::abs(lower[1])});
       const bool news = upper[0] > 0 || upper[1] > 0 || lower[0] > 0 || lower[1] > 0;
       coarse_m_[static_cast<size_t>(y) * width + x] = news ? clear : -clear;
@@ -165,7 +165,7 @@ void Planner::settle(const PlannedFrame& frame) {
   if (frame.kind == PlannedFrame::Kind::kView && !frame.whole && !frame.ended) validation_.resampled(frame.planned_s);
 }
 
-// The newest one first: later views look at what it saw.
+// The newest frame first: later views look at the same space.
 bool Planner::settle() {
   auto& frames = shelf_.frames();
   const auto found = std::find_if(frames.rbegin(), frames.rend(), [](const PlannedFrame& f) { return f.complete(); });
@@ -175,9 +175,9 @@ bool Planner::settle() {
   return true;
 }
 
-// Whole frames tell most, so the next plan waits for them. Others that found no time are forgotten: where they saw
-// nothing rays are cast once more. So are those whose tiles do not come: their samplers died, or a newer view went
-// first. What comes all the same is compared with the model.
+// Whole frames clear most, so the next plan waits for them. Other frames that were not settled in time are forgotten:
+// their rays that met nothing are cast once more. Frames whose tiles do not come are forgotten, too: their samplers
+// died, or a newer view went first. Tiles that still come are compared with the model.
 void Planner::settle_old(double now_s) {
   constexpr double kOld_s = 1;
   for (size_t i = shelf_.frames().size(); i-- > 0;) {
@@ -230,16 +230,16 @@ void write_depths(const SampledTile& tile, std::vector<float>& depth_m) {
 
 namespace {
 
-constexpr float kKnown = -1;  // sign of what was known before
+constexpr float kKnown = -1;  // sign of depths that were known before
 
-// A ray that saw what was shown tells nothing new.
+// A ray that hit the shown surface brings nothing new.
 bool confirms(float came_m, float shown_m) {
   constexpr float kTolerance = 0.01f;
   return came_m == shown_m || std::abs(came_m - shown_m) <= kTolerance * shown_m;
 }
 
-// What was not cast is as it was shown, unless a ray was needed to tell. At edges, and where samples
-// are far apart, the nearest surface around counts.
+// Pixels that were not cast count as clear up to the shown depth, if they need no ray. At edges, and where samples are
+// far apart, up to the nearest surface around.
 void clear_as_shown(const PlannedFrame& frame, int y, float* clear_m) {
   const ViewMap& map = *frame.map;
   const int width = map.camera.width, height = map.camera.height;

@@ -13,8 +13,8 @@
 namespace telesplat::packer {
 namespace {
 
-// A cluster is disproved by so many contradictions, twice as many after each time that this did not help, if they are
-// such a part of all rays at it of about the last second.
+// A cluster is disproved by kProof contradictions, twice as many after each time that forgetting it did not help, if
+// they are kProofShare of all rays at it in about the last second.
 constexpr float kProof = 16, kProofShare = 0.5f;
 constexpr int kMostStrikes = 6;
 constexpr double kHalfLifeSeconds = 0.5, kStrikeSeconds = 10;
@@ -25,13 +25,12 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 struct Around {
   float nearest_m = kInfinity, farthest_m = 0;
   std::array<int, 3> low{255, 255, 255}, high{0, 0, 0};
-  float cosine = -1;  // of the normal most like the sample's
+  float cosine = -1;  // with the most similar normal around
 };
 
 int channel(uint32_t colour, int c) { return static_cast<int>(colour >> (8 * c) & 255); }
 
-// What is shown within `reach` pixels. The sample lies between what is shown where its surface was sampled at other
-// places.
+// Returns the range of what is shown within `reach` pixels. A sample of the same surface lies within it.
 Around look_around(const ShownView& shown, int x, int y, int reach, const glm::vec3& normal) {
   Around out;
   for (int py = std::max(y - reach, 0); py <= std::min(y + reach, shown.camera.height - 1); ++py)
@@ -72,7 +71,7 @@ Validation::Verdict Validation::judge(const ShownView& shown, int shown_x, int s
   if (!(shown.depth_m[i] < kInfinity)) return hit ? Verdict::kNearer : Verdict::kAgrees;
   const glm::vec3 normal = image::decode_normal16(came.normal[pixel]);
   const Around around = look_around(shown, shown_x, shown_y, tolerance_.reach, normal);
-  // What lies beside a silhouette may be either.
+  // Beside a silhouette both a hit and a miss may be right.
   if (!hit) return around.farthest_m < kInfinity ? Verdict::kMissed : Verdict::kNone;
   const auto depth_m = static_cast<float>(image::decode_depth(came.depth[pixel], shown.camera.near_m));
   if (depth_m < around.nearest_m * (1 - tolerance_.relative_depth)) return Verdict::kNearer;
@@ -106,7 +105,7 @@ void Validation::check(const ShownView& shown, const geometry::Rect& rect, const
     });
 }
 
-// One ray at a firm pixel. True: it contradicts.
+// Takes one ray at a firm pixel. Returns true if it contradicts.
 bool Validation::take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
                       double now_s, const image::PixelMask* doubted) {
   const int px = rect.x + x, py = rect.y + y;
@@ -117,7 +116,7 @@ bool Validation::take(const ShownView& shown, const geometry::Rect& rect, int x,
   count(verdict, empty);
   if (verdict == Verdict::kNone) return false;
   const auto room = [&](double depth_m) { return shown.camera.unproject(px + 0.5, py + 0.5, depth_m); };
-  // What is before the shown surface says nothing about that.
+  // A hit before the shown surface says nothing about that surface.
   if (!empty && verdict != Verdict::kNearer)
     if (const auto key = leaf_at(grid_, room(shown_m))) note(*key, verdict == Verdict::kAgrees, now_s);
   if (verdict == Verdict::kAgrees) return false;
@@ -219,7 +218,7 @@ namespace {
 constexpr int kSide = BlueNoise::kSide, kPixels = kSide * kSide;
 using Ranks = std::array<uint16_t, size_t{kPixels}>;
 
-// How crowded each pixel's surroundings are with the pixels chosen so far: a Gaussian about each, on a torus.
+// Measures how crowded each pixel's surroundings are with chosen pixels: a Gaussian around each, on a torus.
 class Crowding {
  public:
   Crowding() {
@@ -238,7 +237,7 @@ class Crowding {
   }
   void choose(int pixel) { change(pixel, 1); }
   void drop(int pixel) { change(pixel, -1); }
-  /// The most crowded of the chosen pixels, the least crowded of the others. One of both must exist.
+  /// Returns the most crowded chosen pixel, or the least crowded other one. Such a pixel must exist.
   int tightest_cluster() const {
     return best(true, [](float a, float b) { return a > b; });
   }
@@ -270,14 +269,14 @@ class Crowding {
 Ranks void_and_cluster() {
   constexpr int kFirst = kPixels / 16;
   Crowding crowding;
-  std::mt19937 random(1);  // the engine's numbers are the same everywhere
+  std::mt19937 random(1);  // this engine gives the same numbers on all machines
   for (int n = 0; n < kFirst;) {
     const auto pixel = static_cast<int>(random() % kPixels);
     if (crowding.chosen(pixel)) continue;
     crowding.choose(pixel);
     ++n;
   }
-  // Spread the first ones: the most crowded moves to the largest void, until it would move back.
+  // Spread the first pixels: the most crowded one moves to the largest void, until it would move back.
   for (int n = 0; n < kPixels; ++n) {
     const int from = crowding.tightest_cluster();
     crowding.drop(from);

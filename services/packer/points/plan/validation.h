@@ -1,5 +1,5 @@
-// Whether the model still shows what is there: rays are cast at some pixels that need none, spread evenly, and compared
-// with what the model shows. No clocks; one thread at a time.
+// Checks the model against the scene: casts rays at some pixels that need none, spread evenly, and compares them with
+// what the model shows. No clocks; one thread at a time.
 #pragma once
 
 #include <array>
@@ -19,18 +19,18 @@ namespace telesplat::packer {
 
 /// Blue noise: sparse sets of pixels that are spread evenly, without regular patterns.
 /// Source: Ulichney 1993, "The void-and-cluster method for dither array generation".
-///   Cuts the pixels of a 64x64 square, which repeats over the image, into `share` sets of about equal size, each of
-/// them spread evenly: round r picks set r % share, so that every pixel is picked once in `share` rounds.
+///     Cuts the pixels of a 64x64 square, which repeats over the image, into `share` sets of about equal size, each
+/// spread evenly: round r picks set r % share, so that every pixel is picked once in `share` rounds.
 class BlueNoise {
  public:
   static constexpr int kSide = 64, kMaxShare = 4096;
 
-  /// share outside [1, kMaxShare] is brought into it.
+  /// share is clamped to [1, kMaxShare].
   explicit BlueNoise(int share);
 
   int share() const { return share_; }
   bool picks(int x, int y, uint64_t round) const { return (row(y, round) >> (x & (kSide - 1)) & 1) != 0; }
-  /// Of pixels x = 64 n to 64 n + 63 of row y, whatever n: as a word of an image::PixelMask.
+  /// Returns the picked pixels 64 n to 64 n + 63 of row y, for any n: as a word of an image::PixelMask.
   uint64_t row(int y, uint64_t round) const;
 
  private:
@@ -38,82 +38,81 @@ class BlueNoise {
   std::vector<uint64_t> rows_;  // share x kSide
 };
 
-/// The dither array: each of 0..4095 once, at y * 64 + x. Computed at the first call.
+/// The dither array: each number of 0..4095 once, at y * 64 + x. Computed at the first call.
 const std::array<uint16_t, size_t{BlueNoise::kSide} * BlueNoise::kSide>& blue_noise_ranks();
 
-/// What the model shows in a view: planes of camera.width x camera.height pixels, row by row.
+/// The model as seen in a view: planes of camera.width x camera.height pixels, row by row.
 struct ShownView {
   const geometry::Camera& camera;
   std::span<const float> depth_m;    ///< +infinity: nothing
   std::span<const uint32_t> colour;  ///< 0x00RRGGBB albedo
   std::span<const uint16_t> normal;  ///< encode_normal16
-  const image::PixelMask& firm;      ///< pixels of which this is believed: good ones and known empty ones
+  const image::PixelMask& firm;      ///< pixels whose content is believed: good and known empty ones
 };
 
-/// How far a ray may be off what is shown. A sample agrees if it lies between what the pixels around show, and these
-/// tolerances beyond.
+/// Allowed difference of a ray from the shown model. A sample agrees if it lies within the range of the pixels around,
+/// widened by these tolerances.
 struct Tolerance {
-  float relative_depth = 0.01f;  ///< of the depth
-  int reach = 2;                 ///< pixels around that are looked at
+  float relative_depth = 0.01f;  ///< as a fraction of the depth
+  int reach = 2;                 ///< distance of pixels around that count
   float colour = 32;             ///< largest difference of a channel, of 255
-  float normal_cosine = 0.5f;    ///< at least, between normals
+  float normal_cosine = 0.5f;    ///< least cosine between normals
 };
 
 class Validation {
  public:
   static constexpr int kMarkPixels = 16;     ///< side of the square that one contradiction makes stale
-  static constexpr double kMarkSeconds = 1;  ///< a mark that no plan takes up is dropped after that
-  static constexpr size_t kMaxMarks = 4096;  ///< oldest go first
+  static constexpr double kMarkSeconds = 1;  ///< a mark older than this is dropped if no plan has taken it up
+  static constexpr size_t kMaxMarks = 4096;  ///< the oldest go first
 
-  /// kNone: beside a silhouette nothing can be said. kNearer also: something where nothing is shown.
+  /// kNone: undecidable beside a silhouette. kNearer: also a hit where nothing is shown.
   enum class Verdict : uint8_t { kNone, kAgrees, kNearer, kFarther, kMissed, kColour, kNormal };
 
   struct Statistics {
-    uint64_t rays = 0;                                                     ///< compared
+    uint64_t rays = 0;                                                     ///< compared rays
     uint64_t nearer = 0, farther = 0, missed = 0, colour = 0, normal = 0;  ///< contradictions
-    uint64_t empty_rays = 0, empty_hits = 0;  ///< at known empty pixels; not in the figures above
+    uint64_t empty_rays = 0, empty_hits = 0;  ///< rays at known empty pixels; not in the figures above
   };
 
   explicit Validation(const points::ModelConfig& model, const Tolerance& tolerance = {});
 
-  /// Compares a tile's rays at firm pixels with what was shown when its frame was planned.
-  ///   cast: of rect's size; came: likewise, as sampled. shown.camera's image holds rect.
-  ///   doubted: of shown.camera's size, or null: pixels where rays have contradicted before, from this camera. There
-  ///   they are evidence, but make nothing stale: splats cannot show what is there, and a still view would cast the
-  ///   squares around again and again.
-  ///   contradicted: becomes a mask of rect's size: the rays that saw something else than what is shown; their hits are
-  ///   new points.
+  /// Compares a tile's rays at firm pixels with the model as seen when its frame was planned.
+  ///     cast: as large as rect; came: the samples, likewise. shown.camera's image holds rect.
+  ///     doubted: as large as the view, or null: pixels where rays have contradicted before, from this camera. There
+  /// rays are evidence, but make nothing stale: splats cannot show such places, and a still view would cast the squares
+  /// around them again and again.
+  ///     contradicted: becomes a mask as large as rect: the rays that contradict the model; their hits are new points.
   void check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
              const image::DepthImage& came, double now_s, image::PixelMask& contradicted,
              const image::PixelMask* doubted = nullptr);
 
-  /// Sets a square of kMarkPixels pixels around each mark in sight: stale. mask: of the camera's size.
+  /// Sets in `mask`, which is as large as the camera's image, a square of kMarkPixels pixels around each mark in sight.
   void mark_stale(const geometry::Camera& camera, double now_s, image::PixelMask& mask);
-  /// The frame of the plan that called mark_stale at planned_s is complete: its marks are settled.
+  /// The frame of the plan that called mark_stale at planned_s is complete: drops that plan's marks.
   void resampled(double planned_s);
 
-  /// Clusters that rays have disproved since the last call, ascending.
+  /// Returns the clusters that rays have disproved since the last call, ascending.
   std::vector<points::ClusterKey> disproved();
-  /// Clusters are gone, for whatever reason: evidence about their old points is void.
+  /// Clusters were forgotten: evidence about their old points is void.
   void forgotten(std::span<const points::ClusterKey> clusters);
 
-  void clear();  ///< a new epoch
+  void clear();  ///< begins a new epoch
   const Statistics& statistics() const { return statistics_; }
   size_t marks() const { return marks_.size(); }
 
-  /// One ray. shown_x, shown_y: its pixel in the view.
+  /// Judges one ray. shown_x, shown_y: its pixel in the view.
   Verdict judge(const ShownView& shown, int shown_x, int shown_y, const image::DepthImage& came, size_t pixel) const;
 
  private:
   struct Mark {
     glm::dvec3 position_room;
-    double made_s = 0, planned_s = -1;  // planned_s: when a plan last had it in sight
+    double made_s = 0, planned_s = -1;  // time of the last plan that had it in sight
   };
-  // Of a cluster: rays since it last changed, old ones count less and less.
+  // Rays at a cluster since it last changed; older ones count less and less.
   struct Evidence {
     float agree = 0, contradict = 0;
     double s = 0, strike_s = 0;
-    uint8_t strikes = 0;  // how often it was forgotten for contradictions: each asks for twice the proof of the last
+    uint8_t strikes = 0;  // times the cluster was disproved: each doubles the proof that is needed
   };
   bool take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
             double now_s, const image::PixelMask* doubted);
@@ -124,7 +123,7 @@ class Validation {
   points::OctreeGrid grid_;
   Tolerance tolerance_;
   std::vector<Mark> marks_;
-  image::PixelMask marked_;  // squares of the tile at hand that have a mark
+  image::PixelMask marked_;  // squares of the current tile that have a mark
   std::unordered_map<points::ClusterKey, Evidence> evidence_;
   std::vector<points::ClusterKey> disproved_;
   Statistics statistics_;

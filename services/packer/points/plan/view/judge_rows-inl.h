@@ -1,4 +1,4 @@
-// Included once a target, by judge_rows.cpp.
+// Included once per target, by judge_rows.cpp.
 #if defined(TELESPLAT_PACKER_JUDGE_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_PACKER_JUDGE_ROWS_INL_H_
 #undef TELESPLAT_PACKER_JUDGE_ROWS_INL_H_
@@ -22,11 +22,11 @@ using F32 = hn::ScalableTag<float>;
 using I32 = hn::RebindToSigned<F32>;
 using U32 = hn::RebindToUnsigned<F32>;
 
-// Depth codes (2^14 an octave). A step of depth is more than kStep, and more than twice what depth changes by beside it
-// on one side: so surfaces seen at a grazing angle have none, and what is thin has two.
+// Depth codes (2^14 per octave). A step is a depth difference of more than kStep, and more than twice the difference
+// beyond it on one side: so a surface seen at a grazing angle has no step, and a thin object has two.
 constexpr int32_t kStep = 96;
-// By how much normals and colours differ: the sum over both octahedral coordinates, about one a degree, and the largest
-// channel.
+// Limits for differences of normals (sum over both octahedral coordinates, about one per degree) and of colours
+// (largest channel).
 constexpr int32_t kFarNormals = 40, kStrongNormals = 20, kWeakNormals = 3;
 constexpr float kEdgeCosine = 0.77f;  // 40 degrees
 constexpr int32_t kStrongColours = 48, kWeakColours = 5;
@@ -53,7 +53,7 @@ struct NormalLanes {
   hn::Vec<F32> x, y, z;
 };
 
-// As image::octahedral16.
+// Decodes normals as image::octahedral16 does.
 HWY_INLINE NormalLanes Normal(hn::Vec<U32> low, hn::Vec<U32> high) {
   const F32 d;
   const auto whole = hn::Set(d, 127.0f);
@@ -69,7 +69,7 @@ HWY_INLINE hn::Vec<F32> Dot(const NormalLanes& a, const NormalLanes& b) {
   return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
 
-// Lanes whose normals are more than 40 degrees apart.
+// Returns the lanes whose normals are more than 40 degrees apart.
 HWY_INLINE hn::Mask<I32> Turned(const NormalLanes& a, const NormalLanes& b) {
   const F32 d;
   const auto towards = Dot(a, b);
@@ -78,7 +78,7 @@ HWY_INLINE hn::Mask<I32> Turned(const NormalLanes& a, const NormalLanes& b) {
   return hn::RebindMask(I32(), small);
 }
 
-// |a - b| of one byte.
+// Returns |a - b| of one byte.
 template <int kShift>
 HWY_INLINE hn::Vec<I32> Apart(hn::Vec<U32> a, hn::Vec<U32> b) {
   const auto byte = [](hn::Vec<U32> v) HWY_ATTR {
@@ -87,7 +87,7 @@ HWY_INLINE hn::Vec<I32> Apart(hn::Vec<U32> a, hn::Vec<U32> b) {
   return hn::Abs(hn::Sub(byte(a), byte(b)));
 }
 
-// A step between two codes, given those on their far sides.
+// True where there is a step between a and b, given the codes beyond them.
 HWY_INLINE hn::Mask<I32> Steps(hn::Vec<I32> before, hn::Vec<I32> a, hn::Vec<I32> b, hn::Vec<I32> after) {
   const I32 di;
   const auto none = hn::Set(di, kNoCode);

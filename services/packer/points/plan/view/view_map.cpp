@@ -17,14 +17,14 @@ namespace {
 constexpr float kNothingMet = std::numeric_limits<float>::infinity();
 constexpr int kReach = splat::ViewKeys::kReach;
 
-// A pin-hole: so many of its eight neighbours are a nearer surface.
+// Nearer neighbours, of eight, that make a pixel a pin-hole.
 constexpr int kPinHoleSides = 7;
 
 }  // namespace
 
-// Rows around the one at hand, kept from tile to tile.
+// The rows around the current one, kept from tile to tile.
 struct PixelJudge::Rows {
-  static constexpr int kKept = 8;  // a power of 2, more than the five that are looked at
+  static constexpr int kKept = 8;  // a power of 2, at least the five rows that are read
   int stride = 0;
   std::vector<uint32_t> memory;
 
@@ -38,7 +38,7 @@ struct PixelJudge::Rows {
     const int n = 3 * (y & (kKept - 1));
     return {signed_at(n), at(n + 1), at(n + 2)};
   }
-  // Contrasts of a row's pixels with the next ones, and with those of the row above and below.
+  // Contrasts of a row's pixels with the next ones, and of rows with the row below.
   int32_t* beside() { return signed_at(3 * kKept); }
   int32_t* between(int y) { return signed_at(3 * kKept + 1 + (y & 1)); }
 
@@ -54,7 +54,7 @@ struct PixelJudge::Rows {
 PixelJudge::PixelJudge(const geometry::Camera& camera, const PixelTest& test, const splat::RimBias& rim)
     : near_m_(static_cast<float>(camera.near_m)), planes_(camera), test_(test), bias_(bias_table(rim)) {}
 
-// As eliminate_redundancy() judges a sample at the pixel's centre (reference_depth.h).
+// Judges like eliminate_redundancy() for a sample at the pixel's centre (reference_depth.h).
 bool PixelJudge::has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y, float depth_m,
                                  uint16_t normal) const {
   const float epsilon_m = test_.relative_epsilon * depth_m;
@@ -75,7 +75,7 @@ bool PixelJudge::has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y
   return false;
 }
 
-// Nothing is shown in a tile without points.
+// A tile without points shows nothing.
 static void clear_planes(const geometry::Rect& r, ViewMap& map) {
   for (int y = r.y; y < r.y + r.height; ++y) {
     const size_t first = static_cast<size_t>(y) * map.covered.width() + r.x;
@@ -96,7 +96,7 @@ void PixelJudge::judge(const splat::ViewKeys::Tile& tile, int x, int y, ViewMap&
   thread_local Rows rows;
   rows.resize(width);
   const auto split = [&](int row) { split_row(tile.key_row(row), -kReach, width + kReach, bias_, rows.row(row)); };
-  // Between a row and the one under it.
+  // Compares a row with the one below.
   const auto compare = [&](int row) {
     compare_rows(rows.row(row - 1).code, rows.row(row), rows.row(row + 1), rows.row(row + 2).code, 0, width,
                  rows.between(row));
@@ -126,7 +126,7 @@ void PixelJudge::judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0,
   const RowBits bits = judge_row_64(rows.row(y).code, rows.beside(), rows.between(y - 1), rows.between(y),
                                     tile.depth_row(y), near_m_, 1.0f + test_.relative_epsilon, x0);
   uint64_t lacking = 0;
-  // Few are left: pixels without a point of their own, and pin-holes at edges.
+  // Few pixels need a closer look: those without a point of their own, and pin-holes at edges.
   for (uint64_t rest = (bits.covered & ~bits.own) & inside; rest != 0; rest &= rest - 1) {
     const int x = x0 + std::countr_zero(rest);
     const float depth_m = splat::decode_depth_code(uint32_t(rows.row(y).code[x]), near_m_);

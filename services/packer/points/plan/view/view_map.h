@@ -1,4 +1,4 @@
-// What the model shows in a view, pixel by pixel, and what it lacks there.
+// Maps of the model as seen in a view, pixel by pixel, and of the samples that it lacks there.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@
 
 namespace telesplat::packer {
 
-/// What is looked at at once: keys and points of so many pixels lie in the second-level cache.
+/// Tiles of this size are processed at once: their keys and points fit into the second-level cache.
 inline constexpr int kPlanTileWidth = 256, kPlanTileHeight = 128;
 
-/// When a pixel counts as shown.
+/// Conditions for a pixel to count as shown.
 struct PixelTest {
-  float relative_epsilon = 0.004f;  ///< points this close to the surface, as a fraction of depth, are of it
-  /// A covered pixel lacks a sample if no point of its surface lies in it or within so many pixels of its centre (up to
-  /// 1.5).
+  float relative_epsilon = 0.004f;  ///< points this close to the surface, as a fraction of depth, belong to it
+  /// A covered pixel lacks a sample if no point of its surface lies in it or within this many pixels of its centre (up
+  /// to 1.5).
   float nearest = 0.6f;
 };
 
@@ -28,17 +28,17 @@ struct PixelTest {
 struct ViewMap {
   geometry::Camera camera;
   std::vector<float> depth_m;    ///< +infinity: nothing
-  std::vector<uint32_t> colour;  ///< 0x00RRGGBB albedo; 0 where nothing is
-  std::vector<uint16_t> normal;  ///< encode_normal16; 0 where nothing is
-  /// What render_reference_depth() gives: the nearest sample in each pixel, and in the last bits where it lies there.
+  std::vector<uint32_t> colour;  ///< 0x00RRGGBB albedo; 0: nothing
+  std::vector<uint16_t> normal;  ///< encode_normal16; 0: nothing
+  /// As render_reference_depth(): the nearest sample in each pixel, with its place in the pixel in the last bits.
   std::vector<float> nearest_m;
   image::PixelMask covered;  ///< some splat covers it
-  /// Covered, but no sample of that surface is near (PixelTest), or a pin-hole: what is shown lies behind a surface
-  /// all around.
+  /// Covered, but no sample of that surface is near (PixelTest), or a pin-hole: a nearer surface is all around the
+  /// pixel.
   image::PixelMask lacking;
   image::PixelMask edge;    ///< beside a step of depth or of the normal
-  image::PixelMask strong;  ///< no edge, but colour or normal differ much from a neighbour's
-  image::PixelMask weak;    ///< the same, less
+  image::PixelMask strong;  ///< not an edge, but colour or normal differ much from a neighbour's
+  image::PixelMask weak;    ///< the same, with a smaller difference
 };
 
 /// Renders the model and judges its pixels. with_planes: depth_m, colour, normal and nearest_m are filled; else they
@@ -47,14 +47,14 @@ struct ViewMap {
 void render_view_map(const points::PointModel& model, const geometry::Camera& camera, const PixelTest& test,
                      bool with_planes, splat::ViewKeys& keys, ViewMap& map, bool rests = false);
 
-/// The same tile by tile, for views that are looked at in parts.
+/// Judges pixels tile by tile, for views that are searched in parts.
 class PixelJudge {
  public:
-  /// rim: of the ViewKeys whose tiles come.
+  /// rim: from the ViewKeys that draw the tiles.
   PixelJudge(const geometry::Camera& camera, const PixelTest& test, const splat::RimBias& rim);
-  /// Fills the part of `map` in which the tile lies: its first pixel is (x, y) there, x a multiple of 64. Masks must
-  /// be zero there. Planes may have no pixels: they are left out then. Several tiles may be judged at a time if their
-  /// words of masks are different ones.
+  /// Fills the part of `map` in which the tile lies: its first pixel is (x, y) there, x a multiple of 64. Masks must be
+  /// zero there. Planes without pixels are left out. Threads may judge several tiles at a time if these share no
+  /// word of a mask.
   void judge(const splat::ViewKeys::Tile& tile, int x, int y, ViewMap& map) const;
 
  private:
@@ -68,7 +68,7 @@ class PixelJudge {
   BiasTable bias_;
 };
 
-/// Makes all masks zero, of this size.
+/// Makes all masks zero, with this size.
 void reset_masks(int width, int height, ViewMap& map);
 
 }  // namespace telesplat::packer
