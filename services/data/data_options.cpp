@@ -24,7 +24,7 @@ using scene::Kinds;
 constexpr Kinds kMeshes{Kind::kMesh}, kVolumes{Kind::kVolume};
 constexpr Kinds kVolumesAndTheirSurfaces{Kind::kVolume, Kind::kMesh}, kFiles = kVolumesAndTheirSurfaces;
 
-// Absolute, because a run's session.toml names the folder.
+// Makes the path absolute, because a run's session.toml names the folder.
 options::Text folder(std::string& path) {
   return {[&path](const std::string& text) {
             std::error_code error;

@@ -1,4 +1,4 @@
-// What a data set is read with: the options of a data server, most of which the launcher has, too.
+// Options for reading a data set: the options of a data server. The launcher has most of them, too.
 #pragma once
 
 #include <string>
@@ -13,12 +13,12 @@ namespace telesplat::data {
 
 struct DataOptions {
   std::string scene;     ///< path of a mesh, raster or volume, or the word "julia"
-  MeshOptions mesh;      ///< its placement counts for all kinds of scene
-  VolumeOptions volume;  ///< its `raw` and `series` count for surfaces of volumes, too
+  MeshOptions mesh;      ///< its placement applies to all kinds of scene
+  VolumeOptions volume;  ///< its `raw` and `series` apply to surfaces of volumes, too
   julia::SceneOptions julia;
-  std::string companions = "folder";  ///< where a data server reads files that others name: "folder" or "anywhere"
+  std::string companions = "folder";  ///< where a server reads files that a data file names: "folder" or "anywhere"
 
-  /// What open_mesh takes. Where nobody says what a mesh is coloured by, it is what its file marks (active_array_of()).
+  /// Returns the options for open_mesh. Without --colour-by, the array that the file marks colours the mesh.
   MeshOptions mesh_options() const;
 };
 
@@ -27,11 +27,11 @@ struct DataServiceOptions : DataOptions {
   bool report_progress = false;  ///< "progress STAGE FRACTION" lines on stdout, for the launcher
 };
 
-/// Flags of a data set, which `telesplat run` hands on to its data servers.
+/// Flags of a data set, which `telesplat run` passes on to its data servers.
 options::Table scene_table(DataOptions& options);
-/// What only a data server takes of a data set: the scene, its part of a volume, memory.
+/// Flags of a data set that only a data server has: the scene, its part of a volume, memory.
 options::Table server_table(DataOptions& options);
-/// All that a data server takes.
+/// All flags of a data server.
 options::Table table(DataServiceOptions& options);
 
 }  // namespace telesplat::data

@@ -18,12 +18,12 @@
 namespace telesplat::data {
 namespace {
 
-// How long the loop waits for messages. While something is worked on, its end ends no wait.
+// Longest wait of the loop for messages. While a background task runs, its end does not end the wait: kBusy_s.
 constexpr double kQuiet_s = 0.05, kBusy_s = 0.002;
-constexpr size_t kMostRemarks = 4000;  // bytes that the session is told of them
-constexpr int kRequestsATurn = 64;     // so that the master is not kept waiting
+constexpr size_t kMostRemarks = 4000;  // bytes of notes in the hello
+constexpr int kRequestsATurn = 64;     // then the master's messages get their turn
 
-// Progress goes to the launcher's pipe, or to the log every two seconds. scene: the file.
+// Reports progress to the launcher's pipe, or to the log every two seconds. scene: the file.
 Progress make_progress(bool to_stdout, const std::string& scene) {
   const std::string name = to_utf8(std::filesystem::path(scene).filename().string());
   return [to_stdout, name, last_s = monotonic_s()](const char* stage, double fraction) mutable {
@@ -40,7 +40,7 @@ Progress make_progress(bool to_stdout, const std::string& scene) {
   };
 }
 
-// Nothing is bound where there is nothing to ask for.
+// Binds the socket for requests, if this kind of scene answers any.
 Result<std::string> bind_requests(std::optional<net::Socket>& socket, net::Context& context,
                                   const Served::Requests& requests, const net::ServiceOptions& o) {
   if (requests.endpoint.empty()) return std::string();
@@ -69,7 +69,7 @@ net::MasterLink::Values status_of(const Served& served, const std::optional<net:
   return values;
 }
 
-// What the record of a run is told of the data set.
+// Returns the data set's additions to the record of a run.
 Recorded recorded(const DataServiceOptions& o, const Served& served) {
   Recorded out{.facts = {{metrics::kRecordFact, record_of(o, served)}}, .files = files_of(o, served.kind())};
   std::error_code error;
@@ -78,7 +78,7 @@ Recorded recorded(const DataServiceOptions& o, const Served& served) {
   return out;
 }
 
-// The launcher passes notes on to people.
+// Logs the notes, and sends them to the launcher, which shows them to users.
 void tell_notes(const Served& served, bool to_stdout) {
   for (const auto& note : served.notes()) {
     log::warn("{}", note);
@@ -201,7 +201,7 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
 Result<int> run(const DataServiceOptions& o) {
   const auto access = net::begin_service(o.service, {net::Role::kData}, true);
   if (!access) return access.error();
-  net::end_on_signals();  // while it reads: what was being read is read again next time
+  net::end_on_signals();  // a signal while reading ends the process: the next start reads anew
   const double begin_s = monotonic_s();
   end_at_cut_off_files(2);
   if (const Status s = check_companions(o); !s) return s.error();

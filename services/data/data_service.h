@@ -1,4 +1,4 @@
-// The data server process (T5.2.1): opens the data set, says hello, serves whoever asks.
+// The data server process (T5.2.1): opens the data set, says hello, answers samplers' requests.
 #pragma once
 
 #include <functional>
@@ -13,27 +13,27 @@
 
 namespace telesplat::data {
 
-/// What the session is told of the data set; all text in it is UTF-8, even where a file's name is not. endpoint: where
-/// requests go to; empty: nowhere.
+/// Returns the hello that describes the data set to the session; all of its text is UTF-8, even if a file's name is
+/// not. endpoint: address for requests; empty: no requests.
 wire::Hello make_hello(const Served& served, const std::string& name, const std::string& endpoint);
 
-/// What the record of a run is told beside: facts, and files whose size and hash follow when they are known.
+/// Additions to the record of a run: facts, and files whose size and hash follow when they are known.
 struct Recorded {
   std::map<std::string, std::string> facts;
   std::vector<std::string> files;
 };
 
-/// The process that serves: it says hello, answers until told to stop, and says goodbye.
+/// The serving process: says hello, answers until told to stop, and says goodbye.
 class DataService : public net::Turns {
  public:
-  /// Binds. Error: that cannot be done. Context and `served` must outlive it.
+  /// Binds its socket. Error: it cannot be bound. Context and `served` must outlive the service.
   static Result<std::unique_ptr<DataService>> open(net::Context& context, Served& served,
                                                    const net::ServiceOptions& options, const Recorded& recorded = {},
                                                    std::function<bool()> stop = {});
   virtual int exit_code() const = 0;
 };
 
-/// Takes its turns until told to stop; `stop` ends it, too. Exit code: 0, or 2 if nothing can be bound.
+/// Serves until told to stop, or until `stop` returns true. Exit code: 0, or 2 if its socket cannot be bound.
 int serve(net::Context& context, Served& served, const net::ServiceOptions& options, const std::function<bool()>& stop,
           const Recorded& recorded = {});
 

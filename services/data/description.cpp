@@ -10,7 +10,7 @@
 namespace telesplat::data {
 namespace {
 
-// A file's name may hold anything; a terminal obeys some of it.
+// Replaces control characters: a file's name may hold any, and a terminal would obey them.
 std::string plain(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');

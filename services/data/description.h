@@ -1,4 +1,4 @@
-// What `telesplat inspect` tells of something: a table for people, and all of it for programs.
+// A description that `telesplat inspect` prints: a table for users, and JSON with all values for programs.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,14 +13,14 @@ namespace telesplat::data {
 
 class Description {
  public:
-  /// what: for programs ("mesh"); title: the first line for people.
+  /// what: for programs ("mesh"); title: the first line for users.
   Description(const std::string& what, std::string title);
 
-  /// A row of the table. Without a label it goes on with the row above.
+  /// Adds a row to the table. Without a label it continues the row above.
   void row(std::string label, std::string text) { rows_.emplace_back(std::move(label), std::move(text)); }
-  /// The table, each line ended by a line feed; control characters of files' texts are replaced.
+  /// Returns the table, each line ended by a line feed; control characters from files' texts are replaced.
   std::string table() const;
-  std::string to_json() const;  ///< indented; what is not UTF-8 is replaced
+  std::string to_json() const;  ///< indented; bytes that are not UTF-8 are replaced
 
   nlohmann::ordered_json json;  ///< begins with "what"
 
@@ -30,14 +30,14 @@ class Description {
 };
 
 std::string bytes_text(uint64_t bytes);  ///< "812 bytes", "1.3 MB"
-/// "0 .. 240": both ends with as many digits as tell them apart.
+/// Returns "0 .. 240": both ends with as many digits as distinguish them.
 std::string range_text(double lo, double hi);
 std::string vector_text(const glm::dvec3& v);  ///< "(1, 2.5, -3)"
 std::string extent_text(const glm::dvec3& v);  ///< "1 x 2.5 x 3"
 nlohmann::ordered_json vector_json(const glm::dvec3& v);
 nlohmann::ordered_json box_json(const geometry::DBox& box);  ///< "lo", "hi"
 
-/// Where something stands in the room: a row each for its box and for the axis that points up, and the same as "room".
+/// Adds the position in the room: a row each for the box and for the axis that points up, and both as JSON "room".
 void describe_room(Description& out, const geometry::Box& box_room, const std::string& up, const std::string& reason);
 
 }  // namespace telesplat::data

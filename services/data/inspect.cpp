@@ -23,7 +23,7 @@ void sum_up(const std::vector<geometry::ChunkInfo>& chunks, MeshFileFacts& facts
   for (const geometry::ChunkInfo& chunk : chunks) facts.chunk_bytes += chunk.bytes;
 }
 
-// In what units a file of this kind has its coordinates.
+// Returns the unit of the coordinates in a file of this kind.
 const char* unit_of(const MeshFileFacts& facts) {
   if (facts.raster)
     return facts.raster->unit.empty()        ? "samples"
@@ -32,7 +32,7 @@ const char* unit_of(const MeshFileFacts& facts) {
   return facts.unit.empty() ? "the file's own units" : facts.unit.c_str();
 }
 
-// As inspect_volume() tells it, but read from the header alone.
+// Returns the same unit as inspect_volume(), but reads only the header.
 std::string unit_of_volume(const std::string& path, const MeshOptions& options) {
   const auto source = find_volume(path, options.volume);
   if (!source) return "";
@@ -114,7 +114,7 @@ nlohmann::ordered_json span_json(const scene::ValueSpan& span) {
   return span.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json{span.lo, span.hi};
 }
 
-// What --colour-by takes.
+// Lists the arrays that --colour-by takes.
 void describe_arrays(const std::vector<scene::ArrayInfo>& arrays, Description& out) {
   constexpr size_t kMostTold = 20;
   out.json["arrays"] = nlohmann::ordered_json::array();
@@ -149,7 +149,7 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   facts.iso = options.iso;
   facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {
-    const std::string& read = facts.info.source;  // of a folder its first file
+    const std::string& read = facts.info.source;  // a folder's first file
     const auto file = MappedFile::open(read);
     if (!file) return file.error();
     std::vector<std::string> files = companion_files((*file)->text(), "raster", read);

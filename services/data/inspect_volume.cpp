@@ -1,4 +1,4 @@
-// What `telesplat inspect` says of a volume.
+// Describes volumes for `telesplat inspect`.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -27,7 +27,7 @@ std::string bars(const std::array<uint64_t, 64>& counts) {
   return out;
 }
 
-// Of the first step, before a store takes its voxels.
+// Takes the first step's histogram and facts, before a store takes its voxels.
 void take(const Volume& v, VolumeFileFacts& facts) {
   facts.voxel_bytes = v.stored.size();
   const size_t count = v.stored.size() / voxel_bytes(v.type);
@@ -75,7 +75,7 @@ void describe_grid(const VolumeFileFacts& facts, Description& out) {
   out.json["box"] = box_json(box);
 }
 
-// Those that a file names, and which one is shown.
+// Lists the arrays that a file names, and the shown one.
 void describe_arrays(const VolumeFileFacts& facts, Description& out) {
   if (facts.volume.array.empty()) return;
   out.row("array", facts.volume.array);

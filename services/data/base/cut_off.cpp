@@ -12,10 +12,10 @@ namespace telesplat::data {
 namespace {
 
 constexpr int kPlaces = 1024;
-constexpr size_t kMostName = 240;  // bytes; of longer names the end
+constexpr size_t kMostName = 240;  // bytes; of a longer name only its end is kept
 constexpr char kEllipsis[] = "...";
 
-// What a signal handler may look at while other threads map and unmap: a place is `here` only while it is complete.
+// A mapping that the signal handler reads while other threads map and unmap: `here` is set only while it is complete.
 struct Place {
   std::atomic<bool> taken{false}, here{false};
   std::atomic<uintptr_t> begin{0}, end{0};
@@ -38,13 +38,13 @@ void on_bus_error(int, siginfo_t* info, void*) {
   const auto at = reinterpret_cast<uintptr_t>(info->si_addr);
   for (const Place& p : places) {
     if (!p.here || at < p.begin || at >= p.end) continue;
-    while (told.exchange(true)) pause();  // another thread ends the process
+    while (told.exchange(true)) pause();  // another thread ends the process already
     say("telesplat: ");
     say(p.name);
     say(": was cut off while it was read\n");
     _exit(exit_code);
   }
-  signal(SIGBUS, SIG_DFL);  // what failed fails again
+  signal(SIGBUS, SIG_DFL);  // the access that failed fails again, with the default action
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Files that others cut off while they are mapped: touching what is gone is SIGBUS, which is to be one line and an end.
+// Handles mapped files that another process cuts off: reading the lost part raises SIGBUS, which ends this one.
 #pragma once
 
 #include <cstddef>
@@ -7,11 +7,11 @@
 namespace telesplat::data {
 
 /// From now on SIGBUS in a mapped file ends this process with `exit_code`, after the line "telesplat: FILE: was cut off
-/// while it was read" on standard error; elsewhere it ends it as before. May be called again, with another code.
+/// while it was read" on standard error; other SIGBUS end it as before. May be called again, with another code.
 void end_at_cut_off_files(int exit_code);
 
-/// Knows a mapping by its file's name as long as it lives. Where very many files are mapped some have no name. Any
-/// thread.
+/// Maps a memory range to its file's name as long as it lives. With more than 1024 mappings, further ones have no name.
+/// Any thread.
 class NamedMapping {
  public:
   NamedMapping(const void* data, size_t bytes, std::string_view name);

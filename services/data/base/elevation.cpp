@@ -14,7 +14,7 @@ struct Tint {
   float at;  // 0: 2nd percentile of land heights, 1: 98th
   std::array<float, 3> rgb;
 };
-// Hypsometric tints, after the usual order of atlases; muted, so that shading shows.
+// Hypsometric tints, in the usual order of atlases; muted, so that shading shows.
 constexpr std::array<Tint, 7> kTints{{{0.00f, {96, 132, 82}},
                                       {0.18f, {148, 168, 100}},
                                       {0.36f, {206, 198, 132}},
@@ -36,12 +36,12 @@ uint32_t tint(float at) {
 }
 
 struct Relief {
-  float lo = 0, hi = 1;  // all
+  float lo = 0, hi = 1;  // range of all heights
   float land_lo = 0, land_hi = 1;
   bool sea = false;
 };
 
-// Percentiles of heights; of those above sea level where a good part is exactly at or below it.
+// Returns percentiles of heights; only of those above sea level where many lie exactly at or below it.
 Relief relief_of(const ElevationRaster& raster) {
   std::vector<float> heights;
   const size_t stride = std::max<size_t>(raster.heights.size() / 1'000'000, 1);
@@ -62,7 +62,7 @@ Relief relief_of(const ElevationRaster& raster) {
   return out;
 }
 
-// vertex: of each sample, kNone: it has no data.
+// vertex: index of each sample's vertex; kNone: no data.
 void add_triangles(const ElevationRaster& raster, const std::vector<uint32_t>& vertex, Mesh& mesh) {
   const auto w = size_t(raster.width), h = size_t(raster.height);
   const bool mirrored = raster.along_row.x * raster.along_column.y > raster.along_row.y * raster.along_column.x;
@@ -76,7 +76,7 @@ void add_triangles(const ElevationRaster& raster, const std::vector<uint32_t>& v
         mesh.indices.insert(mesh.indices.end(), {a, mirrored ? c : b, mirrored ? b : c});
       };
       if (have == 4) {
-        // Along the diagonal whose ends differ less: ridges and valleys stay sharp.
+        // Cut along the diagonal whose ends differ less: ridges and valleys stay sharp.
         const auto z = [&](uint32_t v) { return mesh.positions[v].z; };
         if (std::abs(z(nw) - z(se)) <= std::abs(z(ne) - z(sw)))
           triangle(nw, sw, se), triangle(nw, se, ne);

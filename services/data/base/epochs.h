@@ -1,4 +1,4 @@
-// The scene as it was in the last epochs: people point at what a viewer showed them a moment ago.
+// Keeps the scenes of the last epochs: users point at what a viewer showed them a moment ago.
 #pragma once
 
 #include <algorithm>
@@ -20,13 +20,13 @@ class Epochs {
   struct Scene {
     EpochId epoch;
     geometry::Clip clip;
-    std::string colouring;  ///< as the fact has it
+    std::string colouring;  ///< as the session's fact states it
     std::map<std::string, double> parameters;
   };
 
   void keep(const wire::Welcome& session) {
     const scene::SessionView view(session);
-    if (session.master != master_) scenes_.clear();  // another one counts its own epochs
+    if (session.master != master_) scenes_.clear();  // another master counts its own epochs
     master_ = session.master;
     auto clip = geometry::clip_from_text(view.fact(scene::kClipFact));
     if (!clip) return;
@@ -34,7 +34,7 @@ class Epochs {
     scenes_.push_back({session.epoch, *std::move(clip), view.fact(scene::kColouringFact), session.parameters});
     if (scenes_.size() > kMost) scenes_.pop_front();
   }
-  /// Null: it is not known, or over for long.
+  /// Null: the epoch is not known, or is over for too long.
   const Scene* find(EpochId epoch) const {
     const auto found = std::find_if(scenes_.begin(), scenes_.end(), [&](const Scene& s) { return s.epoch == epoch; });
     return found == scenes_.end() ? nullptr : &*found;

@@ -29,7 +29,7 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::map(int descriptor, const 
 }
 
 Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& path) {
-  // O_NONBLOCK: a pipe given by mistake must not hang us.
+  // O_NONBLOCK: opening a pipe given by mistake must not block.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return Error{fmt::format("{}: cannot be opened: {}", path, std::strerror(errno))};
   auto mapped = map(descriptor, path);

@@ -1,4 +1,4 @@
-// Files, memory-mapped read-only, and those that a data file names: material libraries, pictures, buffers, pieces.
+// Memory-mapped, read-only files, and the files that a data file names: material libraries, pictures, buffers, pieces.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +15,13 @@
 
 namespace telesplat::data {
 
-/// The bytes live as long as the object. Move-free: hold it by shared_ptr. Who reads bytes that somebody has cut off
-/// meanwhile gets SIGBUS (cut_off.h).
+/// The bytes live as long as the object. Not movable: hold it by shared_ptr. Reading bytes that another process has cut
+/// off meanwhile raises SIGBUS (cut_off.h).
 class MappedFile {
  public:
-  /// Maps a regular, readable file that is not empty. Errors name the path and say which of these it is not.
+  /// Maps a regular, readable file that is not empty. Errors name the path and the condition that fails.
   static Result<std::shared_ptr<const MappedFile>> open(const std::string& path);
-  /// Maps an open file of at least one byte; the descriptor stays the caller's.
+  /// Maps an open file of at least one byte; the caller keeps and closes the descriptor.
   static Result<std::shared_ptr<const MappedFile>> map(int descriptor, const std::string& name);
   ~MappedFile();
   MappedFile(const MappedFile&) = delete;
@@ -38,21 +38,21 @@ class MappedFile {
   NamedMapping named_;
 };
 
-/// Gives readers the files that the file they read names, wherever these come from.
+/// Gives readers the other files that their file names, from any source.
 class Companions {
  public:
   virtual ~Companions() = default;
-  /// The content of a file, by its name as it stands in the data file: relative to that file's folder. It stays valid
-  /// as long as this object. Error: there is no such file, or it may not be read; the text names it.
+  /// Returns the content of a file named in the data file, relative to that file's folder. It stays valid as long as
+  /// this object. Error, naming the file: it does not exist, or may not be read.
   virtual Result<std::string_view> read(const std::string& named) = 0;
-  /// The picture in `bytes`, as image::read_picture() has it. Error: only telesplat-import decodes it.
+  /// Decodes the picture in `bytes`, as image::read_picture(). Error: only telesplat-import decodes pictures.
   virtual Result<image::View> picture(std::string_view bytes, const std::string& name, uint64_t most_pixels);
 };
 
 /// Files on disk.
 class FolderCompanions : public Companions {
  public:
-  /// path: of the data file.
+  /// path: the data file's.
   explicit FolderCompanions(const std::string& path) : folder_(std::filesystem::path(path).parent_path()) {}
   Result<std::string_view> read(const std::string& named) override;
 

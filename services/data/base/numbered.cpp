@@ -14,11 +14,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostFiles = 100'000;  // in a folder
+constexpr size_t kMostFiles = 100'000;  // per folder
 
 std::string file_name(const std::string& path) { return fs::path(path).filename().string(); }
 
-// A name as what lies between its numbers ("run*-phase*.nrrd") and these. A number with a fraction is one.
+// A file name, split into its numbers and the text between them ("run*-phase*.nrrd"). A decimal fraction is one number.
 struct Numbered {
   std::string pattern;
   std::vector<std::string> numbers;
@@ -38,7 +38,7 @@ Numbered numbered(const std::string& name) {
   return out;
 }
 
-// "007.50" as "7" and "5".
+// Splits a number into its whole and fractional digits: "007.50" into "7" and "5".
 std::pair<std::string, std::string> parts_of(const std::string& number) {
   const size_t dot = std::min(number.find('.'), number.size());
   std::string whole = number.substr(0, dot), fraction = dot < number.size() ? number.substr(dot + 1) : "";
@@ -98,7 +98,7 @@ Result<std::vector<std::string>> numbered_series(const std::vector<std::string>&
   const size_t counter = *differing.begin();
   std::sort(members.begin(), members.end(),
             [&](auto& a, auto& b) { return lower_number(a.first.numbers[counter], b.first.numbers[counter]); });
-  // Numbers that grow with the counter (a step and its time) are well.
+  // Other numbers may differ, too, if they grow with the counter (a step and its time).
   for (size_t i = 1; i < members.size(); ++i) {
     const auto &a = members[i - 1].first.numbers, &b = members[i].first.numbers;
     for (const size_t n : differing)

@@ -1,4 +1,4 @@
-// Running numbers of things that have a key: vertices, edges.
+// Running numbers for keys: vertices, edges.
 #pragma once
 
 #include <algorithm>
@@ -11,17 +11,17 @@
 
 namespace telesplat::data {
 
-/// Numbers keys in the order in which they first come, by their bytes. An open hash table, which grows with millions of
-/// them.
+/// Numbers keys, compared by their bytes, in the order in which they first come. An open hash table, which grows up to
+/// millions of keys.
 template <class Key>
 class Numbering {
  public:
   static constexpr uint32_t kNone = ~uint32_t{0};
 
-  /// keys: about as many as will come.
+  /// keys: expected number of keys.
   explicit Numbering(size_t keys = 512) : table_(std::bit_ceil(std::max<size_t>(2 * keys, 16)), kNone) {}
 
-  /// The number of a key, the next one if it is new.
+  /// Returns the number of a key: the next one if it is new.
   uint32_t operator()(const Key& key) {
     if (2 * (keys_.size() + 1) > table_.size()) grow();
     uint32_t& slot = table_[place(key)];
@@ -31,7 +31,7 @@ class Numbering {
     }
     return slot;
   }
-  /// kNone: it has not come.
+  /// kNone: the key has not come.
   uint32_t find(const Key& key) const { return table_[place(key)]; }
   const std::vector<Key>& keys() const { return keys_; }  ///< by number
   std::vector<Key> take_keys() { return std::move(keys_); }

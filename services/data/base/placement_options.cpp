@@ -8,7 +8,7 @@ Result<glm::dmat3> rotation_for_up(const std::string& up, scene::Space space) {
   // Columns are the images of the data axes.
   using V = glm::dvec3;
   if (space == scene::Space::kRas) {
-    // The axis that is called x or y points the other way in LPS.
+    // The axes x and y point the other way in LPS.
     const bool minus = up.starts_with('-'), turned = !up.ends_with('z');
     const auto lps = rotation_for_up((minus != turned ? "-" : "") + up.substr(minus ? 1 : 0));
     if (!lps) return rotation_for_up(up);

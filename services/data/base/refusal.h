@@ -1,4 +1,4 @@
-// How readers give up in the midst of a file: they throw, and what is called from outside makes an Error of it.
+// Readers give up in the midst of a file by throwing a Refusal; their public functions turn it into an Error.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 
 namespace telesplat::data {
 
-/// Why a file is not read. Never leaves the library that throws it: or_error().
+/// Reason why a file is not read. or_error() catches it within the library that throws it.
 struct Refusal {
   std::string text;
 };
@@ -31,7 +31,7 @@ inline void need(const Status& status) {
   if (!status) throw Refusal{status.error().text};
 }
 
-/// Returns what read() returns (a Status, where that is nothing), or the Error that it refuses with.
+/// Returns the result of read() (a Status if it returns void), or the Error that it refuses with.
 template <class Read>
 auto or_error(Read&& read) {
   using Value = decltype(read());

@@ -12,24 +12,24 @@ namespace telesplat::data {
 enum class StoredType { kU8, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64 };
 size_t stored_bytes(StoredType type);
 const char* name_of(StoredType type);  ///< "u8" .. "f64"
-/// Turns numbers round, to the other byte order.
+/// Reverses the bytes of each number, to the other byte order.
 void swap_bytes(std::span<std::byte> bytes, StoredType type);
 
-/// The type of whole numbers of 1, 2, 4 or 8 bytes.
+/// Returns the integer type of 1, 2, 4 or 8 bytes.
 constexpr StoredType whole_type(size_t bytes, bool is_signed) {
   const int row = bytes == 1 ? 0 : bytes == 2 ? 2 : bytes == 4 ? 4 : 6;
   return StoredType(row + is_signed);
 }
 
-/// What a format calls a type.
+/// A format's name for a type.
 struct TypeName {
   std::string_view name;
   StoredType type;
 };
-/// The type of a name; nothing: it is not among them.
+/// Returns the type with this name; nullopt: the name is not in the list.
 std::optional<StoredType> type_named(std::string_view name, std::span<const TypeName> names);
 
-/// f(T{}) with the C++ type of `type`.
+/// Returns f(T{}) with the C++ type of `type`.
 template <class F>
 [[gnu::always_inline]] inline decltype(auto) with_type(StoredType type, F&& f) {
   switch (type) {

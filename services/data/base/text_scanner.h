@@ -1,4 +1,4 @@
-// Walking over the words and numbers of a text file in memory. Never reads past its end, never throws.
+// Walks over the words and numbers of a text file in memory. Never reads past its end, never throws.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ class TextScanner {
 
   bool at_end() const { return at_ == end_; }
   size_t offset() const { return static_cast<size_t>(at_ - begin_); }
-  size_t line_number() const {  // counted on demand: for error texts
+  size_t line_number() const {  // counted on demand, for error texts
     size_t lines = 1;
     for (const char* p = begin_; p < at_; ++p) lines += *p == '\n';
     return lines;
@@ -29,7 +29,7 @@ class TextScanner {
     while (at_ < end_ && (*at_ == ' ' || *at_ == '\t' || *at_ == '\r')) ++at_;
     return at_ < end_ && *at_ != '\n' && (comment == '\0' || *at_ != comment);
   }
-  /// Skips white space over line ends, and comments up to their line's end. Returns true if something follows.
+  /// Skips white space across lines, and comments up to their line's end. Returns true if text follows.
   bool skip_space(char comment = '\0') {
     while (at_ < end_) {
       if (static_cast<unsigned char>(*at_) <= ' ')
@@ -51,13 +51,13 @@ class TextScanner {
     while (at_<end_&& static_cast<unsigned char>(*at_)> ' ') ++at_;
     return {start, static_cast<size_t>(at_ - start)};
   }
-  /// A number here: decimal, exponent, nan, inf, 1.#QNAN and its like, with or without a leading plus. What follows
-  /// must not belong to a word.
+  /// Reads a number: decimal, exponent, nan, inf, 1.#QNAN and the like, with or without a leading plus. The character
+  /// after it must not belong to a word.
   bool number(double& out) { return parse(out); }
   bool integer(int64_t& out) { return parse(out); }
   bool value(double& out) { return parse(out); }
   bool value(int64_t& out) { return parse(out); }
-  /// Skips bytes that are no text; at most those that there are.
+  /// Skips bytes that are not text, at most to the end.
   void skip(uint64_t bytes) { at_ += std::min(bytes, static_cast<uint64_t>(end_ - at_)); }
   bool skip_char(char c) { return at_ < end_ && *at_ == c ? (++at_, true) : false; }
 
@@ -87,19 +87,19 @@ class TextScanner {
   const char* begin_;
 };
 
-/// Without white space around it.
+/// Returns the text without white space around it.
 inline std::string_view trim(std::string_view text) {
   while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
   while (!text.empty() && static_cast<unsigned char>(text.back()) <= ' ') text.remove_suffix(1);
   return text;
 }
 
-/// The rest of a line as a name: without blanks around it.
+/// Returns the rest of a line without white space around it.
 inline std::string rest_of_line(std::string_view content, size_t offset) {
   return std::string(trim(content.substr(offset, content.find('\n', offset) - offset)));
 }
 
-/// In small letters, as far as they are ASCII's.
+/// Returns the text with ASCII letters in lower case.
 inline std::string lower(std::string_view text) {
   std::string out(text);
   std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return char(std::tolower(c)); });

@@ -13,7 +13,7 @@ namespace {
 const Json kNothing;
 constexpr const char* kMeshopt[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
 
-// By component type from 5120 on: bytes, and the largest value of integers.
+// By component type from 5120 on: bytes, and the largest integer value.
 struct Component {
   size_t bytes;
   double largest;
@@ -90,7 +90,7 @@ const Json& extension(const Json& of, const char* name) { return member(member(o
 std::optional<size_t> index(const Json& of, const char* key) {
   const Json& value = member(of, key);
   if (value.is_number_unsigned()) return value.get<size_t>();
-  // Some programs write whole numbers as 3.0.
+  // Some programs write integers as 3.0.
   const double number = value.is_number_float() ? value.get<double>() : -1;
   return number >= 0 && number < 1e15 && number == double(size_t(number)) ? std::optional(size_t(number))
                                                                           : std::nullopt;
@@ -139,7 +139,7 @@ Bytes Document::buffer(size_t i) {
   const Json& buffer = at("buffers", i);
   if (!buffer.is_object()) refuse("names buffer {}, there are {}", i, list("buffers").size());
   const std::string uri = text(buffer, "uri");
-  // A buffer without a URI is the second chunk of a GLB, or stands for what compressed views unpack to.
+  // A buffer without a URI is the second chunk of a GLB, or holds the place of unpacked compressed views.
   const auto data = !uri.empty()                             ? resource(uri)
                     : i == 0 && content_.starts_with("glTF") ? Result<std::string_view>(glb_binary(content_))
                                                              : Result<std::string_view>(std::string_view());
@@ -214,7 +214,7 @@ int Document::read(size_t number, int width, std::vector<To>& out) {
   if (width && own != width) refuse("accessor {} is of type {}", number, text(accessor, "type"));
   if (std::is_integral_v<To> && type == kFloat) refuse("accessor {} is of floating point numbers", number);
   const auto view_index = index(accessor, "bufferView");
-  // Elements need not lie apart, so a view of few bytes can hold many; zeros need no view at all.
+  // Elements may overlap, so a view of few bytes can hold many; zeros need no view at all.
   const uint64_t most = view_index ? view(*view_index).size() : bytes_of_files();
   if (*count > most) refuse("accessor {} claims {} elements, its files have {} bytes", number, *count, most);
   out.assign(*count * size_t(own), To{});

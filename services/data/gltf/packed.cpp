@@ -14,11 +14,11 @@
 namespace telesplat::data::gltf {
 namespace {
 
-// Runs of equal elements take least: of 256, each four bytes become two bits.
+// Runs of 256 equal elements are smallest: each four bytes become two bits.
 constexpr size_t kMostExpansion = 1024;
 constexpr size_t kGroup = 16;
 
-// Version 1 of the attribute codec, which meshoptimizer knows from 0.23 on, and Debian 12 has 0.18.
+// Version 1 of the attribute codec: meshoptimizer reads it from 0.23 on, and Debian 12 has 0.18.
 class AttributeDecoder {
  public:
   AttributeDecoder(std::span<const uint8_t> packed, size_t stride) : stride_(stride) {
@@ -57,7 +57,7 @@ class AttributeDecoder {
     return at;
   }
 
-  // One byte of n elements, in groups of 16 that have 0, 1, 2, 4 or 8 bits each.
+  // Unpacks one byte of each of n elements, in groups of 16 that take 0, 1, 2, 4 or 8 bits per value.
   void unpack(int control, size_t n, uint8_t* out) {
     constexpr int kBits[2][4] = {{0, 1, 2, 4}, {1, 2, 4, 8}};
     if (control == 2) std::fill_n(out, n, uint8_t{0});
@@ -68,7 +68,7 @@ class AttributeDecoder {
     for (size_t g = 0; g < groups; ++g) unpack_group(kBits[control][header[g / 4] >> g % 4 * 2 & 3], out + g * kGroup);
   }
 
-  // Values of so few bits; the largest says that the value follows as a byte.
+  // Unpacks values of `bits` bits; the largest value says that the real one follows as a byte.
   void unpack_group(int bits, uint8_t* out) {
     std::fill_n(out, kGroup, uint8_t{0});
     const uint8_t* packed = take(size_t(2 * bits));
@@ -80,7 +80,7 @@ class AttributeDecoder {
     }
   }
 
-  // Four bytes of an element from those of the one before: differences of bytes or of pairs, or turned bits.
+  // Adds an element's four-byte deltas to the element before: differences of bytes or of pairs, or rotated bits.
   static void add(uint8_t channel, std::array<uint8_t, 4> delta, uint8_t* to) {
     const auto unzigzag = [](unsigned v) { return v >> 1 ^ (0 - (v & 1)); };
     const auto pair = [](const uint8_t* p) { return unsigned(p[0] | p[1] << 8); };
@@ -104,7 +104,7 @@ class AttributeDecoder {
   std::vector<uint8_t> last_, channels_;
 };
 
-// Colours as luma and two chromas of fewer bits; the highest bit of alpha says of how many.
+// Decodes colours from luma and two chromas of fewer bits; the highest bit of alpha gives their number of bits.
 template <class Unsigned>
 void decode_colours(std::span<std::byte> data) {
   using Signed = std::make_signed_t<Unsigned>;

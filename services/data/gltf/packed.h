@@ -1,4 +1,4 @@
-// Inside services/data/gltf: what Draco and meshoptimizer have packed. Sources: Khronos, "KHR_draco_mesh_compression";
+// Inside services/data/gltf: unpacks Draco and meshoptimizer data. Sources: Khronos, "KHR_draco_mesh_compression";
 // "EXT_meshopt_compression" and "KHR_meshopt_compression", appendices A and B.
 #pragma once
 
@@ -14,20 +14,20 @@
 namespace telesplat::data::gltf {
 
 struct DracoMesh {
-  std::vector<uint32_t> indices;          ///< three a triangle
-  std::map<uint32_t, Values> attributes;  ///< by the ids that the extension names; integers as they are stored
+  std::vector<uint32_t> indices;          ///< three per triangle
+  std::map<uint32_t, Values> attributes;  ///< by the ids that the extension names; integers as stored
 };
 
-/// Throws Refusal: it is damaged, or is no triangle mesh.
+/// Throws Refusal: the data are damaged, or not a triangle mesh.
 DracoMesh decode_draco(Bytes packed, const std::vector<uint32_t>& ids);
 
 struct MeshoptView {
-  size_t count, stride;      ///< stride: bytes an element
-  std::string mode, filter;  ///< as the extension names them; filter: "" or "NONE": none
+  size_t count, stride;      ///< stride: bytes per element
+  std::string mode, filter;  ///< as the extension names them; filter "" or "NONE": no filter
 };
 
 /// Unpacks count times stride bytes: all modes, filters and versions of both extensions. Throws Refusal: the data are
-/// damaged, or claim more than their bytes can hold.
+/// damaged, or claim more bytes than they can hold.
 std::vector<std::byte> decode_meshopt(std::span<const std::byte> packed, const MeshoptView& view);
 
 }  // namespace telesplat::data::gltf

@@ -17,7 +17,7 @@ Wrap wrap_of(const Json& sampler, const char* key) {
   return word == kClampToEdge ? Wrap::kClamp : word == kMirroredRepeat ? Wrap::kMirror : Wrap::kRepeat;
 }
 
-// Its y axis points down: turned against the clock as one sees the picture.
+// The picture's y axis points down: rotation is counterclockwise as seen on the picture.
 glm::dmat3x2 uv_transform(const Json& transform) {
   const auto offset = numbers<2>(transform, "offset", {0, 0}), scale = numbers<2>(transform, "scale", {1, 1});
   const double angle = number(transform, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
@@ -28,7 +28,7 @@ constexpr size_t kTriangles = 4, kStrip = 5, kFan = 6;
 
 size_t mode_of(const Json& primitive) { return index(primitive, "mode").value_or(kTriangles); }
 
-// What attributes of a primitive hold, wherever they lie.
+// Reads the attributes of a primitive, packed or not.
 class Attributes {
  public:
   Attributes(Document& document, const Json& primitive)
@@ -46,7 +46,7 @@ class Attributes {
     }
   }
 
-  /// Empty: there is no such attribute, or one of another width. width: 0 takes any.
+  /// Empty: no such attribute, or one of another width. width: 0 accepts any.
   Values operator()(const std::string& name, int width) {
     const auto accessor = index(accessors_, name.c_str());
     if (!accessor) return {};
@@ -77,7 +77,7 @@ class Attributes {
   DracoMesh draco_;
 };
 
-// Strips turn every other triangle; those that have one corner twice join strips and are none.
+// Strips turn every other triangle; triangles with two equal corners only join strips and are left out.
 std::vector<uint32_t> triangles_of(std::vector<uint32_t> list, size_t mode) {
   if (mode == kTriangles) {
     list.resize(list.size() / 3 * 3);
@@ -109,7 +109,7 @@ const Material& Materials::at(std::optional<size_t> number_of) {
   out.blend = text(json, "alphaMode") == "BLEND";
   out.cutoff = number(json, "alphaCutoff", 0.5);
   const Json* info = &member(own ? metal : gloss, own ? "baseColorTexture" : "diffuseTexture");
-  // What is black but for its own light is shown in the colour of that.
+  // A material that is black except for its own light is shown in the colour of that light.
   const auto light = numbers<3>(json, "emissiveFactor", {0, 0, 0});
   if (glm::dvec3(out.factor) == glm::dvec3(0) && light != std::array<double, 3>{0, 0, 0}) {
     out.factor = {light[0], light[1], light[2], factor[3]};

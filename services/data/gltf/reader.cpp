@@ -13,10 +13,10 @@ namespace telesplat::data {
 namespace gltf {
 namespace {
 
-constexpr size_t kMostVertices = size_t{1} << 25;  // instances counted; one more for two bytes of the files
+constexpr size_t kMostVertices = size_t{1} << 25;  // with instances; the files' bytes allow one more per two bytes
 constexpr double kInvisible = 1 / 512.0;           // opacity below half of an 8-bit step
 
-// Extensions that files may require: those that are read, and those that change nothing of shapes and base colours.
+// Extensions that files may require: those that are read, and those that change neither shapes nor base colours.
 constexpr std::string_view kRead[] = {
     "KHR_mesh_quantization",   "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression",
     "EXT_mesh_gpu_instancing", "KHR_texture_transform",   "EXT_texture_webp",        "KHR_node_visibility"};
@@ -114,8 +114,8 @@ class Reader {
     corners.resize(kept);
   }
 
-  // Many primitives may share one list of vertices and use few of it each: the vertices that count, by which the
-  // corners are numbered from now on.
+  // Returns the vertices that the primitive uses, and renumbers its corners by them: many primitives may share one
+  // list of vertices and use few of it each.
   static std::vector<uint32_t> keep_used(Primitive& primitive) {
     auto& corners = primitive.corners;
     const size_t vertices = primitive.positions.count();
@@ -135,7 +135,7 @@ class Reader {
     return used;
   }
 
-  // Returns what is negative where the placement mirrors.
+  // Returns a negative number if the placement mirrors.
   double add_places(const Primitive& primitive, const std::vector<uint32_t>& used, const Placement& placement,
                     const std::vector<double>& weights) {
     const bool skinned = placement.joints && !primitive.joints.empty();

@@ -70,7 +70,7 @@ class Scene {
     const Json& scene = document_.at("scenes", index(document_.root(), "scene").value_or(0));
     if (scene.is_object()) {
       auto out = node_list(scene, "nodes", nodes_.size());
-      return {out.rbegin(), out.rend()};  // the last is taken first
+      return {out.rbegin(), out.rend()};  // the last element is visited first
     }
     std::vector<size_t> out;
     for (size_t i = nodes_.size(); i-- > 0;)

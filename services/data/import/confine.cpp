@@ -23,7 +23,7 @@ void limit(int resource, uint64_t most) {
   setrlimit(__rlimit_resource(resource), &both);
 }
 
-// Denies all that the first version of Landlock knows; later ones know more, which seccomp denies.
+// Denies all accesses that the first version of Landlock knows; seccomp denies those of later versions.
 void close_files() {
   constexpr uint64_t kAll = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1;
   constexpr uint64_t kReading = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
@@ -59,12 +59,12 @@ constexpr int kDenied[] = {
 };
 // clang-format on
 
-// Denied calls fail; none ends the process.
+// Denied calls fail; they do not end the process.
 void close_calls() {
   const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ALLOW);
   if (!filter) return;
   for (const int call : kDenied) seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), call, 0);
-  // Where there is no Landlock, files can be read still, but none is written.
+  // Without Landlock, files can still be read, but not written.
   for (const auto& [call, argument] : {std::pair{SCMP_SYS(open), 1u}, std::pair{SCMP_SYS(openat), 2u}})
     for (const scmp_datum_t how : {O_WRONLY, O_RDWR})
       seccomp_rule_add(filter, SCMP_ACT_ERRNO(EACCES), call, 1,

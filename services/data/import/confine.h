@@ -1,4 +1,4 @@
-// What a process that runs other people's parsers may do: compute, and write into what is open already.
+// Confines a process that runs foreign parsers: it may compute, and write into files that are open already.
 #pragma once
 
 #include <cstdint>
@@ -6,12 +6,12 @@
 
 namespace telesplat::data {
 
-/// Takes from this process, as far as the kernel offers it: opening files other than the system's libraries and tables
-/// below /usr, /lib and /etc/ld.so.cache (Landlock), writing any; sockets, programs, other processes (seccomp); memory
-/// beyond `memory_bytes`, three quarters of the machine's at most; output beyond that, too; core files.
+/// Denies this process, as far as the kernel can: opening files other than the system's libraries and tables below
+/// /usr, /lib and /etc/ld.so.cache (Landlock); writing any file; sockets, programs, other processes (seccomp); memory
+/// beyond `memory_bytes`, and beyond three quarters of the machine's; output beyond that, too; core files.
 void confine(uint64_t memory_bytes);
 
-/// What of that this kernel does not offer, for people; empty: it offers all.
+/// Returns the protections that this kernel lacks, for users; empty: it has all.
 std::string not_confined();
 
 }  // namespace telesplat::data

@@ -34,7 +34,7 @@ class View final : public std::streambuf {
   off_type size() const { return egptr() - eback(); }
 };
 
-// Makes three bytes a pixel one, in place; they are interleaved or plane by plane within each frame.
+// Replaces three bytes per pixel by one, in place; input is interleaved, or plane by plane within each frame.
 void make_grey(std::vector<char>& pixels, size_t per_frame, bool planes, bool luma_first) {
   const auto* from = reinterpret_cast<const unsigned char*>(pixels.data());
   const size_t count = pixels.size() / 3;

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr size_t kMostPath = 4096;
 
-// A message of a path and a descriptor.
+// A message with a path and a descriptor.
 struct Packet {
   char path[kMostPath];
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
@@ -49,7 +49,7 @@ bool send(int socket, const std::string& path, int descriptor) {
 void send_files(int socket, const std::vector<std::string>& paths) {
   for (const std::string& path : paths) {
     if (path.empty() || path.size() > kMostPath) continue;
-    // O_NONBLOCK: a pipe given by mistake must not hang us.
+    // O_NONBLOCK: opening a pipe given by mistake must not block.
     const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (descriptor < 0) continue;
     struct stat status {};
@@ -66,7 +66,7 @@ uint64_t ImportFile::size() const {
 }
 
 ImportFiles::ImportFiles(int socket) {
-  rlimit most{};  // of open files: folders of slices have thousands
+  rlimit most{};  // limit of open files: folders of slices have thousands
   if (getrlimit(RLIMIT_NOFILE, &most) == 0) most.rlim_cur = most.rlim_max, setrlimit(RLIMIT_NOFILE, &most);
   for (;;) {
     Packet packet;

@@ -1,4 +1,4 @@
-// How telesplat-import gets the files that it reads: as descriptors, from the process that asked. It opens none itself.
+// telesplat-import opens no files: it receives descriptors of those that it reads from the process that started it.
 #pragma once
 
 #include <memory>
@@ -9,11 +9,11 @@
 
 namespace telesplat::data {
 
-/// Sends descriptors of those of `paths` that are regular files and can be opened, each with its path, through a socket
-/// of packets. Stops where the other end is gone.
+/// Opens `paths` and sends the descriptors of regular files, each with its path, through a socket of packets. Stops if
+/// the other end is closed.
 void send_files(int socket, const std::vector<std::string>& paths);
 
-/// A file that was received.
+/// A received file.
 class ImportFile {
  public:
   ImportFile(std::string path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
@@ -30,18 +30,18 @@ class ImportFile {
   int descriptor_;  // open as long as the process lives
 };
 
-/// All that a sender sent: the file to be read first, then its companions.
+/// All received files: the file to be read first, then its companions.
 class ImportFiles : public Companions {
  public:
   /// Receives until the sender closes its end.
   explicit ImportFiles(int socket);
 
   const std::vector<ImportFile>& all() const { return files_; }
-  uint64_t bytes() const;  ///< of all files together
-  /// The content of the first one. Error: it did not come; it is empty.
+  uint64_t bytes() const;  ///< sum over all files
+  /// Returns the content of the first file. Error: it did not come, or is empty.
   Result<std::string_view> content();
   Result<std::string_view> content_of(const ImportFile& file);
-  /// named: relative to the folder of the first one.
+  /// named: relative to the first file's folder.
   Result<std::string_view> read(const std::string& named) override;
 
  private:

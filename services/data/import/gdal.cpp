@@ -1,4 +1,4 @@
-// Elevation rasters, read by GDAL: heights, where they lie on earth, and a texture draped over them.
+// Reads elevation rasters by GDAL: heights, their position on earth, and a texture draped over them.
 #include <fmt/format.h>
 #include <ogr_srs_api.h>
 
@@ -20,13 +20,13 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kMaxSide = 1 << 18;
 
-// Where pixels lie: in degrees, or in some unit of length.
+// Position of pixels: in degrees, or in a unit of length.
 struct Placement {
   double transform[6] = {0, 1, 0, 0, 0, -1};  // corner of pixel (c, r): x = t0 + c t1 + r t2, y = t3 + c t4 + r t5
   bool georeferenced = false, degrees = false;
-  bool reference = false;  // the file says in what system
-  double metres = 1;       // a unit of length
-  std::string unit;        // its name; empty: not said
+  bool reference = false;  // the file names its reference system
+  double metres = 1;       // length of the unit, m
+  std::string unit;        // its name; empty: not given
 
   glm::dvec2 at(double column, double row) const {
     const double* t = transform;
@@ -50,7 +50,7 @@ Placement placement_of(GDALDatasetH dataset) {
     if (!(out.metres > 0) || !std::isfinite(out.metres)) out.metres = 1;
     out.unit = out.degrees ? "degrees" : out.metres == 1 || !unit ? "metres" : unit;
   } else {
-    // Without a reference system, but with coordinates that can only be degrees.
+    // No reference system, but coordinates that can only be degrees.
     const double w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
     const glm::dvec2 a = out.at(0, 0), b = out.at(w, h);
     out.degrees = std::max(std::abs(a.x), std::abs(b.x)) <= 180.1 && std::max(std::abs(a.y), std::abs(b.y)) <= 90.1 &&
@@ -62,11 +62,11 @@ Placement placement_of(GDALDatasetH dataset) {
 
 std::string line_of(const char* text) { return text ? std::string(text) : std::string(); }
 
-// What a unit of the file's heights is called, and how many metres it has.
+// Name of the unit of the file's heights, and its length in metres.
 struct HeightUnit {
   std::string name = "m";
   double metres = 1;
-  std::string from;  // what says so
+  std::string from;  // the source of this unit
 };
 
 std::optional<double> metres_of(const std::string& name) {
@@ -84,8 +84,8 @@ std::optional<double> metres_of(const std::string& name) {
   return std::nullopt;
 }
 
-// The band's own unit first, then that of a vertical reference system, then the plan's: surveys in feet have heights in
-// feet.
+// Looks for the band's own unit first, then for that of a vertical reference system, then for the plan's: surveys in
+// feet have heights in feet.
 HeightUnit height_unit(GDALDatasetH dataset, GDALRasterBandH band, const Placement& at) {
   if (const std::string unit = line_of(GDALGetRasterUnitType(band)); !unit.empty()) {
     const auto metres = metres_of(unit);
@@ -102,7 +102,7 @@ HeightUnit height_unit(GDALDatasetH dataset, GDALRasterBandH band, const Placeme
   return {};
 }
 
-// What the file's coordinates are called, and how long one of each is in metres.
+// Returns the kind of the file's coordinates, and the length of a unit of each in metres.
 scene::Coordinates coordinates_of(GDALDatasetH dataset, const HeightUnit& heights, const Placement& at,
                                   const glm::dvec2& shown) {
   scene::Coordinates out;
@@ -123,7 +123,7 @@ scene::Coordinates coordinates_of(GDALDatasetH dataset, const HeightUnit& height
   return out;
 }
 
-// The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the
+// Takes the texture's colours at the raster's samples: by coordinates if both files have them, else stretched over the
 // raster.
 void drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
   auto opened = open_with_gdal(gdal_place_of(path), path, "an image", kPictureDrivers);
@@ -167,7 +167,7 @@ void drape(const std::string& path, const Placement& at, int full_width, int ful
     }
 }
 
-// What is no elevation.
+// Refuses files that are not elevations.
 void refuse_picture(GDALDatasetH dataset, const std::string& path) {
   if (const int bands = GDALGetRasterCount(dataset); bands != 1)
     refuse("{}: has {} bands: a picture, not an elevation raster, which has one", path, bands);
@@ -182,13 +182,13 @@ void refuse_picture(GDALDatasetH dataset, const std::string& path) {
       path);
 }
 
-// Every step-th sample of every step-th row, in metres.
+// Reads every step-th sample of every step-th row, in metres.
 void read_heights(GDALRasterBandH band, const std::string& path, double metres, ElevationRaster& out) {
   const int w = GDALGetRasterBandXSize(band), h = GDALGetRasterBandYSize(band);
   int has_none = 0, has_scale = 0, has_offset = 0;
   const double none = GDALGetRasterNoDataValue(band, &has_none);
   const double scale = GDALGetRasterScale(band, &has_scale), offset = GDALGetRasterOffset(band, &has_offset);
-  // A mask of its own: no-data values are looked at below, and a mask of all samples says nothing.
+  // Only a mask of the whole data set is read: no-data values are compared below, and a mask of all samples is no news.
   const bool masked = (GDALGetMaskFlags(band) & GMF_PER_DATASET) != 0;
   const GDALRasterBandH mask = GDALGetMaskBand(band);
   std::vector<float> row(size_t(w), 0.0f);
@@ -200,7 +200,7 @@ void read_heights(GDALRasterBandH band, const std::string& path, double metres, 
       refuse("{}: row {} of {} cannot be read: {}", path, y * out.step, h, gdal_complaint());
     for (int x = 0; x < out.width; ++x) {
       double v = row[size_t(x) * size_t(out.step)];
-      // -32768 and -9999 are what void samples usually have, said or not.
+      // -32768 and -9999 are the usual values of void samples, declared or not.
       const bool no_data = shown[size_t(x) * size_t(out.step)] == 0 || !std::isfinite(v) ||
                            (has_none && v == float(none)) || v == -32768 || v == -9999 || std::abs(v) > 1e9;
       if (has_scale) v *= scale;
@@ -228,7 +228,7 @@ ElevationRaster elevation_of(ImportFiles& files, const std::string& path, const 
   out.width = (w + out.step - 1) / out.step;
   out.height = (h + out.step - 1) / out.step;
   read_heights(band, path, unit.metres, out);
-  glm::dvec2 metres(at.metres);  // a unit of x and y
+  glm::dvec2 metres(at.metres);  // length of a unit of x and y, m
   if (at.degrees) {
     const double latitude = at.at(w / 2.0, h / 2.0).y * kPi / 180;
     metres = {111'320 * std::max(std::cos(latitude), 0.01), 110'574};

@@ -14,7 +14,7 @@ namespace telesplat::data {
 namespace {
 
 GDALDataType type_of(StoredType type) {
-  // GDAL 3.6 tells signed bytes by a remark alone; their bits are the same.
+  // GDAL 3.6 marks signed bytes only by metadata; their bits are the same.
   constexpr GDALDataType kTypes[] = {GDT_Byte,  GDT_Byte,    GDT_UInt16,  GDT_Int16,   GDT_UInt32,
                                      GDT_Int32, GDT_Float64, GDT_Float64, GDT_Float32, GDT_Float64};
   return kTypes[size_t(type)];
@@ -35,7 +35,7 @@ std::vector<std::byte> stack_of(ImportFiles& files, const VolumeFileHeader& head
       const auto picture = (open_with_gdal(pages ? fmt::format("GTIFF_DIR:{}:{}", page, place) : place, file.path(),
                                            "a slice", kPictureDrivers));
       if (GDALGetRasterXSize(picture.get()) != w || GDALGetRasterYSize(picture.get()) != h) {
-        if (pages) continue;  // a reduced copy
+        if (pages) continue;  // a reduced copy of a page
         refuse("{}: is of another size than its header says", file.path());
       }
       if (out.size() + page_bytes > header.voxel_bytes())
@@ -58,7 +58,7 @@ std::string gdal_place_of(const std::string& path) {
   return "/vsimem/" + std::filesystem::absolute(path).lexically_normal().relative_path().string();
 }
 
-// Other drivers go, so that no file of a VRT is read by one of them.
+// Removes all other drivers, so that none of them reads a file that a VRT names.
 void prepare_gdal(ImportFiles& files) {
   CPLSetErrorHandler(CPLQuietErrorHandler);
   GDALAllRegister();
@@ -74,15 +74,15 @@ void prepare_gdal(ImportFiles& files) {
   }
   for (const ImportFile& file : files.all()) {
     const auto content = files.content_of(file);
-    if (!content) continue;  // empty, for one
-    // GDAL reads them alone: they are open for nothing else.
+    if (!content) continue;  // an empty file, for example
+    // GDAL only reads these bytes: the mappings are read-only.
     auto* const bytes = reinterpret_cast<GByte*>(const_cast<char*>(content->data()));
     if (VSILFILE* memory = VSIFileFromMemBuffer(gdal_place_of(file.path()).c_str(), bytes, content->size(), FALSE))
       VSIFCloseL(memory);
   }
 }
 
-// What GDAL complained of last, in one line that names files as they are.
+// Returns GDAL's last error message, as one line with the files' own names.
 std::string gdal_complaint() {
   std::string why = CPLGetLastErrorMsg();
   for (size_t at; (at = why.find("/vsimem/")) != why.npos;) why.erase(at, 7);

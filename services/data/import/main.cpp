@@ -1,6 +1,6 @@
-// telesplat-import FORMAT FILE: reads a glTF, a mesh that pictures cover, a raster, slices or DICOM files with other
-// people's libraries and leaves them on standard output for the process that asked (process.cpp). A program of its own
-// so that neither a crash of these libraries, nor their messages, nor what they could do to the machine reach anyone.
+// telesplat-import FORMAT FILE: reads a glTF, a mesh with pictures, a raster, slices or DICOM files with foreign
+// libraries and writes the result to standard output for the process that started it (process.cpp). A program of its
+// own, so that crashes, messages and exploits of these libraries stay in it.
 #include <fmt/format.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -35,10 +35,10 @@ class PicturedFiles final : public ImportFiles {
   }
 };
 
-// A hostile file must not keep us busy without end.
+// Ends this process after a time: a hostile file must not keep it busy for ever.
 void limit_time(uint64_t bytes) { alarm(static_cast<unsigned>(60 + bytes / 1'000'000)); }
 
-// A reader may take what this process has mapped already, a gigabyte, and `more`.
+// Returns the limit of memory: the memory mapped so far, a gigabyte, and `more`.
 uint64_t memory_with(uint64_t more) {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -61,7 +61,7 @@ Result<Mesh> import_mesh(ImportFiles& files, const std::string& format, const st
   return Error{fmt::format("{}: {} is no format that is read here", path, format)};
 }
 
-// All frames of all files, one after the other, as one volume. bytes: of their pixels.
+// Sends all frames of all files, one after the other, as one volume. bytes: of their pixels.
 bool import_dicom(int out, const ImportFiles& files, uint64_t bytes) {
   limit_time(bytes / 4);
   confine(memory_with(3 * bytes + 16 * files.bytes()));
@@ -112,21 +112,21 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string format = argv[1], path = argv[2];
-  prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
-  // The libraries of this program take a second to load and more; the parent may have died meanwhile.
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // ends with its parent, which waits for the result
+  // This program's libraries take a second or more to load; the parent may have died meanwhile.
   if (const char* parent = std::getenv(kParentVariable); parent && std::atoi(parent) != getppid()) return 1;
   end_at_cut_off_files(kCutOffExit);
   PicturedFiles files(STDIN_FILENO);
   const uint64_t file_bytes = files.bytes();
   const int out = dup(STDOUT_FILENO);
-  dup2(STDERR_FILENO, STDOUT_FILENO);  // what libraries print must not get between
+  dup2(STDERR_FILENO, STDOUT_FILENO);  // output of libraries must not mix with the result
   try {
     limit_time(file_bytes);
     if (format == "stack" && argc == 4) return import_stack(out, files, path, argv[3]) ? 0 : 1;
     if (format == "dicom" && argc == 4) return import_dicom(out, files, std::strtoull(argv[3], nullptr, 10)) ? 0 : 1;
     const bool raster = format.starts_with("raster");
     const uint64_t texture_detail = !raster && argc > 3 ? std::strtoull(argv[3], nullptr, 10) : 0;
-    // Pictures hold many texels a byte; baked triangles are divided into a copy.
+    // Pictures may hold many texels per byte; baked triangles are divided into a copy.
     const uint64_t pictures = raster ? 0 : (uint64_t{3} << 30) + 300 * texture_detail;
     confine(memory_with(100 * file_bytes + pictures));
     if (format == "raster-facts") {

@@ -23,14 +23,14 @@ extern char** environ;
 namespace telesplat::data {
 namespace {
 
-// The import program lies beside this one; else it is looked for in $PATH.
+// Returns the path of the import program: beside this one, else its name, for $PATH.
 std::string import_program() {
   std::error_code error;
   const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / kImportProgram;
   return !error && std::filesystem::exists(beside, error) ? beside.string() : kImportProgram;
 }
 
-// The program's environment: nothing of ours but what sanitizers take.
+// Returns the program's environment: our process id and the sanitizers' variables only.
 std::vector<std::string> surroundings() {
   std::vector<std::string> out{fmt::format("{}={}", kParentVariable, getpid())};
   for (char** variable = environ; *variable; ++variable)
@@ -39,7 +39,7 @@ std::vector<std::string> surroundings() {
   return out;
 }
 
-// Starts the program, which writes into `output`, and sends it the files (files.h).
+// Starts the program, which writes to `output`, and sends it the files (files.h).
 Result<pid_t> start_import(std::vector<std::string> words, const std::vector<std::string>& files, int output) {
   const std::string format = words[0], path = words[1];
   static const bool told = [] {
@@ -75,7 +75,7 @@ Result<pid_t> start_import(std::vector<std::string> words, const std::vector<std
   return child;
 }
 
-// Waits for its end. Error: it crashed, did not end, gave up, is missing.
+// Waits for the program's end. Error: it crashed, did not end, gave up, or is missing.
 Status end_import(pid_t child, const std::string& reader, const std::string& format, const std::string& path) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
@@ -110,14 +110,14 @@ Result<StreamedVolume> import_volume(const std::string& reader, std::vector<std:
   if (pipe2(ends, O_CLOEXEC) != 0)
     return Error{fmt::format("{}: no pipe for reading it: {}", path, std::strerror(errno))};
   Descriptor from(ends[0]), into(ends[1]);
-  fcntl(into.get(), F_SETPIPE_SZ, 1 << 20);  // fewer turns between the two processes; smaller ones do as well
+  fcntl(into.get(), F_SETPIPE_SZ, 1 << 20);  // fewer switches between the processes; a smaller pipe works, too
   const auto child = start_import(std::move(words), files, into.get());
   if (!child) return child.error();
   into.close();
   auto received = receive_volume(from.get(), most_bytes, path, progress);
-  from.close();  // if it still writes, that ends it
+  from.close();  // ends the program if it still writes
   const auto ended = end_import(*child, reader, format, path);
-  if (received) return std::move(*received);  // what it said itself is better than how it ended
+  if (received) return std::move(*received);  // a result counts even if the program ended badly
   if (!ended) return ended.error();
   return Error{fmt::format("{}: what {} gave of it is incomplete", path, kImportProgram)};
 }

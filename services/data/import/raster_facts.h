@@ -1,4 +1,4 @@
-// What the file of an elevation raster says, for people.
+// Description of an elevation raster's file, for users.
 #pragma once
 
 #include <cstdint>
@@ -11,25 +11,25 @@ namespace telesplat::data {
 
 struct RasterFacts {
   std::string format;         ///< in GDAL's words: "GeoTIFF"
-  std::string type;           ///< of samples, in GDAL's words: "Int16"
+  std::string type;           ///< type of samples, in GDAL's words: "Int16"
   int width = 0, height = 0;  ///< samples in the file
-  int step = 1;               ///< every step-th of them is read
-  std::string reference;      ///< name of the coordinates' reference system: "WGS 84 / UTM zone 10N"; empty: not said
-  std::string unit;           ///< "degrees", "metres" or another length; empty: nothing says where it lies
-  /// Edges and a sample's size, in that unit; without one in samples.
+  int step = 1;               ///< every step-th sample is read
+  std::string reference;      ///< name of the coordinates' reference system: "WGS 84 / UTM zone 10N"; empty: not given
+  std::string unit;           ///< "degrees", "metres" or another length; empty: no position is given
+  /// Edges and a sample's size, in that unit; without a unit in samples.
   double west = 0, south = 0, east = 0, north = 0, sample_x = 1, sample_y = 1;
-  double sample_x_m = 1, sample_y_m = 1;  ///< in metres, as it is shown; without a unit 1
-  double lo = 0, hi = 0;                  ///< heights in metres, of the samples that are read
-  std::string height_unit;                ///< of the file's heights; empty: nothing says where it lies
-  double height_m = 1;                    ///< of that unit
-  uint64_t without_data = 0;              ///< of the samples that are read
+  double sample_x_m = 1, sample_y_m = 1;  ///< in metres, as shown; without a unit 1
+  double lo = 0, hi = 0;                  ///< heights in metres, of the read samples
+  std::string height_unit;                ///< unit of the file's heights; empty: no position is given
+  double height_m = 1;                    ///< length of that unit, m
+  uint64_t without_data = 0;              ///< read samples without data
 };
 
-/// Reads it with GDAL, in the program telesplat-import. files: the raster, then what lies beside it. Errors name the
-/// file.
+/// Reads the description with GDAL, in the program telesplat-import. files: the raster, then its companions. Errors
+/// name the file.
 Result<RasterFacts> inspect_raster(const std::vector<std::string>& files);
 
-/// That program's part: what it hands back has them as notes.
+/// Puts the description into a mesh's notes, in that program: read by inspect_raster().
 Mesh to_notes(const RasterFacts& facts);
 
 }  // namespace telesplat::data

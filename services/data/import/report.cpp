@@ -14,16 +14,16 @@ namespace {
 
 constexpr size_t kMaxCoordinates = 2000;  // bytes of their text
 
-// At the start of the file; then follow the error's text or the mesh.
+// Head of a report; the error's text or the mesh follows.
 struct Report {
-  uint64_t text_bytes = 0;  // of an error; 0: a mesh follows
+  uint64_t text_bytes = 0;  // length of an error's text; 0: a mesh follows
   uint64_t vertices = 0, triangles = 0, degenerate = 0;
   uint32_t normals = 0, colours = 0;
-  uint64_t scalars = 0;            // as many as there are
-  uint32_t of_faces = 0;           // scalars are one a triangle
-  uint32_t arrays_bytes = 0;       // scene::to_text() of the arrays
-  uint64_t notes_bytes = 0;        // each ends with a line's end
-  uint64_t coordinates_bytes = 0;  // scene::to_text() of them
+  uint64_t scalars = 0;            // number of scalars
+  uint32_t of_faces = 0;           // 1: one scalar per triangle
+  uint32_t arrays_bytes = 0;       // length of the arrays as scene::to_text()
+  uint64_t notes_bytes = 0;        // notes, each ended by a line feed
+  uint64_t coordinates_bytes = 0;  // length of the coordinates as scene::to_text()
   uint64_t copies = 0;             // vertices that are copies
   uint64_t smooth = 0;             // Mesh::smooth
 };
@@ -38,7 +38,7 @@ bool take(std::span<const std::byte>& bytes, uint64_t count, Array& out) {
   return true;
 }
 
-// One line: what a file says of itself may hold anything.
+// Makes a file's text one line: it may hold any characters.
 std::string line_of(std::string text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < ' ' || c == 127) c = ' ';

@@ -15,11 +15,11 @@
 namespace telesplat::data {
 namespace {
 
-constexpr double kQuiet_s = 2;  // what takes longer tells how far it is
+constexpr double kQuiet_s = 2;  // longer work reports its progress
 
-// A ray's first place of which the orbit does not escape, between two places that are a millionth of the box apart.
-// Steps are half of the distance that is estimated, as estimates near thin parts are too large (distance.h).
-// Nothing: there is none within `most` steps.
+// Returns the ray's first place whose orbit does not escape, between two places a millionth of the box apart. Steps are
+// half of the estimated distance, as estimates near thin parts are too large (distance.h). nullopt: no such place
+// within kMost steps.
 std::optional<scene::Probed> cast(const julia::Parameters& parameters, const julia::Placement& placement,
                                   const geometry::Clip& clip, const scene::Probe& probe) {
   constexpr int kMost = 200'000;

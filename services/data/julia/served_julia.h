@@ -1,4 +1,4 @@
-// A scene that exists only as mathematics: the session is told what it is, there is nothing to ask for.
+// Serves a scene that exists only as mathematics: the session gets its parameters, and there is no data to request.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace telesplat::data {
 
-/// Reads the scene's parameters and finds its box over the whole animation; tells progress if that takes more than two
+/// Reads the scene's parameters and finds its box over the whole animation; reports progress if that takes over two
 /// seconds. Error: a parameter is wrong, or the slice is empty at some time.
 Result<std::unique_ptr<Served>> serve_julia(const julia::SceneOptions& options, double room_size_m,
                                             const Progress& progress);

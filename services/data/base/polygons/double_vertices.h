@@ -1,18 +1,18 @@
-// Vertices that must look different in different triangles.
+// Doubles vertices that must look different in different triangles.
 #pragma once
 
 #include "services/data/base/mesh.h"
 
 namespace telesplat::data {
 
-/// Doubles vertices until each has one look in all its triangles; what they hold is copied with them.
-/// fits(vertex, corner): whether the vertex has the look that this corner of the indices wants. take(vertex, corner):
-/// gives it that look, before anything else asks for it; the vertex is the mesh's last one if it is new.
-/// Preconditions: every index is below the number of vertices; the mesh has no copies.
+/// Doubles vertices until each has one look in all its triangles; a copy gets all of its vertex's values. fits(vertex,
+/// corner): true if the vertex has the look that this corner of the indices wants. take(vertex, corner): gives it that
+/// look, before the next call of fits(); a new vertex is the mesh's last one. Preconditions: every index is below the
+/// number of vertices; the mesh has no copies.
 template <class Fits, class Take>
 void double_vertices(Mesh& mesh, const Fits& fits, const Take& take) {
   constexpr uint32_t kNone = ~uint32_t{0};
-  constexpr int kMostSteps = 64;  // through a vertex's copies: a million looks around one vertex cost no hours
+  constexpr int kMostSteps = 64;  // through a vertex's copies: a vertex with a million looks must not cost hours
   std::vector<bool> taken(mesh.positions.size(), false);
   std::vector<uint32_t> next_copy(mesh.positions.size(), kNone);  // the latest copy first
   for (size_t corner = 0; corner < mesh.indices.size(); ++corner) {

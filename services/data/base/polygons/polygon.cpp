@@ -1,4 +1,4 @@
-// Ears of polygons. Source: D. Eberly, "Triangulation by Ear Clipping", Geometric Tools, 2002; the grid is ours.
+// Cuts ears off polygons. Source: D. Eberly, "Triangulation by Ear Clipping", Geometric Tools, 2002; the grid is ours.
 #include "services/data/base/polygons/polygon.h"
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 namespace telesplat::data {
 namespace {
 
-// Tests of points in triangles that a corner may cost, and that a polygon may cost beside a few a corner. Polygons need
-// more only if they cross themselves or were made for it: what is left of them then becomes a fan.
+// Limits for tests of a point in a triangle: kMostTests per corner, and kManyTests + kFewTests per corner for a
+// polygon. Only polygons that cross themselves, or were made for it, need more: the rest of them becomes a fan.
 constexpr int64_t kMostTests = 500, kManyTests = 50'000'000, kFewTests = 50;
-constexpr double kFlat = 1e-14;  // areas below this part of the polygon's are none
+constexpr double kFlat = 1e-14;  // smaller areas, as a fraction of the polygon's, count as zero
 
 double area_of(glm::dvec2 a, glm::dvec2 b, glm::dvec2 c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
@@ -21,7 +21,7 @@ double area_of(glm::dvec2 a, glm::dvec2 b, glm::dvec2 c) {
 
 class EarCutter {
  public:
-  /// points: of the corners, in the polygon's plane, counterclockwise. area: twice the polygon's.
+  /// points: the corners, in the polygon's plane, counterclockwise. area: twice the polygon's.
   EarCutter(std::span<const glm::dvec2> points, double area)
       : points_(points), flat_(kFlat * area), left_(points.size()) {
     const auto n = uint32_t(points.size());
@@ -32,7 +32,7 @@ class EarCutter {
     sort_into_grid();
   }
 
-  /// emit(a, b, c): for each triangle.
+  /// Calls emit(a, b, c) for each triangle.
   template <class Emit>
   void cut(Emit&& emit) {
     for (uint32_t i = 0; i < points_.size(); ++i) queue_.push_back(i);
@@ -43,7 +43,7 @@ class EarCutter {
       uint32_t ear = kNone;
       while (ear == kNone && at < queue_.size())
         if (const uint32_t i = queue_[at++]; !gone_[i] && (is_spike(i) || is_ear(i))) ear = i;
-      if (ear == kNone && left_ < left_when_queued && budget_ > 0) {  // corners may be ears since others have gone
+      if (ear == kNone && left_ < left_when_queued && budget_ > 0) {  // cutting may have made new ears
         queue_.clear(), at = 0, left_when_queued = left_, budget_ -= int64_t(points_.size());
         for (uint32_t i = 0; i < points_.size(); ++i)
           if (!gone_[i]) queue_.push_back(i);
@@ -67,13 +67,13 @@ class EarCutter {
     for (const uint32_t i : {before, after}) blocks_[i] = turn(i) <= flat_, queue_.push_back(i);
   }
 
-  // A repeated point, or the end of a line that goes forth and back.
+  // True for a repeated point, or the end of a line that goes forth and back.
   bool is_spike(uint32_t i) const {
     return std::abs(turn(i)) <= flat_ &&
            glm::dot(points_[previous_[i]] - points_[i], points_[next_[i]] - points_[i]) >= 0;
   }
 
-  // Corners that turn right or not at all: these alone can lie in ears. Corners never become such later.
+  // Only corners that turn right or not at all can lie in ears. Other corners never become such later.
   void sort_into_grid() {
     lowest_ = highest_ = points_[0];
     for (const glm::dvec2& p : points_) lowest_ = glm::min(lowest_, p), highest_ = glm::max(highest_, p);
@@ -112,7 +112,7 @@ class EarCutter {
     return true;
   }
 
-  // Where no ear is left, the polygon crosses or touches itself: a corner without area, else one that turns left.
+  // Without an ear the polygon crosses or touches itself: returns a corner without area, else one that turns left.
   uint32_t best_of_bad() {
     uint32_t left = kNone, i = some_;
     for (; budget_ > 0; --budget_) {
@@ -126,11 +126,11 @@ class EarCutter {
 
   std::span<const glm::dvec2> points_;
   const double flat_;
-  size_t left_;  // corners that have not gone
+  size_t left_;  // corners that are not cut yet
   int64_t budget_;
   std::vector<uint32_t> next_, previous_, queue_;
   std::vector<bool> gone_, blocks_;
-  uint32_t some_ = 0;  // one that has not gone
+  uint32_t some_ = 0;  // a corner that is not cut yet
   glm::dvec2 lowest_{}, highest_{};
   int64_t side_ = 1;  // cells of the grid along an axis
   std::vector<uint32_t> starts_, members_;
@@ -146,11 +146,11 @@ void cut_corners(std::span<const uint32_t> ring, std::span<const glm::dvec3> pos
   if (count <= 3) return fan();
   const glm::dvec3 origin = positions[ring[0]];
   const auto at = [&](size_t i) { return positions[ring[i]] - origin; };
-  glm::dvec3 area(0);  // twice the polygon's, along its normal
+  glm::dvec3 area(0);  // twice the polygon's area, along its normal
   for (size_t i = 2; i < count; ++i) area += glm::cross(at(i - 1), at(i));
   const double size = glm::length(area);
   if (!(size > 0) || !std::isfinite(size)) return fan();
-  // Where each triangle of the fan turns as the polygon does, the first corner sees all of it.
+  // If each triangle of the fan turns as the polygon does, the whole polygon is visible from the first corner.
   const glm::dvec3 normal = area / size;
   bool all_seen = true;
   for (size_t i = 2; i < count && all_seen; ++i)
