@@ -37,11 +37,11 @@ Status check_named(const std::string& path, const std::string& named) {
       fmt::format("{}: names {}, which lies outside of its folder; --companions anywhere allows that", path, named)};
 }
 
-// The file's own voxels lie in itself, or in the file that its header names.
+// Checks a volume's files: its voxels lie in the file itself, or in files that its header names.
 Status check_volume(const DataOptions& o) {
   const auto source = find_volume(o.scene, o.volume);
   if (!source) return ok_status();
-  if (source->dicom) return ok_status();  // slices name nothing
+  if (source->dicom) return ok_status();  // slices name no files
   for (const std::string& step : source->steps) {
     const auto header = read_volume_header(step, o.volume.raw);
     if (!header) continue;
@@ -68,7 +68,7 @@ using OpenServed = Result<std::unique_ptr<Served>>;
 bool is_julia(const DataOptions& o) { return o.scene == julia::kSceneWord; }
 bool holds_volume(const DataOptions& o) { return !o.volume.raw.empty() || looks_like_volume(o.scene); }
 bool is_volume(const DataOptions& o) { return !o.mesh.iso && holds_volume(o); }
-// A file that nobody else claims is a mesh or a raster; which one, or why not, its reader tells.
+// A file that no other kind claims is a mesh or a raster; its reader finds out which, or why not.
 bool is_mesh(const DataOptions& o) { return o.mesh.iso ? holds_volume(o) : find_mesh_file(o.scene).ok(); }
 
 OpenServed open_as_mesh(const DataOptions& o, const Progress& progress) {
@@ -96,10 +96,10 @@ OpenServed open_as_julia(const DataOptions& o, const Progress& progress) {
   return serve_julia(o.julia, o.mesh.room_size_m, progress);
 }
 
-// One row a kind of scene; the first that claims a data set has it.
+// One row per kind of scene; the first row that claims a data set opens it.
 struct Row {
   Kind kind;
-  const char* files;  // what its data are, for help texts
+  const char* files;  // its kind of data, for help texts
   bool (*claims)(const DataOptions&);
   OpenServed (*open)(const DataOptions&, const Progress&);
 };
@@ -117,10 +117,10 @@ constexpr Row kRows[] = {
 };
 static_assert(std::size(kRows) == std::size(scene::kKinds), "a row a kind");
 
-// What people name files of voxels that nothing describes.
+// Usual names of voxel files without a header.
 constexpr const char* kRawNames[] = {".raw", ".vol", ".img", ".bin", ".dat"};
 
-// A file that is of no format. Nobody needs to start anything to tell.
+// Refuses a file of no known format, before any process is started.
 Status refuse_unknown_format(const std::string& path) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
@@ -156,7 +156,7 @@ Result<const Row*> row_of(const DataOptions& o) {
       o.scene)};
 }
 
-// "--tf: terrain.ply is no volume but a mesh"
+// Returns the error "--tf: terrain.ply is no volume but a mesh".
 Error misfit(const options::Row& row, Kind kind, const DataOptions& o) {
   const std::string flag = options::name_of(row);
   if (o.mesh.iso && kind == Kind::kMesh)
@@ -168,7 +168,7 @@ Error misfit(const options::Row& row, Kind kind, const DataOptions& o) {
   return Error{fmt::format("{}: {} is {}, which has no {}", flag, o.scene, scene::described(kind), flag)};
 }
 
-// What differs from its default was given.
+// Refuses options that differ from their default, but do not fit this kind.
 Status refuse_misfits(DataOptions o, Kind kind) {
   DataOptions none;
   const auto all = [](DataOptions& of) {

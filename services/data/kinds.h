@@ -1,4 +1,4 @@
-// What kind of scene a data set is, whether it may be opened, and opening it.
+// Decides the kind of scene of a data set and whether it may be opened, and opens it.
 #pragma once
 
 #include <memory>
@@ -15,35 +15,35 @@ namespace telesplat::data {
 
 class Served;
 
-/// What data sets there are, for help texts: "mesh file (PLY, ...) or ..., volume (...), the word julia".
+/// Returns the list of data sets for help texts: "mesh file (PLY, ...) or ..., volume (...), the word julia".
 std::string scene_help();
 
-/// What the options' scene is, by the options and by the file's content. Error, naming scene or flag: there is no such
-/// file; it is a folder that holds nothing we know; an option is set that scenes of its kind do not have. Whether a
-/// file is sound only opening it tells.
+/// Returns the kind of the options' scene, by the options and the file's content. Error, naming scene or flag: the file
+/// does not exist; it is a folder without known files; an option is set that this kind does not have. A damaged file is
+/// found only by opening it.
 Result<scene::Kind> kind_of(const DataOptions& options);
 
-/// Opens the scene, as what kind_of() says. Errors (exit code 2 for a user) name the file, or the parameter of a Julia
-/// set.
+/// Opens the scene as the kind that kind_of() returns. Errors (exit code 2 for a user) name the file, or the
+/// parameter of a Julia set.
 Result<std::unique_ptr<Served>> open(const DataOptions& options, const Progress& progress);
 
-/// Opens the store of the mesh file or raster at `path`, or with options.iso that of the volume's surface; makes it
-/// first if the cache has none. progress may be empty. Errors (exit code 2 for a user) name the file.
+/// Opens the store of the mesh file or raster at `path`, or with options.iso that of the volume's surface; makes the
+/// store first if the cache has none. progress may be empty. Errors (exit code 2 for a user) name the file.
 Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const MeshOptions& options,
                                              const Progress& progress);
-/// The same, but coloured by this array (empty: by none), whatever the options say.
+/// The same, but coloured by this array (empty: by none) instead of the options' one.
 Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
                                                 const std::string& array, const Progress& progress);
 
-/// How options colour a mesh with these arrays; nothing: by the file's own colours. Errors name flag or file.
+/// Returns the colouring of a mesh with these arrays; nullopt: by the file's own colours. Errors name flag or file.
 Result<std::optional<scene::Colouring>> colouring_of(const MeshOptions& options, const MeshStoreInfo& mesh);
-/// --colour-map as it was read. Error: names the flag.
+/// Returns the map of --colour-map. Error: names the flag.
 Result<colour::ColourMap> colour_map_of(const MeshOptions& options);
 
-/// Refuses files that lie elsewhere than below the folder of the file that names them (voxels of a detached header, for
-/// one), links followed, unless options.companions is "anywhere": the writer of a file chose these names, and a server
-/// that hands out what they lead to would hand out any file that it can read. What is missing, or cannot be read, is
-/// for its reader to tell. Error: which file names which.
+/// Refuses data files that name files (voxels of a detached header, for example) outside of their own folder, links
+/// followed, unless options.companions is "anywhere": the writer of the data file chose these names, and a server that
+/// sends their content would send any file that it can read. Missing or unreadable files are left to their reader.
+/// Error: names both files.
 Status check_companions(const DataOptions& options);
 
 }  // namespace telesplat::data

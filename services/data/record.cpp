@@ -21,7 +21,7 @@ std::string scene_lines(const DataOptions& o, scene::Kind kind) {
   DataOptions given = o, usual;
   std::error_code error;
   const std::string file = fs::absolute(given.scene, error).string();
-  // Where it stood is told even if it stood as usual: what is usual may change.
+  // Size and up axis are recorded even at their defaults: defaults may change.
   const auto defaults = options::without(scene_table(usual), {"--room-size", "--up"});
   return fmt::format("\n[scene]\nkind = {}\nfile = {}\n{}", options::quoted(std::string(scene::name_of(kind))),
                      options::quoted(file), options::recorded(scene_table(given), defaults));

@@ -1,4 +1,4 @@
-// What a data server tells the record of a run: which scene it was, and which files with which content.
+// A data server's part of a run's record: its scene, and its files with their content's hash.
 #pragma once
 
 #include <atomic>
@@ -12,28 +12,28 @@
 
 namespace telesplat::data {
 
-/// The table [scene] of session.toml for a data set that its file and its flags tell: the launcher makes the same scene
+/// Returns the table [scene] of session.toml for a data set given by file and flags: the launcher makes the same scene
 /// from it again.
 std::string scene_lines(const DataOptions& options, scene::Kind kind);
-/// The tables of session.toml that tell an open scene: its own, or scene_lines().
+/// Returns the tables of session.toml for an open scene: its own, or scene_lines().
 std::string record_of(const DataOptions& options, const Served& served);
 
-/// The files that hold the data, in the order in which they are read; of a folder those in it. None: of a Julia set.
+/// Returns the files that hold the data, in order of reading; for a folder, the files in it; empty for a Julia set.
 std::vector<std::string> files_of(const DataOptions& options, scene::Kind kind);
 
 /// Hashes files in a thread of low priority, so that a session need not wait for it.
 class BackgroundHash {
  public:
   explicit BackgroundHash(std::vector<std::string> files);
-  ~BackgroundHash();  ///< gives up, if it is not done
+  ~BackgroundHash();  ///< cancels unfinished hashing
 
-  /// Once: when the hash is there. Nothing before, after, and if a file cannot be read.
+  /// Returns the hash once, when it is known. nullopt: before, after, and if a file cannot be read.
   std::optional<FileHash> take();
 
  private:
   std::optional<FileHash> hash_;
   std::atomic<bool> done_{false}, stop_{false};
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last, because it uses the others
 };
 
 }  // namespace telesplat::data

@@ -1,5 +1,5 @@
-// What a data server serves: one implementation a kind of scene. The serve loop (data_service.cpp) is the same for all
-// of them.
+// The scene of a data server: one implementation per kind of scene. The serve loop (data_service.cpp) is the same for
+// all kinds.
 #pragma once
 
 #include <fmt/format.h>
@@ -16,52 +16,51 @@
 
 namespace telesplat::data {
 
-/// Where answers go. They may be dropped: who asked asks again.
+/// Sockets for answers. Answers may be dropped: the peer then asks again.
 struct Outlets {
-  net::Socket& requests;  ///< to those who ask, by Message::peer
+  net::Socket& requests;  ///< to the peers that asked, by Message::peer
   net::Socket& master;
 };
 
-/// An open data set. All calls come from the thread of the serve loop; none waits for long.
+/// An open data set. All calls come from the thread of the serve loop; none may block for long.
 class Served {
  public:
-  /// The socket that requests come to.
+  /// The socket for requests.
   struct Requests {
-    std::string_view
-        endpoint;  ///< under which the session tells where to ask: "chunks"; empty: there is nothing to ask for
-    int high_water_mark = 0;  ///< answers that wait for a peer at most
+    std::string_view endpoint;  ///< its name among the session's endpoints: "chunks"; empty: no requests
+    int high_water_mark = 0;    ///< answers queued per peer, at most
   };
 
   virtual ~Served() = default;
   virtual scene::Kind kind() const = 0;
-  /// For people: a file's name, or what else the scene is called. Any bytes.
+  /// For users: a file's name, or another name of the scene. Any bytes.
   virtual std::string title() const = 0;
-  /// For the log: how large it is.
+  /// For the log: the scene's size.
   virtual std::string summary() const = 0;
-  /// What people should know of how it was read: lines that name the file.
+  /// For users: remarks on reading; lines that name the file.
   virtual std::vector<std::string> notes() const { return {}; }
-  /// Adds what the session is told of it: facts, parameters, the box in the room.
+  /// Adds facts, parameters and the box in the room to the hello.
   virtual void describe(wire::Hello& hello) const = 0;
-  /// Its tables of session.toml, "\n[scene]\nkind = ..."; empty: its file and the flags tell all (record.h).
+  /// Returns its tables of session.toml, "\n[scene]\nkind = ..."; empty: file and flags say it all (record.h).
   virtual std::string record() const { return {}; }
   virtual Requests requests() const { return {}; }
 
-  /// Called once, before what follows. self: this data server.
+  /// Called once, before the functions below. self: this data server.
   virtual void begin(InstanceId /*self*/) {}
   /// The session has changed. Error: it is not this scene's.
   virtual Status follow(const wire::Welcome& /*session*/) { return ok_status(); }
-  /// Answers a request, now or later. A message that is none is rejected at its socket.
+  /// Answers a request, now or later. An invalid message is rejected at its socket.
   virtual void answer(const net::Message& /*request*/, const Outlets& /*outlets*/) {}
-  /// An order of the master's. Its answer; nothing: it will be answered over outlets.master. Error: why not.
+  /// Carries out an order of the master. Returns its answer; nullopt: it comes over outlets.master. Error: why not.
   virtual Result<std::optional<std::string>> carry_out(const wire::Order& order) {
     return Error{fmt::format("a data server of {} does not know the order '{}'", scene::described(kind()),
                              order.command.substr(0, 64))};
   }
-  /// Sends what has been worked off meanwhile, where that has a thread of its own.
+  /// Sends the answers that a thread of its own has finished meanwhile.
   virtual void send_finished(const Outlets& /*outlets*/) {}
-  /// Facts of the hello that have changed since it was last asked: the master is told.
+  /// Returns facts of the hello that have changed since the last call; they go to the master.
   virtual std::map<std::string, std::string> news() { return {}; }
-  /// True: something is worked on or waits to be sent, though no message comes.
+  /// True while work goes on or answers wait without a message.
   virtual bool busy() const { return false; }
   virtual void add_status(std::map<std::string, double>& /*values*/) const {}
 };

@@ -23,10 +23,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kLimitFile = "limit";
-constexpr uint64_t kWorthAWord = 1'000'000'000;  // bytes of a cache without a limit, before its growth is told
-constexpr size_t kMostLine = 8192;               // of what a .used file may tell
+constexpr uint64_t kWorthAWord = 1'000'000'000;  // a cache without a limit is reported from this size on, bytes
+constexpr size_t kMostLine = 8192;               // bytes of a .used file that are read
 
-// The stem of a file that is ours; empty: it is not.
+// Returns the stem of a store's file; empty: the file is foreign.
 std::string stem_of(const fs::directory_entry& entry) {
   std::error_code error;
   if (!fs::is_regular_file(entry.symlink_status(error))) return {};
@@ -49,7 +49,7 @@ std::string line_of(std::istream& in) {
   return out.size() > kMostLine ? std::string() : out;
 }
 
-// Bytes and time of a file; false: it is not there.
+// Reads size and time of a file; false: it does not exist.
 bool look_at(const std::string& path, uint64_t& bytes, double& time_s) {
   struct stat s {};
   if (stat(path.c_str(), &s) != 0) return false;
@@ -58,7 +58,7 @@ bool look_at(const std::string& path, uint64_t& bytes, double& time_s) {
   return true;
 }
 
-/// A store that nobody else uses or makes, for as long as this lives.
+/// Locks a store that no other process uses or makes, as long as this object lives.
 class Reserved {
  public:
   explicit Reserved(const std::string& stem)
@@ -73,7 +73,7 @@ class Reserved {
   bool holds_;
 };
 
-// Asking leaves no file behind.
+// Checks the locks without making files.
 bool is_in_use(const std::string& stem) {
   const auto held = [](const std::string& path) {
     const auto file = Descriptor::open_file(path, O_RDONLY);
@@ -97,7 +97,7 @@ CachedStore look_at_store(const std::string& stem) {
   return out;
 }
 
-// False: somebody uses it.
+// False: a process uses the store.
 bool remove_store(const std::string& stem) {
   const Reserved reserved(stem);
   if (!reserved.holds()) return false;
@@ -156,7 +156,7 @@ void note_use(const std::string& stem, const std::string& source, const std::str
 Result<Removal> clear_cache(const std::string& folder) {
   auto out = bound_cache(folder, std::nullopt);
   if (!out) return out;
-  // Locks and notes whose store is gone already.
+  // Remove locks and notes whose store is gone already.
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
     if (const std::string stem = stem_of(*it); !stem.empty() && !is_in_use(stem)) remove_store(stem);

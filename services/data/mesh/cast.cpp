@@ -12,16 +12,16 @@ namespace telesplat::data {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSeam = 1e-9;      // of barycentric coordinates: rays do not pass between neighbours
-constexpr double kCrease = 0.7;     // cosine between normals: what is folded more is no bend
-constexpr double kRound = 0x1p-24;  // of a float: half of what its last bit is worth, over its size
+constexpr double kSeam = 1e-9;      // in barycentric coordinates: rays do not slip between neighbours
+constexpr double kCrease = 0.7;     // cosine between normals: a sharper fold is not a bend
+constexpr double kRound = 0x1p-24;  // relative rounding error of a float: half of its last bit
 
 struct Ray {
   glm::dvec3 origin, direction;
-  geometry::Clip::Stretch kept;  // metres along it
+  geometry::Clip::Stretch kept;  // metres along the ray
 };
 
-// Where the ray enters a box; infinity: it does not.
+// Returns the ray's entry into a box, in metres; infinity: it misses the box.
 double entry(const Ray& ray, const geometry::Box& box) {
   const glm::dvec3 lo(box.lo), hi(box.hi);
   const glm::dvec3 slack = 1e-9 * (glm::abs(lo - ray.origin) + glm::abs(hi - ray.origin));  // planes' boxes are flat
@@ -62,7 +62,7 @@ double value_at(const geometry::MeshChunkView& chunk, uint32_t vertex) {
   return double{std::bit_cast<float>(chunk.colours[vertex])};
 }
 
-// How surface and values bend around a triangle, as far as that tells how they may run within it.
+// Largest deviation of surface and values around a triangle, as an estimate for those within it.
 struct Bend {
   double surface_m = 0, value = 0;
 };
@@ -101,7 +101,7 @@ class Neighbourhood {
   }
 
  private:
-  // By place: a vertex with two normals or colours is two.
+  // Compares places: a vertex with two normals or colours is stored twice.
   bool touches(uint32_t vertex) const {
     const float* p = &chunk_.positions_room[3 * size_t(vertex)];
     const glm::dvec3 at(p[0], p[1], p[2]);
@@ -140,7 +140,7 @@ scene::Probed describe(const geometry::MeshChunkView& chunk, const Ray& ray, con
   const double lean = std::abs(glm::dot(around.normal(), ray.direction));
   const auto [lo, hi] = chunk.box_room;
   const glm::dvec3 far = glm::max(glm::abs(glm::dvec3(lo)), glm::abs(glm::dvec3(hi)));
-  // Corners are rounded, and so is the box that tells how the data stand in the room.
+  // Corners are rounded, and so is the box that places the data in the room.
   out.error_m = (bend.surface_m + 4 * kRound * glm::length(far)) / lean;
   out.normal_room = glm::dot(around.normal(), ray.direction) > 0 ? -around.normal() : around.normal();
   if (!has_value) return out;
@@ -169,7 +169,7 @@ std::optional<scene::Probed> cast(const MeshStore& store, const scene::Probe& pr
   for (const Met& m : met) {
     if (m.at > best.at) break;
     const auto chunk = geometry::MeshChunkView::validate(store.chunk(m.chunk).bytes);
-    if (!chunk) continue;  // its store was checked when it was opened
+    if (!chunk) continue;  // cannot happen: the store was checked when it was opened
     const double before = best.at;
     for (size_t t = 0; t < chunk->triangles(); ++t) intersect(ray, corners_of(*chunk, t), t, best);
     if (best.at < before) of = m.chunk;

@@ -28,8 +28,8 @@ Box box_of(std::span<const Item> items) {
   return box;
 }
 
-// Splits items[0..] into `parts` parts of equal size (to one triangle), recursively; starts.. receives where parts
-// start.
+// Splits items[0..] recursively into `parts` parts of equal size (to one triangle); `starts` receives the first
+// index of each part.
 void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> starts) {
   if (parts == 1) {
     starts[0] = first;
@@ -38,7 +38,7 @@ void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> 
   const glm::vec3 size = box_of(items).size();
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   const size_t left_parts = parts / 2, middle = items.size() * left_parts / parts;
-  // Ties by number, so that the result depends on the mesh alone.
+  // Ties are broken by number, so that the result depends on the mesh alone.
   std::nth_element(items.begin(), items.begin() + middle, items.end(), [axis](const Item& a, const Item& b) {
     return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis] : a.triangle < b.triangle;
   });
@@ -47,7 +47,7 @@ void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> 
       [&] { split(items.subspan(middle), first + middle, parts - left_parts, starts.subspan(left_parts)); });
 }
 
-// Spreads the lower 10 bits, two zeros between each.
+// Spreads the lower 10 bits, with two zeros between them.
 uint32_t spread(uint32_t v) {
   v = (v | v << 16) & 0x030000ff;
   v = (v | v << 8) & 0x0300f00f;
@@ -55,7 +55,7 @@ uint32_t spread(uint32_t v) {
   return (v | v << 2) & 0x09249249;
 }
 
-// The triangles along a Morton curve.
+// Returns the triangles in the order of a Morton curve.
 std::vector<uint32_t> morton_order(const PlacedMesh& mesh, std::span<const uint32_t> triangles) {
   Box box;
   for (uint32_t t : triangles) box.extend(item_of(mesh, t).centroid);

@@ -1,4 +1,4 @@
-// What a mesh file says beside its mesh: which other files it pulls in, and the array that it marks.
+// Reads two things of a mesh file beside its mesh: the names of other files that it needs, and the array that it marks.
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -17,19 +17,19 @@ namespace {
 
 constexpr size_t kMaxCompanions = 1024;
 
-// What may say beside a raster where it lies: world files, reference systems, headers, GDAL's notes.
+// Returns the names of files that may position a raster: world files, reference systems, headers, GDAL's notes.
 std::vector<std::string> raster_sides(const std::string& path) {
   const std::filesystem::path name = std::filesystem::path(path).filename();
   const std::string extension = name.extension().string(), stem = name.stem().string();
   std::vector<std::string> names{name.string() + ".aux.xml"};
   for (const char* other : {".aux.xml", ".wld", ".prj", ".hdr", ".clr"}) names.push_back(stem + other);
-  // .pgw of .png, .tfw of .tif, and the whole extension with a w.
+  // .pgw for .png, .tfw for .tif, and the whole extension with a w.
   if (extension.size() > 3) names.push_back(stem + extension.substr(0, 2) + extension.back() + "w");
   if (extension.size() > 1) names.push_back(stem + extension + "w");
   return names;
 }
 
-// The files that a VRT is made of.
+// Collects the files that a VRT consists of.
 void take_sources(const pugi::xml_node& node, std::vector<std::string>& names) {
   for (const pugi::xml_node& child : node.children()) {
     const std::string_view name = child.name();
@@ -42,7 +42,7 @@ void take_sources(const pugi::xml_node& node, std::vector<std::string>& names) {
 constexpr size_t kMostName = 200;
 constexpr size_t kNoMark = std::string_view::npos;
 
-// What the readers take for colours of the mesh.
+// True for names that readers take for the mesh's colours.
 bool names_colours(std::string_view text) {
   const std::string name = lower(text);
   for (const char* colours : {"rgb", "rgba", "color", "colors", "colours", "color_0"})
@@ -50,7 +50,7 @@ bool names_colours(std::string_view text) {
   return false;
 }
 
-// "SCALARS NAME TYPE" below "POINT_DATA N" or "CELL_DATA N"; the first one is active.
+// Finds "SCALARS NAME TYPE" below "POINT_DATA N" or "CELL_DATA N"; the first one is active.
 std::string active_of_legacy(std::string_view text) {
   for (const char* part : {"\nPOINT_DATA ", "\nCELL_DATA "}) {
     const size_t from = text.find(part);

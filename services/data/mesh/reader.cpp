@@ -29,7 +29,7 @@ bool is_one_of(const std::string& word, std::initializer_list<const char*> words
   return std::any_of(words.begin(), words.end(), [&](const char* w) { return word == w; });
 }
 
-// Formats that are not read: told by their first bytes, else by their name.
+// Describes formats that are not read, by their first bytes, else by their name.
 std::string unread_kind(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   const bool zip = content.starts_with("PK\3\4"sv), gzip = content.starts_with("\x1f\x8b"sv);
@@ -56,7 +56,7 @@ std::string unread_kind(std::string_view content, const std::string& extension) 
   return "";
 }
 
-// Files that people may well take for meshes: what they are, in words, and what to do.
+// Describes files that users may take for meshes: their kind, and what to do with them.
 std::string other_kind(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   constexpr std::string_view kPicture =
@@ -64,7 +64,7 @@ std::string other_kind(std::string_view content, const std::string& extension) {
       "pictures over elevation rasters";
   if (content.starts_with("\xff\xd8\xff"sv)) return fmt::format(kPicture, "a JPEG image");
   if (content.starts_with("\x89PNG"sv)) {
-    // In its header chunk, which comes first: bit depth in byte 24, colour type (0: grey) in byte 25.
+    // A PNG's header chunk comes first: bit depth in byte 24, colour type (0: grey) in byte 25.
     const bool known = content.size() > 26;
     return fmt::format(kPicture, !known ? std::string("a PNG image")
                                         : fmt::format("a PNG image of {}-bit {}", int(content[24]),
@@ -78,23 +78,23 @@ std::string other_kind(std::string_view content, const std::string& extension) {
   return unread_kind(content, extension);
 }
 
-// Elevation rasters, by content or name: TIFF, PNG of 16 bits of grey, and formats without a signature.
+// True for elevation rasters, by content or name: TIFF, PNG with 16-bit grey, and formats without a signature.
 bool looks_like_raster(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv) || content.starts_with("II+\0"sv)) return true;
-  // As in other_kind().
+  // Bytes as in other_kind().
   if (content.starts_with("\x89PNG"sv)) return content.size() > 26 && content[24] == 16 && content[25] == 0;
   if (content.substr(0, 1000).find("<VRTDataset") != content.npos) return true;
   return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2", ".xyz", ".vrt"});
 }
 
-// OFF, behind prefixes that its reader knows or names.
+// True for OFF after prefixes that its reader accepts or names.
 bool looks_like_off(std::string_view content) {
   const size_t at = content.substr(0, 9).find("OFF");
   return at != content.npos && content.substr(0, at).find_first_not_of("STCN4n") == content.npos;
 }
 
-// OBJ has no signature: the first line that is neither empty nor a comment starts with one of its words.
+// OBJ has no signature: its first line that is neither empty nor a comment starts with an OBJ keyword.
 bool looks_like_obj(std::string_view content) {
   size_t at = 0;
   while (at < content.size()) {
@@ -110,7 +110,7 @@ bool looks_like_obj(std::string_view content) {
   return false;
 }
 
-// Error: an array is named, but files of this format have none.
+// Error: an array is named, but files of this format have no arrays.
 Status check_array(const std::string& array, const std::string& format, const std::string& path) {
   if (array.empty() || has_arrays(format)) return ok_status();
   if (format == "raster")
@@ -120,7 +120,7 @@ Status check_array(const std::string& array, const std::string& format, const st
                            array, path, format)};
 }
 
-// Files that it names are read from its folder.
+// Reads a VTK file; files that it names are read from its folder.
 Result<Mesh> read_vtk(std::string_view content, const std::string& path, const ReadProgress& progress,
                       const std::string& array) {
   if (progress) progress(0.0);
@@ -128,7 +128,7 @@ Result<Mesh> read_vtk(std::string_view content, const std::string& path, const R
   return vtk::read_mesh(content, path, companions, array);
 }
 
-// As read_gltf() (gltf/reader.h), in the program telesplat-import: a crash on a hostile file does not reach us.
+// As read_gltf() (gltf/reader.h), but in the program telesplat-import: a hostile file cannot crash this process.
 Result<Mesh> read_imported_gltf(std::string_view content, const std::string& path, const ReadProgress& progress,
                                 uint64_t texture_detail) {
   if (progress) progress(0.0);
@@ -137,8 +137,8 @@ Result<Mesh> read_imported_gltf(std::string_view content, const std::string& pat
   return import("the glTF", {"gltf", path, std::to_string(texture_detail)}, files);
 }
 
-// An OBJ or PLY that pictures cover, read in telesplat-import: decoders of pictures are foreign, too. None: it is of
-// another format, or names no picture.
+// Reads an OBJ or PLY with pictures in telesplat-import: decoders of pictures are foreign, too. nullopt: it has another
+// format, or names no picture.
 std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::string& format, const std::string& path,
                                           const ReadProgress& progress, const std::string& array,
                                           uint64_t texture_detail) {
@@ -152,7 +152,7 @@ std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::s
   return import("the " + format, {format, path, std::to_string(texture_detail), array}, files);
 }
 
-// An elevation raster, through GDAL, in telesplat-import; coloured and triangulated: elevation.h.
+// Reads an elevation raster through GDAL, in telesplat-import; colours and triangulates it (elevation.h).
 Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
                             const ReadProgress& progress) {
   if (progress) progress(0.0);
@@ -181,7 +181,7 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   if (is_binary_stl(content)) return {"stl", ""};
   if (looks_like_off(content)) return {"off", ""};
   if (is_text_stl(content)) return {"stl", ""};
-  // By name, where the content says nothing (or is broken, which the reader will say better).
+  // By name, if the content is not conclusive (or is damaged; the reader then says how).
   if (is_one_of(extension, {".ply", ".off", ".stl", ".obj"}) || vtk::is_mesh_kind(extension.substr(!extension.empty())))
     return {extension.substr(1), ""};
   if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};

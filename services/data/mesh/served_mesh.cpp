@@ -26,23 +26,23 @@
 namespace telesplat::data {
 namespace {
 
-// The stores of one mesh, each with another of its arrays in the chunks: those that are open, and the one that is being
-// opened in a thread of its own.
+// The open stores of one mesh, each with another of its arrays in the chunks, and the one that is being opened in a
+// thread of its own.
 class ArrayStores {
  public:
   using Open = decltype(ServedColours::open);
 
   ArrayStores(std::shared_ptr<const MeshStore> first, const std::string& array, Open open);
-  /// Gives up what is being opened, and waits until it is.
+  /// Cancels the opening store, and waits until its thread ends.
   ~ArrayStores();
 
-  /// Null: it is not open.
+  /// Null: the array's store is not open.
   const MeshStore* find(const std::string& array) const;
-  /// Opens it as soon as nothing else is being opened; only the one wanted last waits.
+  /// Opens the array's store as soon as no other one is being opened; only the array wanted last waits.
   void want(const std::string& array);
   bool busy() const { return opening_.valid(); }
 
-  /// What became of a store that was wanted, once.
+  /// Result of opening a store; returned once.
   struct Opened {
     std::string array;
     Status status;
@@ -53,7 +53,7 @@ class ArrayStores {
   using Made = Result<std::shared_ptr<MeshStore>>;
   void begin(const std::string& array);
 
-  static constexpr size_t kKept = 4;  // the first one among them
+  static constexpr size_t kKept = 4;  // including the first one
 
   std::map<std::string, std::shared_ptr<const MeshStore>> open_;
   const std::string first_;
@@ -119,12 +119,12 @@ std::optional<ArrayStores::Opened> ArrayStores::take_opened() {
   return out;
 }
 
-// Answers that wait for a peer: samplers ask for as many chunks at a time as fill their link, and for a list.
+// Answers queued per peer: samplers ask for as many chunks at a time as fill their link, and for a list.
 constexpr int kAnswersWaiting = 16;
-constexpr double kListsAtOnce = 4, kLists_s = 1;  // of a peer, and how many more a second
-constexpr size_t kPeers = 1024;                   // whose lists are counted
+constexpr double kListsAtOnce = 4, kLists_s = 1;  // per peer: lists at once, then lists per second
+constexpr size_t kPeers = 1024;                   // peers whose lists are counted
 
-// Lists are large and quickly asked for: each peer gets a few at once, then one a second.
+// Lists are large and cheap to ask for: each peer gets a few at once, then one per second.
 class ListLimit {
  public:
   bool allow(const std::string& peer, double now_s) {
@@ -200,13 +200,13 @@ class ServedMesh final : public Served {
   }
   Requests requests() const override { return {"chunks", kAnswersWaiting}; }
 
-  // The session may want other colours than it began with: by order of the master, or because another data server that
-  // was here before had them.
+  // The session may want other colours than it began with: by order of the master, or because an earlier data server
+  // had them.
   Status follow(const wire::Welcome& session) override {
     epochs_.keep(session);
     const scene::SessionView view(session);
     const std::string order = view.fact(scene::kArrayOrderFact);
-    if (std::exchange(master_, session.master) != session.master) order_.clear();  // another one counts from 1 again
+    if (std::exchange(master_, session.master) != session.master) order_.clear();  // another master counts from 1 again
     if (!order.empty() && order != order_) {
       order_ = order;
       stores_.want(ordered_array());
@@ -221,7 +221,7 @@ class ServedMesh final : public Served {
     return ok_status();
   }
 
-  // Who asks for an array that is not there yet asks again, and so does whose answer found the queue full.
+  // Samplers repeat requests: for arrays that are not open yet, and for answers that found the queue full.
   void answer(const net::Message& message, const Outlets& outlets) override {
     net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(outlets.requests, message, [&](const auto& request) {
       constexpr bool kAsksForAll = std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkListRequest>;
@@ -271,7 +271,7 @@ class ServedMesh final : public Served {
   static wire::ChunkList reply(const wire::ChunkListRequest& request, const MeshStore& store) {
     return {request.epoch, store.chunks()};
   }
-  // Without bytes: there is no such chunk.
+  // No bytes: the chunk does not exist.
   static wire::Chunk reply(const wire::ChunkRequest& request, const MeshStore& store) {
     const bool exists = request.chunk.value < store.chunks().size();
     return {request.epoch, request.chunk, exists ? store.chunk(request.chunk).bytes : wire::Bytes{}};
@@ -291,7 +291,7 @@ class ServedMesh final : public Served {
     out.unit = metres ? "m" : info.coordinates.unit;
     return out;
   }
-  // Of the order "N ARRAY".
+  // Parts of the order "N ARRAY".
   std::string order_number() const { return order_.substr(0, order_.find(' ')); }
   std::string ordered_array() const {
     const size_t blank = order_.find(' ');

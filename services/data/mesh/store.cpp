@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 class Store : public MeshStore {
  public:
-  /// use: a lock that says so, of a store in the cache.
+  /// use: the lock that marks a cached store as used.
   explicit Store(StoreContent content, Descriptor use) : content_(std::move(content)), use_(std::move(use)) {}
   const MeshStoreInfo& info() const override { return content_.info; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return content_.chunks; }
@@ -40,7 +40,7 @@ class Store : public MeshStore {
   Descriptor use_;
 };
 
-// news: for the person, of this opening alone.
+// news: remarks on this opening only, for the user.
 std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& path, bool from_cache,
                                       const std::vector<std::string>& news, Descriptor use = Descriptor()) {
   content.info.source = path;
@@ -50,7 +50,7 @@ std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& p
   return std::make_shared<Store>(std::move(content), std::move(use));
 }
 
-// Reads the mesh file and writes its store into the descriptor. unwritten: set if that is what failed.
+// Reads the mesh file and writes its store into the descriptor. unwritten: set to true if writing failed.
 Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
                    const Progress& progress, bool* unwritten = nullptr) {
   auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
@@ -82,7 +82,7 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   return written;
 }
 
-// Without a cache: a file that has no name and goes away with its last mapping.
+// Without a cache: uses a file without a name, which goes away with its last mapping.
 Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const StoreOptions& options,
                                                 const MeshSource& source, const Progress& progress) {
   std::error_code ignored;
@@ -97,7 +97,7 @@ Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const S
   return make_store(std::move(*content), path, false, {});
 }
 
-// The store of a stem, which is locked as in use; null: there is none. news: for the person.
+// Opens the store of a stem and locks it as used; null: it does not exist. news: remarks for the user.
 Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const std::string& path, bool from_cache,
                                                  const std::vector<std::string>& news = {}) {
   const std::string name = stem + ".mesh";
@@ -111,8 +111,8 @@ Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const 
   return make_store(std::move(*content), path, from_cache, news, std::move(file));
 }
 
-// Makes a store in the cache. It gets its name once it is whole. Where the cache has a limit, others make room: this
-// one is locked.
+// Makes a store in the cache. It gets its name once it is whole. If the cache has a limit, other stores are removed for
+// it; this one is locked.
 Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const std::string& path,
                                                const StoreOptions& options, const MeshSource& source,
                                                const Progress& progress) {
@@ -134,7 +134,7 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
       log::warn("{}; going on without a cache", reason);
     }
   }
-  if (unwritten) return open_unnamed(path, options, source, progress);  // elsewhere, there may be room
+  if (unwritten) return open_unnamed(path, options, source, progress);  // there may be room elsewhere
   std::vector<std::string> news;
   if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
     news.push_back(std::move(told));
@@ -146,8 +146,8 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
 constexpr const char* kWaitingForAnother = "waiting for another process that reads it";
 constexpr double kLongestWait_s = 600;
 
-// One process at a time makes a store; others wait for it here and then find it. The lock ends with its holder. Whoever
-// clears the cache removes locks that nobody holds, so the one that was waited for may be gone: then once more.
+// Waits until no other process makes this store: one makes it, the others then find it. The lock ends with its holder.
+// Clearing the cache removes unheld locks, so the file may be gone once it is locked: then try again.
 Descriptor lock_making(const std::string& stem, const Progress& progress) {
   const std::string name = stem + ".lock";
   const double begin_s = monotonic_s();

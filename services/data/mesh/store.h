@@ -15,63 +15,63 @@
 
 namespace telesplat::data {
 
-/// What the store of a mesh depends on beside the mesh.
+/// Settings that change a mesh's store.
 struct StoreOptions : PlacementOptions {
   std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
   bool use_cache = true;
 };
 
-/// What a mesh is coloured by, as people give it.
+/// The colouring of a mesh, as users state it.
 struct ColouringOptions {
   std::string by;               ///< scene::parse_colour_by(); empty: the file's own colours
-  bool by_file = false;         ///< `by` is what the file marks: its own colours count where that is no good
+  bool by_file = false;         ///< `by` is the array that the file marks: if it is not usable, the file's own colours
+                                ///< count
   std::string map = "viridis";  ///< colour::resolve_colour_map()
 };
 
-/// How a mesh is read, placed and kept.
+/// Settings for reading, placing and storing a mesh.
 struct MeshOptions : StoreOptions {
-  ElevationOptions elevation;                       ///< of elevation rasters alone
+  ElevationOptions elevation;                       ///< for elevation rasters only
   uint64_t texture_detail = kDefaultTextureDetail;  ///< triangles, at most, of a mesh whose textures are baked
   ColouringOptions colouring;
-  std::optional<double> iso;  ///< of volumes alone: the surface where they have this value
+  std::optional<double> iso;  ///< for volumes only: the surface where they have this value
   VolumeLayout volume;        ///< with iso
 };
 
-/// What the store's file has as it is in memory.
+/// Figures as the store's file holds them, byte for byte.
 struct MeshFigures {
   uint64_t content_hash = 0;
   uint64_t triangles = 0, vertices = 0;
   uint64_t degenerate_dropped = 0;
   uint32_t had_normals = 0, had_colours = 0;  ///< 1: the file has them
-  geometry::DBox box_data;                    ///< as it is shown: the file's coordinates times coordinates.shown
+  geometry::DBox box_data;                    ///< box as shown: the file's coordinates times coordinates.shown
   geometry::Box box_room;
 };
 
 struct MeshStoreInfo : MeshFigures {
-  std::string source;                    ///< path of the file it was made from
+  std::string source;                    ///< path of the file that it was made from
   std::string format;                    ///< "ply", "obj", ...
-  std::vector<scene::ArrayInfo> arrays;  ///< that the file holds
-  std::string array;                     ///< of which chunks have the values in place of colours; empty: none
+  std::vector<scene::ArrayInfo> arrays;  ///< all arrays of the file
+  std::string array;                     ///< the array whose values chunks hold in place of colours; empty: colours
   scene::Coordinates coordinates;
-  std::string up;         ///< the axis chosen
-  std::string up_reason;  ///< why, in a few words
+  std::string up;         ///< the axis that was chosen
+  std::string up_reason;  ///< reason, in a few words
   bool from_cache = false;
-  std::vector<std::string> notes;  ///< Mesh::notes; what else people should know of the store
+  std::vector<std::string> notes;  ///< Mesh::notes, and other remarks on the store for users
 };
 
 /// An open chunk store: immutable, safe to read from any thread.
 class MeshStore {
  public:
-  /// Opens the store of `source`, making it first if the cache has none. path: of the file that the source reads, for
-  /// errors and info(). Errors (exit code 2 for a user) name it. Precondition: options are
-  /// within the limits of their flags.
+  /// Opens the store of `source`, making it first if the cache has none. path: the source's file, for errors and
+  /// info(). Errors (exit code 2 for a user) name it. Precondition: options are within the limits of their flags.
   static Result<std::shared_ptr<MeshStore>> make(const std::string& path, const MeshSource& source,
                                                  const StoreOptions& options, const Progress& progress);
   virtual ~MeshStore() = default;
 
   virtual const MeshStoreInfo& info() const = 0;
   virtual const std::vector<geometry::ChunkInfo>& chunks() const = 0;
-  /// Bytes of a chunk, in mapped memory. Precondition: id is one of chunks().
+  /// Returns a chunk's bytes, in mapped memory. Precondition: id is one of chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
 };
 

@@ -24,8 +24,8 @@ struct StoreHeader {
   uint64_t file_bytes = 0;
   MeshFigures figures;
   uint64_t arrays_offset = 0, arrays_bytes = 0;
-  uint64_t lines_bytes = 0;  ///< behind the arrays
-  uint64_t checksum = 0;     ///< of all the above and the table of contents
+  uint64_t lines_bytes = 0;  ///< after the arrays
+  uint64_t checksum = 0;     ///< over all fields above and the table of contents
 };
 static_assert(sizeof(StoreHeader) <= kPage);
 
@@ -40,7 +40,7 @@ uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entr
                               XXH3_64bits_withSeed(entries.data(), entries.size_bytes(), seed));
 }
 
-// Writes all of it; returns 0 or an errno.
+// Writes all bytes; returns 0 or an errno.
 int write_at(int descriptor, const void* data, size_t bytes, size_t offset) {
   const char* p = static_cast<const char*>(data);
   while (bytes > 0) {
@@ -66,7 +66,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   std::atomic<size_t> end = kPage + round_up(entries.size() * sizeof(StoreEntry));
   std::atomic<int> failure = 0;
 
-  // Batches, so that progress is told from this thread; a chunk takes its place in the file when its size is known.
+  // Batches, so that this thread reports progress; a chunk gets its place in the file when its size is known.
   constexpr size_t kBatch = 16;
   for (size_t first = 0; first < plan.chunks() && failure == 0; first += kBatch) {
     progress(kWritingTheStore, static_cast<double>(first) / static_cast<double>(plan.chunks()));

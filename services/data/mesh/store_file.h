@@ -1,10 +1,10 @@
-// The chunk store's file: a header, a table of contents, the chunks. Written once, mapped afterwards.
+// The chunk store's file: a header, a table of contents, the chunks. Written once, then mapped.
 //
-//   offset 0      StoreHeader, padded to 4096
-//   4096          StoreEntry[chunks], padded to a multiple of 4096
-//   then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order they were made
-//   then          what the file's arrays are: scene::to_text(); then lines: the format, the axis that points up, why,
-//                 the array of the chunks' values, the coordinates, and remarks on the file, without its name
+//     offset 0      StoreHeader, padded to 4096
+//     4096          StoreEntry[chunks], padded to a multiple of 4096
+//     then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order of making
+//     then          the file's arrays as scene::to_text(); then lines: format, up axis, reason for it, array of the
+//                                 chunks' values, coordinates, and remarks on the file, without its name
 //
 // Native byte order: the file is a cache and never travels.
 #pragma once
@@ -24,29 +24,29 @@ namespace telesplat::data {
 
 inline constexpr size_t kTrianglesPerChunk = 1 << 16;
 
-/// An assignment of triangles to chunks: chunk i has the triangles order[begin[i] .. begin[i + 1]).
+/// Assigns triangles to chunks: chunk i has the triangles order[begin[i] .. begin[i + 1]).
 struct ChunkPlan {
   std::vector<uint32_t> order;  ///< every triangle once
-  std::vector<size_t> begin;    ///< one more than there are chunks
+  std::vector<size_t> begin;    ///< one entry more than chunks
   size_t chunks() const { return begin.size() - 1; }
 };
 
 /// Splits at medians of triangle centroids across the longest axis (a balanced k-d tree) until no part has more than
-/// `most` triangles; parts hold more than most / 2 (but for a mesh that is smaller). Neighbouring chunks are neighbours
-/// in space. Deterministic, parallel (TBB). Precondition: the mesh has triangles; most >= 1.
+/// `most` triangles; parts hold more than most / 2 (except in a smaller mesh). Neighbouring chunks are neighbours in
+/// space. Deterministic, parallel (TBB). Precondition: the mesh has triangles; most >= 1.
 ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most = kTrianglesPerChunk);
 
 /// Lays out one chunk (geometry::build_chunk) of these triangles: vertices are renumbered in the order of their first
-/// use, and doubled where faces of other colours meet, triangles follow a Morton curve through their centroids, so that
-/// neighbours in memory are neighbours in space.
+/// use, and doubled where faces of different colours meet; triangles follow a Morton curve through their centroids, so
+/// that neighbours in memory are neighbours in space.
 std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32_t> triangles);
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
-/// Goes up whenever readers, placement or layout would make another file of the same mesh.
+/// To be raised whenever readers, placement or layout would make another file from the same mesh.
 inline constexpr uint32_t kStoreVersion = 8;
 
-/// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
-/// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages
+/// Writes the store of a placed mesh into an open, empty, writable file. `info` describes the mesh, with boxes and
+/// counts. After a failure (disk full) the file's content is useless. Errors start with `name`. `progress` (stages
 /// kSortingIntoChunks and kWritingTheStore) is called on this thread.
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
                    const Progress& progress);
@@ -55,12 +55,12 @@ struct StoreContent {
   std::shared_ptr<const MappedFile> file;
   MeshStoreInfo info;  ///< without source and from_cache; notes without the file's name
   std::vector<geometry::ChunkInfo> chunks;
-  std::vector<size_t> offsets;  ///< of each chunk in the file
+  std::vector<size_t> offsets;  ///< offset of each chunk in the file
 };
 
-/// Maps a store and checks all of it before anything is believed: magic, version, size, the checksum over header and
-/// table of contents, the offsets, and the checksum of every chunk (which also brings the pages into memory that
-/// samplers are about to ask for).
+/// Maps a store and checks all of it before any value is used: magic, version, size, the checksum over header and
+/// table of contents, the offsets, and the checksum of every chunk (which also loads the pages that samplers are about
+/// to request).
 Result<StoreContent> read_store(int descriptor, const std::string& name);
 
 }  // namespace telesplat::data

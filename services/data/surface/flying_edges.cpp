@@ -21,12 +21,12 @@ namespace telesplat::data {
 
 namespace {
 
-// A case of marching cubes: the triangles in a cube whose corners lie inside or outside. Corner c of a cube stands at
+// A case of marching cubes: the triangles in a cube whose corners are inside or outside. Corner c of a cube stands at
 // (c & 1, c >> 1 & 1, c >> 2). Edges 0..3 run along x from corners 0 2 4 6, 4..7 along y from 0 1 4 5, 8..11 along z
 // from 0 1 2 3.
 struct CubeCase {
   int triangles = 0;
-  std::array<std::array<uint8_t, 3>, 12> edges{};  // of each triangle; their normal looks away from inside corners
+  std::array<std::array<uint8_t, 3>, 12> edges{};  // per triangle; its normal points away from inside corners
 };
 
 // Corners of each face, counterclockwise as seen from outside.
@@ -37,8 +37,8 @@ int edge_between(int a, int b) {
   return axis == 0 ? low >> 1 : axis == 1 ? 4 + ((low & 1) | (low >> 2) << 1) : 8 + low;
 }
 
-// Within each face lines go from where its outline leaves the inside to where it came in; they join to loops through
-// the cube's faces, which become fans.
+// In each face, lines lead from the edge where its outline leaves the inside to the edge where it came in; they join to
+// loops through the cube's faces, which become fans.
 CubeCase make_case(int inside) {
   std::array<int, 12> next;
   next.fill(-1);
@@ -63,8 +63,8 @@ CubeCase make_case(int inside) {
   return out;
 }
 
-// By the bits of corners that are inside. Faces with two inside corners at a diagonal keep these apart, in either of
-// the cubes that share it, so that surfaces are closed.
+// Cases by the bits of inside corners. In faces with two diagonal inside corners these stay apart, in both cubes that
+// share the face, so surfaces are closed.
 const std::array<CubeCase, 256>& cube_cases() {
   static const auto cases = [] {
     std::array<CubeCase, 256> out;
@@ -74,10 +74,10 @@ const std::array<CubeCase, 256>& cube_cases() {
   return cases;
 }
 
-constexpr int kSlices = 16;                      // in a slab: its border is looked at twice, its tables stay small
-constexpr uint32_t kOfNext = uint32_t{1} << 31;  // a vertex of the slab above, by its number there
+constexpr int kSlices = 16;                      // per slab: its border is visited twice, its tables stay small
+constexpr uint32_t kOfNext = uint32_t{1} << 31;  // marks a vertex of the slab above, by its number there
 
-// The least value of T that is inside; too large for any of it: none is.
+// Returns the least value of T that is inside; beyond T's range if no value is.
 template <class T>
 auto threshold(double iso) {
   if constexpr (std::is_integral_v<T>) {
@@ -94,7 +94,7 @@ struct Part {
   std::vector<uint32_t> indices;
 };
 
-// What all slabs share.
+// Data that all slabs share.
 template <class T>
 struct Field {
   const T* values;
@@ -102,7 +102,7 @@ struct Field {
   double iso;
   glm::dmat4 index_to_data;
   glm::dmat3 of_normals;
-  bool turned;  // triangles
+  bool turned;  // triangles must be turned
   size_t steps[3] = {1, size_t(size[0]), size_t(size[0]) * size_t(size[1])};
 
   glm::dvec3 downward(const std::array<int, 3>& at, size_t index) const {
@@ -116,7 +116,7 @@ struct Field {
     return out;
   }
 
-  // Where the edge along `axis` from a grid point crosses the value.
+  // Adds the vertex where the edge along `axis` from a grid point crosses the value.
   void add_vertex(std::array<int, 3> at, size_t axis, Part& out) const {
     const size_t index = size_t(at[0]) + steps[1] * size_t(at[1]) + steps[2] * size_t(at[2]);
     const double s = double(values[index]), t = (iso - s) / (double(values[index + steps[axis]]) - s);
@@ -131,13 +131,13 @@ struct Field {
   }
 };
 
-// The slices from `first` on: their vertices, and the triangles between them and the slices behind them.
+// The slices from `first` on: their vertices, and the triangles between each and the next slice.
 template <class T>
 class Slab {
  public:
   Slab(const Field<T>& field, int first, int last) : field_(field), first_(first), last_(last) {
     const size_t rows = size_t(field.size[1]);
-    stride_ = size_t(field.size[0]) + 9;  // eight points are looked at a time, beside their next ones
+    stride_ = size_t(field.size[0]) + 9;  // eight points are compared at a time, each with the next
     for (auto& slice : inside_) slice.resize(rows * stride_ + 8);
     for (auto* ids : {&x_[0], &x_[1], &y_[0], &y_[1], &z_}) ids->resize(rows * stride_);
   }
@@ -171,7 +171,7 @@ class Slab {
     return out;
   }
 
-  // One byte a point, 1: inside. Behind a row its last point goes on, so that nothing is crossed there.
+  // Sets one byte per point, 1: inside. The last point is repeated behind its row, so that there are no crossings.
   void classify(int k, int slice) {
     const auto least = threshold<T>(field_.iso);
     for (int j = 0; j < field_.size[1]; ++j) {
@@ -182,7 +182,7 @@ class Slab {
     }
   }
 
-  // f(i) where two rows differ.
+  // Calls f(i) for each i where two rows differ.
   template <class F>
   void crossings(const uint8_t* a, const uint8_t* b, F&& f) const {
     for (int begin = 0; begin < field_.size[0]; begin += 8)
@@ -242,7 +242,7 @@ class Slab {
   const int first_, last_;
   size_t stride_;
   std::vector<uint8_t> inside_[2];         // this slice, and the next one
-  std::vector<uint32_t> x_[2], y_[2], z_;  // vertices on the edges from each grid point; where there are some
+  std::vector<uint32_t> x_[2], y_[2], z_;  // vertices on the edges from each grid point, where edges cross
   Part part_;
 };
 
@@ -273,7 +273,7 @@ Result<Mesh> join(std::vector<Part>& parts, const std::string& name) {
 template <class T>
 Result<Mesh> surface_of(const Volume& volume, const T* values, double iso, const std::string& name) {
   const glm::dmat3 linear(volume.index_to_data);
-  const bool upside_down = volume.scale < 0;  // the larger stored value is the lower one
+  const bool upside_down = volume.scale < 0;  // larger stored values are lower values
   const Field<T> field{values,
                        volume.size,
                        iso,
@@ -292,8 +292,8 @@ Result<Mesh> surface_of(const Volume& volume, const T* values, double iso, const
 
 Result<Mesh> flying_edges(const Volume& volume, double iso, double below, const std::string& name) {
   if (volume.type != VoxelType::kF32 || volume.not_finite == 0)
-    return with_type(volume.type, [&](auto value) {  // a vector's storage is aligned for anything
-      using T = std::conditional_t<(sizeof value <= 2), decltype(value), float>;  // volumes have no others
+    return with_type(volume.type, [&](auto value) {  // a vector's storage is aligned for any type
+      using T = std::conditional_t<(sizeof value <= 2), decltype(value), float>;  // the only types of volumes
       return surface_of(volume, reinterpret_cast<const T*>(volume.stored.data()), iso, name);
     });
   std::vector<float> finite(volume.stored.size() / sizeof(float));

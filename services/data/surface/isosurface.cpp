@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kBins = 128;
 
-// Text as hexadecimal digits of its hash: for file names.
+// Returns the hash of a text in hexadecimal digits, for file names.
 std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
 
 }  // namespace
@@ -31,7 +31,7 @@ Result<MeshSource> surface_source(const std::string& path, const VolumeLayout& l
     return isosurface(*volume, iso, source.name);
   };
   const std::string said = layout.text(), which = said.empty() ? "" : "-" + hex(said);
-  // What the volume's first step is read from: one file and those that it names, or all slices of a series.
+  // Files of the volume's first step: one file and those that it names, or all slices of a series.
   const bool several = found->dicom || !found->slices.empty();
   auto files = several ? found->files() : std::vector{found->steps.front()};
   if (!several)
@@ -56,7 +56,7 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
   if (mesh->indices.empty()) return Error{fmt::format("{}: has no surface at this value", name)};
   mesh->format = "iso";
   mesh->frame = volume.box();
-  // The store keeps what other values a surface may have.
+  // The store keeps the range of other values that a surface may have.
   mesh->arrays = {{.name = "value", .unit = {}, .spans = {{volume.lo, volume.hi}}}};
   if (const auto levels = choose_levels(volume, volume.lo, volume.hi))
     mesh->arrays[0].histogram = volume::to_text(volume::histogram_of(count_levels(volume, *levels), *levels, kBins));

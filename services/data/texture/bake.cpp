@@ -23,9 +23,9 @@ struct Edge {
 constexpr uint32_t kNone = Numbering<Edge>::kNone;
 
 constexpr float kShortestEdge = 1.5f;         // texels: longer ones may be halved
-constexpr float kShortestNearestEdge = 0.5f;  // of textures whose texels have sharp rims
-constexpr float kVisible = 6;                 // codes of 255: smaller differences are not worth a vertex
-constexpr int kMostSamples = 2048;            // along a triangle's edge, when looking for differences
+constexpr float kShortestNearestEdge = 0.5f;  // for textures that are not interpolated
+constexpr float kVisible = 6;                 // 8-bit steps: smaller differences are not worth a vertex
+constexpr int kMostSamples = 2048;            // along a triangle's edge, when searching for differences
 
 glm::vec3 codes(glm::vec3 linear) {
   glm::vec3 out;
@@ -42,7 +42,7 @@ uint32_t mean_colour(uint32_t a, uint32_t b) {
   return out;
 }
 
-// Vertices at the same position have the same number, so that edges are halved on both sides of a seam.
+// Numbers positions, so that edges are halved on both sides of a seam.
 std::vector<uint32_t> number_positions(const std::vector<glm::dvec3>& positions) {
   Numbering<glm::dvec3> numbers(positions.size());
   std::vector<uint32_t> out;
@@ -77,11 +77,11 @@ class Baker {
   }
 
  private:
-  // Normals that are to be computed are so here, because texture's seams double vertices: smooth across them.
+  // Computes missing normals now, since seams of textures double vertices: shading stays smooth across seams.
   void complete_normals() {
     mesh_.normals.resize(mesh_.positions.size(), glm::vec3(0));
     const auto absent = [&](size_t v) { return mesh_.normals[v] == glm::vec3(0); };
-    std::vector<glm::dvec3> sums(mesh_.positions.size(), glm::dvec3(0));  // by numbers of positions
+    std::vector<glm::dvec3> sums(mesh_.positions.size(), glm::dvec3(0));  // by number of position
     for (size_t t = 0; t < mesh_.indices.size() / 3; ++t) {
       const auto& p = mesh_.positions;
       const glm::dvec3 n = glm::cross(p[corner(t, 1)] - p[corner(t, 0)], p[corner(t, 2)] - p[corner(t, 0)]);
@@ -94,7 +94,7 @@ class Baker {
   }
 
   uint32_t corner(size_t t, int k) const { return mesh_.indices[3 * t + size_t(k)]; }
-  // Null: it has none, or corners of different ones.
+  // Null: no texture, or corners with different ones.
   const Texture* texture_of(size_t t) const {
     const uint32_t a = use_.texture[corner(t, 0)];
     if (a == kNoTexture || use_.texture[corner(t, 1)] != a || use_.texture[corner(t, 2)] != a) return nullptr;
@@ -105,7 +105,7 @@ class Baker {
   }
   static float shortest(const Texture& texture) { return texture.nearest() ? kShortestNearestEdge : kShortestEdge; }
 
-  // Whether colours in the triangle differ visibly from what its corners give. `longest`: of its edges, in texels.
+  // True if colours in the triangle differ visibly from those between its corners. `longest`: its longest edge, texels.
   bool differs(const Texture& texture, size_t t, float longest) const {
     glm::vec2 uv[3];
     glm::vec3 at[3];
@@ -121,13 +121,13 @@ class Baker {
     return false;
   }
 
-  // Poles of spheres have such triangles; nothing of them is seen.
+  // Poles of spheres have such triangles; they are invisible.
   bool is_a_line(size_t t) const {
     const uint32_t a = place_[corner(t, 0)], b = place_[corner(t, 1)], c = place_[corner(t, 2)];
     return a == b || b == c || c == a;
   }
 
-  // Which edges of a triangle are to be halved for its own sake: bits of its corners 0, 1, 2, behind which they lie.
+  // Returns the edges to be halved for the triangle's own sake: a bit for each corner 0, 1, 2, for the edge after it.
   uint8_t wishes(size_t t) const {
     const Texture* texture = texture_of(t);
     if (!texture || texture->plain() || is_a_line(t)) return 0;
@@ -149,7 +149,7 @@ class Baker {
     return longest;
   }
 
-  // Halves what wants to be, as far as there is room. False: nothing, or no room.
+  // Halves the wanted edges, as far as there is room. False: no edge is wanted, or no room is left.
   bool pass() {
     const size_t triangles = mesh_.indices.size() / 3;
     std::vector<uint8_t> wish(triangles, 0);
@@ -162,7 +162,7 @@ class Baker {
       if (wish[t]) wanted.emplace_back(-size_of(t), uint32_t(t));
     }
     if (wanted.empty()) return false;
-    // A triangle's three edges make at most three of it and one more of each neighbour.
+    // Halving a triangle's three edges adds at most three triangles for it and one for each neighbour.
     const size_t room = most_ > triangles ? size_t(most_ - triangles) / 6 : 0;
     const bool enough = wanted.size() <= room;
     if (!enough) {
@@ -215,7 +215,7 @@ class Baker {
     return v;
   }
 
-  // The first piece takes the triangle's place; all turn the same way round as it did.
+  // The first piece takes the triangle's place; all pieces keep its winding.
   void divide(size_t t, const uint32_t (&middle)[3]) {
     const uint32_t c[3] = {corner(t, 0), corner(t, 1), corner(t, 2)};
     const int count = (middle[0] != kNone) + (middle[1] != kNone) + (middle[2] != kNone);
@@ -228,12 +228,12 @@ class Baker {
       replace(t, {c[k], middle[k], c[(k + 2) % 3]});
       add(t, {middle[k], c[(k + 1) % 3], c[(k + 2) % 3]});
     } else {
-      int whole = 0;  // the edge that stays, from corner a to b; o is opposite of it
+      int whole = 0;  // the edge that stays, from corner a to b; o is opposite
       while (middle[whole] != kNone) ++whole;
       const uint32_t a = c[whole], b = c[(whole + 1) % 3], o = c[(whole + 2) % 3];
       const uint32_t at_b = middle[(whole + 1) % 3], at_a = middle[(whole + 2) % 3];
       replace(t, {o, at_a, at_b});
-      // Of the four-cornered rest the shorter diagonal.
+      // Cut the remaining quadrilateral along its shorter diagonal.
       const auto& p = mesh_.positions;
       if (glm::distance(p[a], p[at_b]) <= glm::distance(p[b], p[at_a])) {
         add(t, {a, b, at_b});
@@ -251,7 +251,7 @@ class Baker {
   }
 
   void colour() {
-    // The mean length of a vertex's edges is how many texels it stands for.
+    // A vertex covers about as many texels as the mean length of its edges.
     std::vector<float> length(mesh_.positions.size(), 0), edges(mesh_.positions.size(), 0);
     for (size_t t = 0; t < mesh_.indices.size() / 3; ++t) {
       const Texture* texture = texture_of(t);
@@ -264,7 +264,7 @@ class Baker {
       if (use_.texture[v] == kNoTexture || edges[v] == 0) return;
       const Texture& texture = *use_.textures[use_.texture[v]];
       const float texels = length[v] / edges[v] / kShortestEdge;
-      // Edges that were left long because nothing is to be seen along them do not blur their ends.
+      // Edges that were left long because nothing is visible along them do not blur their ends.
       const int level = longest_left_ > 0 && texels > 1.5f ? int(std::lround(std::log2(texels))) : 0;
       const glm::vec3 c = linear_of(mesh_.colours[v]) * texture.sample(use_.uv[v], level);
       mesh_.colours[v] =
@@ -275,13 +275,13 @@ class Baker {
   Mesh& mesh_;
   TextureUse use_;
   const uint64_t most_;
-  std::vector<uint32_t> place_;  // of each vertex: the number of its position
+  std::vector<uint32_t> place_;  // per vertex: the number of its position
   uint32_t places_ = 0;
-  std::vector<bool> settled_;  // of each triangle: nothing more is to be seen in it
-  /// By positions: edges to halve; by vertices: those in whose middles the vertices from first_middle_ on are.
+  std::vector<bool> settled_;  // per triangle: no more detail is visible in it
+  /// By positions: edges to halve; by vertices: edges whose middles are the vertices from first_middle_ on.
   Numbering<Edge> marked_, middles_;
   uint32_t first_middle_ = 0;
-  float longest_left_ = 0;  // texels of an edge that should have been halved
+  float longest_left_ = 0;  // texels of the longest edge that should have been halved
 };
 
 }  // namespace

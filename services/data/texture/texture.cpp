@@ -33,7 +33,7 @@ Texture::Texture(image::View picture, Wrap wrap_u, Wrap wrap_v, bool nearest)
     const Level& from = levels_.back();
     Level to{std::max(1, from.width / 2), std::max(1, from.height / 2), {}};
     to.texels.reserve(size_t(to.width) * size_t(to.height));
-    // Means of linear light, over all texels that lie below one of the smaller picture.
+    // Means of linear light, over all texels below one of the smaller picture.
     for (int y = 0; y < to.height; ++y)
       for (int x = 0; x < to.width; ++x) {
         glm::vec3 sum(0);

@@ -16,30 +16,30 @@
 
 namespace telesplat::data {
 
-/// What a texture shows outside of 0..1.
+/// Continuation of a texture outside of 0..1.
 enum class Wrap : uint8_t { kRepeat, kClamp, kMirror };
 
 inline constexpr uint32_t kNoTexture = ~uint32_t{0};
-inline constexpr size_t kMaxTexels = size_t{1} << 28;  ///< of all textures of a mesh
+inline constexpr size_t kMaxTexels = size_t{1} << 28;  ///< in all textures of a mesh
 
-glm::vec3 linear_of(uint32_t rgb);  ///< linear light of sRGB codes
+glm::vec3 linear_of(uint32_t rgb);  ///< converts sRGB codes to linear light
 
 /// Immutable, safe to read from any thread.
 class Texture {
  public:
-  /// picture: sRGB codes. nearest: not interpolated between texels, for pictures of few, sharp texels.
+  /// picture: sRGB codes. nearest: not interpolated between texels, for pictures with few, sharp texels.
   Texture(image::View picture, Wrap wrap_u, Wrap wrap_v, bool nearest = false);
 
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
   bool nearest() const { return nearest_; }
-  /// All texels have one colour.
+  /// True if all texels have one colour.
   bool plain() const { return plain_; }
 
-  /// Linear light, 0 to 1. (0, 0) is the upper left corner of the picture, v goes down. level: of halvings of the
-  /// picture, for colours that stand for many texels.
+  /// Returns linear light, 0 to 1. (0, 0) is the upper left corner of the picture, v goes down. level: number of
+  /// halvings of the picture, for colours that stand for many texels.
   glm::vec3 sample(glm::vec2 uv, int level = 0) const;
-  /// Length in texels.
+  /// Returns the distance in texels.
   float texels(glm::vec2 from, glm::vec2 to) const;
 
  private:
@@ -59,9 +59,9 @@ class NamedTextures {
   /// file: for notes and error texts.
   NamedTextures(const std::string& file, Companions& companions) : file_(file), companions_(companions) {}
 
-  /// The number of a picture, as it is wrapped, among all(). A picture is read once for each way to wrap it.
-  /// kNoTexture: it cannot be opened; notes() tells that once. Throws Refusal: it is damaged, or exceeds kMaxTexels
-  /// with others.
+  /// Returns the number of a picture with this wrapping among all(). A picture is read once for each way to wrap it.
+  /// kNoTexture: it cannot be opened; notes() names it once. Throws Refusal: it is damaged, or exceeds kMaxTexels with
+  /// others.
   uint32_t number_of(const std::string& picture, Wrap wrap);
 
   const std::vector<std::shared_ptr<const Texture>>& all() const { return all_; }

@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kMaxLibraries = 64, kMaxMaterials = 100'000;
 
 std::string beside(const std::string& path, std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');  // as programs on Windows write them
+  std::replace(name.begin(), name.end(), '\\', '/');  // programs on Windows write these
   return (std::filesystem::path(path).parent_path() / name).string();
 }
 
@@ -22,14 +22,14 @@ uint32_t colour_of(const std::array<double, 3>& c) {
   return pack_rgb(channel(c[0]), channel(c[1]), channel(c[2]));
 }
 
-// As many numbers as there are, at most three.
+// Reads up to three numbers; returns their count.
 int take_numbers(TextScanner& scan, double (&out)[3]) {
   int n = 0;
   while (n < 3 && scan.skip_blanks() && scan.number(out[n])) ++n;
   return n;
 }
 
-// -s u v w, -o u v w, -clamp on, others that change colours or do not; then the file's name, which may have blanks.
+// Reads -s u v w, -o u v w, -clamp on, and other options; then the file's name, which may contain blanks.
 void read_map(TextScanner& scan, std::string_view content, const std::string& library, ObjMaterial& material) {
   while (scan.skip_blanks()) {
     const size_t begin = scan.offset();

@@ -16,17 +16,17 @@ namespace telesplat::data {
 
 struct ObjMaterial {
   std::optional<uint32_t> colour;  ///< Kd, 0x00RRGGBB
-  std::string texture;             ///< map_Kd, named from the OBJ's folder; empty: none
-  std::string not_applied;         ///< an option of map_Kd that changes its colours; empty: none
-  bool clamp = false;              ///< of the texture: outside of 0..1 it shows its rim
+  std::string texture;             ///< map_Kd, relative to the OBJ's folder; empty: no texture
+  std::string not_applied;         ///< an unsupported option of map_Kd that changes its colours
+  bool clamp = false;              ///< outside of 0..1 the texture shows its border
   glm::vec2 scale{1, 1}, offset{0, 0};
 };
 
-/// The libraries that the lines "mtllib" name. The rest of a line is one name, if there is such a file, else several.
+/// Returns the libraries of the lines "mtllib". The rest of a line is one name, if that file exists, else several.
 std::vector<std::string> obj_material_libraries(std::string_view content, Companions& companions);
 
-/// By name; of equal names the last. A library that cannot be read has none, and adds itself to `missing`. Ordered, so
-/// that companions are hashed in one order.
+/// Returns the materials by name; of equal names the last. A library that cannot be read is added to `missing`.
+/// Ordered, so that companions are hashed in one order.
 std::map<std::string, ObjMaterial> read_obj_materials(const std::vector<std::string>& libraries, Companions& companions,
                                                       std::vector<std::string>& missing);
 

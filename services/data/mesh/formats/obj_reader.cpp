@@ -1,4 +1,4 @@
-// Wavefront OBJ. Source: "Object Files (.obj)", Wavefront Advanced Visualizer manual, appendix B1.
+// Reads Wavefront OBJ. Source: "Object Files (.obj)", Wavefront Advanced Visualizer manual, appendix B1.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace telesplat::data {
 namespace {
 
 constexpr uint32_t kNone = ~uint32_t{0};
-constexpr int kMostSteps = 64;  // through a position's variants: a million normals at one place cost no hours
+constexpr int kMostSteps = 64;  // through a position's variants: a million normals at one place must not cost hours
 
 class ObjReader {
  public:
@@ -53,8 +53,8 @@ class ObjReader {
   }
 
  private:
-  // A corner of the output mesh: a position with one normal, one material and, where that has a texture, one place in
-  // it. Those of one position form a list.
+  // A corner of the output mesh: a position with one normal, one material and, if textured, one place in the texture.
+  // Variants of one position form a list.
   struct Variant {
     uint32_t normal, material, place, vertex, next;
   };
@@ -64,7 +64,7 @@ class ObjReader {
     std::vector<std::string> missing;
     const auto libraries = obj_material_libraries(content_, companions_);
     for (auto& [name, material] : read_obj_materials(libraries, companions_, missing)) {
-      // Those without a texture that have one colour are one: fewer vertices are doubled.
+      // Materials without texture and of equal colour share a number: fewer vertices are doubled.
       const auto next = uint32_t(materials_.size());
       const int64_t look = material.colour ? int64_t(*material.colour) : -1;
       const uint32_t number = material.texture.empty() ? looks.emplace(look, next).first->second : next;
@@ -81,7 +81,7 @@ class ObjReader {
     refuse("{}:{}: {}", name_, scan_.line_number(), fmt::format(what, std::forward<Given>(given)...));
   }
 
-  // Whether the statement goes on: on the same line, or on the next one behind a backslash.
+  // True if the statement goes on: on the same line, or on the next one after a backslash.
   bool more() {
     while (scan_.skip_blanks('#')) {
       if (!scan_.skip_char('\\')) return true;
@@ -109,7 +109,7 @@ class ObjReader {
     normals_.emplace_back(n);
   }
 
-  // u [v [w]]; v goes up from the picture's lower rim.
+  // u [v [w]]; v grows from the picture's lower edge upwards.
   void read_texture_coordinate() {
     double u = 0, v = 0;
     if (!more() || !scan_.number(u)) bad("a texture coordinate is no number");
@@ -122,7 +122,7 @@ class ObjReader {
     material_ = found == material_numbers_.end() ? kNone : found->second;
   }
 
-  // 1-based, or negative: counted back from the last one so far.
+  // Converts an index: 1-based, or negative: counted back from the last element so far.
   bool resolve(int64_t index, size_t count, uint32_t& out) const {
     const int64_t zero_based = index > 0 ? index - 1 : index < 0 ? static_cast<int64_t>(count) + index : -1;
     if (zero_based < 0 || zero_based >= static_cast<int64_t>(count)) return false;
@@ -130,7 +130,7 @@ class ObjReader {
     return true;
   }
 
-  // position[/[texture][/normal]]
+  // Reads position[/[texture][/normal]].
   uint32_t read_corner() {
     int64_t index = 0;
     uint32_t position = 0, normal = kNone, place = kNone;
@@ -174,14 +174,14 @@ class ObjReader {
 
   uint32_t colour_of_variant(const Variant& v, bool own_colours, bool textured) const {
     const auto kd = v.material == kNone ? std::nullopt : materials_[v.material].colour;
-    // A texture is tinted by its material; many programs write black beside a texture and mean none.
+    // A material tints its texture; many programs write black beside a texture and mean no tint.
     if (textured) return kd && *kd != 0 ? *kd : 0xffffff;
     return !own_colours && kd ? *kd : vertex_colours_[v.vertex];
   }
 
   Mesh finish() {
     auto use = read_textures();
-    const bool own_colours = !colours_.empty();  // they win over materials
+    const bool own_colours = !colours_.empty();  // they take precedence over materials
     bool any_colour = own_colours || !use.textures.empty(), any_normal = false;
     for (const Variant& v : variants_)
       any_colour |= v.material != kNone && materials_[v.material].colour, any_normal |= v.normal != kNone;
@@ -193,7 +193,7 @@ class ObjReader {
       const uint32_t texture = v.material == kNone || v.place == kNone ? kNoTexture : textures_of_[v.material];
       if (any_colour) mesh_.colours.push_back(colour_of_variant(v, own_colours, texture != kNoTexture));
       if (any_normal)
-        mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // without one: computed later
+        mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // 0: to be computed
       if (use.textures.empty()) continue;
       use.texture.push_back(texture);
       use.uv.push_back(texture == kNoTexture ? glm::vec2(0) : place_in_picture(v));
@@ -210,7 +210,7 @@ class ObjReader {
     return {uv.x, 1 - uv.y};
   }
 
-  // Those that faces use.
+  // Loads the textures that faces use.
   TextureUse read_textures() {
     NamedTextures textures(name_, companions_);
     textures_of_.assign(materials_.size(), kNoTexture);
@@ -239,17 +239,17 @@ class ObjReader {
   Mesh mesh_;
   std::vector<glm::dvec3> positions_;
   std::vector<glm::vec3> normals_;
-  RawColours colours_;                    // one a vertex, or none
-  std::vector<uint32_t> vertex_colours_;  // the same, packed
+  RawColours colours_;                    // empty, or one per vertex
+  std::vector<uint32_t> vertex_colours_;  // the same colours, packed
   std::vector<uint32_t> first_variant_;
   std::vector<Variant> variants_;
-  std::vector<glm::vec2> places_;  // in textures
+  std::vector<glm::vec2> places_;  // texture coordinates
   std::unordered_map<std::string, uint32_t> material_numbers_;
   std::vector<ObjMaterial> materials_;
-  std::vector<uint32_t> textures_of_;  // of each material: its number in TextureUse::textures, or kNoTexture
+  std::vector<uint32_t> textures_of_;  // per material: its number in TextureUse::textures, or kNoTexture
   uint32_t material_ = kNone;
-  std::vector<uint32_t> corners_, ring_, cut_;  // of the face that is read
-  size_t others_ = 0;                           // statements that are left out
+  std::vector<uint32_t> corners_, ring_, cut_;  // buffers for the current face
+  size_t others_ = 0;                           // number of statements left out
 };
 
 }  // namespace

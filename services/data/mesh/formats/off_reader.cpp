@@ -1,4 +1,4 @@
-// OFF. Source: Geomview 1.9 manual, section "OFF Files" (http://www.geomview.org/docs/html/OFF.html).
+// Reads OFF. Source: Geomview 1.9 manual, section "OFF Files" (http://www.geomview.org/docs/html/OFF.html).
 #include <algorithm>
 #include <cmath>
 
@@ -39,7 +39,7 @@ class OffReader {
   bool integer(double& out) { return real(out) && out == std::floor(out); }
   bool reals(double (&out)[4]) { return real(out[0]) && real(out[1]) && real(out[2]); }
 
-  // OFF with prefixes, which may be missing; then the numbers of vertices, faces and edges.
+  // Reads OFF with prefixes, which may be missing; then the numbers of vertices, faces and edges.
   void read_header() {
     scan_.skip_space(kComment);
     if (TextScanner first = scan_; !(first.number(counts_[0]) && first.word().empty())) {
@@ -66,7 +66,7 @@ class OffReader {
     for (int i = 0; i < 3; ++i) {
       const bool goes_on = scan_.skip_blanks(kComment);
       if (i == 1) one_line = goes_on;
-      if (i == 2 && one_line && !goes_on) break;  // some leave out the number of edges
+      if (i == 2 && one_line && !goes_on) break;  // some files leave out the number of edges
       if (!integer(counts_[i]) || counts_[i] < 0) bad("after OFF stand the numbers of vertices, faces and edges");
     }
     const size_t vertex_numbers = 3 + (normals_ ? 3 : 0);
@@ -75,7 +75,7 @@ class OffReader {
     vertices_ = size_t(counts_[0]), faces_ = size_t(counts_[1]);
   }
 
-  // Each number takes a digit and a separator, but for the last.
+  // Each number takes a digit and a separator; only the last needs no separator.
   void check_count(const char* what, double count, size_t numbers) const {
     const auto most = double((content_.size() + 1) / (2 * numbers));
     if (count <= most) return;
@@ -101,7 +101,7 @@ class OffReader {
     }
   }
 
-  // At most four.
+  // Reads up to four numbers; returns their count.
   int numbers_to_line_end(double (&out)[4]) {
     int n = 0;
     while (n < 4 && scan_.skip_blanks(kComment) && scan_.number(out[n])) ++n;
@@ -116,7 +116,7 @@ class OffReader {
       if (!integer(corners) || corners < 0)
         bad("face {} of {} is missing or does not start with its number of corners", f, faces_);
       ring.clear();
-      for (double i = 0; i < corners; ++i) {  // a lying number ends where the file ends
+      for (double i = 0; i < corners; ++i) {  // a false number ends at the file's end
         double index;
         if (!integer(index)) bad("face {} lacks corner {:.0f} of {:.0f}", f, i, corners);
         if (!(index >= 0 && index < double(vertices_)))
@@ -130,15 +130,15 @@ class OffReader {
     }
   }
 
-  // Nothing, one number (a place in Geomview's own colour map), or three or four of a colour: whole numbers to 255 or
-  // fractions of 1.
+  // Reads a face's colour: nothing, one number (an index into Geomview's own colour map), or three or four channels:
+  // integers up to 255 or fractions of 1.
   void read_face_colour(size_t first_triangle) {
     double c[4];
     const int count = numbers_to_line_end(c);
     scan_.next_line();
     by_map_ += count == 1;
     if (count < 3) return;
-    uint32_t colour = kUndecided;  // 0 and 1 are both: the other faces tell
+    uint32_t colour = kUndecided;  // 0 and 1 fit both ranges: other faces decide
     const double largest = std::max({c[0], c[1], c[2]});
     const auto channel = [](double v) { return v > 0 ? uint32_t(std::min(v + 0.5, 255.0)) : 0; };
     if (largest > 1)
@@ -174,7 +174,7 @@ class OffReader {
   size_t vertices_ = 0, faces_ = 0;
   Mesh mesh_;
   RawColours vertex_colours_;
-  std::vector<uint32_t> face_colours_;  // one a triangle, or none
+  std::vector<uint32_t> face_colours_;  // empty, or one per triangle
   bool whole_numbers_ = false;
   size_t by_map_ = 0;
 };

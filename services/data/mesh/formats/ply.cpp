@@ -22,7 +22,7 @@ constexpr TypeName kTypes[] = {{"char", kI8},     {"int8", kI8},    {"uchar", kU
                                {"uint", kU32},    {"uint32", kU32}, {"int64", kI64},  {"uint64", kU64}, {"float", kF32},
                                {"float32", kF32}, {"double", kF64}, {"float64", kF64}};
 
-// The words of one header line, at most six.
+// Returns the words of one header line, at most six.
 std::vector<std::string_view> split(TextScanner& scan) {
   std::vector<std::string_view> words;
   while (words.size() < 6 && scan.skip_blanks()) words.push_back(scan.word());
@@ -30,7 +30,7 @@ std::vector<std::string_view> split(TextScanner& scan) {
   return words;
 }
 
-// One "property ..." line into its element.
+// Adds the property of one "property ..." line to its element.
 void parse_property(const std::vector<std::string_view>& words, PlyElement& element, const std::string& where) {
   PlyProperty property;
   property.is_list = words.size() == 5 && words[1] == "list";
@@ -80,7 +80,7 @@ void check_counts(const PlyHeader& header, size_t file_bytes, const std::string&
       refuse("{}: header claims {} of element '{}' ({} bytes or more each), but only {} bytes follow it", name,
              element.count, element.name, least, data_bytes);
     needed += element.count * least;
-    if (needed > data_bytes + 1)  // the last number of a text file need not be followed by a separator
+    if (needed > data_bytes + 1)  // a text file's last number needs no separator
       refuse("{}: is truncated: header claims elements of {} bytes or more, but only {} bytes follow it", name, needed,
              data_bytes);
   }
@@ -154,7 +154,7 @@ PlyArrays::PlyArrays(const PlyHeader& header, const std::function<bool(const Ply
     }
   }
   scene::make_tellable(arrays_);
-  for (auto& of : of_element_)  // those that are too many are passed over
+  for (auto& of : of_element_)  // properties beyond the limit have no array
     for (int& array : of)
       if (array >= int(arrays_.size())) array = -1;
 }

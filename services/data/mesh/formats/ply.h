@@ -1,6 +1,6 @@
 // Inside services/data/mesh/formats: the parts of a PLY file: its header, the values behind it, arrays that can colour
-// the mesh, pictures as MeshLab, CloudCompare and Blender name and place them. Source: G. Turk, "The PLY Polygon File
-// Format", 1994.
+// the mesh, pictures with names and coordinates as MeshLab, CloudCompare and Blender write them. Source: G. Turk, "The
+// PLY Polygon File Format", 1994.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 
 struct PlyProperty {
   std::string name;
-  StoredType type = StoredType::kF32;  ///< of a list: of its items
+  StoredType type = StoredType::kF32;  ///< type of the items, if a list
   bool is_list = false;
   StoredType count_type = StoredType::kU8;
 };
@@ -36,27 +36,27 @@ struct PlyElement {
   uint64_t count = 0;  ///< as claimed
   std::vector<PlyProperty> properties;
 
-  /// The index of a property, or -1.
+  /// Returns the index of a property, or -1.
   int find(std::string_view property) const;
-  /// Fewest bytes that one of these takes in a file of this encoding (lists empty).
+  /// Returns the fewest bytes of one such element in a file of this encoding (lists empty).
   size_t least_bytes(PlyEncoding encoding) const;
 };
 
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<PlyElement> elements;
-  size_t bytes = 0;                   ///< of the header: where the data starts
-  std::vector<std::string> textures;  ///< pictures, of comments "TextureFile", in the order of their numbers
+  size_t bytes = 0;                   ///< length of the header: offset of the data
+  std::vector<std::string> textures;  ///< pictures from comments "TextureFile", in order of their numbers
 
   const PlyElement* find(std::string_view element) const;
 };
 
-/// Parses the header. Claimed counts are checked against the size of `content`: what is returned can be allocated by.
+/// Parses the header. Claimed counts are checked against the size of `content`: memory may be allocated by them.
 /// Limits: 64 elements, 256 properties each, 1,024 textures, a header of 1 MiB. Throws Refusal, starting with `name`.
 PlyHeader parse_ply_header(std::string_view content, const std::string& name);
 
-// Reads values, one or `count` of a type, from the data behind the header. read() returns false where the data ends or
-// is no number.
+// Reads values, one or `count` of a type, from the data behind the header. read() returns false at the data's end, or
+// if they are not a number.
 class AsciiCursor {
  public:
   AsciiCursor(std::string_view content, size_t offset) : scan_(content.substr(offset)) {}
@@ -64,7 +64,7 @@ class AsciiCursor {
   bool read(StoredType type, uint64_t count, std::vector<double>& out) {
     out.clear();
     double item;
-    for (; out.size() < count && read(type, item);) out.push_back(item);  // a lying count ends at the file's end
+    for (; out.size() < count && read(type, item);) out.push_back(item);  // a false count ends at the file's end
     return out.size() == count;
   }
 
@@ -104,23 +104,23 @@ class BinaryCursor {
   const char* end_;
 };
 
-/// Takes the values while the body is read: spans of all arrays, the values of the one that was asked for.
+/// Collects values while the body is read: spans of all arrays, and the values of the requested one.
 class PlyArrays {
  public:
-  /// is_taken: whether a property of an element's vertices or faces is used otherwise.
+  /// is_taken: true if a property of an element's vertices or faces has another use.
   PlyArrays(const PlyHeader& header, const std::function<bool(const PlyElement&, std::string_view)>& is_taken);
 
-  /// Asks for an array. Error: there is none of that name, or it is of faces that are not read.
+  /// Selects an array. Error: no array has that name, or its faces are not read.
   void choose(const std::string& text, const std::string& file);
 
-  /// The array behind each property of this element, -1: none.
+  /// Returns the array of each property of this element; -1: no array.
   const std::vector<int>& arrays_of(const PlyElement& element) const;
 
   void take_vertex(int array, double value) {
     arrays_[size_t(array)].spans[0].add(value);
     if (array == chosen_) values_.push_back(value);
   }
-  /// A face's value becomes that of its triangles when end_face() says how many the mesh has by now.
+  /// Takes a face's value; end_face() gives it to the face's triangles, with the mesh's number of triangles so far.
   void take_face(int array, double value) {
     arrays_[size_t(array)].spans[0].add(value);
     if (array == chosen_) of_this_face_ = value;
@@ -129,7 +129,7 @@ class PlyArrays {
     if (faces_chosen()) values_.resize(triangles, std::exchange(of_this_face_, kMissing));
   }
 
-  /// Puts what was taken into the mesh, whose vertices and triangles are complete.
+  /// Puts the collected values into the mesh, whose vertices and triangles are complete.
   void finish(Mesh& mesh);
 
  private:
@@ -145,16 +145,16 @@ class PlyArrays {
   double of_this_face_ = kMissing;
 };
 
-/// Takes the corners of triangles while the body is read, then bakes the pictures into the mesh's colours.
+/// Collects the corners of triangles while the body is read, then bakes the pictures into the mesh's colours.
 class PlyTextures {
  public:
-  /// texture: the picture's place among the header's; any number may stand there. place: v goes up from the picture's
-  /// lower rim; a place that is no number: the triangle has no picture.
+  /// texture: the picture's index in the header; it may be invalid. place: v grows from the picture's lower edge
+  /// upwards; NaN: the triangle has no picture.
   void add_corner(double texture, glm::vec2 place);
 
-  /// Vertices are doubled where places or pictures differ. The picture's colours replace those of vertices.
-  /// pictures: the header's. Error: a picture is damaged or too large. Precondition: three corners for each triangle,
-  /// and every index is below the number of vertices.
+  /// Doubles vertices where coordinates or pictures differ, and replaces their colours by the picture's. pictures: the
+  /// header's. Error: a picture is damaged or too large. Precondition: three corners for each triangle, and every index
+  /// is below the number of vertices.
   void bake(Mesh& mesh, const std::vector<std::string>& pictures, const std::string& name, Companions& companions,
             uint64_t texture_detail) const;
 

@@ -1,4 +1,4 @@
-// PLY. Source: G. Turk, "The PLY polygon file format", 1994.
+// Reads PLY. Source: G. Turk, "The PLY polygon file format", 1994.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,10 +14,10 @@
 namespace telesplat::data {
 namespace {
 
-// Where a property of a vertex or a face goes.
+// Use of a vertex's or face's property.
 enum class Target : uint8_t { kNone, kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kRed, kGreen, kBlue, kU, kV, kCount };
 
-// textured: the file names a picture, so that numbers with these names are places in it.
+// textured: the file names a picture, so that these names mean texture coordinates.
 Target target_of(std::string_view name, bool textured) {
   constexpr std::string_view kNames[] = {"",
                                          "|x|",
@@ -38,7 +38,7 @@ Target target_of(std::string_view name, bool textured) {
   return Target::kNone;
 }
 
-// The targets of an element's properties, and which of them it has.
+// The targets of an element's properties, and the set of targets that it has.
 struct Targets {
   Targets(const PlyElement& element, bool textured) {
     for (const PlyProperty& p : element.properties) {
@@ -63,7 +63,7 @@ glm::vec3 colour_of(const Values& v) {
   return {v[size_t(Target::kRed)], v[size_t(Target::kGreen)], v[size_t(Target::kBlue)]};
 }
 
-// Bytes go up to 255 whatever stands in them; wider integers at least.
+// Full value of a channel, at least: bytes and 16-bit integers count up to 255 in any case.
 float least_full(StoredType type) { return stored_bytes(type) <= 2 ? 255 : 1; }
 
 template <class Cursor>
@@ -84,7 +84,7 @@ class PlyBody {
     for (const PlyElement& e : header.elements) total_ += e.count;
   }
 
-  /// array: what the mesh is coloured by; empty: nothing.
+  /// array: the array that colours the mesh; empty: no array.
   Mesh read(const std::string& array, Companions& companions, uint64_t texture_detail) {
     mesh_.format = "ply";
     if (!array.empty()) arrays_.choose(array, name_);
@@ -123,7 +123,7 @@ class PlyBody {
     refuse("{}: holds {} {} and no triangles: {}", name_, mesh_.positions.size(), splats ? "Gaussian splats" : "points",
            splats ? "splats of other programs are not read" : "point clouds are not read yet");
   }
-  // Colours of triangles, or their pictures, which win.
+  // Colours triangles by their pictures, else by their own colours.
   void colour_triangles(Companions& companions, uint64_t texture_detail) {
     const size_t triangles = mesh_.indices.size() / 3;
     if (textured_ && places_) return textures_.bake(mesh_, header_.textures, name_, companions, texture_detail);
@@ -221,7 +221,7 @@ class PlyBody {
     refuse("{}: {} {} names vertex {}, there are {}", name_, element.name, face, index, mesh_.positions.size());
   }
 
-  // The face in list_; cut_ and ring_ are right afterwards unless it is a triangle without a picture, which is usual.
+  // Adds the face in list_; sets cut_ and ring_, except for triangles without a picture, the usual case.
   void add_polygon(const PlyElement& element, uint64_t face) {
     const double* c = list_.data();
     if (list_.size() != 3 || textured_ || !is_vertex(c[0]) || !is_vertex(c[1]) || !is_vertex(c[2]))
@@ -239,7 +239,7 @@ class PlyBody {
     for (const uint32_t i : cut_) mesh_.indices.push_back(ring_[i]);
   }
 
-  // Corners of strips, one after the other, -1 between them.
+  // Adds triangle strips: corners one after the other, -1 between strips.
   void add_strip(const PlyElement& element, uint64_t face) {
     ring_.clear(), cut_.clear();
     for (const double index : list_) {
@@ -257,7 +257,7 @@ class PlyBody {
     for (const uint32_t i : cut_) mesh_.indices.push_back(ring_[i]);
   }
 
-  // The places of the corners in cut_: a face's own, or those of its vertices.
+  // Adds texture coordinates of the corners in cut_: the face's own, or those of its vertices.
   void add_places(double picture, size_t first_index) {
     const bool own = places_list_.size() >= 2 * ring_.size();
     for (size_t k = 0; k < cut_.size(); ++k) {
@@ -284,14 +284,14 @@ class PlyBody {
 
   Cursor cursor_;
   const bool textured_;  // the header names pictures
-  bool places_ = false;  // there are places in them
+  bool places_ = false;  // there are texture coordinates
   PlyArrays arrays_;
   PlyTextures textures_;
   std::vector<glm::vec2> places_of_vertices_;
-  RawColours face_colours_;  // one a triangle, or none
+  RawColours face_colours_;  // empty, or one per triangle
   float face_colours_least_ = 1;
   Mesh mesh_;
-  std::vector<double> list_, places_list_, ignored_;  // of the face that is read
+  std::vector<double> list_, places_list_, ignored_;  // for the current face
   std::vector<uint32_t> ring_, cut_;
   uint64_t done_ = 0, total_ = 0;
 };

@@ -1,4 +1,4 @@
-// Colours as they stand in a file, whose range only the whole file tells.
+// Colours as a file holds them: their range is known only when all are read.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class RawColours {
   /// Adds items without a colour until there are `size`.
   void fill(size_t size) { raw_.resize(size, glm::vec3(kNone)); }
 
-  /// 0x00RRGGBB each; `none` for items without a colour. least: channels go at least up to this.
+  /// Returns 0x00RRGGBB for each; `none` for items without a colour. least: channels count at least up to this.
   std::vector<uint32_t> packed(uint32_t none, float least = 1) const {
     constexpr float kRounding = 1.01f;  // programs that compute with floats exceed 1 by a little
     float full = largest_ <= kRounding ? 1.0f : largest_ <= 255 * kRounding ? 255.0f : 65535.0f;

@@ -1,6 +1,6 @@
-// Readers of single formats, which need no foreign library but decoders of pictures. `content` is the whole file;
-// `name` stands in error texts. They promise what validate_mesh checks only as far as sizes go (arrays one a vertex,
-// three indices a triangle); read_mesh checks the rest. Faces of more than three corners are cut by cut_polygon().
+// Readers of single formats, which need no foreign library except decoders of pictures. `content` is the whole file;
+// `name` appears in error texts. They guarantee sizes only (one array entry per vertex, three indices per triangle);
+// read_mesh checks the rest of validate_mesh(). Faces of more than three corners are cut by cut_polygon().
 #pragma once
 
 #include <string>
@@ -13,22 +13,22 @@
 
 namespace telesplat::data {
 
-/// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*)
-/// of vertices and faces; comments "TextureFile" with places of vertices (s t, u v, texture_u texture_v) or of corners
-/// (texcoord, texnumber), which are baked; other numbers of vertices and faces are arrays.
+/// Reads PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also
+/// diffuse_*) for vertices and faces; comments "TextureFile" with coordinates per vertex (s t, u v, texture_u
+/// texture_v) or per corner (texcoord, texnumber), which are baked; other numbers of vertices and faces are arrays.
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
                       Companions& companions, const std::string& array = {},
                       uint64_t texture_detail = kDefaultTextureDetail);
-/// OFF in text, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours of
-/// faces; comments; CRLF. Error: binary files; the prefixes 4 and n, whose vertices are not of three coordinates.
+/// Reads OFF in text, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours per face;
+/// comments; CRLF. Error: binary files; the prefixes 4 and n, whose vertices do not have three coordinates.
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// STL, binary or ascii; colours of facets as VisCAM and Materialise write them. Corners at the same position become
-/// one vertex.
+/// Reads STL, binary or ascii; colours of facets as VisCAM and Materialise write them. Corners at the same position
+/// become one vertex.
 Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// Whether the content is an STL in text, and one in binary, whose header may begin like text.
+/// True if the content is a text STL, or a binary one, whose header may begin like text.
 bool is_text_stl(std::string_view content);
 bool is_binary_stl(std::string_view content);
-/// Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
+/// Reads Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
 /// libraries; textures are baked; continued lines. Lines, points, curves and free-form surfaces are left out, with a
 /// note.
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,

@@ -1,5 +1,5 @@
-// STL. Sources: 3D Systems, "StereoLithography Interface Specification", 1989; colours: "STL (file format)", Wikipedia,
-// and files that VisCAM, Materialise Magics and MeshLab write.
+// Reads STL. Sources: 3D Systems, "StereoLithography Interface Specification", 1989; colours: "STL (file format)",
+// Wikipedia, and files that VisCAM, Materialise Magics and MeshLab write.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,15 +24,15 @@ class Welder {
   Numbering<glm::dvec3> places_;
 };
 
-// Case is ignored, as programs write it both ways.
+// Ignores case: programs write both.
 bool is_word(std::string_view word, std::string_view lower) {
   return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
                     [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + ('a' - 'A') : a) == b; });
 }
 
-// Bit 15 of a facet's last two bytes and 5 bits a channel: VisCAM sets it where the facet has a colour, whose blue is
-// lowest. Materialise tells a colour for all in the header and sets it where that holds; red is lowest. MeshLab has
-// Materialise's header without the comma, but sets the bit of colours.
+// A facet's last two bytes hold bit 15 and 5 bits per channel. VisCAM sets bit 15 for a facet with its own colour, blue
+// lowest. Materialise writes a default colour into the header and sets bit 15 where it applies; red is lowest. MeshLab
+// has Materialise's header without the comma, but sets the bit for own colours.
 std::vector<uint32_t> facet_colours(std::string_view header, const std::vector<uint16_t>& bits) {
   constexpr uint16_t kTop = 0x8000;
   constexpr std::string_view kWord = "COLOR=", kNext = "MATERIAL=";
@@ -48,7 +48,7 @@ std::vector<uint32_t> facet_colours(std::string_view header, const std::vector<u
     const auto byte = [&](size_t i) { return uint32_t(uint8_t(header[rgba + i])); };
     of_all = pack_rgb(byte(0), byte(1), byte(2));
   }
-  const bool used = any(0xffff);  // else the program wrote no colours of facets: they are not all black
+  const bool used = any(0xffff);  // else the program wrote no facet colours: the facets are not all black
   std::vector<uint32_t> out;
   out.reserve(bits.size());
   for (const uint16_t b : bits) {
@@ -85,7 +85,7 @@ Result<Mesh> read_binary(std::string_view content, const std::string& name, cons
   return mesh;
 }
 
-// Only the "vertex" lines matter: three in a row are a triangle.
+// Reads only the "vertex" lines: three in a row are a triangle.
 Result<Mesh> read_ascii(std::string_view content, const std::string& name, const ReadProgress& progress) {
   Mesh mesh;
   mesh.format = "stl";
@@ -132,7 +132,7 @@ bool is_text_stl(std::string_view content) {
   TextScanner scan(content);
   scan.skip_space();
   if (!is_word(scan.word(), "solid")) return false;
-  for (int line = 0; line < kMostNameLines; ++line) {  // behind the name, which binary files have, too
+  for (int line = 0; line < kMostNameLines; ++line) {  // after the name line, which binary files have, too
     scan.next_line();
     if (!scan.skip_space()) return true;
     const std::string_view word = scan.word();

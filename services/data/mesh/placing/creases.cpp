@@ -31,7 +31,7 @@ class Creases {
  private:
   glm::dvec3 area_of(size_t triangle) const { return area_vector(positions_, &indices_[3 * triangle]); }
 
-  // Scaled up so that small triangles do not vanish in float.
+  // Normals are scaled up so that those of small triangles do not vanish in float.
   void add_normals() {
     out_.normals.assign(positions_.size(), glm::vec3(0));
     for (size_t t = 0; t < indices_.size() / 3; ++t) {
@@ -40,8 +40,8 @@ class Creases {
     }
   }
 
-  // Vertices around which some normal is farther than half of the angle from the mean: others need no look, since any
-  // two of their triangles differ by less than the angle. Lists the corners of these vertices.
+  // Finds vertices with a normal farther than half of the angle from the mean, and lists their corners. Other vertices
+  // need no split, since any two of their triangles differ by less than the angle.
   void find_spread() {
     std::vector<uint32_t> number(positions_.size(), kNone);
     uint32_t count = 0;
@@ -63,19 +63,19 @@ class Creases {
       if (const uint32_t n = number[indices_[corner]]; n != kNone) corners_[next[n]++] = corner;
   }
 
-  // An edge from the vertex, of one of its triangles.
+  // An edge of a triangle, from the vertex.
   struct Edge {
     uint32_t other;
-    uint32_t triangle;  // of those around the vertex
-    bool leaves;        // the triangle runs through it from the vertex on
+    uint32_t triangle;  // its number among those around the vertex
+    bool leaves;        // the triangle's winding leads along the edge away from the vertex
   };
 
-  // Where the triangle's group begins, and whether its normal is turned against that of the group's first triangle.
+  // Returns the root of the triangle's group, and whether its normal is turned against that of the root.
   std::pair<uint32_t, bool> group_of(uint32_t triangle) {
     uint32_t root = triangle;
     bool turned = false;
     for (; parent_[root] != root; root = parent_[root]) turned ^= turned_[root];
-    for (bool rest = turned; parent_[triangle] != root && triangle != root;) {  // short ways for later
+    for (bool rest = turned; parent_[triangle] != root && triangle != root;) {  // shorten the path for later calls
       const bool next_rest = rest ^ turned_[triangle];
       turned_[triangle] = rest;
       triangle = std::exchange(parent_[triangle], root);
@@ -109,7 +109,7 @@ class Creases {
     }
   }
 
-  // Where more than two triangles share an edge, two that run through it the same way are those of two sheets.
+  // Where more than two triangles share an edge, two with the same direction along it belong to different sheets.
   void unite_if_smooth(const Edge& a, const Edge& b, bool alone) {
     const bool turned = a.leaves == b.leaves;
     const double cosine = glm::dot(units_[a.triangle], units_[b.triangle]);
@@ -159,10 +159,10 @@ class Creases {
   const bool splits_;
   const double cos_crease_, cos_half_;
   SmoothNormals out_;
-  std::vector<size_t> first_, corners_;  // of each vertex that is looked at; corners: places in indices
-  std::vector<std::pair<size_t, uint32_t>> new_indices_;  // of corners; edges are told by the old ones
+  std::vector<size_t> first_, corners_;  // per vertex that is split: its first corner; corners: positions in indices
+  std::vector<std::pair<size_t, uint32_t>> new_indices_;  // per corner; set at the end
   // split() uses these for one vertex.
-  std::vector<glm::dvec3> areas_, units_, sums_, as_wound_;  // the last two: of groups
+  std::vector<glm::dvec3> areas_, units_, sums_, as_wound_;  // the last two: per group
   std::vector<uint32_t> parent_, numbers_;
   std::vector<bool> turned_;
   std::vector<Edge> edges_;

@@ -16,7 +16,7 @@
 namespace telesplat::data {
 namespace {
 
-// A surface over the plane of x and y: flat on the whole, and seen from one side.
+// True for a surface over the plane of x and y: flat on the whole, and seen from one side.
 bool is_height_field(const Mesh& mesh, const glm::dvec3& size) {
   if (!(size.z < 0.35 * size.x && size.z < 0.35 * size.y)) return false;
   glm::dvec3 sum(0);
@@ -31,7 +31,7 @@ bool is_height_field(const Mesh& mesh, const glm::dvec3& size) {
   return length >= 0.4 * area && std::abs(sum.z) >= 0.87 * length;
 }
 
-// For each of the sampled coordinates: whether its value occurs at least kRepeats times among them.
+// Returns for each sampled coordinate whether its value occurs at least kRepeats times among them.
 std::vector<bool> repeated(const std::vector<double>& values) {
   constexpr size_t kRepeats = 6;
   std::vector<uint32_t> order(values.size());
@@ -82,7 +82,7 @@ bool has_direction(const glm::vec3& n) {
          std::abs(n.x) + std::abs(n.y) + std::abs(n.z) > 1e-20f;
 }
 
-// Normals of any length lose nothing in float if their largest component is near 1.
+// Normals of any length keep their precision in float if their largest component is near 1.
 uint32_t encode(const glm::vec3& n) {
   const float largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   return largest > 0 ? image::encode_normal32(n / largest) : image::encode_normal32({0, 1, 0});
@@ -106,7 +106,7 @@ uint32_t append_copy(PlacedMesh& placed, uint32_t vertex) {
   return uint32_t(placed.positions_room.size() - 1);
 }
 
-// Where the file has no normals: vertices are split at creases. copy_of: as Mesh has it.
+// Makes normals where the file has none: splits vertices at creases. copy_of: as in Mesh.
 void make_normals(PlacedMesh& placed, double crease_deg, const std::vector<uint32_t>& copy_of) {
   const size_t originals = placed.positions_room.size() - copy_of.size();
   const std::vector<uint32_t> looks = copy_of.empty() ? std::vector<uint32_t>() : placed.indices;
@@ -114,7 +114,7 @@ void make_normals(PlacedMesh& placed, double crease_deg, const std::vector<uint3
     if (index >= originals) index = copy_of[index - originals];
   SmoothNormals smooth = smooth_normals(placed.positions_room, crease_deg, placed.indices);
   for (const uint32_t vertex : smooth.copies) append_copy(placed, vertex);
-  std::unordered_map<uint64_t, uint32_t> of_look;  // by normal and colour
+  std::unordered_map<uint64_t, uint32_t> of_look;  // copies by normal and colour
   for (size_t corner = 0; corner < looks.size(); ++corner) {
     uint32_t& index = placed.indices[corner];
     const uint32_t normal = index, colour = placed.colours[looks[corner]];
@@ -131,7 +131,7 @@ void make_normals(PlacedMesh& placed, double crease_deg, const std::vector<uint3
   parallel(placed.normals.size(), [&](size_t i) { placed.normals[i] = encode(smooth.normals[i]); });
 }
 
-// The array that colours the mesh, if any.
+// Takes the array that colours the mesh, if any.
 void take_scalars(Mesh& mesh, PlacedMesh& placed) {
   placed.scalars = !mesh.scalars.empty();
   std::vector<uint32_t>& bits = mesh.scalars_of_faces ? placed.face_colours : placed.colours;
@@ -143,8 +143,8 @@ void take_scalars(Mesh& mesh, PlacedMesh& placed) {
 }  // namespace
 
 // Marching cubes puts its vertices on the edges of the voxel grid: two coordinates are those of grid planes and so
-// shared with many other vertices, the third lies in between and is shared with few. Scans share none, CAD models
-// mostly all three.
+// shared with many other vertices, the third lies in between and is shared with few. Scans share no coordinates, CAD
+// models mostly all three.
 bool is_isosurface(const Mesh& mesh) {
   constexpr size_t kSamples = 1 << 16, kFewest = 2000;
   const size_t vertices = mesh.positions.size(), step = std::max<size_t>(vertices / kSamples, 1);
@@ -190,7 +190,7 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, cons
   const glm::dvec3 centre = frame.lo + size * 0.5;
   const double scale = options.room_size_m / largest;
 
-  // Vertices that no triangle uses may lie anywhere; they are not kept, so they need not be placed well.
+  // Vertices without triangles may lie anywhere; they are not kept, so their placement does not matter.
   placed.positions_room.resize(mesh.positions.size());
   parallel(mesh.positions.size(),
            [&](size_t i) { placed.positions_room[i] = glm::vec3(*rotation * ((mesh.positions[i] - centre) * scale)); });

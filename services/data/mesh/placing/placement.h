@@ -1,4 +1,4 @@
-// From a file's own coordinates to room space (docs/architecture.md, "Room space"), with normals where there are none.
+// Places a mesh from its file's coordinates in room space (docs/architecture.md, "Room space"); makes missing normals.
 #pragma once
 
 #include <cstdint>
@@ -13,41 +13,40 @@
 namespace telesplat::data {
 
 struct SmoothNormals {
-  std::vector<glm::vec3> normals;  ///< one a vertex, then one for each copy; of any length
+  std::vector<glm::vec3> normals;  ///< one per vertex, then one per copy; of any length
   std::vector<uint32_t> copies;    ///< vertices to be copied; the copies come after all vertices, in this order
 };
 
-/// Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses
-/// it. triangle: its three indices.
+/// Returns twice the triangle's area times its normal; double, so that every triangle with an area in float coordinates
+/// keeps it. triangle: its three indices.
 glm::dvec3 area_vector(const std::vector<glm::vec3>& positions, const uint32_t* triangle);
 
-/// Each vertex's mean of its triangles' normals, weighted by area. Triangles around a vertex that meet at an edge under
-/// less than crease_deg have one normal there; those that are parted by sharper edges, or meet in the vertex alone,
-/// have one each, and `indices` refers to copies of the vertex for them. 180: each vertex has one normal.
-///   The angle is that between the surfaces, however the triangles are wound; normals of turned ones are turned before
-///   they are added. A group has the sign of most of its area, so neighbours agree unless most triangles are turned.
+/// Returns each vertex's mean of its triangles' normals, weighted by area. Triangles around a vertex that meet at an
+/// edge under less than crease_deg share one normal there; those parted by sharper edges, or that meet in the vertex
+/// alone, have one each, and `indices` then refers to copies of the vertex. 180: each vertex has one normal.
+///     The angle is that between the surfaces, for any winding; normals of turned triangles are turned before they are
+/// added. A group has the sign of most of its area, so neighbours agree unless most triangles are turned.
 /// The split by edges is that of VTK's vtkPolyDataNormals.
-/// positions: of every vertex. indices: three a triangle; each triangle has an area.
+/// positions: of every vertex. indices: three per triangle; each triangle has an area.
 SmoothNormals smooth_normals(const std::vector<glm::vec3>& positions, double crease_deg,
                              std::vector<uint32_t>& indices);
 
 /// A mesh in room space, ready to be split. Every triangle has three different corners and an area above zero.
 struct PlacedMesh {
   std::vector<glm::vec3> positions_room;
-  std::vector<uint32_t> normals;  ///< encode_normal32, one a vertex
-  std::vector<uint32_t> colours;  ///< 0x00RRGGBB, one a vertex; scalars: the bits of floats
-  std::vector<uint32_t>
-      face_colours;  ///< if there are some, one a triangle in place of colours, of which there are none
+  std::vector<uint32_t> normals;       ///< encode_normal32, one per vertex
+  std::vector<uint32_t> colours;       ///< 0x00RRGGBB, one per vertex; scalars: the bits of floats
+  std::vector<uint32_t> face_colours;  ///< one per triangle, in place of `colours`, which is empty then; or empty
   bool scalars = false;
-  std::vector<uint32_t> indices;  ///< three a triangle
-  geometry::DBox box_data;        ///< of the vertices that triangles use
+  std::vector<uint32_t> indices;  ///< three per triangle
+  geometry::DBox box_data;        ///< box of the vertices that triangles use
   geometry::Box box_room;
   std::string up;         ///< x, y, z, -x, -y or -z
-  std::string up_reason;  ///< why, in a few words
+  std::string up_reason;  ///< reason, in a few words
   uint64_t degenerate_dropped = 0;
 };
 
-/// Which data axis points up, "y" or "z":
+/// Guesses the data axis that points up, "y" or "z":
 ///   z for terrains: elevation rasters; or the box is less than 0.35 times as high in z as it is wide in x and y, and
 ///     the surface is an open height field in z (its area vector, the sum of all triangle normals times areas, is at
 ///     least 0.4 times the total area and within 30 degrees of z; over a closed surface that sum is zero);
@@ -61,17 +60,16 @@ struct UpGuess {
 };
 UpGuess guess_up(const Mesh& mesh);
 
-/// Whether it is the surface of a scan: most vertices have two coordinates, and only two, in common with many others,
+/// True for the surface of a scan: most vertices have two coordinates, and only two, in common with many others,
 /// because marching cubes puts them on the edges of a voxel grid. Precondition: validate_mesh passed.
 bool is_isosurface(const Mesh& mesh);
 
-/// Centres the mesh's frame, or if it has none the box of the used vertices, at the origin, turns `up` ("auto":
-/// guess_up) to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision,
-/// rounded to float at the end. Drops degenerate triangles and counts them. Where the file has no normals it makes
-/// them, and copies of vertices that lie on sharp edges (smooth_normals()), unless the mesh is smooth or an isosurface;
-/// where one of the file's has no direction it makes that one. Takes the mesh apart as it goes to save memory. Errors
-/// start with `name`: the box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh
-/// passed.
+/// Centres the mesh's frame, or without one the box of the used vertices, at the origin, turns `up` ("auto": guess_up)
+/// to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision, rounded
+/// to float at the end. Drops degenerate triangles and counts them. Makes missing normals, with copies of vertices on
+/// sharp edges (smooth_normals()) unless the mesh is smooth or an isosurface; makes single normals without a direction,
+/// too. Takes the mesh apart as it goes to save memory. Errors start with `name`: the box has no extent, or one beyond
+/// 1e30; no triangle is left. Precondition: validate_mesh passed.
 Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name);
 
 }  // namespace telesplat::data
