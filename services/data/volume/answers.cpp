@@ -49,11 +49,11 @@ Status VolumeAnswers::follow(const wire::Welcome& welcome) {
 
   Epoch next{welcome.epoch, session->step, {}, volume::to_text(session->transfer), session->transfer, *clip};
   const std::lock_guard lock(mutex_);
-  if (welcome.master != master_) epochs_.clear();  // another one counts its own epochs
+  if (welcome.master != master_) epochs_.clear();  // another master counts its own epochs
   master_ = welcome.master;
   if (const Epoch* known = epoch(next.id); known && known->step == next.step && known->transfer == next.transfer)
     return ok_status();
-  // Steps of a series come often, and mostly with the transfer function of before.
+  // Steps of a series come often, and mostly with the same transfer function.
   if (!epochs_.empty() && epochs_.back().transfer == next.transfer)
     next.shown = epochs_.back().shown;
   else
@@ -115,7 +115,7 @@ bool VolumeAnswers::has_work() const {
 
 std::optional<VolumeAnswers::Reply> VolumeAnswers::work(InstanceId self) {
   std::unique_lock lock(mutex_);
-  // Weights of epochs that are over are of no use to anyone.
+  // Weights of past epochs are useless.
   if (!epochs_.empty() && epochs_.back().weights_due) {
     for (Epoch& e : epochs_) e.weights_due = false;
     const Epoch newest = epochs_.back();
@@ -137,7 +137,7 @@ std::optional<VolumeAnswers::Reply> VolumeAnswers::work(InstanceId self) {
   return answer(request);
 }
 
-// The mean of what was sent; before anything was, the heaviest slice's.
+// Returns the mean over the answers so far; before the first one, that of the heaviest slice.
 double VolumeAnswers::bytes_per_voxel(int step, const volume::LevelSet& shown, const std::vector<uint32_t>& weights) {
   if (voxels_ > 0) return double(bytes_) / double(voxels_);
   const auto heaviest = std::max_element(weights.begin(), weights.end());
@@ -173,7 +173,7 @@ VolumeAnswers::Reply VolumeAnswers::answer(const Waiting& request) {
   std::vector<uint8_t> encoded;
   Result<volume::Voxels> voxels = Error{};
   if (const auto weights = store_.slice_weights(request.step, wanted); weights) {
-    // As many slices as one answer may have, at least one.
+    // Take as many slices as one answer may have, at least one.
     int end = request.begin;
     for (uint64_t sum = 0; end < request.end && end - request.begin < kSlicesAnAnswer; ++end) {
       sum += (*weights)[size_t(end - begin_)];

@@ -1,5 +1,5 @@
-// What a data server of a volume does between its sockets: learns epochs, keeps requests that wait in order, answers
-// the most urgent one.
+// The part of a volume's data server between its sockets: learns epochs, queues requests, and answers the most urgent
+// request first.
 #pragma once
 
 #include <deque>
@@ -15,8 +15,8 @@
 namespace telesplat::data {
 
 inline constexpr size_t kEpochsKept = 8;
-inline constexpr size_t kRequestsAPeer = 8;      ///< that wait; a newer one replaces the peer's oldest
-inline constexpr size_t kRequestsWaiting = 512;  ///< of all peers
+inline constexpr size_t kRequestsAPeer = 8;      ///< waiting requests per peer; a newer one replaces the peer's oldest
+inline constexpr size_t kRequestsWaiting = 512;  ///< waiting requests of all peers
 inline constexpr size_t kProbesWaiting = 64;
 inline constexpr int kSlicesAnAnswer = 64;
 inline constexpr uint64_t kVoxelsAnAnswer = 768u << 10;  ///< about 3 MB: half a minute at a megabit a second
@@ -24,30 +24,30 @@ inline constexpr uint64_t kVoxelsAnAnswer = 768u << 10;  ///< about 3 MB: half a
 /// follow() and ask() are for the thread of the sockets, work() for another one.
 class VolumeAnswers {
  public:
-  /// The store is used by work() alone.
+  /// Only work() uses the store.
   explicit VolumeAnswers(VolumeStore& store);
 
-  /// Takes notice of a session. A new epoch's weights become due. Error: a session that is not this volume's.
+  /// Learns a session. A new epoch's weights become due. Error: the session shows another volume.
   Status follow(const wire::Welcome& welcome);
 
-  /// What is to be sent: VoxelData to a peer, SliceWeights (without `data`) to the master.
+  /// A message to send: VoxelData to a peer, SliceWeights (without `data`) to the master.
   struct Reply {
     std::string peer;  ///< empty: the master
     std::string_view type;
     std::string body;
-    uint64_t voxels = 0, bytes = 0;  ///< of VoxelData
+    uint64_t voxels = 0, bytes = 0;  ///< figures of VoxelData
   };
 
-  /// Queues a request, or says at once that it cannot be answered (unknown epoch, slices of others, too many wait).
-  /// Error: nonsense.
+  /// Queues a request, or returns at once why it cannot be answered (unknown epoch, slices of others, too many wait).
+  /// Error: the request is not valid.
   Result<std::optional<Reply>> ask(const std::string& peer, const wire::VoxelRequest& request);
 
-  /// Queues the question what a ray meets. Error: it is no ray, the epoch is not known, too many wait.
+  /// Queues the question which surface a ray meets. Error: it is not a ray, the epoch is unknown, too many wait.
   Status probe(const wire::Order& order);
 
   bool has_work() const;
-  /// Does what is most urgent: weights first, then the request of the earliest round, of those the oldest. Nothing:
-  /// there is nothing to do.
+  /// Does the most urgent work: weights first, then probes, then the request of the earliest round, among these the
+  /// oldest. nullopt: no work is left.
   std::optional<Reply> work(InstanceId self);
 
  private:
@@ -68,7 +68,7 @@ class VolumeAnswers {
     volume::LevelSet have, shown;
   };
   struct Probe {
-    uint64_t number;  // of the order
+    uint64_t number;  // the order's
     scene::Probe ray;
     int step;
     volume::TransferFunction function;
@@ -82,11 +82,11 @@ class VolumeAnswers {
 
   VolumeStore& store_;
   const volume::Session session_;
-  const int begin_, end_;  // this store's slices
+  const int begin_, end_;  // slices of this store
   mutable std::mutex mutex_;
   InstanceId master_;
-  std::deque<Epoch> epochs_;    // newest last
-  std::list<Waiting> waiting_;  // in the order in which they came
+  std::deque<Epoch> epochs_;    // the newest last
+  std::list<Waiting> waiting_;  // in order of arrival
   std::deque<Probe> probes_;
   uint64_t voxels_ = 0, bytes_ = 0;  // encoded so far
 };

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kStepsAVoxel = 16;
-constexpr double kLongestBracket = 4;  // voxels to the places that bound it; what is wider is no bound
+constexpr double kLongestBracket = 4;  // voxels to the places that bound it; a wider bracket is no bound
 
-// Extinctions of all values from lo to hi.
+// Range of the extinctions for all values from lo to hi.
 struct Extinctions {
   double least, most;
 };
@@ -29,7 +29,7 @@ Extinctions extinctions(const volume::TransferFunction& transfer, double lo, dou
   return {double{volume::extinction(least)}, double{volume::extinction(most)}};
 }
 
-// Eight voxels around a place, in the data's values, and how far values between them may be from the trilinear ones.
+// Eight voxels around a place, in the data's values, and the deviation of values between them from trilinear ones.
 class Cells {
  public:
   Cells(const volume::Session& session, int begin, int end, const LevelAt& level_at)
@@ -60,7 +60,7 @@ class Cells {
     }
     return out;
   }
-  // The error of linear interpolation is h^2/2 t (1 - t) times the second derivative: none at voxels.
+  // The error of linear interpolation is h^2/2 t (1 - t) times the second derivative: zero at voxels.
   double deviation(const glm::dvec3& index) const {
     const glm::dvec3 part = index - glm::floor(index);
     return glm::dot(bend_, part * (1.0 - part)) / 2 + session_.levels.step / 2;
@@ -87,9 +87,9 @@ class Cells {
   glm::dvec3 bend_{0};  // the largest second differences of the eight, along each axis
 };
 
-// Adds up optical depth until there is enough.
+// Adds up optical depth until it reaches `enough`.
 struct Depth {
-  double sum = 0, reached = kInfinity;  // metres along the ray
+  double sum = 0, reached = kInfinity;  // reached: metres along the ray
   void add(double more, double from, double length, double enough) {
     if (reached < kInfinity) return;
     if (sum + more >= enough) reached = from + length * (more > 0 ? (enough - sum) / more : 0);
@@ -116,7 +116,7 @@ Result<scene::Probed> cast(const volume::Session& session, int begin, int end, c
   const double enough = double{volume::extinction(float(probe.opacity))}, unit_m = session.grid.unit_m();
   Cells cells(session, begin, end, level_at);
   Depth told, nearest, farthest;
-  double lo = kInfinity, hi = -kInfinity;  // values from the nearest place that it may be to the farthest
+  double lo = kInfinity, hi = -kInfinity;  // range of values between the nearest and the farthest possible place
   for (double at = first; at < last && farthest.reached == kInfinity; at += step_m) {
     const double length = std::min(step_m, last - at);
     const glm::dvec3 index = from + (at + length / 2) * on;

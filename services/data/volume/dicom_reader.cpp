@@ -24,7 +24,7 @@ constexpr size_t kLayersAtOnce = 64;
 
 bool needs_gdcm(const DicomSlice& s) { return s.compressed || s.components == 3; }
 
-// Slices that GDCM reads, all of one size: all frames of their files, by file.
+// Decodes slices by GDCM, all of one size: returns all frames of their files, by file.
 std::map<std::string, Bytes> decode(const std::map<std::string, const DicomSlice*>& files, const std::string& path) {
   std::map<std::string, Bytes> out;
   if (files.empty()) return out;
@@ -49,12 +49,12 @@ std::map<std::string, Bytes> decode(const std::map<std::string, const DicomSlice
   return out;
 }
 
-// Stored pixels of slices. Keeps what GDCM gave as long as layers ask for it, and the file that was read last.
+// Stored pixels of slices. Keeps GDCM's results as long as layers need them, and the file that was read last.
 class Pixels {
  public:
   explicit Pixels(const std::string& path) : path_(path) {}
 
-  // Reads all of these slices that GDCM has to read, in one run of the program.
+  // Decodes all of these slices that need GDCM, in one run of the program.
   void prepare(const std::vector<const DicomSlice*>& slices) {
     std::map<std::string, const DicomSlice*> missing;
     std::set<std::string> needed;
@@ -91,12 +91,12 @@ class Pixels {
   std::shared_ptr<const MappedFile> file_;
 };
 
-// A stored value without what lies beside its bits, and turned round where that is asked for.
+// Returns a stored value without the unused bits beside its own, and inverted if asked for.
 template <class T>
 T value_of(T raw, int up, int down, bool inverted) {
   if constexpr (std::is_integral_v<T>) {
     using Raw = std::make_unsigned_t<T>;
-    // Up to the top and back: brings the sign along, or zeroes.
+    // Shifts to the top and back: this extends the sign, or clears the bits.
     const T value = T(T(Raw(raw) << up) >> down);
     return !inverted ? value : std::is_signed_v<T> ? T(~value) : T(Raw(Raw(~Raw(0)) >> down) - value);
   } else {
@@ -104,7 +104,7 @@ T value_of(T raw, int up, int down, bool inverted) {
   }
 }
 
-// The values of padding, as they are shown: from, to.
+// Returns the shown values of padding: from, to.
 template <class T>
 std::optional<std::pair<T, T>> padding_of(const DicomSlice& s) {
   if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
@@ -153,7 +153,7 @@ void mix(const Bytes& below, const Bytes& above, double share, std::byte* to) {
   }
 }
 
-// Padding that lies far from all other values would be most of their range: it becomes the lowest of them.
+// Padding far from all other values would take most of their range: it becomes the lowest of them.
 template <class T>
 void take_padding(const DicomSlice& s, Bytes& bytes, std::string& remark) {
   const auto padding = padding_of<T>(s);
@@ -181,7 +181,7 @@ void fill(const DicomSeries& series, size_t step, const std::string& path, const
   const auto& layers = series.order.steps[step];
   const auto& slices = series.order.slices;
   Pixels source(path);
-  // Slices as they are stored in the volume.
+  // Writes a slice as the volume stores it.
   const auto read = [&](const DicomSlice& s, std::byte* to) {
     const auto from = source.of(s);
     const bool rescale =

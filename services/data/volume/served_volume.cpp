@@ -14,7 +14,7 @@
 namespace telesplat::data {
 namespace {
 
-// Works off requests, in a thread if it has one.
+// Answers requests, in a thread if it has one.
 class Worker {
  public:
   Worker(VolumeAnswers& answers, InstanceId self, VolumeWorker who) : answers_(answers), self_(self) {
@@ -24,16 +24,16 @@ class Worker {
     if (thread_) thread_->request_stop();
     wake_.notify_one();
   }
-  /// There may be something to do.
+  /// Wakes the thread: there may be work.
   void wake() {
-    { const std::lock_guard lock(mutex_); }  // not between its look at what there is to do and its wait
+    { const std::lock_guard lock(mutex_); }  // not between the thread's check for work and its wait
     wake_.notify_one();
   }
   bool busy() const {
     const std::lock_guard lock(mutex_);
     return working_ || !done_.empty() || answers_.has_work();
   }
-  /// Throws what ended the thread, if something did. Without a thread it works off one request.
+  /// Returns finished answers; rethrows the exception that ended the thread. Without a thread it answers one request.
   std::vector<VolumeAnswers::Reply> take() {
     const std::lock_guard lock(mutex_);
     if (!thread_)
@@ -43,7 +43,7 @@ class Worker {
   }
 
  private:
-  // An exception, of memory that is not there, goes to whoever takes the answers.
+  // An exception (out of memory) goes to the caller of take().
   void run(const std::stop_token& stop) {
     try {
       loop(stop);
@@ -57,7 +57,7 @@ class Worker {
   void loop(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     while (!stop.stop_requested()) {
-      // What is done and not taken yet stays within memory.
+      // Answers that are not taken yet keep a bounded memory.
       if (done_.size() >= kRepliesWaiting || !answers_.has_work()) {
         wake_.wait_for(lock, std::chrono::milliseconds(50));
         continue;
@@ -79,7 +79,7 @@ class Worker {
   bool working_ = false;
   std::exception_ptr failed_;
   std::vector<VolumeAnswers::Reply> done_;
-  std::optional<std::jthread> thread_;  // last: it uses the others
+  std::optional<std::jthread> thread_;  // last, because it uses the others
 };
 
 class ServedVolume final : public Served {
@@ -95,7 +95,7 @@ class ServedVolume final : public Served {
     return {title_ + ": " + store_->remark()};
   }
   void describe(wire::Hello& hello) const override;
-  // Few answers wait for a peer: they are large, and samplers ask for one at a time.
+  // Few answers are queued per peer: they are large, and samplers ask for one at a time.
   Requests requests() const override { return {"voxels", 8}; }
 
   void begin(InstanceId self) override { worker_.emplace(answers_, self, who_); }
@@ -147,7 +147,7 @@ class ServedVolume final : public Served {
   const VolumeWorker who_;
   uint64_t asked_ = 0, bytes_ = 0, voxels_ = 0;
   VolumeAnswers answers_;
-  std::optional<Worker> worker_;  // from begin() on; last: its thread uses the others
+  std::optional<Worker> worker_;  // from begin() on; last, because its thread uses the others
 };
 
 std::string ServedVolume::summary() const {

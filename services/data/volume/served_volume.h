@@ -1,5 +1,5 @@
-// A volume as a data server serves it: samplers ask for the voxels that the session's transfer function shows, the
-// master is told how many those are.
+// Serves a volume from a data server: samplers ask for the voxels that the session's transfer function shows, and the
+// master gets their number.
 #pragma once
 
 #include <memory>
@@ -10,11 +10,11 @@
 
 namespace telesplat::data {
 
-/// Who works off what is asked for: a thread of its own from begin() on, so that the serve loop keeps talking to the
-/// master meanwhile; or send_finished(), where no thread may be.
+/// The worker on requests: a thread of its own from begin() on, so that the serve loop keeps talking to the master; or
+/// send_finished(), where threads are not allowed.
 enum class VolumeWorker { kThread, kCaller };
 
-/// path: where the volume is from. From begin() on the worker uses the store.
+/// path: the volume's. From begin() on only the worker uses the store.
 std::unique_ptr<Served> serve_volume(std::shared_ptr<VolumeStore> store, const std::string& path,
                                      VolumeWorker worker = VolumeWorker::kThread);
 

@@ -20,7 +20,7 @@ constexpr double kMaxValue = volume::kMaxTransferValue;
 
 bool is_byte(VoxelType type) { return type == VoxelType::kU8 || type == VoxelType::kI8; }
 
-// The levels of all bit patterns of an integer type; empty for floats.
+// Returns the levels of all bit patterns of an integer type; empty for floats.
 std::vector<uint16_t> level_table(const Volume& volume, const volume::Levels& levels) {
   if (volume.type == VoxelType::kF32) return {};
 
@@ -58,8 +58,8 @@ void each_level(const Volume& volume, const volume::Levels& levels, const std::v
 
 size_t voxels_a_slice(const Volume& volume) { return size_t(volume.size[0]) * size_t(volume.size[1]); }
 
-// A voxel's neighbours along an axis and what one over their distance is: those of the outermost voxels are the voxels
-// themselves.
+// A voxel's neighbours along an axis, and one over their distance: beyond the grid's faces a voxel is its own
+// neighbour.
 struct Neighbours {
   ptrdiff_t before, after;
   float weight;
@@ -69,7 +69,7 @@ Neighbours neighbours(int at, int size, ptrdiff_t stride) {
   return {first ? 0 : -stride, last ? 0 : stride, first && last ? 0.0f : first || last ? 1.0f : 0.5f};
 }
 
-// A row's wanted voxels, before their number is known.
+// The wanted voxels of a row, before their number is known.
 struct RowBuffer {
   uint16_t i[volume::kMaxSide + 1], level[volume::kMaxSide + 1];
 };
@@ -134,7 +134,7 @@ volume::ValueRange describe_values(const std::vector<uint64_t>& counts, const vo
   uint64_t all = 0;
   for (const uint64_t n : counts) all += n;
 
-  // What is left when levels less than `width` from the most frequent one are background.
+  // Percentiles of the rest, if levels nearer than `width` to the most frequent one are background.
   const auto percentiles = [&](double width, double least_share) {
     const auto left = [&](size_t l) {
       return l == mode || std::abs(levels.value(int(l)) - around) < width ? 0 : counts[l];
@@ -248,7 +248,7 @@ volume::Voxels VolumeSlices::voxels(int k_begin, int k_end, const volume::LevelS
   const size_t rows_a_slice = size_t(size_[1]);
   out.rows.resize(size_t(k_end - k_begin) * rows_a_slice + 1);
 
-  // The counts of levels say where each slice's voxels go.
+  // The counts of levels give each slice's place among the voxels.
   std::vector<uint64_t> first{0};
   for (int k = k_begin; k < k_end; ++k) first.push_back(first.back() + weight(k, wanted));
   CHECK(first.back() <= UINT32_MAX);

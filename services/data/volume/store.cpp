@@ -36,7 +36,7 @@ Result<Part> read_part(const std::string& text, int slices) {
   return Part{*index, *of};
 }
 
-// As a mesh's: the box centred, `up` turned to +y, the largest extent the room's size.
+// Places it as a mesh: the box centred, `up` turned to +y, the largest extent the room's size.
 Result<glm::dmat4> place_volume(const Volume& v, const PlacementOptions& options) {
   const auto rotation = rotation_for_up(up_of_volume(options), v.space);
   if (!rotation) return rotation.error();
@@ -83,7 +83,7 @@ class Store final : public VolumeStore {
     session_.part = part->index, session_.parts = part->of;
     begin_ = slice_of(part->index), end_ = slice_of(part->index + 1);
 
-    // All of a series that is kept anyway: then levels cover all values.
+    // Read all steps of a series that fits into memory: then levels cover all values.
     std::vector<Volume> all;
     all.push_back(std::move(*first));
     double lo = all[0].lo, hi = all[0].hi;
@@ -112,7 +112,7 @@ class Store final : public VolumeStore {
     auto resolved = volume::resolve_transfer(transfer, session_.range);
     if (!resolved) return resolved.error();
     session_.transfer = std::move(*resolved);
-    // What others will check is checked here first.
+    // Fail here, not later in the processes that read this session.
     const auto again = volume::read_session(volume::to_parameters(session_), volume::to_facts(session_));
     if (!again) return refuse(again.error());
     return ok_status();
@@ -155,7 +155,7 @@ class Store final : public VolumeStore {
  private:
   int slice_of(int part) const { return int(int64_t{session_.grid.size[2]} * part / session_.parts); }
 
-  // Called from the reading thread, too: touches nothing that changes after initialise().
+  // The reading thread calls it, too: it uses nothing that changes after initialise().
   Result<Volume> read_step(int step, const ReadProgress& progress) const {
     auto v = read_(size_t(step), progress);
     if (!v) return v.error();
@@ -180,7 +180,7 @@ class Store final : public VolumeStore {
     kept_.splice(kept_.begin(), kept_, found);
     return &kept_.front().second;
   }
-  // Newest first; what does not fit goes, but for the newest two: the one that is shown and the one that comes next.
+  // Keeps a step. Drops the oldest beyond the limit, except the newest two: the shown step and the next one.
   void keep(int step, Step slices) {
     kept_.emplace_front(step, std::move(slices));
     size_t bytes = 0;
@@ -225,9 +225,9 @@ class Store final : public VolumeStore {
   std::string format_, remark_;
   uint64_t content_hash_ = 0;
   int begin_ = 0, end_ = 0;
-  std::list<std::pair<int, Step>> kept_;  // newest first
+  std::list<std::pair<int, Step>> kept_;  // the newest first
   int ahead_step_ = 0;
-  std::future<Result<Step>> ahead_;  // last: its destructor waits for the thread that uses the others
+  std::future<Result<Step>> ahead_;  // last, because its destructor waits for the thread that uses the others
 };
 
 }  // namespace

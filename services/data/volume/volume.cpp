@@ -31,20 +31,20 @@ std::string format_of(const std::string& path) {
   return start ? volume_format(*start, path) : "";
 }
 
-// A series, whatever it is read from: a step each for its time steps.
+// Takes a DICOM series: each of its time steps becomes a step.
 VolumeSource take_dicom(VolumeSource source, const std::string& path) {
   source.dicom = need(find_dicom_series(path, source.layout.series));
   source.steps.assign(source.dicom->order.steps.size(), path);
   return source;
 }
 
-// A TIFF file that is a volume.
+// True for a TIFF file that is a volume.
 bool is_stack_file(const std::string& path) {
   const auto file = MappedFile::open(path);
   return file && is_stack((*file)->text());
 }
 
-// Pictures of a folder that may be slices; none where it holds one alone, or meshes that they may cover.
+// Returns the folder's pictures that may be slices; empty for a single picture, or beside meshes that they may cover.
 std::vector<std::string> pictures_among(const std::vector<std::string>& files) {
   std::vector<std::string> out;
   for (const std::string& file : files) {
@@ -72,7 +72,7 @@ VolumeSource find(const std::string& path, const VolumeLayout& layout) {
       source.slices = {path};
       return source;
     }
-    // Reading its header says best what is wrong with it.
+    // The error of reading its header describes the problem best.
     need(read_volume_header(path, raw, layout.array));
     return source;
   }
@@ -100,7 +100,7 @@ VolumeSource find(const std::string& path, const VolumeLayout& layout) {
   return source;
 }
 
-// Gives voxels the spacing that people say, in the directions that they have. Error: it is no spacing.
+// Gives voxels the user's spacing, along their axes. Error: it is not a spacing.
 void space_out(const std::string& spacing, glm::dmat4& index_to_data) {
   if (spacing.empty()) return;
   const auto s = spacing_of(spacing);
@@ -108,18 +108,18 @@ void space_out(const std::string& spacing, glm::dmat4& index_to_data) {
   for (int a = 0; a < 3; ++a) index_to_data[a] *= (*s)[a] / glm::length(index_to_data[a]);
 }
 
-// Checked against the size of all its files.
+// Checks the header against the size of all its files.
 VolumeFileHeader read_stack_header(const std::vector<std::string>& slices) {
   VolumeFileHeader header = need(stack_header(slices));
   uint64_t bytes = 0;
   std::error_code error;
   for (const std::string& slice : slices) bytes += fs::file_size(slice, error);
-  if (header.data_at == 0) header.encoding = Encoding::kGzip;  // as much as the best of packers
+  if (header.data_at == 0) header.encoding = Encoding::kGzip;  // allows as much as the best compressor
   need(check_header(header, bytes, slices[0]));
   return header;
 }
 
-// The checked header of a step, a DICOM series' included; its size is that of the first step.
+// Returns the checked header of a step, also of a DICOM series; its size is that of the first step.
 VolumeFileHeader read_step_header(const VolumeSource& source, size_t step) {
   if (step >= source.steps.size()) refuse("{}: has no step {}, it has {}", source.name, step, source.steps.size());
   if (source.dicom) return source.dicom->header;

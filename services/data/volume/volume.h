@@ -1,4 +1,4 @@
-// Finding and reading the files of a volume, and which part of it is served, and how.
+// Finds and reads the files of a volume; options for serving it.
 #pragma once
 
 #include <memory>
@@ -14,47 +14,47 @@
 namespace telesplat::data {
 
 struct VolumeOptions : VolumeLayout {
-  std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
+  std::string transfer;  ///< as volume::resolve_transfer takes it; empty: chosen by the data
   bool lit = true;
-  /// Steps of a series a second; nothing: all of them in a second, at most 12.5; 0: it does not play.
+  /// Steps of a series per second; nullopt: all of them in a second, at most 12.5; 0: it does not play.
   std::optional<double> steps_per_s;
-  std::string part;     ///< "1/2": the second of two parts; empty: all of it
-  int cache_mb = 2048;  ///< for the steps of a series that are kept
+  std::string part;     ///< "1/2": the second of two parts; empty: the whole volume
+  int cache_mb = 2048;  ///< for the kept steps of a series
 };
 
 struct DicomSeries;
 
-/// Files of one data set: what a layout and a path say. One file a time step.
+/// Files of one data set, found by path and layout. One file per time step.
 struct VolumeSource {
-  std::vector<std::string> steps;  ///< a file each, or a DICOM folder as often as its series has steps
+  std::vector<std::string> steps;  ///< one file each; for DICOM the folder, once per step of its series
   VolumeLayout layout{};
-  std::string name{};                          ///< for people
-  std::shared_ptr<const DicomSeries> dicom{};  ///< of a DICOM folder, file or disc
-  std::vector<std::string> slices{};           ///< pictures in order (formats/stack.h), of a volume that these make
+  std::string name{};                          ///< for users
+  std::shared_ptr<const DicomSeries> dicom{};  ///< for a DICOM folder, file or disc
+  std::vector<std::string> slices{};           ///< pictures in order (formats/stack.h), if the volume consists of these
 
-  /// All files that its voxels come from.
+  /// Returns all files that its voxels come from.
   std::vector<std::string> files() const;
 };
 
-/// Whether a path is (by content, then by name) a volume: a volume file, a DICOM file or folder, or a folder of
-/// numbered volume files.
+/// True if a path is a volume, by content, then by name: a volume file, a DICOM file or folder, or a folder of numbered
+/// volume files.
 bool looks_like_volume(const std::string& path);
-/// A volume file, a DICOM folder or file (dicom.h), or a folder with a numbered series of volume files
+/// Finds a volume file, a DICOM folder or file (dicom.h), or a folder with a numbered series of volume files
 /// (phase00.nrrd, phase02.nrrd, ...), in order of their numbers; a TIFF file of several pages, or a folder with a
-/// picture a slice. With `raw`, a raw file or a folder of numbered ones. series: of a DICOM folder alone.
-/// Error: nothing of the kind; names path and what it is instead.
+/// picture per slice. With `raw`, a raw file or a folder of numbered ones. series: for DICOM folders only. Error: no
+/// volume; names the path and its likely kind.
 Result<VolumeSource> find_volume(const std::string& path, const VolumeLayout& layout = {});
-/// Reads one step. Error: truncated, lying and mismatched headers (sizes against file
-/// sizes), more than volume::kMaxSide on an axis, several components, types that are none of VoxelType's (wider ones
-/// become f32 where that keeps them), memory. Names file, value and limit.
+/// Reads one step. Error, naming file, value and limit: truncated files, false and mismatched headers (sizes against
+/// file sizes), more than volume::kMaxSide on an axis, several components, values that VoxelType cannot hold
+/// (make_volume()), too little memory.
 Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadProgress& progress);
-/// Reads the headers of all steps, but no voxels. Error: as read_volume says of a header; a step whose size is not that
-/// of the first.
+/// Reads the headers of all steps, but no voxels. Error: a header's, as in read_volume; a step of another size than the
+/// first.
 Status check_steps(const VolumeSource& source);
 
-/// Reads a step of a series: bits beside those stored are cleared (or carry the sign); slices that are stored or scaled
-/// differently become f32; padding far from all other values becomes the lowest of them. What is compressed or coloured
-/// is read by GDCM in the program telesplat-import. Error: files that changed, damaged pixels.
+/// Reads a step of a series: unused bits beside the stored ones are cleared (or carry the sign); slices stored or
+/// scaled differently become f32; padding far from all other values becomes the lowest of them. Compressed or coloured
+/// pixels are decoded by GDCM in the program telesplat-import. Error: files that changed, damaged pixels.
 Result<Volume> read_dicom(const DicomSeries& series, size_t step, const std::string& path,
                           const ReadProgress& progress);
 
