@@ -11,8 +11,8 @@
 namespace telesplat::data::vtk {
 namespace {
 
-// A letter a node. Faces of volume cells look outward. "abc:def": corners, then middles and centre. A star: middles
-// of two edges alone.
+// One letter per node. Faces of volume cells look outward. "abc:def": corners, then middles and centre. A star: only
+// two edges have middles.
 struct Row {
   uint8_t type;
   int dimension;
@@ -55,8 +55,8 @@ constexpr Row kRows[] = {
     {37, 3, 19, "adcb:ihgfn abe:fkjo bce:glkp cde:hmlq dae:ijmr"},
     {kPolyhedron, 3, 0, ""},
 };
-// Cells of any order, Lagrange's (from 68) and Bezier's (from 75), have the corners of these, and come first with
-// them; some of Lagrange's have the nodes of the others if they are of second order (0: VTK has changed their order).
+// Cells of any order, Lagrange's (from 68) and Bezier's (from 75), begin with the corners of these types; some Lagrange
+// cells of second order have the nodes of kOfSecondOrder (0: VTK has changed their order).
 constexpr uint8_t kOfCorners[] = {3, 5, 9, 10, 12, 13, 14}, kOfSecondOrder[] = {0, 22, 28, 24, 0, 0, 0};
 constexpr uint8_t kFirstLagrange = 68, kFirstBezier = 75, kBehindBezier = 82;
 
@@ -242,7 +242,7 @@ void CellReader::orient(size_t cell) {
   inward_.assign(face_count(cell), volume < 0);
 }
 
-// Faces of polyhedra have either sense: neighbours are made to go along their edge in opposite ways first.
+// Faces of polyhedra may have either orientation: first neighbours are turned to run along their edge in opposite ways.
 void CellReader::orient_polyhedron(size_t cell) {
   struct Edge {
     uint32_t low, high;
@@ -273,7 +273,7 @@ void CellReader::orient_polyhedron(size_t cell) {
       volume += volume_under(corners, from) * (inward_[f] ? -1 : 1);
       for (size_t i = 0; i < corners.size(); ++i) {
         const Edge edge = edge_of(corners, i, f);
-        // More than two faces at an edge: the cell is damaged, and its first ones count.
+        // More than two faces at an edge: the cell is damaged, and only its first ones count.
         auto other = std::lower_bound(edges.begin(), edges.end(), edge);
         for (int n = 0; n < 4 && other != edges.end() && !(edge < *other); ++n, ++other)
           if (!reached[other->face]) {

@@ -1,4 +1,4 @@
-// Inside services/data/vtk: the cells of data sets, their faces, and what is seen of them from outside.
+// Inside services/data/vtk: the cells of data sets, their faces, and the surface that is visible from outside.
 #pragma once
 
 #include <cstdint>
@@ -10,39 +10,39 @@
 
 namespace telesplat::data::vtk {
 
-/// Nodes of a face in VTK's order: corners, then middles of edges (of all, or of those between corners 0 and 1 and
+/// Nodes of a face in VTK's order: corners, then middles of edges (of all, or only of those between corners 0 and 1 and
 /// between 2 and 3), then the centre.
 struct FaceRow {
   uint8_t corners = 0, middles = 0, nodes = 0;
-  uint8_t node[9] = {};  ///< of the cell
+  uint8_t node[9] = {};  ///< numbers of the cell's nodes
 };
 
-/// What a type of cells is. Surface cells have one face: themselves. Polygons, strips and polyhedra have no rows.
+/// A type of cells. Surface cells have one face: themselves. Polygons, strips and polyhedra have no rows.
 struct CellKind {
   int dimension = 0;
-  size_t nodes = 0;            ///< at least
-  bool corners_alone = false;  ///< it is curved, and shown by its corners
+  size_t nodes = 0;            ///< least number
+  bool corners_alone = false;  ///< it is curved, and drawn by its corners only
   std::vector<FaceRow> faces;
 };
 inline constexpr uint8_t kPolyVertex = 2, kPolyLine = 4, kStrip = 6, kPolygon = 7, kQuad = 9, kHexahedron = 12,
                          kQuadraticPolygon = 36, kPolyhedron = 42;
 
-/// Returns the kind that one of VTK's numbers means ("VTK File Formats"); null: it is not known. nodes: Lagrange's
-/// cells of second order have all their nodes.
+/// Returns the kind of one of VTK's type numbers ("VTK File Formats"); null: not known. nodes: the cell's number of
+/// nodes; Lagrange cells of second order then have faces with all their nodes.
 const CellKind* kind_of_cell(uint8_t type, size_t nodes);
 
 /// One face of a cell: its nodes as points of the data set.
 struct FacePoints {
   std::span<const uint32_t> corners, middles;
-  std::span<const uint32_t> centre;  ///< one, or none
+  std::span<const uint32_t> centre;  ///< one point, or empty
 };
 
-/// Cuts faces into triangles; keeps its memory from one to the next.
+/// Cuts faces into triangles; reuses its memory.
 class FaceCutter {
  public:
   explicit FaceCutter(const DataSet& set) : set_(set) {}
-  /// Appends three points a triangle to `out`. Curved faces are divided at their middle nodes, as VTK's geometry filter
-  /// does at its first level; where there is no centre, the quadrilateral of the middles goes by its shorter diagonal.
+  /// Appends three points per triangle to `out`. Curved faces are divided at their middle nodes, as VTK's geometry
+  /// filter does at its first level; without a centre, the quadrilateral of the middles gets its shorter diagonal.
   void cut(const FacePoints& face, std::vector<uint32_t>& out);
 
  private:
@@ -63,18 +63,18 @@ class CellReader {
   void check() const;
   size_t count() const { return states_.size(); }
   uint8_t type(size_t cell) const { return set_.structured ? structured_type_ : set_.types[cell]; }
-  /// Null: it is not known.
+  /// Null: the cell's type is not known.
   const CellKind* kind(size_t cell) const;
   CellState state(size_t cell) const { return states_[cell]; }
   size_t face_count(size_t cell) const;
-  /// Valid until the next call. Precondition: check(), cell and face are there.
+  /// Valid until the next call. Precondition: check() passed; cell and face exist.
   FacePoints face(size_t cell, size_t face);
-  /// Whether that face of a volume cell looks into it, by the sign of the cell's own volume.
+  /// True if that face of a volume cell looks into it, by the sign of the cell's own volume.
   bool looks_inward(size_t cell, size_t face);
-  /// Structured data sets of three axes: the cells along each.
+  /// Structured data sets with three axes: the number of cells along each.
   std::array<size_t, 3> sides() const { return sides_; }
 
-  /// Twice a polygon's area, times its normal.
+  /// Returns twice a polygon's area, times its normal.
   glm::dvec3 area_vector(std::span<const uint32_t> corners) const;
 
  private:
@@ -87,30 +87,30 @@ class CellReader {
   std::vector<CellState> states_;
   std::array<size_t, 3> sides_{};
   uint8_t structured_type_ = 0;
-  std::vector<size_t> steps_;  // of points along the axes that are longer than one point
+  std::vector<size_t> steps_;  // steps between points along the axes that are longer than one point
   std::array<uint32_t, 8> corners_;
   std::vector<uint32_t> face_;
   size_t oriented_ = ~size_t{0};
-  std::vector<bool> inward_;  // the faces of cell oriented_
+  std::vector<bool> inward_;  // per face of cell oriented_
 };
 
 /// Triangles of a data set.
 struct Surface {
-  std::vector<uint32_t> corners;  ///< three points of the data set a triangle
-  std::vector<uint32_t> cells;    ///< whose data a triangle has
+  std::vector<uint32_t> corners;  ///< per triangle three points of the data set
+  std::vector<uint32_t> cells;    ///< per triangle the cell whose data it has
 };
 
-/// What people should know of cells that are not shown, or not as they are.
+/// Counts cells that are not shown, or not exactly, for notes to users.
 struct SurfaceNotes {
   uint64_t points_and_lines = 0, straightened = 0, ghosts = 0, unknown = 0;
 };
 
-/// The surfaces of data sets that make one whole, one each: their surface cells, and those faces of volume cells that
-/// no second cell has. Faces are told apart by their points, between data sets by their points' positions. Faces of
-/// volume cells look outward, however the cell is turned. A surface cell on a volume cell's outer face is shown once,
-/// with its own data. Ghost cells (vtkGhostType: duplicates) cover others' faces, but are not shown; hidden and refined
-/// cells, and those with hidden points, are not there. Error: a cell with too few points or with points that are not
-/// there.
+/// Returns the surfaces of data sets that form one whole, one each: their surface cells, and the faces of volume cells
+/// that no second cell shares. Faces are identified by their points, between data sets by their points' positions.
+/// Faces of volume cells look outward, for any orientation of the cell. A surface cell on a volume cell's outer face is
+/// shown once, with its own data. Ghost cells (vtkGhostType: duplicates) cover other cells' faces, but are not shown;
+/// hidden and refined cells, and cells with hidden points, count as absent. Error: a cell with too few points or with
+/// missing points.
 std::vector<Surface> surfaces_of(std::span<const DataSet> sets, SurfaceNotes& notes);
 
 }  // namespace telesplat::data::vtk

@@ -71,7 +71,7 @@ void check_extent(const std::array<int64_t, 6>& extent, size_t file_bytes, const
     if (side < 1) refuse("{}: its extent goes from {} to {}", name, extent[2 * a], extent[2 * a + 1]);
     points *= side;
   }
-  const double most = std::min(4294967294.0, 1032.0 * double(file_bytes));  // deflate's best packing
+  const double most = std::min(4294967294.0, 1032.0 * double(file_bytes));  // deflate's best ratio
   if (points <= most) return;
   refuse("{}: claims {:.0f} points, limit {:.0f} in a file of {} bytes", name, points, most, file_bytes);
 }

@@ -12,7 +12,7 @@
 namespace telesplat::data::vtk {
 namespace {
 
-// An array as the file's words have it.
+// An array as the file's words describe it.
 struct ArrayRow {
   std::string name;
   bool of_cells = false;
@@ -49,10 +49,10 @@ std::vector<ArrayRow> rows_in(pugi::xml_node points, pugi::xml_node cells, const
     for (const auto node : (of_cells ? cells : points).children(element)) {
       const std::string_view format = node.attribute("format").value();
       ArrayRow row{node.attribute("Name").value(),
-              of_cells,
-              {},
-              std::max(node.attribute("NumberOfComponents").as_uint(1), 1u),
-              format == "ascii" || (format.empty() && !node.attribute("offset"))};
+                   of_cells,
+                   {},
+                   std::max(node.attribute("NumberOfComponents").as_uint(1), 1u),
+                   format == "ascii" || (format.empty() && !node.attribute("offset"))};
       if (type_of(node.attribute("type").value(), row.type) && row.name != "vtkGhostType")
         out.push_back(std::move(row));
     }
@@ -72,7 +72,7 @@ Image legacy_header(std::string_view content, const std::string& path, const std
   return out;
 }
 
-// f(content, name) for the file and for those that it names.
+// Calls f(content, name) for the file, or for those that it names.
 template <class F>
 void each_file(std::string_view content, const std::string& path, Companions& companions, F&& f) {
   if (kind_of(content) != "pvti") return f(content, path);
@@ -159,7 +159,7 @@ Image xml_header(const XmlFile& file, std::string_view content, const std::strin
   const auto rows = rows_in(points, cells, parallel ? "PDataArray" : "DataArray");
   choose(rows, array, {points.attribute("Scalars").value(), cells.attribute("Scalars").value()}, out, path);
   each_file(content, path, companions, [&](std::string_view one, const std::string&) { out.bytes += one.size(); });
-  out.packed = out.packed || parallel, out.text = out.text && !parallel;  // its files may be either
+  out.packed = out.packed || parallel, out.text = out.text && !parallel;  // the named files may be packed or text
   return out;
 }
 

@@ -16,7 +16,7 @@ std::string upper(std::string_view text) {
   return out;
 }
 
-// "%20" in names of arrays.
+// Decodes "%20" in names of arrays.
 std::string decoded(std::string_view name) {
   std::string out;
   for (size_t i = 0; i < name.size(); ++i) {
@@ -65,13 +65,13 @@ class Parser {
     return in_.word();
   }
   std::string word() { return upper(raw_word()); }
-  // A number from 0 on. what: it counts, for errors.
+  // Reads a number >= 0. what: the counted things, for errors.
   uint64_t count(const char* what) {
     int64_t out = -1;
     if (!in_.skip_space() || !in_.integer(out) || out < 0) fail("its number of {} is no number", what);
     return uint64_t(out);
   }
-  // One that the file's bytes can bear out.
+  // Reads a number that the file's size allows.
   uint64_t claim(const char* what) {
     const uint64_t out = count(what);
     if (out > content_.size()) fail("claims {} {} in a file of {} bytes", out, what, content_.size());
@@ -102,7 +102,7 @@ class Parser {
     check_extent(set_.extent, content_.size(), set_.name);
   }
 
-  // ORIGIN into column 3 of the placement, SPACING onto its diagonal.
+  // Reads ORIGIN into column 3 of the placement, SPACING onto its diagonal.
   void three(int column) {
     for (int a = 0; a < 3; ++a) {
       double value = 0;
@@ -134,7 +134,7 @@ class Parser {
     return found.has_value();
   }
 
-  // `what` names it in errors.
+  // Reads an array's values. `what` names it in errors.
   Array values(StoredType type, uint64_t count, const std::string& what) {
     Array out;
     out.type = type;
@@ -180,7 +180,7 @@ class Parser {
     set_.axes[a] = typed(n, "coordinates");
   }
 
-  // "N SIZE" and a list of counts and points; since version 5 "OFFSETS" and "CONNECTIVITY" behind N + 1 and SIZE.
+  // Reads "N SIZE" and a list of counts and points; since version 5 "OFFSETS" and "CONNECTIVITY" follow N + 1 and SIZE.
   void cells(Cells& out) {
     if (set_.structured) fail("has cells of its own, which a structured data set has not");
     const uint64_t n = claim("POLYGONS or CELLS"), size = claim("numbers of POLYGONS or CELLS");
@@ -205,7 +205,7 @@ class Parser {
     data_ = of_cells ? &set_.cell_data : &set_.point_data;
   }
 
-  // Ends at an empty line.
+  // Reads METADATA up to an empty line.
   void metadata() {
     in_.next_line();
     std::string_view name, line;
@@ -220,7 +220,7 @@ class Parser {
     } while (!line.empty() && !in_.at_end());
   }
 
-  // active: the name of the kind that this array is, if it is the first one.
+  // active: the attribute that this array's name is set to if it is the first of its kind.
   void take(Array array, std::string_view name, size_t components, std::string Attributes::*active = nullptr) {
     array.name = decoded(name);
     array.components = components;
@@ -237,7 +237,7 @@ class Parser {
         in_.next_line();
         continue;
       }
-      // Two bits tell in how many bytes the length is written.
+      // Two bits give the number of bytes in which the length is written.
       const auto first = static_cast<unsigned char>(content_[in_.offset()]);
       const size_t more = first >> 6 == 3 ? 0 : first >> 6 == 2 ? 1 : first >> 6 == 1 ? 3 : 7;
       uint64_t length = first & 63;
@@ -302,7 +302,7 @@ class Parser {
          key == "NORMALS" ? &Attributes::normals : nullptr);
   }
 
-  // "SCALARS name type [components]", and mostly "LOOKUP_TABLE name" behind it.
+  // Reads "SCALARS name type [components]", and mostly "LOOKUP_TABLE name" after it.
   void scalars() {
     const std::string_view name = raw_word();
     const std::string_view type_text = raw_word();
@@ -323,7 +323,7 @@ class Parser {
          &Attributes::scalars);
   }
 
-  // Bytes in binary files, fractions in text.
+  // Reads COLOR_SCALARS: bytes in binary files, fractions in text.
   void colour_scalars() {
     const std::string_view name = raw_word();
     const uint64_t components = count("COLOR_SCALARS' components");
@@ -367,7 +367,7 @@ class Parser {
     std::erase_if(data.arrays, [&](const Array& a) { return a.tuples() != tuples; });
   }
 
-  // Their "points" are a stream of faces, which become their points as well.
+  // The "points" of polyhedra are a stream of faces; the points of these become the polyhedra's points as well.
   void take_polyhedra() {
     if (std::find(set_.types.begin(), set_.types.end(), kPolyhedron) == set_.types.end()) return;
     Cells kept;
@@ -390,7 +390,7 @@ class Parser {
   Cells cells_, of_poly_[4];  // vertices, lines, polygons, strips: the order of their data
   uint64_t tuples_ = 0;
   Attributes* data_ = nullptr;
-  Array* last_ = nullptr;  // what METADATA belong to
+  Array* last_ = nullptr;  // the array that METADATA belong to
 };
 
 }  // namespace

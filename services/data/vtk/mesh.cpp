@@ -1,4 +1,4 @@
-// From data sets to one mesh.
+// Joins data sets into one mesh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ double value_of(const Array& array, size_t tuple, int component) {
 
 bool is_colour_sized(const Array* a) { return a && (a->components == 3 || a->components == 4); }
 
-// An array that holds colours, or null: active scalars of bytes, then names of colours, then any other bytes.
+// Returns an array that holds colours, or null: active scalars of bytes, then names of colours, then any other bytes.
 const Array* find_colours(const Attributes& data) {
   const Array* scalars = data.find(data.scalars);
   if (is_colour_sized(scalars) && scalars->type == StoredType::kU8) return scalars;
@@ -39,7 +39,7 @@ const Array* find_colours(const Attributes& data) {
   return nullptr;
 }
 
-// What a channel is multiplied with to lie in 0..255.
+// Returns the factor that scales a channel to 0..255.
 double channel_scale(const Array& colours) {
   if (colours.type == StoredType::kU8) return 1;
   if (colours.type == StoredType::kU16) return 1 / 257.0;
@@ -56,7 +56,7 @@ uint32_t colour_of(const Array& colours, size_t tuple, double scale) {
   return pack_rgb(channel(0), channel(1), channel(2));
 }
 
-// The data sets' points and triangles, one after another.
+// Collects the data sets' points and triangles, one after another.
 class Collector {
  public:
   Collector(std::span<const DataSet> sets, std::span<const Surface> surfaces, Mesh& mesh)
@@ -76,7 +76,7 @@ class Collector {
   }
 
  private:
-  // Those that are used, in their order.
+  // Adds the points that triangles use, in their order.
   void add_points(size_t s) {
     const Surface& surface = surfaces_[s];
     std::vector<uint32_t> places(sets_[s].point_count(), kUnused);
@@ -134,7 +134,7 @@ class Collector {
     return cells ? std::span(surfaces_[s].cells) : std::span(used_[s]);
   }
 
-  // Arrays of one name and size are one, whatever data sets they are in.
+  // Lists arrays; those of equal name and size in different data sets count as one.
   void list_arrays() {
     for (const bool cells : {false, true})
       for (size_t s = 0; s < sets_.size(); ++s)
@@ -165,7 +165,7 @@ class Collector {
     const auto& info = mesh_.arrays[choice->index];
     const double origin = scene::scalar_origin(scene::span_of(mesh_.arrays, *choice));
     mesh_.scalars_of_faces = info.of_cells;
-    // Files may hold two arrays of one name.
+    // Files may hold two arrays with the same name.
     size_t same_before = 0;
     for (size_t i = 0; i < choice->index; ++i)
       same_before += names_[i] == names_[choice->index] && mesh_.arrays[i].of_cells == info.of_cells &&
@@ -185,8 +185,8 @@ class Collector {
   std::span<const DataSet> sets_;
   std::span<const Surface> surfaces_;
   Mesh& mesh_;
-  std::vector<std::vector<uint32_t>> used_;  // points of each data set
-  std::vector<std::string> names_;           // of mesh_.arrays, as in the files
+  std::vector<std::vector<uint32_t>> used_;  // used points of each data set
+  std::vector<std::string> names_;           // names of mesh_.arrays, as in the files
 };
 
 void tell(const SurfaceNotes& n, const std::string& path, std::vector<std::string>& notes) {

@@ -26,7 +26,7 @@ constexpr std::array<uint32_t, 256> kSixBits = [] {
 
 uint32_t six_bits(char c) { return kSixBits[static_cast<unsigned char>(c)]; }
 
-// What packed bytes can become at most, to one of them.
+// Returns the best ratio of a compressor, to 1.
 uint64_t best_packing(Packing packing) {
   return packing == Packing::kLzma ? 10'000 : packing == Packing::kLz4 ? 256 : 1032;
 }
@@ -58,10 +58,10 @@ bool read_number(EncodedBytes& in, size_t bytes, bool big_endian, uint64_t& out)
   return true;
 }
 
-// What a header says of packed data.
+// A header of packed data.
 struct Blocks {
   uint64_t count = 0, bytes = 0, last_bytes = 0, total = 0, packed_total = 0;
-  std::vector<uint64_t> packed;  // of each block
+  std::vector<uint64_t> packed;  // size of each block
 };
 
 Blocks read_blocks(EncodedBytes& in, Packing packing, size_t header_bytes, bool big_endian, const std::string& what) {

@@ -9,7 +9,7 @@
 namespace telesplat::data::vtk {
 namespace {
 
-constexpr int kMostLevels = 8;  // of files that name files
+constexpr int kMostLevels = 8;  // files that name files
 constexpr size_t kMostFiles = 10'000;
 
 struct KindRow {
@@ -36,7 +36,7 @@ constexpr KindRow kKinds[] = {{"ImageData", "vti"},
                               {"vtkOverlappingAMR", "vtm"},
                               {"Collection", "pvd"}};
 
-// The files that an element and those in it name, in their order. pvd: those of the first time step.
+// The files that an element and those in it name, in their order. pvd: only those of the first time step.
 struct Named {
   std::vector<std::string> files;
   size_t steps = 0;
@@ -76,7 +76,7 @@ class Reader {
   Reader(const std::string& path, Companions& companions, std::vector<std::string>& notes)
       : path_(path), companions_(companions), notes_(notes) {}
 
-  // from: the folder of this file, as seen from the first one's.
+  // from: this file's folder, relative to the first file's.
   void read(std::string_view content, const std::string& name, const std::string& from, int level) {
     const std::string kind = kind_of(content);
     if (kind.empty()) refuse("{}: is no data set of VTK's that is known", name);
@@ -113,7 +113,7 @@ class Reader {
   size_t files_ = 0;
 };
 
-// Damaged files name none.
+// Lists the files that a file names; damaged files add no names.
 void list_named(std::string_view content, const std::string& path, const std::string& from, Companions& companions,
                 int level, std::vector<std::string>& out) try {
   const std::string kind = kind_of(content);

@@ -13,10 +13,10 @@ struct OuterFace {
   uint32_t cell, face;
   uint32_t data_cell;
   bool of_volume;
-  int8_t inward = -1;  // 0 or 1 where it is known already
+  int8_t inward = -1;  // -1: not known yet; 1: it looks into its cell
 };
 
-// A face by its corners: the three that follow the lowest one, or the next one and a hash of all.
+// A face by its corners: the three after the lowest one, or the next one and a hash of all.
 struct Entry {
   uint32_t b, c, d, cell, face;
   bool same_face(const Entry& o) const { return b == o.b && c == o.c && d == o.d; }
@@ -34,7 +34,7 @@ uint64_t mixed(uint64_t v) {  // splitmix64
   return v ^ v >> 31;
 }
 
-// The lowest corner; ~0: it has fewer than three.
+// Returns the lowest corner; ~0: the face has fewer than three.
 uint32_t key_of(std::span<const uint32_t> face, std::vector<uint32_t>& sorted, Entry& out) {
   sorted.assign(face.begin(), face.end());
   for (size_t i = 1; i < sorted.size() && sorted.size() <= 8; ++i)
@@ -85,7 +85,7 @@ class OuterFaces {
     const size_t steps[3] = {1, sides[0], sides[0] * sides[1]};
     for (size_t cell = 0; cell < cells_.count(); ++cell) {
       if (cells_.state(cell) != CellState::kShown) continue;
-      for (uint32_t face = 0; face < 6; ++face) {  // -x +x -y +y -z +z, as the table has them
+      for (uint32_t face = 0; face < 6; ++face) {  // -x +x -y +y -z +z, the table's order
         const size_t axis = face / 2, at = cell / steps[axis] % sides[axis];
         const bool up = face % 2 == 1;
         if (at == (up ? sides[axis] - 1 : 0) ||
@@ -95,7 +95,7 @@ class OuterFaces {
     }
   }
 
-  // f(lowest corner, entry) for each face of cells that are there.
+  // Calls f(lowest corner, entry) for each face of cells that are not absent.
   template <class F>
   void each_face(F&& f) {
     std::vector<uint32_t> sorted;
@@ -111,7 +111,7 @@ class OuterFaces {
     }
   }
 
-  // Faces in lists by their lowest corner; equal ones meet when each list is sorted.
+  // Finds outer faces: lists faces by their lowest corner; equal ones meet when each list is sorted.
   void find_by_corners() {
     std::vector<uint32_t> counts(set_.point_count(), 0);
     each_face([&](uint32_t lowest, const Entry&) { ++counts[lowest]; });
@@ -138,7 +138,7 @@ class OuterFaces {
       if (cells_.type(cell) == kStrip) take_alone(cell);
   }
 
-  // What is seen of cells that share one face.
+  // Decides the visible part of cells that share one face.
   void settle(std::span<const Entry> same) {
     const Entry* volume = nullptr;
     const Entry* surface = nullptr;
@@ -182,7 +182,7 @@ class Joint {
   Joint(std::span<const DataSet> sets, std::vector<CellReader>& cells, std::vector<std::vector<OuterFace>>& faces)
       : sets_(sets), cells_(cells), faces_(faces) {}
 
-  // Leaves out faces that volume cells of two data sets share, and those that a surface cell covers.
+  // Removes faces that volume cells of two data sets share, and those that a surface cell covers.
   void join() {
     std::vector<Placed> placed;
     for (uint32_t s = 0; s < sets_.size(); ++s)
@@ -219,7 +219,7 @@ class Joint {
       const glm::dvec3 own = cells_[surface->set].area_vector(points(*surface).corners);
       at(*surface).inward = glm::dot(own, outward(*volume)) < 0;
     }
-    // Cells on both sides hide it; those on one side are one cell that several pieces have.
+    // Volume cells on both sides hide the face; those on one side are copies of one cell in several pieces.
     const auto other = std::find_if(volume + 1, same.end(), is_volume);
     const bool repeated = other != same.end() && glm::dot(outward(*volume), outward(*other)) > 0;
     const auto kept = surface != same.end() || !repeated ? surface : volume;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr size_t kNone = std::string_view::npos;
 
-// The end of the markup that begins at `at`, behind its '>'; npos: it has none.
+// Returns the end of the markup that begins at `at`, after its '>'; npos: it does not end.
 size_t markup_end(std::string_view text, size_t at) {
   const auto behind = [&](std::string_view mark) {
     const size_t found = text.find(mark, at);
@@ -33,8 +33,8 @@ size_t markup_end(std::string_view text, size_t at) {
 
 bool is_tag(std::string_view markup) { return markup.size() > 1 && markup[1] != '!' && markup[1] != '?'; }
 
-// The file's tags; instead of each text between them, where it lies: "offset length". Ends before appended data, at
-// `appended`.
+// Returns the file's tags; each text between them is replaced by its place: "offset length". Ends before appended data,
+// at `appended`.
 std::string skeleton_of(std::string_view content, size_t& appended) {
   std::string out;
   appended = kNone;
@@ -130,7 +130,7 @@ Array XmlFile::array(pugi::xml_node element, int64_t tuples) const {
     const uint64_t offset = appended ? element.attribute("offset").as_ullong() : 0;
     if (offset > encoded.size()) refuse("{} begins at byte {} of {} appended ones", what, offset, encoded.size());
     encoded.remove_prefix(offset);
-    const bool nothing = !appended && encoded.empty();  // as some write arrays without values
+    const bool nothing = !appended && encoded.empty();  // some programs write arrays without values so
     if (!nothing) out = decode(std::move(out), encoded, !appended || appended_base64_, what);
   } else {
     TextScanner in(text(element));

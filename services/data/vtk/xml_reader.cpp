@@ -7,13 +7,13 @@
 namespace telesplat::data::vtk {
 namespace {
 
-constexpr size_t kBestPacking = 10'000;  // of any compressor, to 1
+constexpr size_t kBestPacking = 10'000;  // best ratio of any compressor, to 1
 
 pugi::xml_node array_named(pugi::xml_node element, const char* name) {
   return element.find_child_by_attribute("DataArray", "Name", name);
 }
 
-// All arrays of numbers in an element <PointData> or <CellData>.
+// Reads all arrays of numbers in an element <PointData> or <CellData>.
 Attributes read_attributes(const XmlFile& file, pugi::xml_node element, size_t tuples) {
   Attributes out{{}, element.attribute("Scalars").value(), element.attribute("Normals").value()};
   StoredType type;
@@ -22,7 +22,7 @@ Attributes read_attributes(const XmlFile& file, pugi::xml_node element, size_t t
   return out;
 }
 
-// What is shared by all kinds of pieces.
+// Common part of all kinds of pieces.
 struct Piece {
   const XmlFile& file;
   pugi::xml_node node;
@@ -40,7 +40,7 @@ struct Piece {
     set.cell_data = read_attributes(file, node.child("CellData"), set.cell_count());
   }
 
-  // Cells of an element with connectivity and offsets.
+  // Reads the cells of an element with connectivity and offsets.
   Cells read_cells(const char* element, int64_t count) {
     if (count == 0) return Cells{};
     const auto from = node.child(element);
@@ -63,7 +63,7 @@ void read_poly_data(Piece& piece) {
     append_cells(piece.read_cells(kind.element, piece.number(kind.count)), kind.type, piece.set);
 }
 
-// As VTK 9.4 writes them (file version 2.3): faces by themselves, and which ones each polyhedron has.
+// Reads polyhedra as VTK 9.4 writes them (file version 2.3): a list of faces, and the faces of each polyhedron.
 void read_listed_faces(Piece& piece, pugi::xml_node cells) {
   DataSet& set = piece.set;
   const auto ids = piece.file.array(array_named(cells, "face_connectivity"), -1);
@@ -80,7 +80,7 @@ void read_listed_faces(Piece& piece, pugi::xml_node cells) {
   }
 }
 
-// As older files have them: a stream of numbers, and where each cell's part of it ends (-1: it is no polyhedron).
+// Reads polyhedra of older files: a stream of numbers, and the end of each cell's part (-1: not a polyhedron).
 void read_face_streams(Piece& piece, pugi::xml_node cells) {
   DataSet& set = piece.set;
   const auto faces = piece.file.array(array_named(cells, "faces"), -1);

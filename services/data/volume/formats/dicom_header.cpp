@@ -25,7 +25,7 @@ constexpr uint32_t kPixels = 0x7fe00010, kFloatPixels = 0x7fe00008, kDoublePixel
 constexpr uint32_t kPerFrame = 0x52009230;
 constexpr std::string_view kDeflated = "1.2.840.10008.1.2.1.99";
 
-// Sequences whose values are those of a frame, or of all frames: functional groups (PS3.3 C.7.6.16) and detectors.
+// Sequences with values of a frame, or of all frames: functional groups (PS3.3 C.7.6.16) and detectors.
 constexpr uint32_t kGroups[] = {0x52009229, kPerFrame,  0x00189114, 0x00189117, 0x00189118, 0x00189226, 0x00189329,
                                 0x00209111, 0x00209113, 0x00209116, 0x00289110, 0x00289145, 0x00540022};
 
@@ -63,7 +63,7 @@ class Parser {
     return slices();
   }
 
-  // Where the elements behind the meta group begin: it is always explicit and little-endian.
+  // Returns the end of the meta group, which is always explicit and little-endian.
   size_t end_of_meta() {
     at_ = has_preamble(content_) ? 132 : 0;
     while (at_ + 2 <= content_.size() && u16(at_) == 2) element(0, false);
@@ -78,7 +78,7 @@ class Parser {
   uint32_t u32(size_t at) const {
     return big_ ? uint32_t(u16(at)) << 16 | u16(at + 2) : uint32_t(u16(at + 2)) << 16 | u16(at);
   }
-  // A double in the file's byte order; 0 for what orders nothing.
+  // Returns a double in the file's byte order; 0 if it is not finite.
   double real(size_t at) const {
     const uint64_t a = u32(at), b = u32(at + 4), bits = big_ ? a << 32 | b : b << 32 | a;
     double value;
@@ -89,14 +89,14 @@ class Parser {
     refuse("{}: is cut or damaged: an element at byte {} does not fit its {} bytes", path_, at_, content_.size());
   }
 
-  // What the file says of types is not always so: the first element itself shows whether it has one.
+  // A file's own statement on types may be false: the first element itself shows whether it has one.
   void choose_syntax() {
     big_ = base_.big_endian = base_.syntax == "1.2.840.10008.1.2.2";
     explicit_ = base_.syntax != "1.2.840.10008.1.2";
     if (!big_ && at_ + 6 <= content_.size()) explicit_ = is_type(content_.substr(at_ + 4, 2));
   }
 
-  // Tag, type and length; leaves at_ at the value.
+  // Reads tag, type and length; leaves at_ at the value.
   Element begin_element() {
     if (content_.size() - at_ < 8) cut();
     Element e;
@@ -119,7 +119,7 @@ class Parser {
     return e;
   }
 
-  // inside: of functional groups, whose values are kept.
+  // inside: within functional groups, whose values are kept.
   void element(int depth, bool inside) {
     const Element e = begin_element();
     if (depth == 0 && (e.tag == kPixels || e.tag == kFloatPixels || e.tag == kDoublePixels)) return pixels(e);
@@ -182,7 +182,7 @@ class Parser {
     done_ = true;
   }
 
-  // A slice of each frame; a file without pixels has one, too.
+  // Returns a slice for each frame; also one for a file without pixels.
   std::vector<DicomSlice> slices() {
     const size_t count = base_.data_bytes > 0 ? size_t(base_.frames) : 1;
     if (count > kMostFrames) refuse("{}: has {} frames, limit {}", path_, count, kMostFrames);
@@ -205,7 +205,7 @@ class Parser {
     return std::move(frames_);
   }
 
-  // Where frames lie that do not say it themselves: as offsets along the normal tell (a dose), or one behind the other.
+  // Places frames without own positions: at offsets along the normal if given (a dose), else one behind the other.
   void place_frames(size_t count) {
     frames_.assign(count, base_);
     if (count == 1) return;
@@ -240,7 +240,7 @@ class Parser {
     std::replace(plain.begin(), plain.end(), '\\', ' ');
     return numbers(plain);
   }
-  // Decimal strings, separated by backslashes. Nothing changes if they are not as many numbers.
+  // Reads decimal strings, separated by backslashes. Changes nothing if they are fewer than `to`.
   static bool decimals(std::string_view text, auto&... to) {
     const auto all = decimals(text.substr(0, 400));
     if (!all || all->size() < sizeof...(to)) return false;
@@ -287,7 +287,7 @@ class Parser {
       case 0x00181164:
       case 0x00280030:
         decimals(text, out.spacing.y, out.spacing.x);
-        break;  // between rows comes first
+        break;  // the spacing between rows comes first
       case 0x3004000c:
         if (auto all = decimals(text)) offsets_ = std::move(*all);
         break;
@@ -326,7 +326,7 @@ class Parser {
 
 bool is_dicom(std::string_view content) {
   if (has_preamble(content)) return true;
-  // Without a preamble: three elements by ascending tags, of groups that come before pixels.
+  // Without a preamble: three elements with ascending tags, from groups that come before pixels.
   uint32_t last = 0;
   for (size_t at = 0, elements = 0; elements < 3; ++elements) {
     if (content.size() - at < 12) return false;

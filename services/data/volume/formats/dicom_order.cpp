@@ -13,11 +13,11 @@ namespace telesplat::data {
 namespace {
 
 using Slices = std::vector<DicomSlice>;
-using Place = std::vector<size_t>;  // slices at the same height, by time
+using Place = std::vector<size_t>;  // slices at the same height, ordered by time
 
-constexpr size_t kMostKinds = 64;    // others count as of no kind
-constexpr double kSamePlace = 1e-3;  // of a pixel
-constexpr double kEven = 0.1;        // of the distance of slices: how far one may lie from where it is shown
+constexpr size_t kMostKinds = 64;    // slices of further kinds are left out
+constexpr double kSamePlace = 1e-3;  // in pixels
+constexpr double kEven = 0.1;        // in distances of slices: largest shift of a slice without resampling
 constexpr double kSilentlyEven = 0.01;
 constexpr double kSilentlyTilted = 0.5;  // degrees
 
@@ -27,7 +27,6 @@ std::string name_of(const DicomSlice& s) {
 }
 
 std::string counted(size_t n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
-
 
 glm::dvec3 normal_of(const DicomSlice& s) { return glm::cross(s.along_row, s.along_column); }
 
@@ -48,7 +47,7 @@ std::string why_other(const DicomSlice& s, const DicomSlice& taken) {
   return s.stacked ? "another file of frames" : "turned, spaced or placed otherwise";
 }
 
-// Slices that can make one volume.
+// Returns the largest group of slices that can make one volume.
 Slices most_alike(Slices all, std::string& remark) {
   std::vector<Slices> kinds;
   Slices others;
@@ -71,7 +70,7 @@ Slices most_alike(Slices all, std::string& remark) {
   return std::move(*taken);
 }
 
-// Copies by their UIDs go, the first one stays.
+// Removes copies, by their UIDs; the first one stays.
 void drop_copies(Slices& slices, std::string& remark) {
   std::set<std::pair<std::string, int>> seen;
   const auto copies = std::stable_partition(slices.begin(), slices.end(), [&](const DicomSlice& s) {
@@ -87,7 +86,7 @@ bool earlier(const DicomSlice& a, const DicomSlice& b) {
   return std::tie(a.times, a.instance, a.path, a.frame) < std::tie(b.times, b.instance, b.path, b.frame);
 }
 
-// Ascending heights; without positions a place each.
+// Groups slices by ascending height; without positions each slice has its own place.
 std::vector<Place> places_of(const Slices& slices) {
   const glm::dvec3 normal = normal_of(slices.front());
   std::vector<std::pair<double, size_t>> by_height;
@@ -120,7 +119,7 @@ std::string told_apart_by(const Slices& slices, const Place& place) {
   return "number";
 }
 
-// What lies at a place more than once: copies, time steps, or neither.
+// Sorts out places with several slices: copies, time steps, or neither.
 void sort_out(const Slices& slices, std::vector<Place>& places,
               const std::function<bool(const DicomSlice&, const DicomSlice&)>& same_pixels, std::string& remark) {
   const auto several = [](const Place& p) { return p.size() > 1; };
@@ -133,7 +132,7 @@ void sort_out(const Slices& slices, std::vector<Place>& places,
     copies += size_t(p.end() - end);
     p.erase(end, p.end());
   }
-  // Time steps may have slices in common (air), so copies are those whose loss leaves as many slices at each place.
+  // Time steps may have equal slices (air), so copies are removed only if each place then has as many slices.
   if (copies > 0 && equally_many(once)) {
     say(remark, fmt::format("left out {} with the pixels of others at their place", counted(copies, "slice")));
     places = std::move(once);
@@ -151,7 +150,7 @@ void sort_out(const Slices& slices, std::vector<Place>& places,
                           counted(left_out, "slice"), name_of(slices[first->front()]), by));
 }
 
-// Where on a grid slices lie: a layer lies at each whole number.
+// Positions of slices on a grid whose layers are the whole numbers.
 using GridPlaces = std::vector<double>;
 
 std::vector<DicomLayer> layers_at(const GridPlaces& at) {
@@ -166,7 +165,7 @@ std::vector<DicomLayer> layers_at(const GridPlaces& at) {
   return out;
 }
 
-// How far slices lie from where the grid has them, by the distance of its layers.
+// Returns the largest shift of a slice from its place on the grid, in distances of layers.
 double unevenness(const std::vector<double>& heights, const GridPlaces& at) {
   const double distance = (heights.back() - heights.front()) / at.back();
   double most = 0;
@@ -212,7 +211,7 @@ GridPlaces grid_of(const std::vector<double>& heights, const std::function<std::
   return by_gaps([&](double gap) { return gap / distance; });
 }
 
-// The way from one layer to the next: as positions say, which may be askew (gantry tilt).
+// Computes the offset from one layer to the next from the positions; it may be askew (gantry tilt).
 void place(DicomOrder& out, const std::vector<Place>& places, double distance) {
   const DicomSlice &first = out.slices[places.front()[0]], &last = out.slices[places.back()[0]];
   const glm::dvec3 normal = normal_of(first), way = *last.position - *first.position;

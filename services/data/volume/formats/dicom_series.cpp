@@ -26,7 +26,7 @@ using Slices = std::vector<DicomSlice>;
 struct Found {
   std::map<std::string, Slices> series;
   size_t slices = 0, damaged = 0;
-  std::string damage;  // of the first
+  std::string damage;  // damage of the first such file
 };
 
 void scan(const std::string& path, Found& found) {
@@ -42,7 +42,7 @@ void scan(const std::string& path, Found& found) {
     for (DicomSlice& s : *slices) found.series[s.series].push_back(std::move(s));
 }
 
-// All slices with pixels, a series each.
+// Reads all slices with pixels, grouped by series.
 Found read_slices(const std::string& folder) {
   std::error_code error;
   for (const bool below : {fs::exists(folder + "/DICOMDIR", error), true}) {
@@ -75,7 +75,7 @@ std::string list_of(const std::vector<DicomSeriesName>& all) {
   return all.size() > kMostNamed ? fmt::format("{}; and {} more", out, all.size() - kMostNamed) : out;
 }
 
-// The place of the series that was asked for.
+// Returns the index of the requested series.
 size_t choose(const std::vector<DicomSeriesName>& all, const std::string& which, const std::string& folder) {
   if (which.empty())
     return size_t(std::max_element(all.begin(), all.end(), [](auto& a, auto& b) { return a.slices < b.slices; }) -
@@ -110,7 +110,7 @@ void check_slice(const DicomSlice& s) {
     refuse("{}: its values are scaled by {} and shifted by {}", s.path, s.slope, s.intercept);
 }
 
-// Whether two slices have the same pixels, as far as their files tell it without unpacking.
+// True if two slices have equal pixels, as far as their files show without unpacking.
 bool same_pixels(const DicomSlice& a, const DicomSlice& b) {
   if (a.deflated || b.deflated || a.data_bytes != b.data_bytes || (a.compressed && a.frames > 1)) return false;
   const auto file = MappedFile::open(a.path), other = MappedFile::open(b.path);
@@ -119,7 +119,7 @@ bool same_pixels(const DicomSlice& a, const DicomSlice& b) {
          (*other)->text().substr(std::min<size_t>(b.data_at, (*other)->text().size()), b.data_bytes);
 }
 
-// What is common to all steps. Slices that are stored or scaled differently become f32.
+// Returns the header common to all steps. If slices are stored or scaled differently, all become f32.
 VolumeFileHeader header_of(const DicomOrder& order) {
   const DicomSlice& first = order.slices.front();
   VolumeFileHeader h;
@@ -138,7 +138,6 @@ VolumeFileHeader header_of(const DicomOrder& order) {
   if (even) h.scale = first.slope, h.offset = first.intercept;
   return h;
 }
-
 
 void say_values(DicomSeries& series) {
   const DicomSlice& first = series.order.slices.front();
@@ -162,7 +161,7 @@ std::shared_ptr<const DicomSeries> series_at(const std::string& path, const std:
     lone = slices.front().stacked;
   }
   auto found = read_slices(folder);
-  if (lone)  // a film of ultrasound: others of its series are other films
+  if (lone)  // an ultrasound film: other files of its series are other films
     std::erase_if(found.series[wanted], [&](const DicomSlice& s) { return !fs::equivalent(s.path, path, error); });
   std::vector<Slices> all;
   for (auto& [uid, slices] : found.series)
@@ -210,7 +209,7 @@ std::vector<std::string> DicomSeries::files() const {
 }
 
 std::string text_of(const DicomSeriesName& series, size_t place) {
-  // What files say: cut, and without what a terminal might obey.
+  // Texts from files: shortened, and without characters that a terminal would obey.
   const auto plain = [](const std::string& said) {
     const std::string quoted = in_quotes(said);
     return said.empty() ? "" : quoted.substr(1, quoted.size() - 2) + ", ";

@@ -17,7 +17,7 @@
 namespace telesplat::data {
 namespace {
 
-constexpr uint64_t kBestPacking = 1032;  // of deflate, to 1
+constexpr uint64_t kBestPacking = 1032;  // deflate's best ratio, to 1
 
 std::string extension_of(const std::string& path) { return lower(std::filesystem::path(path).extension().string()); }
 
@@ -26,14 +26,14 @@ std::string claim_of(const VolumeFileHeader& h) {
                      h.voxel_bytes());
 }
 
-// As much as fits of what a gzip stream's beginning holds.
+// Unpacks the beginning of a gzip stream, up to kHeaderBytes.
 std::string unpack_start(std::string_view packed) {
   std::string out(kHeaderBytes, '\0');
   size_t have = 0;
   or_error([&] {
     Inflater inflater(packed, "");
     while (const size_t n = inflater.read(out.data() + have, out.size() - have)) have += n;
-  }).ok();  // what it gave is what there is
+  }).ok();  // an error leaves the bytes unpacked before it
   out.resize(have);
   return out;
 }
@@ -85,7 +85,7 @@ VolumeFileHeader parse(const FileStart& start, const std::string& path, const st
       path);
 }
 
-// The size of the smallest file of detached voxels.
+// Returns the size of the smallest file with detached voxels.
 uint64_t smallest_part(const VolumeFileHeader& h, const std::string& path) {
   uint64_t out = ~uint64_t{0};
   for (size_t i = 0; i < h.parts(); ++i) {
@@ -140,7 +140,7 @@ Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::
     VolumeFileHeader h = parse(start, path, raw, array, data_bytes);
     if (h.data_path != path) data_bytes = smallest_part(h, path);
     if (h.format == "nifti" && (start.packed || lower(h.data_path).ends_with(".gz"))) {
-      h.encoding = Encoding::kGzip;  // all of the file is packed, header included
+      h.encoding = Encoding::kGzip;  // the whole file is packed, header included
       h.skip_unpacked = h.data_at;
       h.data_at = 0;
     }

@@ -34,7 +34,7 @@ std::vector<std::string> files_of_pattern(std::string_view text, const std::stri
 }  // namespace
 
 std::optional<std::vector<double>> numbers(std::string_view text, bool loose) {
-  std::string plain(text.substr(0, 4096));  // no header has that many numbers in a line
+  std::string plain(text.substr(0, 4096));  // no header has more numbers in a line
   if (loose)
     std::replace_if(
         plain.begin(), plain.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');

@@ -15,10 +15,10 @@ enum class Kind : uint32_t { kProgress = 1, kError = 2, kVolume = 3 };
 struct Message {
   Kind kind = Kind::kError;
   uint32_t unused = 0;
-  uint64_t bytes = 0;  // that follow
+  uint64_t bytes = 0;  // bytes after the message's head
 };
 
-// What follows Kind::kVolume, before the voxels.
+// Follows Kind::kVolume, before the voxels.
 struct Placed {
   int64_t size[3];
   double columns[12], scale, offset;
@@ -39,13 +39,13 @@ bool read_all(int descriptor, void* to, size_t bytes) {
   return true;
 }
 
-// bytes: of all that follows; data: the first of it.
+// bytes: number of bytes that follow the head; data: the first of them.
 bool send(int descriptor, Kind kind, uint64_t bytes, const void* data, uint64_t data_bytes) {
   const Message message{kind, 0, bytes};
   return write_all(descriptor, &message, sizeof message) && write_all(descriptor, data, data_bytes);
 }
 
-// The least of VTK's time goes by after its reader is done.
+// Reading's share of the progress: with VTK, little time passes after its reader is done.
 constexpr double kShareOfReading = 0.9;
 
 std::optional<Result<StreamedVolume>> receive_voxels(int descriptor, uint64_t message_bytes, uint64_t most_bytes,

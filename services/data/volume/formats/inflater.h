@@ -1,4 +1,4 @@
-// Unpacking of gzip, zlib and deflate streams in memory.
+// Unpacks gzip, zlib and deflate streams in memory.
 #pragma once
 
 #include <zlib.h>
@@ -13,7 +13,7 @@ namespace telesplat::data {
 
 class Inflater {
  public:
-  /// name: of the file, for errors. deflate: without a header of gzip or zlib.
+  /// name: the file's, for errors. deflate: the stream has no gzip or zlib header.
   Inflater(std::string_view packed, std::string name, bool deflate = false) : rest_(packed), name_(std::move(name)) {
     if (inflateInit2(&stream_, deflate ? -15 : 15 + 32) != Z_OK) refuse("{}: no memory for unpacking it", name_);
   }
@@ -21,7 +21,7 @@ class Inflater {
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
-  /// Unpacks at most `bytes`; returns how many, 0 at the end. Refuses damaged data, after those that are whole.
+  /// Unpacks at most `bytes`; returns their number, 0 at the end. Refuses damaged data, after the intact part.
   size_t read(void* to, size_t bytes) {
     if (damaged_) refuse("{}: its compressed data are damaged: {}", name_, stream_.msg ? stream_.msg : "zlib gave up");
     stream_.next_out = static_cast<Bytef*>(to);
@@ -35,7 +35,7 @@ class Inflater {
       }
       const int status = inflate(&stream_, Z_NO_FLUSH);
       if (status == Z_STREAM_END) {
-        // Another member may follow: gzip files may be joined.
+        // Another member may follow: gzip files may be concatenated.
         ended_ = stream_.avail_in < 2 || stream_.next_in[0] != 0x1f || inflateReset(&stream_) != Z_OK;
       } else if (status != Z_OK && status != Z_BUF_ERROR) {
         damaged_ = true;
@@ -45,7 +45,7 @@ class Inflater {
     if (damaged_ && stream_.avail_out == bytes) return read(to, bytes);  // refuses
     return bytes - stream_.avail_out;
   }
-  /// Whether the stream's own end was reached.
+  /// True if the stream's own end was reached.
   bool ended() const { return ended_; }
 
  private:

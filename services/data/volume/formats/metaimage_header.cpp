@@ -1,4 +1,4 @@
-// MetaImage headers: "Key = value" lines, the last of which is ElementDataFile.
+// Parses MetaImage headers: "Key = value" lines up to ElementDataFile, the last key.
 // https://itk.org/Wiki/ITK/MetaIO/Documentation
 #include <fmt/format.h>
 
@@ -17,7 +17,7 @@ constexpr TypeName kTypes[] = {{"MET_CHAR", kI8},    {"MET_UCHAR", kU8},   {"MET
 
 bool is_true(std::string_view text) { return !text.empty() && (text[0] == 'T' || text[0] == 't' || text[0] == '1'); }
 
-// As many numbers as axes; `otherwise` if the key is not there.
+// Returns one number per axis; `otherwise` if the key is missing.
 std::vector<double> per_axis(const Fields& keys, std::initializer_list<const char*> names, size_t count,
                              std::vector<double> otherwise, const std::string& path) {
   const std::string_view text = field(keys, names);
@@ -28,10 +28,10 @@ std::vector<double> per_axis(const Fields& keys, std::initializer_list<const cha
   return *all;
 }
 
-// The lines up to ElementDataFile, behind which local data begin.
+// The lines up to ElementDataFile; local data begin after it.
 struct Lines {
   Fields keys;
-  std::vector<std::string> files;  // behind "ElementDataFile = LIST"
+  std::vector<std::string> files;  // after "ElementDataFile = LIST"
   size_t data_at = 0;
 };
 Lines read_lines(std::string_view content, const std::string& path) {
@@ -83,14 +83,14 @@ void read_size(const Fields& keys, const std::string& path, VolumeFileHeader& h)
 }
 
 void read_placement(const Fields& keys, const std::string& path, VolumeFileHeader& h) {
-  // The matrix has the direction of each axis, one after the other.
+  // The matrix holds the direction of each axis, one after the other.
   const auto turn =
       per_axis(keys, {"TransformMatrix", "Orientation", "Rotation"}, 9, {1, 0, 0, 0, 1, 0, 0, 0, 1}, path);
   const auto size = per_axis(keys, {"ElementSize"}, 3, {1, 1, 1}, path);
   const auto spacing = per_axis(keys, {"ElementSpacing"}, 3, size, path);
   const auto origin = per_axis(keys, {"Offset", "Origin", "Position"}, 3, {0, 0, 0}, path);
   const auto axis = [&](size_t a) { return glm::dvec3(turn[3 * a], turn[3 * a + 1], turn[3 * a + 2]) * spacing[a]; };
-  // AnatomicalOrientation tells how the voxels' axes run, not what the placement's are: those are ITK's.
+  // AnatomicalOrientation gives the directions of the voxels' axes; the placement's axes are ITK's.
   if (const auto said = field(keys, {"AnatomicalOrientation"});
       said.size() == 3 && said.find_first_not_of("RLAPSI") == said.npos)
     h.space = scene::Space::kLps, h.unit = "mm";

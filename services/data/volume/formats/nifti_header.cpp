@@ -1,4 +1,4 @@
-// NIfTI 1 and 2 headers. Offsets from https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h and nifti2.h.
+// Parses NIfTI 1 and 2 headers. Offsets from https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h and nifti2.h.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kBytes1 = 348, kBytes2 = 540;
 
-// NiftiFields at given offsets, in the file's byte order.
+// Reads fields at given offsets, in the file's byte order.
 class NiftiFields {
  public:
   NiftiFields(std::string_view content, bool swapped) : content_(content), swapped_(swapped) {}
@@ -33,7 +33,7 @@ class NiftiFields {
   bool swapped_;
 };
 
-// What both versions say, in doubles where they differ.
+// Fields of both versions, as doubles where their types differ.
 struct Values {
   int64_t dim[8];
   int type;
@@ -73,7 +73,7 @@ bool usable(const glm::dmat4& m) {
   return std::isfinite(volume) && volume > 0;
 }
 
-// Methods 3, 2 and 1 of nifti1.h: the sform, the qform, the spacing alone.
+// Uses methods 3, 2 and 1 of nifti1.h: the sform, the qform, the spacing alone.
 glm::dmat4 placement_of(const Values& v) {
   if (v.sform > 0) {
     glm::dmat4 m(1.0);
@@ -86,7 +86,7 @@ glm::dmat4 placement_of(const Values& v) {
     double a = 0, b = v.quaternion[0], c = v.quaternion[1], d = v.quaternion[2];
     if (const double rest = 1 - (b * b + c * c + d * d); rest > 1e-7) {
       a = std::sqrt(rest);
-    } else {  // half a turn, but for rounding
+    } else {  // half a turn, up to rounding
       const double length = std::sqrt(1 - rest);
       b /= length, c /= length, d /= length;
     }
@@ -153,7 +153,7 @@ VolumeFileHeader parse(std::string_view content, const std::string& path) {
     const size_t dot = stem.rfind('.');
     h.data_path = stem.substr(0, dot) + ".img" + (packed ? ".gz" : "");
   } else {
-    h.data_at = std::max<uint64_t>(h.data_at, two ? 544 : 352);  // 0 is written, and means just behind the header
+    h.data_at = std::max<uint64_t>(h.data_at, two ? 544 : 352);  // 0 in the file means directly after the header
   }
   return h;
 }

@@ -1,4 +1,4 @@
-// NRRD headers: "field: value" lines up to an empty one. https://teem.sourceforge.net/nrrd/format.html
+// Parses NRRD headers: "field: value" lines up to an empty one. https://teem.sourceforge.net/nrrd/format.html
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ constexpr TypeName kNrrdTypes[] = {
     {"ushort", kU16},   {"uint16", kU16}, {"int", kI32},       {"int32", kI32},  {"uint", kU32},  {"uint32", kU32},
     {"longlong", kI64}, {"int64", kI64},  {"ulonglong", kU64}, {"uint64", kU64}, {"float", kF32}, {"double", kF64}};
 
-// "unsigned short int" is ushort, "signed char" char, "int8_t" int8.
+// Normalises names of types: "unsigned short int" is ushort, "signed char" char, "int8_t" int8.
 std::optional<StoredType> type_of(std::string name) {
   if (name.ends_with(" int")) name.resize(name.size() - 4);
   if (name.ends_with("_t")) name.resize(name.size() - 2);
@@ -26,10 +26,10 @@ std::optional<StoredType> type_of(std::string name) {
   return type_named(name, kNrrdTypes);
 }
 
-// The fields, by lower-case names without blanks, and where the data begins: behind the first empty line.
+// The fields, by lower-case names without blanks, and the offset of the data: after the first empty line.
 struct NrrdLines {
   Fields fields;
-  std::vector<std::string> files;  // behind "data file: LIST"
+  std::vector<std::string> files;  // after "data file: LIST"
   bool ct = false;
   bool ended = false;  // by an empty line
   size_t data_at = 0;
@@ -68,7 +68,7 @@ NrrdLines split(std::string_view content) {
   return out;
 }
 
-// A vector an axis, "(a,b,c)" or "none"; the latter have no numbers.
+// Parses one vector per axis, "(a,b,c)" or "none"; a "none" becomes an empty vector.
 std::optional<std::vector<std::vector<double>>> vectors(std::string_view text) {
   std::vector<std::vector<double>> out;
   for (text = trim(text); !text.empty() && out.size() < 16; text = trim(text)) {
@@ -89,14 +89,14 @@ std::optional<std::vector<std::vector<double>>> vectors(std::string_view text) {
 
 glm::dvec3 to_vec(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
 
-// Spaces with left-handed axes would show a body's mirror image.
+// True for spaces with left-handed axes, which would show a body's mirror image.
 bool left_handed(std::string_view space) {
   const std::string name = lower(space);
   return name == "left-anterior-superior" || name == "las" || name == "left-anterior-superior-time" || name == "last" ||
          name == "3d-left-handed" || name == "3d-left-handed-time";
 }
 
-// Mirrored at x, a left-handed space is the right-handed one.
+// Returns the space of a name; a left-handed space mirrored at x is the right-handed one.
 scene::Space space_named(std::string_view space) {
   const std::string name = lower(space);
   for (const char* lps : {"left-posterior-superior", "lps", "left-posterior-superior-time", "lpst"})
@@ -107,13 +107,13 @@ scene::Space space_named(std::string_view space) {
   return scene::Space::kPlain;
 }
 
-// Whether the samples of an axis stand at nodes: "cell node ???", a word an axis.
+// True if the samples of an axis stand at nodes: "cell node ???", one word per axis.
 bool at_nodes(std::string_view centers, size_t axis) {
   for (; axis > 0; --axis) centers = trim(centers.substr(std::min(centers.find(' '), centers.size())));
   return centers.starts_with("node");
 }
 
-// Directions and origin of the three axes that are kept.
+// Returns directions and origin of the three kept axes.
 glm::dmat4 placement_of(const Fields& fields, const std::vector<size_t>& axes, const std::vector<int64_t>& sizes,
                         const std::string& path) {
   const size_t dimension = sizes.size();
@@ -138,7 +138,7 @@ glm::dmat4 placement_of(const Fields& fields, const std::vector<size_t>& axes, c
   const auto mins = numbers(field(fields, {"axismins"})), maxs = numbers(field(fields, {"axismaxs"}));
   if (!placed && mins && maxs && mins->size() == dimension && maxs->size() == dimension)
     for (size_t a = 0; a < 3; ++a) {
-      // From the first sample's edge to the last one's; of samples at nodes from the first to the last.
+      // From the first sample's edge to the last one's; for samples at nodes, from the first sample to the last.
       const double lo = (*mins)[axes[a]], span = (*maxs)[axes[a]] - lo, n = double(sizes[axes[a]]);
       if (!std::isfinite(lo) || !(std::abs(span) > 0)) continue;
       const bool nodes = at_nodes(field(fields, {"centers", "centerings"}), axes[a]) && n > 1;
@@ -157,7 +157,7 @@ glm::dmat4 placement_of(const Fields& fields, const std::vector<size_t>& axes, c
   return m;
 }
 
-// The three axes that make the volume; one more may be there if it is one long.
+// Returns the three axes of the volume; further axes may have length one.
 std::vector<size_t> choose_axes(const std::vector<int64_t>& sizes, const std::string& path) {
   std::vector<size_t> axes;
   for (size_t a = 0; a < sizes.size(); ++a) axes.push_back(a);
@@ -173,7 +173,7 @@ std::vector<size_t> choose_axes(const std::vector<int64_t>& sizes, const std::st
       path, sizes.size(), text);
 }
 
-// How the voxels are written.
+// Reads encoding and byte order of the voxels.
 void read_encoding(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
   const std::string encoding = lower(field(fields, {"encoding"}));
   if (encoding == "raw")
@@ -190,18 +190,18 @@ void read_encoding(const Fields& fields, const std::string& path, VolumeFileHead
   h.big_endian = endian == "big";
 }
 
-// Where they lie.
+// Finds the file and offset of the voxels.
 void find_data(const NrrdLines& lines, const std::string& path, VolumeFileHeader& h) {
   const Fields& fields = lines.fields;
   const std::string_view data = field(fields, {"datafile"});
   if (data.empty() && !lines.ended) refuse("{}: its header does not end (no empty line) and names no data file", path);
-  // "LIST [DIM]" and names, or "PATTERN FIRST LAST STEP [DIM]"; DIM adds nothing: all have as many voxels.
+  // "LIST [DIM]" and names, or "PATTERN FIRST LAST STEP [DIM]"; DIM is redundant: all files have equally many voxels.
   if (take_files(data, lines.files, path, h)) return;
   h.data_path = data.empty() ? path : beside(path, data);
   h.data_at = data.empty() ? lines.data_at : 0;
 }
 
-// What is left out at their beginning.
+// Reads the numbers of lines and bytes to skip at a file's beginning.
 void read_skips(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
   const auto skipped = [&](std::initializer_list<const char*> names) {
     const auto text = field(fields, names);
@@ -245,7 +245,7 @@ VolumeFileHeader parse_lines(std::string_view content, const std::string& path) 
   for (size_t a = 0; a < 3; ++a) h.size[a] = (*sizes)[axes[a]];
   h.index_to_data = placement_of(fields, axes, *sizes, path);
   h.space = space_named(field(fields, {"space"}));
-  // "mm" "mm" "mm": the first counts, as scanners' axes have one unit.
+  // "mm" "mm" "mm": the first one counts, as scanners' axes have one unit.
   if (const auto units = field(fields, {"spaceunits"}); units.starts_with('"'))
     h.unit = units.substr(1, std::min(units.find('"', 1) - 1, size_t{16}));
 

@@ -17,14 +17,14 @@
 namespace telesplat::data {
 namespace {
 
-constexpr size_t kCachedBytes = 256 << 10;  // stays in the second cache between being cleared and being filled
+constexpr size_t kCachedBytes = 256 << 10;  // stays in the second-level cache between clearing and filling
 
-// What of a file is voxels, packed or not.
+// Returns the part of a file that holds voxels, packed or not.
 std::string_view behind_skips(std::string_view content, const VolumeFileHeader& h, const std::string& file) {
   const uint64_t bytes = h.voxel_bytes() / h.parts();
   if (h.data_at_end && bytes > content.size()) refuse("{}: has {} bytes of {}", file, content.size(), bytes);
   const uint64_t at = h.data_at_end ? content.size() - bytes : h.data_at;
-  size_t lines = 0;  // bytes of those that are left out
+  size_t lines = 0;  // bytes of the skipped lines
   for (uint32_t line = 0; line < h.line_skip; ++line) {
     lines = content.find('\n', lines) + 1;
     if (lines == 0) refuse("{}: ends within the lines to be left out", file);
@@ -37,7 +37,7 @@ std::string_view behind_skips(std::string_view content, const VolumeFileHeader& 
          h.size[1], h.size[2], name_of(h.stored));
 }
 
-// Fills `out` by another file's share, block by block; `next(to, n)` gives up to n bytes, 0 at the end.
+// Appends a file's share to `out`, block by block; `next(to, n)` returns up to n bytes, 0 at the end.
 template <class Next>
 void fill(const VolumeFileHeader& h, const std::string& path, const ReadProgress& progress, std::vector<std::byte>& out,
           Next&& next) {
@@ -64,7 +64,7 @@ bool parse_stored(StoredType type, std::string_view word, std::byte* to) {
   });
 }
 
-// As many values as fit.
+// Parses as many values as fit.
 size_t read_text(std::string_view& text, StoredType type, const std::string& path, std::byte* to, size_t bytes) {
   const auto blank = [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == ','; };
   const size_t size = stored_bytes(type);
@@ -101,7 +101,7 @@ void read_part(const VolumeFileHeader& h, const std::string& name, const std::st
     left -= n;
   }
   fill(h, path, progress, out, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
-  // Reading on brings the stream's checksum, if the voxels were all of it.
+  // Reading on checks the stream's checksum, if the voxels end it.
   std::byte more;
   inflater.read(&more, 1);
 }
@@ -113,7 +113,7 @@ struct Range {
 
 template <class T>
 Range range_of(const std::byte* bytes, size_t count) {
-  const T* v = reinterpret_cast<const T*>(bytes);  // a vector's storage is aligned for anything
+  const T* v = reinterpret_cast<const T*>(bytes);  // a vector's storage is aligned for any type
   T lo = std::numeric_limits<T>::max(), hi = std::numeric_limits<T>::lowest();
   uint64_t not_finite = 0;
   if constexpr (std::is_integral_v<T>) {
@@ -129,8 +129,8 @@ Range range_of(const std::byte* bytes, size_t count) {
   return not_finite == count ? Range{0, 0, not_finite} : Range{double(lo), double(hi), not_finite};
 }
 
-// In place: what is written never overtakes what is read. Values whose range has less than 4096 of the steps that f32
-// has there, or that f32 does not reach, become fractions of half that range around its middle: scale and offset.
+// Works in place: writing never overtakes reading. Values become fractions of half their range around its middle, with
+// scale and offset, if f32 has fewer than 4096 steps in that range, or cannot reach it.
 template <class T>
 void narrow(std::vector<std::byte>& bytes, const std::string& path, Volume& v) {
   const size_t count = bytes.size() / sizeof(T);
@@ -180,7 +180,7 @@ Volume volume_of(const VolumeFileHeader& h, std::vector<std::byte> bytes, const 
   v.not_finite = range.not_finite;
   v.lo = std::min(range.lo * v.scale, range.hi * v.scale) + v.offset;
   v.hi = std::max(range.lo * v.scale, range.hi * v.scale) + v.offset;
-  // Air is -1000 and bone above 300; no other scale has integers on both sides that far.
+  // Air is -1000 and bone above 300; no other scale has integers that far on both sides.
   v.hounsfield = h.ct || (v.type != VoxelType::kF32 && v.lo <= -500 && v.lo >= -32768 && v.hi >= 300);
   return v;
 }
@@ -200,7 +200,7 @@ Result<std::vector<std::byte>> read_payload(const VolumeFileHeader& h, const std
                                             const ReadProgress& progress) {
   return or_error([&] {
     std::vector<std::byte> out;
-    out.reserve(h.voxel_bytes());  // address space; pages come with what is read
+    out.reserve(h.voxel_bytes());  // address space; pages come with the data
     for (size_t i = 0; i < h.parts(); ++i)
       read_part(h, i == 0 ? h.data_path : h.more_paths[i - 1], path, progress, out);
     return out;

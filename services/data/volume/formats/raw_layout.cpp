@@ -1,4 +1,4 @@
-// What --raw says of a file that does not tell its layout itself, and what it could say.
+// Parses --raw for files that do not state their layout, and guesses it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ std::optional<StoredType> type_named(std::string_view name) {
   return std::nullopt;
 }
 
-// "103x94x161" at the text's beginning; leaves what follows.
+// Reads "103x94x161" at the text's beginning; leaves the rest.
 std::optional<std::array<int64_t, 3>> take_size(std::string_view& text) {
   std::array<int64_t, 3> size{};
   const char *at = text.data(), *const end = at + text.size();
@@ -33,7 +33,7 @@ std::optional<std::array<int64_t, 3>> take_size(std::string_view& text) {
   return size;
 }
 
-// Words for types that file names have: "tooth_103x94x161_uint16.raw".
+// Finds words for types in a file's name: "tooth_103x94x161_uint16.raw".
 std::optional<StoredType> type_in(std::string_view name) {
   using enum StoredType;
   constexpr TypeName kWords[] = {{"uint8", kU8},   {"uint16", kU16},  {"uint32", kU32}, {"uchar", kU8},
@@ -51,7 +51,7 @@ StoredType usual_type(uint64_t bytes) {
                       : StoredType::kF64;
 }
 
-// What a name says, if the file is as large as that.
+// Returns the layout in a file's name, if it fits the file's size.
 std::string guess_by_name(std::string_view name, uint64_t bytes) {
   for (size_t at = 0; at < name.size(); ++at) {
     if (!std::isdigit(static_cast<unsigned char>(name[at])) ||
@@ -118,7 +118,7 @@ std::vector<std::string> raw_guesses(const std::string& path, uint64_t bytes) {
   const std::string name = lower(std::filesystem::path(path).filename().string());
   if (const std::string named = guess_by_name(name, bytes); !named.empty()) return {named};
   struct Guess {
-    int64_t slices;  // against the side: how far from a cube
+    int64_t slices;  // ratio to the side: distance from a cube
     int64_t side;
     uint64_t each;
   };

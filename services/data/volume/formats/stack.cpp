@@ -18,7 +18,7 @@ bool is_tiff(std::string_view start) {
          start.starts_with("MM\0+"sv);
 }
 
-// One page, from a PNG's first chunk. Source: W3C, "Portable Network Graphics", 11.2.2.
+// Returns one page, from a PNG's first chunk. Source: W3C, "Portable Network Graphics", 11.2.2.
 TiffPages pages_of_png(std::string_view content) {
   const auto byte = [&](size_t at) {
     return at < content.size() ? int64_t(static_cast<unsigned char>(content[at])) : 0;
@@ -134,7 +134,7 @@ class Walker {
     if (tag == 33550 || tag == 34735) page.placed = true;  // GeoTIFF's pixel scale and keys
   }
 
-  // Reads the directory at `at`, which becomes the place of the next one.
+  // Reads the directory at `at`, and sets `at` to the next one.
   bool directory(uint64_t& at) {
     const uint64_t count = number(at, large_ ? 8 : 2), entry_bytes = large_ ? 20 : 12;
     const uint64_t first = at + (large_ ? 8 : 2);
@@ -148,7 +148,7 @@ class Walker {
   }
 
   void take(const Page& page) {
-    if (page.subfile & 5) return;  // a reduced copy, a mask
+    if (page.subfile & 5) return;  // a reduced copy, or a mask
     if (out_.pages > 0) {
       out_.pages += int64_t(page.width) == out_.width && int64_t(page.height) == out_.height;
       return;
@@ -159,7 +159,7 @@ class Walker {
     out_.placed = page.placed;
     if (out_.width > kMostSide || out_.height > kMostSide) return;
     out_.type = type_of(page);
-    // Pixels a centimetre or an inch; ImageJ writes those of its own unit.
+    // Pixels per centimetre or inch; ImageJ writes pixels per its own unit.
     const auto spacing = [](double resolution) {
       return resolution > 0 && std::isfinite(resolution) ? 1 / resolution : 1;
     };
@@ -170,7 +170,7 @@ class Walker {
     out_.spacing = {spacing(page.x_resolution), spacing(page.y_resolution),
                     std::abs(data::number(said("spacing=")).value_or(1))};
     if (!(out_.spacing.z > 0)) out_.spacing.z = 1;
-    // Where nothing else has several, what it calls channels or frames are slices.
+    // If only one kind is more than one, ImageJ's channels or frames count as slices.
     const auto several = [&](std::string_view key) { return data::number(said(key)).value_or(1) > 1; };
     const int axes = several("slices=") + several("frames=") + several("channels=");
     if (axes > 1) out_.channels = int(within(data::number(said("images=")).value_or(2), 2.0, 1e6));
@@ -204,7 +204,7 @@ class Walker {
   std::string_view content_;
   bool big_endian_ = false, large_ = false;
   uint64_t entries_ = 0;
-  int64_t listed_ = 0;  // images behind one directory, as ImageJ says, and where the first of them lies
+  int64_t listed_ = 0;  // images with one directory, according to ImageJ
   uint64_t listed_at_ = 0;
   TiffPages out_;
 };
