@@ -34,7 +34,7 @@ class SpareTime {
 
   /// Keeps a request for rays beyond a view. The master waits for the newest answer alone: this one replaces the older.
   void keep(const wire::PlanRequest& extra) { question_ = extra; }
-  /// A viewer's next view is planned: its request for rays beyond views continues with this view.
+  /// A viewer's next view is planned: its waiting request is about this view from now on.
   void follow(const wire::PlanRequest& view);
   /// Returns the request to work on. Null: none, or it pauses (kPause), which a resting head's does not.
   const wire::PlanRequest* question(double now_s) const;

@@ -20,7 +20,7 @@ namespace telesplat::data {
 inline constexpr uint64_t kMaxTriangles = uint64_t{1} << 31;
 inline constexpr uint64_t kMaxVertices = (uint64_t{1} << 32) - 2;
 inline constexpr uint32_t kNeutralAlbedo = 0xc8c8c8;  ///< the colour of data without colours
-inline constexpr uint32_t kNoColour = ~uint32_t{0};   ///< triangle without own colour: its vertices keep theirs
+inline constexpr uint32_t kNoColour = ~uint32_t{0};   ///< a triangle without a colour: its vertices keep theirs
 
 struct Mesh {
   std::string format;                 ///< "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf"

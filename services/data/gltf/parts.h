@@ -45,7 +45,7 @@ class Materials {
   Document& document_;
   const std::string name_;
   std::map<size_t, Material> materials_;
-  std::map<size_t, uint32_t> loaded_;  // by textures of the file
+  std::map<size_t, uint32_t> loaded_;  // by number of the file's texture
   uint64_t room_ = kMaxTexels;
 };
 

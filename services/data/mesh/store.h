@@ -24,8 +24,7 @@ struct StoreOptions : PlacementOptions {
 /// The colouring of a mesh, as users state it.
 struct ColouringOptions {
   std::string by;               ///< scene::parse_colour_by(); empty: the file's own colours
-  bool by_file = false;         ///< `by` is the array that the file marks: if it is not usable, the file's own colours
-                                ///< count
+  bool by_file = false;         ///< `by` is what the file marks; if unusable, the file's own colours count
   std::string map = "viridis";  ///< colour::resolve_colour_map()
 };
 

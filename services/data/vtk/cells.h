@@ -96,8 +96,8 @@ class CellReader {
 
 /// Triangles of a data set.
 struct Surface {
-  std::vector<uint32_t> corners;  ///< per triangle three points of the data set
-  std::vector<uint32_t> cells;    ///< per triangle the cell whose data it has
+  std::vector<uint32_t> corners;  ///< three points of the data set for each triangle
+  std::vector<uint32_t> cells;    ///< for each triangle the cell whose data it has
 };
 
 /// Counts cells that are not shown, or not exactly, for notes to users.

@@ -45,7 +45,7 @@ struct Array {
 
 struct Attributes {
   std::vector<Array> arrays;
-  std::string scalars, normals;  ///< names of the active arrays; empty: not active
+  std::string scalars, normals;  ///< names of the active arrays; empty: no array is
 
   const Array* find(std::string_view name) const;
 };

@@ -98,8 +98,8 @@ class Completions {
 
   /// An event was published. A new epoch voids earlier completions.
   void add(const Event& event);
-  /// Inserts into `events` the completions of this viewer's views after `after` that it lacks, in order, as patches
-  /// without points. events: those after `after`, in order.
+  /// Inserts into `events`, which are those after `after`, the completions of this viewer's views that they lack, as
+  /// patches without points. All in order.
   void fill(std::deque<Event>& events, InstanceId viewer, Sequence after) const;
   void clear() { of_.clear(); }
 

@@ -36,7 +36,7 @@ class FrameBook {
     uint32_t tiles = 0, first = 0;
     uint32_t tiles_in_frame = 0;
   };
-  /// nullopt: the frame is finished. tiles: the frame's number of tiles, > 0; used if none of them was packed.
+  /// Returns the missing tiles; nullopt: the frame is finished. tiles: their number, > 0, if none was packed yet.
   std::optional<Left> left(FrameId frame, uint32_t tiles) const;
   /// True if this tile was packed before.
   bool has(FrameId frame, uint32_t tile) const;

@@ -47,8 +47,8 @@ class LinkMeter {
   /// nullopt: no receipt came from this viewer.
   std::optional<LinkFigures> figures(InstanceId viewer, double now_s) const;
   size_t viewers() const { return viewers_.size(); }
-  /// The rate of the slowest link among those busy for at least kBusyEnough_s lately: a viewer that took long over one
-  /// view says little about its link. 0: no link was.
+  /// Returns the rate of the slowest link among those busy for at least kBusyEnough_s lately: a viewer that
+  /// took long over one view says little about its link. 0: unknown.
   double slowest_bytes_s() const;
   /// True if no link has more on its way than it carries in `most_s`, or (also where its rate is unknown) than `least`.
   bool all_free(double most_s, uint64_t least, double now_s) const;

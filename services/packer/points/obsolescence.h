@@ -16,7 +16,7 @@ class Obsolescence {
   void forgotten(points::ClusterKey key) { access_s_.erase(key); }
   void clear() { access_s_.clear(); }
   bool knows(points::ClusterKey key) const { return access_s_.count(key) != 0; }
-  /// True if it was drawn, or got points, at that time or later.
+  /// True if the cluster was drawn, or got points, at that time or later.
   bool accessed_since(points::ClusterKey key, double since_s) const {
     const auto found = access_s_.find(key);
     return found != access_s_.end() && found->second >= since_s;

@@ -98,7 +98,7 @@ struct PackerCore::Impl {
   Statistics statistics;
   ModelWatcher* watcher = nullptr;
   std::vector<float> reference_depth_m;               // kept for its memory
-  std::vector<points::ClusterKey> clusters_of_patch;  // likewise
+  std::vector<points::ClusterKey> clusters_of_patch;  // kept for its memory
   struct CoarsePass {
     FrameId frame;
     InstanceId viewer;

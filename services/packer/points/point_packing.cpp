@@ -196,7 +196,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   if (lease.epoch != core_->epoch()) return void(++other_epoch_);
   const double begin_s = outlets_.master_now();
   wire::TileDone done = done_of(m, outlets_.to_master_s(received.message.arrived_s), outlets_.to_master_s(since_s));
-  // A tile that came before is done. The master may not know; if it does, it ignores the message.
+  // A tile of a packed block is done. The master may not know yet; if it does, it ignores the message.
   if (core_->has(lease.frame, uint32_t(lease.block))) {
     ++duplicates_;
     return tell_taken(done);
@@ -350,7 +350,7 @@ void PointPacking::answer(const wire::StateRequest& request, const net::Message&
   const bool follows = request.packer == instance_ || request.packer.value == 0;
   if (known && answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
   if (!beginnings_.admit(peer, now_s)) return;  // an answer searches all events; the viewer asks again
-  if (answers_.is_full(peer)) return;           // likewise
+  if (answers_.is_full(peer)) return;           // its viewer asks again
   if (!known) {
     // A mark with an unknown packer id makes the viewer ask for all events.
     answers_.drop(peer);

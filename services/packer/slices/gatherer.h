@@ -65,7 +65,7 @@ class SlicePace {
   FrameId newest_;                               // the newest frame sent
   double last_s_ = 0;                            // time of the last acknowledgement
   double most_ = 0, before_ = 0, window_s_ = 0;  // bytes per second, in this and the last window; this one's begin
-  double wished_ = 0, wish_s_ = 0;               // limit; when a link of that rate would be done
+  double wished_ = 0, wish_s_ = 0;               // user's limit; when a link of that rate would be free
 };
 
 inline constexpr size_t kMaxOpenVolumeFrames = 8;        ///< unfinished frames held; then the oldest is dropped

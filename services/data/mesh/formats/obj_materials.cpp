@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kMaxLibraries = 64, kMaxMaterials = 100'000;
 
 std::string beside(const std::string& path, std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');  // programs on Windows write these
+  std::replace(name.begin(), name.end(), '\\', '/');  // backslashes of Windows programs
   return (std::filesystem::path(path).parent_path() / name).string();
 }
 

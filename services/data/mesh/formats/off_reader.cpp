@@ -116,7 +116,7 @@ class OffReader {
       if (!integer(corners) || corners < 0)
         bad("face {} of {} is missing or does not start with its number of corners", f, faces_);
       ring.clear();
-      for (double i = 0; i < corners; ++i) {  // a false number ends at the file's end
+      for (double i = 0; i < corners; ++i) {  // a false count ends with the file
         double index;
         if (!integer(index)) bad("face {} lacks corner {:.0f} of {:.0f}", f, i, corners);
         if (!(index >= 0 && index < double(vertices_)))

@@ -64,7 +64,7 @@ class AsciiCursor {
   bool read(StoredType type, uint64_t count, std::vector<double>& out) {
     out.clear();
     double item;
-    for (; out.size() < count && read(type, item);) out.push_back(item);  // a false count ends at the file's end
+    for (; out.size() < count && read(type, item);) out.push_back(item);  // a false count ends with the file
     return out.size() == count;
   }
 

@@ -170,7 +170,7 @@ class Walker {
     out_.spacing = {spacing(page.x_resolution), spacing(page.y_resolution),
                     std::abs(data::number(said("spacing=")).value_or(1))};
     if (!(out_.spacing.z > 0)) out_.spacing.z = 1;
-    // If only one kind is more than one, ImageJ's channels or frames count as slices.
+    // ImageJ's channels or frames alone count as slices; two of slices, frames and channels do not.
     const auto several = [&](std::string_view key) { return data::number(said(key)).value_or(1) > 1; };
     const int axes = several("slices=") + several("frames=") + several("channels=");
     if (axes > 1) out_.channels = int(within(data::number(said("images=")).value_or(2), 2.0, 1e6));

@@ -117,7 +117,7 @@ void Planner::plan_extra(Question& q, ViewerView& view) {
     view.still = q.request.still;
   }
   if (q.model.points() == 0) return;
-  // Near its limit the model would forget points that the view needs to make room for extra ones.
+  // Near its limit the model would make room for extra points by forgetting points that the view needs.
   if (config_.max_points > 0 &&
       static_cast<double>(q.model.points()) > kMostFull * static_cast<double>(config_.max_points))
     return;

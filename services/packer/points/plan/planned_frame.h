@@ -28,7 +28,7 @@ struct RayTile {
 
 struct TileLimits {
   int size = 256;     ///< pixels: longest side; at least kLeastTile
-  uint64_t rays = 0;  ///< rays in a tile, at most, unless it is at most kLeastTile long; 0: no limit
+  uint64_t rays = 0;  ///< rays in a tile, at most; tiles up to kLeastTile long may have more; 0: no limit
 };
 inline constexpr int kLeastTile = 32;
 

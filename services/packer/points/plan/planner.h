@@ -64,8 +64,7 @@ class Planner final : public ModelWatcher {
   std::optional<wire::Plan> plan_piece(const points::PointModel& model, Sequence sequence,
                                        const wire::PlanRequest& request, double now_s);
 
-  static constexpr uint64_t kMaxPixels = uint64_t{1} << 23;  ///< larger views are not planned: all of their pixels are
-                                                             ///< cast
+  static constexpr uint64_t kMaxPixels = uint64_t{1} << 23;  ///< larger views are cast whole
   static constexpr uint64_t kPiecePixels = uint64_t{1} << 20;
 
   /// Takes a frame's sampled tile, before elimination and before its points are inserted. Its frame may be planned or
@@ -79,8 +78,8 @@ class Planner final : public ModelWatcher {
   /// Returns the rays of a tile finer than a view that met nothing, as large as the tile. Empty: the tile is not of
   /// that kind, or its plan is no longer known.
   image::PixelMask missed(const SampledTile& tile);
-  /// Learns from a complete frame which space is empty. To be called in spare time, after the frame's points are
-  /// inserted, until no work is left (false). plan() calls it for frames that have waited long.
+  /// Learns the empty space of one complete frame, and drops it. False: no frame is complete. To be called in spare
+  /// time, after the frame's points are inserted; plan() does the same for frames that have waited long.
   bool settle();
   /// True if settle() should not wait: else a view's rays into empty space are cast again.
   bool settles_soon() const { return tells_much(shelf_); }
