@@ -28,7 +28,7 @@ struct Mesh {
   std::vector<glm::vec3> normals;     ///< empty, or one per vertex; of any length; (0, 0, 0): to be computed
   std::vector<uint32_t> colours;      ///< empty, or one per vertex: 0x00RRGGBB
   std::vector<uint32_t> indices;      ///< three per triangle
-  /// The originals of the last vertices, in order: these are copies with another colour at the same place. A mesh
+  /// Originals of the mesh's last vertices, in order: these are copies of another colour at the same place. A mesh
   /// without normals is as smooth there as without copies. double_vertices() adds them.
   std::vector<uint32_t> copy_of;
   /// Values of the requested array: one per vertex, or per triangle with scalars_of_faces. Each is the file's minus

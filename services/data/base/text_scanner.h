@@ -57,7 +57,7 @@ class TextScanner {
   bool integer(int64_t& out) { return parse(out); }
   bool value(double& out) { return parse(out); }
   bool value(int64_t& out) { return parse(out); }
-  /// Skips bytes that are not text, at most to the end.
+  /// Skips `bytes` bytes, which need not be text, at most to the end.
   void skip(uint64_t bytes) { at_ += std::min(bytes, static_cast<uint64_t>(end_ - at_)); }
   bool skip_char(char c) { return at_ < end_ && *at_ == c ? (++at_, true) : false; }
 

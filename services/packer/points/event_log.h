@@ -59,7 +59,7 @@ class EventLog {
     Event event;
     size_t alive = 0;                             ///< clusters in which it is not forgotten
     std::vector<points::ClusterKey> forgotten{};  ///< whole clusters that were forgotten and held its points
-    std::vector<std::pair<Sequence, points::ClusterKey>> patch_forgotten{};  ///< single patches forgotten
+    std::vector<std::pair<Sequence, points::ClusterKey>> patch_forgotten{};  ///< forgets of this patch alone
     Sequence refined;                                                        ///< kRefine event; 0: not refined
     std::shared_ptr<const std::vector<uint8_t>> refinement{};                ///< the kRefine event's blob
     uint64_t bytes() const;  ///< with the patch's entries in patches_of_clusters()

@@ -106,7 +106,7 @@ class Validation {
  private:
   struct Mark {
     glm::dvec3 position_room;
-    double made_s = 0, planned_s = -1;  // time of the last plan that had it in sight
+    double made_s = 0, planned_s = -1;  // planned_s: when a plan last had it in sight
   };
   // Rays at a cluster since it last changed; older ones count less and less.
   struct Evidence {
