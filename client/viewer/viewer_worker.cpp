@@ -5,17 +5,14 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/viewer/coupling/stage_table.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
-#include "common/metrics/process.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kReportPeriod_s = 1.0;
-constexpr int kMessagesAtOnce = 16;  // then requests and control have their turn
-// Longest time until the worker looks at what the display did. Where the display waits, this time is lost in each
+constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
+// How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each
 // cycle.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
 constexpr double kWallPoll_s = 0.003;  // views of a wall wait for each other at the master
@@ -39,15 +36,13 @@ RequestOptions with_buffers(RequestOptions o, const CouplingGate& gate) {
 ViewerWorker::ViewerWorker(net::Context& context, const Options& options, CouplingGate& gate,
                            metrics::TableRecorder& frames, metrics::SpanRecorder& spans)
     : options_(options),
-      gate_(gate),
-      frames_(frames),
-      spans_(spans),
-      updates_table_("updates", update_columns()),
+      coupling_(gate),
+      tables_(frames, spans),
       link_(context, options.service.master, make_hello(options), options.service.give_up_after_s),
       feeds_(context, options.service.name),
       requester_(with_buffers(options.requests, gate), link_.instance()),
-      started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
-      instance_(link_.instance()) {
+      meter_(options.started_s > 0 ? options.started_s : monotonic_s()) {
+  board_.instance = link_.instance();
   link_.on_order([this](const wire::Order& order) { orders_.put(order); });
   link_.on_renewed([this](InstanceId instance) { renew(instance); });
   if (options_.own_thread) thread_ = std::thread([this] { loop(); });
@@ -58,93 +53,29 @@ ViewerWorker::~ViewerWorker() {
   if (thread_.joinable()) thread_.join();
 }
 
-void ViewerWorker::on_expected(double t_s, const geometry::Pose& pose) {
-  const std::lock_guard lock(mutex_);
-  expected_ = {t_s, pose};
-}
-
-void ViewerWorker::on_jump() {
-  const std::lock_guard lock(mutex_);
-  jumped_ = true;
-}
-
 void ViewerWorker::on_pose(double now_s, const geometry::Camera& camera) {
-  const std::lock_guard lock(mutex_);
-  poses_.push_back({.t_s = now_s,
-                    .camera = camera,
-                    .expected = std::exchange(expected_, std::nullopt),
-                    .jumped = std::exchange(jumped_, false)});
-}
-
-void ViewerWorker::on_first_points(double now_s) {
-  if (first_points_s_ == 0) first_points_s_ = now_s - started_s_;
+  news_.on_pose({.t_s = now_s, .camera = camera});
 }
 
 void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown,
                             bool waited) {
-  ++frames_shown_;
-  if (const uint64_t before = epoch_shown_.exchange(epoch.value); before != 0 && before != epoch.value) ++epochs_shown_;
-  const std::lock_guard lock(mutex_);
-  poses_.push_back({now_s, camera, waited ? shown.requested_s : 0.0, shown.request,
-                    std::exchange(expected_, std::nullopt), std::exchange(jumped_, false)});
-}
-
-void ViewerWorker::on_ask(uint64_t ask, const geometry::Camera& camera) {
-  const std::lock_guard lock(mutex_);
-  ask_ = {ask, camera};
-}
-
-void ViewerWorker::on_measured(const MeasuredFrame& f) {
-  if (f.previous_s > 0) {
-    const double gap_ms = (f.end_s - f.previous_s) * 1e3;
-    inter_frame_ms_.add(f.end_s, gap_ms);
-    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // safe: only one thread displays
-  }
-  update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
+  meter_.displayed(epoch);
+  news_.on_pose({now_s, camera, waited ? shown.requested_s : 0.0, shown.request});
 }
 
 FrameFigures ViewerWorker::figures() const {
-  const std::lock_guard lock(mutex_);
-  return {.scene = scene_,
-          .updates = updates_,
-          .latency_ms = latency_ms_,
-          .bytes_received = bytes_received_,
-          .epochs_shown = epochs_shown_,
-          .sampled_width = sampled_width_,
-          .sampled_height = sampled_height_,
-          .renderer = options_.renderer->get()};
+  FrameFigures out{.renderer = options_.renderer->get()};
+  board_.add_figures(out);
+  meter_.add_figures(out);
+  return out;
 }
 
-std::shared_ptr<const wire::Welcome> ViewerWorker::session() const {
-  const std::lock_guard lock(mutex_);
-  return session_;
-}
-
-void ViewerWorker::set_sampling(const SamplingWish& wish) {
-  const std::lock_guard lock(mutex_);
-  sampling_ = wish;
-}
-
-// A person's wish overrides the session's setting.
+// What a person wishes goes before what the session tells.
 void ViewerWorker::take_sampling() {
-  std::optional<SamplingWish> wish;
-  {
-    const std::lock_guard lock(mutex_);
-    wish = std::exchange(sampling_, std::nullopt);
-  }
+  const auto wish = news_.take_wish();
   if (!wish) return;
   if (wish->adaptive) options_.least_sampling = wish->least_sampling;
   requester_.set_sampling(*wish);
-}
-
-ShownScene ViewerWorker::shown_scene() const {
-  const std::lock_guard lock(mutex_);
-  return shown_scene_;
-}
-
-std::shared_ptr<const SceneTerms> ViewerWorker::terms() const {
-  const std::lock_guard lock(mutex_);
-  return terms_;
 }
 
 void ViewerWorker::loop() {
@@ -153,22 +84,23 @@ void ViewerWorker::loop() {
     net::take_turns(*this);
   } catch (const std::exception& e) {
     log::error("the viewer's worker failed: {}", e.what());
-    failed_ = true;
-    shutdown_ = true;
+    end_.on_failure();
   }
 }
 
 std::optional<net::Wait> ViewerWorker::turn() {
   receive_control();
   receive();
-  const double poll_s = gate_.waits() ? kCoupledPoll_s : options_.requests.wall.empty() ? kPoll_s : kWallPoll_s;
+  const double poll_s = coupling_.gate().waits()         ? kCoupledPoll_s
+                        : options_.requests.wall.empty() ? kPoll_s
+                                                         : kWallPoll_s;
   const double now = monotonic_s();
-  if (stop_) {
+  if (end_.stops()) {
     report(now, true);
     link_.leave([this] { return status(); });
     return std::nullopt;
   }
-  offset_s_ = link_.to_master_s(now) - now;
+  board_.offset_s = link_.to_master_s(now) - now;
   link_.tick(now, [this] { return status(); });
   follow_session();
   change_coupling(now);
@@ -190,51 +122,46 @@ void ViewerWorker::receive() {
 void ViewerWorker::receive_control() {
   link_.receive();
   for (auto& answer : orders_.take_answers()) link_.answer(answer.number, answer.ok, std::move(answer.text));
-  link_code_ = link_.exit_code();
-  if (!link_.shutdown_requested() || shutdown_) return;
-  why_ = link_.shutdown_reason();
-  shutdown_ = true;
+  end_.set_link_code(link_.exit_code());
+  if (link_.shutdown_requested() && !end_.shutdown()) end_.on_shutdown(link_.shutdown_reason());
 }
 
-// Content received so far belongs to the old instance: the next welcome begins anew.
+// What was received speaks for the instance before: with the next welcome it begins anew.
 void ViewerWorker::renew(InstanceId instance) {
-  instance_ = instance;
+  board_.instance = instance;
   requester_.set_viewer(instance);
   pipeline_.reset();
 }
 
 void ViewerWorker::follow_session() {
-  if (link_.version() == seen_version_) return;
-  seen_version_ = link_.version();
+  if (std::exchange(followed_.version, link_.version()) == link_.version()) return;
   const wire::Welcome& session = *link_.session();
   const scene::SessionView view(session);
   follow_record(session);
-  legends_.follow(session);
+  board_.legends.follow(session);
   requester_.set_min_scale(options_.least_sampling.value_or(session.settings.least_sampling));
-  follow_coupling(session.settings);
+  coupling_.follow(session.settings, monotonic_s());
   follow_pictures(view);
-  if (std::exchange(session_epoch_, session.epoch) != session.epoch)
+  if (std::exchange(followed_.epoch, session.epoch) != session.epoch)
     requester_.on_new_epoch(to_master_s(monotonic_s()));
   requester_.set_steered(session.settings.steering);
-  if (std::exchange(master_, session.master) != session.master) {
-    all_again_ = true;  // the new master does not know the open requests
+  if (std::exchange(followed_.master, session.master) != session.master) {
+    open_.on_all_lost();
     if (received_) received_->on_new_master();
   }
   const auto pipeline = view.pipeline();
   if (!pipeline && !view.fact("kind").empty())
     log::error("the session's scene is of the kind \"{}\", which this viewer does not know", view.fact("kind"));
-  // The display gets a session when its scene can be shown, or when it is known that it cannot.
+  // The display hears of a session when its scene is there to be shown, or cannot be.
   auto copy = std::make_shared<const wire::Welcome>(session);
   const bool has_scene = !session.box_room.empty() && pipeline;
   const Status followed = has_scene ? follow(*pipeline, session) : ok_status();
-  {
-    const std::lock_guard lock(mutex_);
-    session_ = std::move(copy);
-    if (has_scene && followed) {
-      scene_ = view.fact("scene");
-      terms_ = std::make_shared<const SceneTerms>(terms_of(session));
-      shown_scene_ = {session.box_room, *pipeline};
-    }
+  if (has_scene && followed) {
+    const SessionBoard::Scene scene{
+        view.fact("scene"), std::make_shared<const SceneTerms>(terms_of(session)), {session.box_room, *pipeline}};
+    board_.show(std::move(copy), &scene);
+  } else {
+    board_.show(std::move(copy), nullptr);
   }
   if (!followed)
     return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
@@ -243,60 +170,37 @@ void ViewerWorker::follow_session() {
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
 }
 
-// Takes the wish of `telesplat ctl coupling`; if the master has no wish, the coupling stays.
-void ViewerWorker::follow_coupling(const wire::SessionSettings& session) {
-  const auto told = coupling_told(session.coupling, session.buffers);
-  if (!told) return;
-  if (told == wished_) return;
-  wished_ = *told != gate_.state() ? told : std::nullopt;
-  wished_since_s_ = monotonic_s();
-}
-
-// The session alone decides if views come as pictures, for as long as it lasts; the viewer's flags do not.
+// Views come as pictures or not as long as the session lasts, and no order changes that.
 void ViewerWorker::follow_pictures(const scene::SessionView& session) {
   const auto pipeline = session.pipeline();
-  const bool pictures = pipeline == scene::Pipeline::kPictures, shows = gate_.state().mode == CouplingMode::kImages;
+  const bool pictures = pipeline == scene::Pipeline::kPictures;
   requester_.set_pictures(pictures);
-  if (!pipeline || pictures == shows) return;
-  const CouplingState now = pictures ? coupling_state(CouplingMode::kImages, 0) : CouplingState{};
-  log::warn("coupling: {} instead of {}: so do the views of this session come", coupling_text(now),
-            coupling_text(gate_.state()));
-  requester_.set_buffers(uint64_t(now.buffers));
-  gate_.change(now);
+  const auto now = pipeline ? coupling_.follow_pictures(pictures) : std::nullopt;
+  if (!now) return;
+  log::warn("coupling: {} instead of {}: so do the views of this session come", coupling_text(*now),
+            coupling_text(coupling_.gate().state()));
+  set_coupling(*now);
 }
 
-// Keeps as many views under way as servers and link need to stay busy.
-void ViewerWorker::follow_depth(const metrics::StagesMs& stages, uint64_t ahead) {
-  CouplingState state = gate_.state();
-  if (state.mode != CouplingMode::kImages) return;
-  depth_.answered({.latency_ms = metrics::sum_ms(stages, ""),
-                   .queued_ms = metrics::sum_ms(stages, "queue_ms"),
-                   .network_ms = metrics::sum_ms(stages, "network_ms"),
-                   .ahead = int(ahead)});
-  if (state.buffers == depth_.depth()) return;
-  state.buffers = depth_.depth();
+void ViewerWorker::set_coupling(const CouplingState& state) {
   requester_.set_buffers(uint64_t(state.buffers));
-  gate_.change(state);
+  coupling_.gate().change(state);
 }
 
-// Before the display begins to wait, the update under way is completed and shown, for kPatience_s at most. So no update
-// is lost, and the first frame that waits does so for a request made after the change.
 void ViewerWorker::change_coupling(double now_s) {
-  if (!wished_) return;
-  const CouplingState before = gate_.state(), after = *wished_;
-  const bool begins_to_wait = !before.waits() && after.waits();
-  if (begins_to_wait && requester_.answer_open() && now_s < wished_since_s_ + Coupling::kPatience_s) return;
-  wished_.reset();
-  log::info("coupling: {} instead of {}", coupling_text(after), coupling_text(before));
-  requester_.set_buffers(uint64_t(after.buffers));
-  if (begins_to_wait && received_) received_->on_coupling(after.buffers);
-  gate_.change(after);
-  if (!after.waits())
-    for (const auto& [request, update] : std::exchange(complete_, {})) may_display(update);
-  if (!begins_to_wait && received_) received_->on_coupling(after.buffers);
+  const auto after = coupling_.next(requester_.answer_open(), now_s);
+  if (!after) return;
+  const CouplingState before = coupling_.gate().state();
+  const bool begins_to_wait = !before.waits() && after->waits();
+  log::info("coupling: {} instead of {}", coupling_text(*after), coupling_text(before));
+  if (begins_to_wait && received_) received_->on_coupling(after->buffers);
+  set_coupling(*after);
+  if (!after->waits())
+    for (const auto& [request, update] : open_.take_complete()) may_display(update);
+  if (!begins_to_wait && received_) received_->on_coupling(after->buffers);
 }
 
-// The record must have its folder before any data are received.
+// Where the record lies is known before anything is received.
 void ViewerWorker::follow_record(const wire::Welcome& session) {
   if (!options_.record) return;
   const std::string before = options_.record->records_in();
@@ -317,23 +221,23 @@ Status ViewerWorker::follow(scene::Pipeline pipeline, const wire::Welcome& sessi
   return ok_status();
 }
 
-// The scene is drawn by another Received from now on: requests are answered that way.
+// The scene is drawn another way from now on. What was asked for is answered that way.
 void ViewerWorker::retire() {
   received_->on_retired();
   feeds_.close();
-  complete_.clear();
-  gate_.with([](Coupling& c) { c.drop_complete(); });
-  all_again_ = true;
+  open_.take_complete();
+  coupling_.gate().with([](Coupling& c) { c.drop_complete(); });
+  open_.on_all_lost();
   requester_.on_epoch(to_master_s(monotonic_s()));
 }
 
 ReceivedLinks ViewerWorker::links() {
   return {.viewer = link_.instance(),
-          .gate = gate_,
+          .gate = coupling_.gate(),
           .feeds = feeds_,
-          .spans = spans_,
+          .spans = tables_.spans(),
           .on_part = [this](const ViewPart& part) { on_part(part); },
-          .on_lost = [this](RequestId r) { lost_.push_back(r); },
+          .on_lost = [this](RequestId r) { open_.on_lost(r); },
           .on_epoch = [this] { requester_.on_epoch(to_master_s(monotonic_s())); },
           .requested_s = [this](RequestId r) { return requester_.requested_s(r); },
           .to_master_s = [this](double s) { return to_master_s(s); }};
@@ -341,29 +245,22 @@ ReceivedLinks ViewerWorker::links() {
 
 void ViewerWorker::on_part(const ViewPart& part) {
   const double local_s = monotonic_s(), now_s = to_master_s(local_s);
-  bytes_received_ += part.bytes;
+  CouplingGate& gate = coupling_.gate();
+  meter_.received(part.bytes);
   if (part.viewer != link_.instance()) return;
-  // Rays beyond views answer no request: they must not keep a lost request from being repeated.
-  if (!part.extra) gate_.with([&](Coupling& c) { c.progress(local_s); });
+  // Rays beyond views answer no request: while they come, one that was lost must be asked for again all the same.
+  if (!part.extra) gate.with([&](Coupling& c) { c.progress(local_s); });
   const auto u = requester_.on_part(part, now_s);
   if (!u) return;
-  updates_table_.add(update_row({*u, part}));
-  const auto stages = stages_table_.complete({*u, part});
-  spans_.add("view update", u->requested_s, u->complete_s, metrics::kOverlapping,
-             {.frame = double(part.frame.value), .request = double(u->request.value)});
+  const auto stages = tables_.complete(*u, part);
   const ShownUpdate update{u->request, u->requested_s, part.camera.pose, u->posed_s};
-  if (stages) follow_depth(*stages, u->ahead);
-  if (!gate_.waits()) may_display(update);
-  {
-    const std::lock_guard lock(mutex_);
-    latency_ms_ = (u->complete_s - u->requested_s) * 1e3;
-    ++updates_;
-    latencies_ms_.add(local_s, latency_ms_);
-  }
-  if (!gate_.waits()) return;
-  complete_[u->request] = update;
+  if (const auto state = stages ? coupling_.answered(*stages, u->ahead) : std::nullopt) set_coupling(*state);
+  if (!gate.waits()) may_display(update);
+  meter_.completed(local_s, (u->complete_s - u->requested_s) * 1e3);
+  if (!gate.waits()) return;
+  open_.on_complete(update);
   received_->on_complete(u->request);
-  gate_.with([&](Coupling& c) { release(c.completed(u->request, local_s)); });
+  gate.with([&](Coupling& c) { release(c.completed(u->request, local_s)); });
 }
 
 void ViewerWorker::may_display(const ShownUpdate& update) {
@@ -371,67 +268,52 @@ void ViewerWorker::may_display(const ShownUpdate& update) {
   succession_.on_update(update.request);
 }
 
-// Call it with the gate closed, before the display can take them.
+// To be called before the display can take them: with the gate closed.
 void ViewerWorker::release(const std::vector<RequestId>& requests) {
-  for (const RequestId request : requests) {
-    may_display(complete_[request]);
-    complete_.erase(complete_.begin(), complete_.upper_bound(request));
-  }
+  for (const RequestId request : requests) may_display(open_.release(request));
 }
 
-void ViewerWorker::take_poses() {
-  std::vector<SeenPose> poses;
-  std::optional<std::pair<uint64_t, geometry::Camera>> ask;
-  {
-    const std::lock_guard lock(mutex_);
-    poses.swap(poses_);
-    ask = std::exchange(ask_, std::nullopt);
-  }
+void ViewerWorker::take_news() {
+  const auto [poses, ask] = news_.take();
   for (const auto& p : poses) {
     if (p.jumped) requester_.on_jump();
     requester_.on_pose(to_master_s(p.t_s), p.camera);
     if (p.expected) requester_.on_expected(to_master_s(p.expected->t_s), p.expected->pose);
-    if (p.shown.value != 0) stages_table_.displayed(p.shown, to_master_s(p.t_s));
+    if (p.shown.value != 0) tables_.displayed(p.shown, to_master_s(p.t_s));
     if (p.waited_since_s > 0) requester_.on_displayed(to_master_s(p.t_s) - p.waited_since_s);
   }
-  if (ask) requester_.on_ask(to_master_s(monotonic_s()), ask->first, ask->second);
-  horizon_s_ = requester_.horizon_s();
+  if (ask) requester_.on_ask(to_master_s(monotonic_s()), ask->number, ask->camera);
+  board_.horizon_s = requester_.horizon_s();
 }
 
 void ViewerWorker::ask_again(double now_s) {
   std::vector<RequestId> again;
-  gate_.with([&](Coupling& c) {
+  coupling_.gate().with([&](Coupling& c) {
     std::vector<RequestId> released;
     again = c.overdue(now_s, released);
     release(released);
-    for (const RequestId request : std::exchange(lost_, {}))
-      if (c.is_open(request)) again.push_back(request);
-    if (std::exchange(all_again_, false)) again = c.open();
+    again = open_.take_lost(c, std::move(again));
   });
   for (const auto& request : requester_.again(again, to_master_s(now_s))) link_.socket().send(request);
 }
 
 void ViewerWorker::request_views(double now_s) {
-  take_poses();
-  horizon_s_ = requester_.horizon_s();
+  take_news();
   if (!link_.session() || !feeds_.connected()) return;
   ask_again(now_s);
-  if (wished_) return;  // no requests until the coupling has changed
-  bool may_ask = gate_.may_ask();
+  if (coupling_.waits()) return;
+  bool may_ask = coupling_.gate().may_ask();
   while (may_ask) {
     const auto request = requester_.next(to_master_s(now_s));
     if (!request) return;
     link_.socket().send(*request);
     tell_if_coarser(request->camera);
-    {
-      const std::lock_guard lock(mutex_);
-      sampled_width_ = request->camera.width, sampled_height_ = request->camera.height;
-    }
-    may_ask = gate_.asked(request->request, now_s);
+    board_.show_size(request->camera.width, request->camera.height);
+    may_ask = coupling_.gate().asked(request->request, now_s);
   }
 }
 
-// Warns once if the master samples coarser than the view asks for.
+// Once: the master samples it coarser than it was asked for.
 void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
   const uint64_t most = link_.session()->settings.max_sampling_pixels;
   const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
@@ -441,40 +323,13 @@ void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
 }
 
 void ViewerWorker::report(double now_s, bool last) {
-  if (!last && now_s - last_report_s_ < kReportPeriod_s) return;
-  last_report_s_ = now_s;
-  if (last) take_poses();
-  const InstanceId own = link_.instance();
-  for (const auto& rows :
-       {frames_.flush(own), updates_table_.flush(own), stages_table_.flush(own, last), spans_.flush(own)})
-    if (rows) link_.socket().send(*rows);
+  if (!tables_.due(now_s, last)) return;
+  if (last) take_news();
+  tables_.send(link_, last);
   if (received_) received_->report();
 }
 
-// Adds recent figures and how long the display waits, for people who watch.
-void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
-  const double now_s = monotonic_s();
-  for (const auto& [name, recent] : {std::pair{"inter_frame", &inter_frame_ms_},
-                                     {"update_latency", &latencies_ms_},
-                                     {"update_age", &update_age_ms_}}) {
-    const auto figures = recent->figures(now_s);
-    if (figures.count == 0) continue;
-    values[fmt::format("{}_ms", name)] = figures.median;
-    values[fmt::format("{}_p95_ms", name)] = figures.p95;
-  }
-  const CouplingState coupling = gate_.state();
-  values["coupling"] = double(coupling.mode);
-  values["buffers"] = double(coupling.buffers);
-  values["waits_s"] = waits_s_;
-  if (const auto renderer = options_.renderer->get(); renderer.gl_ms > 0) {
-    values["renderer_gl"] = renderer.kept == "gl";
-    values["renderer_cpu_ms"] = renderer.cpu_ms;
-    values["renderer_gl_ms"] = renderer.gl_ms;
-  }
-  values["longest_gap_ms"] = longest_gap_ms_;
-}
-
-// Adds mean errors of predicted poses: of view requests, and of displayed poses from a tracker.
+// How well poses were predicted, means: those of view requests, and those that a tracker's poses were displayed with.
 void ViewerWorker::add_prediction(net::MasterLink::Values& values) const {
   const auto add = [&](const char* what, const tracking::PredictionMeter::Figures& f) {
     if (f.count == 0) return;
@@ -502,20 +357,22 @@ net::MasterLink::Values ViewerWorker::status() const {
                                  {"model_bytes", 0},
                                  {"pixels", 0},
                                  {"points_received", 0},
-                                 {"bytes_received", double(bytes_received_)},
                                  {"gaps_resynced", 0},
-                                 {"updates", double(updates_)},
-                                 {metrics::kUpdateRows, double(updates_table_.gone())},
-                                 {metrics::kStageRows, double(stages_table_.gone())},
-                                 {"frames", double(frames_shown_)},
-                                 {"first_points_s", first_points_s_},
-                                 {"epochs_shown", double(epochs_shown_)},
-                                 {"epoch", double(epoch_shown_)},
                                  {"sequence", 0},
                                  {"messages_rejected", double(feeds_.rejected())}};
+  tables_.add_status(values);
+  meter_.add_status(values);
   if (received_) received_->add_status(values);
   if (options_.record) values[metrics::kRecordFailed] = double(options_.record->files_failed());
-  add_recent(values);
+  meter_.add_recent(values);
+  const CouplingState coupling = coupling_.gate().state();
+  values["coupling"] = double(coupling.mode);
+  values["buffers"] = double(coupling.buffers);
+  if (const auto renderer = options_.renderer->get(); renderer.gl_ms > 0) {
+    values["renderer_gl"] = renderer.kept == "gl";
+    values["renderer_cpu_ms"] = renderer.cpu_ms;
+    values["renderer_gl_ms"] = renderer.gl_ms;
+  }
   add_prediction(values);
   return values;
 }
