@@ -23,7 +23,7 @@ std::string text_of(const char* path) {
   return out.str();
 }
 
-// The system's start, and by how much this process' clock is shifted against it.
+// The id of this start of the system, and the offset of this process' clock against the system's.
 std::string read_clock_id() {
   std::istringstream boot(text_of("/proc/sys/kernel/random/boot_id"));
   std::string id;

@@ -8,8 +8,8 @@ namespace telesplat {
 /// Seconds since an arbitrary, machine-wide origin (CLOCK_MONOTONIC: the same for all processes of one machine).
 double monotonic_s();
 
-/// Which clock monotonic_s() reads: processes of one machine, in one time namespace, have the same id. Empty: that
-/// cannot be told here.
+/// Names the clock that monotonic_s() reads: processes of one machine, in one time namespace, have the same id. Empty:
+/// the system does not report it.
 const std::string& clock_id();
 
 /// Seconds since 1970 (UTC), by the system's clock, which people and NTP set.

@@ -1,4 +1,4 @@
-// Threads, where an exception that nobody catches would end the process.
+// Catches exceptions at the border of a thread, where an uncaught one would end the process.
 #pragma once
 
 #include <exception>
@@ -11,11 +11,11 @@
 
 namespace telesplat {
 
-/// What the exception says that is being handled.
+/// Text of the exception that is being handled.
 std::string current_problem() noexcept;
 
-/// Does `work`. An exception that leaves it is logged, "NAME failed: why", and is the error: whoever owns the thread
-/// counts what is lost by it. Not for main(), which ends with one line and exit code 1 (net::guarded_main).
+/// Does `work`. An exception that leaves it is logged, "NAME failed: why", and becomes the error: the owner of the
+/// thread counts its losses. Not for main(), which ends with one line and exit code 1 (net::guarded_main).
 template <class Work>
 Status guarded(std::string_view name, Work&& work) {
   try {

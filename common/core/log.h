@@ -12,8 +12,8 @@ enum class Level { kDebug, kInfo, kWarn, kError };
 /// Names this process in every line. level: trace, debug, info, warn, error, off.
 void initialise(const std::string& service, const std::string& level);
 
-/// Writes one line if `level` is switched on; formats it only then. Any thread. What others said may be in it: control
-/// characters and what is not UTF-8 become U+FFFD, and it ends after 4096 bytes.
+/// Writes one line if `level` is switched on; formats it only then. Any thread. Foreign text may be in it: control
+/// characters and bytes that are not UTF-8 become U+FFFD, and the line ends after 4096 bytes.
 void write(Level level, fmt::string_view format, fmt::format_args arguments);
 
 // Formats are checked against their arguments when the caller is compiled.
@@ -34,10 +34,10 @@ void error(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
   write(Level::kError, format, fmt::make_format_args(arguments...));
 }
 
-/// At most one line a second for each limiter; says how many were left out.
+/// Lets through at most one line a second for each limiter, and counts those that it held back.
 class RateLimiter {
  public:
-  /// Returns true if the caller should log now; suppressed() then tells how many calls said no since the last yes.
+  /// True if the caller should log now; suppressed() then returns how many calls got false since the last true.
   bool allow(double now_s);
   int suppressed() const { return reported_; }
 

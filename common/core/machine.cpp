@@ -28,14 +28,14 @@ std::string cpu_info(const std::string& key) {
   return {};
 }
 
-// Processors' worth of time that a group of this folder has; 0: no limit, or the system does not tell.
+// Processors whose time the control group of this folder may use; 0: no limit, or the system does not report it.
 double quota_of(const std::filesystem::path& group) {
   std::ifstream in(group / "cpu.max");
   double quota_us = 0, period_us = 0;  // or "max 100000", which is no number
   return in >> quota_us >> period_us && period_us > 0 ? quota_us / period_us : 0;
 }
 
-// The least of this process's control group and those around it; 0: no limit.
+// The least quota of this process' control group and of the groups around it; 0: no limit.
 double least_quota() {
   std::ifstream in("/proc/self/cgroup");
   std::string line;
@@ -60,7 +60,7 @@ bool plain(const std::string& argument) {
 Machine this_machine() {
   Machine out;
   out.processor = cpu_info("model name");
-  if (out.processor.empty()) out.processor = cpu_info("Model");  // of ARM boards
+  if (out.processor.empty()) out.processor = cpu_info("Model");  // the key on ARM boards
   out.cores = usable_processors();
   struct sysinfo info {};
   if (sysinfo(&info) == 0) out.memory_mb = double(info.totalram) * info.mem_unit / 1e6;

@@ -8,44 +8,44 @@
 namespace telesplat {
 
 struct Machine {
-  std::string processor;  ///< model; empty: the system does not tell
+  std::string processor;  ///< model; empty: the system does not report it
   int cores = 0;          ///< usable_processors()
-  double memory_mb = 0;   ///< 0: the system does not tell
+  double memory_mb = 0;   ///< 0: the system does not report it
 };
 Machine this_machine();
 
-/// How many processors this process may use, at least 1: those that it may run on (taskset, cpusets), and no more than
-/// its control group's share of time comes to (cpu.max, as of containers with --cpus). std::thread does not count so.
+/// Number of processors that this process may use, at least 1: those that it may run on (taskset, cpusets), but at most
+/// its control group's share of time (cpu.max, as of containers with --cpus). std::thread ignores that share.
 int usable_processors();
 
-/// Arguments as a shell would take them: what needs quotes has some.
+/// Writes arguments as a shell would take them, with quotes where needed.
 std::string shell_line(const std::vector<std::string>& arguments);
-/// This process's own. What is longer than 8192 bytes is cut, with "..." at its end.
+/// This process' own command line. Beyond 8192 bytes it is cut, with "..." at its end.
 std::string command_line();
 
-/// Variable by which a launcher tells the processes that it starts its own command line.
+/// Variable in which a launcher passes its own command line to the processes that it starts.
 inline constexpr const char* kLaunchedByVariable = "TELESPLAT_LAUNCHED_BY";
 
-// What a process asks of the machine: time, chance, its number, and whether it was told to stop. A simulation of whole
-// sessions in one process (tools/lab/simulation) puts another in its place.
+// A process asks its World for the time, random bits, its process number, and whether to stop. A simulation of whole
+// sessions in one process (tools/lab/simulation) puts another World in its place.
 
 class World {
  public:
   virtual ~World() = default;
-  virtual double monotonic_s() = 0;           ///< of the process whose turn it is
-  virtual double thread_cpu_s() = 0;          ///< likewise
-  virtual const std::string& clock_id() = 0;  ///< likewise
-  virtual uint64_t random_bits() = 0;         ///< 64 of them
+  virtual double monotonic_s() = 0;           ///< clock of the simulated process that runs now
+  virtual double thread_cpu_s() = 0;          ///< likewise its CPU time
+  virtual const std::string& clock_id() = 0;  ///< likewise its clock's id
+  virtual uint64_t random_bits() = 0;         ///< 64 random bits
   virtual uint64_t process_id() = 0;
   virtual bool stop_requested() = 0;
 };
 
 /// From now on this process asks `world`, which must outlive that; null: the system. No other thread may ask meanwhile.
 void enter_world(World* world);
-/// Null: the system.
+/// The world of enter_world(); null: the system.
 World* simulated_world();
 
-/// 64 random bits, of the system's source, or of the simulated world's.
+/// 64 random bits, from the system's source or from the simulated world.
 uint64_t random_bits();
 /// The process' number.
 uint64_t process_id();

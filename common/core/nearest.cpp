@@ -6,7 +6,7 @@
 namespace telesplat {
 namespace {
 
-constexpr size_t kLongest = 200;  // what is longer is no misspelt word
+constexpr size_t kLongest = 200;  // a longer word is not a misspelt one
 
 }  // namespace
 

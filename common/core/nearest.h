@@ -1,4 +1,4 @@
-// For "did you mean": which of the known words a misspelt one is nearest to.
+// For "did you mean": finds the known word nearest to a misspelt one.
 #pragma once
 
 #include <cstddef>

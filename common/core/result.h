@@ -9,12 +9,12 @@
 
 namespace telesplat {
 
-/// What went wrong, for a person: names the file or peer, the value and the limit.
+/// Text of a failure, for a person: names the file or peer, the value and the limit.
 struct Error {
   std::string text;
 };
 
-/// A value, or the reason why there is none. Never thrown away unread.
+/// A value, or the reason why it is missing. The compiler warns if a caller ignores it.
 template <class T>
 class [[nodiscard]] Result {
  public:

@@ -1,4 +1,4 @@
-// How often something may happen.
+// Limits how often an event may happen.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@ class TokenBucket {
  public:
   TokenBucket(double rate, double burst) : rate_(rate), burst_(burst), tokens_(burst) {}
 
-  /// Whether one more may happen now.
+  /// True if one more event may happen now.
   bool take(double now_s) {
     tokens_ = std::min(burst_, tokens_ + std::max(0.0, now_s - last_s_) * rate_);
     last_s_ = std::max(last_s_, now_s);
@@ -18,7 +18,7 @@ class TokenBucket {
     tokens_ -= 1;
     return true;
   }
-  double last_s() const { return last_s_; }  ///< when it was asked last
+  double last_s() const { return last_s_; }  ///< time of the last call of take()
 
  private:
   double rate_, burst_, tokens_, last_s_ = -1e300;

@@ -8,8 +8,7 @@ namespace {
 
 bool in(unsigned char c, int least, int most) { return c >= least && c <= most; }
 
-// Bytes of the character that `text` begins with, or of as much of one as there is. text is not empty; bytes is 1 at
-// least.
+// The character, or the part of one, that `text` begins with. Precondition: text is not empty. bytes is at least 1.
 struct Front {
   size_t bytes;
   bool valid;
@@ -21,7 +20,7 @@ Front front_of(std::string_view text) {
   if (lead < 0x80) return {1, true};
   if (!in(lead, 0xc2, 0xf4)) return {1, false};  // a trailing byte, an overlong form, or beyond U+10FFFF
   const size_t length = lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-  // The second byte's range excludes overlong forms, surrogates and what is beyond U+10FFFF.
+  // The second byte's range excludes overlong forms, surrogates and code points beyond U+10FFFF.
   const int least = lead == 0xe0 ? 0xa0 : lead == 0xf0 ? 0x90 : 0x80;
   const int most = lead == 0xed ? 0x9f : lead == 0xf4 ? 0x8f : 0xbf;
   for (size_t i = 1; i < length; ++i)
@@ -59,7 +58,7 @@ std::string printable(std::string_view text, size_t most) {
     const auto byte = [&](size_t k) { return static_cast<unsigned char>(valid[i + k]); };
     const size_t bytes = byte(0) < 0x80 ? 1 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : 4;
     const bool control = byte(0) < 0x20 || byte(0) == 0x7f || (byte(0) == 0xc2 && byte(1) < 0xa0);
-    // U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069
+    // Characters that turn the direction of text: U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069
     const bool turns =
         bytes == 3 && byte(0) == 0xe2 &&
         ((byte(1) == 0x80 && (byte(2) == 0x8e || byte(2) == 0x8f || (byte(2) >= 0xa8 && byte(2) <= 0xae))) ||

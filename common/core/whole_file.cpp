@@ -19,7 +19,7 @@ namespace telesplat {
 namespace {
 
 constexpr size_t kPiece = 64 << 10;
-constexpr int kTries = 100;  // for the name of a new file
+constexpr int kTries = 100;  // names tried for a new file
 
 Error failed(const std::string& path, const char* what) {
   return Error{fmt::format("{}: {}: {}", path, what, std::strerror(errno))};
@@ -36,7 +36,7 @@ Status check(const std::string& path, const struct stat& about, uint64_t most_by
   return ok_status();
 }
 
-// A new file beside `path`, of a name that nobody has.
+// Makes a new file beside `path`, under a name that no file has. Returns its descriptor; negative: errno says why.
 int make_part(const std::string& path, std::string& part, unsigned mode = 0666) {
   static std::atomic<unsigned> made{0};
   for (int tries = 0; tries < kTries; ++tries) {
@@ -61,7 +61,7 @@ bool write_all(int fd, std::string_view text) {
 }  // namespace
 
 Result<std::string> read_whole(const std::string& path, uint64_t most_bytes) {
-  // O_NONBLOCK: a pipe that is given by mistake does not hold us up.
+  // O_NONBLOCK: opening a pipe, given by mistake, does not wait.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat about {};
   if (file.get() < 0 || fstat(file.get(), &about) != 0) return failed(path, "cannot be read");

@@ -1,11 +1,12 @@
-// A value within bounds that are calculated: std::clamp ends the program where they cross.
+// Brings a value between two bounds that are calculated: std::clamp has undefined behaviour if they cross.
 #pragma once
 
 #include <algorithm>
 
 namespace telesplat {
 
-/// `value`, or the bound that it lies beyond, whichever bound is the lower one. A value that is no number stays.
+/// Returns `value`, or the bound that it lies beyond; either bound may be the lower one. Keeps a value that is no
+/// number.
 template <class T>
 constexpr T within(T value, T one, T other) {
   return std::min(std::max(value, std::min(one, other)), std::max(one, other));

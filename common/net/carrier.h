@@ -1,5 +1,5 @@
-// What carries a socket's messages: ZeroMQ (zeromq.cpp), or a network that is simulated (tools/lab/simulation). Socket
-// says what each function means.
+// Carriers transport a socket's messages: ZeroMQ (zeromq.cpp), or a simulated network (tools/lab/simulation). Socket
+// documents each function.
 #pragma once
 
 #include <functional>
@@ -18,12 +18,12 @@ class Carrier {
 
   virtual Result<std::string> bind(const std::string& endpoint, bool insecure) = 0;
   virtual Status connect(const std::string& endpoint) = 0;
-  /// make(): the body, of about `bytes`; it is called if the peer's queue takes it.
+  /// make(): returns the body, of about `bytes`; called only if the peer's queue takes it.
   virtual bool send(std::string_view peer, std::string_view type, uint64_t bytes,
                     const std::function<std::string()>& make) = 0;
   virtual void set_due(Socket::Due due) = 0;
   virtual std::optional<Message> receive() = 0;
-  /// Whether receive() has a message. Nothing: wait_readable() asks ZeroMQ.
+  /// True if receive() has a message. Nothing: unknown here, so wait_readable() polls ZeroMQ.
   virtual std::optional<bool> readable() = 0;
   virtual void reject(const Message& message, const std::string& why) = 0;
 
@@ -40,14 +40,14 @@ class Carrier {
   virtual bool reads_ahead() const = 0;  ///< SocketOptions::read_ahead
 };
 
-/// Where carriers come from.
+/// Opens carriers.
 class Network {
  public:
   virtual ~Network() = default;
   virtual std::unique_ptr<Carrier> open(Kind kind, std::string name, const SocketOptions& options) = 0;
 };
 
-/// ZeroMQ's.
+/// The network that opens ZeroMQ's sockets.
 std::unique_ptr<Network> make_zeromq(Access access);
 
 }  // namespace telesplat::net

@@ -33,7 +33,7 @@ std::string refusal_of_master(const Socket& socket, const std::string& endpoint)
 Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                            double timeout_s, const std::map<std::string, std::string>& arguments) {
   while (socket.receive()) {
-  }  // answers to what was asked before
+  }  // drops answers to earlier commands
   const uint64_t failed_before = socket.failed_connections();
   socket.send(wire::Control{command, arguments});
   for (const double until = monotonic_s() + timeout_s; monotonic_s() < until;) {

@@ -1,4 +1,4 @@
-// Commands to a master (wire::Control): what `telesplat ctl` says, and health checks.
+// Commands to a master (wire::Control), for `telesplat ctl` and health checks.
 #pragma once
 
 #include <map>
@@ -8,28 +8,28 @@
 
 namespace telesplat::net {
 
-/// Of a DEALER that asks a master: it knows when nobody is there.
+/// For a DEALER that asks a master: it notices if no process listens.
 inline constexpr SocketOptions kControlSocket{
     .high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes, .linger_ms = 0, .watch_connecting = true};
 
-/// Who runs this program, for others: "ada of node7". Told as the argument "by" of "stop".
+/// The user of this program, for others to read: "ada of node7". Sent as the argument "by" of "stop".
 std::string this_person();
 
 /// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer,
-/// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once where
-/// nothing takes connections, or our keys are not taken. Answers to earlier commands that are there by then are
-/// dropped; one that comes later would be taken for this one's, so after an error the socket is to be given up.
+/// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once if no
+/// process listens or our keys are refused. Drops answers to earlier commands that are there already; a later one would
+/// pass for this command's, so after an error the socket must be given up.
 Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                            double timeout_s, const std::map<std::string, std::string>& arguments = {});
 
-/// The text of the answer. Error: a refusal too.
+/// Returns the text of the answer. A refusal is an error, too.
 Result<std::string> ask_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                double timeout_s, const std::map<std::string, std::string>& arguments = {});
 
-/// Why no answer can come over a socket that has kControlSocket: empty, or a line that names the master.
+/// Returns why no answer can come over a socket that has kControlSocket, in a line that names the master; else empty.
 std::string refusal_of_master(const Socket& socket, const std::string& endpoint);
 
-/// The same over a socket of its own.
+/// Asks over a socket of its own.
 Result<std::string> ask_master(const std::string& endpoint, const std::string& command, double timeout_s,
                                const std::map<std::string, std::string>& arguments = {}, const Access& access = {});
 

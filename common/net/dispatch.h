@@ -5,8 +5,8 @@
 
 namespace telesplat::net {
 
-/// Decodes `message` as the one of M... whose name it bears and calls handler(decoded). Messages of other types, and
-/// those that do not decode, are counted and logged by the socket. Returns true if a handler was called.
+/// Decodes `message` as the one of M... with its name and calls handler(decoded). The socket counts and logs other
+/// types, and messages that do not decode. Returns true if a handler was called.
 template <class... M>
 bool dispatch(Socket& socket, const Message& message, auto&& handler) {
   bool called = false;

@@ -1,4 +1,4 @@
-// Which endpoints of ZeroMQ stay on this machine.
+// Tells endpoints on this machine from those on others.
 #pragma once
 
 #include <arpa/inet.h>
@@ -9,7 +9,7 @@
 
 namespace telesplat::net {
 
-/// ipc, inproc, and tcp on a loopback address or localhost. Names that only begin like one are none.
+/// True for ipc, inproc, and tcp on a loopback address or localhost. False for names that only begin like one.
 inline bool is_local(std::string_view endpoint) {
   if (endpoint.starts_with("ipc://") || endpoint.starts_with("inproc://")) return true;
   constexpr std::string_view kTcp = "tcp://";
@@ -24,13 +24,13 @@ inline bool is_local(std::string_view endpoint) {
   return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
-/// With 127.0.0.1 for localhost: ZeroMQ binds to addresses and interfaces alone.
+/// Replaces localhost by 127.0.0.1: ZeroMQ binds only to addresses and interfaces.
 inline std::string numeric_host(const std::string& endpoint) {
   constexpr std::string_view kLocal = "tcp://localhost:";
   return endpoint.starts_with(kLocal) ? "tcp://127.0.0.1:" + endpoint.substr(kLocal.size()) : endpoint;
 }
 
-/// tcp://[ADDRESS]:PORT, for which a socket needs ZeroMQ's option.
+/// True for tcp://[ADDRESS]:PORT, for which a socket needs ZeroMQ's IPv6 option.
 inline bool is_ipv6(std::string_view endpoint) { return endpoint.starts_with("tcp://["); }
 
 }  // namespace telesplat::net

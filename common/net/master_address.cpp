@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a socket can connect to: tcp://HOST:PORT or ipc://PATH.
+// True if a socket can connect to it: tcp://HOST:PORT or ipc://PATH.
 bool is_address(const std::string& text) {
   constexpr std::string_view kTcp = "tcp://", kIpc = "ipc://";
   if (text.find_first_of(" \t\n") != text.npos) return false;
@@ -37,7 +37,7 @@ std::string keys_at(const std::string& master) {
   return {};
 }
 
-// As a person may name it.
+// True if a person may call the session by this name.
 bool is_called(const RunningSession& session, const std::string& name) {
   if (name == std::to_string(session.pid) || name == session.address) return true;
   for (const auto& text : {session.scene, session.run_folder})

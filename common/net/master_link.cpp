@@ -18,18 +18,18 @@ namespace telesplat::net {
 
 namespace {
 constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
-// The clock is asked for in quick succession at first: the shortest round trip of some is near the shortest there is.
+// First asks for the clock in quick succession: the shortest round trip of several is near the shortest possible.
 constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
 constexpr int kFirstClocks = 8;
-constexpr double kSilence_s = 5;       // of a master that answers once a second
-constexpr double kSignPeriod_s = 1.5;  // of signs of life while no reports come
+constexpr double kSilence_s = 5;       // a master answers once a second
+constexpr double kSignPeriod_s = 1.5;  // period of signs of life while no reports come
 constexpr int kMostRenewals = 3;
 }  // namespace
 
 struct MasterLink::Life {
   std::atomic<bool> welcomed{false};
   std::atomic<InstanceId> self;
-  std::atomic<double> ticked_s{0}, said_s{0};  // when the owner was last here, and a report or a sign was sent
+  std::atomic<double> ticked_s{0}, said_s{0};  // times of the owner's last tick, and of the last report or sign
 };
 
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello, double give_up_after_s)
@@ -70,7 +70,7 @@ void MasterLink::say_hello(double sent_s) {
   ++hellos_;
 }
 
-// Each hello that was said as the instance before is answered.
+// Skips refusals of the old instance: the master answers each hello that was sent as it.
 bool MasterLink::renew() {
   if (!renewed_) return false;
   if (hellos_before_ > 0) return --hellos_before_, true;
@@ -112,7 +112,7 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
   look_at_waiting(now_s);
 }
 
-// What this process cannot go on without.
+// Describes what this process waits for and cannot go on without; empty: nothing.
 std::string MasterLink::awaited() {
   if (shutdown_ || warned_) return {};
   if (welcomed_ && silent_s_ < kSilence_s)
@@ -129,7 +129,7 @@ std::string MasterLink::awaited() {
                          : fmt::format("{}no master is at {}: {}", before, endpoint_, problem);
 }
 
-// Time in which the owner worked, and nothing was read, does not count.
+// Counts how long the master is silent. Time in which the owner worked and read nothing does not count.
 void MasterLink::look_at_waiting(double now_s) {
   constexpr double kLongestTurn_s = 0.5;
   silent_s_ += std::clamp(now_s - std::exchange(ticked_s_, now_s), 0.0, kLongestTurn_s);
@@ -139,7 +139,7 @@ void MasterLink::look_at_waiting(double now_s) {
   gave_up_ = shutdown_ = true;
 }
 
-// What merely breaks off may be a tunnel whose other end is not there yet.
+// A handshake that breaks off is no refusal: it may be a tunnel whose other end is not there yet.
 void MasterLink::look_for_refusal() {
   if (refused_) return;
   const auto refusal = socket_.refusal();
@@ -176,7 +176,7 @@ bool MasterLink::handle(const Message& message) {
       session_ = std::move(welcome);
       if (!welcomed_) follow_welcomed(true);
       ++version_;
-      // The hello and its answer are an exchange, too.
+      // The hello and the welcome are an exchange of clocks, too.
       if (another && session_->hello_sent_s != 0)
         learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s, session_->clock},
                     message.arrived_s);
@@ -227,13 +227,13 @@ void MasterLink::receive() {
 
 void MasterLink::tell(const std::string& fact, const std::string& value) {
   hello_.facts[fact] = to_utf8(value);
-  if (!welcomed_) return;  // the hello that is due anyway tells it
-  say_hello(0);            // no exchange to take the time from
+  if (!welcomed_) return;  // the hello that is due anyway contains it
+  say_hello(0);            // 0: not for an exchange of clocks
 }
 
 void MasterLink::leave(const std::function<Values()>& status) {
   report(status, monotonic_s());
-  life_->welcomed = false;  // nothing after the goodbye
+  life_->welcomed = false;  // sends nothing after the goodbye
   socket_.send(wire::Goodbye{hello_.instance});
 }
 
@@ -241,9 +241,9 @@ namespace {
 
 constexpr size_t kMostExchanges = 512;
 constexpr size_t kLeastForDrift = 8;
-constexpr double kMostDrift = 500e-6;    // what an operating system corrects at most
-constexpr double kLeastError_s = 20e-6;  // reading clocks and waking up take their time
-constexpr double kSigmas = 3;            // of the line's slope
+constexpr double kMostDrift = 500e-6;    // largest drift that an operating system corrects
+constexpr double kLeastError_s = 20e-6;  // error of reading clocks and waking up
+constexpr double kSigmas = 3;            // width of the slope's error bounds
 
 }  // namespace
 
@@ -254,13 +254,13 @@ void ClockEstimate::add(const ClockExchange& e) {
   if (!std::isfinite(seen.offset_s) || !std::isfinite(seen.at_s) || !(seen.round_trip_s >= 0) ||
       e.replied_s < e.received_s)
     return;
-  if (!exchanges_.empty() && seen.at_s < exchanges_.back().at_s) return;  // an answer that was overtaken
+  if (!exchanges_.empty() && seen.at_s < exchanges_.back().at_s) return;  // an answer that a later one overtook
   exchanges_.push_back(seen);
   while (exchanges_.size() > kMostExchanges || exchanges_.front().at_s < seen.at_s - kMemory_s) exchanges_.pop_front();
   estimate_drift();
 }
 
-// A line through the offsets by least squares. An exchange counts by its round trip: half of it is how wrong it may be.
+// Fits a line through the offsets by least squares, weighted by half the round trip, the largest error of an offset.
 void ClockEstimate::estimate_drift() {
   drift_ = 0, drift_error_ = kUnknownDrift;
   if (exchanges_.size() < kLeastForDrift || exchanges_.back().at_s - exchanges_.front().at_s < kDriftAfter_s) return;

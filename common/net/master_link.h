@@ -1,6 +1,6 @@
 // The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status
-// report a second, hello again when the master asks, what the master's clock says, shutdown. While its owner works and
-// does not tick, the thread that reads the socket says that the process lives.
+// report a second, hello again when the master asks, the master's clock, shutdown. While its owner works and does not
+// tick, the thread that reads the socket sends signs of life.
 #pragma once
 
 #include <deque>
@@ -15,11 +15,11 @@
 
 namespace telesplat::net {
 
-// How another machine's clock goes, from exchanges of messages with it (NTP, RFC 5905: on-wire protocol and clock
-// filter): the exchange with the shortest round trip tells the offset best, since its two ways can differ least. No
+// Estimates another machine's clock from exchanges of messages with it (NTP, RFC 5905: on-wire protocol and clock
+// filter): the exchange with the shortest round trip gives the best offset, since its two ways can differ least. No
 // sockets, no clocks.
 
-/// An exchange: a message to the other machine and its answer. Seconds, each of the clock of where it happened.
+/// A message to the other machine and its answer. Each time is in seconds of the clock of the machine it happened on.
 struct ClockExchange {
   double sent_s = 0, received_s = 0;    ///< the message: here, there
   double replied_s = 0, arrived_s = 0;  ///< the answer: there, here
@@ -30,26 +30,25 @@ struct ClockExchange {
 class ClockEstimate {
  public:
   static constexpr double kMemory_s = 300;     ///< older exchanges are forgotten
-  static constexpr double kDriftAfter_s = 20;  ///< exchanges must lie so far apart to tell the drift
-  /// What two clocks may drift apart as long as nothing is known of it, and what they may wander from a drift that is
-  /// known (RFC 5905's PHI): seconds a second.
+  static constexpr double kDriftAfter_s = 20;  ///< exchanges must span this time to show the drift
+  /// Drift assumed while none is known, and largest change of a known drift (RFC 5905's PHI): seconds a second.
   static constexpr double kUnknownDrift = 100e-6, kWander = 15e-6;
 
-  /// Exchanges that no clocks could have brought about (a negative round trip, times that are not finite) are ignored.
+  /// Adds an exchange. Ignores impossible ones (a negative round trip, times that are not finite).
   void add(const ClockExchange& exchange);
   void clear();
-  /// It is one and the same clock: nothing has to be estimated any more, until clear().
+  /// Both machines read the same clock: nothing is estimated any more, until clear().
   void same_clock() { same_ = true; }
 
   bool known() const { return same_ || !exchanges_.empty(); }
-  /// The other clock minus this one, at this moment of this one; 0 while nothing is known.
+  /// The other clock minus this one, at local_s of this one; 0 while nothing is known.
   double offset_s(double local_s) const;
-  /// By how much offset_s() may be wrong: half the round trip it rests on, and what may have come since. Infinite while
-  /// nothing is known.
+  /// Largest error of offset_s(): half the round trip that it rests on, plus the drift since. Infinite while nothing is
+  /// known.
   double error_s(double local_s) const;
-  /// Seconds a second by which the other clock is faster; 0 while that is not known.
+  /// Seconds a second by which the other clock is faster; 0 while unknown.
   double drift() const { return same_ ? 0 : drift_; }
-  /// The shortest round trip that is remembered; 0 while nothing is known.
+  /// The shortest remembered round trip; 0 while nothing is known.
   double round_trip_s() const;
 
  private:
@@ -68,58 +67,58 @@ class ClockEstimate {
 class MasterLink {
  public:
   using Values = std::map<std::string, double>;
-  /// An owner that does not tick for longer hangs: it is not said to live any more.
+  /// An owner that does not tick for longer hangs: signs of life end.
   static constexpr double kLongestWork_s = 60;
 
   /// Connects to the master at `endpoint`; instance, pid and process_facts() are filled in. Nothing is sent before the
-  /// first tick().
-  /// give_up_after_s: how long it waits for the master, or for what the session lacks; 0: for ever.
+  /// first tick(). give_up_after_s: limit of a wait for the master, or for processes that the session lacks; 0: for
+  /// ever.
   MasterLink(Context& context, const std::string& endpoint, wire::Hello hello, double give_up_after_s = 0);
 
   Socket& socket() { return socket_; }
   InstanceId instance() const { return hello_.instance; }
 
-  /// To be called at least every 100 ms: says hello until welcomed (every 250 ms), then reports status (every second)
-  /// and asks what the master's clock says; `status` is asked for its values then. Logs what is waited for.
+  /// To be called at least every 100 ms: says hello until welcomed (every 250 ms), then reports status (every second;
+  /// calls `status` for its values) and asks for the master's clock. Logs what it waits for.
   void tick(double now_s, const std::function<Values()>& status);
 
-  /// Handles welcome, who_are_you, clock_reply and shutdown, rejects other unknown types unless the caller knows them:
-  /// returns true if the message was one of these.
+  /// Handles welcome, who_are_you, clock_reply and shutdown: returns true if the message was one of these. Other
+  /// messages are left to the caller.
   bool handle(const Message& message);
 
-  /// Handles all messages that are here by now; those that handle() does not know are rejected.
+  /// Handles all messages that have come; rejects those that handle() does not know.
   void receive();
 
-  /// What orders of others come to (wire::Order). Without one they are refused.
+  /// Handler of orders from others (wire::Order). Without one they are refused.
   using Obey = std::function<void(const wire::Order&)>;
   void on_order(Obey obey) { obey_ = std::move(obey); }
-  /// The answer to an order of this master's.
+  /// Sends the answer to an order.
   void answer(uint64_t number, bool ok, std::string text);
 
-  /// Called when this process becomes another instance, because the master knows the one before as another's. Without
-  /// it, and after some in a row, the process is refused.
+  /// Called when this process becomes another instance, because the master knows its instance as another process'.
+  /// Without a handler, and after some renewals in a row, the process is refused.
   using Renewed = std::function<void(InstanceId)>;
   void on_renewed(Renewed renewed) { renewed_ = std::move(renewed); }
 
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
-  /// The session is over for this process: its end was told, the master does not let it in, or it waited too long.
+  /// The session is over for this process: a shutdown came, the master does not let it in, or it waited too long.
   bool shutdown_requested() const { return shutdown_; }
-  /// What the master says why the session ends; empty: it has said nothing.
+  /// Reason that the master gave for the session's end; empty: none yet.
   const std::string& shutdown_reason() const { return shutdown_reason_; }
-  /// The master does not take it in (why was logged): bad usage.
+  /// The master does not accept this process (the reason was logged): bad usage.
   bool refused() const { return refused_; }
-  /// What the process ends with, as far as the master goes: 2 if it is refused, 1 if it waited too long, else 0.
+  /// The process' exit code as far as the master goes: 2 if it is refused, 1 if it waited too long, else 0.
   int exit_code() const { return refused_ ? 2 : gave_up_ ? 1 : 0; }
-  /// This machine's monotonic time on the master's clock.
+  /// Converts this machine's monotonic time to the master's clock.
   double to_master_s(double local_s) const { return local_s + clock_.offset_s(local_s); }
   const ClockEstimate& clock() const { return clock_; }
 
-  /// Sets a fact that was not known at first; the master is told by another hello.
+  /// Sets a fact that was not known at first; sends it to the master in another hello.
   void tell(const std::string& fact, const std::string& value);
 
-  /// Last report and goodbye.
+  /// Sends the last report and goodbye.
   void leave(const std::function<Values()>& status);
 
  private:
@@ -143,16 +142,16 @@ class MasterLink {
   std::string shutdown_reason_;
   Obey obey_;
   Renewed renewed_;
-  int hellos_ = 0;         // of this instance, since it was welcomed
-  int hellos_before_ = 0;  // of the instance before: they will be refused, too
-  int renewals_ = 0;       // since it was welcomed
+  int hellos_ = 0;         // hellos of this instance, since the last welcome
+  int hellos_before_ = 0;  // hellos of the instance before: they will be refused, too
+  int renewals_ = 0;       // renewals since the last welcome
   ClockEstimate clock_;
-  int clock_asked_ = 0;  // since the master is known
+  int clock_asked_ = 0;  // requests since the master is known
   const std::string endpoint_;
   const double give_up_after_s_;
   Waiting waiting_;
   HostSearch host_;
-  double ticked_s_ = -1e9, silent_s_ = 0;  // since the master was heard, as far as this process ran
+  double ticked_s_ = -1e9, silent_s_ = 0;  // silent_s_: since the last message of the master, while this process ran
   double last_hello_s_ = -1e9, last_status_s_ = -1e9, last_clock_s_ = -1e9;
 };
 

@@ -9,8 +9,8 @@
 namespace telesplat::net {
 namespace {
 
-constexpr int kIdle_ms = 100;     // the socket's bookkeeping is done so often, whatever happens
-constexpr int kSendAgain_ms = 5;  // a socket that takes nothing now is asked again
+constexpr int kIdle_ms = 100;     // the socket's bookkeeping is done at least this often
+constexpr int kSendAgain_ms = 5;  // after this the socket is tried again
 
 int make_eventfd() {
   const int descriptor = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -49,7 +49,7 @@ ReadAhead::~ReadAhead() {
 
 bool ReadAhead::full() const { return received_.size() >= limits_.messages || bytes_ >= limits_.bytes; }
 
-// In order. False: the socket takes no more now.
+// Sends in order. False: the socket takes no more now.
 bool ReadAhead::send_waiting() {
   for (;;) {
     Outgoing next;
@@ -66,7 +66,7 @@ bool ReadAhead::send_waiting() {
   }
 }
 
-// An exception goes to the owner, who asks for messages.
+// Runs loop(). An exception goes to the owner, through receive().
 void ReadAhead::run() {
   try {
     loop();

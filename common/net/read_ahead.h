@@ -1,5 +1,5 @@
-// A thread that does nothing but take messages from a socket and give it others: so that a process that works knows
-// when a message came, not only when it found time for it. Private to this library.
+// A thread that only receives and sends a socket's messages: so a busy process knows when a message came, not only when
+// it found time for it. Private to this library.
 #pragma once
 
 #include <deque>
@@ -19,16 +19,16 @@ class ReadAhead {
   struct Outgoing {
     std::string type, body;
   };
-  /// What can be done with the socket. From the constructor to the destructor nobody but the thread does it.
+  /// Operations on the socket. From the constructor to the destructor only the thread calls them.
   struct Ends {
     std::function<std::optional<Message>()> receive;           ///< without waiting
     std::function<bool(Outgoing&)> send;                       ///< without waiting; false: not now, nothing changed
     std::function<void(int descriptor, int timeout_ms)> wait;  ///< for a message, or until `descriptor` is readable
-    /// What is to be said by time alone, however busy the owner is; asked at least every 100 ms. May be empty.
+    /// Messages that are due by time alone, even if the owner is busy; asked at least every 100 ms. May be empty.
     std::function<std::optional<Outgoing>()> due = {};
   };
-  /// Messages that were not taken yet, at most, and the bytes of their bodies: then nothing more is read, and whoever
-  /// sends has to wait. Messages that could not be sent yet: then send() refuses.
+  /// Limits of received messages not taken yet, and of the bytes of their bodies: above, the thread stops reading and
+  /// senders have to wait. unsent: messages that could not be sent yet; above, send() refuses.
   struct Limits {
     size_t messages = 1024;
     size_t bytes = 64u << 20;
@@ -37,10 +37,10 @@ class ReadAhead {
 
   /// Starts the thread.
   ReadAhead(Ends ends, const Limits& limits);
-  /// Gives the socket what is left to send, as far as it takes it at once; ends the thread.
+  /// Sends the remaining messages, as far as the socket takes them at once; ends the thread.
   ~ReadAhead();
 
-  /// The next message, without waiting. Throws what ended the thread, if something did.
+  /// The next message, without waiting. Throws the exception that ended the thread, if there was one.
   std::optional<Message> receive();
   /// False: dropped, because too many wait already.
   bool send(Outgoing message);
@@ -55,11 +55,11 @@ class ReadAhead {
 
   Ends ends_;
   const Limits limits_;
-  const int there_, woken_;  // eventfds: for the owner, for the thread
-  std::mutex mutex_;         // guards what follows
+  const int there_, woken_;  // eventfds: one wakes the owner, one the thread
+  std::mutex mutex_;         // guards all members below
   std::deque<Message> received_;
   std::deque<Outgoing> unsent_;
-  size_t bytes_ = 0;  // of received_
+  size_t bytes_ = 0;  // bytes of the bodies in received_
   bool stalled_ = false, stop_ = false;
   std::exception_ptr failed_;
   std::thread thread_;

@@ -85,10 +85,10 @@ Status RuntimeFolder::create(const std::string& name, const std::string& text) c
 
 Status RuntimeFolder::put(const std::string& name, const std::string& text, Place place) const {
   const std::string partial = fmt::format(".{}.{}", name, getpid());
-  unlinkat(fd_, partial.c_str(), 0);  // of a process of this number that died here
+  unlinkat(fd_, partial.c_str(), 0);  // left by a process of this number that died here
   const int fd = openat(fd_, partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (fd < 0) return failed(path_ + "/" + name, "cannot be written");
-  // A file that must not be lost is on the disk before its name is.
+  // A new file must not be lost: its bytes are on the disk before its name is.
   const bool is_new = place == Place::kIsNew, written = write_all(fd, text) && (!is_new || fsync(fd) == 0);
   const bool whole = close(fd) == 0 && written;
   if (whole && !is_new && renameat(fd_, partial.c_str(), fd_, name.c_str()) == 0) return ok_status();
@@ -103,7 +103,7 @@ void RuntimeFolder::remove(const std::string& name) const { unlinkat(fd_, name.c
 
 std::vector<std::string> RuntimeFolder::names() const {
   std::vector<std::string> out;
-  const int fd = openat(fd_, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);  // with a position of its own
+  const int fd = openat(fd_, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);  // has its own read position
   DIR* folder = fd < 0 ? nullptr : fdopendir(fd);
   if (!folder) {
     if (fd >= 0) close(fd);
@@ -118,7 +118,7 @@ std::vector<std::string> RuntimeFolder::names() const {
 }
 
 std::optional<std::string> RuntimeFolder::read(const std::string& name, size_t most_bytes) const {
-  // A pipe of that name must not make us wait.
+  // O_NONBLOCK: opening a pipe of that name does not wait.
   const int fd = openat(fd_, name.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return std::nullopt;
   struct stat about {};

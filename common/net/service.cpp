@@ -181,7 +181,7 @@ std::string complain_about_host(const std::string& host) {
 void end_on_signals() { handle_signals(end_process); }
 void install_signal_handlers() {
   handle_signals(set_flag);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of who writes it, like a disk that is full
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the file size limit becomes an error, like a full disk
 }
 bool stop_requested() {
   World* world = simulated_world();

@@ -8,8 +8,8 @@
 
 namespace telesplat::net {
 
-/// table(options) has a row a flag; run(options) serves and returns the exit code (Result<int>). Its error, and bad
-/// usage, become one line and exit code 2; exceptions that escape one line and exit code 1.
+/// table(options) returns the rows of all flags; run(options) serves and returns the exit code (Result<int>). Bad usage
+/// and run's error become one line and exit code 2; an uncaught exception one line and exit code 1.
 template <class Options>
 int service_main(int argc, char** argv, const char* about, Options options,
                  telesplat::options::Table (*table)(Options&), auto run) {

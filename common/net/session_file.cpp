@@ -24,11 +24,11 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr size_t kMostBytes = 64 << 10;
-constexpr size_t kMostText = 4096;  // of one value that is read; less is written
+constexpr size_t kMostText = 4096;  // limit of one value that is read; written ones are shorter
 constexpr std::string_view kFileBegin = "session-", kFileEnd = ".json";
 
-// Where a process number means something: a container has numbers of its own, and after the machine started anew they
-// are others.
+// The machine and namespace in which a process number is valid: a container numbers its own processes, and after a
+// restart of the machine numbers are reused.
 struct SessionPlace {
   std::string host, numbers, boot;
 };
@@ -41,18 +41,18 @@ SessionPlace this_place() {
   return out;
 }
 
-// When the process began, in clock ticks since the machine did: another process of the same number has another.
-// nullopt: it does not run.
+// Start of a process, in clock ticks since the machine started: tells apart processes with the same number. nullopt: no
+// such process runs.
 std::optional<uint64_t> process_start(uint64_t pid) {
   std::ifstream in(fmt::format("/proc/{}/stat", pid));
   std::string line;
   std::getline(in, line);
-  const size_t name_end = line.rfind(')');  // a name may hold anything
+  const size_t name_end = line.rfind(')');  // a name may contain any character
   if (name_end == std::string::npos) return std::nullopt;
   std::istringstream rest(line.substr(name_end + 1));
   std::string state, skipped;
   rest >> state;
-  if (state == "Z" || state == "X") return std::nullopt;  // dead, and nobody has looked
+  if (state == "Z" || state == "X") return std::nullopt;  // dead, but its parent has not waited for it
   for (int field = 4; field < 22; ++field) rest >> skipped;
   uint64_t out = 0;
   return rest >> out ? std::optional(out) : std::nullopt;
@@ -81,7 +81,7 @@ struct File {
   SessionPlace place;
 };
 
-// What would steer a terminal, or break a table's line.
+// Replaces control characters, which would steer a terminal or break a table's line.
 std::string harmless(std::string text) {
   for (size_t i = 0; i < text.size(); ++i) {
     const auto byte = [&](size_t at) { return at < text.size() ? static_cast<unsigned char>(text[at]) : 0; };

@@ -1,4 +1,4 @@
-// The loop of a process, cut where it waits: a simulation of whole sessions takes turns of many processes in one.
+// The loop of a process, cut where it waits: a simulation of whole sessions runs many processes in one, turn by turn.
 #pragma once
 
 #include <optional>
@@ -8,16 +8,16 @@
 
 namespace telesplat::net {
 
-/// What a process waits for between two turns.
+/// Condition that a process waits for between two turns.
 struct Wait {
   std::vector<Socket*> sockets;  ///< a message on one of them ends the wait
-  double for_s = 0;              ///< at most; 0: it goes on at once
+  double for_s = 0;              ///< at most; 0: the next turn follows at once
 };
 
 class Turns {
  public:
   virtual ~Turns() = default;
-  /// Does what is due now. Nothing: the process is over.
+  /// Does all work that is due now. Nothing: the process is over.
   virtual std::optional<Wait> turn() = 0;
 };
 

@@ -33,14 +33,14 @@
 namespace telesplat::net {
 namespace {
 
-// A frame that is this much over a socket's limit is still read, so that it can be dropped and counted with its peer
-// named; one that claims more ends its connection before anything is allocated for it.
+// A frame at most this much over a socket's limit is still read, so that it can be dropped and counted with its peer's
+// name; one that claims more ends its connection before memory is allocated for it.
 constexpr int64_t kOversizedBytes = 16 << 20;
-constexpr uint64_t kUnderWayBytes = 8 << 20;  // of a connection, which the kernel has
+constexpr uint64_t kUnderWayBytes = 8 << 20;  // bytes of a connection that the kernel may still hold
 constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads; handshakes fit
 constexpr size_t kMaxTypeBytes = 64;
 constexpr double kQuietPusher_s = 1.0;
-// Handshakes that broke off without a word, one after the other: a server that ends breaks off one or two.
+// Consecutive handshakes that broke off without a reason: a server that ends breaks off one or two.
 constexpr uint32_t kBrokenOff = 3;
 
 zmq::socket_type zmq_type(Kind kind) {
@@ -54,14 +54,14 @@ zmq::socket_type zmq_type(Kind kind) {
     case Kind::kPull:
       return zmq::socket_type::pull;
     case Kind::kPub:
-      return zmq::socket_type::xpub;  // shows subscriptions, so that strange ones can be counted
+      return zmq::socket_type::xpub;  // delivers subscriptions, so that unusual ones can be counted
     case Kind::kSub:
       return zmq::socket_type::sub;
   }
   return zmq::socket_type::dealer;
 }
 
-// For log lines: routing ids are binary.
+// Escapes bytes for log lines: routing ids are binary.
 std::string printable(std::string_view bytes) {
   std::string out;
   for (unsigned char c : bytes.substr(0, 24))
@@ -69,7 +69,7 @@ std::string printable(std::string_view bytes) {
   return out;
 }
 
-// True if one of them is readable.
+// True if one of the items is readable.
 bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
   try {
     return zmq::poll(items, std::chrono::milliseconds(timeout_ms)) > 0;
@@ -85,10 +85,10 @@ struct ZeroMq final : Network {
   std::list<std::unique_ptr<Tunnel>> tunnels;  // they outlast the context, which still sends when sockets are closed
   zmq::context_t context{1};
   Access access;
-  std::mutex mutex;                        // of what follows: sockets may be bound by several threads
-  std::unique_ptr<Doorkeeper> doorkeeper;  // from the first socket on that binds with keys
-  std::unique_ptr<Lookout> lookout;        // from the first socket on that binds
-  bool warned_of_clear = false;            // in one line, of the first
+  std::mutex mutex;                        // guards the members below: several threads may bind sockets
+  std::unique_ptr<Doorkeeper> doorkeeper;  // made for the first socket that binds with keys
+  std::unique_ptr<Lookout> lookout;        // made for the first socket that binds
+  bool warned_of_clear = false;            // only the first socket warns
 
   Status let_in() {
     const std::lock_guard lock(mutex);
@@ -139,7 +139,7 @@ struct Parts {
     if (tunnel) home.retire(*tunnel);
   }
 
-  // Limits what is read; a frame that claims more ends its connection.
+  // Largest frame that is read; a frame that claims more ends its connection.
   int64_t most_frame_bytes() const {
     return kind == Kind::kPub ? kSubscriptionBytes : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes;
   }
@@ -147,7 +147,7 @@ struct Parts {
     return options.most_unread_bytes ? options.most_unread_bytes : kUnderWayBytes + uint64_t(most_frame_bytes());
   }
 
-  // Where this socket connects to in place of `endpoint`.
+  // Address that this socket connects to for `endpoint`: itself, or a tunnel.
   Result<std::string> way_to(const std::string& endpoint) {
     constexpr std::string_view kTcp = "tcp://";
     const std::string proxy = home.access.via().proxy(std::string(options.toward));
@@ -159,7 +159,7 @@ struct Parts {
     return tunnel->endpoint();
   }
 
-  // A proxy is the end of a tunnel, or of a link that is simulated on this machine.
+  // Not for a proxy: it is the end of a tunnel, or of a simulated link on this machine.
   void warn_of_clear(const std::string& endpoint) {
     if (is_local(endpoint) || home.access.clear_allowed() || tunnel) return;
     const std::lock_guard lock(home.mutex);
@@ -168,7 +168,7 @@ struct Parts {
                 endpoint);
   }
 
-  // Events that tell a socket that connects why it is not let in.
+  // Events that show why the server does not let this socket in.
   static constexpr int kHandshakeFailed =
       ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
@@ -184,7 +184,7 @@ struct Parts {
         ++broken_off;
       else
         turned_away = what;
-    } else if (failed_unseen > 0) {  // somebody is there, who did not let us in
+    } else if (failed_unseen > 0) {  // a server is there, which did not let us in
       --failed_unseen;
     } else {
       ++failed_connections;
@@ -208,7 +208,7 @@ struct Parts {
   }
   Connections::Counts counts() const { return connections ? connections->counts() : Connections::Counts{}; }
 
-  // Whoever came in by a key that is on the list no more goes; who comes again is asked for the key.
+  // Hangs up on connections whose key is on the list no more; those that come again are asked for their key.
   void close_revoked() {
     const auto now = home.doorkeeper->may_stay();
     if (now == may_stay) return;
@@ -218,28 +218,27 @@ struct Parts {
                 visitor_of(user).value_or(Visitor{}).name);
   }
 
-  // Is called before messages are read, until no message is left.
+  // To be called before messages are read, until no message is left.
   void begin_reading() {
     if (connections) connections->begin_reading();
     if (connections && guarded) close_revoked();
     look_at_attempts();
   }
 
-  // message: the last frame of one that had `bytes` on its way.
+  // message: the last frame of a message that took `bytes` on the network.
   void note_spoken(zmq::message_t& message, uint64_t bytes) {
     if (!connections) return;
     const char* user = guarded ? zmq_msg_gets(message.handle(), "User-Id") : nullptr;
     connections->spoke(zmq_msg_get(message.handle(), ZMQ_SRCFD), bytes, user ? user : "");
   }
 
-  // A connection that ends without ever having brought a whole message counts as one rejected. To be called when there
-  // is no message any more.
+  // Counts a connection that ended without one whole message as rejected. To be called when no message is left.
   void end_reading() {
     if (connections && connections->judge() > 0)
       log_rejection("a connection", "it brought nothing that is a ZeroMQ message");
   }
 
-  // What viewers send to a publisher: that they want everything, or no longer do.
+  // Reads what viewers send to a publisher: subscriptions to everything, or their end.
   void drain_subscriptions() {
     zmq::message_t message;
     begin_reading();
@@ -250,12 +249,12 @@ struct Parts {
         return;
       }
       const int from = zmq_msg_get(message.handle(), ZMQ_SRCFD);
-      if (from < 0) continue;  // ZeroMQ says it for one that is gone
+      if (from < 0) continue;  // ZeroMQ unsubscribes for a connection that is gone
       note_spoken(message, wire_bytes(message.size()));
       const char first = message.size() ? *static_cast<const char*>(message.data()) : '?';
       if (message.size() == 1 && (first == 0 || first == 1)) continue;
       ++rejected;
-      if (connections) connections->hang_up_on(from);  // ZeroMQ keeps its wishes
+      if (connections) connections->hang_up_on(from);  // ZeroMQ would keep its subscriptions
       log_rejection(fmt::format("a subscription of {} bytes", message.size()), "viewers subscribe to everything");
     }
   }
@@ -271,8 +270,8 @@ struct Parts {
 
   bool counts_queued() const { return kind == Kind::kRouter || kind == Kind::kPub; }
 
-  // What is published is shared: no subscriber waits for more than for all messages together that are not sent yet to
-  // everyone.
+  // Subscribers share published messages: none of them waits for more bytes than all messages together that are not
+  // sent to everyone yet.
   bool make_room(std::string_view peer, std::string_view type, size_t bytes) {
     if (kind == Kind::kPub && connections) {
       connections->published(wire_bytes(type.size()) + wire_bytes(bytes));
@@ -291,7 +290,7 @@ struct Parts {
     return sent + (sent > 255 ? 9 : 2);
   }
 
-  // make(): the body, once the peer's queue takes it.
+  // make(): returns the body; called only if the peer's queue takes it.
   template <class Make>
   bool send(std::string_view peer, std::string_view type, size_t bytes, const Make& make) {
     if (kind == Kind::kPub) drain_subscriptions();
@@ -301,11 +300,11 @@ struct Parts {
       const auto part = [&](std::string_view bytes) {
         return undisturbed([&] { return socket.send(zmq::buffer(bytes), send_flags::sndmore | send_flags::dontwait); });
       };
-      // What a fast peer has read is known to ZeroMQ's thread at once, to this one only when it looks.
+      // ZeroMQ's thread knows at once what a fast peer has read; this thread only after it reads the socket's events.
       const auto look = [&] { return undisturbed([&] { return socket.get(zmq::sockopt::events) >= 0; }); };
       if (kind == Kind::kRouter && !part(peer) && look() && !part(peer)) return false;
       if (!part(type)) return false;
-      // ZeroMQ takes the body over without copying it.
+      // ZeroMQ takes ownership of the body without copying it.
       struct Owned {
         std::string body;
         QueuedBytes::Ticket ticket;
@@ -336,7 +335,7 @@ struct Parts {
       return std::nullopt;
     }
     begin_reading();
-    // A flood of bad messages must not keep the caller from its other sockets.
+    // Reads at most 100 bad messages, so that a flood does not keep the caller from its other sockets.
     for (int bad = 0; bad < 100; ++bad) {
       std::vector<zmq::message_t> frames;
       uint64_t bytes = 0;
@@ -347,7 +346,7 @@ struct Parts {
             end_reading();
             return std::nullopt;
           }
-          const bool is_name = kind == Kind::kRouter && frames.empty();  // which is not sent
+          const bool is_name = kind == Kind::kRouter && frames.empty();  // the routing id was not sent
           if (!is_name) bytes += wire_bytes(frame.size());
           if (frames.size() < 4) frames.push_back(std::move(frame));
         } while (socket.get(zmq::sockopt::rcvmore));
@@ -368,7 +367,7 @@ struct Parts {
       struct Received {
         explicit Received(zmq::message_t message) : body(std::move(message)) {}
         zmq::message_t body;
-        ~Received() { hand_over(body.data()); }  // to the thread that frees it
+        ~Received() { hand_over(body.data()); }  // gives it to the thread that frees memory
       };
       auto received = std::make_shared<Received>(std::move(frames[next + 1]));
       zmq::message_t& body = received->body;
@@ -385,7 +384,7 @@ struct Parts {
     return std::nullopt;
   }
 
-  // Who sent it, and whether they may.
+  // Sets the sender's name and role. False: its role may not send this message.
   bool admit(Message& message, zmq::message_t& body) {
     const char* text = zmq_msg_gets(body.handle(), "User-Id");
     const auto visitor = visitor_of(text ? text : "");
@@ -409,7 +408,7 @@ struct Parts {
     log_rejection(fmt::format("message '{}' from peer '{}'", printable(message.type), printable(message.peer)), why);
   }
 
-  // Starts the thread that reads ahead, where there is to be one.
+  // Starts the thread that reads ahead, if the options ask for it.
   bool reads_ahead() {
     if (!options.read_ahead || ahead) return ahead != nullptr;
     CHECK(kind == Kind::kDealer || kind == Kind::kPull || kind == Kind::kSub);
@@ -439,23 +438,23 @@ struct Parts {
   std::string name;
   SocketOptions options;
   zmq::socket_t socket;
-  std::unique_ptr<Connections> connections;  // of a socket that binds
-  std::optional<Monitor> attempts;           // of one that connects, with watch_connecting
-  Socket::Due due;                           // what the thread that reads says by itself
+  std::unique_ptr<Connections> connections;  // only if the socket binds
+  std::optional<Monitor> attempts;           // only if it connects, with watch_connecting
+  Socket::Due due;                           // returns messages that the reading thread sends by itself
   std::atomic<uint64_t> rejected{0}, failed_connections{0}, queue_refused{0};
-  Tunnel* tunnel = nullptr;    // of one that connects through a proxy; the context's
-  uint64_t tunnel_failed = 0;  // Tunnel::failed() that was heard of
+  Tunnel* tunnel = nullptr;    // only if it connects through a proxy; owned by the context
+  uint64_t tunnel_failed = 0;  // value of Tunnel::failed() when last read
   QueuedBytes queued{options.most_queued_bytes};
-  bool guarded = false;                                   // bound with keys
-  std::shared_ptr<const std::set<std::string>> may_stay;  // what the doorkeeper said last
-  std::atomic<bool> in_touch{false};                      // of a socket that connects
-  size_t failed_unseen = 0;                               // handshakes whose attempt's end was not heard of yet
-  std::atomic<uint32_t> broken_off{0}, turned_away{0};    // of a socket that connects: handshakes; event, 0: none
-  std::string endpoint;                                   // it connects to
+  bool guarded = false;                                   // it is bound with keys
+  std::shared_ptr<const std::set<std::string>> may_stay;  // the doorkeeper's last answer
+  std::atomic<bool> in_touch{false};                      // only if it connects
+  size_t failed_unseen = 0;                               // failed handshakes whose attempt's end was not reported yet
+  std::atomic<uint32_t> broken_off{0}, turned_away{0};    // only if it connects: handshakes; event, 0: none
+  std::string endpoint;                                   // address that it connects to
   bool looked_for_mechanism = false;
-  std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
+  std::mutex log_mutex;  // guards the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
-  std::unique_ptr<ReadAhead> ahead;  // with read_ahead, once something was sent or received; it is the first to go
+  std::unique_ptr<ReadAhead> ahead;  // with read_ahead, from the first message on; destroyed first
 };
 
 class ZeroMqCarrier final : public Carrier {
@@ -565,7 +564,7 @@ Socket::Refusal ZeroMqCarrier::refusal() {
     return {.text =
                 fmt::format("the key {} of {} is not let in there", keys->own ? keys->own->name : "", keys->folder)};
   const bool broken_off = parts_.broken_off >= kBrokenOff;
-  // A server with keys may close a connection before its own greeting is out, so that libzmq cannot tell why.
+  // A server with keys may close a connection before it sends its own greeting, so that libzmq cannot say why.
   if (!keys && broken_off && !parts_.tunnel && !std::exchange(parts_.looked_for_mechanism, true) &&
       mechanism_at(parts_.endpoint) == "CURVE")
     parts_.turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;

@@ -40,7 +40,7 @@ std::optional<Error> check_version(const msgpack::object& map) {
 
 constexpr int kMaxDepth = 8;
 
-// Adds up what lists and maps claim to hold, without taking memory for it. Beyond the limit it stops.
+// Adds up the sizes that lists and maps claim, without taking memory for them. Stops beyond the limit.
 struct ElementCounter : msgpack::null_visitor {
   size_t left = 0;
   int depth = 0;
@@ -57,7 +57,7 @@ struct ElementCounter : msgpack::null_visitor {
   bool end_map() { return --depth, true; }
 };
 
-// An element takes a byte in the message, and 24 of memory once it is read. What is wrong otherwise is for the reader.
+// An element takes a byte in the message, and 24 of memory once it is read. Other faults are left to the reader.
 bool has_more(Bytes body, size_t max_elements) {
   ElementCounter counter;
   counter.left = max_elements;
@@ -71,7 +71,7 @@ std::optional<Error> read_any(Bytes body, size_t max_elements,
                               const std::function<std::optional<Error>(const msgpack::object&)>& read) {
   try {
     if (has_more(body, max_elements)) return Error{fmt::format("has more than {} elements", max_elements)};
-    // Strings and binaries are referenced in place. What lists and maps claim is limited before memory is taken for it.
+    // Strings and binaries are referenced in place. Sizes that lists and maps claim are limited before memory is taken.
     const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, kMaxString,
                                       kMaxDepth);
     size_t offset = 0;
@@ -165,7 +165,7 @@ void Decoder::get(const msgpack::object& o, double& v) {
   if (!std::isfinite(v)) fail("is not finite");
 }
 
-// Texts go into JSON, logs and terminals, which take nothing but UTF-8.
+// Texts go into JSON, logs and terminals, which take only UTF-8.
 void Decoder::get(const msgpack::object& o, std::string& v) {
   if (o.type != msgpack::type::STR) return fail("is not a string");
   const std::string_view text(o.via.str.ptr, o.via.str.size);
@@ -174,7 +174,7 @@ void Decoder::get(const msgpack::object& o, std::string& v) {
   v = text;
 }
 
-// What becomes a float must not become infinite.
+// True if all values stay finite as floats.
 bool Decoder::all_single(std::span<const double> v) {
   return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(static_cast<float>(x)); });
 }
@@ -216,7 +216,7 @@ void Decoder::get_map(const msgpack::object& o, std::map<std::string, V>& v) {
   const size_t value_limit = limit_;
   for (uint32_t i = 0; i < o.via.map.size && !error_; ++i) {
     std::string key;
-    limit_ = 0;  // a field's own limit is its values'
+    limit_ = 0;  // the field's limit is for its values, not for its keys
     get(o.via.map.ptr[i].key, key);
     limit_ = value_limit;
     if (!error_) get(o.via.map.ptr[i].val, v[key]);
@@ -225,7 +225,7 @@ void Decoder::get_map(const msgpack::object& o, std::map<std::string, V>& v) {
 void Decoder::get(const msgpack::object& o, std::map<std::string, std::string>& v) { get_map(o, v); }
 void Decoder::get(const msgpack::object& o, std::map<std::string, double>& v) { get_map(o, v); }
 
-// ---- what is seen, and from where ----------------------------------------------------------------------------------
+// ---- cameras, boxes and poses --------------------------------------------------------------------------------------
 
 void Decoder::get(const msgpack::object& o, geometry::Box& b) {
   double v[6];
@@ -269,7 +269,7 @@ void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
   if (const auto valid = geometry::validate(c); !valid) fail(": " + valid.error().text);
 }
 
-// What they say, in microseconds or not known, one after the other: next() returns it, or has failed.
+// Reads moments, each in microseconds after the known one before. next(): a number, nothing if not known, or fails.
 void Decoder::get_moments(Moments& m, const std::function<std::optional<double>()>& next) {
   double before = 0;  // sums stay far below what f64 holds exactly: each is checked
   for (double Moments::*const moment : kMoments) {

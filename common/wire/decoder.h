@@ -15,19 +15,19 @@
 
 namespace telesplat::wire {
 
-/// A visitor of fields(): fills each from the map. After the first error it does nothing more.
+/// A visitor of fields(): fills each from the map. After the first error it reads nothing more.
 class Decoder {
  public:
   explicit Decoder(const msgpack::object& map) : map_(map) {}
 
-  /// From now on fields have numbers in place of names, and those that are missing stay as they are, which is no error
-  /// (kIsBrief).
+  /// From now on reads a brief message (kIsBrief): keys are numbers instead of names, and a missing field keeps its
+  /// value, without an error.
   void be_brief() { brief_ = true; }
 
   /// Names the field and what is wrong with it.
   const std::optional<Error>& error() const { return error_; }
 
-  /// Whether a field of this name is there.
+  /// True if the map has a field of this name.
   bool has(std::string_view name) const;
 
   template <class T>
@@ -36,12 +36,12 @@ class Decoder {
   }
 
  private:
-  /// The value of a field that is read from now on; null if there is none.
+  /// Returns the value of the field that is read from now on; null if the map lacks the field.
   const msgpack::object* enter(const char* name, size_t limit);
   void fail(std::string_view why);
   bool within(size_t size, size_t limit);
   bool is_map(const msgpack::object& o);
-  /// How many entries a list has; 0, and an error, if it is no list or has more than `limit`.
+  /// Returns the number of entries of a list; 0, and an error, if it is no list or has more than `limit`.
   size_t list_size(const msgpack::object& o, size_t limit);
   static const msgpack::object& entry(const msgpack::object& list, size_t i);
   bool numbers(const msgpack::object& o, std::span<double> out);
@@ -54,7 +54,7 @@ class Decoder {
   void get(const msgpack::object& o, bool& v);
   void get(const msgpack::object& o, uint64_t& v);
   void get(const msgpack::object& o, double& v);
-  /// The field's limit says how many values there are.
+  /// Precondition: the field's limit is the number of values of E.
   template <class E>
   requires std::is_enum_v<E>
   void get(const msgpack::object& o, E& v) {
@@ -101,18 +101,18 @@ class Decoder {
 
   const msgpack::object& map_;
   bool brief_ = false;
-  uint64_t number_ = 0;  // of the next field, where it is brief
+  uint64_t number_ = 0;  // number of the next field, if the message is brief
   const char* name_ = "";
   size_t limit_ = 0;
   std::optional<Error> error_;
 };
 
-/// Calls `read` with a body that is one msgpack map, of any version or none. Error: it is not, or its lists and maps
-/// have more than max_elements elements.
+/// Calls `read` with a body that is one msgpack map, of any version or without one. Error: the body is no such map, or
+/// its lists and maps have more than max_elements elements.
 std::optional<Error> read_any(Bytes body, size_t max_elements,
                               const std::function<std::optional<Error>(const msgpack::object&)>& read);
 
-/// The version of a body, if it is a map that has one.
+/// The version in a body; nothing if the body is no map or has none.
 std::optional<uint64_t> version_of(Bytes body);
 
 /// Reads a body: one msgpack map of this protocol's version, whose fields `read` takes, with at most max_elements

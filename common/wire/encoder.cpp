@@ -26,8 +26,8 @@ class Packer : Appender, public msgpack::packer<Appender> {
   explicit Packer(std::string& out) : Appender{out}, msgpack::packer<Appender>(static_cast<Appender&>(*this)) {}
 };
 
-// Text that is not UTF-8, as receivers take it: to_utf8() of it, which may be three times as long, cut at a character
-// so that it stays within the limit that the text was within.
+// Returns text that is not UTF-8 in the form that receivers take: to_utf8(text) may be three times as long, so it is
+// cut at a character, to the limit that the text kept.
 std::string presentable(std::string_view text) {
   std::string out = to_utf8(text);
   for (const size_t limit : {kMaxString, kMaxFact, kMaxControlBytes}) {
@@ -55,7 +55,7 @@ void Encoder::numbers(std::span<const double> values) {
   for (const double v : values) put(v);
 }
 
-// Names and paths of a machine may be any bytes, and no receiver takes what is not UTF-8.
+// Names and paths of a machine may be any bytes, but receivers take only UTF-8.
 void Encoder::put_text(std::string_view text) {
   if (!valid_utf8(text)) return put_text(presentable(text));
   Packer packer(out_);
@@ -66,7 +66,7 @@ void Encoder::put_text(std::string_view text) {
 void Encoder::put(bool v) { v ? Packer(out_).pack_true() : Packer(out_).pack_false(); }
 void Encoder::put(uint64_t v) { Packer(out_).pack_uint64(v); }
 
-// The shortest that is exactly this number: msgpack's writers make whole numbers integers.
+// Writes the shortest form that is exactly this number: msgpack's writers turn whole numbers into integers.
 void Encoder::put(double v) {
   const bool single =
       std::abs(v) <= std::numeric_limits<float>::max() && static_cast<double>(static_cast<float>(v)) == v;
@@ -112,7 +112,7 @@ void Encoder::put(const geometry::Camera& c) {
            double(c.height)});
 }
 
-// Whole microseconds since the moment before that is known: most differences take three bytes, what is not known one;
+// Writes whole microseconds since the known moment before: most differences take three bytes, an unknown moment one;
 // in a brief message two bytes and one.
 void Encoder::put(const Moments& m) {
   std::string brief;

@@ -16,7 +16,7 @@ class Encoder {
  public:
   explicit Encoder(std::string& out) : out_(out) {}
 
-  /// A whole message: "v", then its fields, those of a brief one by their numbers.
+  /// Writes a whole message: "v", then its fields; a brief message names its fields by number.
   template <Struct M>
   void versioned_map(const M& m, uint64_t version = kProtocolVersion) {
     const Blank<M> blank(m);
@@ -45,7 +45,7 @@ class Encoder {
   }
 
  private:
-  /// Tells which fields of a message need not be sent: those of a brief one that hold what a new one's hold.
+  /// Finds the fields of a brief message that need not be sent: they hold the same values as in a new message.
   template <class M>
   class Blank {
    public:

@@ -14,7 +14,7 @@ namespace {
 constexpr double kLongestTime_s = 1e12;
 constexpr double kLengthTolerance = 0.05;
 
-// Reads what the decoder has of a map that a program of anybody's wrote.
+// Reads the fields of a map that any tracking program may have written.
 Result<HeadPose> read(const msgpack::object& map) {
   Decoder decoder(map);
   HeadPose out;

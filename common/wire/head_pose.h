@@ -1,4 +1,4 @@
-// A head's pose as any program may tell it: not a message of this protocol, but a plain msgpack map without a version
+// A head's pose as any program may send it: not a message of this protocol, but a plain msgpack map without a version
 // (docs/tracking.md).
 #pragma once
 
@@ -12,7 +12,7 @@
 namespace telesplat::wire {
 
 struct HeadPose {
-  std::optional<double> t_s;  ///< sender's clock, seconds; nothing: when it arrives
+  std::optional<double> t_s;  ///< sender's clock, seconds; empty: the time of arrival counts
   geometry::Pose pose;
 };
 

@@ -32,7 +32,7 @@ Words seal_of(const std::string& encoded, InstanceId sampler, std::span<const ui
   return out;
 }
 
-// Without what samplers change.
+// Encodes the fields of a lease that samplers do not change.
 std::string fixed_part(const Lease& lease) {
   Lease fixed = lease;
   fixed.rays = 0;

@@ -1,6 +1,6 @@
-// Seals of leases: the packer takes only what its master leased, for the frame, the rectangle and the sampler that it
-// was leased for. A seal is a keyed BLAKE2b hash (libsodium's crypto_generichash) of the encoded lease. The master
-// makes a key when it starts, and tells it to the packer alone (Welcome::lease_key).
+// Seals of leases: the packer takes only tiles that its master leased, for the frame, the rectangle and the sampler
+// that the master leased them for. A seal is a keyed BLAKE2b hash (libsodium's crypto_generichash) of the encoded
+// lease. The master makes a key when it starts, and sends it to the packer alone (Welcome::lease_key).
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@
 
 namespace telesplat::wire {
 
-/// kLeaseKeyWords random numbers.
+/// Returns kLeaseKeyWords random numbers.
 std::vector<uint32_t> make_lease_key();
 
-/// Sets lease.seal for `sampler`. What the sampler may change is not in it: Lease::rays, Lease::mask, moments.
-/// Precondition: key has kLeaseKeyWords numbers.
+/// Sets lease.seal for `sampler`. The seal does not cover fields that the sampler may change: Lease::rays, Lease::mask,
+/// moments. Precondition: key has kLeaseKeyWords numbers.
 void seal(Lease& lease, InstanceId sampler, std::span<const uint32_t> key);
 void seal(SliceLease& lease, InstanceId sampler, std::span<const uint32_t> key);
 
-/// The seal is of this lease, sampler and key. False for a key of another size than kLeaseKeyWords.
+/// True if the seal fits this lease, sampler and key. False for a key of another size than kLeaseKeyWords.
 bool is_sealed(const Lease& lease, InstanceId sampler, std::span<const uint32_t> key);
 bool is_sealed(const SliceLease& lease, InstanceId sampler, std::span<const uint32_t> key);
 

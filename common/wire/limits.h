@@ -1,4 +1,4 @@
-// What every message keeps to: the protocol's version, sizes and counts. Decoding refuses what is beyond them.
+// The protocol's version, and the sizes and counts that every message keeps to. Decoding refuses anything beyond them.
 #pragma once
 
 #include <cstddef>
@@ -15,35 +15,35 @@ inline constexpr size_t kMaxControlBytes = 1u << 20;  ///< whole body of a messa
 inline constexpr size_t kMaxBulkBytes = 256u << 20;   ///< all bulk fields of a message
 inline constexpr size_t kMaxKeys = 1u << 21;          ///< cluster keys in one message
 inline constexpr size_t kMaxEntries = 4096;           ///< entries of a map or list
-inline constexpr size_t kMaxElements = 1u << 16;      ///< of all lists and maps of a message together
+inline constexpr size_t kMaxElements = 1u << 16;      ///< elements of all lists and maps of a message together
 inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame, and blocks
-inline constexpr size_t kMaxMaskWords = 1u << 17;     ///< of a tile: 512 KiB
-inline constexpr size_t kPlanNumbers = 6;             ///< of each tile of a plan
-inline constexpr size_t kMaxPlanWords = 1u << 21;     ///< of the masks of a plan: 8 MiB
-inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
-inline constexpr int kMaxTileSide = 2048;             ///< of the squares that a frame is cut into
-inline constexpr int64_t kMaxTilePixels = 1 << 22;    ///< of a tile: a few bytes may say so many
-inline constexpr uint64_t kMaxSlabs = 1024;           ///< of a volume, and samplers that share it
-inline constexpr uint64_t kMaxBuffers = 8;            ///< of a loosely coupled viewer
-inline constexpr size_t kSealWords = 4;               ///< of a lease's seal: 16 bytes
-inline constexpr size_t kLeaseKeyWords = 8;           ///< of the key that seals leases: 32 bytes
+inline constexpr size_t kMaxMaskWords = 1u << 17;     ///< words of a tile's mask: 512 KiB
+inline constexpr size_t kPlanNumbers = 6;             ///< numbers that a plan holds for each tile
+inline constexpr size_t kMaxPlanWords = 1u << 21;     ///< words of all masks of a plan: 8 MiB
+inline constexpr uint64_t kMaxStep = 16;              ///< pixels between two that a coarse frame samples
+inline constexpr int kMaxTileSide = 2048;             ///< side of the squares that a frame is cut into
+inline constexpr int64_t kMaxTilePixels = 1 << 22;    ///< pixels of a tile: a few bytes may claim that it has more
+inline constexpr uint64_t kMaxSlabs = 1024;           ///< slabs of a volume, and samplers that share it
+inline constexpr uint64_t kMaxBuffers = 8;            ///< buffers of a loosely coupled viewer
+inline constexpr size_t kSealWords = 4;               ///< words of a lease's seal: 16 bytes
+inline constexpr size_t kLeaseKeyWords = 8;           ///< words of the key that seals leases: 32 bytes
 inline constexpr size_t kMaxViews = 64;               ///< viewers that one sampling frame of a volume serves
 
 /// A bulk field. When encoding it points to the sender's bytes; when decoded it points into the received frame.
 using Bytes = std::span<const std::byte>;
 
-/// Whether a message may be larger than kMaxControlBytes. It says so itself: `static constexpr bool kBulk = true;`.
+/// True if a message may be larger than kMaxControlBytes. It declares it: `static constexpr bool kBulk = true;`.
 template <class M>
 inline constexpr bool kIsBulk = requires {
   requires M::kBulk;
 };
 
-/// The most bytes of a message's body.
+/// Most bytes of a message's body.
 template <class M>
 inline constexpr size_t kBodyLimit = kIsBulk<M> ? kMaxBulkBytes + kMaxControlBytes : kMaxControlBytes;
 
-/// The most elements of all lists and maps in a message, a map's keys included. One that may have more says how many
-/// more: `static constexpr size_t kElements = ...;`.
+/// Most elements of all lists and maps in a message, a map's keys included. A message that may have more declares how
+/// many more: `static constexpr size_t kElements = ...;`.
 template <class M>
 consteval size_t element_limit() {
   if constexpr (requires { M::kElements; })

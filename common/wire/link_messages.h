@@ -11,25 +11,25 @@ namespace telesplat::wire {
 // Structs and their fields() stand as tables.
 // clang-format off
 
-/// Viewer (DEALER) -> packer (ROUTER), while events arrive and twice a second: I have everything up to this one.
+/// Viewer (DEALER) -> packer (ROUTER), while events arrive and twice a second: I have all events up to `newest`.
 struct Receipt {
   static constexpr std::string_view kName = "receipt";
   InstanceId viewer;
-  InstanceId packer;  ///< whose sequences
-  Sequence newest;    ///< applied
-  double viewer_s = 0;  ///< when, on the viewer's own clock
+  InstanceId packer;  ///< packer that numbers the events
+  Sequence newest;    ///< newest event that was applied
+  double viewer_s = 0;  ///< time of that, on the viewer's own clock
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("packer", m.packer); f("newest", m.newest); f("viewer_s", m.viewer_s);
   }
 };
-/// Packer -> master, after each receipt: what it says of that viewer's link.
+/// Packer -> master, after each receipt: figures of that viewer's link that follow from it.
 struct LinkReport {
   static constexpr std::string_view kName = "link_report";
   InstanceId viewer;
-  double rate_bytes_s = 0;     ///< what the link carried when it was busy; 0: not known
+  double rate_bytes_s = 0;     ///< rate that the link carried when it was busy; 0: not known
   uint64_t backlog_bytes = 0;  ///< published and not received
-  double rtt_s = 0;            ///< least, lately; 0: not known
-  double oldest_s = 0;         ///< it has had a backlog so long and received nothing of it
+  double rtt_s = 0;            ///< least recent round trip; 0: not known
+  double oldest_s = 0;         ///< for this long it has had a backlog and received nothing of it
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("rate_bytes_s", m.rate_bytes_s); f("backlog_bytes", m.backlog_bytes);
     f("rtt_s", m.rtt_s); f("oldest_s", m.oldest_s);

@@ -17,7 +17,7 @@
 
 namespace telesplat::wire {
 
-/// All of them. A message that is not in this list cannot be encoded or decoded: the compiler says so. Tests and the
+/// List of all messages. A message that is not in it cannot be encoded or decoded: the compiler says so. Tests and the
 /// fuzz target go through it too.
 using Messages =
     std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply, ViewRequest, LeaseRequest, Lease, LeaseExtend,

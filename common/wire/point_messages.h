@@ -20,28 +20,28 @@ namespace telesplat::wire {
 struct Patch {
   static constexpr std::string_view kName = "patch";
   static constexpr bool kBulk = true;
-  static constexpr bool kBrief = true;  ///< fields by number; those that hold what stands here are not sent
+  static constexpr bool kBrief = true;  ///< fields by number; those that hold their default are not sent
   InstanceId packer;
   Sequence sequence;
   EpochId epoch;
   FrameId frame;
   InstanceId viewer;
   RequestId request;
-  uint64_t tile = 0, tiles_in_frame = 0;  ///< of what is published of a frame at once: the leases' blocks
+  uint64_t tile = 0, tiles_in_frame = 0;  ///< blocks (Lease::block): a frame is published block by block
   uint64_t step = 1;                      ///< Lease::step
   bool extra = false;                     ///< Lease::extra
   bool frame_complete = false;            ///< the last tile of its frame to be packed
-  uint64_t left_out = 0;                  ///< tiles of the frame that are not sampled (FrameEnd): this ends it
+  uint64_t left_out = 0;                  ///< tiles that are not sampled (FrameEnd): this patch ends the frame
   uint64_t samples = 0, kept = 0;
-  geometry::Camera camera;  ///< of the whole frame
+  geometry::Camera camera;  ///< camera of the whole frame
   geometry::Rect rect;      ///< the tile in it
   Bytes image;              ///< codec stream; eliminated pixels are not covered
-  /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else empty.
+  /// Rays finer than a view's: mask of those that met nothing (codec::encode_mask), over missed_rect; else empty.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
-  Moments moments;                        ///< of the last tile, if it completes an update; none when sent again
-  bool refinable = false;                 ///< what its image leaves out may follow: Refine
-  /// Not 0: its points go when the head has moved on, by the tag that this number gives (points::tagged).
+  Moments moments;                        ///< moments of its last tile, if it completes an update; else empty
+  bool refinable = false;                 ///< points that its image leaves out may follow: Refine
+  /// Not 0: its points are removed when the head has moved on, by this tag (points::tagged).
   uint64_t rest = 0;
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
@@ -72,8 +72,8 @@ struct Refine {
   InstanceId packer;
   Sequence sequence;
   EpochId epoch;
-  Sequence patch;  ///< which
-  Bytes image;     ///< what its image left out (codec::decode_refinement)
+  Sequence patch;  ///< patch that becomes exact
+  Bytes image;     ///< the part that its image left out (codec::decode_refinement)
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("patch", m.patch);
     f("image", m.image, kMaxBulkBytes);
@@ -92,11 +92,11 @@ struct EpochBegin {
 struct StateMark {
   static constexpr std::string_view kName = "state_mark";
   InstanceId packer;
-  Sequence sequence;    ///< of the newest event
+  Sequence sequence;    ///< sequence of the newest event
   EpochId epoch;
   bool answer = false;  ///< true: everything a state_request asked for has been sent
   uint64_t points = 0;  ///< points of the model after that event
-  uint64_t digest = 0;  ///< points::PointModel::digest() of the model after that event; 0: not told
+  uint64_t digest = 0;  ///< points::PointModel::digest() of the model after that event; 0: not sent
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("answer", m.answer);
     f("points", m.points); f("digest", m.digest);
@@ -109,14 +109,14 @@ struct StateMark {
 struct StateRequest {
   static constexpr std::string_view kName = "state_request";
   InstanceId viewer;
-  InstanceId packer;  ///< that is followed; 0: none yet
-  Sequence after;     ///< newest that was applied; 0: everything
-  bool anew = false;  ///< what came, or comes, over this connection in answer to an earlier request is not taken
+  InstanceId packer;  ///< packer that the viewer follows; 0: none yet
+  Sequence after;     ///< newest event that was applied; 0: send everything
+  bool anew = false;  ///< the viewer drops all answers to earlier requests over this connection
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("packer", m.packer); f("after", m.after); f("anew", m.anew);
   }
 };
-/// Begins an answer. It leaves out what was forgotten since `after`: only a replica that stands there may take it.
+/// Begins an answer. It leaves out points forgotten since `after`: only a replica in that state may apply it.
 struct StateBegin {
   static constexpr std::string_view kName = "state_begin";
   InstanceId packer;
@@ -131,7 +131,7 @@ struct AccessReport {
   static constexpr bool kBulk = true;
   InstanceId viewer;
   std::vector<uint32_t> clusters;
-  std::vector<uint32_t> frames;  ///< empty: not told; else one a cluster: the frame tag of the mosaics that were drawn
+  std::vector<uint32_t> frames;  ///< empty: not known; else one a cluster: frame tag of the mosaics that were drawn
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("clusters", m.clusters); f("frames", m.frames);
   }

@@ -10,7 +10,7 @@
 namespace telesplat::wire {
 namespace {
 
-constexpr uint64_t kMaxWallFrame = uint64_t{1} << 53;  // the number of a wall's frame
+constexpr uint64_t kMaxWallFrame = uint64_t{1} << 53;  // largest number of a wall's frame
 
 // A tile's rectangle must lie in its frame, its number among the frame's tiles.
 std::optional<Error> check_tile(const geometry::Camera& c, const geometry::Rect& r, uint64_t tile, uint64_t tiles) {
@@ -59,13 +59,13 @@ std::optional<Error> check_slab(uint64_t slab, uint64_t slabs, uint64_t begin, u
   return check_slices(begin, end);
 }
 
-// NaN is within nothing.
+// NaN lies within no limits.
 struct Setting {
   const char* name;
   double value, least, most;
 };
 
-// What must hold between the fields of a message, beyond each field's own limits. Most messages have nothing to check.
+// Checks conditions between the fields of a message, beyond each field's own limits. Most messages need no check.
 template <class M>
 std::optional<Error> check(const M&) {
   return std::nullopt;
@@ -110,8 +110,8 @@ std::optional<Error> check(const PlanRequest& m) {
   return Error{fmt::format("tiles of {} pixels, limits 32 and {}", m.tile_size, kMaxTileSide)};
 }
 
-// Each tile lies in the frame, has rays, and its mask is there. All together have no more pixels than the frame: a plan
-// is no more work than the frame is.
+// Each tile lies in the frame and has rays, and its mask is there. All tiles together have no more pixels than the
+// frame: a plan costs no more work than the frame.
 std::optional<Error> check(const Plan& m) {
   if (m.tiles.size() % kPlanNumbers != 0) return Error{fmt::format("{} numbers of tiles", m.tiles.size())};
   uint64_t words = 0, pixels = 0;
@@ -201,7 +201,7 @@ std::optional<Error> check(const SwapReady& m) {
   return std::nullopt;
 }
 
-/// How one message is written and read.
+/// Functions and limits that write and read one message.
 struct Codec {
   std::string_view name;
   size_t body_limit, element_limit;

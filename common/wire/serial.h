@@ -17,7 +17,7 @@ consteval size_t number_in(std::type_identity<std::tuple<Listed...>>) {
   static_cast<void>(((std::is_same_v<M, Listed> || (++number, false)) || ...));
   return number;
 }
-/// The place of a message in Messages: serial.cpp knows messages by it.
+/// The index of a message in Messages: serial.cpp finds messages by it.
 template <class M>
 constexpr size_t number_of() {
   constexpr size_t number = number_in<M>(std::type_identity<Messages>{});
@@ -30,7 +30,7 @@ std::optional<Error> decode(size_t number, Bytes body, void* message);
 
 }  // namespace detail
 
-/// One msgpack map: "v" and the fields of M. Texts that are not UTF-8 are sent with U+FFFD in place of what is none.
+/// Writes one msgpack map: "v" and the fields of M. Bytes of texts that are not UTF-8 are sent as U+FFFD.
 template <class M>
 std::string encode(const M& message) {
   return detail::encode(detail::number_of<M>(), &message);
@@ -47,11 +47,11 @@ Result<M> decode(Bytes body) {
   return message;
 }
 
-/// The version of a message's body if it has one, and another than kProtocolVersion.
+/// The version of a message's body, if it has one that differs from kProtocolVersion.
 std::optional<uint64_t> other_version(Bytes body);
-/// Names both, of a process that says hello to a master.
+/// Names both versions, for a process that says hello to a master.
 std::string about_versions(uint64_t other);
-/// As a process of that version reads it: these two have been the same since the first version, and stay.
+/// Encodes for a process of that version: these two messages have been the same since the first version, and stay.
 std::string encode_for(uint64_t version, const Shutdown& message);
 std::string encode_for(uint64_t version, const ControlReply& message);
 

@@ -30,7 +30,7 @@ struct Hello {
   std::map<std::string, std::string> endpoints;
   /// data: "scene", "kind", "triangles"; sampler: "sampler"; viewer: "renderer"; docs/protocol.md has all.
   std::map<std::string, std::string> facts;
-  /// data: of the scene, as it begins (julia/parameters.h); empty otherwise.
+  /// data: parameters of the scene, as it begins (julia/parameters.h); empty otherwise.
   std::map<std::string, double> parameters;
   geometry::Box box_room;  ///< data: the data set's box; empty otherwise
   template <class F> static void fields(F& f, auto& m) {
@@ -40,41 +40,41 @@ struct Hello {
   }
 };
 
-/// What `telesplat ctl coupling` makes of a viewer's coupling.
+/// Coupling that `telesplat ctl coupling` orders a viewer to use.
 enum class CouplingOrder : uint8_t {
-  kOwn,  ///< stays as the viewer began
+  kOwn,  ///< the coupling that the viewer began with
   kAsync,
   kSync,
   kLoose
 };
 inline constexpr uint64_t kCouplingOrders = 4;
 
-/// How a session runs. The defaults of all of it stand here; serial.cpp has the limits.
+/// Settings of a session. All defaults stand here; serial.cpp has the limits.
 struct SessionSettings {
   // The point model, and how it travels.
-  bool keep_redundant = false;        ///< packs what the model shows already, too (T7.3)
+  bool keep_redundant = false;        ///< also packs points that the model shows already (T7.3)
   uint64_t max_points = 20'000'000;   ///< least recently drawn clusters are forgotten above it; 0: no limit
   double obsolete_after_s = 0;        ///< clusters that nothing drew for longer are forgotten (T4.3.3); 0: never
-  double depth_error = -1;            ///< of points, in pixels' footprints at their depth; negative: by the link
-  double normal_error = -1;           ///< likewise in codes,
-  double colour_error = -1;           ///< and of 255
-  double max_rate_mbit = 0;           ///< to each viewer, wished; 0: what its link carries
+  double depth_error = -1;            ///< error of points, in pixels' footprints at their depth; negative: by the link
+  double normal_error = -1;           ///< likewise of normals, in codes
+  double colour_error = -1;           ///< likewise of colours, in steps of 255
+  double max_rate_mbit = 0;           ///< wished rate to each viewer; 0: as much as its link carries
   // Sampling.
   bool steering = true;               ///< the packer plans which rays of a view are cast
-  double view_cell_m = 0.2;           ///< a head movement this long shall uncover nothing unknown; 0: no such rays
+  double view_cell_m = 0.2;           ///< a head movement this long shall uncover nothing unknown; 0: no rays for that
   uint64_t validation = 32;           ///< every good pixel is cast once in this many plans of a view; 0: never
   uint64_t still_rays = 16;           ///< rays a pixel everywhere while the head stands still: 1, 4 or 16
-  uint64_t max_sampling_pixels = 1u << 24;  ///< of a view; larger ones are sampled coarser
+  uint64_t max_sampling_pixels = 1u << 24;  ///< pixels of a view; larger views are sampled coarser
   uint64_t layers = 16;               ///< slice images that a frame of a volume has at most
   // Viewers.
   double least_sampling = 0.5;        ///< sampled pixels a displayed pixel, on each axis, at least
   CouplingOrder coupling = CouplingOrder::kOwn;
-  uint64_t buffers = 3;               ///< of loose coupling
+  uint64_t buffers = 3;               ///< buffers of loose coupling
   // Views that come as pictures.
   bool pictures = false;
-  uint64_t picture_quality = 80;      ///< of JPEG, 1 to 100
+  uint64_t picture_quality = 80;      ///< quality of JPEG, 1 to 100
   uint64_t picture_samples = 1;       ///< rays a pixel: 1, 4 or 16
-  uint64_t picture_shading = 0;       ///< its place among image::kShadingNames
+  uint64_t picture_shading = 0;       ///< index in image::kShadingNames
   uint64_t picture_background = 0x141820;  ///< 0xRRGGBB
   bool operator==(const SessionSettings&) const = default;
   template <class F> static void fields(F& f, auto& m) {
@@ -89,7 +89,7 @@ struct SessionSettings {
   }
 };
 
-/// All of them as numbers by their fields' names, for records.
+/// All settings as numbers by their fields' names, for records.
 inline std::map<std::string, double> numbers_of(const SessionSettings& settings) {
   std::map<std::string, double> out;
   auto add = [&](const char* name, const auto& value, uint64_t = 0) { out[name] = static_cast<double>(value); };
@@ -103,15 +103,15 @@ struct Welcome {
   InstanceId master;
   double hello_sent_s = 0;  ///< Hello::sent_s, echoed; 0 in an unasked welcome
   double master_s = 0;      ///< master's clock when sent
-  std::string clock;        ///< which clock that is: clock_id()
+  std::string clock;        ///< clock_id() of that clock
   EpochId epoch;
   uint64_t octree_depth = 0;
   geometry::Box box_room;                        ///< empty until a data server said hello
-  std::map<std::string, std::string> endpoints;  ///< as in the hellos, as far as they are known
+  std::map<std::string, std::string> endpoints;  ///< as in the hellos, once they are known
   std::map<std::string, std::string> facts;      ///< "scene", "kind", "triangles"
-  std::map<std::string, double> parameters;      ///< of the scene in this epoch
+  std::map<std::string, double> parameters;      ///< parameters of the scene in this epoch
   SessionSettings settings;
-  std::vector<uint32_t> lease_key;               ///< to the packer alone: kLeaseKeyWords numbers (lease_seal.h)
+  std::vector<uint32_t> lease_key;               ///< sent to the packer alone: kLeaseKeyWords numbers (lease_seal.h)
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s);
     f("clock", m.clock); f("epoch", m.epoch);
@@ -128,7 +128,7 @@ struct WhoAreYou {
   template <class F> static void fields(F& f, auto& m) { f("master", m.master); }
 };
 
-/// Every process -> master, and its answer: what the master's clock says (common/net/master_link.h).
+/// Every process -> master, and its answer: the time of the master's clock (common/net/master_link.h).
 struct ClockRequest {
   static constexpr std::string_view kName = "clock_request";
   double sent_s = 0;      ///< sender's own clock
@@ -138,9 +138,9 @@ struct ClockReply {
   static constexpr std::string_view kName = "clock_reply";
   InstanceId master;
   double sent_s = 0;      ///< ClockRequest::sent_s
-  double received_s = 0;  ///< master's clock when it took the request,
-  double replied_s = 0;   ///< and when it answered
-  std::string clock;      ///< which clock that is: clock_id()
+  double received_s = 0;  ///< master's clock when it took the request
+  double replied_s = 0;   ///< master's clock when it answered
+  std::string clock;      ///< clock_id() of the master's clock
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("sent_s", m.sent_s); f("received_s", m.received_s); f("replied_s", m.replied_s);
     f("clock", m.clock);
@@ -176,8 +176,8 @@ struct Control {
   /// volume::parse_transfer takes them), "colour" (arguments "array": as scene::parse_colour_by takes it, "map": as
   /// colour::from_text takes it), "clip" (argument "clip": as scene::parse_clip takes it), "play" (arguments "how":
   /// play, pause or step; "steps"), orders that a viewer or a data server answers ("pick", "where", "go", "overlay",
-  /// "measure", "probe"; argument "viewer": whose), "coupling" (arguments "coupling": async, sync or loose; "buffers"
-  /// of loose, 1 to kMaxBuffers; "viewer": the name of the one that is meant).
+  /// "measure", "probe"; argument "viewer": its name), "coupling" (arguments "coupling": async, sync or loose;
+  /// "buffers": 1 to kMaxBuffers, for loose; "viewer": its name).
   std::string command;
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {
@@ -191,11 +191,11 @@ struct ControlReply {
   template <class F> static void fields(F& f, auto& m) { f("ok", m.ok); f("text", m.text, kMaxControlBytes); }
 };
 
-/// Master -> viewer or data server: somebody asks what only this process knows, or wishes for something that is its
-/// business (docs/protocol.md has the orders). And its answer, which the master passes on.
+/// Master -> viewer or data server: a user asks for a fact that only this process knows, or wishes that it does
+/// something (docs/protocol.md has the orders). OrderAnswer is its answer, which the master passes on.
 struct Order {
   static constexpr std::string_view kName = "order";
-  uint64_t number = 0;  ///< of the master, for the answer
+  uint64_t number = 0;  ///< the master's number for it; the answer repeats it
   std::string command;  ///< viewer: "pick", "where", "go", "measure", "overlay"; data: "probe"
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {
@@ -204,16 +204,16 @@ struct Order {
 };
 struct OrderAnswer {
   static constexpr std::string_view kName = "order_answer";
-  InstanceId instance;  ///< whose
+  InstanceId instance;  ///< process that answers
   uint64_t number = 0;
   bool ok = false;
-  std::string text;     ///< JSON, or why not; at most kMaxControlBytes
+  std::string text;     ///< JSON, or the reason of a refusal; at most kMaxControlBytes
   template <class F> static void fields(F& f, auto& m) {
     f("instance", m.instance); f("number", m.number); f("ok", m.ok); f("text", m.text, kMaxControlBytes);
   }
 };
 
-/// Begins the reason of a shutdown that answers a hello: the process may say hello again as another instance.
+/// First words of the reason of a shutdown that answers a hello: the process may say hello again as another instance.
 inline constexpr std::string_view kInstanceTaken = "its instance is another's";
 
 /// Master -> everyone: finish, flush metrics, say goodbye, exit 0. A process that leaves by itself sends Goodbye too.

@@ -16,10 +16,10 @@ namespace {
 constexpr unsigned kEvenX = 4, kEvenY = 8, kUsualNear = 16, kFlags = 31;
 constexpr double kNear_m = 0.02f;
 constexpr double kMostSteps = 1 << 30;  // 2 km
-constexpr unsigned kMostBytes = 5;      // of a number
+constexpr unsigned kMostBytes = 5;      // bytes of a number
 
-// The orientation has three components and is of unit length: the fourth is what remains, and positive. All but the
-// root is exact in f64, and roots are rounded alike everywhere.
+// The orientation is stored as three components: it has unit length, so the fourth is the root of the rest, and
+// positive. All steps but the root are exact in f64, and roots are rounded alike on all machines.
 struct Steps {
   unsigned flags = 0;
   std::array<int64_t, 3> position{}, turn{};

@@ -19,14 +19,14 @@ namespace telesplat::wire {
 
 // ---- control: data and samplers (DEALER) <-> master (ROUTER) -------------------------------------------------------
 
-/// Data server -> master: how many voxels of each of its slices are not transparent in this epoch. They decide where
-/// slabs are cut.
+/// Data server -> master: the number of visible voxels of each of its slices in this epoch. The master cuts slabs by
+/// them.
 struct SliceWeights {
   static constexpr std::string_view kName = "slice_weights";
   InstanceId data;
   EpochId epoch;
   uint64_t begin = 0;            ///< the first slice
-  std::vector<uint32_t> voxels;  ///< of slices begin, begin + 1, ... (as bin, little-endian u32)
+  std::vector<uint32_t> voxels;  ///< voxels of slices begin, begin + 1, ... (as bin, little-endian u32)
   double bytes_per_voxel = 0;    ///< estimated
   template <class F> static void fields(F& f, auto& m) {
     f("data", m.data); f("epoch", m.epoch); f("begin", m.begin); f("voxels", m.voxels);
@@ -46,8 +46,8 @@ struct SheetEntry {
   }
 };
 
-/// Master -> sampler: in this partition of the volume you hold the slab [begin, end). Fetch what you lack of it, in the
-/// sheet's order. The sheet covers one slice more on both sides. An older partition may still be leased until the new
+/// Master -> sampler: in this partition of the volume you hold the slab [begin, end). Fetch the slices that you lack,
+/// in the sheet's order. The sheet covers one slice more on both sides. Leases of an older partition come until this
 /// one is ready.
 struct SlabAssignment {
   static constexpr std::string_view kName = "slab_assignment";
@@ -61,26 +61,26 @@ struct SlabAssignment {
   }
 };
 
-/// Sampler -> master: it holds its slab of this partition, in the session's newest epoch that it knows of.
+/// Sampler -> master: I hold my slab of this partition, in the session's newest epoch that I know.
 struct SlabReady {
   static constexpr std::string_view kName = "slab_ready";
   InstanceId sampler;
   uint64_t partition = 0;
   EpochId epoch;
-  uint64_t voxels = 0, bytes = 0;  ///< held; received for it
+  uint64_t voxels = 0, bytes = 0;  ///< voxels held; bytes received for them
   template <class F> static void fields(F& f, auto& m) {
     f("sampler", m.sampler); f("partition", m.partition); f("epoch", m.epoch); f("voxels", m.voxels);
     f("bytes", m.bytes);
   }
 };
 
-/// A viewer that a sampling frame is for.
+/// A viewer that a sampling frame serves.
 struct SliceView {
   InstanceId viewer;
   RequestId request;
   geometry::Camera camera;  ///< as requested
   uint64_t buffers = 0;     ///< ViewRequest::buffers
-  Moments moments;          ///< as far as the frame's beginning
+  Moments moments;          ///< up to the frame's beginning
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("buffers", m.buffers);
     f("moments", m.moments);
@@ -96,10 +96,10 @@ struct SliceLease {
   uint64_t partition = 0;
   uint64_t slab = 0, slabs = 1;  ///< the frame is complete with one delivery of each
   uint64_t begin = 0, end = 0;   ///< the slab's slices
-  volume::ShearFrame shear;      ///< validated against the session's grid by whoever uses it
+  volume::ShearFrame shear;      ///< the receiver checks it against the session's grid before use
   std::vector<SliceView> views;  ///< at least one, at most kMaxViews
   Moments moments;               ///< from the lease on; a sampler sends it back with its own
-  InstanceId master;             ///< which numbers leases and frames
+  InstanceId master;             ///< master that numbers leases and frames
   std::vector<uint32_t> seal;    ///< as Lease::seal
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("partition", m.partition); f("slab", m.slab);
@@ -110,23 +110,23 @@ struct SliceLease {
 
 // ---- voxels: sampler (DEALER) <-> data (ROUTER) --------------------------------------------------------------------
 
-/// Sampler -> data: voxels of these slices, please: those that the epoch's transfer function shows and whose level is
-/// not in `have`.
+/// Sampler -> data: send voxels of these slices that the epoch's transfer function shows and whose level is not in
+/// `have`.
 struct VoxelRequest {
   static constexpr std::string_view kName = "voxel_request";
   EpochId epoch;
-  uint64_t step = 0;            ///< of a time-varying volume
+  uint64_t step = 0;            ///< step of a time-varying volume
   uint64_t begin = 0, end = 0;  ///< slices
-  uint64_t round = 0;           ///< of the sheet: requests of earlier rounds are served first
-  Bytes have;                   ///< volume::LevelSet; empty: none
+  uint64_t round = 0;           ///< round of the sheet: requests of earlier rounds are served first
+  Bytes have;                   ///< volume::LevelSet; empty: no levels
   template <class F> static void fields(F& f, auto& m) {
     f("epoch", m.epoch); f("step", m.step); f("begin", m.begin); f("end", m.end); f("round", m.round);
     f("have", m.have, size_t{volume::kMaxLevels / 8});
   }
 };
-/// Its answer. A server that does not know the epoch (yet), has none of the slices or too much to do, says so with
-/// `known` false: ask again after a while. It may have fewer slices than were asked for (those from begin to end, at
-/// most 64 or about 32 MB): ask for the rest.
+/// Its answer. `known` is false if the server does not know the epoch (yet), has none of the slices or is too busy: ask
+/// again after a while. It may have fewer slices than were asked for (those from begin to end, at most 64 or about
+/// 32 MB): ask for the rest.
 struct VoxelData {
   static constexpr std::string_view kName = "voxel_data";
   static constexpr bool kBulk = true;
@@ -136,7 +136,7 @@ struct VoxelData {
   bool known = false;
   uint64_t voxels = 0;
   Bytes have;   ///< as requested
-  Bytes shown;  ///< volume::LevelSet: the levels of which the sampler has all voxels of these slices now
+  Bytes shown;  ///< volume::LevelSet: the sampler now has all voxels of these slices in these levels
   Bytes data;   ///< volume::encode_voxels
   template <class F> static void fields(F& f, auto& m) {
     f("epoch", m.epoch); f("step", m.step); f("begin", m.begin); f("end", m.end); f("known", m.known);
@@ -152,17 +152,17 @@ struct SliceImages {
   static constexpr std::string_view kName = "slice_images";
   static constexpr bool kBulk = true;
   InstanceId sampler;
-  SliceLease lease;     ///< as leased, with moments as far as the encoded images
-  uint64_t voxels = 0;  ///< splatted
-  Bytes data;           ///< volume/slices/image.h, one after the other
+  SliceLease lease;     ///< as leased, with moments up to the encoded images
+  uint64_t voxels = 0;  ///< number of voxels that were splatted
+  Bytes data;           ///< images (volume/slices/image.h), one after the other
   template <class F> static void fields(F& f, auto& m) {
     f("sampler", m.sampler); f("lease", m.lease); f("voxels", m.voxels);
     f("data", m.data, kMaxBulkBytes);
   }
 };
 
-/// Packer -> viewer: a complete frame, cropped to what this viewer may see of it. Frames go in order; never more of
-/// them are unacknowledged than the viewer has buffers.
+/// Packer -> viewer: a complete frame, cropped to the part that this viewer may see. Frames go in order; at most as
+/// many are unacknowledged as the viewer has buffers.
 struct SliceFrame {
   static constexpr std::string_view kName = "slice_frame";
   static constexpr bool kBulk = true;
@@ -173,23 +173,23 @@ struct SliceFrame {
   RequestId request;
   geometry::Camera camera;            ///< as requested
   volume::ShearFrame shear;
-  uint64_t slabs = 1, voxels = 0;     ///< that it was made from
-  Moments moments;                    ///< of the slab that completed it
-  Bytes data;                         ///< volume/slices/image.h
+  uint64_t slabs = 1, voxels = 0;     ///< slabs and voxels that the frame was made from
+  Moments moments;                    ///< moments of the slab that completed it
+  Bytes data;                         ///< image (volume/slices/image.h)
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer); f("request", m.request);
     f("camera", m.camera); f("shear", m.shear); f("slabs", m.slabs); f("voxels", m.voxels); f("moments", m.moments);
     f("data", m.data, kMaxBulkBytes);
   }
 };
-/// Viewer -> packer: this frame has left its buffer (it was decoded and replaced an older one, or was displayed and let
-/// go). Frame 0: here I am.
+/// Viewer -> packer: this frame has left its buffer (it was decoded and replaced an older one, or was displayed and
+/// freed). Frame 0: the viewer has just connected.
 struct SliceAck {
   static constexpr std::string_view kName = "slice_ack";
   InstanceId viewer;
   FrameId frame;
-  uint64_t buffers = 1;   ///< it has, 1 to kMaxBuffers
-  bool in_order = false;  ///< false: of frames that wait for it only the newest is worth sending
+  uint64_t buffers = 1;   ///< buffers that the viewer has, 1 to kMaxBuffers
+  bool in_order = false;  ///< false: of the frames that wait for this viewer, send only the newest
   bool damaged = false;   ///< the frame could not be decoded
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("frame", m.frame); f("buffers", m.buffers); f("in_order", m.in_order);

@@ -1,5 +1,5 @@
-// Messages about tiles of depth images (surfaces, Julia sets), or of pictures: their leases, what samplers fetch for
-// them and send.
+// Messages about tiles of depth images (surfaces, Julia sets), or of pictures: their leases, the data that samplers
+// fetch for them, and the results.
 #pragma once
 
 #include <map>
@@ -27,13 +27,13 @@ struct ViewRequest {
   InstanceId viewer;
   RequestId request;
   geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
-  Moments moments;          ///< requested_s; the master goes on
+  Moments moments;          ///< requested_s is set; the master adds the others
   uint64_t buffers = 0;     ///< at most kMaxBuffers
-  double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0: of
-                            ///< one of camera's pixels
-  std::string wall;           ///< SwapReady::wall of a viewer that presents with others; empty: it does not
-  uint64_t wall_viewers = 0;  ///< that the wall has, at most kMaxWallViewers
-  uint64_t ask = 0;           ///< Swap::ask: views of the same are of one head; 0: of the viewer's own
+  double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0:
+                            ///< width\nof one of camera's pixels
+  std::string wall;           ///< SwapReady::wall of a viewer that presents with others; empty: it presents alone
+  uint64_t wall_viewers = 0;  ///< viewers that the wall has, at most kMaxWallViewers
+  uint64_t ask = 0;           ///< Swap::ask: views with the same number show one head's pose; 0: the viewer's own head
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("moments", m.moments);
     f("buffers", m.buffers); f("footprint", m.footprint); f("wall", m.wall); f("wall_viewers", m.wall_viewers);
@@ -43,7 +43,7 @@ struct ViewRequest {
 
 // ---- control: samplers and packer (DEALER) <-> master (ROUTER) -----------------------------------------------------
 
-/// Sampler -> master: one tile, please, as soon as there is one. Samplers of a volume ask for their next frame with it.
+/// Sampler -> master: send one tile as soon as there is one. Samplers of a volume ask for their next frame with it.
 struct LeaseRequest {
   static constexpr std::string_view kName = "lease_request";
   InstanceId sampler;
@@ -56,20 +56,20 @@ struct Lease {
   LeaseId lease;
   FrameId frame;
   EpochId epoch;
-  InstanceId viewer;          ///< who asked
-  RequestId request;          ///< which of its requests
+  InstanceId viewer;          ///< viewer that asked
+  RequestId request;          ///< number of its request
   uint64_t tile = 0;          ///< its number in the frame; a tile that is leased anew keeps it
   uint64_t step = 1;          ///< the frame has every step-th pixel of every step-th row (geometry::subsample)
   uint64_t block = 0, blocks_in_frame = 0;  ///< the packer packs and publishes all tiles of a block as one
-  geometry::Camera camera;    ///< of the whole frame
+  geometry::Camera camera;    ///< camera of the whole frame
   geometry::Rect rect;        ///< the tile in it
   geometry::Rect block_rect;  ///< the block in it; the tile lies in the block
-  bool extra = false;         ///< of rays beyond what the view asked for: it completes no update
-  uint64_t rays = 0;          ///< to be cast: those of the mask; without one all of the rectangle
+  bool extra = false;         ///< rays beyond those that the view asked for: the tile completes no update
+  uint64_t rays = 0;          ///< rays to cast: one for each pixel of mask; without a mask, of rect
   std::vector<uint32_t> mask; ///< codec::encode_mask, of rect's size; empty: all pixels. Samplers do not send it back
-  double footprint = 0;       ///< as ViewRequest::footprint; 0: of one of camera's pixels, over step
-  Moments moments;            ///< as far as the lease; a sampler sends it back with its own
-  InstanceId master;          ///< which numbers leases and frames
+  double footprint = 0;       ///< as ViewRequest::footprint; 0: width of one of camera's pixels, over step
+  Moments moments;            ///< up to the lease; a sampler sends it back with its own
+  InstanceId master;          ///< master that numbers leases and frames
   std::vector<uint32_t> seal; ///< kSealWords numbers, of this master and for this sampler (lease_seal.h)
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request);
@@ -80,7 +80,7 @@ struct Lease {
   }
 };
 
-/// Sampler -> master: still fetching what this lease needs; do not give it to another yet.
+/// Sampler -> master: I still fetch data that this lease needs; do not give it to another sampler yet.
 struct LeaseExtend {
   static constexpr std::string_view kName = "lease_extend";
   InstanceId sampler;
@@ -88,22 +88,22 @@ struct LeaseExtend {
   template <class F> static void fields(F& f, auto& m) { f("sampler", m.sampler); f("lease", m.lease); }
 };
 
-/// Packer -> master: the packer has this tile, or this slab of a volume's frame. Times tell who did what when.
+/// Packer -> master: the packer has this tile, or this slab of a volume's frame. `moments` has the time of each step.
 struct TileDone {
   static constexpr std::string_view kName = "tile_done";
   FrameId frame;
   uint64_t tile = 0;
   LeaseId lease;
   InstanceId sampler;
-  RequestId request;                           ///< Lease::request; 0 where a frame serves several viewers
+  RequestId request;                           ///< Lease::request; 0 if a frame serves several viewers
   uint64_t step = 1;                           ///< Lease::step
   bool extra = false;                          ///< Lease::extra
   uint64_t rays = 0;                           ///< Lease::rays
   geometry::Rect rect;                         ///< Lease::rect
   uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
-  uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
-  /// How far what was published may be from what was sampled: depth, m; angles of normals, degrees; each channel of
-  /// colour, of 255. 0: it is exact.
+  uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< bytes of the encoded tile as received, as published
+  /// Largest difference between the published and the sampled points: depth, m; angles of normals, degrees; each
+  /// channel of colour, in steps of 255. 0: exact.
   double depth_error_m = 0, normal_error_deg = 0, colour_error = 0;
   Moments moments;
   template <class F> static void fields(F& f, auto& m) {
@@ -116,8 +116,8 @@ struct TileDone {
   }
 };
 
-/// Packer -> master: a tile, or a slab of a volume's frame, that was leased came and cannot be used. Whoever sampled it
-/// made it wrong, or the frame is: the master does not lease it for ever.
+/// Packer -> master: a leased tile, or a slab of a volume's frame, came and cannot be used. Its sampler made it wrong,
+/// or the frame is wrong: the master must not lease it for ever.
 struct TileRefused {
   static constexpr std::string_view kName = "tile_refused";
   FrameId frame;
@@ -135,20 +135,20 @@ struct TileRefused {
 /// Master -> packer: which rays of this view does the model lack?
 struct PlanRequest {
   static constexpr std::string_view kName = "plan_request";
-  FrameId frame;            ///< that its tiles will be of
+  FrameId frame;            ///< frame that its tiles will belong to
   EpochId epoch;
-  InstanceId viewer;        ///< who asked,
-  RequestId request;        ///< and with which request
-  geometry::Camera camera;  ///< of the view
-  bool extra = false;       ///< the view has been planned: which rays beyond it are worth casting, from where?
-  uint64_t round = 0;       ///< extra: how many such questions there were before about this viewer's views
-  bool still = false;       ///< the viewer's view before was seen by the same camera
+  InstanceId viewer;        ///< viewer that asked
+  RequestId request;        ///< number of its request
+  geometry::Camera camera;  ///< camera of the view
+  bool extra = false;       ///< the view itself is planned already: which further rays are worth casting, from where?
+  uint64_t round = 0;       ///< extra: number of earlier questions of this kind about this viewer's views
+  bool still = false;       ///< the viewer's previous view had the same camera
   uint64_t tile_size = 256; ///< no tile has longer sides
   uint64_t tile_rays = 0;   ///< a tile that is longer than 32 pixels has no more rays; 0: no limit
-  /// extra: all tiles together have about as many at most. Else: as many rays, about, may refine surfaces that the
-  /// model shows too coarsely; others wait for later views. 0: no limit.
+  /// extra: upper limit of all rays together, about. Else: limit, about, of rays that refine surfaces which the
+  /// model shows too coarsely; other such surfaces wait for later views. 0: no limit.
   uint64_t most_rays = 0;
-  Moments moments;          ///< as far as the question
+  Moments moments;          ///< up to the question
   template <class F> static void fields(F& f, auto& m) {
     f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request); f("camera", m.camera);
     f("extra", m.extra); f("round", m.round); f("still", m.still); f("tile_size", m.tile_size);
@@ -156,18 +156,18 @@ struct PlanRequest {
   }
 };
 
-/// Packer -> master: the tiles of that frame. Without any the frame is over; of a view the packer has published that
-/// its update is complete.
+/// Packer -> master: the tiles of that frame. Without tiles the frame is over, and the packer has published that the
+/// view's update is complete.
 struct Plan {
   static constexpr std::string_view kName = "plan";
   static constexpr bool kBulk = true;
   FrameId frame;
   EpochId epoch;
-  geometry::Camera camera;       ///< of the tiles: the request's; of extra rays another one, finer or from beside
-  bool full = false;             ///< too little is known: all pixels are to be sampled, as if nobody had planned
+  geometry::Camera camera;       ///< camera of the tiles: the request's; for extra rays finer, or from beside
+  bool full = false;             ///< the model knows too little: sample all pixels, as without a plan
   std::vector<uint32_t> tiles;   ///< kPlanNumbers a tile: x, y, width, height, rays, words of its mask; most
                                  ///< urgent first; no two overlap
-  std::vector<uint32_t> masks;   ///< of all tiles, one behind the other (codec::encode_mask); 0 words: all pixels
+  std::vector<uint32_t> masks;   ///< masks of all tiles, one behind the other (codec::encode_mask); 0 words: no mask
   std::map<std::string, double> figures;  ///< for the record: rays.nothing, rays.sparse, rays.edge, rays.stale,
                                           ///< rays.validation, rays.refinement, rays.cell, pixels.*, plan_ms
   template <class F> static void fields(F& f, auto& m) {
@@ -176,8 +176,8 @@ struct Plan {
   }
 };
 
-/// Master -> packer: no more tiles of this frame come, because a newer view of its viewer overtook it. What is in the
-/// packer of it stays; the packer publishes that its update is over.
+/// Master -> packer: no more tiles of this frame come, because a newer view of its viewer overtook it. The packer keeps
+/// the tiles that it has, and publishes that the update is over.
 struct FrameEnd {
   static constexpr std::string_view kName = "frame_end";
   FrameId frame;
@@ -185,8 +185,8 @@ struct FrameEnd {
   InstanceId viewer;
   RequestId request;
   uint64_t tiles = 0;       ///< Lease::blocks_in_frame
-  geometry::Camera camera;  ///< of the frame
-  Moments moments;          ///< of the view, until it was planned
+  geometry::Camera camera;  ///< camera of the frame
+  Moments moments;          ///< moments of the view, until it was planned
   template <class F> static void fields(F& f, auto& m) {
     f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request); f("tiles", m.tiles);
     f("camera", m.camera); f("moments", m.moments);
@@ -195,8 +195,8 @@ struct FrameEnd {
 
 // ---- blocks of a mesh: sampler (DEALER) <-> data (ROUTER) ----------------------------------------------------------
 
-/// array: what the mesh is coloured by in this epoch (scene::Colouring::array): its chunks hold that array's values in
-/// place of colours; empty: the file's own colours. A data server that does not have it does not answer.
+/// array: the array that colours the mesh in this epoch (scene::Colouring::array): the chunks hold that array's values
+/// in place of colours; empty: the file's own colours. A data server that does not have it does not answer.
 struct ChunkListRequest {
   static constexpr std::string_view kName = "chunk_list_request";
   EpochId epoch;
@@ -251,15 +251,15 @@ struct PictureTile {
   static constexpr std::string_view kName = "picture_tile";
   static constexpr bool kBulk = true;
   InstanceId sampler;
-  Lease lease;  ///< as leased, with moments as far as the encoded tile
+  Lease lease;  ///< as leased, with moments up to the encoded tile
   Bytes image;  ///< JPEG, of lease.rect's size
   template <class F> static void fields(F& f, auto& m) {
     f("sampler", m.sampler); f("lease", m.lease); f("image", m.image, kMaxBulkBytes);
   }
 };
 
-/// Packer -> the viewer that asked: a tile of its view. Tiles come as they were drawn; with the last one the picture is
-/// complete.
+/// Packer -> the viewer that asked: a tile of its view. Tiles come as soon as they are drawn; the last one completes
+/// the picture.
 struct Picture {
   static constexpr std::string_view kName = "picture";
   static constexpr bool kBulk = true;
@@ -269,9 +269,9 @@ struct Picture {
   InstanceId viewer;
   RequestId request;
   uint64_t tile = 0, tiles_in_frame = 0;
-  geometry::Camera camera;  ///< of the whole view, as requested
+  geometry::Camera camera;  ///< camera of the whole view, as requested
   geometry::Rect rect;      ///< the tile in it
-  Moments moments;          ///< of the tile, until it was published
+  Moments moments;          ///< moments of the tile, until it was published
   Bytes image;              ///< JPEG, of rect's size
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer); f("request", m.request);

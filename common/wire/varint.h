@@ -19,7 +19,7 @@ inline void put_varint(std::string& out, uint64_t v) {
 inline uint64_t fold(int64_t v) { return (static_cast<uint64_t>(v) << 1) ^ static_cast<uint64_t>(v >> 63); }
 inline int64_t unfold(uint64_t v) { return static_cast<int64_t>(v >> 1) ^ -static_cast<int64_t>(v & 1); }
 
-/// Takes numbers from bytes. After the first that is not there or too long it has failed, and all are 0.
+/// Takes numbers from bytes. It fails at the first number that is missing or too long; from then on all numbers are 0.
 class VarintSource {
  public:
   explicit VarintSource(Bytes bytes) : bytes_(bytes) {}
@@ -32,7 +32,7 @@ class VarintSource {
     bytes_ = bytes_.subspan(1);
     return next;
   }
-  /// most: bytes, at most kMostVarint.
+  /// most: upper limit of the number's bytes, at most kMostVarint.
   uint64_t number(unsigned most) {
     uint64_t v = 0;
     for (unsigned i = 0; i < most; ++i) {

@@ -22,15 +22,16 @@ namespace telesplat::net {
 
 namespace {
 
-constexpr size_t kMostEnded = 4096;  // before they are judged, whatever may still come of them
+constexpr size_t kMostEnded = 4096;  // ended connections; above, all are judged at once, though messages may still
+                                     // come
 constexpr double kLatePeriod_s = 0.1;
-constexpr uint64_t kNobodyKnows = ~uint64_t(0);  // not over TCP
+constexpr uint64_t kNobodyKnows = ~uint64_t(0);  // not a TCP connection
 
 struct Passed {
-  uint64_t taken = kNobodyKnows, came = kNobodyKnows;  // bytes that the other machine has, and that this one has
+  uint64_t taken = kNobodyKnows, came = kNobodyKnows;  // bytes that the other machine, and this one, received
 };
 
-// Where the number is of another file, it is told nothing, or too little: who is hung up on is looked at again.
+// If fd is another file's by now, the kernel reports none or too few bytes. shut_down() checks again before it acts.
 Passed passed(int fd) {
   tcp_info about{};
   socklen_t size = sizeof about;
@@ -44,9 +45,9 @@ constexpr int kFailed =
 
 }  // namespace
 
-// Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too much
-// are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed handshake is
-// certain to be told.
+// Only a monitor sees peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame
+// that claims too much. ZeroMQ reads unknown bytes as its oldest protocol, so that it may not even report a failed
+// handshake.
 Connections::Connections(zmq::context_t& context, zmq::socket_t& socket, Options options)
     : options_(std::move(options)),
       monitor_(context, socket, ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED | (options_.guarded ? kFailed : 0)),
@@ -75,7 +76,7 @@ void Connections::drain() {
   while (const auto event = monitor_.next()) take(*event, now_s);
 }
 
-// What ends a connection is told by one thread, at once: that its handshake broke off, and then that it ended.
+// One thread of ZeroMQ reports a connection's end, without a pause: first that its handshake broke off, then the end.
 void Connections::take(const Monitor::Event& event, double now_s) {
   if (event.what & kFailed) {
     ++failed_unseen_;
@@ -97,7 +98,7 @@ void Connections::ended(int fd) {
     ended_.push_back(it->second);
   } else {
     --refused_open_;
-    if (broke_off_) --failed_unseen_, --counts_.keys_refused;  // by us
+    if (broke_off_) --failed_unseen_, --counts_.keys_refused;  // this process broke it off
   }
   open_.erase(it);
   if (ended_.size() + to_judge_.size() < kMostEnded) return;
@@ -115,8 +116,8 @@ bool Connections::may_shake_hands(const Name& name, double now_s) const {
   return !c.has_spoken && now_s - c.accepted_s <= kHandshake_s;
 }
 
-// The one that came first of those who may still be about to say who they are, so that whoever holds places without a
-// word does not keep others out; where there is none, the one that came last.
+// Hangs up on the oldest connection that may still be shaking hands, so that silent peers cannot keep others out; if
+// there is none, on the newest of all.
 void Connections::hang_up_on_one() {
   const double now_s = monotonic_s();
   while (!young_.empty()) {
@@ -168,13 +169,13 @@ void Connections::hang_up_on(int fd) {
     refuse({fd, found->second.number}, "a connection is hung up on for what it said", End::kAtOnce);
 }
 
-// The number may be of another file by now. ZeroMQ tells of an end before it closes the file: as long as nothing was
-// told after the number was looked at, it was the connection's.
+// The descriptor may be another file's by now. ZeroMQ reports an end before it closes the file: if no end was reported
+// after the descriptor was duplicated, the duplicate is the connection's.
 bool Connections::shut_down(const Name& name, End end) {
   const bool looks = looks_at(name.first);
   drain();
   const bool there = is_open(name);
-  // Whoever sends faster than it is read is never found to have ended: all that it sent would be read first.
+  // shutdown() alone would not end a peer that sends fast: ZeroMQ first reads all bytes that came.
   const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
   const bool ended = there && looks && end == End::kAtOnce && ::connect(spare_, &nobody, sizeof nobody) == 0;
   if (there && looks && !ended) shutdown(spare_, SHUT_RDWR);
@@ -212,14 +213,14 @@ size_t Connections::hang_up_on_late(uint64_t bytes) {
 
 void Connections::spoke(int fd, uint64_t bytes, std::string_view user) {
   const std::lock_guard lock(mutex_);
-  drain();  // its acceptance was told before its message came
+  drain();  // ZeroMQ reports the acceptance before it delivers the message
   const auto it = open_.find(fd);
   for (auto* gone : {&to_judge_, &ended_}) {
     const auto found =
         std::find_if(gone->begin(), gone->end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
     if (found == gone->end()) continue;
     found->has_spoken = true;
-    // It is of the one that came since by this number, if so much has come of that one.
+    // Counts the message for the newer connection with this descriptor, if that one received as many bytes.
     if (it == open_.end() || passed(fd).came < it->second.read + bytes) return;
     break;
   }
@@ -261,13 +262,13 @@ uint64_t Connections::judge() {
   return out;
 }
 
-// Everyone of ours speaks as soon as it is connected, but for samplers, who push no tile before they have one.
+// All processes of ours speak as soon as they are connected, except samplers, which push only when they have a tile.
 uint64_t Connections::silent_among(const std::vector<Connection>& gone) {
   uint64_t out = 0;
   for (const Connection& c : gone) {
     if (c.has_spoken || monotonic_s() - c.accepted_s > options_.quiet_s) continue;
     if (failed_unseen_ > 0)
-      --failed_unseen_;  // counted as not let in
+      --failed_unseen_;  // counted in keys_refused
     else
       ++out;
   }
@@ -285,11 +286,11 @@ Connections::Counts Connections::counts() {
 namespace {
 
 constexpr int kUntold_ms = 500;
-constexpr int kUnread_ms = 50;  // what a fast network brings meanwhile is read into memory, whoever sends it
+constexpr int kUnread_ms = 50;  // bytes of a fast network are read into memory meanwhile, from any sender
 
 }  // namespace
 
-// Signals are for the threads that wait for them.
+// Blocks all signals in the new thread: they go to the threads that wait for them.
 Lookout::Lookout() : woken_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   sigset_t all, before;
   sigfillset(&all);
@@ -343,7 +344,7 @@ void Lookout::loop() {
       items.assign(1, {woken_, POLLIN, 0});
       for (const auto& [connections, descriptor] : watched_) items.push_back({descriptor, POLLIN, 0});
     }
-    // A connection that the owner's thread was told of first does not wake this one.
+    // An event that the owner's thread took first does not wake this poll: hence the timeouts.
     ::poll(items.data(), items.size(), anybody ? kUnread_ms : kUntold_ms);
     uint64_t count = 0;
     [[maybe_unused]] const ssize_t read = ::read(woken_, &count, sizeof count);

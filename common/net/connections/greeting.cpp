@@ -15,7 +15,7 @@
 namespace telesplat::net {
 namespace {
 
-// A greeting's signature and major version: the other side sends the rest of its own for them, and waits for ours.
+// A greeting's signature and major version: the other side answers them with the rest of its own, and waits for ours.
 constexpr std::string_view kBegin("\xff\0\0\0\0\0\0\0\1\x7f\3", 11);
 constexpr size_t kMechanismAt = 12, kMechanismEnd = 32;
 
@@ -33,7 +33,7 @@ std::string mechanism_at(const std::string& endpoint) {
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> all(found, freeaddrinfo);
   const Descriptor fd(::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const timeval patience{0, 500'000};
-  setsockopt(fd.get(), SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);  // of connect(), too
+  setsockopt(fd.get(), SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);  // limits connect(), too
   setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   if (::connect(fd.get(), found->ai_addr, found->ai_addrlen) != 0) return {};
   if (::send(fd.get(), kBegin.data(), kBegin.size(), MSG_NOSIGNAL) != ssize_t(kBegin.size())) return {};

@@ -1,4 +1,4 @@
-// What a peer says of itself before anybody is let in.
+// Reads the greeting that a ZeroMQ peer sends before it lets anyone in.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace telesplat::net {
 
-/// Connects to tcp://HOST:PORT, and reads which security mechanism its greeting names (ZMTP 3, RFC 23): "NULL" or
-/// "CURVE". Empty: no peer that speaks so names one within half a second.
+/// Connects to tcp://HOST:PORT, and reads the security mechanism in its greeting (ZMTP 3, RFC 23): "NULL" or "CURVE".
+/// Empty: no ZMTP peer sent one within half a second.
 std::string mechanism_at(const std::string& endpoint);
 
-/// Whether this machine reaches itself at 127.0.0.1. Error: why not, in the system's words.
+/// Checks that this machine reaches itself at 127.0.0.1. Error: the system's reason why not.
 Status check_loopback();
 
 }  // namespace telesplat::net

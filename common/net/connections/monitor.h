@@ -1,4 +1,4 @@
-// What ZeroMQ tells of a socket's connections. Private to this library.
+// Events that ZeroMQ reports about a socket's connections. Private to this library.
 #pragma once
 
 #include <zmq.hpp>
@@ -13,10 +13,10 @@
 
 namespace telesplat::net {
 
-// Calls of ZeroMQ while signals come. Private to this library.
+// Calls of ZeroMQ that signals may interrupt. Private to this library.
 
-/// A call of ZeroMQ that a signal may interrupt, until it is done: given up between two parts of a message it would
-/// tear the message. It does not wait.
+/// Repeats a call of ZeroMQ, one that does not wait, until no signal interrupts it: giving up between two parts of a
+/// message would tear the message.
 template <class Call>
 auto undisturbed(const Call& call) {
   for (;;) {
@@ -28,12 +28,12 @@ auto undisturbed(const Call& call) {
   }
 }
 
-// Connections over which nothing comes any more.
+// Detection of dead connections.
 
-/// To be called before a socket binds or connects: TCP looks after its connections. One whose other end does not
-/// answer for about patience_s is taken for broken; a process that stands still answers, its kernel does.
-/// ZeroMQ's own heartbeats are off. ZeroMQ 4.3 ends the process if it is time for one over a connection that broke
-/// while what came over it waited to be read (libzmq/issues/4841); and what comes, and when it breaks, is up to others.
+/// To be called before a socket binds or connects: TCP keeps watch over its connections. One whose other end does not
+/// answer for about patience_s counts as broken; the kernel of a process that stands still answers for it. ZeroMQ's own
+/// heartbeats are off: ZeroMQ 4.3 ends the process if one is due over a connection that broke while bytes of it waited
+/// to be read (libzmq/issues/4841); and peers decide about both.
 inline void look_after(zmq::socket_t& socket, double patience_s) {
   constexpr int kIdle_s = 5, kApart_s = 5;
   socket.set(zmq::sockopt::heartbeat_ivl, 0);
@@ -44,15 +44,15 @@ inline void look_after(zmq::socket_t& socket, double patience_s) {
   socket.set(zmq::sockopt::tcp_maxrt, static_cast<int>(patience_s * 1e3));
 }
 
-/// Several threads may use it, one at a time; `socket` must outlive it.
+/// Reads a socket's events. Several threads may use it, one at a time; `socket` must outlive it.
 class Monitor {
  public:
   struct Event {
     uint16_t what = 0;  ///< ZMQ_EVENT_ACCEPTED and so on
-    int32_t value = 0;  ///< for most, a file descriptor
+    int32_t value = 0;  ///< for most events, a file descriptor
   };
 
-  /// events: those that are told of, together.
+  /// events: those to report, combined by "or".
   Monitor(zmq::context_t& context, zmq::socket_t& socket, int events)
       : watched_(socket.handle()), told_(context, zmq::socket_type::pair) {
     static std::atomic<int> counter{0};
@@ -61,12 +61,12 @@ class Monitor {
     told_.set(zmq::sockopt::rcvhwm, 0);  // a queue that is full would stop ZeroMQ's thread
     if (zmq_socket_monitor(watched_, address.c_str(), events) == 0) told_.connect(address);
   }
-  /// ZeroMQ's thread must find someone who takes its events until it stops to make them.
+  /// Stops ZeroMQ from making events while told_ can still take them.
   ~Monitor() { zmq_socket_monitor(watched_, nullptr, 0); }
   Monitor(const Monitor&) = delete;
   Monitor& operator=(const Monitor&) = delete;
 
-  /// Without waiting.
+  /// Returns the next event without waiting.
   std::optional<Event> next() {
     zmq::message_t event, address;
     while (undisturbed([&] { return told_.recv(event, zmq::recv_flags::dontwait); })) {
@@ -80,7 +80,7 @@ class Monitor {
     }
     return std::nullopt;
   }
-  /// Becomes readable when next() has something, once it had nothing.
+  /// Becomes readable after next() returned nothing and an event came.
   int descriptor() { return told_.get(zmq::sockopt::fd); }
 
  private:

@@ -7,7 +7,7 @@ namespace telesplat::net {
 namespace {
 
 constexpr size_t kMostBuckets = 4096;
-constexpr double kBurst_s = 2;  // of the rate
+constexpr double kBurst_s = 2;  // burst, in seconds of the rate
 constexpr double kIdle_s = 5;
 
 }  // namespace
@@ -16,7 +16,7 @@ bool PeerRates::admit(const std::string& peer, double now_s) {
   auto bucket = peers_.find(peer);
   if (bucket == peers_.end()) {
     if (peers_.size() >= kMostBuckets) forget_idle(now_s);
-    // Where there are that many, the rest has one together.
+    // Beyond kMostBuckets, all further peers share one bucket.
     const std::string& whose = peers_.size() < kMostBuckets ? peer : std::string();
     bucket = peers_.try_emplace(whose, rate_, kBurst_s * rate_).first;
   }
@@ -33,7 +33,7 @@ void PeerRates::forget_idle(double now_s) {
 
 namespace {
 
-constexpr double kForgets_s = 1;  // so often it looks for those who owe nothing
+constexpr double kForgets_s = 1;  // forgets payers without debt this often
 
 }  // namespace
 

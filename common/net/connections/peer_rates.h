@@ -1,4 +1,4 @@
-// How many messages a second each peer may send: who floods a socket is no other's business. No sockets, no clocks.
+// Limits the messages a second of each peer, so that a flood of one does not harm the others. No sockets, no clocks.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace telesplat::net {
 
 class PeerRates {
  public:
-  /// rate: messages of a peer a second; two seconds' worth of them at once after a quiet time, since a process that was
-  /// stopped finds as many waiting.
+  /// rate: messages of a peer a second. After a quiet time a peer may send two seconds' worth at once: a process that
+  /// was stopped finds that many waiting.
   explicit PeerRates(double rate) : rate_(rate) {}
 
-  /// One more message of this peer (Message::peer) may be looked at; else it is counted.
+  /// True if one more message of this peer (Message::peer) may be handled; false: counts it as refused.
   bool admit(const std::string& peer, double now_s);
   uint64_t refused() const { return refused_; }
 
@@ -29,11 +29,11 @@ class PeerRates {
   double forgot_s_ = -1e300;
 };
 
-// How much of a process' time each guest's messages may take: a limit of messages alone lets large ones through. No
-// sockets, no clocks.
+// Limits the share of a process' time that each guest's messages take: a limit of the number alone lets large ones
+// through. No sockets, no clocks.
 
-/// Who a message counts to: the owner of a viewer's key; where there are no keys its connection. nullptr: a key of
-/// another role, whose owner may end the session anyway.
+/// The payer of a message: the owner of a viewer's key; without keys its connection. nullptr: a key of another role,
+/// whose owner may end the session anyway.
 inline const std::string* payer(const Message& message) {
   if (!message.role) return &message.peer;
   return *message.role == Role::kViewer ? &message.user : nullptr;
@@ -41,17 +41,17 @@ inline const std::string* payer(const Message& message) {
 
 class WorkShares {
  public:
-  static constexpr double kShare = 0.2;    ///< of the time
-  static constexpr double kBurst_s = 0.5;  ///< at once after a quiet time
+  static constexpr double kShare = 0.2;    ///< share of the time
+  static constexpr double kBurst_s = 0.5;  ///< seconds at once after a quiet time
 
-  /// One more message of theirs may be handled; else it is counted.
+  /// True if one more message of this payer may be handled; false: counts it as refused.
   bool admit(const std::string& payer, double now_s);
-  /// What handling one took. It may take more than is left: then they wait for longer.
+  /// Adds the time that one message took. It may exceed the rest of the share: then the payer waits for longer.
   void worked(const std::string& payer, double seconds, double now_s);
   uint64_t refused() const { return refused_; }
 
  private:
-  // Those who have all of their time left are not kept.
+  // Time that a payer used beyond its share. Payers without such a debt are not stored.
   struct Owed {
     double seconds = 0, at_s = 0;
   };

@@ -1,5 +1,5 @@
-// How many bytes wait to be sent to whom: ZeroMQ's own limits count messages, which may have a byte or hundreds of
-// megabytes. No sockets.
+// Counts the bytes that wait to be sent to each peer: ZeroMQ's own limits count messages, which may have a byte or
+// hundreds of megabytes. No sockets.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace telesplat::net {
 class QueuedBytes {
  public:
   using Count = std::shared_ptr<std::atomic<uint64_t>>;
-  /// A message on its way: its bytes are counted until it is gone, in whatever thread.
+  /// A message on its way: its bytes count until the ticket is destroyed, in any thread.
   class Ticket {
    public:
     Ticket() = default;
@@ -36,10 +36,10 @@ class QueuedBytes {
     uint64_t bytes_ = 0;
   };
 
-  /// most: to a peer, in bytes. Where twice as much waits for all together, each may have its part of an eighth of it.
+  /// most: bytes for one peer. Above twice that for all together, the waiting peers share an eighth of it.
   explicit QueuedBytes(uint64_t most) : most_(most) {}
 
-  /// One more message for this peer. A peer for whom nothing waits may have one of any size.
+  /// True if one more message fits for this peer. A peer without queued bytes may have one of any size.
   bool has_room(std::string_view peer, uint64_t bytes) {
     const auto found = peers_.find(std::string(peer));
     return found == peers_.end() || fits(*found->second, bytes);
@@ -58,7 +58,7 @@ class QueuedBytes {
   uint64_t most() const { return most_; }
 
  private:
-  static constexpr uint64_t kReserve = 8;  // an eighth of most_ is shared by those who have least
+  static constexpr uint64_t kReserve = 8;  // the waiting peers share most_ / kReserve when the total is high
 
   bool fits(uint64_t queued, uint64_t bytes) const {
     if (queued == 0) return true;
@@ -73,7 +73,7 @@ class QueuedBytes {
   }
 
   const uint64_t most_;
-  size_t most_peers_ = 256;                       // then those for whom nothing waits are forgotten
+  size_t most_peers_ = 256;                       // above it, peers without queued bytes are forgotten
   std::unordered_map<std::string, Count> peers_;  // by routing id
   const Count of_all_ = std::make_shared<std::atomic<uint64_t>>(0);
 };

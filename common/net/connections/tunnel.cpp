@@ -27,10 +27,10 @@
 namespace telesplat::net {
 namespace {
 
-constexpr double kDial_s = 30;     // to the proxy, and from there to the target
-constexpr double kFarewell_s = 2;  // a closed socket that has something to say connects within this time
+constexpr double kDial_s = 30;     // to reach the proxy, and from there the target
+constexpr double kFarewell_s = 2;  // a closed socket with unsent messages connects within this time
 constexpr size_t kBuffer = 1 << 16;
-constexpr double kNoFiles_s = 0.1;  // until one may be free
+constexpr double kNoFiles_s = 0.1;  // wait until a descriptor may be free
 
 struct Place {
   std::string host, port;
@@ -48,7 +48,7 @@ std::optional<Place> place_of(const std::string& text) {
   return Place{host, port};
 }
 
-// RFC 1928, section 4: CONNECT to an address, or to a name that the proxy looks up.
+// SOCKS5 request (RFC 1928, section 4): CONNECT to an address, or to a name that the proxy looks up.
 std::string request_for(const Place& target) {
   std::string out{5, 1, 0};
   std::array<char, 16> address{};
@@ -63,7 +63,7 @@ std::string request_for(const Place& target) {
   return out;
 }
 
-// As look_after() does for ZeroMQ's own: who has not acknowledged anything for patience_s is gone.
+// Same as look_after() for ZeroMQ's own connections: a peer that acknowledges nothing for patience_s is gone.
 void watch_over(int fd, double patience_s) {
   constexpr int kIdle_s = 5, kApart_s = 5;
   const int options[][3]{{SOL_SOCKET, SO_KEEPALIVE, 1},
@@ -76,13 +76,13 @@ void watch_over(int fd, double patience_s) {
 
 bool again(ssize_t n) { return n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR); }
 
-/// What passes one way.
+/// One direction of a tunnel, with its buffer.
 struct Way {
   Way(int source, int sink) : from(source), to(sink) {}
   const int from, to;
   std::array<char, kBuffer> bytes{};
   size_t begin = 0, end = 0;
-  bool ended = false;  // at its source
+  bool ended = false;  // the source sends no more
 
   bool empty() const { return begin == end; }
   bool over() const { return ended && empty(); }
@@ -123,14 +123,14 @@ class Tunnel::Worker {
       if (remote.valid())
         pass(local.get(), remote.get());
       else
-        ++tunnel_.failed_;  // before the socket hears of it
+        ++tunnel_.failed_;  // counted before the socket notices
       if (tunnel_.retired_) break;
     }
     tunnel_.over_ = true;
   }
 
  private:
-  // Waits for one of them, or for stop_. False: stop_, or the time is over.
+  // Waits for one of the descriptors, or for stop_. False: stop_, or the time is over.
   bool wait(std::array<pollfd, 2> of, double until_s) {
     for (;;) {
       const double left_s = until_s - monotonic_s();
@@ -147,7 +147,7 @@ class Tunnel::Worker {
   }
   bool wait(int fd, short events, double until_s) { return wait({{{fd, events, 0}, {-1, 0, 0}}}, until_s); }
 
-  // The socket's next connection.
+  // Accepts the socket's next connection; none: the tunnel ends.
   Descriptor next() {
     std::optional<double> farewell_s;
     for (;;) {
@@ -188,7 +188,7 @@ class Tunnel::Worker {
     return false;
   }
 
-  // To the target, through the proxy.
+  // Connects to the target, through the proxy.
   Descriptor dial() {
     Descriptor remote = connected();
     if (!remote.valid()) return remote;
@@ -202,7 +202,7 @@ class Tunnel::Worker {
     const auto hear = [&](size_t bytes) { return receive(remote.get(), bytes, until_s); };
     using namespace std::string_view_literals;
     if (!say("\5\1\0"sv) || hear(2) != "\5\0"sv || !say(request_for(target_))) return Descriptor();
-    const std::string answer = hear(4);  // where the proxy listens follows, which is of no use
+    const std::string answer = hear(4);  // the address of the proxy follows, which is not needed
     if (answer.size() != 4 || answer[0] != 5 || answer[1] != 0) return Descriptor();
     const size_t length = answer[3] == 1 ? 4 : answer[3] == 4 ? 16 : 0;
     const std::string named = length ? "" : hear(1);
@@ -210,7 +210,7 @@ class Tunnel::Worker {
     if (hear(rest).size() != rest) return Descriptor();
     return remote;
   }
-  // Fewer: it has ended, or the time is over.
+  // Returns fewer bytes if the connection has ended or the time is over.
   std::string receive(int fd, size_t bytes, double until_s) {
     std::string out;
     while (out.size() < bytes && wait(fd, POLLIN, until_s)) {
@@ -223,14 +223,14 @@ class Tunnel::Worker {
     return out;
   }
 
-  // Until one end has ended, and the other has what it said.
+  // Passes bytes until one end has ended, and the other has received all bytes of it.
   void pass(int local, int remote) {
     const auto out = std::make_unique<Way>(local, remote), in = std::make_unique<Way>(remote, local);
     const auto wanted = [](const Way& read, const Way& written) {
       return short((read.empty() && !read.ended ? POLLIN : 0) | (written.empty() ? 0 : POLLOUT));
     };
     while (!out->over() && !in->over()) {
-      // One of whom nothing is wanted must not wake us by having ended.
+      // Polls only ends with wanted events: otherwise one that has ended would wake this loop all the time.
       const short of_local = wanted(*out, *in), of_remote = wanted(*in, *out);
       if (!wait({{{of_local ? local : -1, of_local, 0}, {of_remote ? remote : -1, of_remote, 0}}}, 1e300)) return;
       for (Way* way : {out.get(), in.get()}) {
@@ -257,7 +257,7 @@ Result<std::unique_ptr<Tunnel>> Tunnel::open(const std::string& proxy, const std
   const std::string name = fmt::format("telesplat-{}-{:08x}{:08x}", getpid(), random(), random());
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path + 1, name.data(), name.size());  // in the namespace that has no files
+  std::memcpy(address.sun_path + 1, name.data(), name.size());  // in the namespace without files
   Descriptor listener(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const auto length = socklen_t(offsetof(sockaddr_un, sun_path) + 1 + name.size());
   if (!listener.valid() || ::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), length) != 0 ||

@@ -1,6 +1,6 @@
-// A way through a SOCKS5 proxy (RFC 1928) for one socket that connects. ZeroMQ has one of its own, whose process dies
-// (4.3.4: "Bad file descriptor") when a socket is closed whose last attempt the proxy did not take or refused: a packer
-// that is gone, or a relay, would end its viewers. Private to this library.
+// A way through a SOCKS5 proxy (RFC 1928) for one socket that connects. ZeroMQ's own support ends the process (4.3.4:
+// "Bad file descriptor") when a socket is closed whose last attempt the proxy did not take or refused: a packer or
+// relay that is gone would end its viewers. Private to this library.
 #pragma once
 
 #include <atomic>
@@ -16,17 +16,17 @@ namespace telesplat::net {
 class Tunnel {
  public:
   /// proxy, target: HOST:PORT; an IPv6 address in brackets. A proxy that acknowledges nothing for patience_s is gone.
-  /// Nobody is connected to yet. Error: what this machine refuses, or that one is no HOST:PORT.
+  /// Does not connect yet. Error: the system's refusal, or names the text that is no HOST:PORT.
   static Result<std::unique_ptr<Tunnel>> open(const std::string& proxy, const std::string& target, double patience_s);
   /// Ends connections at once.
   ~Tunnel();
 
-  /// Where the socket connects to instead, on this machine; only processes of this user are let in, one at a time.
-  /// Each connection to it becomes one to the target; it ends where that cannot be had.
+  /// Local address for the socket to connect to instead; lets in only processes of this user, one at a time. Each
+  /// connection to it becomes one to the target; it ends if the target cannot be reached.
   const std::string& endpoint() const { return endpoint_; }
-  /// Connections to the target that could not be had. Any thread.
+  /// Number of connections to the target that failed. Any thread.
   uint64_t failed() const { return failed_; }
-  /// Its socket is being closed: what it has still to say passes, and then the tunnel is over().
+  /// Its socket is being closed: passes the messages still to be sent, then becomes over().
   void retire();
   bool over() const { return over_; }
 

@@ -74,7 +74,7 @@ void HostSearch::begin() {
     found_->under_way = true;
     found_->begun_s = now_s;
   }
-  // A search cannot be broken off: nothing waits for it.
+  // A search cannot be interrupted: no thread waits for it.
   std::thread([found = found_, endpoint = endpoint_] {
     std::string problem = host_problem(endpoint);
     const std::lock_guard lock(found->mutex);

@@ -1,4 +1,4 @@
-// What a process waits for, as people are told it: in a line after some seconds, then once a minute.
+// Reports to people what a process waits for: in a line after some seconds, then once a minute.
 #pragma once
 
 #include <memory>
@@ -11,13 +11,13 @@ namespace telesplat::net {
 
 class Waiting {
  public:
-  static constexpr double kGrace_s = 3;   ///< of each thing that is waited for, before the first line about it
-  static constexpr double kEvery_s = 60;  ///< between two lines about the same
+  static constexpr double kGrace_s = 3;   ///< for each new cause, before the first line about it
+  static constexpr double kEvery_s = 60;  ///< between two lines about the same cause
 
-  /// Looks at what is waited for now: a sentence without its full stop; empty: nothing is. Returns the line that is
-  /// due.
+  /// what: what the process waits for now, a sentence without its full stop; empty: for nothing. Returns the line that
+  /// is due.
   std::optional<std::string> look(const std::string& what, double now_s);
-  /// How long it has waited, for one thing or another.
+  /// Seconds that it has waited, for one cause or another.
   double waited_s(double now_s) const { return since_s_ ? now_s - *since_s_ : 0; }
 
  private:
@@ -31,16 +31,16 @@ class Waiting {
 /// lacks; empty for none.
 std::string lacking_text(std::string_view roles);
 
-/// Why the host of tcp://HOST:PORT is not found; empty: it is, or the endpoint names none. It may take seconds.
+/// Returns why the host of tcp://HOST:PORT is not found; empty if it is, or the endpoint has no host. May take seconds.
 std::string host_problem(const std::string& endpoint);
 
-/// The same in a thread of its own.
+/// Searches like host_problem(), in a thread of its own.
 class HostSearch {
  public:
   explicit HostSearch(std::string endpoint) : endpoint_(std::move(endpoint)) {}
   /// Begins a search, unless one is under way or began less than half a minute ago.
   void begin();
-  /// What the last one found.
+  /// Result of the last finished search.
   std::string problem() const;
 
  private:

@@ -1,4 +1,4 @@
-// How a process reaches others and is reached: through which proxies, and with which keys.
+// The proxies and keys with which a process connects to others, and lets others in.
 #pragma once
 
 #include <map>
@@ -11,13 +11,13 @@
 
 namespace telesplat::net {
 
-// The proxies through which a process connects to others: a simulated link, or a real way out of a closed network.
+// The proxies through which a process connects to others: for a simulated link, or the way out of a closed network.
 
-/// SOCKS5 proxies, HOST:PORT, by the role of who is connected to; "": of all others. A process that connects to nothing
-/// through a proxy has an empty one.
+/// SOCKS5 proxies, HOST:PORT, by the role of the server; "": for all other roles. Empty: the process connects to no
+/// server through a proxy.
 class Via {
  public:
-  /// Of texts "HOST:PORT" or "ROLE=HOST:PORT". Error: which one is neither.
+  /// Reads texts "HOST:PORT" or "ROLE=HOST:PORT". Error: names the text that is neither.
   static Result<Via> parse(const std::vector<std::string>& texts);
 
   /// The proxy toward this role; empty: none.
@@ -27,24 +27,24 @@ class Via {
   std::map<std::string, std::string> proxies_;
 };
 
-/// In place of a folder of keys: there shall be none.
+/// In place of a folder of keys: run without keys.
 inline constexpr const char* kNoKeys = "none";
 
 class Access {
  public:
-  /// Without keys: nothing is encrypted, and nobody asks who it is.
+  /// Without keys: nothing is encrypted, and no peer is identified.
   Access(Via via = {}) : via_(std::move(via)) {}  // NOLINT: implicit on purpose
   Access(Via via, Keys keys) : via_(std::move(via)), keys_(std::make_shared<const Keys>(std::move(keys))) {}
 
-  /// folder: of keys; empty or kNoKeys: without keys. roles, binds: as read_keys() takes them. Error: begins with
-  /// --keys.
+  /// folder: of keys; empty or kNoKeys: without keys. roles, binds: as read_keys() takes them. Error: a text that
+  /// begins with --keys.
   static Result<Access> open(Via via, const std::string& folder, const std::vector<Role>& roles, bool binds = false);
 
   const Via& via() const { return via_; }
-  /// Without keys, others than this machine are spoken to in clear; that is warned of unless it is said to be wanted.
+  /// Allows connections in clear, which lack keys, to other machines without a warning.
   void allow_clear() { clear_allowed_ = true; }
   bool clear_allowed() const { return clear_allowed_; }
-  /// Null: none.
+  /// Null: without keys.
   const Keys* keys() const { return keys_.get(); }
 
  private:
@@ -53,9 +53,9 @@ class Access {
   bool clear_allowed_ = false;
 };
 
-/// Whose keys programs take that only ask or tell a master, the most wanted first: `telesplat ctl`, a window's panel.
+/// Roles whose keys a program may use to ask or command a master, the preferred one first: `telesplat ctl`, a panel.
 inline std::vector<Role> asking_roles() { return {Role::kOperator, Role::kViewer}; }
-/// And health checks, which run wherever a service runs.
+/// The same for health checks, which run wherever a service runs.
 inline std::vector<Role> any_role() {
   return {Role::kOperator, Role::kViewer, Role::kSampler, Role::kPacker, Role::kData, Role::kServer};
 }

@@ -53,7 +53,7 @@ Result<AllowList> AllowList::parse(std::string_view text) {
   try {
     const toml::table table = toml::parse(text);
     const toml::node* list = table.get("allowed");
-    if (!list) return out;  // nobody
+    if (!list) return out;  // lets no one in
     const toml::array* entries = list->as_array();
     if (!entries) return Error{"\"allowed\" is no list of tables"};
     for (size_t i = 0; i < entries->size(); ++i) {

@@ -1,4 +1,4 @@
-// The public keys that are let in, as the file allowed.toml of a folder of keys lists them.
+// Public keys that are let in, as listed in the file allowed.toml of a folder of keys.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace telesplat::net {
 
 /// A key that is let in.
 struct Allowed {
-  std::string name;  ///< of its owner: a role's, or a person's
+  std::string name;  ///< owner of the key: a role's name, or a person's
   Role role = Role::kViewer;
   std::string key;  ///< public
   bool operator==(const Allowed&) const = default;
@@ -22,26 +22,26 @@ class AllowList {
  public:
   static constexpr size_t kMostBytes = 1 << 20, kMost = 4096;
 
-  /// Error: no TOML; an entry without name, role or key, or with one that is none; a name or a key twice; too many.
+  /// Error: no TOML; an entry with a missing or invalid name, role or key; a name or a key twice; too many entries.
   static Result<AllowList> parse(std::string_view text);
-  /// As parse() takes it.
+  /// TOML that parse() reads.
   std::string text() const;
 
   const std::vector<Allowed>& entries() const { return entries_; }
-  /// Null: nobody is called so, or has this public key.
+  /// Null: no entry has this name, or this public key.
   const Allowed* named(std::string_view name) const;
   const Allowed* of_key(std::string_view key) const;
 
   /// Error: the name or the key is there already, or there are too many.
   Status add(Allowed entry);
-  /// False: nobody is called so.
+  /// False: no entry has this name.
   bool remove(std::string_view name);
 
  private:
   std::vector<Allowed> entries_;
 };
 
-/// Empty if it can be the name of a key, else what is wrong with it.
+/// Returns what is wrong with a name for a key; empty: it is valid.
 std::string complain_about_name(std::string_view name);
 
 }  // namespace telesplat::net

@@ -23,12 +23,12 @@ namespace telesplat::net {
 namespace {
 
 constexpr const char* kQuestions = "inproc://zeromq.zap.01";
-constexpr auto kLook = std::chrono::milliseconds(1000);  // at the list, while nobody comes
+constexpr auto kLook = std::chrono::milliseconds(1000);  // period of looks at the list, while no one comes
 constexpr size_t kMostFrames = 16, kMostAddress = 64;
-// What ZAP's answers are made of.
+// Parts of ZAP's answers.
 constexpr std::string_view kVersion = "1.0", kCurve = "CURVE", kYes = "200", kNo = "400";
 
-// What tells that a file was written anew.
+// Changes when a file is written anew.
 using Stamp = std::tuple<dev_t, ino_t, off_t, int64_t, int64_t>;
 
 Stamp stamp_of(const std::string& path) {
@@ -68,7 +68,7 @@ struct Doorkeeper::Impl {
     questions.bind(kQuestions);
   }
 
-  // Nobody is let in whose file cannot be read: it may be there to keep somebody out.
+  // Lets no one in if the file cannot be read: it may be there to keep a person out.
   Status read_list() {
     stamp = stamp_of(folder + "/" + kAllowedFile);
     visitors.clear();
@@ -107,7 +107,7 @@ struct Doorkeeper::Impl {
     return Question{frames[0], frames[1], frames[2], frames[3], frames[5], frames[6]};
   }
 
-  // Who asks; nothing: nobody who may come in, and `why`.
+  // Returns the owner of the key that a question shows; nothing, and `why`: the key is not let in.
   std::optional<Visitor> look_up(const Question& q, std::string& why) {
     if (q.version != kVersion || q.mechanism != kCurve) {
       why = "it shows no key";
@@ -130,7 +130,7 @@ struct Doorkeeper::Impl {
     if (!q) return;
     std::string why;
     std::optional<Visitor> visitor;
-    // Whoever is not answered is not let in; an answer must follow every question.
+    // ZeroMQ lets in only peers that are answered, and needs an answer to each question: so exceptions end here.
     try {
       visitor = look_up(*q, why);
     } catch (const std::exception& e) {
@@ -169,7 +169,7 @@ struct Doorkeeper::Impl {
   zmq::socket_t questions, told, tell;
   Stamp stamp;
   std::unordered_map<std::string, Allowed> visitors;  // by the bytes of their keys
-  mutable std::mutex mutex;                           // of what others ask for
+  mutable std::mutex mutex;                           // guards may_stay, which other threads read
   std::shared_ptr<const std::set<std::string>> may_stay;
   log::RateLimiter limiter;
   std::thread thread;

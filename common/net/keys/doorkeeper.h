@@ -1,5 +1,5 @@
-// Answers ZeroMQ's question who may come in (ZAP, RFC 27), on a thread of its own: whose key is on the allow-list and
-// has a role that is something at this socket. Private to this library.
+// Answers ZeroMQ's question who may come in (ZAP, RFC 27), on a thread of its own: owners of keys on the allow-list
+// whose role may send something at this socket. Private to this library.
 #pragma once
 
 #include <memory>
@@ -22,12 +22,12 @@ struct Keys;
 
 class Doorkeeper {
  public:
-  /// Binds in `context`, which must outlive it; there is one in a context. Error: the allow-list cannot be read.
+  /// Binds in `context`, which must outlive it; a context has at most one. Error: the allow-list cannot be read.
   static Result<std::unique_ptr<Doorkeeper>> open(zmq::context_t& context, const Keys& keys);
   ~Doorkeeper();
 
-  /// Who may be in now, as text_of(Visitor), by the newest list that could be read: it is looked at once a second. Any
-  /// thread; the same pointer as long as the list has not changed.
+  /// Visitors that may be in now, as text_of(Visitor), by the newest list that could be read: checked once a second.
+  /// Any thread; the same pointer as long as the list has not changed.
   std::shared_ptr<const std::set<std::string>> may_stay() const;
 
  private:
@@ -36,18 +36,18 @@ class Doorkeeper {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Who sent a message, as the doorkeeper wrote it into what ZeroMQ knows of the connection.
+/// Sender of a message, as the doorkeeper wrote it into ZeroMQ's data about the connection.
 struct Visitor {
   Role role = Role::kViewer;
   std::string_view name, key;
 };
 std::string text_of(const Visitor& visitor);
-/// Nothing: it is no such text.
+/// Nothing: `text` does not come from text_of().
 std::optional<Visitor> visitor_of(std::string_view text);
 
-/// Before it binds: lets in whom the doorkeeper lets in at `serves` (SocketOptions::serves).
+/// To be called before `socket` binds: lets in only visitors that the doorkeeper admits to `serves` (SocketOptions).
 void guard(zmq::socket_t& socket, const Keys& keys, std::string_view serves);
-/// Before it connects: says who it is, and talks to the server of its keys alone.
+/// To be called before `socket` connects: shows its own key, and talks only to the server of its keys.
 void identify(zmq::socket_t& socket, const Keys& keys);
 
 }  // namespace telesplat::net

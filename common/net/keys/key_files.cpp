@@ -29,7 +29,7 @@ Error key_file_failed(const std::string& path, const char* what) {
   return Error{fmt::format("{}: {}: {}", path, what, std::strerror(errno))};
 }
 
-// Whoever owns it could change it at will.
+// Refuses a file of a stranger, who could change it at will.
 Status check_owner(const std::string& path, const struct stat& about) {
   if (about.st_uid == geteuid() || about.st_uid == 0) return ok_status();
   return Error{fmt::format("{}: belongs to user {}, not to {} or root", path, about.st_uid, geteuid())};
@@ -39,8 +39,8 @@ std::string secret_path(const std::string& folder, std::string_view name) {
   return fmt::format("{}/{}{}", folder, name, kSecretEnd);
 }
 
-// What was meant for what is missing. A bundle, which was made from another folder, is not completed: keys that are
-// made in it are let in nowhere.
+// Text that says how to get a missing file. A bundle, which was made from another folder, cannot be completed: no
+// server lets in keys that are made in it.
 std::string remedy(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::exists(fmt::format("{}/{}", folder, kServerFile), error) &&
@@ -58,7 +58,7 @@ Result<std::string> read_server_public(const std::string& folder) {
   return text;
 }
 
-// The key by which a process of one of these roles connects.
+// Finds the key with which a process of one of these roles connects.
 Result<NamedKey> own_key(const std::string& folder, const std::vector<Role>& roles) {
   const auto names = key_names(folder);
   std::vector<NamedKey> keys;
@@ -204,7 +204,7 @@ Result<Keys> read_keys(const std::string& folder, const std::vector<Role>& roles
 
 namespace {
 constexpr size_t kBytes = 32, kCharacters = 40;
-using Text = std::array<char, kCharacters + 1>;  // with the zero at its end
+using Text = std::array<char, kCharacters + 1>;  // with the zero byte at its end
 }  // namespace
 
 KeyPair make_key_pair() {
@@ -215,7 +215,7 @@ KeyPair make_key_pair() {
 
 bool is_key(std::string_view text) {
   std::array<unsigned char, kBytes> bytes{};
-  // What is decoded stops at a zero.
+  // Checks for zero bytes first: ZeroMQ's decoder stops at one.
   return text.size() == kCharacters && text.find('\0') == text.npos &&
          zmq_z85_decode(bytes.data(), std::string(text).c_str()) != nullptr;
 }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds kLockPatience{5};  // another program that makes keys takes milliseconds
+constexpr std::chrono::seconds kLockPatience{5};  // another program holds the lock for milliseconds
 constexpr std::string_view kMaster = "master";
 
 std::string file_of(std::string_view name) { return fmt::format("{}{}", name, kSecretEnd); }
@@ -29,7 +29,7 @@ bool is_there(const std::string& folder, const std::string& name) {
   return fs::symlink_status(folder + "/" + name, error).type() != fs::file_type::not_found;
 }
 
-// Someone's documents are no place for keys.
+// Refuses a folder that holds other files: keys do not belong among someone's documents.
 Status refuse_strangers(const RuntimeFolder& folder) {
   if (is_there(folder.path(), kServerFile)) return ok_status();
   for (const std::string& name : folder.names())
@@ -61,12 +61,12 @@ Result<KeyMaker> KeyMaker::open(const std::string& path) {
   return out;
 }
 
-// The secret first: a key that is let in without having an owner could not be made again.
+// Writes the secret first: a key on the allow-list without its secret could not be made again.
 Status KeyMaker::make(const std::string& name, Role role) {
   const NamedKey key{name, role, make_key_pair()};
   if (const Status s = folder_.create(file_of(name), text_of(key)); !s) return s;
   if (role == Role::kServer) return folder_.write(kServerPublicFile, key.pair.open + "\n");
-  allowed_.remove(name);  // of a file that was lost
+  allowed_.remove(name);  // an entry whose secret file was lost
   if (const Status s = allowed_.add({name, role, key.pair.open}); !s) return s;
   return folder_.write(kAllowedFile, allowed_.text());
 }
@@ -81,7 +81,7 @@ Result<std::vector<std::string>> KeyMaker::make_missing() {
       if (role == Role::kServer && !is_there(folder_.path(), kServerPublicFile))
         if (const Status s = folder_.write(kServerPublicFile, key->pair.open + "\n"); !s) return s.error();
       if (role == Role::kServer || allowed_.named(name)) continue;
-      // Made, and then the power went.
+      // The power may have gone after the secret was written.
       if (const Status s = allowed_.add({name, role, key->pair.open}); !s) return s.error();
       if (const Status s = folder_.write(kAllowedFile, allowed_.text()); !s) return s.error();
       continue;

@@ -26,14 +26,14 @@ class Roles {
 using enum Role;
 constexpr Roles kEveryone{kServer, kData, kPacker, kSampler, kViewer, kOperator};
 constexpr Roles kMembers{kData, kPacker, kSampler, kViewer, kOperator};
-constexpr Roles kWatchers{kViewer, kOperator};  // an operator may look, too
+constexpr Roles kWatchers{kViewer, kOperator};  // an operator may watch, too
 
 struct Row {
   std::string_view socket, type;
   Roles roles;
 };
 
-// What is sent *to* a socket that binds. Answers need no row: whoever asks knows the server by its key.
+// Messages *to* a socket that binds. Answers need no row: the asker knows the server by its key.
 constexpr Row kTable[] = {
     {"control", "hello", kMembers},
     {"control", "status", kMembers},
@@ -58,7 +58,7 @@ constexpr Row kTable[] = {
     {"tiles", "depth_tile", {kSampler}},
     {"tiles", "slice_images", {kSampler}},
     {"tiles", "picture_tile", {kSampler}},
-    {"patches", "", kWatchers},  // they subscribe
+    {"patches", "", kWatchers},  // empty type: they subscribe
     {"state", "state_request", kWatchers},
     {"state", "access_report", kWatchers},
     {"state", "receipt", kWatchers},
@@ -70,7 +70,7 @@ struct Command {
   Roles roles;
 };
 
-// Those that only tell something. All others are an operator's.
+// Commands that change nothing. All others need an operator's key.
 constexpr Command kCommands[] = {
     {"status", kEveryone}, {"health", kEveryone}, {"pick", kWatchers}, {"where", kWatchers}, {"probe", kWatchers},
 };

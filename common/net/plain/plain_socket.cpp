@@ -63,11 +63,11 @@ bool PlainSubscriber::wait(int timeout_ms) {
 void PlainSubscriber::connect_again() {
   try {
     impl_->socket.disconnect(impl_->endpoint);
-  } catch (const zmq::error_t&) {  // ENOENT: there is no connection any more
+  } catch (const zmq::error_t&) {  // ENOENT: the connection is gone already
   }
   try {
     impl_->socket.connect(impl_->endpoint);
-  } catch (const zmq::error_t&) {  // EINTR, or no more sockets: the next time
+  } catch (const zmq::error_t&) {  // EINTR, or no more sockets: tried again at the next call
   }
 }
 
@@ -114,7 +114,7 @@ const std::string& PlainPublisher::endpoint() const { return impl_->endpoint; }
 
 bool PlainPublisher::heard() {
   try {
-    // A flood of subscriptions must not hold up what is published.
+    // Reads a limited number, so that a flood of subscriptions does not hold up the publisher.
     zmq::message_t message;
     for (int i = 0; i < 100 && impl_->socket.recv(message, zmq::recv_flags::dontwait); ++i)
       if (message.size() > 0) impl_->subscriptions += *static_cast<const char*>(message.data()) == 1 ? 1 : -1;
@@ -127,7 +127,7 @@ bool PlainPublisher::heard() {
 void PlainPublisher::send(const std::string& body) {
   try {
     static_cast<void>(impl_->socket.send(zmq::buffer(body), zmq::send_flags::dontwait));
-  } catch (const zmq::error_t&) {  // EINTR: as if it had been lost
+  } catch (const zmq::error_t&) {  // EINTR: counts as lost
   }
 }
 

@@ -1,5 +1,5 @@
-// ZeroMQ sockets for what other programs publish: messages of one frame, without the type that our own bear. Every
-// queue is bounded, every size limited.
+// ZeroMQ sockets for messages of other programs: one frame, without the type that our own messages have. Every queue is
+// bounded, every size limited.
 #pragma once
 
 #include <memory>
@@ -15,19 +15,19 @@ struct PlainLimits {
   int64_t most_bytes = 1 << 16;  ///< a peer that sends a larger frame is disconnected
 };
 
-/// Hears everything that a publisher says. The publisher need not exist yet, and may come back after being away.
+/// Receives all messages of a publisher. The publisher need not exist yet, and may come back after being away.
 class PlainSubscriber {
  public:
-  /// Error: the endpoint is none.
+  /// Error: the endpoint is not valid.
   static Result<std::unique_ptr<PlainSubscriber>> connect(const std::string& endpoint, const PlainLimits& limits = {});
   ~PlainSubscriber();
 
-  /// Until a message is there, `timeout_ms` passed, or a signal came. True: a message is there.
+  /// Waits until a message is there, `timeout_ms` passed, or a signal came. True: a message is there.
   bool wait(int timeout_ms);
-  /// A publisher that broke the rules (a message over most_bytes) is never spoken to again unless it is asked anew. One
-  /// that is merely silent loses nothing but what it says in the meantime.
+  /// Connects anew to a publisher that broke the rules (a message over most_bytes): ZeroMQ does not do so by itself. A
+  /// publisher that is merely silent loses only messages that it sends meanwhile.
   void connect_again();
-  /// Without waiting. Of several frames the last one, so that publishers may put a topic in front.
+  /// Returns the next message without waiting: the last of its frames, so that publishers may put a topic in front.
   std::optional<std::string> receive();
 
  private:
@@ -36,7 +36,7 @@ class PlainSubscriber {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Tells everybody who listens.
+/// Publishes to all subscribers.
 class PlainPublisher {
  public:
   /// Binds to tcp://ADDRESS:PORT (PORT may be *) or ipc://. An address other than loopback is refused unless
@@ -45,11 +45,11 @@ class PlainPublisher {
                                                       const PlainLimits& limits = {});
   ~PlainPublisher();
 
-  /// With its real port.
+  /// The endpoint with its real port.
   const std::string& endpoint() const;
-  /// Somebody listens, as far as is known without waiting.
+  /// True if a subscriber is known, without waiting.
   bool heard();
-  /// Never waits: who does not keep up misses messages.
+  /// Never waits: a subscriber that is too slow misses messages.
   void send(const std::string& body);
 
  private:
