@@ -98,7 +98,7 @@ Result<CsvTable> CsvTable::read(const std::string& path, const Limits& limits) {
   return out;
 }
 
-// Why a line cannot be read; empty: it can.
+// Says why a line cannot be read; empty: it can.
 std::string CsvTable::problem(std::string_view line, const Limits& limits) const {
   if (line.size() > limits.line_bytes) return fmt::format("a line of more than {} bytes", limits.line_bytes);
   size_t fields = 0;
@@ -106,7 +106,7 @@ std::string CsvTable::problem(std::string_view line, const Limits& limits) const
   return fields == header_.size() ? "" : fmt::format("{} values instead of {}", fields, header_.size());
 }
 
-// The same of the first line. Editors put a byte order mark in front of it.
+// Does the same for the first line. Editors put a byte order mark in front of it.
 std::string CsvTable::take_header(std::string_view line, const Limits& limits) {
   if (line.starts_with("\xef\xbb\xbf")) line.remove_prefix(3);
   if (line.size() <= limits.line_bytes) header_ = csv_fields(line).value_or(std::vector<std::string>());

@@ -33,7 +33,7 @@ class CsvTable {
   size_t damaged() const { return damaged_; }
   const std::vector<std::string>& header() const { return header_; }
 
-  /// Where a column is. Error: there is none of that name.
+  /// Finds a column by its name. Error: the table has no such column.
   Result<size_t> column(std::string_view name) const;
   std::optional<size_t> find(std::string_view name) const;
 
@@ -41,9 +41,9 @@ class CsvTable {
   std::string text(size_t row, size_t column) const;
   /// Error: not a finite number.
   Result<double> number(size_t row, size_t column) const;
-  /// A whole number of 0 up to, not including, `end`.
+  /// Reads a whole number from 0 up to, not including, `end`.
   Result<uint64_t> count(size_t row, size_t column, double end = 9e15) const;
-  /// A column's numbers; what is no number counts as 0, as programs of this project write none.
+  /// Returns a column's numbers. Text that is no number counts as 0: programs of this project write none.
   std::vector<double> numbers(size_t column) const;
 
   /// "PATH:LINE: what"
@@ -55,32 +55,32 @@ class CsvTable {
 
   std::string path_, bytes_;
   std::vector<std::string> header_;
-  std::map<std::string, size_t, std::less<>> places_;  // of columns, by their names
+  std::map<std::string, size_t, std::less<>> places_;  // column name -> its index
   size_t damaged_ = 0;
   struct Line {
     size_t begin, size;
   };
-  std::vector<Line> lines_;  // of bytes_, without the header; places, since short texts move with their table
+  std::vector<Line> lines_;  // parts of bytes_, without the header; offsets, since short texts move with their table
   std::string_view line(size_t row) const { return {bytes_.data() + lines_[row].begin, lines_[row].size}; }
 };
 
-/// One row, its values by the names of their columns. The first thing that is wrong with it is kept, so that whoever
-/// reads asks once, at the end.
+/// One row, its values by the names of their columns. It keeps its first error: the caller reads all values and asks
+/// status() once, at the end.
 class CsvRow {
  public:
   CsvRow(const CsvTable& table, size_t row) : table_(table), row_(row), fields_(table.fields(row)) {}
 
   const CsvTable& table() const { return table_; }
   bool has(std::string_view column) const { return table_.find(column).has_value(); }
-  /// Of columns whose value is one.
+  /// Returns the columns whose value is a number.
   std::map<std::string, double> numbers() const;
-  /// Empty where the table has no such column.
+  /// Empty if the table has no such column.
   std::string text(std::string_view column) const;
   /// Wrong: there is no such column, or the value is no finite number.
   double number(std::string_view column);
-  /// `fallback` where the table has no such column.
+  /// Returns `fallback` if the table has no such column.
   double number(std::string_view column, double fallback) { return has(column) ? number(column) : fallback; }
-  /// A whole number of 0 up to, not including, `end`.
+  /// Reads a whole number from 0 up to, not including, `end`.
   uint64_t count(std::string_view column, double end = 9e15);
   uint64_t count(std::string_view column, uint64_t fallback, double end) {
     return has(column) ? count(column, end) : fallback;

@@ -12,7 +12,7 @@ namespace {
 constexpr double kTail = 0.025;
 
 struct Moments {
-  double n = 0, mean = 0, variance = 0;  // of n - 1
+  double n = 0, mean = 0, variance = 0;  // variance: divided by n - 1
 };
 Moments moments_of(std::span<const double> values) {
   Moments out{double(values.size()), 0, 0};

@@ -13,7 +13,7 @@ namespace telesplat::tools {
 namespace {
 
 constexpr double kLeastLeft_s = 5;
-// Before that a guess would jump about.
+// Before that much time and work a guess would jump about.
 constexpr double kLeastSeen_s = 1, kLeastSeen = 0.02;
 
 constexpr double kRewriteEvery_s = 0.1, kLineEvery_s = 5;

@@ -1,4 +1,4 @@
-// Tables for people: columns as wide as what stands in them.
+// Tables for people: each column is as wide as its widest cell.
 #pragma once
 
 #include <string>
@@ -25,9 +25,9 @@ class TextTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// How many places a text of UTF-8 takes on a terminal: one a character, wide ones aside.
+/// Returns the number of terminal columns that a UTF-8 text takes: one a character; wide characters count as one too.
 size_t width_of(const std::string& text);
-/// `text`, or its begin and "..." where it is wider than `most` places (at least 3).
+/// Returns `text`, or its begin and "..." if it is wider than `most` columns (at least 3).
 std::string shortened(const std::string& text, size_t most);
 
 }  // namespace telesplat::tools

@@ -1,5 +1,5 @@
-// telesplat-health: exit code 0 if a session's master answers and, where one is asked for, a process takes part in it;
-// 1 if not. What a container's health check asks.
+// telesplat-health: the health check of a container. Exit code 0 if a session's master answers and, if a process is
+// named, it takes part in the session; 1 if not.
 #include <cstdio>
 #include <map>
 
@@ -44,7 +44,7 @@ options::Table table(Options& o) {
       net::keys_row(o.keys)};
 }
 
-// No answer is an Error, a bad one a refusal.
+// Returns an Error if no answer comes, and a refusal if a bad one comes.
 Result<wire::ControlReply> ask(const net::Access& access, const std::string& master, const std::string& command,
                                double timeout_s, const std::map<std::string, std::string>& about = {}) {
   net::Context context(access);

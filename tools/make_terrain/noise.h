@@ -28,7 +28,7 @@ class Noise {
     return 1.5 * (a + su * (b - a) + sv * (c - a + su * (a - b - c + d)));
   }
 
-  /// Sum of octaves, each of half the size and `gain` times the height of the one before. About -1..1.
+  /// Returns a sum of octaves, each of half the size and `gain` times the height of the one before. About -1..1.
   double fractal(double x, double y, int octaves, double gain = 0.5) const {
     double sum = 0, amplitude = 1, total = 0;
     for (int i = 0; i < octaves; ++i, amplitude *= gain, x = 2 * x + 17.3, y = 2 * y - 9.1)
@@ -36,7 +36,7 @@ class Noise {
     return sum / total;
   }
 
-  /// The same of ridges: 0 in valleys, 1 on crests.
+  /// Returns a sum of octaves of ridges: 0 in valleys, 1 on crests.
   double ridged(double x, double y, int octaves) const {
     double sum = 0, amplitude = 1, total = 0;
     for (int i = 0; i < octaves; ++i, amplitude *= 0.5, x = 2 * x + 5.7, y = 2 * y + 3.9) {
@@ -46,7 +46,7 @@ class Noise {
     return sum / total;
   }
 
-  /// A number in 0..1 for a whole number.
+  /// Returns a number in 0..1 for a whole number.
   double uniform(uint64_t n) const { return static_cast<double>(mix(n * 0x9e3779b97f4a7c15 + seed_) >> 11) * 0x1p-53; }
 
  private:

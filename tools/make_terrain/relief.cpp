@@ -50,8 +50,8 @@ double initial_height(double x, double y, uint64_t seed) {
 
 constexpr int kDx[8] = {1, -1, 0, 0, 1, 1, -1, -1}, kDy[8] = {0, 0, 1, -1, 1, -1, 1, -1};
 constexpr double kDistance[8] = {1, 1, 1, 1, 1.41421356, 1.41421356, 1.41421356, 1.41421356};
-constexpr double kExponent = 0.45;  // of the drainage area
-constexpr double kTalus = 0.9;      // slopes above slide
+constexpr double kExponent = 0.45;  // exponent of the drainage area
+constexpr double kTalus = 0.9;      // steeper slopes slide
 
 class Eroder {
  public:
@@ -102,7 +102,7 @@ class Eroder {
     }
   }
 
-  // Each cell drains to its steepest neighbour; what it drains is its own area and that of all above it.
+  // Finds each cell's steepest neighbour downhill; a cell's area is its own and that of all cells above it.
   void route() {
     receiver_.assign(cells_, -1);
     distance_.assign(cells_, 1.0f);
@@ -132,7 +132,7 @@ class Eroder {
     }
   }
 
-  // Half of what is too steep moves down.
+  // Moves half of what is too steep down.
   void slide() {
     const double limit = kTalus * map_.cell_m();
     for (int y = 1; y < n_ - 1; ++y)

@@ -21,7 +21,7 @@ struct HeightMap {
   double sample(double x_m, double y_m) const;
 };
 
-/// The caldera's outline: distance of a point from its centre over that of the rim's crest in the same direction. Below
+/// Returns the distance of a point from the caldera's centre over that of the rim's crest in the same direction. Below
 /// 1: inside.
 double caldera_radius(double x_m, double y_m, uint64_t seed);
 

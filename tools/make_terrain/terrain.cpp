@@ -28,7 +28,7 @@ struct Grid {
   double step_m() const { return kExtentM / static_cast<double>(std::max(columns, rows)); }
 };
 
-// A place on the land and what it looks like.
+// A place on the land: its heights and its colour.
 class Land {
  public:
   Land(uint64_t seed, double step_m, const std::function<void(double)>& progress)
@@ -38,7 +38,7 @@ class Land {
   }
 
   struct Point {
-    double height_m;  // of the surface: ground or water
+    double height_m;  // height of the surface: ground or water
     double ground_m;
     bool water;
   };
@@ -124,7 +124,7 @@ Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void
   std::vector<float> ground_m(vertices);
   std::vector<uint8_t> water(vertices);
 
-  // Calls body(vertex, x, y) for all vertices, a batch of rows at a time, telling progress between `from` and `to`.
+  // Calls body(vertex, x, y) for all vertices, a batch of rows at a time; reports progress between `from` and `to`.
   const auto sweep = [&](double from, double to, const auto& body) {
     const uint64_t batch = std::max<uint64_t>(rows / 50, 16);
     for (uint64_t first = 0; first < rows; first += batch) {

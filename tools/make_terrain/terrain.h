@@ -19,9 +19,9 @@ struct Terrain {
   std::vector<uint32_t> indices;     ///< three a triangle, counter-clockwise from above
 };
 
-/// The land of this seed with exactly this many triangles, on a regular grid (the last row of which may be cut short).
-/// The large forms do not depend on the number of triangles. The same arguments make the same land, whatever the number
-/// of threads. `progress`: fraction done, called on this thread. Precondition: kMinTriangles <= triangles <=
+/// Makes the land of this seed with exactly this many triangles, on a regular grid; its last row may be cut short. The
+/// large forms do not depend on the number of triangles. The same arguments make the same land on any number of
+/// threads. `progress`: fraction done, called on this thread. Precondition: kMinTriangles <= triangles <=
 /// kMaxTriangles.
 Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void(double fraction)>& progress = {});
 

@@ -24,7 +24,7 @@ void declare(options::Parser& parser, const std::vector<Command>& commands, Pars
   }
 }
 
-// The command's name stays in front of what its scene file says.
+// Puts the flags of a scene file behind the command's name.
 Status expand(const std::vector<Command>& commands, std::vector<std::string>& arguments) {
   for (const Command& command : commands) {
     if (!command.expand || arguments.empty() || arguments.front() != command.name) continue;
@@ -37,7 +37,7 @@ Status expand(const std::vector<Command>& commands, std::vector<std::string>& ar
   return ok_status();
 }
 
-// `ctl --master ADDRESS status` means `ctl status --master ADDRESS`: flags in front of a sub-command are its own.
+// `ctl --master ADDRESS status` means `ctl status --master ADDRESS`: flags before a sub-command belong to it.
 void put_flags_behind(const std::vector<Command>& commands, std::vector<std::string>& arguments) {
   for (const Command& command : commands) {
     if (command.commands.empty() || arguments.size() < 3 || arguments.front() != command.name) continue;

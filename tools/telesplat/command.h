@@ -1,4 +1,4 @@
-// The commands of telesplat: one row a command says its name, its help, its flags and what it does.
+// The commands of telesplat: one row a command holds its name, its help, its flags and its function.
 #pragma once
 
 #include <functional>
@@ -16,14 +16,14 @@ struct Command {
   options::Table table;  ///< its flags
   /// Exit code: 0 done, 1 failed, 2 bad usage or input, 130 interrupted.
   std::function<int(const options::Given&)> run;
-  /// Its arguments, with the flags of a scene file in place of that file's name; null: it takes none.
+  /// Puts a scene file's flags in place of its name in the arguments; null: the command takes no scene file.
   Result<std::vector<std::string>> (*expand)(std::vector<std::string> arguments, const options::Table& table) = nullptr;
   std::string footer;             ///< at the end of --help
   std::vector<Command> commands;  ///< its sub-commands, instead of flags
 };
 
-/// A command whose flags fill `o`, an options struct of its own. table: as tables of options are; it points into the
-/// struct.
+/// Makes a command whose flags fill `o`, an options struct of its own. table: returns the flags' table, which points
+/// into the struct.
 template <class Options>
 Command make_command(const std::string& name, const std::string& help, options::Table (*table)(Options&),
                      int (*run)(Options, const options::Given&),
@@ -47,11 +47,11 @@ Command presets_command();
 Command autostereo_command();
 Command keys_command();
 
-/// `commands`, and two more that tell of all of them: completion and man.
+/// Returns `commands`, and two more that describe all of them: completion and man.
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);
 
-/// Runs the command of `program` that the arguments name; --help prints and ends the program, bad usage too, with code
-/// 2.
+/// Runs the command of `program` that the arguments name. --help prints and ends the program with code 0, bad usage
+/// with code 2.
 int run_commands(const std::string& program, const std::string& about, const std::vector<Command>& commands,
                  std::vector<std::string> arguments);
 

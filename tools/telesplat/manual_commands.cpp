@@ -1,4 +1,4 @@
-// `telesplat completion SHELL` and `telesplat man`: what shells and man(1) are told, from the tables of --help.
+// `telesplat completion SHELL` and `telesplat man`: texts for shells and man(1), made from the tables of --help.
 #include <fmt/format.h>
 
 #include <array>
@@ -53,7 +53,7 @@ options::Manual manual_of(const std::string& name, const Command& command) {
   return out;
 }
 
-// The page of telesplat, of one of its commands, or of a service.
+// Writes the page of telesplat, of one of its commands, or of a service.
 Result<std::string> page_of(const options::Manual& all, const std::string& word) {
   if (word.empty() || word == "telesplat") return options::man_page(all, version(), true);
   std::vector<std::string> known;
@@ -91,7 +91,7 @@ Status write_pages(const options::Manual& all, const std::string& folder) {
   return ok_status();
 }
 
-// A person at a terminal reads it with man(1), where there is one.
+// Shows the page with man(1), if stdout is a terminal and man is installed.
 void show(const std::string& page) {
   if (isatty(STDOUT_FILENO))
     if (const std::unique_ptr<FILE, int (*)(FILE*)> reader(
@@ -136,7 +136,7 @@ std::vector<Command> with_manuals(const std::string& about, std::vector<Command>
       {.name = "man", .help = "show or write manual pages", .table = man_table(*man_options), .run = {}});
   options::Manual all{"telesplat", about, {}, {}, {}};
   for (const Command& c : commands) all.commands.push_back(manual_of("telesplat " + c.name, c));
-  // What the tables point to lives as long as what `commands` runs.
+  // The tables point into `commands`: keep a copy as long as these functions.
   const auto owned = std::make_shared<std::vector<Command>>(commands);
   commands[commands.size() - 2].run = [all, owned, o = completion_options](const options::Given&) {
     return complete(all, *o);

@@ -1,5 +1,5 @@
-// telesplat as the containers' images have it: what a running session is asked and told with, and keys. The whole
-// launcher reads data sets and pictures, whose libraries are 400 MB.
+// telesplat for container images: only the commands that ask and steer a running session, and keys. The whole launcher
+// reads data sets and pictures, and its libraries take 400 MB.
 #include "common/net/service.h"
 #include "tools/telesplat/command.h"
 

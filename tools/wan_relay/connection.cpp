@@ -20,7 +20,7 @@ constexpr size_t kLeastWindow = 256 << 10, kMostWindow = 16 << 20;
 constexpr int kLeastBuffer = 32 << 10, kMostBuffer = 4 << 20, kSegment = 1448;
 constexpr size_t kMostAtOnce = 64;  // pieces written together
 
-// Bytes that may be between a connection's ends: what the link holds, waiting and under way.
+// Returns the bytes that may be between a connection's ends: those that wait in the link and those under way.
 size_t window_of(const links::Link& link) {
   if (link.rate_bit_s <= 0) return kMostWindow;
   const double under_way = link.rate_bit_s / 8 * (link.rtt_s / 2 + link.jitter_s);
@@ -63,7 +63,7 @@ void Flow::send_piece() {
   const size_t n = from_.read_some(boost::asio::buffer(bytes), error);
   reading_ = false;
   if (error == boost::asio::error::would_block) return read();
-  at_end_ = bool(error);  // also where it broke: what came before is passed on
+  at_end_ = bool(error);  // also after an error: earlier bytes are passed on
   bytes.resize(at_end_ ? 0 : n);
   put(std::move(bytes));
   read();
@@ -89,7 +89,7 @@ void Flow::write() {
     return;
   }
   if (line_.front().bytes.empty()) {
-    error_code ignored;  // who has gone needs no end
+    error_code ignored;  // fails if the receiver has gone: no matter
     to_.shutdown(Tcp::socket::shutdown_send, ignored);
     return finish();
   }
@@ -106,7 +106,7 @@ void Flow::write() {
 
 void Flow::written(const error_code& error, size_t bytes) {
   if (over_) return;
-  if (error) return finish();  // what comes now has nowhere to go
+  if (error) return finish();  // later bytes have no receiver
   held_ -= bytes;
   writing_.clear();
   write();
@@ -142,7 +142,7 @@ Connection::~Connection() {
 
 void Connection::connect(const Tcp::endpoint& to, std::function<std::string(const error_code&)> told) {
   told_ = std::move(told);
-  // TCP's own greeting takes a round trip.
+  // The greeting of TCP takes a round trip.
   patience_.expires_at(time_point(monotonic_s() + link_.link.rtt_s));
   patience_.async_wait([self = shared_from_this(), to](const error_code& cancelled) {
     if (cancelled) return;
@@ -163,7 +163,7 @@ void Connection::connect(const Tcp::endpoint& to, std::function<std::string(cons
 }
 
 void Connection::connected(const error_code& error) {
-  // A proxy is beside the one who asked: its answer does not pass the link.
+  // A proxy is beside its client: its answer does not pass the link.
   const std::string answer = told_ ? std::exchange(told_, nullptr)(error) : std::string();
   error_code ignored;
   if (!answer.empty()) near_.write_some(boost::asio::buffer(answer), ignored);

@@ -1,4 +1,4 @@
-// One connection through the link: what either side sends comes out at the other as the link has it, ends included.
+// One connection through the link, which delays each side's bytes, and its end of stream, on the way to the other.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -17,8 +17,8 @@ using Tcp = boost::asio::ip::tcp;
 /// One direction of a connection.
 class Flow : public Sender, public std::enable_shared_from_this<Flow> {
  public:
-  /// window: bytes on their way at most, from the reading to the writing end; then nothing is read, so that the sender
-  /// feels it. ended: everything has passed, the end as well, or the receiving side is gone.
+  /// window: most bytes on their way, from the reading to the writing end; a full window stops reading, so that the
+  /// sender feels it. ended: called when all bytes and the end have passed, or the receiving side is gone.
   Flow(Context& context, Tcp::socket& from, Tcp::socket& to, Way& way, size_t window, std::function<void()> ended);
 
   void start() { read(); }
@@ -28,7 +28,7 @@ class Flow : public Sender, public std::enable_shared_from_this<Flow> {
  private:
   struct Piece {
     double due_s;
-    std::string bytes;  // empty: the end
+    std::string bytes;  // empty: the end of the stream
   };
   void read();
   void put(std::string bytes);
@@ -48,7 +48,7 @@ class Flow : public Sender, public std::enable_shared_from_this<Flow> {
   bool reading_ = false, timing_ = false, at_end_ = false, over_ = false;
 };
 
-/// Both directions, from the side that asked for it (near) to the one that it is connected to (far).
+/// Both directions, from the side that asked for the connection (near) to its target (far).
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   struct Link {
@@ -59,8 +59,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   Connection(Context& context, Tcp::socket near, Link link, std::function<void()> gone);
   ~Connection();
 
-  /// Connects to `to`, a round trip after now, and passes bytes on. told: takes the outcome, and gives what the near
-  /// side is answered before; null: nothing.
+  /// Connects to `to`, a round trip after now, and passes bytes on. told: takes the outcome, and returns an answer for
+  /// the near side, sent before other bytes; null: no answer.
   void connect(const Tcp::endpoint& to, std::function<std::string(const boost::system::error_code&)> told);
   Tcp::socket& near() { return near_; }
   void close();
@@ -76,12 +76,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::function<std::string(const boost::system::error_code&)> told_;
   Timer patience_;
   std::shared_ptr<Flow> to_far_, to_near_;
-  int open_ = 0;  // flows
+  int open_ = 0;  // number of flows
 };
 
 /// A sender fills the buffers of a real network path no further than a few round trips need; those of a loopback device
-/// hold megabytes, a second of a slow link. So pieces and receive buffers are made as they are on the network. To be
-/// called before a socket listens or connects.
+/// hold megabytes, a second of a slow link. This makes pieces and receive buffers as large as on the network. Call it
+/// before a socket listens or connects.
 template <class Socket>
 void size_as_on_network(Socket& socket, const links::Link& link);
 

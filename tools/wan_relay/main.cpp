@@ -1,4 +1,4 @@
-// telesplat-wan-relay: a link of a network, simulated: delay, rate, jitter and stalls between processes of one machine.
+// telesplat-wan-relay: simulates a network link: delay, rate, jitter and stalls between processes of one machine.
 #include <csignal>
 #include <cstdio>
 

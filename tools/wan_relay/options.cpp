@@ -10,7 +10,7 @@
 namespace telesplat::wan_relay {
 namespace {
 
-// "HOST:PORT"; an IPv6 address stands in brackets. "tcp://" before it and "*" for a free port are what others say.
+// Splits "HOST:PORT"; an IPv6 address stands in brackets. "tcp://" in front and "*" for a free port are allowed.
 Result<std::pair<std::string, std::string>> split(const char* flag, std::string text, bool to_listen) {
   const std::string given = text;
   if (text.starts_with("tcp://")) text.erase(0, 6);

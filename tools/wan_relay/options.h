@@ -9,11 +9,11 @@
 
 namespace telesplat::wan_relay {
 
-/// A place to listen at, and where its connections go.
+/// A place to listen at, and the target of its connections.
 struct Door {
   std::string host;              ///< a numeric address
   std::string port;              ///< "0": a free one
-  std::string to_host, to_port;  ///< empty: what the client asks for, by SOCKS5
+  std::string to_host, to_port;  ///< empty: the client names it, by SOCKS5
 };
 
 struct Options {
@@ -21,12 +21,12 @@ struct Options {
   std::string link_text = "local";
   bool insecure = false;
   std::string name = "wan-relay", log_level = "info";
-  std::vector<Door> doors;  ///< what these come to
+  std::vector<Door> doors;  ///< made of listen, to and socks
   links::Link link;
 };
 
 options::Table table(Options& options);
-/// Works out doors and link. Error: names the flag, its value and what is wrong.
+/// Makes doors and link of the texts. Error: names the flag, its value and what is wrong.
 Status settle(Options& options);
 
 }  // namespace telesplat::wan_relay

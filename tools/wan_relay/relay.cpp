@@ -28,9 +28,9 @@ Timer::duration seconds(double s) {
   return std::chrono::duration_cast<Timer::duration>(std::chrono::duration<double>(s));
 }
 
-/// Blocks the signals that this process reads, and returns a descriptor that they are read from. Handlers would
-/// interrupt what the relay does at each signal, and Boost.Asio 1.74 reads its signals until none comes: a process that
-/// is told to end without a pause would not end.
+/// Blocks the signals that this process reads, and returns a descriptor for reading them. Handlers would interrupt the
+/// relay at each signal, and Boost.Asio 1.74 reads signals until no more come: a process that gets SIGTERM without a
+/// pause would not end.
 int read_signals() {
   sigset_t known;
   sigemptyset(&known);
@@ -68,7 +68,7 @@ struct Relay::Impl {
     auto& acceptor = doors.back().acceptor;
     acceptor.open(at.protocol(), error);
     acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
-    size_as_on_network(acceptor, options.link);  // accepted sockets are as this one
+    size_as_on_network(acceptor, options.link);  // accepted sockets inherit the sizes
     if (!acceptor.bind(at, error)) acceptor.listen(boost::asio::socket_base::max_listen_connections, error);
     if (error) return Error{fmt::format("cannot listen at {}: {}", shown(at), error.message())};
     return ok_status();
@@ -81,7 +81,7 @@ struct Relay::Impl {
         take(d.door, std::move(near));
         return accept(d);
       }
-      // Too many files are open, for one: it passes.
+      // Too many open files, for example: that passes.
       complain("a connection cannot be taken: " + error.message());
       d.pause.expires_after(seconds(kAcceptPause_s));
       d.pause.async_wait([this, &d](const error_code& cancelled) {
@@ -107,7 +107,7 @@ struct Relay::Impl {
     auto resolver = std::make_shared<Tcp::resolver>(context);
     resolver->async_resolve(
         host, port, [resolver, connection, told = std::move(told)](const error_code& error, auto found) {
-          // Services listen at IPv4 addresses unless told otherwise.
+          // Services listen at IPv4 addresses by default.
           const auto v4 = std::find_if(found.begin(), found.end(),
                                        [](const auto& entry) { return entry.endpoint().address().is_v4(); });
           if (!error) return connection->connect(v4 == found.end() ? *found.begin() : *v4, told);
@@ -128,7 +128,7 @@ struct Relay::Impl {
     if (limiter.allow(monotonic_s())) log::warn("{}", what);
   }
 
-  /// What is said before a connection of a SOCKS client passes bytes on.
+  /// The dialogue with a SOCKS client, before its connection passes bytes on.
   struct Dialogue : std::enable_shared_from_this<Dialogue> {
     Dialogue(Impl& relay, std::shared_ptr<Connection> connection)
         : relay(relay), connection(std::move(connection)), patience(relay.context) {

@@ -1,4 +1,4 @@
-// A link between whoever connects here and the places they connect to.
+// Passes bytes between the clients that connect here and the places they connect to, through a simulated link.
 #pragma once
 
 #include <functional>
@@ -12,15 +12,15 @@ namespace telesplat::wan_relay {
 
 class Relay {
  public:
-  /// Listens at all doors; refers to the options. Error: which one cannot be, and why.
+  /// Listens at all doors; refers to the options. Error: names the door and the reason.
   static Result<std::unique_ptr<Relay>> open(const Options& options);
   ~Relay();
 
-  /// Where each door listens: ADDRESS:PORT.
+  /// Addresses of the doors: ADDRESS:PORT.
   std::vector<std::string> addresses() const;
   /// Passes bytes on until SIGINT or SIGTERM; on SIGUSR1 `tell` gets the statistics.
   void run(const std::function<void(const std::string&)>& tell);
-  /// What passed, in one line.
+  /// Returns counts of connections and bytes, in one line.
   std::string statistics() const;
 
  private:

@@ -1,4 +1,4 @@
-// What a client of a SOCKS5 proxy says (RFC 1928) before its bytes are passed on: without sockets.
+// The dialogue with a client of a SOCKS5 proxy (RFC 1928) before its bytes are passed on: without sockets.
 #pragma once
 
 #include <cstdint>
@@ -9,23 +9,23 @@
 
 namespace telesplat::wan_relay {
 
-/// Takes the bytes that a client sends first, in any pieces.
+/// Takes the first bytes of a client, in any pieces.
 class SocksDialogue {
  public:
   enum class State { kGreeting, kRequest, kAsked };
 
-  /// Error: the client speaks something else, wants a password, wants anything but a connection, or does not wait for
+  /// Error: the client speaks another protocol, wants a password, wants anything but a connection, or does not wait for
   /// answers.
   Status take(std::string_view bytes);
 
   State state() const { return state_; }
-  /// What the client must be answered with now, once.
+  /// Returns the answer that is due to the client, once.
   std::string take_answer();
-  /// kAsked: where it wants to be connected to.
+  /// kAsked: the target that it wants to be connected to.
   const std::string& host() const { return host_; }
   uint16_t port() const { return port_; }
 
-  /// The answer to a request.
+  /// The answers to a request.
   enum class Outcome : uint8_t { kConnected = 0, kFailed = 1, kUnreachable = 4, kRefused = 5 };
   static std::string reply(Outcome outcome);
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kPiece_s = 1e-3;
 constexpr size_t kLeastPiece = 512, kMostPiece = 64 << 10, kUnlimitedQueue = 16 << 20;
-// Delays of real links wander: between two values, so far apart, jitter passes evenly.
+// Delays of real links wander: jitter moves evenly from one random value to the next in this time.
 constexpr double kJitterPeriod_s = 0.02;
 
 }  // namespace
@@ -41,7 +41,7 @@ size_t Shaper::queued(double now_s) {
 
 size_t Shaper::room(double now_s) { return capacity_ - queued(now_s); }
 
-// The end of the stall that t_s lies in, else t_s.
+// Returns the end of the stall at t_s; without a stall t_s.
 double Shaper::end_of_stall(double t_s) const {
   if (link_.stall_s <= 0) return t_s;
   const double k = std::floor((t_s - from_s_) / link_.stall_every_s);
@@ -49,7 +49,7 @@ double Shaper::end_of_stall(double t_s) const {
   return k >= 1 && t_s < end_s ? end_s : t_s;
 }
 
-// When the bottleneck is through with what takes it `duration_s`, stalls left out.
+// Returns when the bottleneck has finished a piece that takes it `duration_s`; stalls do not count.
 double Shaper::passed(double from_s, double duration_s) const {
   double t = end_of_stall(from_s);
   if (link_.stall_s <= 0) return t + duration_s;
@@ -65,7 +65,7 @@ double Shaper::passed(double from_s, double duration_s) const {
 double Shaper::jitter(double now_s) {
   if (link_.jitter_s <= 0) return 0;
   const auto draw = [&] { return std::uniform_real_distribution(0.0, link_.jitter_s)(random_); };
-  if (now_s - jitter_from_s_ >= 2 * kJitterPeriod_s) {  // nothing passed for long
+  if (now_s - jitter_from_s_ >= 2 * kJitterPeriod_s) {  // no bytes passed for long
     jitter_from_s_ = now_s;
     jitter_before_s_ = draw();
     jitter_after_s_ = draw();

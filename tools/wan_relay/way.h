@@ -1,5 +1,4 @@
-// One direction of the link, which all connections of a relay share: what it does to bytes, and who may put some on it,
-// in turn.
+// One direction of the link, which all connections of a relay share: it delays bytes, and gives senders their turns.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -14,30 +13,29 @@
 
 namespace telesplat::wan_relay {
 
-/// One direction of a simulated link, without bytes, sockets and clocks: numbers of bytes and times come in, times come
-/// out.
-/// Bytes wait in a queue of limited length, pass the bottleneck at the link's rate one after the other, and are then
-/// under way for half a round trip and what jitter adds. Calls come with times that never fall.
+/// One direction of a simulated link, without bytes, sockets and clocks: takes numbers of bytes and times, returns
+/// times. Bytes wait in a queue of limited length, pass the bottleneck at the link's rate one after the other, and are
+/// then under way for half a round trip and the jitter. Times of calls never fall.
 class Shaper {
  public:
-  /// from_s: stalls are counted from then; the first begins one period later. seed: of the jitter.
+  /// from_s: stalls are counted from then; the first begins one period later. seed: for the jitter.
   Shaper(const links::Link& link, double from_s, uint32_t seed);
 
-  /// Bytes that the queue has room for. Without a rate, what a link of 100 Gbit/s would be given at once.
+  /// Bytes that the queue has room for. Without a rate, as many as a link of 100 Gbit/s would take at once.
   size_t room(double now_s);
-  /// When there is room again, if there is none now.
+  /// Returns when the queue has room again, if it is full.
   double room_at_s() const { return queue_.empty() ? 0 : queue_.front().end_s; }
-  /// Bytes arrive at the link: when the last of them comes out at its other end; no earlier than what came before.
-  /// Precondition: bytes <= room(now_s). 0 bytes: an end of stream, which keeps its place.
+  /// Takes bytes that arrive at the link; returns when the last of them comes out at its other end, not before earlier
+  /// bytes. Precondition: bytes <= room(now_s). 0 bytes: an end of stream, which keeps its place.
   double pass(double now_s, size_t bytes);
-  /// The largest piece that should pass as one: what the bottleneck lets through in about a millisecond.
+  /// The largest piece to pass as one: the bottleneck takes about a millisecond for it.
   size_t piece() const { return piece_; }
   /// Bytes that wait before the bottleneck or are passing it.
   size_t queued(double now_s);
 
  private:
   struct Waiting {
-    double end_s;  // when it has passed the bottleneck
+    double end_s;  // time when it has passed the bottleneck
     size_t bytes;
   };
   double passed(double from_s, double duration_s) const;
@@ -61,11 +59,11 @@ using Timer = boost::asio::steady_timer;
 /// A time of the monotonic clock, seconds, for a timer.
 Timer::time_point time_point(double monotonic_s);
 
-/// Whoever has bytes for the link.
+/// A connection that has bytes for the link.
 class Sender {
  public:
   virtual ~Sender() = default;
-  /// There is room on the link: puts one piece on it.
+  /// The link has room: puts one piece on it.
   virtual void send_piece() = 0;
 };
 
@@ -74,9 +72,9 @@ class Way {
   Way(Context& context, const links::Link& link, double from_s, uint32_t seed);
 
   Shaper& shaper() { return shaper_; }
-  /// `sender` has bytes: it is called at once if there is room and nobody waits for it, else in its turn.
+  /// `sender` has bytes: calls it at once if there is room and no other sender waits, else in its turn.
   void join(const std::shared_ptr<Sender>& sender);
-  /// Bytes are put on the link; when they come out at its end.
+  /// Puts bytes on the link; returns when they come out at its end.
   double pass(double now_s, size_t bytes);
 
   uint64_t bytes() const { return bytes_; }

@@ -19,7 +19,7 @@ namespace telesplat::made_volume {
 namespace {
 
 constexpr float kNeedle = 9000, kWood = 14000, kSoil = 18000, kPot = 30000, kGlass = 40000, kMetal = 60000;
-constexpr float kNoise = 350;  // of a scanner, amplitude
+constexpr float kNoise = 350;  // amplitude of the scanner's noise
 
 // Everything is in the unit cube.
 struct Capsule {  // tapered
@@ -110,7 +110,7 @@ uint64_t mix(uint64_t h) {  // splitmix64
   return h ^ h >> 31;
 }
 
-// Part of a voxel that lies within a surface `inside` deep under it, for a scanner that blurs over a voxel.
+// Share of a voxel that a surface covers, `inside` (unit cube) below it, for a scanner that blurs over a voxel.
 float coverage(float inside, float voxel) { return std::clamp(inside / voxel + 0.5f, 0.0f, 1.0f); }
 
 // The slices [z0, z1), drawn with everything that touches them.
@@ -148,7 +148,7 @@ class Slices {
   void add_noise(uint64_t seed) {
     const size_t from = at(0, 0, z0_), to = at(0, 0, z1_);
     for (size_t i = from; i < to; ++i) {
-      // The mean of two uniform numbers, around 0; what falls below 0 is cut off, as scanners do.
+      // The mean of two uniform numbers, around 0; negative values become 0, as scanners store them.
       const uint64_t h = mix((seed + i) * 0x9e3779b97f4a7c15);
       const float noise = (float(h >> 40) + float(h & 0xffffff)) * 0x1p-24f - 1;
       scan_.values[i] = uint16_t(std::clamp(float(scan_.values[i]) + kNoise * noise, 0.0f, 65535.0f));
@@ -182,7 +182,7 @@ Scan make_tree(int side, uint64_t seed, const std::function<void(double)>& progr
   CHECK(side >= kMinSide && side <= kMaxSide);
   const Tree tree = Grower(seed).grow();
   Scan scan{side, std::vector<uint16_t>(size_t(side) * size_t(side) * size_t(side))};
-  constexpr int kSlices = 8;  // at a time
+  constexpr int kSlices = 8;  // drawn at a time
   const int parts = (side + kSlices - 1) / kSlices;
   std::atomic<int> done = 0;
   in_parallel(0, parts, [&](int part) {

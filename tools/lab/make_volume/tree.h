@@ -1,6 +1,6 @@
 // A made-up CT scan: a potted Christmas tree with hollow glass balls, after the data set with which volume renderers
 // have been compared for long (Kanitsar et al., "Christmas tree case study", IEEE Visualization 2002). Every value here
-// is computed; none is theirs.
+// is computed; none comes from their data.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct Scan {
 /// The same seed makes the same tree. Precondition: side within the limits. progress: 0 to 1.
 Scan make_tree(int side, uint64_t seed, const std::function<void(double)>& progress);
 
-/// By the path's ending: .nrrd, .mha or .raw; bits: 16, or 8 (the upper half of every value). Errors name the file.
+/// Writes .nrrd, .mha or .raw, by the ending; bits: 16, or 8 (the upper half of each value). Errors name the file.
 Status write_scan(const Scan& scan, int bits, const std::string& path);
 
 }  // namespace telesplat::made_volume

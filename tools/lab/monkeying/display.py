@@ -34,7 +34,7 @@ class Hands:
             raise OSError("Xvfb did not start")
         self.name = ":" + number.decode().strip()
         self.x = display.Display(self.name)
-        self.x.set_error_handler(lambda *_: None)  # windows come and go while they are looked at
+        self.x.set_error_handler(lambda *_: None)  # windows come and go while the loop looks at them
         self.root = self.x.screen().root
         self.root.change_attributes(event_mask=X.SubstructureNotifyMask)
         self.window, self.pings, self.answered = None, 0, 0

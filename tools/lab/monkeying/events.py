@@ -80,7 +80,7 @@ def order(chance):
     orders |= {name: ["on", "off", "x"] for name in ("lighting", "panel", "fullscreen", "legend", "swap-eyes")}
     numbers = ("z-scale", "detail", "least-sampling", "eye-separation", "screen-distance")
     orders |= {name: [some, "0.5", "1"] for name in numbers}
-    whole = {"clip": clips, "animate": timelines}  # with blanks in one argument
+    whole = {"clip": clips, "animate": timelines}  # one argument with blanks
     name = pick(["tf", "tf", *orders, *whole])
     return [name, pick(whole[name])] if name in whole else [name, *pick(orders[name]).split()]
 
@@ -122,7 +122,7 @@ def follows(chance, keys, orders, drops):
         return ["wheel", chance.choice([4, 5]), chance.randrange(1, 12), share(), share()]
     if kind == "move":
         return ["move", share(), share()]
-    if kind == "measure":  # what is in the middle, most likely
+    if kind == "measure":  # most likely what the middle shows
         return ["measure", round(chance.uniform(0.3, 0.7), 3), round(chance.uniform(0.3, 0.7), 3)]
     if kind == "ctl":
         return ["ctl", *any_order(chance, orders)]
@@ -147,7 +147,7 @@ def is_last(event):
 def event(seed, index, keys, orders, drops):
     """The event of that number, and how long the monkey waits after it, seconds."""
     chance = random.Random(f"{seed}/{index}")
-    if index == 2:  # of volumes: it begins far below the data and ends within them, as presets of a CT do
+    if index == 2:  # for volumes: begins far below the data and ends within them, as presets of a CT do
         return ["ctl", "tf", "--", "-3000:#000000:0, 100:#a07040:0.05, 200:#40a040:0.4"], 1
     return follows(chance, keys, orders, drops), chance.choice([0, 0, 0.02, 0.05, 0.1, 0.2])
 

@@ -20,9 +20,9 @@ BAD = re.compile(
     r"|Segmentation fault|ended with code (?!2\b)"
 )
 WHOLE = (640, 560)  # pixels of the window
-WHEEL = 80  # pixels that a list moves at a step of the wheel, at most
-ENOUGH = 3  # uses of a widget in earlier runs, after which it is as good as any other
-NEVER = ("messages_rejected", "digests_different", "tiles_refused", "tiles_unsealed", "keys_refused")  # in a status
+WHEEL = 80  # pixels that a list scrolls at most in a step of the wheel
+ENOUGH = 3  # uses of a widget in earlier runs; above that it is chosen no less often than others
+NEVER = ("messages_rejected", "digests_different", "tiles_refused", "tiles_unsealed", "keys_refused")  # must stay 0
 
 
 def known_as(name):
@@ -96,7 +96,7 @@ class Run:
         status = json.loads(self.told() or "{}")
         for p in status.get("processes", []):
             for name in NEVER:
-                if p.get("values", {}).get(name, 0) > 0:  # none yet of one that has just come
+                if p.get("values", {}).get(name, 0) > 0:  # a process that has just joined has sent no values
                     raise Fault(f"{p['name']} counts {p['values'][name]} {name}{self.dropped()}")
 
     def dropped(self):
@@ -233,7 +233,7 @@ class Run:
                 self.settle()
         if name not in all_here() and "=" in name and name.split("=")[0] in self.widgets():
             self.open_list(name.split("=")[0])
-            self.settle()  # it is laid out in its second frame
+            self.settle()  # the list is laid out in its second frame
         if name not in all_here() and name in self.openers and not self.opens:
             self.opens = True
             self.do(self.openers[name])
@@ -302,7 +302,7 @@ class Run:
             return self.act_on_widget(event)
         if kind == "key":
             self.press(*rest)
-        elif kind == "fly":  # and back again: in flight the panel is out of reach
+        elif kind == "fly":  # flies and comes back: in flight the panel is out of reach
             self.press("f", [])
             for key in rest[0]:
                 hands.key(key, True)
@@ -354,7 +354,7 @@ class Run:
             for _ in range(2):  # a field's focus or a dialog, then flight
                 self.settle()
                 hands.tap("Escape")
-            field = self.widgets().get("Open/path")  # of an empty window: it takes all letters
+            field = self.widgets().get("Open/path")  # an empty window has this field: it takes all letters
             for name in ["Control_L+q"] if field and field[5] else rest:
                 self.settle()
                 *modifiers, key = name.split("+")

@@ -17,17 +17,17 @@
 namespace telesplat::lab {
 namespace {
 
-constexpr double kMostSleep_s = 0.05;  // so that a signal is seen
+constexpr double kMostSleep_s = 0.05;  // short enough to see a signal soon
 
 struct ReplayOptions {
   std::string file;
   std::string bind = "tcp://127.0.0.1:7790";
-  double jitter_ms = 0;  ///< each pose is late by 0 to so much, evenly distributed
-  double loss = 0;       ///< this share of the poses is never sent
-  uint64_t seed = 1;     ///< of both
+  double jitter_ms = 0;  ///< each pose is late by 0 to this, evenly distributed
+  double loss = 0;       ///< share of the poses that is never sent
+  uint64_t seed = 1;     ///< for both jitter and loss
   bool loop = false;
-  bool wait = false;      ///< for somebody who listens
-  bool no_times = false;  ///< poses without a time: they count from when they arrive
+  bool wait = false;      ///< until a subscriber is there
+  bool no_times = false;  ///< sends poses without a time: the viewer takes the time of arrival
   bool insecure = false;
 };
 
@@ -57,7 +57,7 @@ options::Table table(ReplayOptions& o) {
 
 void sleep_s(double s) { std::this_thread::sleep_for(std::chrono::duration<double>(s)); }
 
-// False: told to stop.
+// False: a signal asked to stop.
 bool sleep_until(double t_s) {
   for (double left_s = t_s - monotonic_s(); left_s > 0 && !net::stop_requested(); left_s = t_s - monotonic_s())
     sleep_s(std::min(left_s, kMostSleep_s));

@@ -1,6 +1,6 @@
-// `telesplat-lab scaling`: how a Julia set's frame speeds up with the number of samplers (T7.3, table 7.2), with real
-// processes, leases and messages. Where samplers outnumber the processors, the computing of each row is replaced by a
-// wait of its measured cost. Leaves scaling.csv and the runs' records.
+// `telesplat-lab scaling`: measures how a Julia set's frame speeds up with the number of samplers (T7.3, table 7.2),
+// with real processes, leases and messages. If samplers outnumber the processors, a wait of its measured cost takes the
+// place of computing each row. Writes scaling.csv and the runs' records.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -37,9 +37,9 @@
 namespace telesplat::lab {
 namespace {
 
-constexpr double kRoom_m = 0.8, kFov_deg = 90;  // as `telesplat run` has them
-constexpr double kCheap = 20;                   // the second series' rows are so many times cheaper
-constexpr int kScalingPasses = 5;               // over the rows, when their costs are measured
+constexpr double kRoom_m = 0.8, kFov_deg = 90;  // the same as in `telesplat run`
+constexpr double kCheap = 20;                   // a row of the second series costs 1 / kCheap
+constexpr int kScalingPasses = 5;               // passes over the rows to measure their costs
 constexpr int kComputedFrames = 20;
 
 /// One number of nodes in one series.
@@ -48,13 +48,13 @@ struct ScalingPoint {
   double time_s = 0;  ///< median, from request to the frame's last patch at the viewer
 };
 
-/// One way to pay for rows.
+/// One series: the source of the rows' costs, and its points.
 struct ScalingSeries {
   std::string name;  ///< "thesis rows", ...
   bool simulated = false;
-  double row_seconds = 0;  ///< what all rows of the frame cost together, on one node
+  double row_seconds = 0;  ///< cost of all rows of the frame on one node
   std::vector<ScalingPoint> points;
-  /// T(1) / T(N) and T(1) / (N T(N)); none without a measured T(1).
+  /// Returns T(1) / T(N) and T(1) / (N T(N)); nothing if T(1) was not measured.
   std::optional<double> speed_up(const ScalingPoint& p) const {
     for (const auto& one : points)
       if (one.nodes == 1) return one.time_s / p.time_s;
@@ -67,7 +67,7 @@ struct ScalingSeries {
 };
 
 constexpr double kThesisSingle_s = 69.3;
-// Table 7.2 of the thesis: seconds on this many nodes; none for numbers it does not have.
+// Returns the thesis' time on this many nodes (table 7.2), seconds; nothing for numbers that the table lacks.
 std::optional<double> thesis_time_s(int nodes) {
   static const std::map<int, double> table{{1, kThesisSingle_s}, {2, 34.8},  {4, 17.3}, {8, 8.7},
                                            {16, 4.36},           {32, 2.19}, {40, 1.76}};
@@ -119,7 +119,7 @@ struct ScalingOptions {
   std::string size = "1024x640";
   julia::SceneOptions scene;
   std::string row_cost = "both";  ///< "thesis", "cheap" (20 times cheaper), "both", "measured", or seconds a frame
-  int frames = 0;                 ///< measured for each number of nodes, the median counts; 0: as many as seem worth it
+  int frames = 0;                 ///< timed for each number of nodes; the median counts; 0: chosen by their cost
   std::string out = "scaling";
   bool computed = true;
 };
@@ -201,7 +201,7 @@ class Study {
   }
   static std::vector<std::string> compute_flags() { return {"--threads", "1"}; }
 
-  // The times of `frames` frames.
+  // Returns the times of `frames` frames, seconds.
   Result<std::vector<double>> frames(Session& session, int nodes, int frames, double expected_s,
                                      const std::string& name) {
     std::vector<double> times;
@@ -236,7 +236,7 @@ class Study {
     return ok_status();
   }
 
-  // As many samplers as there are processors, sampling in earnest.
+  // Starts as many samplers as there are processors; they sample in earnest.
   Status computed() {
     ScalingSeries series{"computed", false, rows_s_, {}};
     const int count = options_.frames ? options_.frames : kComputedFrames;
@@ -280,7 +280,7 @@ class Study {
   tools::ProgressLine progress_;
 };
 
-// A flag that takes several numbers, "1,2,4", each within least..most.
+// Reads a flag with several numbers, "1,2,4", each within least..most.
 options::Text number_list(std::vector<int>& value, int least, int most) {
   const auto read = [&value, least, most](const std::string& text) -> Status {
     value.clear();

@@ -12,9 +12,9 @@
 namespace telesplat::lab {
 namespace {
 
-constexpr double kPatience_s = 20;                    // for processes to start
-constexpr double kAskEvery_s = 0.2;                   // who has joined
-constexpr int kPackerNice = 5, kBackgroundNice = 10;  // as `telesplat run` has them
+constexpr double kPatience_s = 20;                    // time for processes to start
+constexpr double kAskEvery_s = 0.2;                   // asks the master for its processes this often
+constexpr int kPackerNice = 5, kBackgroundNice = 10;  // the same as in `telesplat run`
 
 }  // namespace
 
@@ -31,8 +31,8 @@ Result<std::unique_ptr<Session>> Session::start(const std::vector<std::string>& 
 }
 
 Status Session::start_processes(const std::vector<std::string>& scene_flags, bool own_machines) {
-  unsetenv(net::kKeysVariable);  // this process has none
-  // Every picture is sampled whole, and nothing of it left out (T7.3): the same view comes again and again.
+  unsetenv(net::kKeysVariable);  // this process has no keys
+  // The master samples every picture whole (T7.3): the same view comes again and again.
   const std::vector<std::string> master{"--bind",
                                         "tcp://127.0.0.1:*",
                                         "--started-by",
@@ -81,7 +81,7 @@ int Session::count_joined(const std::string& role) {
   const auto status = control_->status(2);
   if (!status) return 0;
   int n = 0;
-  // Values come with the first report, after the welcome.
+  // A process that has joined reports values a little later.
   for (const auto& p : status->value("processes", nlohmann::json::array()))
     n += p.value("role", "") == role && p.value("alive", false) && p.contains("values");
   return n;
@@ -132,7 +132,7 @@ Result<double> Session::frame(const geometry::Camera& camera, double patience_s,
   return progress_.elapsed_s;
 }
 
-// Keeps the connections going and takes what came.
+// Keeps the connections alive and takes the messages that have arrived.
 void Session::pump(int timeout_ms) {
   link_->tick(monotonic_s(), [] { return net::MasterLink::Values{}; });
   std::vector<net::Socket*> sockets{&link_->socket()};

@@ -17,10 +17,10 @@ namespace telesplat::lab {
 
 class Session {
  public:
-  /// scene_flags: as telesplat-data julia takes them. The master records into `directory`, logs go to directory/logs.
+  /// scene_flags: flags of telesplat-data julia. The master records into `directory`, logs go to directory/logs.
   /// own_machines: samplers stand for machines of their own, so the packer gives way to none of them; else all have the
-  /// priorities that `telesplat run` gives them. Returns when data server and packer have joined. Error: what failed to
-  /// start, or took over 20 s, or that Ctrl-C came.
+  /// priorities that `telesplat run` gives them. Returns when data server and packer have joined. Error: a process
+  /// failed to start or took over 20 s, or Ctrl-C came.
   static Result<std::unique_ptr<Session>> start(const std::vector<std::string>& scene_flags,
                                                 const std::string& directory, bool own_machines);
   ~Session();
@@ -28,18 +28,18 @@ class Session {
   /// Starts samplers with these flags until there are `count`; returns when all of them have joined. Errors as start().
   Status add_samplers(size_t count, const std::vector<std::string>& flags);
 
-  /// What happened to a frame. Rows are those that have arrived here.
+  /// Progress of a frame. rows: those that have arrived here.
   struct Progress {
     double elapsed_s = 0;
     int rows = 0;
     bool complete = false;
   };
-  /// Requests a frame and waits until its last patch is here: the seconds that it took. `watch` is called every 50 ms
-  /// or sooner. Error: Ctrl-C, a process died, or nothing arrived for `patience_s`.
+  /// Requests a frame and waits for its last patch; returns the seconds that it took. Calls `watch` every 50 ms or
+  /// sooner. Error: Ctrl-C, a process died, or nothing arrived for `patience_s`.
   Result<double> frame(const geometry::Camera& camera, double patience_s,
                        const std::function<void(const Progress&)>& watch);
 
-  /// Ends all processes; the record is complete then.
+  /// Ends all processes; then the record is complete.
   void finish();
 
  private:

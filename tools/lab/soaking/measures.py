@@ -3,11 +3,11 @@ import csv
 import os
 import statistics
 
-GROWTH = 0.05  # of memory after the warm-up
-SAMPLE_S = 3  # from one look at all processes to the next
-SLACK_MB = 4  # below it growth is that of single buffers
+GROWTH = 0.05  # allowed share of memory growth after the warm-up
+SAMPLE_S = 3  # from one sample of all processes to the next
+SLACK_MB = 4  # smaller growth is that of single buffers
 MOST_GAP_MS = 500  # between two displayed frames
-OUTAGE_S = (3, 8)  # before and after a master's death: rows that it had not written are missing in the record
+OUTAGE_S = (3, 8)  # before and after a master's death: the record lacks rows that the master had not written
 
 
 def value(status, name, key):
@@ -101,8 +101,8 @@ def steadiness(soak):
     names = sorted({s[1] for s in soak.samples if not s[3]})
     out = []
     for name in names:
-        # Who was killed began anew, with little: of such the most counts, and not what is there most of the time. A
-        # master goes on with what the one before it recorded.
+        # A killed process begins again with little memory: compare the most that it had, not the median. A master goes
+        # on with what the one before it recorded.
         lives = len({s[2] for s in soak.samples if s[1] == name and not s[3]})
         begins_anew = lives > 1 and name != "master"
         first, last, guests = memory(soak.samples, name, length_s)
@@ -117,7 +117,7 @@ def steadiness(soak):
             if len(first) < 5 or len(last) < 5:
                 continue
             a, b = statistics.median(first), statistics.median(last)
-            # Guests come and go, and each has some connections.
+            # Guests come and go, and each has up to some connections.
             slack = 0 if what == "threads" else 12
             out.append((f"{what} of {name}", f"{a:.0f} -> {b:.0f}", "as many" if slack == 0 else
                         f"at most {slack} more, of guests' connections", b - a <= slack))
@@ -158,7 +158,7 @@ def display(soak):
     rows = rows_of(os.path.join(soak.run_folder, "frames.csv"))
     gaps = [float(r["inter_frame_ms"]) for r in rows if r["viewer"] == "viewer-1" and float(r["t_s"]) > 5]
     told = [s[8] for s in soak.samples if s[1] == "viewer-1" and s[8] != ""]
-    # The viewer's own figure has what the record lacks; its first seconds, in which all starts, do not count.
+    # The viewer's own figure has frames that the record lacks; its first seconds, in which all starts, do not count.
     grown = [b for a, b in zip(told[3:], told[4:]) if b > a]
     longest = max(gaps + grown, default=0)
     return ("display: longest time between two frames", f"{longest:.0f} ms of {len(gaps)} frames",

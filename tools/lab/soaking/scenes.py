@@ -90,7 +90,7 @@ def mesh(options):
     def change(chance):
         return chance.choice((clip, lambda c: ("colour", "map", c.choice(("viridis", "plasma", "turbo", "grey"))),
                               lambda c: ("epoch",)))(chance)
-    # Points have errors, and become exact when heads rest.
+    # Points have errors, and become exact while heads rest.
     errors = ["--depth-error", "1/32", "--normal-error", "1", "--colour-error", "1"]
     arguments = [path, "--colour-by", "height", "--cache", os.path.join(options.out, "cache")]
     return Scene("mesh", [*arguments, *errors], change, True, heads)

@@ -1,5 +1,5 @@
-// `telesplat autostereo PANEL.toml`: what the figures of an autostereo display come to; patterns for it; what an eye
-// would see of a picture on it, simulated.
+// `telesplat autostereo PANEL.toml`: computes the figures of an autostereo display; writes test patterns for it;
+// simulates what an eye sees of a picture on it.
 #include <fmt/format.h>
 
 #include <array>
@@ -76,7 +76,7 @@ void print(const stereo::Panel& panel, double separation_m) {
               f.crosstalk * 100, f.dark * 100);
 }
 
-// The pictures of both eyes; nothing: none are asked for.
+// Returns the pictures of both eyes; nothing: no flag asks for pictures.
 Result<std::optional<std::array<image::View, 2>>> pictures(const AutostereoOptions& o, const stereo::Panel& panel) {
   using Pictures = std::optional<std::array<image::View, 2>>;
   const auto pattern = *stereo::pattern_named(o.pattern);

@@ -1,4 +1,4 @@
-// `telesplat cache list|clear|limit`: the stores of chunks that data sets leave on disk.
+// `telesplat cache list|clear|limit`: stores of chunks that data sets leave on disk.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace telesplat::launcher {
 namespace {
 
 struct CacheOptions {
-  std::string folder;  ///< empty: the user's
+  std::string folder;  ///< empty: the user's cache folder
   std::string limit;
 };
 
@@ -38,7 +38,7 @@ std::string folder_of(const CacheOptions& o) { return o.folder.empty() ? data::d
 
 double now_s() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
-// "3 hours ago"
+// Writes an age as text: "3 hours ago".
 std::string ago(double seconds) {
   if (seconds < 60) return "just now";
   for (const auto& [unit_s, name] : {std::pair{86400.0, "day"}, {3600.0, "hour"}, {60.0, "minute"}}) {

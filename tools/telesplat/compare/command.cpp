@@ -1,4 +1,4 @@
-// `telesplat compare DIR`: poses of a recorded run, drawn by every kernel and renderer and directly from the data.
+// `telesplat compare DIR`: draws poses of a recorded run with every kernel and renderer, and directly from the data.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,9 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostColumns = 6;  // of the run's sheet
+constexpr size_t kMostColumns = 6;  // columns of the run's sheet
 
-// Which renderers to use: those asked for; without a wish cpu, and gl where it can be had.
+// Returns the renderers to use: those asked for; by default cpu, and gl where the machine has it.
 Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
   if (!o.renderers.empty()) {
     for (const auto& kind : o.renderers)
@@ -58,7 +58,7 @@ class Comparison {
     return ok_status();
   }
 
-  /// One pose after the other, until told to stop. What was compared so far counts.
+  /// Compares pose after pose until a signal stops it. Poses compared so far count.
   Status compare_poses() {
     for (const auto& frame : subject_.frames) {
       if (net::stop_requested()) break;
@@ -117,7 +117,7 @@ class Comparison {
             {"repeat", options_.repeat}};
   }
 
-  // To the model that the frame displayed.
+  // Replays the record up to the model that the frame displayed.
   Status replay_to(const DisplayedFrame& frame) {
     const auto there = models_->advance(frame);
     if (!there) return there.error();
@@ -146,11 +146,11 @@ class Comparison {
     return *complete ? keep(reference.view, std::move(pose)) : ok_status();
   }
 
-  // One cell a kernel and renderer. False: told to stop in between.
+  // Measures one cell a kernel and renderer. False: a signal stopped it in between.
   Result<bool> measure_cells(const points::PointModel& model, const image::Reference& reference,
                              const image::Flip& flip, const std::string& where, ComparedPose& pose) {
-    // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same
-    // numbers.
+    // A pose has renderers of its own: they keep copies of points by event number, and another pose may have another
+    // model with the same numbers.
     std::vector<std::unique_ptr<viewer::Renderer>> renderers;
     for (const auto& kind : renderers_) {
       auto made = viewer::make_renderer(kind, options_.threads);
@@ -218,7 +218,7 @@ class Comparison {
   std::unique_ptr<DirectScene> scene_;
   std::unique_ptr<ModelReplay> models_;
   std::vector<ComparedPose> poses_;
-  std::vector<std::vector<SheetCell>> columns_;  // of the run's sheet
+  std::vector<std::vector<SheetCell>> columns_;  // columns of the run's sheet
 };
 
 int compare(CompareOptions o, const options::Given&) {

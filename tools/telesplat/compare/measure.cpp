@@ -76,7 +76,7 @@ Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, S
     splat::SplatStats stats;
   };
   std::vector<Timed> timed;
-  // Timed as a viewer draws most of its frames: without depth. The first frame warms up caches and buffers.
+  // Times frames as a viewer draws most of them: without depth. The first frame warms up caches and buffers.
   for (int i = 0; i <= o.repeat; ++i) {
     const double begin_s = monotonic_s();
     splat::select_view(model, camera, selection, list);

@@ -11,14 +11,14 @@
 
 namespace telesplat::launcher {
 
-/// Where the squared error lies, as shares of its sum over pixels where reference or reconstruction shows the data set
-/// (1 in all, 0 where the pictures are identical):
+/// Shares of the squared error: parts of its sum over pixels where reference or reconstruction shows the data set (1 in
+/// all, 0 if the pictures are identical):
 ///   silhouette: only one of the two shows it, or not all of the reference's rays do;  depth_edge: both do, but their
 ///   depths differ by more than 2 % of the reference's;  interior: the rest.
 struct ErrorShares {
   double silhouette = 0, depth_edge = 0, interior = 0;
-  double silhouette_pixels = 0, depth_edge_pixels = 0;  ///< their shares of the pixels
-  double interior_psnr_db = 0;                          ///< over the interior alone; 99 where identical
+  double silhouette_pixels = 0, depth_edge_pixels = 0;  ///< shares of the pixels
+  double interior_psnr_db = 0;                          ///< over the interior alone; 99 if identical
 };
 
 /// Preconditions: equal sizes, both with depth.
@@ -28,7 +28,7 @@ struct FrameTimes {
   double frame_ms =
       0;  ///< what a viewer waits for: choosing what to draw, drawing and, for gl, reading the picture back
   double select_ms = 0, render_ms = 0;
-  splat::SplatStats stats;  ///< of the frame of median render_ms
+  splat::SplatStats stats;  ///< those of the frame of median render_ms
 };
 
 struct Cell {
@@ -37,11 +37,11 @@ struct Cell {
   float splat_scale = 0;
   image::Quality quality;
   ErrorShares shares;
-  double flip = 0;  ///< mean over the pixels that count (quality.h)
+  double flip = 0;  ///< mean over the pixels that quality.h counts
   FrameTimes times;
   uint64_t items = 0;
   image::View view;             ///< with depth
-  std::vector<float> flip_map;  ///< of its pixels
+  std::vector<float> flip_map;  ///< one value a pixel of view
 };
 
 struct CellOptions {

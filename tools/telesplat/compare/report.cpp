@@ -66,7 +66,7 @@ const Figure& figure(std::string_view name) {
 constexpr uint32_t kFrame = 0xffd23f;
 constexpr int kZoom = 4, kPoseWidth = 480, kColumnWidth = 280;
 
-// Side of the square to look at closer: as high as the small pictures once magnified.
+// Returns the side of the magnified square: once magnified, it is as high as the small pictures.
 int square_side(const image::View& reference, int width) {
   return std::max(8, small_picture(reference, width).height / kZoom);
 }

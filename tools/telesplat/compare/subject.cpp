@@ -25,7 +25,7 @@ std::vector<std::string> split(const std::string& text) {
   }
 }
 
-// "square,disc"
+// Reads names: "square,disc".
 options::Text names(std::vector<std::string>& value, std::vector<std::string> known) {
   return {.read =
               [&value, known](const std::string& text) {
@@ -39,7 +39,7 @@ options::Text names(std::vector<std::string>& value, std::vector<std::string> kn
           .write = [&value] { return fmt::format("{}", fmt::join(value, ",")); }};
 }
 
-// "10,250"
+// Reads numbers: "10,250".
 options::Text numbers(std::vector<uint64_t>& value) {
   return {.read =
               [&value](const std::string& text) {
@@ -62,7 +62,7 @@ Status refuse_what_no_points_show(const CompareOptions& o, const Scene& scene) {
                            o.path, scene::described(scene.kind()))};
 }
 
-// The scene of a run, where its data lie now.
+// Points the scene of a run at its data's present place.
 Status settle_scene(const CompareOptions& o, Scene& scene) {
   if (!o.moved.empty())
     if (const Status s = scene.move_to(o.moved); !s) return s;

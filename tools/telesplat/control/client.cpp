@@ -17,15 +17,15 @@ struct ControlClient::Line {
   explicit Line(const net::Access& access) : context(access) {}
   net::Context context;
   net::Socket socket{context, net::Kind::kDealer, "ctl", net::kControlSocket};
-  uint64_t failed_before = 0;  // attempts to connect, by the last answer
-  uint64_t due = 0;            // answers to request_status()
+  uint64_t failed_before = 0;  // attempts to connect until the last answer
+  uint64_t due = 0;            // answers to request_status() that are still to come
 };
 
 ControlClient::ControlClient(const std::string& master_endpoint, const net::Access& access)
     : endpoint_(master_endpoint), access_(access) {}
 ControlClient::~ControlClient() = default;
 
-// A connection over which nothing is said counts at the master as a message that it rejected.
+// Sends something at once: the master counts a connection without messages as a rejected message.
 ControlClient::Line& ControlClient::line() {
   if (line_) return *line_;
   line_ = std::make_unique<Line>(access_);
@@ -64,7 +64,7 @@ Result<wire::ControlReply> ControlClient::order(const std::string& command, doub
   auto reply = net::reply_of_master(to.socket, endpoint_, command, timeout_s, arguments);
   unanswered_ = !reply.ok();
   if (reply) {
-    reply->text = printable_lines(reply->text);  // whoever said it, it may come to a terminal
+    reply->text = printable_lines(reply->text);  // the text may have any source, and may go to a terminal
     to.failed_before = to.socket.failed_connections();
     nobody_there_ = false;
   } else {

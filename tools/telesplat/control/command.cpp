@@ -1,4 +1,4 @@
-// `telesplat ctl ORDER ...`: asks or tells a running session's master.
+// `telesplat ctl ORDER ...`: sends questions and orders to a running session's master.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -62,7 +62,7 @@ Status print_status(ControlClient& client, const StatusOptions& o) {
 int show_status(StatusOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
   int exit_code = 0;
-  const auto client = reach(o.session, given, exit_code, net::any_role());  // everybody may ask that
+  const auto client = reach(o.session, given, exit_code, net::any_role());  // every role may ask for the status
   if (!client) return exit_code;
   if (o.watch) net::install_signal_handlers();
   bool shown = false;
@@ -79,7 +79,7 @@ int show_status(StatusOptions o, const options::Given& given) {
   return 0;
 }
 
-// What an order without words asks for. Exit code.
+// Prints the status' value of `key`, for an order without words. Returns the exit code.
 int print_shown(ControlClient& client, const std::string& key) {
   const auto status = client.status(kPatience_s);
   if (!status) return complain(status.error(), 1);
@@ -88,7 +88,7 @@ int print_shown(ControlClient& client, const std::string& key) {
   return 0;
 }
 
-// A master that refuses was asked for something wrong.
+// If the master refuses, the order was wrong.
 int give_order(OrderOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
   int exit_code = 0;
@@ -108,7 +108,7 @@ Command order_command(const Order& order) {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kListPatience_s = 0.5;  // for each master: it is on this machine
+constexpr double kListPatience_s = 0.5;  // for each master: all are on this machine
 
 struct ListOptions {
   bool json = false;

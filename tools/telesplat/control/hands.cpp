@@ -68,7 +68,7 @@ int pick(PickOptions o, const options::Given& given) {
   return 0;
 }
 
-// ---- what a window's person measures ------------------------------------------------------------------------------
+// ---- measurements in a window -------------------------------------------------------------------------------------
 
 struct MeasureOptions {
   SessionChoice session;
@@ -123,7 +123,7 @@ int measure(MeasureOptions o, const options::Given& given) {
   return 0;
 }
 
-// ---- what is kept of a data set -----------------------------------------------------------------------------------
+// ---- notes and bookmarks of a data set ----------------------------------------------------------------------------
 
 struct KeptOptions {
   SessionChoice session;
@@ -155,12 +155,12 @@ options::Table notes_table(KeptOptions& o) {
 
 std::string now_text() { return fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr))); }
 
-// The session that a command is about, as far as it needs one.
+// The session that a command is about, if the command needs one.
 class Subject {
  public:
   Subject(KeptOptions& o, const options::Given& given) : o_(o), given_(given) {}
 
-  /// The file that the session shows, or --data. Error, exit code: no session, no file.
+  /// Returns the shelf of the session's file, or of --data. Error, exit code: no session, no file.
   Result<notes::Shelf> shelf(int& exit_code) {
     exit_code = 2;
     std::string file = o_.data, scene;
@@ -199,7 +199,7 @@ class Subject {
   std::unique_ptr<ControlClient> client_;
 };
 
-// Words after the first, as one text.
+// Joins the words after the first.
 std::string rest(const std::vector<std::string>& words) {
   return fmt::format("{}",
                      fmt::join(words.begin() + std::min<ptrdiff_t>(1, ptrdiff_t(words.size())), words.end(), " "));
@@ -233,7 +233,7 @@ int print_book(const notes::Shelf& shelf, bool json, bool bookmarks) {
   return 0;
 }
 
-// Changes the book and tells where it lies. Refusals of what a person wished are their fault: exit code 2.
+// Changes the book and prints its path. A refused change is the user's mistake: exit code 2.
 int change(const notes::Shelf& shelf, const std::string& done, const std::function<Status(notes::Book&)>& how) {
   std::string path;
   if (const Status s = notes::change_book(shelf, how, &path); !s) return complain(s.error());
@@ -288,7 +288,7 @@ int bookmark(KeptOptions o, const options::Given& given) {
   return change(*shelf, "kept", [&](notes::Book& book) { return book.keep(*view); });
 }
 
-// The place that a note is about. Error: nothing is there.
+// Finds the place of a note. Error: nothing is there.
 Status find_place(ControlClient& client, const KeptOptions& o, notes::Note& note) {
   const auto answer = ask_pick(client, {.places = {o.at}, .viewer = o.viewer, .opacity = {}});
   if (!answer) return answer.error();

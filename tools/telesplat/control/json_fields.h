@@ -1,4 +1,4 @@
-// Values of a JSON object that another program wrote: what is not there, or of another type, is empty.
+// Reads values of a JSON object that another program wrote: a missing value, or one of another type, is empty.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ inline std::optional<double> number(const nlohmann::ordered_json& object, const 
   return value && value->is_number() ? std::optional(value->get<double>()) : std::nullopt;
 }
 
-/// A whole number of 0 to 9e15.
+/// Reads a whole number from 0 to 9e15.
 inline uint64_t count(const nlohmann::ordered_json& object, const char* key) {
   return uint64_t(std::clamp(number(object, key).value_or(0), 0.0, 9e15));
 }
@@ -38,13 +38,13 @@ inline bool flag(const nlohmann::ordered_json& object, const char* key) {
   return value && value->is_boolean() && value->get<bool>();
 }
 
-/// Its elements; none if it is no array.
+/// Returns the array's elements; no elements if it is no array.
 inline nlohmann::ordered_json array(const nlohmann::ordered_json& object, const char* key) {
   const auto* value = field(object, key);
   return value && value->is_array() ? *value : nlohmann::ordered_json::array();
 }
 
-/// Its elements, if it is an array of `count` numbers.
+/// Returns the array's elements, if it has `count` numbers.
 inline std::optional<std::vector<double>> numbers(const nlohmann::ordered_json& object, const char* key, size_t count) {
   std::vector<double> out;
   for (const auto& v : array(object, key))

@@ -22,9 +22,9 @@ namespace fs = std::filesystem;
 using Arguments = Order::Arguments;
 using Words = std::vector<std::string>;
 
-constexpr uintmax_t kMaxMapBytes = 4 << 20;  // of a colour-map file
+constexpr uintmax_t kMaxMapBytes = 4 << 20;  // size of a colour-map file
 
-// "NAME=VALUE"s.
+// Reads words "NAME=VALUE".
 Result<Arguments> set_arguments(const Words& words, ControlClient&) {
   Arguments out;
   if (words.empty()) return Error{"ctl set: needs NAME=VALUE, such as c.y=0.3 or volume.step=3"};
@@ -49,7 +49,7 @@ Result<Arguments> animate_arguments(const Words& words, ControlClient&) {
   return Arguments{{"timeline", words.front()}};
 }
 
-// FILE.json or FILE.json:NAME. A colour-map file's values may lie in any range; the session's is asked for.
+// Reads FILE.json or FILE.json:NAME. A colour-map file's values may lie in any range; the master sends the session's.
 Result<std::string> read_map(const std::string& word, ControlClient& client) {
   const size_t named = word.find(".json:");
   const std::string path = word.substr(0, named == std::string::npos ? named : named + 5);
@@ -103,7 +103,7 @@ Result<Arguments> transfer_arguments(const Words& words, ControlClient& client) 
   return Arguments{{"transfer", text}};
 }
 
-// ARRAY[:MIN:MAX], none, map NAME, or ARRAY map NAME. Maps are read here: their files lie on this machine.
+// Reads ARRAY[:MIN:MAX], none, map NAME, or ARRAY map NAME. Map files lie on this machine: they are read here.
 Result<Arguments> colour_arguments(const Words& words, ControlClient&) {
   const bool maps = words.size() >= 2 && words[words.size() - 2] == "map";
   const size_t arrays = words.size() - (maps ? 2 : 0);
@@ -129,7 +129,7 @@ Result<Arguments> overlay_arguments(const Words& words, ControlClient&) {
   return Arguments{{"name", words.front()}, {"on", words.back()}};
 }
 
-// play, pause, step or step N.
+// Reads play, pause, step or step N.
 Result<Arguments> play_arguments(const Words& words, ControlClient&) {
   const std::string how = words.empty() ? "play" : words.front();
   if ((how != "play" && how != "pause" && how != "step") || words.size() > (how == "step" ? 2u : 1u))
@@ -139,7 +139,7 @@ Result<Arguments> play_arguments(const Words& words, ControlClient&) {
   return out;
 }
 
-// plane ..., box ..., off; parts may be separated by ";".
+// Reads plane ..., box ..., off; ";" may separate parts.
 Result<Arguments> clip_arguments(const Words& words, ControlClient&) {
   if (words.empty()) return Error{"ctl clip: needs plane x>=50%, plane A,B,C,D, box X0,Y0,Z0,X1,Y1,Z1 or off"};
   const std::string text = fmt::format("{}", fmt::join(words, " "));
@@ -147,7 +147,7 @@ Result<Arguments> clip_arguments(const Words& words, ControlClient&) {
   return Arguments{{"clip", text}};
 }
 
-// Without a help it is that of the settings that it changes.
+// An order without a help has that of the settings that it changes.
 std::vector<Order> all_orders() {
   std::vector<Order> all{
       {.name = "stop",

@@ -1,4 +1,4 @@
-// What `telesplat ctl` can order of a session: one row an order.
+// Orders of `telesplat ctl` to a session: one row an order.
 #pragma once
 
 #include <map>
@@ -12,29 +12,29 @@ namespace telesplat::launcher {
 
 /// A sub-command of `telesplat ctl` whose answer is one line.
 struct Order {
-  using Arguments = std::map<std::string, std::string>;  ///< as wire::Control has them
+  using Arguments = std::map<std::string, std::string>;  ///< those of wire::Control
 
-  std::string name;   ///< of the sub-command and of the command on the wire
-  std::string help;   ///< what it does
-  std::string words;  ///< help of the words that follow; empty: none may
-  /// What the words come to. Error: what is wrong with them; a person typed them. It may ask the master.
+  std::string name;   ///< name of the sub-command and of the command on the wire
+  std::string help;   ///< one line for --help
+  std::string words;  ///< help of the words that follow; empty: it takes no words
+  /// Turns words that a person typed into arguments; may ask the master. Error: says what is wrong with the words.
   Result<Arguments> (*read)(const std::vector<std::string>& words, ControlClient& client) = nullptr;
-  std::string shown;  ///< without words it prints this of the session's status, or "off"; empty: it does not
+  std::string shown;  ///< without words the order prints this field of the status, or "off"; empty: it needs words
 };
 
 const std::vector<Order>& orders();
 
-/// How long a master may take to answer.
+/// Time limit for a master's answer.
 inline constexpr double kPatience_s = 5;
 
-/// The sessions of this user on this machine.
+/// Lists the sessions of this user on this machine.
 Command list_command();
-/// How displays and server wait for each other, while a session runs.
+/// Sets how displays and server wait for each other, while a session runs.
 Command coupling_command();
-/// pick, measure, bookmark, notes: what people point at, and what they keep about it.
+/// pick, measure, bookmark, notes: commands for places that people point at, and for their notes about them.
 std::vector<Command> hands_commands();
-/// One for each order of scene::settings() that a viewer or the launcher keeps, and `settings`, which lists all that
-/// can be changed.
+/// Makes a command for each order of scene::settings() that a viewer or the launcher keeps, and `settings`, which lists
+/// all that can be changed.
 std::vector<Command> setting_commands();
 
 }  // namespace telesplat::launcher

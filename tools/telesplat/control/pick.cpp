@@ -33,7 +33,7 @@ std::string within_text(const Json& place, const std::string& unit) {
   return fmt::format("  within       no bound is known{}\n", why.empty() ? "" : "; an estimate: " + why);
 }
 
-// What the data server finds there.
+// Asks the data server for the exact place of a pick.
 Result<scene::Probed> probe(ControlClient& client, const Json& pick) {
   std::map<std::string, std::string> arguments;
   if (const auto* told = field(pick, "probe"); told && told->is_object())
@@ -45,7 +45,7 @@ Result<scene::Probed> probe(ControlClient& client, const Json& pick) {
   return scene::probed_from_text(answer->text);
 }
 
-// The place as it is in the data; else why it is an estimate.
+// Returns the place as the data have it; if they do not, the place says why it is an estimate.
 scene::ToldPlace refined(ControlClient& client, Json& pick, scene::ToldPlace place, const scene::Placement& placement) {
   if (const auto found = probe(client, pick))
     scene::refine(place, *found, placement);

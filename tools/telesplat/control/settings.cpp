@@ -25,7 +25,7 @@ struct ChangeOptions {
   std::string value, viewer;
 };
 
-// The row of the flag that the setting begins with, as one that takes a text by its place. Without a flag: any text.
+// Returns the row of the setting's first flag, as a positional argument. A setting without a flag takes any text.
 Row value_row(const ChangeOptions& o) {
   static viewer::ViewerOptions viewer;
   static data::DataOptions data;
@@ -61,7 +61,7 @@ int change(ChangeOptions o, const options::Given& given) {
   const Row flag = value_row(o);
   if (!is_switch(flag))
     if (const Status s = options::check(flag, o.value); !s) return complain(s.error());
-  // The launcher may stand in another folder.
+  // The launcher may run in another folder.
   if (o.setting->order == "open" && o.value != julia::kSceneWord) {
     std::error_code error;
     o.value = std::filesystem::absolute(o.value, error).lexically_normal().string();

@@ -30,14 +30,14 @@ std::string fact_of(const Json& process, const char* key) {
   return facts ? text(*facts, key) : std::string();
 }
 
-/// A column: its title and what a process has there; empty: nothing.
+/// A column: its title, and its cell for a process; empty: the process has no value.
 struct Field {
   const char* title;
   std::function<std::string(const Json&)> cell;
   bool right = true;
 };
 
-// A number of `group`, in units of `unit`, with so many digits.
+// A number of `group`, divided by `unit`, with `digits` digits after the point.
 Field value(const char* title, const char* group, const char* key, double unit, int digits) {
   return {title, [=](const Json& p) {
             const auto* values = field(p, group);
@@ -80,7 +80,7 @@ Field coupling() {
             return fmt::format("loose({:.0f})", number(*values, "buffers").value_or(0));
           }};
 }
-// Share of its time in which a sampler samples and encodes.
+// Share of its time that a sampler spends sampling and encoding.
 Field busy() {
   return {"busy", [](const Json& p) {
             const auto* rates = field(p, "rates");
@@ -110,7 +110,7 @@ std::string heard(const Json& p) {
   return *silent_s > kSilent_s ? fmt::format("silent for {:.1f} s", *silent_s) : fmt::format("{:.1f} s ago", *silent_s);
 }
 
-// Against the master's; nothing where it is the same clock.
+// Offset to the master's clock; nothing if the process has the same clock.
 Field clock_offset() {
   return {"clock ms", [](const Json& p) {
             const auto* values = field(p, "values");
@@ -161,7 +161,7 @@ Field host() {
   return {"host", [](const Json& p) { return tools::shortened(printable(fact_of(p, "host")), 16); }, false};
 }
 
-// Empty: there are no processes.
+// Empty if there are no processes.
 std::string table_with(const std::vector<Field>& fields, const std::vector<Json>& processes) {
   std::vector<tools::TextTable::Column> columns;
   for (const Field& f : fields) columns.push_back({f.title, f.right});
@@ -189,7 +189,7 @@ std::string table_of(const RoleTable& role, const std::vector<Json>& processes, 
   return table_with(fields, processes);
 }
 
-// How processes are connected, those that report it.
+// Table of the connections of processes that report them.
 std::string link_table(const std::vector<Json>& processes) {
   const std::vector<Field> fields{name("link of"), value("rtt ms", "values", "rtt_ms", 1, 2),
                                   value("Mbit/s", "values", "link_mbit", 1, 1),
@@ -203,11 +203,11 @@ std::string link_table(const std::vector<Json>& processes) {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kColumns = 110, kIndent = 14;  // of a line, and of what a line of the head says
+constexpr size_t kColumns = 110, kIndent = 14;  // width of a line; width of its label
 
 std::string line(const std::string& what, const std::string& value) { return fmt::format("  {:<12}{}\n", what, value); }
 
-// Words in as many lines as they need.
+// Breaks words into lines.
 std::string wrapped(const std::string& what, const std::vector<std::string>& words) {
   std::string out, row;
   const auto end_row = [&] {
@@ -241,7 +241,7 @@ std::string title(const Json& session, double now_s) {
   return out + "\n";
 }
 
-// Those that bit.
+// Lists the limits that were hit, with their counts.
 std::string limits(const Json& status) {
   const auto* told = field(status, "limits");
   if (!told || !told->is_object()) return {};
@@ -281,7 +281,7 @@ std::string head(const Json& status, double now_s) {
   return out;
 }
 
-// A volume's parameters are its grid and placement, which `inspect` tells.
+// A volume's parameters are its grid and placement; `inspect` prints them.
 std::string parameters(const Json& status) {
   const auto* found = field(status, "parameters");
   if (field(status, "volume") || !found || !found->is_object()) return {};

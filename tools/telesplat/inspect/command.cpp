@@ -1,5 +1,5 @@
-// `telesplat inspect PATH`: what a data set, a run folder, a picture, a recorded frame, a depth image or a file of the
-// cache holds.
+// `telesplat inspect PATH`: describes a data set, a run folder, a picture, a recorded frame, a depth image or a file of
+// the cache.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,11 +23,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct InspectOptions {
-  data::DataOptions data;  // its scene: the path
+  data::DataOptions data;  // data.scene is the path
   bool json = false;
   double skip_s = 0;
   std::string out;               // .npy or .exr file for depth; empty: none
-  std::optional<double> near_m;  // of a depth image of which nothing tells it
+  std::optional<double> near_m;  // near plane of a depth image that has no cameras.csv
 };
 
 options::Table own_table(InspectOptions& o) {
@@ -59,7 +59,7 @@ options::Table table(InspectOptions& o) {
   return joined(joined(std::move(path), own_table(o)), data::scene_table(o.data));
 }
 
-// What lies at the path, as far as flags decide on it.
+// Kind of the path's content, as far as flags depend on it.
 enum class Inspected { kData, kRun, kPicture, kDepthImage, kStore };
 
 std::string lower_extension(const std::string& path) {
@@ -72,7 +72,7 @@ Inspected subject_of(const data::DataOptions& o) {
   std::error_code error;
   const std::string& path = o.scene;
   if (path == julia::kSceneWord || !o.volume.raw.empty()) return Inspected::kData;
-  // A folder is a run's, unless it holds a volume and no run.
+  // A folder counts as a run's, unless it holds a volume or a mesh and no run.
   if (fs::is_directory(path, error))
     return fs::exists(path + "/summary.json", error) || !(data::looks_like_volume(path) || data::is_mesh_file(path))
                ? Inspected::kRun
@@ -85,7 +85,7 @@ Inspected subject_of(const data::DataOptions& o) {
   return Inspected::kData;
 }
 
-// Flags that say nothing of what lies there.
+// Refuses flags that do not fit the path's content.
 Status refuse_misfits(const InspectOptions& o, const options::Given& given, Inspected subject) {
   constexpr const char* kWords[] = {"a data set", "a run folder", "a picture", "a depth image", "a chunk store"};
   InspectOptions any;
@@ -133,7 +133,7 @@ int inspect(InspectOptions o, const options::Given& given) {
   std::error_code error;
   if (path != julia::kSceneWord && !fs::exists(path, error)) return complain({fmt::format("{}: no such file", path)});
   const Inspected subject = subject_of(o.data);
-  // A folder of anything else, whatever the flags.
+  // The folder holds no run: print why, without regard to flags.
   if (subject == Inspected::kRun && !fs::exists(path + "/summary.json", error))
     return complain(inspect_run(path).error());
   if (const Status s = refuse_misfits(o, given, subject); !s) return complain(s.error());

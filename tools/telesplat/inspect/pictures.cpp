@@ -74,7 +74,7 @@ Result<std::vector<uint8_t>> read_limited(const std::string& path) {
   return std::vector<uint8_t>(bytes->begin(), bytes->end());
 }
 
-// Codes to metres, colours and normals.
+// Decodes codes to metres, colours and normals.
 void decode(const image::DepthImage& image, double near_m, Picture& out) {
   out.view = {image.width, image.height, image.colour, {}};
   for (const uint32_t code : image.depth)
@@ -123,8 +123,8 @@ Result<geometry::Camera> camera_in(const tools::CsvTable& table, size_t index) {
   return c;
 }
 
-// What cameras.csv beside a .depth file says of its camera; nothing if it is not there or has no such frame. path ends
-// in the frame's number: "frame-000012.depth". Error: it is no such table; names file and line.
+// Reads a depth image's camera from cameras.csv beside it; nothing if there is no such file or no such frame. path ends
+// in the frame's number: "frame-000012.depth". Error: the file is no such table; names file and line.
 Result<std::optional<geometry::Camera>> recorded_camera(const std::string& path) {
   const std::string cameras = (fs::path(path).parent_path() / "cameras.csv").string();
   const auto number = number_of(path);

@@ -46,7 +46,7 @@ options::Table table(KeysOptions& o) {
 
 void print(const std::string& text) { std::fputs((text + "\n").c_str(), stdout); }
 
-// Who may connect, and which files they need.
+// Prints the keys that may connect, and the files that each machine needs.
 void tell(const std::string& folder, const net::AllowList& allowed) {
   tools::TextTable keys({{"key", false}, {"role", false}, {"public key", false}});
   tools::TextTable files({{"machine of", false}, {"files", false}});
@@ -65,7 +65,7 @@ void tell(const std::string& folder, const net::AllowList& allowed) {
   std::fputs(files.text().c_str(), stdout);
 }
 
-// Whoever asks for two things gets neither.
+// Refuses two actions at a time.
 Status check(const KeysOptions& o, const options::Given& given) {
   const auto is_given = [&](const char* flag) { return std::ranges::find(given, flag) != given.end(); };
   std::vector<std::string> asked;

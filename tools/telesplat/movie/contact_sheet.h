@@ -17,10 +17,10 @@ struct SheetRow {
   std::vector<SheetCell> cells;
 };
 
-/// Captions on top, then the rows. Cells of a column stand below each other.
+/// Puts captions on top, then the rows. Cells of a column stand below each other.
 image::View contact_sheet(const std::vector<std::string>& captions, const std::vector<SheetRow>& rows);
 
-/// As small as `width`, in the picture's proportions; never enlarged.
+/// Shrinks a picture to `width`, in its proportions; never enlarges it.
 image::View small_picture(const image::View& picture, int width);
 
 }  // namespace telesplat::launcher

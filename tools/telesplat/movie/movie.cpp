@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMostFrames = 1e7;
-constexpr int kSmallWidth = 400;  // of a picture of a contact sheet
+constexpr int kSmallWidth = 400;  // width of a contact sheet's pictures
 
 std::string cut_short(const Screen& screen, double t_s) {
   return fmt::format(
@@ -26,7 +26,7 @@ std::string cut_short(const Screen& screen, double t_s) {
       screen.record_file(), screen.frame().number, t_s, screen.duration_s());
 }
 
-// How to make a movie of pictures: a line for a shell.
+// Returns a shell line that makes a movie of the pictures.
 std::string advice(const MovieTarget& target, double fps) {
   const std::string command =
       shell_line({"ffmpeg", "-framerate", fmt::format("{}", fps), "-i", target.pattern(), "-c:v", "libx264", "-crf",
@@ -36,10 +36,10 @@ std::string advice(const MovieTarget& target, double fps) {
       target.wanted_video, command);
 }
 
-// Numbered pictures in a folder; they go again unless they are kept.
+// Numbered pictures in a folder; the destructor deletes them unless they are kept.
 class Pictures {
  public:
-  // Of a video they go into a folder beside it, from which ffmpeg reads them.
+  // Pictures for a video go into a folder beside it, where ffmpeg reads them.
   Pictures(const MovieTarget& target, image::Alpha alpha) : target_(target), alpha_(alpha) {
     if (target.kind != MovieTarget::Kind::kVideo) return;
     target_.path = target.path + ".pictures";
@@ -60,7 +60,7 @@ class Pictures {
     if (temporary_ && !made_) return Error{fmt::format("{}: is in the way; remove it", target_.path)};
     return ok_status();
   }
-  // again: it is the picture before once more.
+  // again: the picture is that of the last call.
   Status add(const image::View& picture, bool again) {
     const std::string path = target_.picture(count_);
     std::error_code error;
@@ -117,7 +117,7 @@ class Movie {
   }
 
  private:
-  // How many frames the movie has. What cannot be written stands in the report.
+  // Returns the movie's number of frames. Write errors stand in the report.
   Result<uint64_t> draw(Pictures& pictures, uint64_t frames, tools::ProgressLine& line) {
     for (uint64_t k = 0; k < frames; ++k) {
       if (should_stop_()) return k;
@@ -156,7 +156,7 @@ class Movie {
   MovieReport report_;
 };
 
-// About as high as it is wide.
+// Arranges the cells so that the sheet is about as high as wide.
 std::vector<SheetRow> in_rows(const std::vector<SheetCell>& cells) {
   const image::View& first = cells.front().pictures.front();
   const auto columns =

@@ -52,7 +52,7 @@ const std::vector<Container>& containers() {
       {"libvpx-vp9",
        joined({"-crf", "24", "-b:v", "0", "-row-mt", "1", "-deadline", "good", "-cpu-used", "4"}, kColours)},
       {"libvpx", joined({"-crf", "8", "-b:v", "20M"}, kColours)}};
-  // A palette of its own for each picture, so that none must wait for the last one.
+  // Each picture has its own palette, so that it need not wait for the last one.
   const std::vector<Container::Encoder> gif{
       {"gif", {"-filter_complex", "[0:v]split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1"}}};
   static const std::vector<Container> all{
@@ -68,7 +68,7 @@ std::string lower_case(std::string text) {
 
 std::string part_of(const std::string& path) { return path + ".part"; }
 
-// Runs ffmpeg to its end. What it writes to its output. log: a file for what it complains of.
+// Runs ffmpeg to its end; returns its output. log: file for its complaints.
 Result<std::string> run(const std::string& ffmpeg, const Arguments& arguments, const std::string& log,
                         const tools::ShouldStop& should_stop) {
   auto process = ChildProcess::start("ffmpeg", ffmpeg,
@@ -88,7 +88,7 @@ Result<std::string> run(const std::string& ffmpeg, const Arguments& arguments, c
   return Error{fmt::format("ffmpeg ended with code {}{}{}", process->exit_code(), line.empty() ? "" : ": ", line)};
 }
 
-// The first of the encoders that this ffmpeg has.
+// Returns the first of the encoders that this ffmpeg has.
 Result<const Container::Encoder*> choose_encoder(const std::string& ffmpeg, const Container& container,
                                                  const std::string& log, const tools::ShouldStop& should_stop) {
   const auto known = run(ffmpeg, {"-encoders"}, log, should_stop);
@@ -101,7 +101,7 @@ Result<const Container::Encoder*> choose_encoder(const std::string& ffmpeg, cons
   return Error{fmt::format("{} has no encoder {} for {} files", ffmpeg, names, container.extension)};
 }
 
-// Names of numbered pictures, as ffmpeg reads them: only one % may mean something, and no protocol stands in front.
+// Pattern of numbered pictures for ffmpeg: only one % may mean something, and no protocol stands in front.
 std::string pattern_in(const std::string& folder) {
   std::error_code error;
   std::string out;
@@ -115,7 +115,7 @@ namespace fs = std::filesystem;
 
 constexpr int kMostDigits = 9;
 
-// Whether something can be made in this folder, which may have to be made first.
+// Checks that a file can be made in this folder; the folder itself may still be missing.
 Status check_folder(fs::path folder, const std::string& path) {
   std::error_code error;
   folder = fs::absolute(folder.empty() ? "." : folder, error);
@@ -180,7 +180,7 @@ Result<MovieTarget> pictures(const std::string& name) {
   return out;
 }
 
-// A video, or what takes its place.
+// Returns a video, or the pictures that take its place.
 Result<MovieTarget> video(const std::string& name) {
   MovieTarget out;
   out.path = name;
@@ -234,7 +234,7 @@ Result<std::string> encode_video(const std::string& ffmpeg, const std::string& f
   // "file:" keeps names from being taken for options or protocols.
   arguments = joined(std::move(arguments), {"-f", container->format, "file:" + part_of(path)});
   std::error_code error;
-  fs::remove(part_of(path), error);  // ffmpeg would write through a link
+  fs::remove(part_of(path), error);  // ffmpeg would write through a link of that name
   const auto done = run(ffmpeg, arguments, log, should_stop);
   if (done) fs::rename(part_of(path), path, error);
   if (done && !error) return (*encoder)->name;

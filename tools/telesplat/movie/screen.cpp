@@ -34,7 +34,7 @@ Result<Screen> Screen::open(const std::string& directory, int width, int height,
   return out;
 }
 
-// A described wall is laid flat, with the gaps of its bezels.
+// Lays a described wall flat, with the gaps of its bezels.
 Status Screen::choose_size_of_description(int width, int height, const char* size_flag) {
   const auto flat = wall::unrolled(*run().wall.described);
   if (!flat) return flat.error();
@@ -71,7 +71,7 @@ Status Screen::choose_size(int width, int height, const char* size_flag) {
 Status Screen::open_replays(int threads) {
   for (Tile& tile : tiles_) {
     auto replay = FrameReplay::open(*tile.run, tile.run->renderer, threads);
-    // A machine without a GPU draws frames of one that has.
+    // Without a GPU, draws a record of the gl renderer with cpu.
     if (!replay && tile.run->renderer == "gl") {
       const std::string why = replay.error().text;
       replay = FrameReplay::open(*tile.run, "cpu", threads);
@@ -83,7 +83,7 @@ Status Screen::open_replays(int threads) {
   return ok_status();
 }
 
-// Epochs that told the same share a legend.
+// Epochs with the same legend share it.
 Status Screen::read_legends(const std::string& directory) {
   std::map<std::string, std::string> told;
   std::shared_ptr<const image::Legend> legend;
@@ -101,7 +101,7 @@ Status Screen::read_legends(const std::string& directory) {
   });
 }
 
-// A wall's tiles have one clock.
+// The tiles of a wall use one clock.
 void Screen::find_times() {
   double end_s = run().frames.back().shown_s;
   begin_s_ = run().frames.front().shown_s;

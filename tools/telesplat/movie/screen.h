@@ -1,4 +1,4 @@
-// What was on screen at a moment of a recorded run: the frame of its display, or those of a wall's tiles side by side.
+// The screen at a moment of a recorded run: the frame of its display, or those of a wall's tiles side by side.
 #pragma once
 
 #include <memory>
@@ -13,38 +13,38 @@ namespace telesplat::launcher {
 
 class Screen {
  public:
-  /// Of the run in this folder. width, height: pixels of the whole picture; 0: as it was displayed. Error: names the
-  /// file, or `size_flag` and what is wrong with the size.
+  /// Opens the run in this folder. width, height: pixels of the whole picture; 0: as displayed. Error: names the file,
+  /// or `size_flag` and what is wrong with the size.
   static Result<Screen> open(const std::string& directory, int width, int height, const char* size_flag, int threads);
 
-  /// From the first frame on screen (of a wall: from when all tiles had one) to the last.
+  /// Time from the first frame on screen (for a wall: when all tiles had one) to the last.
   double duration_s() const { return duration_s_; }
-  /// Whether its record ends before the frame that was on screen at t_s.
+  /// Result of show(); kRecordEnds: the record ends before the frame that was on screen at t_s.
   enum class Shown { kNew, kSame, kRecordEnds };
-  /// Makes view() what was on screen t_s seconds after the first frame was. t_s never falls.
+  /// Draws into view() the screen t_s seconds after the first frame. t_s never falls.
   Result<Shown> show(double t_s);
   const image::View& view() const { return view_; }
 
-  /// The run, and the frame that is shown, of the first tile.
+  /// The first tile's run, and its frame on screen.
   const RecordedRun& run() const { return *tiles_.front().run; }
   const DisplayedFrame& frame() const;
   int width() const { return width_; }
   int height() const { return height_; }
-  /// How many frames were drawn, of the first tile.
+  /// Number of frames drawn on the first tile.
   uint64_t drawn() const { return drawn_; }
   /// "points.events"
   std::string record_file() const;
-  /// What the person should know: lines.
+  /// Lines for the person.
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
   struct Tile {
     std::unique_ptr<RecordedRun> run;  // its address stays: replay refers to it
     std::unique_ptr<FrameReplay> replay;
-    size_t frame = 0;    // on screen
+    size_t frame = 0;    // index of the frame on screen
     bool drawn = false;  // view shows it
     image::View view;
-    std::unique_ptr<viewer::EyeRig> rig;  // two eyes saw it; else null
+    std::unique_ptr<viewer::EyeRig> rig;  // for frames of two eyes; else null
     std::array<image::View, 2> eyes;
   };
   Status choose_size(int width, int height, const char* size_flag);
@@ -57,9 +57,9 @@ class Screen {
   void compose();
 
   std::vector<Tile> tiles_;
-  std::map<EpochId, std::shared_ptr<const image::Legend>> legends_;  // where there was something to tell
-  int width_ = 0, height_ = 0;                                       // of the whole
-  std::vector<geometry::Rect> places_;                               // of the tiles in it
+  std::map<EpochId, std::shared_ptr<const image::Legend>> legends_;  // only epochs with a legend
+  int width_ = 0, height_ = 0;                                       // size of the whole
+  std::vector<geometry::Rect> places_;                               // tiles' places in it
   double begin_s_ = 0, duration_s_ = 0;
   uint64_t drawn_ = 0;
   image::View view_;

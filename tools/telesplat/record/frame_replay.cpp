@@ -60,7 +60,7 @@ class PointReplay final : public FrameReplay {
   }
 
  private:
-  // What was drawn of the model as it is.
+  // Selects the points of the present model that the frame drew.
   splat::SelectionOptions select(const DisplayedFrame& frame, const geometry::Camera& camera,
                                  const std::optional<std::array<geometry::Camera, 2>>& eyes) {
     splat::SelectionOptions selection;
@@ -85,7 +85,7 @@ class PointReplay final : public FrameReplay {
     image::find_coverage(over_white_, view);
   }
 
-  // Frames of a head that stands still take a second to draw and are often alike.
+  // A head that stands still leaves many equal frames, and each takes up to a second to draw.
   bool same_as_last(const DisplayedFrame& frame, const geometry::Camera& camera) const {
     const DisplayedFrame& last = last_frame_;
     const auto look = [](const viewer::Look& l) {
@@ -101,8 +101,8 @@ class PointReplay final : public FrameReplay {
     if (frame.refined > 0) last_.colour = view.colour;
   }
 
-  // As many tiles as the display had, in its order. Those that waited there because points had just come have them here
-  // already.
+  // Refines as many tiles as the display had, in its order. Points that had just come made tiles wait there; here they
+  // are ready.
   void refine(const DisplayedFrame& frame, const splat::SelectionOptions& selection,
               const image::ShadingParameters& parameters, image::View& view) {
     constexpr double kRounding = 1e-4;

@@ -1,4 +1,4 @@
-// The displayed frames of a recorded run, made again from what its viewer received. No data set is needed.
+// Draws the displayed frames of a recorded run again, from what its viewer received. Needs no data set.
 #pragma once
 
 #include <memory>
@@ -10,18 +10,18 @@
 
 namespace telesplat::launcher {
 
-/// The point models of a run's displayed frames, one after the other, from its points.events.
+/// Rebuilds the point models of a run's displayed frames, one after the other, from its points.events.
 class ModelReplay {
  public:
   /// with_summaries: as EventReplay.
   static Result<std::unique_ptr<ModelReplay>> open(const std::string& path, bool with_summaries);
 
-  /// Goes on to the model that the frame displayed. Frames come in order of display. False: the record ends before it.
+  /// Advances to the model that the frame displayed. Frames come in order of display. False: the record ends before it.
   Result<bool> advance(const DisplayedFrame& frame);
-  /// Null before the first. It holds until the next call.
+  /// Null before the first frame. Valid until the next call.
   const points::PointModel* model() const { return events_->model(); }
   const points::Summaries& summaries() const { return events_->summaries(); }
-  /// Its newest event, and of which packer's model: the first, the second, ...
+  /// Number of the model's newest event. replica(): 0 for the first packer's model, 1 for the second, ...
   Sequence applied() const { return events_->applied(); }
   uint32_t replica() const { return replica_; }
   const viewer::FineRays& fine_rays() const { return events_->fine_rays(); }
@@ -36,21 +36,21 @@ class ModelReplay {
 /// Draws displayed frames as they were displayed: by the same renderer, kernel, detail, finish and shading.
 class FrameReplay {
  public:
-  /// Opens the record of what the run's viewer received. renderer: "cpu" or "gl". threads: to draw with, 0: all cores.
-  /// `run` must outlive this. Error: there is no record, it is none, or no such renderer can be had.
+  /// Opens the record of what the run's viewer received. renderer: "cpu" or "gl". threads: for drawing, 0: all cores.
+  /// `run` must outlive this. Error: the record is missing or damaged, or this machine lacks the renderer.
   static Result<std::unique_ptr<FrameReplay>> open(const RecordedRun& run, const std::string& renderer, int threads);
   virtual ~FrameReplay() = default;
 
-  /// Draws what the frame showed, for this camera: the frame's own, or one of another size. Where the run's background
-  /// is transparent, colours have the coverage in their upper byte (image/background.h). Frames come in order of
-  /// display. False: the record ends before it. Errors name the file and what is wrong with it.
+  /// Draws the frame for this camera: the frame's own, or one of another size. If the run's background is transparent,
+  /// colours have the coverage in their upper byte (image/background.h). Frames come in order of display. False: the
+  /// record ends before it. Errors name the file and what is wrong with it.
   virtual Result<bool> draw(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) = 0;
-  /// The same of a frame that two eyes saw.
+  /// Draws a frame that two eyes saw.
   virtual Result<bool> draw_pair(const DisplayedFrame& frame, const viewer::EyePair& pair,
                                  std::array<image::View, 2>& views) = 0;
 };
 
-/// The file that frames are made again from.
+/// Returns the file that frames are made again from.
 std::string record_path(const RecordedRun& run);
 
 }  // namespace telesplat::launcher

@@ -26,7 +26,7 @@ Result<toml::table> read_session(const std::string& path) {
   return read_toml(path, kMostSessionBytes);
 }
 
-// A finite number that may stand as text: the facts of processes are.
+// Reads a finite number that may stand as text, as in the facts of processes.
 double number(const toml::node_view<const toml::node>& node, double fallback) {
   double out = fallback;
   if (const auto v = node.value<double>())
@@ -46,10 +46,10 @@ std::vector<const toml::table*> viewers(const toml::table& session) {
   return out;
 }
 
-// The viewer whose frames the run's own record has: the launcher's first, else the first that joined.
+// Finds the viewer whose frames stand in the run's own record: the launcher's first, else the first that joined.
 const toml::table* own_viewer(const toml::table& session) {
   const auto all = viewers(session);
-  // Of those before records told who kept one where, the launcher's first.
+  // Older records do not say where each viewer recorded: take the launcher's first.
   auto first =
       std::find_if(all.begin(), all.end(), [](const toml::table* t) { return text_of(*t, "records_in") == "."; });
   if (first == all.end())
@@ -72,7 +72,7 @@ Status read_size(const std::string& path, const toml::table& viewer, RecordedRun
   return ok_status();
 }
 
-// The record's own copy of a file, where it has one.
+// Returns the record's own copy of a file, if it has one.
 std::string kept_or(const std::string& session, const char* name, const std::string& file) {
   const std::string kept = (std::filesystem::path(session).parent_path() / name).string();
   std::error_code error;
@@ -82,7 +82,7 @@ std::string described_in(const std::string& session, const std::string& wall) {
   return viewer::is_description(wall) ? kept_or(session, "wall.toml", wall) : wall;
 }
 
-// Which part of a wall it was.
+// Reads the viewer's part of the wall.
 Status read_wall(const std::string& path, const toml::table& viewer, RecordedRun& run) {
   const std::string text = viewer["wall"].value_or(std::string());
   if (text.empty()) return ok_status();
@@ -95,7 +95,7 @@ Status read_wall(const std::string& path, const toml::table& viewer, RecordedRun
   return ok_status();
 }
 
-// How it showed two eyes' pictures.
+// Reads how the two eyes' pictures were shown.
 Status read_stereo(const std::string& path, const toml::table& session, RecordedRun& run) {
   const auto& display = session["display"];
   viewer::StereoFlags flags;
@@ -111,7 +111,7 @@ Status read_stereo(const std::string& path, const toml::table& session, Recorded
   return ok_status();
 }
 
-// How the display drew. Kernels are refused where they are drawn, if at all: volumes have none.
+// Reads how the display drew. An unknown kernel is refused when it draws, if ever: volumes have no kernels.
 Status read_look(const std::string& path, const toml::table& viewer, RecordedRun& run) {
   if (const auto kernel = splat::kernel_named(run.kernel)) run.look.render.kernel = *kernel;
   const std::string finish = viewer["finish"].value_or(std::string("on"));
@@ -154,7 +154,7 @@ Status read_display(const std::string& path, const toml::table& session, const t
   return read_look(path, viewer, run);
 }
 
-// How the frame was drawn, where its row tells; else as the run began.
+// Reads how the frame was drawn, if its row says so; else as the run began.
 void read_look(tools::CsvRow& row, viewer::Look& look) {
   const auto kernel = row.count("splat", uint64_t(look.render.kernel), splat::kKernels.size());
   const auto finish = row.count("finish", splat::finish_bits(look.render.finish), 8);
@@ -174,7 +174,7 @@ void read_refinement(tools::CsvRow& row, DisplayedFrame& f) {
              fmt::format("sub_pixels is {}, limits are 2 and 4", f.sub_pixels));
 }
 
-// Where two eyes were.
+// Reads the places of the two eyes.
 void read_eyes(tools::CsvRow& row, DisplayedFrame& f) {
   for (const char* column : {"left_x", "left_y", "left_z", "right_x", "right_y", "right_z", "screen_m"})
     row.demand(row.has(column), "two eyes saw the frame, but there are no columns that tell where they were");
@@ -230,7 +230,7 @@ Status read_frames(const std::string& path, const std::string& viewer, RecordedR
   return ok_status();
 }
 
-// The frames that one viewer displayed.
+// Reads the frames that one viewer displayed.
 Result<RecordedRun> read_viewer(const std::string& directory, const toml::table& session, const toml::table& viewer) {
   RecordedRun run;
   run.directory = directory;
@@ -242,13 +242,13 @@ Result<RecordedRun> read_viewer(const std::string& directory, const toml::table&
   return run;
 }
 
-// Where in the run's folder it recorded.
+// Returns the folder, within the run's, that the viewer recorded in.
 std::string folder_of(const toml::table& viewer) {
   const std::string told = text_of(viewer, "records_in");
   return told.empty() ? text_of(viewer, "name") : told;
 }
 
-// The viewers of the wall's tiles, in their order.
+// Returns the viewers of the wall's tiles, in their order.
 Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, const toml::table& session,
                                                      const std::string& wall) {
   const auto whole = viewer::wall_tile(described_in(path, wall), 0, 1);

@@ -13,7 +13,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// Frames of quality.csv that were displayed later, as quality_json() has them.
+// Computes quality_json() of the frames in quality.csv that were displayed after skip_s.
 Status verify_again(const std::string& directory, double skip_s, nlohmann::ordered_json& quality) {
   const auto table = tools::CsvTable::read(directory + "/quality.csv", {});
   if (!table) return table.error();

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// What lies at "a.b.c"; null if nothing does.
+// Returns the value at "a.b.c", or null.
 ordered_json at(const ordered_json& s, std::string_view path) {
   const ordered_json* here = &s;
   while (!path.empty()) {
@@ -40,7 +40,7 @@ std::string size(const ordered_json& s, const char* key) {
   return fmt::format("{} x {}", v[0].get<int64_t>(), v[1].get<int64_t>());
 }
 
-// "both, with `between`", or the one that is there.
+// Joins a and b with `between`; if one is empty, returns the other.
 std::string with(const std::string& a, const char* between, const std::string& b) {
   return a.empty() || b.empty() ? a : a + between + b;
 }
@@ -68,7 +68,7 @@ struct Measure {
   double scale;
   int better;
   const char* table;
-  const char* fallback = "";  ///< of spreads, where there is no summary
+  const char* fallback = "";  ///< the place in spreads, for runs without a summary
 };
 
 constexpr Measure kFigures[] = {
@@ -154,7 +154,7 @@ constexpr Measure kFigures[] = {
     {"expired", "errors.leases_expired", "leases expired", "", "ran out, or their sampler died", 1, -1, "error"},
 };
 
-// Rates that a summary tells and a run without one does not.
+// Adds rates from the tables, for a run without a summary.
 void add_counted(const ordered_json& spreads, const RunTables& t, ordered_json& out) {
   const double s = t.duration_s();
   if (!(s > 0)) return;

@@ -19,7 +19,7 @@ constexpr size_t kMostLogs = 64, kMostLines = 8;
 constexpr size_t kLongestLine = size_t{64} << 10, kShownOfALine = 400;
 constexpr uint64_t kMostBytes = uint64_t{256} << 20;
 
-// The word at this place, from 0, of words with one space between them.
+// Returns word number `place`, from 0; one space separates words.
 std::string_view word(std::string_view line, int place) {
   for (int i = 0; i < place; ++i) {
     const size_t space = line.find(' ');
@@ -34,13 +34,13 @@ struct Line {
   std::string text;
   uint64_t left_out = 0;  ///< bytes behind the text
 };
-// False: the file is over.
+// False: the file has ended.
 bool next_line(std::istream& in, Line& out) {
   out.text.resize(kLongestLine + 1);
   in.getline(out.text.data(), std::streamsize(out.text.size()));
   const auto bytes = size_t(in.gcount());
   const bool longer = in.fail() && bytes > 0;
-  out.text.resize(in.good() ? bytes - 1 : bytes);  // without its end
+  out.text.resize(in.good() ? bytes - 1 : bytes);  // without its line end
   out.left_out = 0;
   if (!longer) return bytes > 0;
   in.clear();
@@ -49,7 +49,7 @@ bool next_line(std::istream& in, Line& out) {
   return true;
 }
 
-// What is too long ends with how much more there was.
+// Cuts a long line and adds the number of bytes cut off.
 std::string shown(const Line& line) {
   const std::string text = to_utf8(line.text.substr(0, kShownOfALine));
   const uint64_t more = line.left_out + line.text.size() - std::min(line.text.size(), kShownOfALine);

@@ -55,7 +55,7 @@ std::string script_json(const nlohmann::ordered_json& data) {
 }
 
 std::string page_html(const std::string& title, const nlohmann::ordered_json& data) {
-  // Each mark stands in the frame once; what takes its place is not looked at again.
+  // Each mark stands in the frame once; inserted text is not searched for marks.
   std::string out;
   std::string_view rest = frame_html;
   for (const auto& [mark, text] : std::vector<std::pair<std::string_view, std::string>>{

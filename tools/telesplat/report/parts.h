@@ -1,4 +1,4 @@
-// What was run and how it went, in words and figures.
+// The parts of a report page: facts and figures of a run, logs, series, pictures.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,45 +9,44 @@
 
 namespace telesplat::launcher {
 
-/// summary.json of a run; null if there is none, or it is no JSON object.
+/// Reads summary.json of a run; null: the file is missing or holds no JSON object.
 nlohmann::ordered_json read_summary(const std::string& directory);
 
-/// [[what, how], ...]: scene, size, samplers, coupling, version, ... What nobody told is left out.
+/// [[what, how], ...]: scene, size, samplers, coupling, version, ... Unknown facts are left out.
 nlohmann::ordered_json facts_json(const nlohmann::ordered_json& summary);
 
-/// The kinds of figures that a page has, in their order: key, place in summary.json, scale, label, unit, what it means,
-/// whether more or less is better, and to which of the page's tables it belongs.
+/// Returns the kinds of figures that a page has, in their order: key, place in summary.json, scale, label, unit,
+/// meaning, direction (1 more is better, -1 less, 0 neither), and the page's table that shows it.
 nlohmann::ordered_json figure_kinds();
 
-/// Figures of one run by key: those of the summary; without one, what the tables tell. What is not known is left out.
+/// Returns one run's figures by key, from the summary; without one, from the tables. Unknown figures are left out.
 nlohmann::ordered_json figures_json(const nlohmann::ordered_json& summary, const nlohmann::ordered_json& spreads,
                                     const RunTables& tables);
 
-/// The run's warnings and errors: a list with `process`, `warnings`, `errors` and their first `lines`, for each log.
+/// The run's warnings and errors: for each log `process`, `warnings`, `errors` and their first `lines`.
 nlohmann::ordered_json logs_json(const std::string& directory);
 
-/// Series by name (inter_frame_ms, update_age_ms, latency_ms, transfer, psnr_db, ...), each a list with one of each
-/// viewer. What there are no rows for is not there.
+/// Series by name (inter_frame_ms, update_age_ms, latency_ms, transfer, psnr_db, ...), each a list with one entry a
+/// viewer. A series without rows is left out.
 nlohmann::ordered_json time_series(const RunTables& tables, const PageLimits& limits);
 
-/// Distributions over all viewers, of frames that were drawn: motion_to_photon_ms, inter_frame_ms (first frames left
-/// out), construction_ms; and latency_ms, start_up_ms, update_age_ms.
+/// Distributions over the drawn frames of all viewers: motion_to_photon_ms, inter_frame_ms (without first frames),
+/// construction_ms; and latency_ms, start_up_ms, update_age_ms.
 nlohmann::ordered_json spreads(const RunTables& tables);
 
-/// The stages of view updates: of each how long it took in updates over time and in all of them; null without
-/// stages.csv.
+/// The stages of view updates: the time of each over the run, and its distribution; null without stages.csv.
 nlohmann::ordered_json stages_json(const RunTables& tables, const PageLimits& limits);
 
-/// The walk from above: poses with what was measured at them; null without frames.
+/// The walk seen from above: poses with the values measured there; null without frames.
 nlohmann::ordered_json walk_json(const RunTables& tables, const PageLimits& limits);
 
-/// RFC 4648, with padding.
+/// Encodes by RFC 4648, with padding.
 std::string base64(std::string_view bytes);
 
 /// {"shown": [{"frame", "t", "src"}], "compared": [{"name", "frame", "t", "src"}], "of": pictures in images/}:
-/// displayed frames, evenly chosen, and what --verify left (reference, display, difference side by side). src: a data
-/// URI of a JPEG. bytes: of all of them together; what goes beyond it is left out, and `left_out` counts it. A picture
-/// that cannot be read is left out, too.
+/// displayed frames, evenly chosen, and pictures of --verify (reference, display, difference side by side). src: a data
+/// URI of a JPEG. bytes: limit for all together; pictures beyond it are left out, and `left_out` counts them. An
+/// unreadable picture is left out, too.
 nlohmann::ordered_json pictures_json(const std::string& directory, const RunTables& tables, const PageLimits& limits,
                                      size_t bytes);
 

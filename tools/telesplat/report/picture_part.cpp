@@ -23,7 +23,7 @@ constexpr int kShownWidth = 480, kComparedWidth = 1440;  // pixels
 constexpr int kQuality = 82;
 
 struct Picture {
-  std::string path, name;  ///< name: "worst", ... of what --verify left; empty: a displayed frame
+  std::string path, name;  ///< name: "worst", ... for pictures of --verify; empty: a displayed frame
   uint64_t frame = 0;
 };
 
@@ -54,7 +54,7 @@ std::vector<Picture> pictures_in(const std::string& directory, bool compared) {
   return out;
 }
 
-// Evenly: the first and the last among them.
+// Chooses evenly, the first and the last among them.
 template <class T>
 std::vector<T> evenly(const std::vector<T>& all, size_t most) {
   if (all.size() <= most) return all;
@@ -63,7 +63,7 @@ std::vector<T> evenly(const std::vector<T>& all, size_t most) {
   return out;
 }
 
-// When the first viewer displayed each frame.
+// Returns when the first viewer displayed each frame.
 std::map<uint64_t, double> moments(const RunTables& t) {
   std::map<uint64_t, double> out;
   if (!t.frames) return out;

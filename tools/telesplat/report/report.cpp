@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr size_t kMostRuns = 12, kLongestName = 100;
-constexpr size_t kLeastBuckets = 500;  // of a series over time, however many runs there are
+constexpr size_t kLeastBuckets = 500;  // for a series over time, with any number of runs
 
 bool is_run(const std::string& directory) {
   std::error_code error;
@@ -39,7 +39,7 @@ fs::path without_slash(const std::string& directory) {
   return path;
 }
 
-// What the run was called when it began, else its folder; of "latest" and of "." what they stand for.
+// Returns the run's label, else its folder's name; "latest" and "." are resolved.
 std::string name_of(const std::string& run) {
   if (const std::string label = text(read_summary(run), "label"); !label.empty()) return label;
   std::error_code error;
@@ -47,7 +47,7 @@ std::string name_of(const std::string& run) {
   return (error ? without_slash(run) : real).filename().string();
 }
 
-// Names by which runs are told apart; with a number where two are alike.
+// Returns a name for each run; equal names get a number.
 std::vector<std::string> names_of(const ReportOptions& o) {
   std::vector<std::string> out;
   std::set<std::string> taken;
@@ -67,7 +67,7 @@ ordered_json config_of(const std::string& directory, const PageLimits& limits) {
   return text ? ordered_json(to_utf8(text->substr(0, limits.text_bytes))) : ordered_json();
 }
 
-// What readers pass over.
+// Lists the symbolic links of a run, which readers skip.
 std::vector<std::string> links_in(const std::string& directory) {
   std::vector<std::string> out;
   std::error_code error;
@@ -81,7 +81,7 @@ std::vector<std::string> links_in(const std::string& directory) {
   return out;
 }
 
-// Where the run's trace lies; null: it has none.
+// Returns the path of the run's trace; null: the run has no trace.
 ordered_json trace_json(const std::string& directory) {
   const fs::path path = fs::path(directory) / "trace.json";
   std::error_code error;
@@ -89,7 +89,7 @@ ordered_json trace_json(const std::string& directory) {
   return fs::absolute(path, error).lexically_normal().string();
 }
 
-// A link from the page to a file.
+// Makes a link from the page to a file.
 std::string from_page(const std::string& page, const fs::path& file) {
   std::error_code error;
   return to_utf8(file.lexically_relative(fs::absolute(page, error).lexically_normal().parent_path()).string());

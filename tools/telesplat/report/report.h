@@ -1,4 +1,4 @@
-// Reports of recorded runs, or of a sweep: a page.
+// Makes a page about recorded runs, or about a sweep.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -12,37 +12,37 @@
 namespace telesplat::launcher {
 
 struct ReportOptions {
-  std::vector<std::string> runs;    ///< folders; the first is what others are compared with; or a sweep's folder alone
-  std::vector<std::string> labels;  ///< what the page calls them; none: as summary.json and folders do
-  double skip_s = 0;                ///< of each run, left out
+  std::vector<std::string> runs;    ///< folders; the others are compared with the first; or a sweep's folder alone
+  std::vector<std::string> labels;  ///< names of the runs on the page; empty: those of summary.json and folders
+  double skip_s = 0;                ///< left out at the begin of each run
   std::string out;                  ///< the page; empty: report.html in the run, or beside the first of several runs
-  nlohmann::ordered_json sweep;     ///< of settle_report(): what a page shows of a sweep; null: it is of runs
+  nlohmann::ordered_json sweep;     ///< set by settle_report(): a sweep's part of the page; null: runs
 };
 
 struct ReportMade {
   std::string page;
-  bool interrupted = false;  ///< should_stop said so: nothing was written
+  bool interrupted = false;  ///< should_stop returned true: no page was written
 };
 
-/// Where the page goes, and which runs it shows. Error: no run, a folder that is none, a sweep beside other runs, a
-/// label too few or too many, or a run that is no longer than what is left out.
+/// Chooses the page's path and its runs. Error: no run, a folder without a run, a sweep beside other runs, a label too
+/// few or too many, or a run no longer than the time left out.
 Result<ReportOptions> settle_report(ReportOptions options);
 
-/// What a page shows of one run. runs: how many share the limits of the page.
+/// Returns a run's part of the page. runs: number of runs that share the limits of the page.
 nlohmann::ordered_json run_json(const std::string& directory, const std::string& name, size_t runs,
                                 const PageLimits& limits = {}, double skip_s = 0);
 
-/// Reads the runs and writes the page. Error: something cannot be written. Precondition: settle_report().
+/// Reads the runs and writes the page. Error: a file cannot be written. Precondition: settle_report().
 Result<ReportMade> make_report(const ReportOptions& options, tools::ProgressLine& progress,
                                const tools::ShouldStop& should_stop);
 
-/// What was made, for people.
+/// Returns a line for people that names the page.
 std::string line_of(const ReportMade& made);
 
 bool is_sweep(const std::string& directory);
 
-/// Puts into `options` what a page shows of a sweep, and as runs the first that is done of each configuration, named
-/// by the flags that vary. Error: sweep.csv is none, or no run is done.
+/// Puts the sweep's part of a page into `options`, and as runs the first completed one of each configuration, named by
+/// the flags that vary. Error: sweep.csv is no such table, or no run is done.
 Status take_sweep(const std::string& directory, ReportOptions& options);
 
 }  // namespace telesplat::launcher

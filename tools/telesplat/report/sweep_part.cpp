@@ -25,7 +25,7 @@ std::string cell(const CsvTable& table, size_t row, const char* name) {
   return column ? to_utf8(table.text(row, *column)) : std::string();
 }
 
-// Flags that vary, and their columns.
+// Returns the flags that vary, and their columns.
 std::vector<std::pair<std::string, size_t>> flags_of(const CsvTable& table) {
   std::vector<std::pair<std::string, size_t>> out;
   for (size_t i = 0; i < table.header().size(); ++i)
@@ -33,14 +33,14 @@ std::vector<std::pair<std::string, size_t>> flags_of(const CsvTable& table) {
   return out;
 }
 
-// The folder of a run that is done; empty: it is not, or leads out of the sweep.
+// Returns the folder of a completed run; empty: the run is not done, or the path leads out of the sweep.
 std::string folder_of(const std::string& sweep, const CsvTable& table, size_t row) {
   const std::string name = cell(table, row, "folder");
   if (cell(table, row, "state") != "done" || name.empty() || fs::path(name).is_absolute()) return {};
   return lies_within(sweep, name) ? (fs::path(sweep) / name).string() : std::string();
 }
 
-// Tests of each configuration against the first one.
+// Returns the tests of each configuration against the first one.
 ordered_json differences_in(const std::string& directory) {
   ordered_json out = ordered_json::array();
   if (!lies_within(directory, "cells.csv")) return out;

@@ -26,7 +26,7 @@ constexpr int kMostBins = 600;
 
 double bin_of(const RunTables& t) { return std::max(kLeastBin_s, t.duration_s() / kMostBins); }
 
-// A series a viewer, in the order in which they come.
+// A series for each viewer, in order of appearance.
 template <class Value>
 ordered_json by_viewer(const LooseTable& table, const std::vector<double>& at_s, double offset_s,
                        const PageLimits& limits, Value&& value) {
@@ -70,7 +70,7 @@ ordered_json one(const char* label, const Series& series, const PageLimits& limi
   return ordered_json::array({series_json(label, series, limits.buckets)});
 }
 
-// Times since the run's beginning, sums of bytes or numbers.
+// Rates of bytes or numbers, at times since the run's beginning.
 Series rate_of(const RunTables& t, std::vector<double> at_s, std::vector<double> amounts, double scale) {
   for (double& s : at_s) s -= t.origin_s;
   for (double& a : amounts) a *= scale;
@@ -106,7 +106,7 @@ void add_tiles(const RunTables& t, const PageLimits& limits, ordered_json& out) 
   keep(out, "transfer_mb_s", one("sent", rate_of(t, sent_s, tiles.numbers("bytes_sent"), 1 / kMega), limits));
 }
 
-// When the frames of quality.csv were displayed. They are the first viewer's; without frames.csv its own clock counts.
+// Returns when the first viewer displayed the frames of quality.csv; without frames.csv by that viewer's clock.
 std::vector<double> quality_s(const RunTables& t) {
   std::map<double, double> shown;
   if (t.frames) {
@@ -150,7 +150,7 @@ double mean_of(const std::vector<double>& values) {
   return values.empty() ? NAN : std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
-// share: of the mean latency.
+// mean_latency: the row gives its share of it.
 ordered_json row_of(const std::vector<double>& values, double mean_latency) {
   const auto finite = finite_of(values);
   if (finite.empty()) return nullptr;
@@ -161,7 +161,7 @@ ordered_json row_of(const std::vector<double>& values, double mean_latency) {
           {"share", rounded(d.mean / mean_latency)}};
 }
 
-// The rows to show over time: of each of at most `most` parts, equal in number of updates, the slowest.
+// Chooses the rows to show over time: the slowest of each of at most `most` parts with equal numbers of updates.
 std::vector<size_t> slowest_rows(const LooseTable& stages, size_t most) {
   std::vector<size_t> rows;
   const auto& requested = stages.numbers("requested_s");
@@ -178,8 +178,8 @@ std::vector<size_t> slowest_rows(const LooseTable& stages, size_t most) {
   return out;
 }
 
-// Of each row who sampled the part whose way the stages follow: of its frame's tiles the one that was published last
-// (docs/metrics.md, "Joining the tables"). Null: nobody did, or it is not known.
+// Returns for each row the sampler of the tile that the stages follow: the last one published of its frame's tiles
+// (docs/metrics.md, "Joining the tables"). Null: not sampled, or unknown.
 ordered_json samplers_of(const RunTables& t, const std::vector<size_t>& rows) {
   const auto& frames = t.stages->numbers("frame");
   struct Last {
@@ -206,7 +206,7 @@ ordered_json samplers_of(const RunTables& t, const std::vector<size_t>& rows) {
   return out;
 }
 
-// How far the stages are from adding up to the latency, and how many of them are negative.
+// Adds the largest difference between latency and the stages' sum, and the number of negative stages.
 void check_sums(const LooseTable& stages, ordered_json& out) {
   size_t negative = 0;
   double off = 0;
@@ -262,7 +262,7 @@ ordered_json walk_json(const RunTables& t, const PageLimits& limits) {
         std::isfinite(f.numbers("pz")[row]))
       rows.push_back(row);
   if (rows.empty()) return nullptr;
-  // Of each part of the walk the frame with the longest delay stays.
+  // Keeps the frame with the longest delay of each part of the walk.
   const size_t parts = std::min(limits.poses, rows.size());
   std::vector<size_t> chosen;
   const auto& delay = f.numbers("inter_frame_ms");
@@ -280,7 +280,7 @@ ordered_json walk_json(const RunTables& t, const PageLimits& limits) {
   for (const size_t row : chosen) {
     const double w = f.numbers("qw")[row], x = f.numbers("qx")[row], y = f.numbers("qy")[row], z = f.numbers("qz")[row];
     t_s.push_back(t.frame_s[row]);
-    ahead_x.push_back(-2 * (x * z + w * y));  // of -z turned by the quaternion
+    ahead_x.push_back(-2 * (x * z + w * y));  // x of -z turned by the quaternion
     ahead_z.push_back(-(1 - 2 * (x * x + y * y)));
   }
   return {{"viewer", viewers.front()},

@@ -42,7 +42,7 @@ void AfterRun::develop_pictures() {
   }
 }
 
-// The first displayed frame becomes a picture, where the figures are another's.
+// A joined session leaves no summary here, but its first displayed frame is always recorded as a picture.
 bool AfterRun::displayed() const {
   if (!o_.join_master.empty()) {
     const auto files = metrics::recorded_files(o_.out);
@@ -61,7 +61,7 @@ int AfterRun::run(bool stopped, const std::string& master_folder) {
   if (const int code = stitch(stopped)) return code;
   const int movie = make_the_movie(stopped);
   if (movie == kInterrupted) return movie;
-  // A movie that failed is no reason to go without a report.
+  // The report is made even if the movie failed.
   const int report = make_the_report(stopped);
   return movie ? movie : report;
 }
@@ -93,7 +93,7 @@ int AfterRun::verify(bool stopped) {
     return 0;
   }
   if (stopped) progress_.line("what was displayed is verified; Ctrl-C leaves that out");
-  // The scene as it was opened, with what the record tells of its epochs: session.toml cannot tell every file's name.
+  // Uses the open scene, with its epochs from the record: session.toml does not hold every file's name.
   if (const Status s = scene_->read_record(o_.out); !s) return complain(s.error());
   auto direct = scene_->open_direct(0, [](const char*, double) {});
   if (!direct) return complain(direct.error());
@@ -104,7 +104,7 @@ int AfterRun::verify(bool stopped) {
   return verified ? 0 : complain(verified.error(), 1);
 }
 
-// The wall's picture, and the moments its tiles are of. A run that was stopped need not have one of each tile.
+// Makes the wall's picture, and prints its tiles' moments. A run that was stopped may lack some tiles.
 int AfterRun::stitch(bool stopped) const {
   if (const Status s = keep_barrier(o_.out, o_.viewer.stereo.panel_file); !s) return complain(s.error(), 1);
   if (o_.viewer.wall.empty()) return 0;
@@ -118,7 +118,7 @@ int AfterRun::stitch(bool stopped) const {
   return 0;
 }
 
-// Whoever stops the run does not want to wait for a movie; Ctrl-C interrupts the movie, too.
+// A user who stops the run does not want to wait for a movie; Ctrl-C interrupts the movie, too.
 int AfterRun::make_the_movie(bool stopped) {
   if (!movie_) return 0;
   const std::string& file = movie_->options.file;
@@ -158,7 +158,7 @@ int AfterRun::make_the_report(bool stopped) {
 }
 
 void AfterRun::drop_spools() const {
-  if (!developed_) return;  // whoever finds out why may need them
+  if (!developed_) return;  // they may show why developing failed
   std::error_code error;
   for (int i = 1; i <= o_.viewers; ++i) {
     const std::string spool = viewer_directory(o_.out, i) + "/spool";

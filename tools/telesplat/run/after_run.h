@@ -1,5 +1,5 @@
-// What is made of a run's record once its processes are gone, step by step: pictures, the comparison with direct
-// rendering, the figures, the wall's picture, the movie, the report.
+// Steps that follow once a run's processes have ended: pictures, the comparison with direct rendering, the figures, the
+// wall's picture, the movie, the report.
 #pragma once
 
 #include <memory>
@@ -13,26 +13,25 @@
 
 namespace telesplat::launcher {
 
-/// A signal that comes while a step works (net::stop_requested) ends that step, and those that take long after it.
+/// A signal (net::stop_requested) ends the step that runs, and skips later ones that take long.
 class AfterRun {
  public:
-  /// movie: what is to be made of the record, if anything. All are used as long as this lives. scene: null where a
-  /// session was joined.
+  /// movie: the movie to make, if any. All arguments must outlive this. scene: null if a session was joined.
   AfterRun(const RunOptions& options, Scene* scene, const std::optional<MoviePlan>& movie,
            tools::ProgressLine& progress)
       : o_(options), scene_(scene), movie_(movie), progress_(progress) {}
 
-  /// Recorded frames become pictures, whatever made their viewer stop before they were.
+  /// Makes pictures of recorded frames that the viewer left raw when it ended.
   void develop_pictures();
-  /// Whether anything was displayed.
+  /// True if any frame was displayed.
   bool displayed() const;
-  /// All that follows. stopped: the run was, before its end. master_folder: of a joined session, if it is known. Exit
-  /// code: 0, 1 something went wrong, 2 the data cannot be read any more, 130 a signal came.
+  /// Runs all later steps. stopped: a signal ended the run early. master_folder: a joined session's, if known. Exit
+  /// code: 0, 1 a step failed, 2 the data cannot be read any more, 130 a signal came.
   int run(bool stopped, const std::string& master_folder);
-  /// Tells which viewers showed no complete view of the data. Exit code: 1 where none did, though the run lasted to its
-  /// end.
+  /// Prints which viewers showed no complete view of the data. Exit code: 1 if no viewer did, though the run lasted to
+  /// its end.
   int tell_unseen(bool stopped) const;
-  /// Raw frames that no step will need any more.
+  /// Deletes raw frames that no later step needs.
   void drop_spools() const;
 
  private:

@@ -115,7 +115,7 @@ void ChildProcess::signal(int number) {
 
 void ChildProcess::finish(double patience_s) {
   for (const int next : {SIGTERM, SIGKILL, 0}) {
-    // Who interrupts again does not want to wait; but nobody is left behind.
+    // A second Ctrl-C shortens the wait, but the child always ends.
     const auto waits = [&] { return next == 0 || !net::stop_requested(); };
     for (const double until = monotonic_s() + patience_s; !ended() && monotonic_s() < until && waits();) {
       read_lines();  // a full pipe must not keep it from ending

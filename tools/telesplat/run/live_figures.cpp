@@ -8,9 +8,9 @@
 namespace telesplat::launcher {
 namespace {
 
-// The rate of at least these last seconds: frames that come in bursts look steady, a change shows soon.
+// Rates cover at least this time: frames that come in bursts look steady, a change still shows soon.
 constexpr double kWindow_s = 4;
-// A viewer that reported nothing for this long displays nothing, as far as one knows.
+// A viewer without a report for this long counts as displaying nothing.
 constexpr double kSilence_s = 3.5;
 
 }  // namespace
@@ -22,14 +22,14 @@ double SessionFigures::Viewer::rate(double Report::*counter) const {
 }
 
 void SessionFigures::take(Viewer& viewer, const nlohmann::json& values, double now_s) {
-  if (values == viewer.values) return;  // the report that was there before
+  if (values == viewer.values) return;  // the report is not new
   viewer.values = values;
   viewer.heard_s = now_s;
   const Report report{values.value("reported_s", now_s), values.value("frames", 0.0), values.value("updates", 0.0),
                       values.value("bytes_received", 0.0)};
   auto& reports = viewer.reports;
   if (!reports.empty() && (report.frames < reports.back().frames || report.at_s < reports.back().at_s)) reports.clear();
-  // Waiting for the first picture is no low frame rate.
+  // Frames before the first picture must not lower the rate.
   if (reports.size() == 1 && reports.front().frames == 0) reports.clear();
   reports.push_back(report);
   while (reports.size() > 2 && reports[1].at_s <= report.at_s - kWindow_s) reports.pop_front();

@@ -16,8 +16,8 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr double kMasterPatience_s = 10, kRelayPatience_s = 5, kAskEvery_s = 0.1;
-// From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view
-// meanwhile.
+// Time from the start of a wall's viewers to the beginning of their trajectory: for joining and receiving their first
+// view.
 constexpr double kWallLead_s = 1.5;
 constexpr int kServersNice = 10;  // servers must not take the processor from a display
 
@@ -40,14 +40,14 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
 Status Pipeline::start_servers() {
   const RunOptions& o = options_;
   if (const Status s = group_.start_master(master_arguments(o), kMasterPatience_s); !s) return s;
-  // The others would ask for ever where there is no loopback device.
+  // Without a loopback device the other processes would ask for ever.
   if (const Status s = net::check_loopback(); !s)
     return Error{
         fmt::format("the session's master cannot be reached at {}: {}; is the loopback device up (ip link set "
                     "lo up)?",
                     group_.endpoint(), s.error().text)};
   if (const Status s = start_data(); !s) return s;
-  // A headset's frames come first; else views are worth more than that they are drawn a little later.
+  // A headset's frames come first; in a window new views are worth a little delay of frames.
   Member packer{.role = "packer",
                 .name = "packer",
                 .arguments = packer_arguments(o),
@@ -68,7 +68,7 @@ Status Pipeline::start_sampler(int number) {
   return group_.start(std::move(sampler));
 }
 
-// One that is told to finish hands back what it holds; its end is no reason to start it again.
+// A sampler that is asked to finish hands back its leases; it is not started again.
 Status Pipeline::set_samplers(int count) {
   if (!options_.join_master.empty()) return Error{"samplers: the session is another's, and so are its samplers"};
   std::vector<Member*> here;
@@ -84,7 +84,7 @@ Status Pipeline::set_samplers(int count) {
   return ok_status();
 }
 
-// None where there is no data set yet.
+// Starts no server if there is no data set yet.
 Status Pipeline::start_data() {
   const RunOptions& o = options_;
   for (int i = 0; i < o.data_servers && !o.data.scene.empty(); ++i) {
@@ -108,7 +108,7 @@ Status Pipeline::open(const RunOptions& options, bool goes_back) {
   return start_data();
 }
 
-// Who could not write all of the record says so, or ends with 1.
+// Collects record failures: from a process' own message, or its exit code 1.
 void Pipeline::finish() {
   group_.finish();
   for (Member& m : group_.members()) {
@@ -138,7 +138,7 @@ Status Pipeline::put_link(links::Place place, const std::string& name, Member& b
     const auto listens = group_.start_listener(std::move(member), kRelayPatience_s);
     if (!listens) return listens.error();
     relays_[relay] = *listens;
-    // Started again, it listens where it did: those before it know no other place.
+    // A restarted relay listens at its old address: processes before it know no other.
     group_.find(relay)->arguments[1] = *listens;
   }
   const std::string role = place == links::Place::kData ? "data" : "";
@@ -156,7 +156,7 @@ Status Pipeline::put_link(links::Place place, const std::string& name, Member& b
 Status Pipeline::start_viewers(double clock_from_s) {
   has_viewers_ = true;
   for (int i = 1; i <= options_.viewers; ++i) {
-    // A session that is joined has a viewer-1 already.
+    // The session that this viewer joins has a viewer-1 already.
     const std::string name = options_.join_master.empty() ? viewer_name(i) : net::unique_name(viewer_name(i));
     Member viewer{.role = "viewer",
                   .name = name,
@@ -168,7 +168,7 @@ Status Pipeline::start_viewers(double clock_from_s) {
   return ok_status();
 }
 
-// The viewers of a wall share a clock, which begins when there is something to see: so they start once the data servers
+// The viewers of a wall share a clock, which begins when there is a view to see: so they start once the data servers
 // are there.
 Status Pipeline::start_wall() {
   const double now = monotonic_s();
@@ -211,7 +211,7 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     if (m.role == "viewer" && !m.process->ended()) ++viewing;
     read(m);
     if (m.given_up || !m.process->ended()) continue;
-    read(m);  // its last words
+    read(m);  // lines that it printed before it ended
     const State state = m.again_s ? start_again(m, news) : ended(m, news);
     if (state != State::kRunning) return state;
   }
@@ -225,7 +225,7 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     tell_viewers(progress_.empty() ? "progress" : "progress " + progress_);
   }
   if (viewing > 0 || !has_viewers_) return State::kRunning;
-  // The record is complete when a master has ended it.
+  // Only a master that ends in order completes the record.
   if (Member* master = group_.find("master"); master && master->again_s) {
     master->again_s = 0;
     return start_again(*master, news);
@@ -235,9 +235,9 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
 
 Consequence consequence_of(const Ended& e) {
   const bool viewer = e.role == "viewer", master = e.role == "master";
-  // Told to finish, by `telesplat ctl stop`: the viewers finish too.
+  // `telesplat ctl stop` ended it: the viewers finish too.
   if (e.code == 0) return master ? Consequence::kFinish : Consequence::kNone;
-  if (e.record_failed && e.code == 1) return master ? Consequence::kFinish : Consequence::kNone;  // all else is well
+  if (e.record_failed && e.code == 1) return master ? Consequence::kFinish : Consequence::kNone;  // else all is well
   const bool refused = e.code == 2;
   if (!refused && !viewer && e.restarts < Restarts::kMost) return Consequence::kRestart;
   if (viewer && !refused && e.others) return Consequence::kGiveUp;
@@ -300,7 +300,7 @@ void Pipeline::give_up(Member& m, std::vector<std::string>& news) {
 Pipeline::State Pipeline::start_again(Member& m, std::vector<std::string>& news) {
   if (monotonic_s() < *m.again_s) return State::kRunning;
   m.again_s.reset();
-  // The record is the session's, not one master's.
+  // The record belongs to the session, not to one master: the next one continues it.
   auto& told = m.arguments;
   const auto has = [&](const char* flag) { return std::find(told.begin(), told.end(), flag) != told.end(); };
   if (m.role == "master" && has("--out") && !has("--continue")) told.push_back("--continue");
@@ -310,13 +310,13 @@ Pipeline::State Pipeline::start_again(Member& m, std::vector<std::string>& news)
   return State::kFailed;
 }
 
-// "STAGE 0.430"
+// Reads "STAGE 0.430".
 void Pipeline::read_progress(const std::string& member, const std::string& told) {
   const size_t space = told.rfind(' ');
   if (space == told.npos) return;
   const double fraction = std::atof(told.c_str() + space);
   progress_ = time_left_[member].text(told.substr(0, space), fraction, monotonic_s());
-  if (fraction >= 1) progress_.clear();  // what follows tells of itself
+  if (fraction >= 1) progress_.clear();  // later stages report their own progress
 }
 
 void Pipeline::read(Member& m) {

@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kViewersFarewell_s = 20, kFarewell_s = 4;
-// A session whose processes all heard of its end is over by then.
+// Time in which a session ends once all its processes have the "stop".
 constexpr double kSoon_s = 0.3;
 constexpr std::string_view kListening = "listening on ";
 
@@ -66,7 +66,7 @@ Status ProcessGroup::start_master(std::vector<std::string> arguments, double pat
   auto listens = start_listener(std::move(member), patience_s);
   if (!listens) return listens.error();
   endpoint_ = std::move(*listens);
-  // Started again, it listens where it did: those who look for it know no other place.
+  // A restarted master listens at its old address: processes that look for it know no other.
   auto& told = members_.back().arguments;
   const auto bind = std::find(told.begin(), told.end(), "--bind");
   if (bind != told.end() && bind + 1 != told.end()) *(bind + 1) = endpoint_;
@@ -91,7 +91,7 @@ Status ProcessGroup::start(Member member) {
   if (const auto error = make_private_folder(log_directory_))
     return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
   member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
-  // The environment or a session's file may name other keys.
+  // Names the keys: the environment or a session's file may name other ones.
   const std::string keys = keys_.empty() ? net::kNoKeys : keys_;
   if (member.joins) member.arguments.insert(member.arguments.end(), {"--keys", keys});
   if (!endpoint_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
@@ -156,11 +156,11 @@ void ProcessGroup::finish() {
       master->process->signal(SIGTERM);
     for (const double until = monotonic_s() + kSoon_s; !master->process->ended() && monotonic_s() < until;)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    // Who said hello while the session ended has not heard of it, and the master waits for them.
+    // Processes that joined while the session ended did not get the "stop", and the master waits for them.
     signal([](const Member& m) { return m.role != "master"; });
     master->process->finish(kFarewell_s);
   }
-  // Those whom the master could not tell, because it is dead or they had not said hello yet.
+  // Ends those that the master did not reach, because it is dead or they had not joined yet.
   end([](const Member&) { return true; }, kFarewell_s);
 }
 
@@ -170,7 +170,7 @@ void limit_log(const std::string& path, uint64_t most) {
   if (fs::symlink_status(path, error).type() != fs::file_type::regular) return;
   if (const auto bytes = fs::file_size(path, error); error || bytes <= most) return;
   const std::string before = fs::path(path).replace_extension(".before.log").string();
-  fs::remove(before, error);  // a link, not what it leads to
+  fs::remove(before, error);  // removes a link, not its target
   if (!fs::copy_file(path, before, error)) fs::remove(before, error);
   fs::resize_file(path, 0, error);
 }

@@ -1,5 +1,5 @@
-// `telesplat run SCENE`: the whole pipeline on this machine, headless and recorded. `telesplat view SCENE`: the same in
-// a window.
+// `telesplat run SCENE`: runs the whole pipeline on this machine, headless and recorded. `telesplat view SCENE`: the
+// same in a window.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -39,10 +39,10 @@ namespace fs = std::filesystem;
 
 using State = Pipeline::State;
 
-constexpr double kAskStatusEvery_s = 0.5;  // the master for its status
+constexpr double kAskStatusEvery_s = 0.5;  // asks the master for its status this often
 constexpr double kResultPatience_s = 2;
 
-// Whether the viewer could show its window here: nothing is started for one that cannot.
+// Checks that the viewer could show its window here; if it could not, no process is started.
 Status check_display(const RunOptions& o) {
   if (!viewer::has_person(o.viewer)) return ok_status();
   if (const auto program = viewer::display_program(); !program) return program.error();
@@ -51,14 +51,14 @@ Status check_display(const RunOptions& o) {
   return why.empty() ? ok_status() : Status(Error{why});
 }
 
-// What ctl must be told where the session's file is not there, by which it finds others: the master's log tells why.
+// Returns flags for ctl if the session's file, which ctl looks for, is missing: the master's log says why.
 std::string flags_of_ctl(const std::string& master, const std::string& keys) {
   for (const auto& session : net::running_sessions())
     if (session.address == net::local_address(master)) return "";
   return " --master " + master + (keys.empty() ? "" : " --keys " + keys);
 }
 
-/// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
+/// A folder for the logs of a session without a record; the destructor deletes it unless something went wrong.
 class PassingFolder {
  public:
   Status make() {
@@ -79,16 +79,16 @@ class PassingFolder {
   std::string path_;
 };
 
-// For the dialog that opens data sets. A list that cannot be kept is no reason not to look at them.
+// Keeps the data set in the list of the open dialog. If the list cannot be written, the run goes on.
 void keep_recent(const std::string& data_set) {
   if (const Status s = viewer::add_recent(viewer::recent_files_path(), data_set); !s) log::info("{}", s.error().text);
 }
 
-/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input, 130 interrupted. No
-/// process is left behind in any case.
+/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input, 130 interrupted. Never
+/// leaves a process behind.
 class Run {
  public:
-  /// movie: what is to be made of the record, if anything.
+  /// movie: the movie to make of the record, if any.
   Run(RunOptions options, std::shared_ptr<Scene> scene, std::optional<MoviePlan> movie)
       : o_(std::move(options)), scene_(std::move(scene)), movie_(std::move(movie)) {}
 
@@ -100,7 +100,7 @@ class Run {
       progress_.line(fmt::format("session at {}; telesplat ctl status{} shows it", pipeline->master_endpoint(),
                                  flags_of_ctl(pipeline->master_endpoint(), o_.keys)));
     const State state = watch(*pipeline);
-    // From here on a signal is another one: what is at hand is left out.
+    // From here on a signal is a new one: it ends the step that runs.
     const bool stopped = state == State::kRunning;
     if (stopped) net::forget_stop();
     pipeline->finish();
@@ -118,7 +118,7 @@ class Run {
   }
 
  private:
-  // The folder is ours from here on.
+  // From here on the folder is ours.
   Status prepare() {
     std::error_code error;
     if (o_.out.empty()) {
@@ -133,7 +133,7 @@ class Run {
     return begun ? ok_status() : Status(begun.error());
   }
 
-  // Shows what goes on until the pipeline ends or somebody wants it to; kRunning: the latter.
+  // Shows figures and news until the pipeline ends or a signal comes (kRunning).
   State watch(Pipeline& pipeline) {
     ControlClient control(pipeline.master_endpoint(), pipeline.access());
     SessionFigures figures;
@@ -172,7 +172,7 @@ class Run {
     return state;
   }
 
-  // What a person at the window wants to see instead. What cannot be is said there and here, and nothing else happens.
+  // Opens the data set that a person chose in a window. A failure is shown there and here, and nothing else happens.
   void open(Pipeline& pipeline, const std::string& wish) {
     Status opened = try_open(pipeline, wish);
     if (opened) opened = open_due();
@@ -187,7 +187,7 @@ class Run {
     progress_.line("telesplat: " + error.text);
   }
 
-  // What people ordered of this process, by way of the master (scene::Keeper::kLauncher).
+  // Carries out orders of people to this process, which the master keeps (scene::Keeper::kLauncher).
   void follow_orders(const nlohmann::json& status, Pipeline& pipeline, ControlClient& control) {
     for (const Wish& wish : wishes_of(status)) {
       if (!obeyed_.emplace(wish.master, wish.number).second) continue;
@@ -195,7 +195,7 @@ class Run {
       control.tell("done", {{"number", fmt::format("{}", wish.number)},
                             {"ok", done ? "true" : "false"},
                             {"text", done ? *done : done.error().text}});
-      // The person has the answer; the data server that goes may take some seconds.
+      // First the answer, then the change: the old data server may take some seconds to end.
       if (const Status s = open_due(); !s) tell_problem(pipeline, s.error());
     }
   }
@@ -213,7 +213,7 @@ class Run {
                                 : fmt::format("the data set is opened anew: {} {}", wish.order, wish.value);
   }
 
-  // The same data set, read with another value of a flag.
+  // Reads the same data set again with another value of a flag.
   Status reopen(Pipeline& pipeline, const Wish& wish) {
     if (!o_.out.empty()) return Error{wish.order + ": a session that is recorded keeps its data set"};
     RunOptions other = o_;
@@ -251,8 +251,8 @@ class Run {
     return ok_status();
   }
 
-  // The record of a joined session is its master's; so what its viewers did is asked for, once they have left.
-  // A master that others started may speak another dialect: what it says in one is not shown.
+  // A joined session is recorded by its master: takes the viewers' results from the status, once they have left. The
+  // master may have another version: an answer in another form is not shown.
   void read_status(const nlohmann::json& status, SessionFigures& figures, std::string& live) try {
     live = figures.update(status, monotonic_s());
     if (const auto session = status.find("session"); session != status.end())
@@ -272,8 +272,8 @@ class Run {
     if (!o_.out.empty()) metrics::remove_record(o_.out, !folder_existed_);
   }
 
-  // What --overwrite was to replace is gone once there is something in its place. What a run that failed has measured
-  // stays, and so does the record before.
+  // Deletes the record that --overwrite replaces, once the new one has frames. If the run failed, both its record and
+  // the old one stay.
   void settle_replaced() const {
     if (!o_.overwrite || o_.out.empty()) return;
     std::error_code error;
@@ -301,7 +301,7 @@ class Run {
     return 1;
   }
 
-  // A window that is closed, or Ctrl-C there, is an end like any other.
+  // A closed window, or Ctrl-C in it, is an ordinary end.
   int nothing_displayed(bool stopped) {
     remove_record();
     if (o_.viewer.window) return 0;
@@ -324,7 +324,7 @@ class Run {
     return o_.viewer.window ? 0 : kInterrupted;
   }
 
-  // Whether the run would have ended by itself.
+  // True if the run ends by itself.
   bool has_end() const {
     const auto& d = o_.viewer.display;
     return !o_.viewer.window && (d.duration_s > 0 || d.frames > 0);
@@ -357,16 +357,16 @@ class Run {
   bool folder_existed_ = false, viewer_died_ = false;
   std::vector<std::string> record_failures_;
   ProcessorWait busy_;
-  std::string master_folder_;                       // where the session's record is; empty: not known, or nowhere
-  std::vector<std::string> results_;                // of the viewers of a joined session
-  std::function<Status()> due_;                     // opens what was checked
+  std::string master_folder_;                       // folder of the session's record; empty: unknown, or no record
+  std::vector<std::string> results_;                // a line a viewer of a joined session
+  std::function<Status()> due_;                     // opens the checked data set
   std::set<std::pair<uint64_t, uint64_t>> obeyed_;  // orders: master, number
   PassingFolder logs_;
   tools::ProgressLine progress_;
   AfterRun after_{o_, scene_.get(), movie_, progress_};  // last: it uses the others
 };
 
-// Finds the session that --master auto means. Returns 0, or the exit code after saying why there is none.
+// Finds the session of --master auto. Returns 0, or prints the problem and returns the exit code.
 int find_session(RunOptions& o) {
   if (o.join_master.empty()) return 0;
   const auto search = net::find_master(o.join_master);

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kBegin = "keys-";
-constexpr std::chrono::seconds kYoung{60};  // of a folder that may be about to be locked
+constexpr std::chrono::seconds kYoung{60};  // a younger folder may be about to be locked
 
 // Removes keys of runs that were killed: no process has their folders open.
 void remove_left_behind(const net::RuntimeFolder& runtime) {
@@ -52,7 +52,7 @@ Result<std::unique_ptr<PassingKeys>> PassingKeys::make() {
   remove_left_behind(*folder);
   const std::string path = fmt::format("{}/{}{}", folder->path(), kBegin, getpid());
   std::error_code error;
-  fs::remove_all(path, error);  // of a process of this number that was killed
+  fs::remove_all(path, error);  // a killed process may have had this number
   auto maker = net::KeyMaker::open(path);
   if (!maker) return not_made(maker.error());
   std::unique_ptr<PassingKeys> out(new PassingKeys(path, *std::move(maker)));

@@ -1,4 +1,4 @@
-// The keys of a run: a folder that is given, or throw-away ones.
+// The keys of a run: a given folder, or keys made for this run alone.
 #pragma once
 
 #include <memory>
@@ -10,10 +10,10 @@
 
 namespace telesplat::launcher {
 
-/// As values of --keys: keys that are made for this run.
+/// Value of --keys: keys made for this run.
 inline constexpr const char* kKeysAuto = "auto";
 
-/// Keys that are made for one run, in the user's runtime folder; they go when it does.
+/// Keys made for one run, in the user's runtime folder; the destructor deletes them.
 class PassingKeys {
  public:
   static Result<std::unique_ptr<PassingKeys>> make();
@@ -25,12 +25,12 @@ class PassingKeys {
  private:
   PassingKeys(std::string path, net::KeyMaker maker) : path_(std::move(path)), maker_(std::move(maker)) {}
   std::string path_;
-  net::KeyMaker maker_;  // as long as it is open, others know that the keys are in use
+  net::KeyMaker maker_;  // open as long as the keys are in use: other processes see that
 };
 
 /// Checks that options.keys has a key for each process that will be started; "auto" becomes a folder of new ones, and
-/// "none" becomes empty, after a line on stderr that says what this means. Returns the new keys; null: there is nothing
-/// that would have to go. Error: what is missing or wrong.
+/// "none" becomes empty, after a line on stderr that says what this means. Returns the new keys; null: no keys were
+/// made. Error: names the missing or wrong key.
 Result<std::unique_ptr<PassingKeys>> settle_keys(RunOptions& options);
 
 }  // namespace telesplat::launcher

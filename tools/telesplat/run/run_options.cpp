@@ -21,12 +21,12 @@ namespace {
 using options::Range;
 using options::Table;
 
-// The tiles of a wall are compared where the head stands still.
+// Time at which a wall's head stands still, so that its tiles can be compared.
 constexpr double kWallHold_s = 2;
 
 constexpr const char* kWhatIsKept = "what a run keeps";
 
-// What a person looks for first: --help shows these, by what they are for, and --help all the others, too.
+// Flags that a person looks for first, by purpose: --help shows these, and --help all the others, too.
 struct Purpose {
   const char* group;
   std::vector<std::string_view> flags;
@@ -44,7 +44,7 @@ const std::vector<Purpose>& purposes() {
   return all;
 }
 
-// Where a row stands; sets its group, and whether --help shows it.
+// Returns the row's place in the help; sets its group, and whether --help shows it.
 size_t place_of(options::Row& row) {
   const std::string name = options::name_of(row);
   size_t place = 0;
@@ -72,7 +72,7 @@ Table by_purpose(const Table& table) {
   return out;
 }
 
-// Either `run`'s or `view`'s.
+// Returns the rows of `run` or of `view`.
 Table display_rows(RunOptions& o) {
   if (o.viewer.window)
     return joined({{.flag = "--out",
@@ -175,13 +175,13 @@ Table own_rows(RunOptions& o) {
        .not_in_scene = "what is logged"}};
 }
 
-// --sampler alone: threads and memory of samplers are the launcher's business.
+// Only --sampler: the launcher chooses threads and memory of samplers.
 Table sampler_rows(RunOptions& o) {
   const Table all = sampler::table(o.sampler);
   return {*options::find(all, "--sampler")};
 }
 
-// What only some scenes have means nothing where no scene is named.
+// Without a scene, refuses flags that only some scenes have.
 Status refuse_scene_flags(RunOptions& o, const options::Given& given) {
   const Table of_scenes = data::scene_table(o.data), of_all = table(o);
   const auto means_nothing = [&](const std::string& flag) {
@@ -223,7 +223,7 @@ Status settle_wall(RunOptions& o, const options::Given& given) {
   return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.viewer.wall, wall->tiles())};
 }
 
-// The first of these needs a folder.
+// Refuses a flag that records into a folder, if there is no folder.
 Status refuse_records_without_folder(const RunOptions& o) {
   const auto& d = o.viewer.display;
   for (const auto& [asked, flag] : {std::pair{d.verify_every > 0, "--verify"},
@@ -237,12 +237,12 @@ Status refuse_records_without_folder(const RunOptions& o) {
   return ok_status();
 }
 
-// A viewer that joins is told by its session.
+// A viewer that joins takes the coupling from its session.
 bool shows_pictures(const RunOptions& o) { return o.viewer.coupling == "images" && o.join_master.empty(); }
 
 namespace fs = std::filesystem;
 
-// Whether `file` is this path, or lies in the folder of this path.
+// True if `file` is this path, or lies in the folder of this path.
 bool is_or_holds(const fs::path& path, const fs::path& file) {
   return std::mismatch(path.begin(), path.end(), file.begin(), file.end()).first == path.end();
 }
@@ -257,7 +257,7 @@ Status check_pictures(const RunOptions& o, const Scene* scene) {
 
 namespace {
 
-// A movie is made of the record.
+// A movie needs the record.
 Status check_movie(const RunOptions& o, const options::Given& given) {
   if (o.movie.file.empty()) {
     for (const char* flag : {"--movie-fps", "--movie-size"})
@@ -282,7 +282,7 @@ Status check_report(const RunOptions& o) {
       "report of it afterwards"};
 }
 
-// A place that is given twice has what was given last, as other flags do.
+// If a place is given twice, the last one counts, as with other flags.
 Status settle_links(RunOptions& o) {
   for (const auto& text : o.link_texts) {
     const auto placed = links::parse_placed(text);
@@ -298,7 +298,7 @@ Status settle_links(RunOptions& o) {
   return ok_status();
 }
 
-// As a program of these options is to be told, where `defaults` is what it does anyway.
+// Returns arguments for a program with these options, without those that equal its defaults.
 template <class Options>
 std::vector<std::string> arguments(Options o) {
   Options defaults;
@@ -317,7 +317,7 @@ Table table(RunOptions& o) {
   const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
   const Table launcher = joined(joined(own, sampler_rows(o)), {give_up_row(o)});
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
-  // The limits of a service that others use; this session's processes are all the person's own.
+  // Limits for a service that strangers use; all processes of this session belong to the person.
   const Table limits = without(joined(master::limit_table(o.master), net::peer_limit_table(o.master.service)),
                                {"--max-peers", "--max-messages", "--queue-limit-mb"});
   const Table of_master = joined(joined(master::record_table(o.master), limits), master::session_table(o.master));
@@ -328,7 +328,7 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   std::shared_ptr<Scene> out;
   if (o.data.scene.empty()) {
     if (o.join_master.empty()) o.join_master = net::master_from_environment();
-    // A window may begin with nothing: the person opens something there.
+    // A window may begin empty: the person opens a data set in it.
     if (o.join_master.empty() && !(o.viewer.window && o.out.empty()))
       return Error{"a scene is needed: a mesh or volume file, a folder of DICOM slices, or the word julia"};
     if (const Status s = refuse_scene_flags(o, given); !s) return s.error();
@@ -367,7 +367,7 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
 
 std::vector<std::string> data_arguments(const RunOptions& o, int part) {
   data::DataServiceOptions d = o.data;
-  d.companions = "anywhere";  // the person's own files, for the person alone
+  d.companions = "anywhere";  // the files belong to the person, who alone sees them
   d.service.max_connections = o.master.service.max_connections;
   if (o.data_servers > 1) d.volume.part = fmt::format("{}/{}", part, o.data_servers);
   auto out = arguments(d);
@@ -394,7 +394,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o, int number, doubl
   v.window = v.window && !v.xr;
   if (number != 1) v.display.verify_every = 0;
   if (o.out.empty())
-    v.join_record = false;  // a guest without a folder leaves nothing in that of others
+    v.join_record = false;  // a guest without a folder leaves no files in the host's
   else
     v.out = viewer_directory(o.out, number);
   if (!v.wall.empty()) v.wall_tile = number - 1;

@@ -19,11 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr const char* kNotMeasured = "-";  // in place of what was not measured
+constexpr const char* kNotMeasured = "-";  // in place of a figure that was not measured
 
 std::string plural(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-// What a summary has under this key; null if it has nothing.
+// Returns the summary's value of this key, or null.
 json at(const json& s, const char* key) {
   const auto found = s.find(key);
   return found == s.end() ? json() : *found;
@@ -34,7 +34,7 @@ std::string text_of(const json& s, const char* key) {
   return v.is_string() ? v.get<std::string>() : kNotMeasured;
 }
 
-// As `format` has it, times `scale`.
+// Formats value times `scale`.
 std::string number(const json& value, const char* format, double scale = 1) {
   return value.is_number() ? fmt::format(fmt::runtime(format), value.get<double>() * scale) : kNotMeasured;
 }
@@ -59,7 +59,7 @@ std::string subject_of(const std::string& directory, const json& s) {
   return text_of(s, "scene") + (*scene)->summary(primitives.is_number() ? primitives.get<uint64_t>() : 0);
 }
 
-// Whether the run was drawn from points, so that there are splats and points cached.
+// True if the run was drawn from points: only then are there splats and cached points.
 bool has_points(const json& s) {
   if (text_of(s, "coupling") == "images") return false;
   const auto kind = scene::kind_named(text_of(s, "kind"));
@@ -76,7 +76,7 @@ std::string head_of(const std::string& directory, const json& s) {
   return head;
 }
 
-// Simulated links: one line for all that are alike.
+// Simulated links: one line for all equal ones.
 void add_links(const json& s, RunReport& out) {
   const json links = at(s, "links");
   if (!links.is_object()) return;
@@ -88,7 +88,7 @@ void add_links(const json& s, RunReport& out) {
   for (const auto& [link, names] : whose) out.line("simulated link", fmt::format("{} (of {})", link, names));
 }
 
-// What of the display's figures not every record has.
+// Adds figures of the display that only some records have.
 std::string beside_frames(const json& s) {
   std::string out;
   if (const json still = at(s, "frames_still"); still.is_number() && still.get<double>() > 0)
@@ -141,7 +141,7 @@ void add_updates(const json& s, RunReport& out) {
   out.line("sent to viewers", sent(s));
 }
 
-// From one frame to the next; nothing where no two frames were compared in a row.
+// Changes from frame to frame; no line if no two successive frames were compared.
 void add_steadiness(const json& q, RunReport& out) {
   const json flicker = at(q, "flicker"), popping = at(q, "popping");
   if (!flicker.is_object() || !popping.is_object()) return;
@@ -179,7 +179,7 @@ void add_errors(const json& s, RunReport& out) {
                                  expired, expired > 0 ? " (a slow sampler's work went to another)" : ""));
 }
 
-// How a person names the folder next: runs/latest, where that is this run.
+// Returns a name of the folder for commands: runs/latest if that leads to this run.
 std::string called_next(const std::string& directory) {
   std::error_code error;
   const fs::path latest = fs::path(directory).lexically_normal().parent_path() / "latest";
@@ -187,7 +187,7 @@ std::string called_next(const std::string& directory) {
   return shell_line({is_it ? latest.string() : directory});
 }
 
-// What to do with the record. Nothing is replayed of volumes, and without what the viewer received.
+// Prints commands for the record. Volumes, and runs without the record of points, cannot be replayed.
 void print_next(const std::string& directory) {
   std::error_code error;
   std::string there;
@@ -206,11 +206,11 @@ void print_next(const std::string& directory) {
 namespace fs = std::filesystem;
 
 struct File {
-  std::string name;  // from the run folder on
+  std::string name;  // relative to the run folder
   uint64_t bytes = 0;
 };
 
-// Subfolders after the folder's own files, each by name.
+// Lists the folder's own files, then subfolders, each by name.
 std::vector<File> files_below(const std::string& directory) {
   std::vector<File> out;
   std::error_code error;
@@ -237,7 +237,7 @@ void describe_scene(const std::string& directory, data::Description& out) {
   for (bool first = true; std::getline(lines, line); first = false) out.row(first ? "scene" : "", line);
 }
 
-// A row for each of its own files, one for all of a subfolder.
+// A row for each of the folder's own files, one for all of a subfolder.
 void describe_files(const std::string& directory, data::Description& out) {
   const std::vector<File> files = files_below(directory);
   std::map<std::string, std::pair<size_t, uint64_t>> folders;  // files, bytes
@@ -274,7 +274,7 @@ Result<RunReport> read_report(const std::string& directory, double skip_s) {
     add_quality(s, out);
     add_errors(s, out);
     return out;
-  } catch (const json::exception&) {  // a file that somebody else wrote
+  } catch (const json::exception&) {  // another program wrote the file
     return Error{directory + "/summary.json: lacks a figure, or has another thing in its place"};
   }
 }

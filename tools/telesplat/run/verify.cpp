@@ -28,7 +28,7 @@ std::string change_columns(const VerifiedView& v) {
   return out + ",,";
 }
 
-// Quality lies in thousandths: more digits than of times.
+// Qualities differ in thousandths: they need more digits than times.
 ordered_json precise(const std::vector<double>& values) { return metrics::distribution_json(values, 9); }
 
 ordered_json last_view(const std::vector<VerifiedView>& views) {
@@ -51,7 +51,7 @@ Columns columns_of(const std::vector<VerifiedView>& views) {
       c.flicker.push_back(v.change->unsteadiness.flicker);
       c.popping.push_back(v.change->unsteadiness.popping);
     }
-    if (v.quality.object_pixels == 0) continue;  // looking away from the data set: there is nothing to compare
+    if (v.quality.object_pixels == 0) continue;  // the view does not show the data set: no quality
     c.psnr.push_back(v.quality.psnr_db);
     c.ssim.push_back(v.quality.ssim);
     c.flip.push_back(v.flip);
@@ -89,7 +89,7 @@ image::View side_by_side(const image::View& a, const image::View& b) {
   return out;
 }
 
-// Changes summary.json.
+// Adds "quality" to summary.json.
 Status write_summary(const std::string& directory, const std::vector<VerifiedView>& views) {
   const std::string path = directory + "/summary.json";
   auto summary = tools::read_json_object(path);
@@ -103,7 +103,7 @@ class Verification {
  public:
   Verification(DirectScene& scene, const VerifyOptions& options) : scene_(scene), options_(options) {}
 
-  /// Frames come in the order of their numbers.
+  /// Call in the order of frame numbers.
   Status compare(const std::string& path) {
     auto read = viewer::read_spooled_frame(path);
     if (!read) return read.error();
@@ -115,7 +115,7 @@ class Verification {
     if (now.frame.use & viewer::kPictureOnly) now.frame.view.depth_m = now.reference.view.depth_m;
     VerifiedView v{
         .frame = now.frame.number, .t_s = now.frame.t_s, .samples = now.reference.samples, .eye = now.frame.eye};
-    std::optional<Frame>& before = before_[v.eye];  // of this eye
+    std::optional<Frame>& before = before_[v.eye];  // the last frame of this eye
     v.quality = image::compare(now.reference, now.frame.view);
     v.flip = image::flip(now.reference, now.frame.view);
     if (before && before->frame.number + 1 == now.frame.number && alike(before->frame.camera, now.frame.camera))
@@ -128,7 +128,7 @@ class Verification {
 
   const std::vector<VerifiedView>& views() const { return views_; }
 
-  /// Of the worst, the median and the last view that shows the data set.
+  /// Writes pictures of the worst, the median and the last view that shows the data set.
   Status write_pictures(const std::string& directory) const {
     std::vector<size_t> seen;
     for (size_t i = 0; i < views_.size(); ++i)
@@ -174,8 +174,8 @@ class Verification {
   DirectScene& scene_;
   const VerifyOptions& options_;
   std::vector<VerifiedView> views_;
-  std::vector<std::string> paths_;              // of views_
-  std::array<std::optional<Frame>, 3> before_;  // of both eyes, the left, the right
+  std::vector<std::string> paths_;              // files of views_
+  std::array<std::optional<Frame>, 3> before_;  // last frame for both eyes, the left, the right
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Verification after a run: displayed frames against direct rendering of the data at the same pose (docs/quality.md).
+// Verifies a run: compares displayed frames with direct rendering of the data at the same pose (docs/quality.md).
 #pragma once
 
 #include <cstdint>
@@ -23,36 +23,36 @@ struct VerifiedView {
   int samples = 1;   ///< rays a pixel of the reference
   uint32_t eye = 0;  ///< 1: the left eye's picture, 2: the right one's, 0: one for both
   image::Quality quality;
-  double flip = 0;  ///< mean over the pixels that count
-  /// Where the frame before it was compared too.
+  double flip = 0;  ///< mean over the pixels that count (quality.h)
+  /// Change from the frame before it, if that was compared too.
   struct Change {
     double since_s = 0;  ///< from that frame to this one
     image::Unsteadiness unsteadiness;
-    std::optional<image::HoleFates> holes;  ///< of surfaces, within an epoch
+    std::optional<image::HoleFates> holes;  ///< only for surfaces, within an epoch
   };
   std::optional<Change> change;
 };
 
-/// A row a view; what was not measured is empty.
+/// A row a view; empty cells were not measured.
 std::string quality_csv(const std::vector<VerifiedView>& views);
 
-/// Distributions over the views that show the data set; null where nothing was measured.
+/// Distributions over the views that show the data set; null without a measurement.
 nlohmann::ordered_json quality_json(const std::vector<VerifiedView>& views);
 
-/// How long a hole lasts on average, in ms: holes that exist, over holes that close in a second (Little 1961). Nothing
-/// where none closed.
+/// Mean life of a hole, in ms: existing holes over holes that close in a second (Little 1961). Nothing if no hole
+/// closed.
 std::optional<double> hole_lifetime_ms(const std::vector<VerifiedView>& views);
 
 struct VerifyOptions {
-  image::ShadingParameters shading;  ///< as the frames were displayed with
+  image::ShadingParameters shading;  ///< as in the displayed frames
   int samples = 16;                  ///< rays a pixel of the reference: image::validate_samples
 };
 
-/// Compares every spooled frame of `run_directory` that is marked for verification with a direct rendering of the
-/// scene in the frame's epoch, and with the frame before it where that is among them; writes quality.csv, comparison
-/// pictures (reference | displayed | difference) of the worst, the median and the last view into images/, fills
-/// "quality" in summary.json, and deletes the spooled frames. progress(done, of) is called after each view.
-/// should_stop() ends it early; what was compared so far counts.
+/// Compares every spooled frame of `run_directory` that is marked for verification with a direct rendering of the scene
+/// in the frame's epoch, and with the frame before it if that is marked too; writes quality.csv, comparison pictures
+/// (reference | displayed | difference) of the worst, the median and the last view into images/, fills "quality" in
+/// summary.json, and deletes the spooled frames. Calls progress(done, of) after each view. should_stop() ends it early;
+/// views compared so far count.
 Status verify_run(const std::string& run_directory, DirectScene& scene, const VerifyOptions& options,
                   const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& should_stop);
 

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The newest frame-NNNNNN.png of a folder.
+// Returns the newest frame-NNNNNN.png of a folder.
 std::optional<std::pair<uint64_t, std::string>> newest_picture(const std::string& directory) {
   std::optional<std::pair<uint64_t, std::string>> out;
   std::error_code error;
@@ -33,7 +33,7 @@ std::optional<std::pair<uint64_t, std::string>> newest_picture(const std::string
   return out;
 }
 
-// When the frames of `tiles` were displayed; 0 where that is not recorded.
+// Reads when the frames of `tiles` were displayed; 0 if the record does not say.
 void read_times(const std::string& path, std::vector<TilePicture>& tiles) {
   const auto table = tools::CsvTable::read(path, {});
   if (!table) return;
@@ -45,7 +45,7 @@ void read_times(const std::string& path, std::vector<TilePicture>& tiles) {
         if (const auto t_s = table->number(row, *t)) tile.t_s = *t_s;
 }
 
-// Where pictures of tiles lie in the picture of all.
+// Places of the tiles' pictures in the wall's.
 using Flat = wall::Unrolled;
 
 Result<Flat> lay_flat(const std::string& directory, const viewer::WallTile& wall, const image::View& first) {
@@ -64,7 +64,7 @@ Result<Flat> lay_flat(const std::string& directory, const viewer::WallTile& wall
   return out;
 }
 
-// Screens whose pixels are coarser than the finest one's: the nearest pixel.
+// Enlarges pictures of screens with coarser pixels than the finest one: the nearest pixel.
 image::View resized(const image::View& picture, int width, int height) {
   image::View out{width, height, std::vector<uint32_t>(size_t(width) * size_t(height)), {}};
   for (int y = 0; y < height; ++y)

@@ -13,8 +13,8 @@ using viewer::WallLayout;
 
 inline constexpr int kMaxViewers = 64;
 
-/// A viewer's name, and the folder it records into: the first one's is the run's own, the others have one of theirs in
-/// it.
+/// Returns a viewer's name, and the folder that it records into: the run's own for the first, a subfolder of it for the
+/// others.
 std::string viewer_name(int number);
 std::string viewer_directory(const std::string& run_directory, int number);
 
@@ -26,14 +26,13 @@ struct TilePicture {
 };
 
 /// Puts the newest recorded picture of each tile's viewer (1, 2, ...) into one, DIR/images/wall.png: a described wall
-/// unrolled, black where its bezels are. Returns what it was made from. Error: a viewer recorded none, a picture has
+/// unrolled, black where its bezels are. Returns the pictures used. Error: a viewer recorded no picture, a picture has
 /// another size than its tile, or the whole is larger than a picture may be.
 Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, const viewer::WallTile& wall);
 
-/// Keeps the description of the wall in the record, wall.toml, if it has one. Error: it cannot be read or written any
-/// more.
+/// Copies the wall's description, if it has one, to wall.toml in the record. Error: the file cannot be read or written.
 Status keep_description(const std::string& run_directory, const std::string& wall);
-/// The same of an autostereo display's file, which people edit to calibrate it; empty: there is none.
+/// Copies an autostereo display's file, which people edit to calibrate it; barrier is empty without one.
 Status keep_barrier(const std::string& run_directory, const std::string& barrier);
 
 }  // namespace telesplat::launcher

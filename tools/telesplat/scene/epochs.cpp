@@ -9,7 +9,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// Quotes double the length of a transfer function or colouring, numbers stand beside it.
+// Escaped quotes may double the length of a transfer function or colouring, and numbers stand beside it.
 constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = 1 << 18};
 
 }  // namespace

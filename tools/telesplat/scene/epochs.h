@@ -1,4 +1,4 @@
-// What a run's record says of its epochs: epochs.csv.
+// Reads the epochs of a run's record: epochs.csv.
 #pragma once
 
 #include <cstdint>
@@ -13,24 +13,24 @@
 
 namespace telesplat::launcher {
 
-/// epochs.csv has no such epoch.
+/// The error that epochs.csv lacks this epoch.
 Error no_epoch(const std::string& run_directory, EpochId epoch, uint64_t first, uint64_t last);
 
-/// What each epoch showed.
+/// The content of each epoch.
 template <class T>
 struct Epochs {
-  std::string directory;  ///< of the run
+  std::string directory;  ///< the run's folder
   std::map<uint64_t, T> by_id;
-  std::map<uint64_t, geometry::Clip> clips;  ///< what was cut away, where something was
+  std::map<uint64_t, geometry::Clip> clips;  ///< clips of epochs that had one
 
-  /// Error: there is no such epoch.
+  /// Error: epochs.csv has no such epoch.
   Result<T> at(EpochId epoch) const {
     const auto found = by_id.find(epoch.value);
     if (found != by_id.end()) return found->second;
     return by_id.empty() ? no_epoch(directory, epoch, 0, 0)
                          : no_epoch(directory, epoch, by_id.begin()->first, by_id.rbegin()->first);
   }
-  /// without: of all epochs of a run without epochs.csv.
+  /// without: the value for a run without epochs.csv.
   Result<T> at(EpochId epoch, const T& without) const { return by_id.empty() ? without : at(epoch); }
   geometry::Clip clip_at(EpochId epoch) const {
     const auto found = clips.find(epoch.value);
@@ -43,7 +43,7 @@ struct Epochs {
 Status read_epochs(const std::string& run_directory, const std::vector<const char*>& columns,
                    const std::function<Status(uint64_t, tools::CsvRow&)>& read);
 
-/// Column "clip" of a row, which is of this epoch.
+/// Reads column "clip" of an epoch's row.
 void read_clip(uint64_t epoch, tools::CsvRow& row, std::map<uint64_t, geometry::Clip>& clips);
 
 }  // namespace telesplat::launcher

@@ -46,7 +46,7 @@ class JuliaKeys : public SceneKeys {
     return flags_;
   }
 
-  // A preset makes the whole set anew. An animation of the file would move away a constant that was given.
+  // A preset makes the whole set anew. The file's animation would move a constant of the command line.
   void give_way(std::vector<std::string>& flags, const std::vector<std::string>& command_line) const override {
     const bool preset = gives(command_line, "--preset"), c = preset || gives(command_line, "--c");
     std::erase_if(flags, [&](const std::string& flag) {
@@ -71,7 +71,7 @@ class JuliaKeys : public SceneKeys {
     return ok_status();
   }
 
-  // The tables below `prefix`: each value goes to a parameter. use(name, value).
+  // Gives each value in the tables below `prefix` to use(parameter's name, value).
   template <class Use>
   Status each_parameter(const std::string& prefix, const toml::table& table, const Use& use) {
     for (const auto& [key, node] : table) {
@@ -100,7 +100,7 @@ class JuliaKeys : public SceneKeys {
     });
   }
 
-  // A text, or an array of texts.
+  // Reads a text, or an array of texts.
   Status read_animate(const toml::node& node) {
     const auto add = [&](const toml::node& part) -> Status {
       const auto text = part.value<std::string>();

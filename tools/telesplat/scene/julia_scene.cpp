@@ -81,7 +81,7 @@ Status read_session(const std::string& path, JuliaScene::Record& out) {
   return ok_status();
 }
 
-// All columns of a row are parameters but for the clip.
+// All columns of a row except the clip are parameters.
 Status read_epoch(uint64_t epoch, tools::CsvRow& row, Epochs<julia::Parameters>& out) {
   read_clip(epoch, row, out.clips);
   std::map<std::string, double> values;

@@ -1,4 +1,4 @@
-// A Julia set: parameters instead of a data file, and in each epoch others.
+// A Julia set: has parameters instead of a data file, and new ones in each epoch.
 #pragma once
 
 #include "tools/telesplat/scene/epochs.h"
@@ -13,7 +13,7 @@ class JuliaScene : public Scene {
   std::string name() const override;
   Status check() const override;
   /// [scene], [julia] with the parameters it begins with, [placement].
-  /// Reads what its data server told of it, and epochs.csv (epoch, t_s, a column for each parameter) if there is one.
+  /// Reads the data server's facts about it, and epochs.csv (epoch, t_s, a column for each parameter) if there is one.
   Status read_record(const std::string& run_directory) override;
   Status move_to(const std::string& file) override;
   Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;
@@ -25,13 +25,13 @@ class JuliaScene : public Scene {
     std::string title;
     julia::Parameters begin;
     julia::Placement placement;
-    Epochs<julia::Parameters> epochs;  ///< none if the run has no epochs.csv, it showed one set only
+    Epochs<julia::Parameters> epochs;  ///< empty if the run has no epochs.csv: it showed one set only
     /// Error: epochs.csv has no such epoch.
     Result<julia::Parameters> at(EpochId epoch) const { return epochs.at(epoch, begin); }
   };
 
  private:
-  /// As recorded; before a run as the flags have it.
+  /// Returns the recorded set; before a run the one of the flags.
   Result<Record> record() const;
   std::optional<Record> record_;
 };

@@ -12,7 +12,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// Begins as the options colour it; each epoch of a record has colours of its own, and maybe another array's chunks.
+// Begins with the options' colours; each epoch of a record has its own, and maybe another array's chunks.
 class DirectMesh : public DirectScene {
  public:
   using Open = std::function<Result<std::shared_ptr<data::MeshStore>>(const std::string& array)>;
@@ -20,7 +20,7 @@ class DirectMesh : public DirectScene {
   DirectMesh(MeshScene::Colours epochs, Open open, int threads)
       : epochs_(std::move(epochs)), open_(std::move(open)), sampler_(sampler::make_ray_sampler(threads)) {}
 
-  // Holds the chunks of this store and no others.
+  // Replaces all chunks by those of this store.
   Status load(std::shared_ptr<data::MeshStore> store) {
     if (store_)
       for (const auto& c : store_->chunks()) sampler_->remove_chunk(c.id);
@@ -43,7 +43,7 @@ class DirectMesh : public DirectScene {
   std::string size() const override { return fmt::format("{} triangles", primitives()); }
 
  private:
-  // Frames come in order, so there is seldom another epoch than before.
+  // Frames come in order: the epoch seldom changes.
   Status prepare(EpochId id) {
     if (epochs_.by_id.empty() || prepared_ == id) return ok_status();
     const auto colouring = epochs_.at(id);
@@ -74,7 +74,7 @@ Status MeshScene::read_record(const std::string& run_directory) {
   std::error_code error;
   if (std::filesystem::file_size(run_directory + "/epochs.csv", error) == 0) return ok_status();
   return read_epochs(run_directory, {"epoch"}, [&](uint64_t epoch, tools::CsvRow& row) -> Status {
-    if (!row.has(scene::kColouringFact)) return ok_status();  // a run of before meshes were coloured
+    if (!row.has(scene::kColouringFact)) return ok_status();  // an old run: its meshes had no colouring
     read_clip(epoch, row, epochs_.clips);
     auto& at = epochs_.by_id[epoch];
     const std::string text = row.text(scene::kColouringFact);

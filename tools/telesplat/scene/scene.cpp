@@ -32,14 +32,14 @@ std::string text_of(const toml::node& node) {
   return fmt::format("{}", node.value_or(0.0));
 }
 
-// Keys of [scene] that are recorded flags of a data set. Others (kind, file, title) are not its own.
+// Reads keys of [scene] that are recorded flags of a data set. Others (kind, file, title) are not.
 Status read_options(const std::string& path, const toml::table& scene, data::DataOptions& o) {
   const options::Table table = data::scene_table(o);
   for (const auto& [key, node] : scene) {
     const auto row = std::find_if(table.begin(), table.end(),
                                   [&name = key](const auto& r) { return options::key_of(r) == name.str(); });
     if (row == table.end() || !node.is_value()) continue;
-    if (!row->not_in_scene.empty()) continue;  // a record may be anybody's: it does not say where this machine writes
+    if (!row->not_in_scene.empty()) continue;  // a stranger's record must not choose where this machine writes
     if (const Status s = options::set(*row, text_of(node)); !s)
       return Error{
           fmt::format("{}:{}: key {} of [scene]: {}", path, node.source().begin.line, key.str(), s.error().text)};
@@ -91,7 +91,7 @@ Result<std::unique_ptr<Scene>> recorded_scene(const std::string& run_directory) 
   if (!session) return session.error();
   const toml::table nothing;
   const auto* table = (*session)["scene"].as_table();
-  // Runs of meshes did not tell their kind once.
+  // Old runs of meshes have no kind.
   const std::string name = (*session)["scene"]["kind"].value_or(std::string("mesh"));
   const auto kind = scene::kind_named(name);
   if (!kind) return Error{fmt::format("{}: kind of [scene] is \"{}\", which is unknown", path, name.substr(0, 40))};

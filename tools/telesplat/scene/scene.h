@@ -1,5 +1,5 @@
-// A kind of scene as the launcher knows it: what session.toml keeps of it, how its pictures are drawn directly, what is
-// told of it. The one place of the launcher where kinds differ: one class and one row (scene.cpp) a kind.
+// A kind of scene for the launcher: reads its part of session.toml, draws it directly, describes it. The one place of
+// the launcher where kinds differ: one class and one row (scene.cpp) a kind.
 #pragma once
 
 #include <cmath>
@@ -20,18 +20,17 @@
 
 namespace telesplat::launcher {
 
-/// A scene as rays see it, without points: what displayed frames are compared with.
+/// Draws a scene by rays, without points: the reference for displayed frames.
 class DirectScene {
  public:
   virtual ~DirectScene() = default;
 
-  /// The scene of `epoch`: every pixel of `camera` traced and shaded with unquantised normals. Depth in metres,
-  /// +infinity where nothing is. Error: the scene of that epoch is not known.
-  /// footprint_px: pixels of `camera` that are one of the view it is drawn for: what a pixel shows may depend on how
-  /// large it is (sampler::JuliaSampler).
+  /// Draws the scene of `epoch`: every pixel of `camera` traced and shaded with unquantised normals. Depth in metres,
+  /// +infinity for background. Error: the scene of that epoch is not known. footprint_px: pixels of `camera` that make
+  /// one of the final view: a pixel's content may depend on its size (sampler::JuliaSampler).
   virtual Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading,
                                    EpochId epoch, double footprint_px) = 0;
-  /// The same with `samples` rays a pixel (image::validate_samples), or one of what has no surface. It is marked
+  /// Draws with `samples` rays a pixel (image::validate_samples), or one if the scene has no surface. Marks the picture
   /// (mark_shown).
   Result<image::Reference> draw_reference(const geometry::Camera& camera, const image::ShadingParameters& shading,
                                           EpochId epoch, int samples) {
@@ -43,13 +42,13 @@ class DirectScene {
     });
   }
 
-  /// Whether pictures have the depth of a surface.
+  /// True if pictures have the depth of a surface.
   virtual bool has_surface() const { return true; }
-  /// Gives a picture, drawn directly or displayed, the depth by which measures find what shows the data set: surfaces
-  /// have it.
+  /// Gives a picture, drawn directly or displayed, a depth that marks the pixels of the data set for measures. Surfaces
+  /// have it already.
   virtual void mark_shown(image::View& view) const { (void)view; }
 
-  virtual uint64_t primitives() const { return 0; }  ///< triangles; 0: it has none
+  virtual uint64_t primitives() const { return 0; }  ///< triangles; 0: no triangles
   virtual std::string size() const = 0;              ///< "20000 triangles", for captions
 };
 
@@ -64,48 +63,47 @@ class Scene {
 
   /// For captions: the file's name; a Julia set's title.
   virtual std::string name() const;
-  /// Whether it is there and can be shown, as far as that is known without reading all of it. The error names file or
-  /// parameter.
+  /// Checks that it exists and can be shown, as far as that is possible without reading all of it. The error names file
+  /// or parameter.
   virtual Status check() const;
 
-  /// From here on of a recorded run. Takes in what else the run folder tells: the scene of each epoch. Errors name
-  /// file, line, value, limit.
+  /// For recorded runs. Reads the scene of each epoch from the run folder. Errors name file, line, value, limit.
   virtual Status read_record(const std::string& run_directory);
-  /// The data lie elsewhere now. Error: it has no data file.
+  /// Sets the present path of its data file. Error: it has no data file.
   virtual Status move_to(const std::string& file);
 
-  /// Keeps its chunk store where `options` say, if they say anything of it.
+  /// Takes the folder of the chunk store from `options`, if they name one.
   void use_cache_of(const data::DataOptions& options);
 
-  /// Opens the data to draw them directly. threads: to draw with, 0: all cores. Errors name the file.
+  /// Opens the data for direct drawing. threads: for drawing, 0: all cores. Errors name the file.
   virtual Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const = 0;
 
-  /// What a report adds to its name, with what stands between them: ": 20000 triangles". primitives: from summary.json.
+  /// Returns a report's addition to its name, with the separator: ": 20000 triangles". primitives: from summary.json.
   virtual std::string summary(uint64_t primitives) const = 0;
-  /// What `telesplat inspect` tells of the scene of a run folder beside its summary: lines; may be empty.
+  /// Returns lines of `telesplat inspect` about the scene of a run folder, beside its summary; may be empty.
   virtual std::string describe_record() const { return {}; }
-  /// What `telesplat inspect` tells of the data.
+  /// Describes the data for `telesplat inspect`.
   virtual Result<data::Description> describe_data(const data::Progress& progress) const = 0;
 
  protected:
   data::DataOptions options_;
 };
 
-/// The scene that options name. Error: as data::kind_of(), which decides what it is.
+/// Returns the scene that options name. Error: that of data::kind_of(), which decides its kind.
 Result<std::unique_ptr<Scene>> scene_of(const data::DataOptions& options);
 
-/// The scene that a run showed, from its session.toml and epochs.csv. Its data need not be there: check() tells. A
-/// folder that names no data file has a scene without one. Errors name file, line, value and limit.
+/// Returns the scene that a run showed, from its session.toml and epochs.csv. Its data may be missing: check() finds
+/// out. A folder that names no data file has a scene without one. Errors name file, line, value and limit.
 Result<std::unique_ptr<Scene>> recorded_scene(const std::string& run_directory);
 
-/// Keys of a scene file that only one kind of scene has, and that are no flags as they stand.
+/// Keys of a scene file that only one kind of scene has, and that do not equal flags.
 class SceneKeys;
 
-/// What the launcher has of each kind.
+/// The launcher's parts of each kind.
 struct SceneKind {
   scene::Kind kind;
   std::unique_ptr<Scene> (*make)(data::DataOptions options);
-  std::unique_ptr<SceneKeys> (*make_keys)();  ///< nullptr: it has none
+  std::unique_ptr<SceneKeys> (*make_keys)();  ///< nullptr: no keys of its own
 };
 const std::vector<SceneKind>& scene_kinds();
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One scene file on its way to flags.
+// Turns one scene file into flags.
 class SceneReader {
  public:
   SceneReader(const std::string& path, const options::Table& table) : path_(path), table_(table) {
@@ -52,7 +52,7 @@ class SceneReader {
   struct Owner {
     scene::Kind kind;
     std::unique_ptr<SceneKeys> keys;
-    std::string first_key;  // that was taken, for messages
+    std::string first_key;  // the first key that it took, for messages
   };
 
   Error refuse(const std::string& what) const { return Error{fmt::format("{}: {}", path_, what)}; }
@@ -119,7 +119,7 @@ class SceneReader {
     }
     const options::Row* row = options::find(table_, flag);
     const bool off = node.is_boolean() && !**node.as_boolean();
-    if (!row && off) return ok_status();  // a flag of another command, and not wanted
+    if (!row && off) return ok_status();  // a flag of another command, switched off
     if (!row) return wrong(node, fmt::format("key {} is none: there is no flag {}{}", name, flag, meant(group, name)));
     if (!row->not_in_scene.empty())
       return wrong(node, fmt::format("key {}: a scene file does not say {}; give {} on the command line", name,
@@ -158,8 +158,8 @@ class SceneReader {
     return ok_status();
   }
 
-  // Files that a scene names lie beside it, or where the command is given. What may be a file may be a name, too: then
-  // it is a file if one is there.
+  // Files that a scene names lie beside it, or in the working folder. A text that may be a file or a name is a file if
+  // one exists.
   bool names_file(const options::Row& row, const std::string& text) const {
     std::error_code error;
     const bool looks_like_file = text.find_first_of(":,") == text.npos && fs::path(text).has_extension();
@@ -189,7 +189,7 @@ Result<std::vector<std::string>> read_scene_file(const std::string& path, const 
 }
 
 Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> arguments, const options::Table& table) {
-  // Other files may be TOML, too: --wall NAME.toml.
+  // A flag's value may be a TOML file, too: --wall NAME.toml.
   const auto is_value = [&](const std::string& a) {
     const options::Row* before = &a == arguments.data() ? nullptr : options::find(table, *(&a - 1));
     const bool* const* flag = before ? std::get_if<bool*>(&before->value) : nullptr;

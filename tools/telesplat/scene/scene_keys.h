@@ -1,4 +1,4 @@
-// Keys of a scene file that only one kind of scene has, and that are no flags as they stand: tables, arrays.
+// Keys of a scene file that only one kind of scene has, and that do not equal flags: tables, arrays.
 #pragma once
 
 #include <toml++/toml.h>
@@ -13,20 +13,20 @@
 
 namespace telesplat::launcher {
 
-/// Of one kind of scene.
+/// Reads the keys of one kind of scene.
 class SceneKeys {
  public:
   virtual ~SceneKeys() = default;
 
-  /// What stands where a data file would; empty: a data file.
+  /// Returns the word in the data file's place; empty: the kind has a data file.
   virtual std::string_view scene() const = 0;
-  /// Whether a key is one of its own. table: the one it stands in; "": in none. node: a value or a table.
+  /// True if a key belongs to this kind. table: the table around it; "": none. node: a value or a table.
   virtual bool owns(std::string_view table, std::string_view name, const toml::node& node) const = 0;
-  /// Takes a key that it owns. Errors say what is wrong, and with which node, but do not name the file.
+  /// Takes a key that it owns. Errors name the fault and the node's line, not the file.
   virtual Status take(std::string_view name, const toml::node& node) = 0;
-  /// What was taken, as flags. Error: the keys do not go together.
+  /// Returns the taken keys as flags. Error: the keys do not go together.
   virtual Result<std::vector<std::string>> flags() = 0;
-  /// Drops from a file's flags what the command line gives more generally.
+  /// Drops from a file's flags those that a more general flag on the command line replaces.
   virtual void give_way(std::vector<std::string>& flags, const std::vector<std::string>& command_line) const = 0;
 
  protected:
@@ -36,13 +36,13 @@ class SceneKeys {
   }
 };
 
-/// A value as a flag takes it: text or number. Empty: it is neither.
+/// Returns a text or number as a flag's value. Empty: the node is neither.
 std::string flag_text(const toml::node& node);
 
-/// Error: the file cannot be read, is no regular file, has more than `most_bytes`, or is no TOML: then file and line.
+/// Error: the file cannot be read, is no regular file, has more than `most_bytes`, or is no TOML (names file and line).
 Result<toml::table> read_toml(const std::string& path, uint64_t most_bytes);
 
-/// Of a Julia set: its preset, constant and animation, its parameters in [julia], its key frames.
+/// Reads a Julia set's preset, constant and animation, its parameters in [julia], its key frames.
 std::unique_ptr<SceneKeys> make_julia_keys();
 
 }  // namespace telesplat::launcher

@@ -27,7 +27,7 @@ class DirectVolume : public DirectScene {
     return raycaster_->draw(camera, shading.background);
   }
   bool has_surface() const override { return false; }
-  // Depth 1 where the volume covers the picture visibly, and none elsewhere, whatever the background.
+  // Depth 1 where the volume is visible, none elsewhere, on any background.
   void mark_shown(image::View& view) const override {
     constexpr uint32_t kVisible = 3;  // steps of 255
     view.depth_m.assign(view.colour.size(), std::numeric_limits<float>::infinity());
@@ -40,7 +40,7 @@ class DirectVolume : public DirectScene {
   }
 
  private:
-  // Frames come in order, so there is seldom another epoch than before.
+  // Frames come in order: the epoch seldom changes.
   Status prepare(EpochId id) {
     if (prepared_ == id && raycaster_) return ok_status();
     const auto epoch = epochs_.at(id, {});

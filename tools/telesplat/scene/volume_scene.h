@@ -1,4 +1,4 @@
-// A volume, its transfer function and the time step it stands at; an epoch has others of both.
+// A volume with its transfer function and time step; an epoch may change both.
 #pragma once
 
 #include "tools/telesplat/scene/epochs.h"
@@ -18,10 +18,10 @@ class VolumeScene : public Scene {
   Result<data::Description> describe_data(const data::Progress& progress) const override;
 
   struct Epoch {
-    std::string transfer;  ///< text form, absolute values; empty: as the data server begins
+    std::string transfer;  ///< text form, absolute values; empty: the data server's first one
     int step = 0;
   };
-  /// What a run's epoch showed; a run without epochs.csv showed one. Error: epochs.csv has no such epoch.
+  /// Returns the content of an epoch; a run without epochs.csv has one. Error: epochs.csv has no such epoch.
   Result<Epoch> at(EpochId epoch) const { return epochs_.at(epoch, {}); }
 
  private:

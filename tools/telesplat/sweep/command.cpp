@@ -1,5 +1,5 @@
-// `telesplat sweep SCENE --vary FLAG=V1,V2,...`: a grid over flags of `telesplat run`, each of its configurations
-// several times, each run by the real command in a folder of its own.
+// `telesplat sweep SCENE --vary FLAG=V1,V2,...`: runs a grid over flags of `telesplat run`, each configuration several
+// times, each run by the real command in a folder of its own.
 #include <fcntl.h>
 #include <fmt/format.h>
 
@@ -34,7 +34,7 @@ struct SweepOptions {
   bool dry_run = false;
 };
 
-// A folder that no other sweep writes into as long as what it returns lives.
+// Locks the folder against other sweeps as long as the returned file is open.
 Result<Descriptor> claim(const std::string& directory) {
   auto file = Descriptor::open_file(directory + "/.sweep.lock", O_RDWR | O_CREAT);
   if (!file.valid()) return Error{fmt::format("{}: cannot be written to", directory)};
@@ -44,9 +44,9 @@ Result<Descriptor> claim(const std::string& directory) {
 
 bool asks_for_nothing(const SweepOptions& o) { return o.scene.empty() && o.vary.empty() && o.flags.empty(); }
 
-// What is asked for; `before` is what the folder holds already.
+// Returns the grid of the command line; `before`: the folder's manifest.
 Result<Grid> wanted_grid(SweepOptions o, const std::optional<Manifest>& before) {
-  // Words behind "--" fill the scene's place where none is named.
+  // Without a scene, the first word behind "--" has taken its place: it is a flag.
   if (o.scene.starts_with("-")) o.flags.insert(o.flags.begin(), std::exchange(o.scene, {}));
   Grid out;
   if (before && asks_for_nothing(o)) {
@@ -90,12 +90,12 @@ void list(const Sweep& sweep) {
   for (const NextRun& run : runs) std::printf("telesplat %s\n", shell_line(sweep.command(run)).c_str());
 }
 
-// Writes and prints what is there; the exit code that follows from it.
+// Writes and prints the results; returns the exit code.
 Result<int> conclude(const Sweep& sweep, const std::string& directory, double skip_s, tools::ProgressLine& progress) {
   const SweepRecord record = read_record(sweep.manifest(), directory, skip_s);
   if (const Status s = write_whole(directory + "/sweep.csv", to_csv(record)); !s) return s.error();
   if (const Status s = write_whole(directory + "/cells.csv", cells_csv(record)); !s) return s.error();
-  // Without a run that is done there is no report.
+  // There is no report before a run is done.
   std::string report;
   if (const auto settled = settle_report({.runs = {directory}, .labels = {}, .skip_s = skip_s})) {
     const auto made = make_report(*settled, progress, [] { return false; });
@@ -134,7 +134,7 @@ int carry_out(Sweep& sweep, const std::string& directory, double skip_s) {
   return kInterrupted;
 }
 
-// A folder with other things in it is not a sweep's.
+// Refuses a folder with other files in it.
 Status check_folder(const std::string& directory, bool has_sweep) {
   std::error_code error;
   if (has_sweep || !fs::exists(directory, error)) return ok_status();
@@ -149,7 +149,7 @@ int sweep(SweepOptions o, const options::Given&) {
   log::initialise("telesplat", "warn");
   if (o.out.empty()) o.out = dated_folder("sweep-");
   std::error_code error;
-  // Whole: the sweep may go on in the folder where it began.
+  // An absolute path: the sweep may go on from another working folder.
   const std::string directory = fs::absolute(o.out, error).lexically_normal().string();
   auto before = read_manifest(directory);
   if (!before) return complain(before.error());

@@ -16,7 +16,7 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr size_t kLongestFolder = 120;  // of a folder; file systems take 255 bytes
+constexpr size_t kLongestFolder = 120;  // bytes of a folder's name; file systems take 255
 constexpr const char* kScene = "scene";
 
 bool is_plain_flag(const options::Row& row) { return std::holds_alternative<bool*>(row.value) && !row.on_off; }
@@ -55,7 +55,7 @@ std::vector<std::string> split_values(const std::string& text) {
   return out;
 }
 
-// Of a scene its file's name, without what may stand in front or behind.
+// Shortens a scene to its file's name, without folder and ending.
 std::string shown_value(const std::string& flag, const std::string& value) {
   const std::string stem = flag == kScene ? std::filesystem::path(value).stem().string() : value;
   return stem.empty() ? value : stem;
@@ -129,7 +129,7 @@ Manifest manifest_of(const ordered_json& j) {
   return out;
 }
 
-// What a person may have broken by hand: names become paths.
+// Checks what an edit by hand may have broken: names become paths.
 bool is_whole(const Manifest& m) {
   for (const Configuration& c : m.configurations)
     if (c.values.size() != m.grid.axes.size() || c.name.empty() || c.name.find('/') != c.name.npos || c.name == "..")
@@ -223,7 +223,7 @@ std::vector<PlannedRun> run_order(const Grid& grid, size_t configurations) {
     const size_t first = out.size();
     for (size_t c = 0; c < configurations; ++c) out.push_back({c, repetition});
     if (!grid.shuffle) continue;
-    // Fisher and Yates, with a generator that is the same everywhere.
+    // Fisher and Yates, with a generator that is the same on all machines.
     std::mt19937_64 random(*grid.shuffle + uint64_t(repetition));
     for (size_t left = configurations; left > 1; --left) std::swap(out[first + left - 1], out[first + random() % left]);
   }

@@ -26,7 +26,7 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr double kLook_s = 0.05;
-constexpr double kEndPatience_s = 30;  // of a run that is told to end because it took too long
+constexpr double kEndPatience_s = 30;  // for a run to end, after its time limit
 constexpr size_t kLongestReason = 300;
 
 std::string reason_for(int exit_code, const std::string& said) {
@@ -36,14 +36,14 @@ std::string reason_for(int exit_code, const std::string& said) {
   return why.empty() ? how : how + ": " + why;
 }
 
-/// Waits for the child and passes on what this process is told.
+/// Waits for the child, and passes signals on to it.
 class Watch {
  public:
   Watch(ChildProcess& child, double limit_s) : child_(child), limit_s_(limit_s) {}
 
   void until_ended(const std::function<void(double)>& watch) {
     while (!child_.ended()) {
-      child_.read_lines();  // a full pipe must not hold it up
+      child_.read_lines();  // a full pipe would stop it
       const double elapsed_s = monotonic_s() - begin_s_;
       if (net::stop_requested()) pass_on();
       if (limit_s_ > 0 && elapsed_s > limit_s_) end_late(elapsed_s);
@@ -87,11 +87,11 @@ constexpr Refused kRefused[] = {
 namespace fs = std::filesystem;
 
 constexpr int kAttempts = 2;
-constexpr double kStarting_s = 4;  // of a run, beside what it lasts: a guess until one is done
+constexpr double kStarting_s = 4;  // starting a run, beside its own time: a guess until a run is done
 constexpr double kUnknown_s = 10;  // a run that ends after a number of frames
 constexpr double kLimitTimes = 10, kLimitMore_s = 600;
 
-// Flags of `telesplat run` by name; nothing is read into them.
+// Returns the flags of `telesplat run` by name; they set a struct that is not used.
 const options::Table& run_flags() {
   static RunOptions options;
   static const options::Table flags = table(options);
@@ -153,7 +153,7 @@ Result<double> check_run(const std::vector<std::string>& arguments) {
     if (std::find(given.begin(), given.end(), flag) != given.end())
       return Error{fmt::format("{}: is not for sweeps: {}", flag, why)};
   if (o.data.scene.empty()) return Error{"a scene is needed: telesplat sweep SCENE, or --vary scene=A,B"};
-  o.out = "run";  // it will have one
+  o.out = "run";  // settle() needs a folder
   if (const auto scene = settle(o, given); !scene) return scene.error();
   const auto& display = o.viewer.display;
   if (display.duration_s <= 0 && display.frames == 0) return Error{"--duration 0: such a run does not end by itself"};
@@ -214,7 +214,7 @@ std::vector<std::string> Sweep::command(const NextRun& run) const {
   std::string label = words(manifest_.grid, manifest_.configurations[run.configuration]);
   if (manifest_.grid.repeat > 1) label += fmt::format(", run {}", run.repetition);
   out.insert(out.end(), {"--label", std::move(label)});
-  // What lies there is of a run that did not end.
+  // The folder's content comes from a run that did not end.
   std::error_code error;
   if (fs::exists(folder(run), error)) out.emplace_back("--overwrite");
   return out;

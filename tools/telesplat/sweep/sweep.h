@@ -1,4 +1,4 @@
-// A sweep from start to end: what is to be run, the runs, what they leave.
+// Runs a sweep from start to end: its list of runs, the runs, their outcomes.
 #pragma once
 
 #include <cstdint>
@@ -13,34 +13,34 @@
 
 namespace telesplat::launcher {
 
-/// One run of a sweep: `telesplat run` as a child process, watched until it has ended.
+/// One run of a sweep: `telesplat run` as a child process, watched until it ends.
 struct RunRequest {
   std::string program;                 ///< telesplat
   std::vector<std::string> arguments;  ///< run, scene, flags, --out
-  std::string log;                     ///< file that what it says on stderr is appended to
-  double limit_s = 0;                  ///< it is ended when it takes longer, and has failed; 0: no limit
+  std::string log;                     ///< file that its stderr is appended to
+  double limit_s = 0;                  ///< a run that takes longer is ended, and has failed; 0: no limit
 };
 
 struct RunEnd {
   int exit_code = 0;         ///< or 128 + signal
-  std::string reason;        ///< empty: it is done
-  bool interrupted = false;  ///< this process was told to stop meanwhile
+  std::string reason;        ///< why it failed; empty: it is done
+  bool interrupted = false;  ///< a signal came to this process meanwhile
   double wall_s = 0;
 };
 
-/// Runs it to its end. watch(seconds since its start) is called every 50 ms. If this process is told to stop, the run
-/// is told once (it ends in order), and again if that is repeated; the third time it is killed.
+/// Runs it to its end. Calls watch(seconds since its start) every 50 ms. Passes signals to this process on: the first
+/// one lets the run end in order, the second one again, the third one kills it.
 RunEnd carry_out(const RunRequest& request, const std::function<void(double)>& watch);
 
 inline constexpr uintmax_t kMostLastWords = 1 << 20;
-/// What was written to a file behind its first `offset` bytes, the last kMostLastWords bytes of it.
+/// Returns what a file has behind its first `offset` bytes, the last kMostLastWords bytes of it.
 std::string last_words(const std::string& path, uintmax_t offset);
 
-/// What a run said last that it complained about: the last line that begins "telesplat: ", else the last one; without
-/// control characters, 300 bytes at most.
+/// Returns a run's last complaint: the last line that begins "telesplat: ", else the last line; without control
+/// characters, 300 bytes at most.
 std::string complaint_in(const std::string& log);
 
-/// A run that is to be carried out.
+/// A run that is still to be carried out.
 struct NextRun {
   size_t configuration;
   int repetition;
@@ -48,20 +48,20 @@ struct NextRun {
 
 class Sweep {
  public:
-  /// directory: of the sweep; it exists, and nobody else writes into it. program: telesplat. limit_s: as RunRequest has
-  /// it; 0: ten times the time that a run lasts, and ten minutes.
+  /// directory: the sweep's; it exists, and no other process writes into it. program: telesplat. limit_s: that of
+  /// RunRequest; 0: ten times a run's length, and ten minutes.
   Sweep(Manifest manifest, std::string directory, std::string program, double limit_s);
 
-  /// Asks of every configuration what `telesplat run` would refuse. Error: the first refusal, and of which one.
+  /// Checks every configuration as `telesplat run` would. Error: the first refusal, and its configuration.
   Status check();
-  /// Runs that are not done, in the order in which they will be carried out. One that failed is among them.
+  /// Returns the runs that are not done, failed ones too, in their order.
   std::vector<NextRun> to_do() const;
-  /// The command line of a run.
+  /// Returns the command line of a run.
   std::vector<std::string> command(const NextRun& run) const;
 
   enum class End { kDone, kInterrupted };
-  /// Carries all of them out. Each is tried twice; one that fails twice is noted as failed, and the sweep goes on. The
-  /// manifest is written after each. Error: the folder cannot be written to.
+  /// Carries all of them out. Tries each twice; a run that fails twice is noted as failed, and the sweep goes on.
+  /// Writes the manifest after each. Error: the folder cannot be written to.
   Result<End> carry_out(tools::ProgressLine& progress);
 
   const Manifest& manifest() const { return manifest_; }
@@ -75,17 +75,17 @@ class Sweep {
   Manifest manifest_;
   std::string directory_, program_;
   double limit_s_;
-  std::vector<double> lasts_s_;  // a configuration's runs, as they are asked for; 0: not known
+  std::vector<double> lasts_s_;  // length of a configuration's runs, by their flags; 0: unknown
 };
 
-/// What this run took part in: median of those of its configuration that are done, else of all that are done, else what
-/// it is asked to last and what starting takes; seconds.
+/// Returns the expected time of a run, in seconds: the median of the configuration's completed runs, else of all
+/// completed runs, else its length by its flags and the time of starting.
 double expected_wall_s(const Manifest& manifest, size_t configuration, double lasts_s);
 
-/// arguments: the words behind `telesplat run`. Looks at flags, values and the scene as the command itself does, and
-/// starts nothing. Returns how long the run will last, in seconds; 0: not known, it ends after a number of frames.
-/// Error: what `telesplat run` would refuse; that the run would not end; that --out, --overwrite, --master or --movie
-/// is given, which are the sweep's business or would not be of one run.
+/// arguments: the words behind `telesplat run`. Checks flags, values and the scene as the command itself does, and
+/// starts nothing. Returns the run's length, in seconds; 0: unknown, it ends after a number of frames. Error:
+/// `telesplat run` would refuse it; the run would not end; or --out, --overwrite, --master or --movie is given, which
+/// the sweep sets itself or which do not fit a single run.
 Result<double> check_run(const std::vector<std::string>& arguments);
 
 }  // namespace telesplat::launcher

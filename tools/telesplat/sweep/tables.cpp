@@ -25,7 +25,7 @@ std::string csv_field(const std::string& text) {
   return out + "\"";
 }
 
-// Of all runs, in the order in which summaries have them: what a run has more goes behind what precedes it there.
+// Merges the names of all runs in the order of their summaries: a new name follows the one before it there.
 std::vector<std::string> figure_names(const SweepRecord& record) {
   std::vector<std::string> out;
   std::set<std::string> known;
@@ -42,7 +42,7 @@ std::vector<std::string> figure_names(const SweepRecord& record) {
 
 std::string state_of(const SweptRun& run) { return !run.outcome ? "open" : run.outcome->done ? "done" : "failed"; }
 
-// The figures of its configuration that are too noisy, with blanks between.
+// Returns a configuration's figures that are too noisy, with blanks between.
 std::string noisy_figures(const std::vector<Noise>& all, size_t configuration) {
   std::string out;
   for (const Noise& n : all)

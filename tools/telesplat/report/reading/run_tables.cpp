@@ -16,7 +16,7 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr size_t kLongestText = 200, kLongestRow = size_t{64} << 10;
-constexpr double kMost = 1e12;  // beyond it nothing was measured: no moment, size or number that a run can have
+constexpr double kMost = 1e12;  // a larger value is damage: no moment, size or number of a run is beyond it
 
 double loose_number(const std::string& text) {
   double value = 0;
@@ -54,7 +54,7 @@ const Names kUpdateNumbers{"request",     "requested_s", "complete_s",  "latency
 const Names kTileNumbers{"frame", "samples", "kept", "bytes_sent", "encode_end_s", "packed_s", "published_s"};
 const Names kQualityNumbers{"frame", "t_s", "psnr_db", "ssim", "flip", "hole_fraction", "object_pixels"};
 
-// lacks: what the page has not without it.
+// lacks: the page's part that needs the table.
 std::optional<LooseTable> read(const std::string& directory, const char* name, const char* lacks, const Names& numbers,
                                const Names& texts, std::vector<std::string>& notes) {
   std::error_code error;
@@ -84,7 +84,7 @@ Names stage_numbers() {
   return out;
 }
 
-// Where rows of earlier versions have no begin_s, times count from the first frame of each viewer.
+// Rows of earlier versions have no begin_s: their times count from the first frame of each viewer.
 void place_frames(RunTables& t) {
   const auto& begin = t.frames->has("begin_s") ? t.frames->numbers("begin_s") : t.frames->numbers("t_s");
   if (!t.frames->has("begin_s"))
@@ -107,7 +107,7 @@ void leave_out_beginning(RunTables& t, double skip_s) {
   t.frame_s.clear();
 }
 
-// Without frames the others tell when things began.
+// Without frames, the other tables give the run's begin and end.
 void place_without_frames(RunTables& t) {
   double first = INFINITY, last = -INFINITY;
   const auto look = [&](const std::optional<LooseTable>& table, const char* column) {
@@ -144,7 +144,7 @@ Result<LooseTable> LooseTable::read(const std::string& path, const std::vector<s
   for (size_t row = 0; row < out.rows_; ++row) {
     const auto fields = table->fields(row);
     for (const auto& [at, column] : number_columns) (*column)[row] = loose_number(fields[at]);
-    // Cut before it is made valid: a character that is cut in two becomes one sign.
+    // Cut first, then made valid: a character that is cut in two becomes one sign.
     for (const auto& [at, column] : text_columns) (*column)[row] = to_utf8(fields[at].substr(0, kLongestText));
   }
   return out;

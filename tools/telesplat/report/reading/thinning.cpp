@@ -16,8 +16,8 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kBinsPerOctave = 16;
-constexpr double kLeastBinned = 1.0 / 64;  // ms; what is less is in the bin of this
-constexpr double kSlack = 1.05;            // of a display's period
+constexpr double kLeastBinned = 1.0 / 64;  // ms; lower values count in its bin
+constexpr double kSlack = 1.05;            // times a display's period
 constexpr int kQuantiles = 400;
 
 // Value at a share of the way through sorted values, linear between neighbours.
@@ -35,7 +35,7 @@ ordered_json bins_of(const std::vector<double>& values) {
   return out;
 }
 
-// Evenly spaced, and finer where the slowest are.
+// Evenly spaced, and closer at the slowest values.
 ordered_json quantiles_of(const std::vector<double>& sorted) {
   std::vector<double> shares;
   for (int i = 0; i <= kQuantiles; ++i) shares.push_back(double(i) / kQuantiles);
@@ -83,7 +83,7 @@ Series thinned(const Series& series, size_t buckets) {
 double rounded(double value, int digits) {
   if (!std::isfinite(value) || value == 0) return value;
   const double scale = std::pow(10.0, digits - 1 - int(std::floor(std::log10(std::abs(value)))));
-  // Through text where the scale would lose bits: what is written must be short.
+  // Goes through text if the scale would lose bits: numbers must be short when written.
   if (!std::isfinite(scale) || scale == 0) return value;
   const double near = std::round(value * scale);
   return scale >= 1 ? near / scale : near * std::round(1 / scale);
@@ -119,7 +119,7 @@ Series rate(const std::vector<double>& t_s, const std::vector<double>& amounts, 
   }
   for (size_t k = 0; k < bins; ++k) {
     const double from = begin_s + double(k) * bin_s, to = std::min(from + bin_s, end_s);
-    // A rest that is next to nothing would tell a rate of chance.
+    // A very short last part would have a rate by chance.
     if (to - from < bin_s / 10 && k > 0) continue;
     out.add((from + to) / 2, sums[k] / (to - from));
   }

@@ -11,9 +11,9 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr double kMasterSilence_s = 3;  // of a master that is asked twice a second
+constexpr double kMasterSilence_s = 3;  // a master that is asked twice a second is silent after this
 
-// A session calls a data set by its file's name, with its ending or without.
+// A session's name for a data set is its file's name, with its ending or without.
 bool is_called(const std::string& shown, const std::string& named) {
   const std::string file = std::filesystem::path(named).filename();
   return named == shown || file == shown || file.starts_with(shown + ".");

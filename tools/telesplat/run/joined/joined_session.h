@@ -1,4 +1,4 @@
-// Tells a person who joins a session what it lacks, and that it shows another data set than the one that was named.
+// Prints for a person who joins a session what it lacks, and that it shows another data set than the one named.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -12,11 +12,11 @@ namespace telesplat::launcher {
 
 class JoinedSession {
  public:
-  /// named: the data set of the command line; empty: none.
+  /// named: the data set of the command line; may be empty.
   JoinedSession(std::string master, std::string named);
 
-  /// status: an answer of the master that has just come, or null. nobody_there: nothing takes connections at its
-  /// address. refusal: why it does not take this person in; empty: it did not refuse. Returns the lines that are due.
+  /// status: the master's newest answer, or null. nobody_there: no process accepts connections at its address. refusal:
+  /// its reason for refusing this person; empty: it did not refuse. Returns the lines that are due.
   std::vector<std::string> look(const nlohmann::json* status, bool nobody_there, const std::string& refusal,
                                 double now_s);
 
@@ -24,7 +24,7 @@ class JoinedSession {
   std::string awaited(bool nobody_there, const std::string& refusal, double now_s);
 
   const std::string master_;
-  std::string named_;  // until it is compared with what is shown
+  std::string named_;  // reset once it is compared with the shown one
   std::string lacks_;
   std::optional<double> heard_s_;
   net::Waiting waiting_;
