@@ -1,7 +1,7 @@
 // The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), and dense tiles
-// (dense/): depth first (depth), normals by what depth says of them (normals, guided), colours by a palette or by
-// channels (colours); residuals -> tokens by context -> words (symbols, tables, rans). Where few pixels are
-// covered: prediction from coarse to fine (scatter), residuals -> bits by how far they spread (scatter_coder, spread).
+// (dense/): depth first (depth), normals predicted from depth (normals, guided), colours by a palette or by channels
+// (colours); residuals -> tokens by context -> words (symbols, tables, rans). For tiles with few covered pixels:
+// prediction from coarse to fine (scatter), residuals -> bits by their expected spread (scatter_coder, spread).
 #include "common/codec/depth_codec.h"
 
 #include <fmt/format.h>
@@ -19,8 +19,8 @@ using detail::Reader;
 using detail::TileGrid;
 using image::DepthImage;
 
-// stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
-// after them. bounds = varint depth, u8 normal, u8 colour. flags: bounds follow; there is one tile, a sparse one.
+// stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h), and no
+// more bytes. bounds = varint depth, u8 normal, u8 colour. flags: bounds follow; the image is one sparse tile.
 constexpr uint8_t kMagic = 0xD7, kVersion = 12, kBounded = 1, kOneTile = 2, kKnownFlags = kBounded | kOneTile;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
@@ -36,7 +36,7 @@ struct Header {
   ErrorBounds bounds;
 };
 
-// Nothing where they are not what encode() writes.
+// Nothing: encode() does not write such bounds.
 std::optional<ErrorBounds> read_bounds(Reader& in) {
   const auto depth = in.varint();
   const auto normal = in.u8(), colour = in.u8();
@@ -46,8 +46,8 @@ std::optional<ErrorBounds> read_bounds(Reader& in) {
   return known && (*depth == 0 || *depth >= ErrorBounds::kLeastDepth) ? std::optional(bounds) : std::nullopt;
 }
 
-// Refuses sizes that the rest of the stream cannot hold: every tile, of at most kMaxTilePixels pixels, takes a byte or
-// more.
+// Refuses sizes that the rest of the stream cannot hold: every tile, of at most kMaxTilePixels pixels, takes at least a
+// byte.
 Result<Header> read_header(Reader& in) {
   const auto magic = in.u8(), version = in.u8();
   if (!version) return damaged("shorter than its header");
@@ -74,14 +74,14 @@ Result<Header> read_header(Reader& in) {
   return header;
 }
 
-// Axes that count columns and rows from (x, y).
+// Axes for columns and rows that are counted from (x, y).
 RoomAxes moved(const RoomAxes& axes, int x, int y) {
   RoomAxes out = axes;
   for (auto& axis : out) axis[2] += axis[0] * x + axis[1] * y;
   return out;
 }
 
-// f(column, row) -> bool for every tile in order, until one is false.
+// Calls f(column, row) -> bool for every tile in order, until one returns false.
 template <class F>
 bool for_each_tile(const TileGrid& grid, F f) {
   for (int row = 0; row < grid.rows; ++row)
@@ -131,7 +131,7 @@ std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& bounds, 
 
 std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& bounds, DepthImage* decoded,
                             const RoomAxes& axes) {
-  constexpr double kMost = 1e30;  // beyond, and what is no number, says nothing
+  constexpr double kMost = 1e30;  // larger axes, and those that are not numbers, are ignored
   bool known = true;
   for (const auto& axis : axes)
     for (const double v : axis) known &= std::abs(v) < kMost;

@@ -11,9 +11,9 @@ namespace {
 // A block is varint(size << 2 | kind) and then `size` bytes.
 enum BlockKind : uint32_t { kConstant = 0, kStored = 1, kCoded = 2 };
 
-constexpr size_t kTooShort = 4;  // bytes
+constexpr size_t kTooShort = 4;  // bytes: shorter data are not coded
 
-// The bits of a byte, from the highest, by those above and by what the byte before was.
+// Models the bits of a byte, from the highest, by the higher bits and by the kind of the byte before.
 class ByteModel {
  public:
   std::array<AdaptiveBit, 256>& bits() { return bits_[before_]; }

@@ -1,4 +1,4 @@
-// What masks and sparse tiles are made of: fields, raw bits, and bytes coded by how often their bits came before.
+// Building blocks of masks and sparse tiles: fields, raw bits, and bytes coded by adaptive frequencies of their bits.
 #pragma once
 
 #include <bit>
@@ -11,7 +11,7 @@
 
 namespace telesplat::codec::detail {
 
-/// Reads fields and sub-spans, never past the end; once something is missing every later read fails too.
+/// Reads fields and sub-spans, never past the end; after the first that is missing, every read fails.
 class Reader {
  public:
   explicit Reader(std::span<const uint8_t> bytes) : rest_(bytes) {}
@@ -27,17 +27,16 @@ class Reader {
 
 void put_varint(std::vector<uint8_t>& out, uint32_t value);
 
-/// Appends `raw` as one self-delimiting block: constant, stored or coded by adaptive bits, whichever is shorter.
+/// Appends `raw` as one self-delimiting block: constant, stored or coded by adaptive bits, the shortest of the three.
 void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 /// Appends `raw` as a stored block: for bits known to be random.
 void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 
-/// Fills all of `raw` from the block at the reader's place; false where the block is damaged or holds another number of
-/// bytes.
+/// Fills all of `raw` from the next block. False: the block is damaged or holds another number of bytes.
 [[nodiscard]] bool get_block(Reader& in, std::span<uint8_t> raw);
-/// The content of a stored block, in place; nothing where the block is damaged or of another kind.
+/// The content of a stored block, in place; nothing if the block is damaged or of another kind.
 std::optional<std::span<const uint8_t>> get_stored_block(Reader& in);
-/// Passes over any block; false where it is cut off.
+/// Passes over any block. False: it is cut off.
 [[nodiscard]] bool skip_block(Reader& in);
 
 /// Packs numbers, least significant bit first, into a buffer that must have 16 bytes to spare. Loops copy it into a
@@ -61,7 +60,7 @@ struct BitSink {
 /// A BitSink and its buffer.
 class BitWriter {
  public:
-  /// Forgets what was written; until the next call at most `max_bits` bits follow.
+  /// Discards earlier bits; until the next call at most `max_bits` bits may follow.
   void start(size_t max_bits) {
     if (buffer_.size() < max_bits / 8 + 16) buffer_.resize(max_bits / 8 + 16);
     sink = {buffer_.data()};
@@ -89,7 +88,7 @@ struct BitSource {
     position += count;
     return static_cast<uint32_t>(word & ((uint64_t{1} << count) - 1));
   }
-  /// How many of the next bits are ones, up to 57; takes none.
+  /// The number of ones at the front of the next bits, up to 57; takes none of them.
   unsigned ones() const {
     uint64_t word;
     std::memcpy(&word, data + (position >> 3), 8);
@@ -97,7 +96,7 @@ struct BitSource {
   }
 };
 
-/// A BitSource and its buffer. Reading past the end gives zeros for a while, and is found by overrun().
+/// A BitSource and its buffer. Reading past the end gives zeros for a while; overrun() reports it.
 class BitReader {
  public:
   /// Copies `bytes`. Between two calls of overrun() at most `max_bits_unchecked` bits may be taken.
@@ -110,7 +109,7 @@ class BitReader {
     end_ = bytes.size() * 8;
   }
   [[nodiscard]] bool overrun() const { return source.position > end_; }
-  /// True when all bits but the padding of the last byte were taken.
+  /// True if all bits except the padding of the last byte were taken.
   [[nodiscard]] bool finished() const { return source.position <= end_ && end_ - source.position < 8; }
 
   BitSource source;

@@ -17,11 +17,11 @@ constexpr double kDepthOne = 4294967296.0;  // 2^32
 
 double angle_deg(uint16_t a, uint16_t b) {
   const glm::dvec3 u(image::octahedral16(a)), v(image::octahedral16(b));
-  // Not by the cosine, which says little of small angles.
+  // Not by the cosine, which is imprecise for small angles.
   return std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v)) * 180 / std::numbers::pi;
 }
 
-// Turning the octahedron changes no angle, so that one pole stands for all.
+// Turning the octahedron changes no angle, so that one pole represents all.
 double largest_angle_deg(int codes) {
   const detail::NormalLattice lattice(codes);
   double most = 0;
@@ -37,7 +37,7 @@ double largest_angle_deg(int codes) {
 ErrorBounds error_bounds(double depth_pixels, double pixel_tangent, int normal, int colour) {
   ErrorBounds out;
   const double share = depth_pixels * pixel_tangent * kDepthOne;
-  if (share >= ErrorBounds::kLeastDepth)  // false where it is no number
+  if (share >= ErrorBounds::kLeastDepth)  // false if it is NaN
     out.depth = static_cast<uint32_t>(std::min<double>(share, ErrorBounds::kMostDepth));
   out.normal = std::clamp(normal, 0, ErrorBounds::kMostNormal);
   out.colour = std::clamp(colour, 0, ErrorBounds::kMostColour);

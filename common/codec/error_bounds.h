@@ -1,17 +1,17 @@
-// How far a decoded depth image may be from the encoded one.
+// Bounds of the difference between a decoded depth image and the encoded one.
 #pragma once
 
 #include <cstdint>
 
 namespace telesplat::codec {
 
-/// Bounds that hold in every covered pixel. Which pixels are covered is always exact.
+/// Bounds that hold in every covered pixel. The set of covered pixels is always exact.
 struct ErrorBounds {
   /// In 2^-32: |code - decoded code| <= depth / 2^32 * decoded code. A depth in metres is the reciprocal of its code,
-  /// so that it is wrong by at most that share of itself. 0 is exact, and less than kLeastDepth is taken for 0.
+  /// so its relative error has the same bound. 0 is exact; less than kLeastDepth counts as 0.
   uint32_t depth = 0;
-  int normal = 0;  ///< codes of each coordinate on the octahedron's map, turned as suits a tile; 0..kMostNormal
-  int colour = 0;  ///< of each channel; 0..kMostColour
+  int normal = 0;  ///< codes of each coordinate on the octahedron's map, turned by the tile's pole; 0..kMostNormal
+  int colour = 0;  ///< steps of 255 of each channel; 0..kMostColour
 
   static constexpr uint32_t kLeastDepth = 1u << 14;  ///< a 262144th: below it nearly all codes would be exact
   static constexpr uint32_t kMostDepth = 1u << 28;   ///< a sixteenth
@@ -21,14 +21,14 @@ struct ErrorBounds {
   bool operator==(const ErrorBounds&) const = default;
 };
 
-/// Bounds of `depth_pixels` of a pixel's footprint: a pixel at depth z covers z * pixel_tangent, so that the share of a
-/// depth is their product, rounded down. pixel_tangent: (right - left) / width of the frustum at distance 1, or
-/// (top - bottom) / height where that is smaller. All are cut to what ErrorBounds may have; less than kLeastDepth, and
-/// what is no number, to 0.
+/// Bounds of `depth_pixels` of a pixel's footprint: a pixel at depth z covers z * pixel_tangent, so the bound of a
+/// depth is their product, rounded down. pixel_tangent: the smaller of (right - left) / width of the frustum at
+/// distance 1 and (top - bottom) / height. Values are cut to the limits of ErrorBounds; less than kLeastDepth, and NaN,
+/// becomes 0.
 ErrorBounds error_bounds(double depth_pixels, double pixel_tangent, int normal, int colour);
 
-/// The largest angle in degrees between a normal and what is decoded of it, over all of them. Precondition: 0 <= codes
-/// <= ErrorBounds::kMostNormal. Thread-safe.
+/// The largest angle in degrees between a normal and its decoded one, over all normals. Precondition: 0 <= codes <=
+/// ErrorBounds::kMostNormal. Thread-safe.
 double normal_error_degrees(int codes);
 
 }  // namespace telesplat::codec

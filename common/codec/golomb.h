@@ -1,8 +1,8 @@
-// Residuals as bits whose number follows the residuals before: Golomb's codes (S. Golomb, 1966) with a parameter that
-// adapts as in LOCO-I (M. Weinberger et al., 2000), and Elias' gamma code for what is much larger than the rest.
-//   z = zigzag-folded residual, q = z >> k.  q = 0, 1: as many ones, a zero.  q >= 2: 2 + e ones, a zero, and the lower
-//   e bits of q - 1, e of which are below its highest.  Then the lower k bits of z.
-// No tables, so that the headers of dense tiles, which are short, have nothing to learn first.
+// Residuals as bits whose number adapts to earlier residuals: Golomb's codes (S. Golomb, 1966) with a parameter that
+// adapts as in LOCO-I (M. Weinberger et al., 2000), and Elias' gamma code for much larger residuals.
+//   z = zigzag-folded residual, q = z >> k.  q = 0, 1: q ones, a zero.  q >= 2: 2 + e ones, a zero, and the e bits
+//   of q - 1 below its highest.  Then the lower k bits of z.
+// Needs no tables, so that the headers of dense tiles, which are short, need not learn any first.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@
 
 namespace telesplat::codec::detail {
 
-/// The mean of the residuals of one context.
+/// The mean size of the residuals of one context.
 class GolombContext {
  public:
-  static constexpr unsigned kMostBits = 27 + 24;  ///< of a residual below 2^24, and of any that get() takes
-  /// expected: of the first residual.
+  static constexpr unsigned kMostBits = 27 + 24;  ///< bits of a residual below 2^24, and of any that get() takes
+  /// expected: size of the first residual.
   void start(uint32_t expected) { mean_ = std::min(expected, kMostLearned) << 8, seen_ = 0; }
 
   void put(int residual, BitSink& bits) {
@@ -31,10 +31,10 @@ class GolombContext {
     bits.put(((uint64_t{1} << ones) - 1) | rest << (ones + 1), ones + 1 + e + k);
     learn(z);
   }
-  /// Any bits give some residual, below 2^25 in size.
+  /// Any bits give some residual of size below 2^25.
   int get(BitSource& bits) {
     const unsigned k = parameter();
-    const unsigned ones = std::min(bits.ones(), 2 + kMostFoldedBits - 1 - k);  // of what put() writes
+    const unsigned ones = std::min(bits.ones(), 2 + kMostFoldedBits - 1 - k);  // most ones that put() writes
     bits.position += ones + 1;
     const unsigned e = ones < 2 ? 0 : ones - 2;
     const uint32_t rest = bits.take(e + k);
@@ -59,7 +59,7 @@ class GolombContext {
     seen_ += seen_ < 7;
   }
 
-  uint32_t mean_ = 0, seen_ = 0;  // 256ths
+  uint32_t mean_ = 0, seen_ = 0;  // in 256ths
 };
 
 }  // namespace telesplat::codec::detail

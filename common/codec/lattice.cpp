@@ -5,7 +5,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr size_t kKept = 2;  // lattices of a thread; of the smallest bound one takes 8 MiB
+constexpr size_t kKept = 2;  // lattices a thread keeps; that of the smallest bound takes 8 MiB
 
 }  // namespace
 

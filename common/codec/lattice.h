@@ -1,5 +1,5 @@
-// What bounds of error leave of depths, normals and colours: the values that a decoder can give. Integers alone, the
-// same on every machine.
+// The depths, normals and colours that a decoder can return within bounds of error. Integers alone, the same on every
+// machine.
 #pragma once
 
 #include <algorithm>
@@ -14,15 +14,15 @@
 
 namespace telesplat::codec::detail {
 
-/// Depth codes that stand for those around them, in equal steps of their logarithm. Code m stands for those that are at
-/// most reach(m) = floor(m * depth / 2^32) away. If a is the first code of an interval, m is the largest one with
-/// m - reach(m) <= a, which is floor(a * 2^32 / (2^32 - depth)); the next interval begins behind m + reach(m). Code 0
-/// is an interval of its own; where codes are small, all are.
+/// Depth codes that represent those around them, in equal steps of their logarithm. Code m represents codes at most
+/// reach(m) = floor(m * depth / 2^32) away. If a is the first code of an interval, m is the largest one with m -
+/// reach(m) <= a, which is floor(a * 2^32 / (2^32 - depth)); the next interval begins after m + reach(m). Code 0 is an
+/// interval of its own; so is each small code.
 class DepthLattice {
  public:
   /// ErrorBounds::kLeastDepth <= depth <= kMostDepth. Up to 1.2 million codes, fewer for larger bounds.
   explicit DepthLattice(uint32_t depth);
-  /// The same, made once for several images: each thread keeps its last two.
+  /// The same lattice, shared by several images: each thread keeps its last two.
   static std::shared_ptr<const DepthLattice> of(uint32_t depth);
 
   uint32_t depth() const { return depth_; }
@@ -35,7 +35,7 @@ class DepthLattice {
   uint32_t index(uint32_t code) const {
     const Line& line = lines_[place(code)];
     const uint32_t* end = ends_.data() + line.index + (uint64_t{code - line.code} * line.slope >> 32);
-    end += *end < code;  // the line lies below, by less than 2 nearly always: two steps without branches
+    end += *end < code;  // the line lies below, nearly always by less than 2: two steps without branches
     end += *end < code;
     while (*end < code) ++end;
     while (end != ends_.data() && end[-1] >= code) --end;
@@ -43,9 +43,9 @@ class DepthLattice {
   }
 
  private:
-  // Between two codes that have the upper bits of their logarithms in common, indices lie on a line, nearly.
+  // Indices of codes whose logarithms have the upper bits in common lie nearly on a line.
   struct Line {
-    uint32_t code = 0, index = 0;  // of its first
+    uint32_t code = 0, index = 0;  // the line's first point
     uint32_t slope = 0;            // in 2^-32 indices a code
   };
   static constexpr unsigned kFraction = 7;  // bits
@@ -54,11 +54,11 @@ class DepthLattice {
   }
 
   uint32_t depth_;
-  std::vector<uint32_t> codes_, ends_;  // of each interval: what stands for it, and the last code
+  std::vector<uint32_t> codes_, ends_;  // for each interval: the code that represents it, and its last code
   std::vector<Line> lines_;
 };
 
-/// Bounds of error as the coders of tiles take them.
+/// Bounds of error in the form that the coders of tiles take.
 struct TileBounds {
   explicit TileBounds(const ErrorBounds& bounds)
       : kept(bounds.depth != 0 ? DepthLattice::of(bounds.depth) : nullptr),
@@ -70,7 +70,7 @@ struct TileBounds {
   int normal, colour;
 };
 
-/// Coordinates on a normal's map, 0 to 254, in steps of 2 * reach + 1 around its centre: none of them on the map's rim,
+/// Coordinates on a normal's map, 0 to 254, in steps of 2 * reach + 1 around its centre: all inside the map's rim,
 /// unless reach is 0. 0 <= reach <= 3.
 class NormalLattice {
  public:
@@ -85,20 +85,20 @@ class NormalLattice {
   int nearest(int v) const { return value(index(v)); }
   /// 64ths of a coordinate, 0 to 254 * 64 -> 64ths of a step.
   int16_t index64(int v) const { return static_cast<int16_t>(divided(v + offset64())); }
-  /// The same for many: max(v + offset64(), 0) * share() >> kShare.
+  /// index64() of many numbers is max(v + offset64(), 0) * share() >> kShare.
   int offset64() const { return 64 * half_ * step_ + step_ / 2 - 64 * 127; }
   uint32_t share() const { return share_; }
   static constexpr int kShare = 18;
 
  private:
-  // By the step, rounded down, not below 0. As a product: exact for what coordinates can be.
+  // Divides by the step, rounds down, and returns at least 0. A multiplication: exact for all coordinates.
   int divided(int v) const { return static_cast<int>(static_cast<uint32_t>(std::max(v, 0)) * share_ >> kShare); }
 
   int step_, half_;
   uint32_t share_;
 };
 
-/// Values of a channel in steps of 2 * reach + 1, from 0; above the last one 255.
+/// Values of a channel in steps of 2 * reach + 1, from 0; the last one is 255.
 class ColourLattice {
  public:
   explicit ColourLattice(int reach) : reach_(reach), step_(2 * reach + 1) {}

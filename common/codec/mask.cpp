@@ -15,7 +15,7 @@ constexpr uint32_t kPeriodic = 1;
 
 size_t bytes_per_row(const Mask& mask) { return (static_cast<size_t>(mask.width()) + 7) / 8; }
 
-// Groups of eight pixels of a row: whether any is covered, whether all are, and else which.
+// Codes groups of eight pixels of a row: is any covered, are all, and if neither, which.
 class GroupModel {
  public:
   // Puts a mask by coder(bit, model), or gets it into an empty one.
@@ -34,7 +34,7 @@ class GroupModel {
         const int pixels = group + 1 == groups ? last : 8;
         const uint32_t all = (1u << pixels) - 1;
         uint32_t here = byte(row, group), up_left = 0, up = 0, up_right = 0;
-        // The rows' groups that are known: of those beside the mask no pixel is covered.
+        // The known groups around it; pixels outside the mask count as not covered.
         if (!quiet) {
           up_left = group == 0 ? 0 : byte(above, group - 1), up = byte(above, group);
           up_right = group + 1 == groups ? 0 : byte(above, group + 1);
@@ -64,12 +64,12 @@ class GroupModel {
   static uint32_t byte(const uint64_t* row, size_t group) {
     return static_cast<uint32_t>(row[group / 8] >> group % 8 * 8) & 255;
   }
-  // left: the group to the left; above: the pixels above, from that above the one to the left of the first.
+  // left: the group to the left; above: the pixels above, from the one above left of the first.
   template <class Coder>
   uint32_t some(const Coder& coder, uint32_t wanted, int pixels, uint32_t left, uint32_t above) {
     uint32_t row = left >> 6, found = 0;  // the two pixels to the left; those of this group
     for (int i = 0; i < pixels; ++i) {
-      uint32_t bit = 1;  // of the last one, if no other is
+      uint32_t bit = 1;  // a single covered pixel in the last place needs no bit
       if (found != 0 || i + 1 < pixels)
         bit =
             coder(wanted >> i & 1, pixel_[found != 0 ? 8 : static_cast<size_t>(i)][(row & 3) | (above >> i & 7) << 2]);
@@ -104,7 +104,7 @@ void put_plain(std::vector<uint8_t>& out, const Mask& mask) {
   out.insert(out.end(), s.packed.begin(), s.packed.end());
 }
 
-// Into an empty mask.
+// Gets a mask into an empty one.
 bool get_plain(Reader& in, Mask& mask) {
   const auto head = in.varint();
   const auto bytes = head && *head % 2 == 0 ? in.bytes(*head / 2) : std::nullopt;
@@ -115,7 +115,7 @@ bool get_plain(Reader& in, Mask& mask) {
   return coder.finished();
 }
 
-// Calls f(y, word index, pattern's bits inside of the mask) for all words of the mask that the pattern has bits in.
+// Calls f(y, word index, the pattern's bits within the mask) for all words of the mask in which the pattern has bits.
 template <class F>
 void for_each_repeat(const Mask& mask, const Mask& pattern, F f) {
   const size_t words = mask.words_per_row(), last = static_cast<size_t>(mask.width()) % 64;
@@ -127,9 +127,9 @@ void for_each_repeat(const Mask& mask, const Mask& pattern, F f) {
     }
 }
 
-// What is covered in two periods or more, where few pixels are. Returns how many covered pixels it explains.
+// Finds pixels that are covered in two or more periods of sparse areas. Returns how many covered pixels they match.
 size_t find_pattern(const Mask& mask, Mask& pattern) {
-  constexpr int kFew = 12;  // of 64: more are no pattern, but a place where all pixels are covered
+  constexpr int kFew = 12;  // of 64: a fuller word is a covered area, not a pattern
   pattern.reset(kPeriod, kPeriod);
   uint64_t once[kPeriod] = {};
   for (int y = 0; y < mask.height(); ++y)
@@ -186,12 +186,12 @@ void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
   const size_t covered = mask.count();
   const bool repeats = covered >= 64 && (mask.width() > kPeriod || mask.height() > kPeriod);
   const size_t explained = repeats ? find_pattern(mask, s.pattern) : 0;
-  constexpr size_t kMostOfPattern = kPeriod * kPeriod / 6;  // what is denser repeats by chance
+  constexpr size_t kMostOfPattern = kPeriod * kPeriod / 6;  // a denser pattern repeats by chance
   if (explained * 3 < covered || explained == 0 || s.pattern.count() > kMostOfPattern) return put_plain(out, mask);
   s.periodic.clear();
   put_periodic(s.periodic, mask, s);
   const size_t begin = out.size();
-  if (explained * 10 < covered * 8) {  // not clear: the shorter one
+  if (explained * 10 < covered * 8) {  // not clear: takes the shorter one
     put_plain(out, mask);
     if (out.size() - begin <= s.periodic.size()) return;
     out.resize(begin);

@@ -13,11 +13,11 @@ namespace telesplat::codec::detail {
 using image::for_each_set;
 using Mask = image::PixelMask;
 
-/// Sets bit x of `words` where depth[x] != 0. Bits at and beyond `count` of the last word become 0.
+/// Sets bit x of `words` if depth[x] != 0. Bits of the last word at and beyond `count` become 0.
 void covered_bits(const uint32_t* depth, size_t count, uint64_t* words);
 
 void put_mask(std::vector<uint8_t>& out, const Mask& mask);
-/// Fills a mask whose size was set by reset(); false where the stream is damaged.
+/// Fills a mask whose size reset() set. False: the stream is damaged.
 [[nodiscard]] bool get_mask(Reader& in, Mask& mask);
 
 }  // namespace telesplat::codec::detail

@@ -30,7 +30,7 @@ Result<image::PixelMask> decode_mask(std::span<const uint32_t> words, int width,
   check_size(width, height);
   detail::Reader in({reinterpret_cast<const uint8_t*>(words.data()), words.size_bytes()});
   image::PixelMask mask(width, height);
-  // What fills the last word is no part of the mask.
+  // Up to three bytes fill the last word.
   if (!detail::get_mask(in, mask) || in.left() > 3)
     return Error{
         fmt::format("the mask of a tile of {} x {} pixels: {} words are no mask", width, height, words.size())};

@@ -1,4 +1,4 @@
-// Masks as messages carry them: which rays of a tile are to be cast.
+// Masks in messages: the rays of a tile to cast.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ namespace telesplat::codec {
 
 /// A mask of 1..kMaxPixels pixels as whole 32-bit words, little-endian, without its size.
 std::vector<uint32_t> encode_mask(const image::PixelMask& mask);
-/// The mask of width x height pixels that encode_mask() made; other words give an error or some mask of that size.
-/// Precondition: 1..kMaxPixels pixels.
+/// Reads a mask of width x height pixels from the words of encode_mask(); other words give an error or some mask of
+/// that size. Precondition: 1..kMaxPixels pixels.
 Result<image::PixelMask> decode_mask(std::span<const uint32_t> words, int width, int height);
 
 }  // namespace telesplat::codec

@@ -1,4 +1,4 @@
-// Octahedral codes of normals with another axis of the lattice as the pole, so that the map's seam is far away.
+// Octahedral codes of normals, with an axis of the lattice chosen as pole so that the map's seam is far away.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace telesplat::codec::detail {
 
-/// Poles 0 to 5 turn the lattice: the axis pole / 2 becomes z, negated if the pole is odd. kRaw: codes are as they are.
+/// Poles 0 to 5 turn the lattice: the axis pole / 2 becomes z, negated if the pole is odd. kRaw leaves codes unchanged.
 inline constexpr int kPoles = 6, kRaw = 6;
 
 /// A point of the octahedron's lattice: |x| + |y| + |z| = 127.
@@ -28,8 +28,8 @@ constexpr uint16_t code_of(const LatticePoint& p) {
   return static_cast<uint16_t>((cx + 127) | (cy + 127) << 8);
 }
 
-/// A permutation of the canonical codes; the other codes of a direction become those of the canonical one. Poles are
-/// 2 * axis + (negated ? 1 : 0).
+/// A permutation of the canonical codes; other codes of a direction are treated as its canonical one. Poles are 2 *
+/// axis + (negated ? 1 : 0).
 constexpr uint16_t turn_normal(uint16_t code, int axis, bool negated) {
   if (axis == kRaw / 2) return code;
   const LatticePoint p = lattice_point(code);
@@ -61,7 +61,7 @@ constexpr uint16_t turn_back(uint16_t code, int axis, bool negated) {
 constexpr uint16_t turn_normal(uint16_t code, int pole) { return turn_normal(code, pole / 2, pole % 2 != 0); }
 constexpr uint16_t turn_back(uint16_t code, int pole) { return turn_back(code, pole / 2, pole % 2 != 0); }
 
-/// Finds the pole that is nearest to many normals.
+/// Finds the pole nearest to most normals.
 class PoleChoice {
  public:
   void add(uint16_t code) {

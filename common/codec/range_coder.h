@@ -1,4 +1,4 @@
-// Range coding (G. Martin, 1979) of bits, with carries as in I. Pavlov's LZMA, by how often each came where it may.
+// Range coding (G. Martin, 1979) of bits by adaptive frequencies, with carries as in I. Pavlov's LZMA.
 #pragma once
 
 #include <algorithm>
@@ -11,12 +11,12 @@
 
 namespace telesplat::codec::detail {
 
-/// How likely a bit is 0: the mean of what two rates of learning say, both faster at first.
+/// Probability that a bit is 0: the mean of two estimates that learn at different rates, both faster at first.
 class AdaptiveBit {
  public:
   uint32_t zero() const { return (uint32_t{fast_} + slow_) >> 5; }  ///< in 2^-12, 2 to 4093
   void learn(uint32_t bit) {
-    if (bit == 0 && fast_ == kMost && slow_ >= kSettled) return;  // one 0 more changes nothing
+    if (bit == 0 && fast_ == kMost && slow_ >= kSettled) return;  // another 0 would change nothing
     const int target = bit == 0 ? 65535 : 0;
     const auto towards = [&](uint16_t from, int most) {
       const int step = (target - from) * kShare[static_cast<size_t>(std::min(most, seen_ + 2))] >> 16;
@@ -28,7 +28,7 @@ class AdaptiveBit {
 
  private:
   static constexpr int kLongest = 128, kMost = 65503;
-  static constexpr int kSettled = 65536 - 65536 / 512;  // the slow rate's steps from here on round to 0
+  static constexpr int kSettled = 65536 - 65536 / 512;  // from here on the slow rate's steps round to 0
   static constexpr auto kShare = [] {                   // 2^16 / n
     std::array<int, kLongest + 1> out{};
     for (int n = 2; n <= kLongest; ++n) out[static_cast<size_t>(n)] = 65536 / n;
@@ -38,7 +38,7 @@ class AdaptiveBit {
   uint16_t fast_ = 1u << 15, slow_ = 1u << 15, seen_ = 0;
 };
 
-/// Appends to `out`, which must not change otherwise until finish().
+/// Appends to `out`. Until finish() the caller must not change `out`.
 class RangeEncoder {
  public:
   explicit RangeEncoder(std::vector<uint8_t>& out) : out_(&out), begin_(out.size()) {}
@@ -52,7 +52,7 @@ class RangeEncoder {
     model.learn(bit);
     while (range_ < 1u << 24) range_ <<= 8, shift();
   }
-  /// Bits that nothing is known of, the highest first.
+  /// Puts bits without a model, the highest first.
   void put_raw(uint32_t value, unsigned count) {
     while (count-- > 0) {
       range_ >>= 1;
@@ -60,13 +60,13 @@ class RangeEncoder {
       while (range_ < 1u << 24) range_ <<= 8, shift();
     }
   }
-  /// One of several places, which fill 2^16: it begins at `begin` and has `size`.
+  /// Puts one of several symbols that share [0, 2^16): its interval begins at `begin` and has `size`.
   void put_share(uint32_t begin, uint32_t size) {
     const uint32_t unit = range_ >> 16;
     low_ += uint64_t{unit} * begin, range_ = unit * size;
     while (range_ < 1u << 24) range_ <<= 8, shift();
   }
-  /// The fewest bytes that mean the same: zeros follow them.
+  /// Writes the fewest bytes with the same meaning; the decoder reads zeros after them.
   void finish() {
     for (int zeros = 32; zeros >= 0; --zeros) {
       const uint64_t unit = uint64_t{1} << zeros, number = (low_ + unit - 1) & ~(unit - 1);
@@ -100,7 +100,7 @@ class RangeEncoder {
   size_t held_ = 0;
 };
 
-/// Reads zeros past the end of its bytes, for ever: its callers bound the number of bits.
+/// Reads endless zeros past the end of its bytes: callers must bound the number of bits.
 class RangeDecoder {
  public:
   explicit RangeDecoder(std::span<const uint8_t> bytes = {}) : bytes_(bytes) {
@@ -129,14 +129,14 @@ class RangeDecoder {
     }
     return value;
   }
-  /// Below 2^16: in the place that put_share() was given, which take_share() must be told.
+  /// Returns a number below 2^16 in the interval that put_share() got; the caller passes that interval to take_share().
   uint32_t share() const { return std::min(code_ / (range_ >> 16), 65535u); }
   void take_share(uint32_t begin, uint32_t size) {
     const uint32_t unit = range_ >> 16;
     code_ -= unit * begin, range_ = unit * size;
     for (; range_ < 1u << 24; range_ <<= 8) code_ = code_ << 8 | next();
   }
-  /// All bytes were read.
+  /// True if all bytes were read.
   bool finished() const { return at_ == bytes_.size(); }
 
  private:
@@ -147,7 +147,7 @@ class RangeDecoder {
   uint32_t range_ = ~0u, code_ = 0;
 };
 
-/// What both directions of a code are written for: put or get a bit, and raw bits; each returns what it is.
+/// Common interface of both directions: puts or gets a bit, or raw bits; each call returns the value.
 struct BitCoder {
   RangeEncoder& coder;
   uint32_t operator()(uint32_t bit, AdaptiveBit& model) const { return coder.put(bit, model), bit; }
@@ -162,7 +162,7 @@ struct BitDecoder {
   RangeDecoder& coder;
   uint32_t operator()(uint32_t, AdaptiveBit& model) const { return coder.get(model); }
   uint32_t raw(uint32_t, unsigned count) const { return coder.get_raw(count); }
-  /// Shares: begin(place) of [0, 2^16) for 0 <= place <= places(), rising.
+  /// Shares: begin(place) in [0, 2^16] for 0 <= place <= places(), rising.
   template <class Shares>
   int place(int, const Shares& shares) const {
     const uint32_t share = coder.share();
@@ -176,11 +176,11 @@ struct BitDecoder {
   }
 };
 
-/// A signed number: how large it is by unary bits, its sign, the two bits below its highest one, and the rest as it is.
+/// A signed number: its size's length in unary bits, its sign, the two bits below the highest, then the rest raw.
 class SignedModel {
  public:
-  static constexpr unsigned kMostBits = 9;  ///< of its size
-  /// sign: 0 to 2, which of the models of signs.
+  static constexpr unsigned kMostBits = 9;  ///< bits of its size
+  /// sign: 0 to 2, index of the model for the sign.
   template <class Coder>
   int code(const Coder& coder, int value, size_t sign) {
     const unsigned size_is = value < 0 ? 0u - static_cast<unsigned>(value) : static_cast<unsigned>(value);

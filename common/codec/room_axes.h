@@ -1,4 +1,4 @@
-// Where an image's pixels look, for those who encode: normals follow from that and from depth, and colours of many data
+// Directions of an image's pixels, for encoders: normals follow from them and from depth, and colours of many data sets
 // follow a height in the room.
 #pragma once
 
@@ -9,12 +9,12 @@
 
 namespace telesplat::codec {
 
-/// axis . (x, y, 1), divided by a pixel's depth code, is that coordinate of what it shows, from the eye, in a unit of
-/// its own; x and y are the pixel's column and row in the image.
+/// axis . (x, y, 1), divided by a pixel's depth code, is that coordinate of the pixel's point relative to the eye, in a
+/// unit of its own; x and y are the pixel's column and row in the image.
 using RoomAxes = std::array<std::array<double, 3>, 3>;
 
-/// As encode() in depth_codec.h, and what is decoded is as near to `image`. With `axes` normals take fewer
-/// bytes, and so do colours that follow one of the room's axes.
+/// As encode() in depth_codec.h, with the same bounds. With `axes` normals take fewer bytes, and so do colours that
+/// follow one of the room's axes.
 std::vector<uint8_t> encode(const image::DepthImage& image, const ErrorBounds& bounds, image::DepthImage* decoded,
                             const RoomAxes& axes);
 

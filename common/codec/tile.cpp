@@ -9,7 +9,7 @@ namespace telesplat::codec::detail {
 namespace {
 
 enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
-constexpr int kRamp = 8;  // beside a sparse tile's pole: a ramp's axis follows
+constexpr int kRamp = 8;  // added to a sparse tile's pole: a ramp's axis follows
 
 TileScratch& tile_scratch() {
   static thread_local TileScratch s;
@@ -38,24 +38,24 @@ void clear(image::DepthImage& image, const TileRect& rect) {
   }
 }
 
-// Only such tiles are coded as sparse ones, which bounds the time that a stream costs its decoder.
+// Refuses sparse coding of denser tiles, which bounds the decoding time of a stream.
 bool may_be_sparse(size_t covered, size_t pixels) { return covered * 4 < pixels; }
 
-// Limits of an image that is one tile: its pixels, since its walk keeps two bytes a pixel and thread, and the covered
-// ones, as a walk numbers them.
+// Limits of an image that is one tile: of its pixels, since a walk keeps two bytes a pixel in each thread, and of the
+// covered ones, since a walk numbers them in 16 bits.
 constexpr size_t kMostOfOne = size_t{1} << 22, kMostScattered = 65535;
 
-constexpr size_t kFewWithinBounds = 4000;  // bench codec on whole views: 2700 to 8000 are alike
+constexpr size_t kFewWithinBounds = 4000;  // bench codec on whole views: 2700 to 8000 do equally well
 
-// Filled rows predict better where runs are long. Elsewhere sparse tiles take fewer bits up to any density (a tenth
-// less at a third), but ten times longer a pixel than full ones do: bench codec/patch* and codec/sparse*.
-// Within bounds filled rows' tables are smaller, and pay from a few thousand pixels on.
+// Filled rows predict better if runs are long. Otherwise sparse tiles take fewer bits at any density (a tenth less at a
+// third), but ten times longer a pixel than full ones: bench codec/patch* and codec/sparse*. Within bounds, filled rows
+// have smaller tables, and pay from a few thousand pixels on.
 bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
   const bool few = covered * 8 < pixels && (!bounded || covered < kFewWithinBounds);
   return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
-// What is covered of a tile.
+// Sets `mask` to the covered pixels of a tile.
 void look_at(Mask& mask, const image::DepthImage& image, const TileRect& rect) {
   mask.reset(rect.width, rect.height);
   for (int y = 0; y < rect.height; ++y)
@@ -64,7 +64,7 @@ void look_at(Mask& mask, const image::DepthImage& image, const TileRect& rect) {
 
 size_t pixels_of(const TileRect& rect) { return static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height); }
 
-// By which the sparse tile's normals are turned. exact: codes that are not canonical must come back.
+// Chooses the pole that turns a sparse tile's normals. exact: codes that are not canonical must be restored, too.
 int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& mask, bool exact) {
   PoleChoice choice;
   bool canonical = true;
@@ -77,7 +77,7 @@ int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& ma
   return exact && !canonical ? kRaw : choice.best();
 }
 
-// Looks for a ramp that explains a sparse tile's colours, which takes 17 bytes. Some pixels find it as well as all.
+// Looks for a ramp that explains a sparse tile's colours, which takes 17 bytes. A sample of pixels is enough.
 std::optional<RampAxis> find_ramp(const Mask& mask, const image::DepthImage& image, const TileRect& rect,
                                   const RoomAxes* axes) {
   constexpr size_t kMostSamples = 1024;
@@ -97,7 +97,7 @@ std::optional<RampAxis> find_ramp(const Mask& mask, const image::DepthImage& ima
   return fit_ramp(*axes, samples, rect.width, rect.height);
 }
 
-// Fills pixels covered by s.mask from s.scatter_decoder, which was started; others are left alone (they are zero).
+// Fills pixels covered by s.mask from s.scatter_decoder, which was started; leaves others alone (they are zero).
 // Returns false if the stream is damaged.
 bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole) {
   s.predictor.start({base.depth, base.colour, turn_normal(base.normal, pole)});
@@ -117,7 +117,7 @@ bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rec
 TileGrid::TileGrid(int width, int height, bool one)
     : width(width), height(height), tile_width(width), tile_height(height), columns(1), rows(1) {
   if (one) return;
-  // About 256 x 256, longer where the image is narrow; of equal size up to rounding, so that none is a sliver.
+  // About 256 x 256, longer in narrow images; of equal size up to rounding, so that no tile is a sliver.
   constexpr int kSide = 256, kPixels = static_cast<int>(kMaxTilePixels);
   const int most_rows = width < kSide ? kPixels / width : kSide,
             most_columns = height < kSide ? kPixels / height : kSide;
@@ -177,7 +177,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
                       (pixels > kMaxTilePixels || is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr));
   out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
 
-  size_t first = rect.first;  // of the covered pixels
+  size_t first = rect.first;  // index of the first covered pixel
   for (int y = 0; y < rect.height; ++y) {
     const size_t row = rect.first + rect.stride * static_cast<size_t>(y), end = row + static_cast<size_t>(rect.width);
     for (first = row; first < end && image.depth[first] == 0;) ++first;
@@ -224,7 +224,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
     s.mask.reset(rect.width, rect.height);
     if (!get_mask(in, s.mask)) return std::nullopt;
     covered = s.mask.count();
-    if (covered == 0) return std::nullopt;  // that is an empty tile
+    if (covered == 0) return std::nullopt;  // an empty tile has its own kind
     if (sparse) clear(image, rect);
   }
   if (sparse) {

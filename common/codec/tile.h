@@ -1,4 +1,4 @@
-// One tile's pixels <-> bytes. docs/codec.md describes them.
+// One tile's pixels <-> bytes. docs/codec.md describes the stream.
 //   tile = u8 kind, and unless it is empty: base, [mask], and a dense tile (dense/dense.h) or a sparse one
 //          (sparse/scatter_coder.h)
 //   kind = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered
@@ -25,7 +25,7 @@ namespace telesplat::codec::detail {
 /// Most pixels of a tile; every tile takes at least a byte.
 inline constexpr size_t kMaxTilePixels = size_t{1} << 16;
 
-/// How an image of width x height pixels is divided: tiles of tile_width x tile_height, those at the right and below
+/// Divides an image of width x height pixels into tiles of tile_width x tile_height; tiles at the right and bottom are
 /// cut off.
 struct TileGrid {
   /// one: all of the image is a single tile, which must be sparse.
@@ -34,7 +34,7 @@ struct TileGrid {
   int width, height, tile_width, tile_height, columns, rows;
 };
 
-/// Buffers that one thread keeps: a tile is too small to allocate them anew.
+/// Buffers that a thread keeps: a tile is too small to allocate them anew.
 struct TileScratch {
   Mask mask;
   ScatterWalk scatter_walk;
@@ -45,21 +45,21 @@ struct TileScratch {
   DenseCoder dense;
 };
 
-/// Puts the pixels of a sparse tile that s.mask covers into s.scatter_encoder, which was started. base: what predicts
-/// the first pixel. pole: by which normals are turned; kRaw: they are coded as they are.
+/// Puts the pixels of a sparse tile that s.mask covers into s.scatter_encoder, which was started. base: prediction of
+/// the first pixel. pole: turns normals; kRaw: codes them unchanged.
 void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole);
 
-/// Whether an image is coded as one tile: what it covers lies in several sparse tiles, for which
-/// one takes fewer bytes nearly always.
+/// True if an image is coded as one tile: its pixels lie in several sparse tiles, and one tile nearly always takes
+/// fewer bytes.
 bool is_one_tile(const image::DepthImage& image, const TileBounds& bounds);
 
 /// Appends the pixels of `rect`; returns the number of covered ones. axes: of the room, from the tile's centre, or
 /// null.
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
                 const TileBounds& bounds, const RoomAxes* axes = nullptr);
-/// Writes all pixels of `rect`; returns the number of covered ones, or nothing where the stream is damaged.
+/// Writes all pixels of `rect`; returns the number of covered ones, or nothing if the stream is damaged.
 std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect, const TileBounds& bounds);
-/// Adds the covered pixels and the bytes of a tile of the size of `rect` to `info`; false where the stream is damaged.
+/// Adds the covered pixels and the bytes of a tile of the size of `rect` to `info`. False: the stream is damaged.
 [[nodiscard]] bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info);
 
 }  // namespace telesplat::codec::detail

@@ -31,7 +31,7 @@ class ClockEstimate {
  public:
   static constexpr double kMemory_s = 300;     ///< older exchanges are forgotten
   static constexpr double kDriftAfter_s = 20;  ///< exchanges must span this time to show the drift
-  /// Drift assumed while none is known, and largest change of a known drift (RFC 5905's PHI): seconds a second.
+  /// Drift assumed at first, and largest change of a known drift (RFC 5905's PHI): seconds a second.
   static constexpr double kUnknownDrift = 100e-6, kWander = 15e-6;
 
   /// Adds an exchange. Ignores impossible ones (a negative round trip, times that are not finite).

@@ -14,12 +14,12 @@ constexpr unsigned kRampShiftBits = 5;
 constexpr int kMostKnot = 16383;
 constexpr int kByte = GuidedPlane::kByteBits, kIndex = GuidedPlane::kIndexBits;
 
-// The places of colours in a palette, by open addressing.
+// Indices of colours in a palette, by open addressing.
 class ColourTable {
  public:
   ColourTable() { std::fill_n(slots_, kSlots, Slot{}); }
   static constexpr uint32_t kNone = 0xFFFFFFFF;
-  /// The place of `colour`, which the caller sets; kNone if it is new.
+  /// The index of `colour`, which the caller sets; kNone if the colour is new.
   uint32_t& operator[](uint32_t colour) {
     size_t at = (colour * 0x9E3779B1u) >> 20;
     while (slots_[at].colour != colour && slots_[at].colour != kNone) at = (at + 1) % kSlots;
@@ -37,8 +37,8 @@ class ColourTable {
 
 uint32_t brightness(uint32_t c) { return (c >> 16 & 255) + 2 * (c >> 8 & 255) + (c & 255); }
 
-// The channels of a palette's colours, each as the difference to the colour before modulo 256: code(difference,
-// context) -> difference.
+// Codes a palette's colours: each channel as the difference to the colour before, modulo 256. code(difference, context)
+// -> difference.
 template <class Code>
 void for_each_colour(std::vector<uint32_t>& palette, Code code) {
   GolombContext contexts[3];
@@ -55,8 +55,8 @@ void for_each_colour(std::vector<uint32_t>& palette, Code code) {
   }
 }
 
-// The knots of a ramp, each as what it is off from the line through the two before it: code(difference, context) ->
-// difference. Returns false if one is out of range.
+// Codes the knots of a ramp, each as its distance from the line through the two before it. code(difference, context) ->
+// difference. Returns false if a knot is out of range.
 template <class Code>
 bool for_each_knot(std::array<int16_t, kKnots>& knots, Code code) {
   GolombContext context;
@@ -71,7 +71,7 @@ bool for_each_knot(std::array<int16_t, kKnots>& knots, Code code) {
   return true;
 }
 
-// Colours beside each other that one stands for: `by` is how far a channel of each may be from it.
+// A range of neighbouring colours that one colour replaces: no channel is further than `by` from its middle.
 struct Joined {
   int low[3] = {255, 255, 255}, high[3] = {};
   bool take(uint32_t colour, int by) {
@@ -102,7 +102,7 @@ bool has_one_colour(const TileShape& shape, const PixelRows<uint32_t>& colours, 
   return other == 0;
 }
 
-// The colours in the order in which they come, and the place of each pixel's. False where they are too many.
+// Lists the colours in the order of their first pixels, and sets each pixel's index. False: more than kMostColours.
 bool ColourPlanes::make_palette(const TileShape& shape, const PixelRows<uint32_t>& colours) {
   ColourTable table;
   palette_.clear();
@@ -129,7 +129,7 @@ void ColourPlanes::find_heights(const TileShape& shape, const DepthPlane& depth)
   }
 }
 
-// By height where a ramp explains the colours, else by brightness.
+// Sorts by height if a ramp explains the colours, else by brightness.
 void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth, const RoomAxes* axes) {
   GuidedPlane& index = plane_[0];
   const size_t colours = palette_.size();
@@ -174,7 +174,7 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
     shape.for_each_run(y, [&, row = index.values.row(static_cast<ptrdiff_t>(y))](size_t x, size_t end) {
       for (; x < end; ++x) row[x] = rank[static_cast<size_t>(row[x])];
     });
-  // A knot is where its height lies among those of the colours.
+  // A knot's value is interpolated between the colours whose mean heights lie around it.
   for (size_t k = 0, i = 0; k < kKnots && ramp_; ++k) {
     const auto height = static_cast<double>(256 * k);
     while (i < colours && order[i].key < height) ++i;
@@ -184,7 +184,7 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
   }
 }
 
-// From heights, which find_heights() left where the guide shall be, or all are the palette's middle.
+// Sets the guide from the heights that find_heights() left in it; without a ramp, to the palette's middle.
 void ColourPlanes::begin_index(const TileShape& shape) {
   GuidedPlane& index = plane_[0];
   index.most = static_cast<int>(palette_.size()) - 1;
@@ -198,7 +198,7 @@ void ColourPlanes::begin_index(const TileShape& shape) {
   index.begin(shape);
 }
 
-// The guide is the first pixel's colour.
+// Sets the guide to the first pixel's colour.
 void ColourPlanes::begin_channels(const TileShape& shape) {
   for (size_t i = 0; i < 3; ++i) {
     GuidedPlane& p = plane_[i];

@@ -13,15 +13,15 @@
 
 namespace telesplat::codec::detail {
 
-/// Whether all covered pixels have that colour.
+/// True if all covered pixels have that colour.
 bool has_one_colour(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t colour);
 
 struct ColourPlanes {
   enum Mode : uint8_t { kPlain = 0, kPalette = 1, kChannels = 2 };
   static constexpr size_t kMostColours = 1024;
 
-  /// colours: row by row in all the tile's width, of covered pixels; `base`: of the first. axes: of the room, from the
-  /// tile's centre, or null. reach: how far a channel may be off.
+  /// colours: of covered pixels, row by row in the tile's full width; `base`: of the first one. axes: the room's, from
+  /// the tile's centre, or null. reach: largest error of a channel.
   void encode(const TileShape& shape, const PixelRows<uint32_t>& colours, uint32_t base, const DepthPlane& depth,
               const RoomAxes* axes, int reach);
   size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
@@ -30,7 +30,7 @@ struct ColourPlanes {
   static constexpr size_t kMostHeaderBits = 256 + 51 * (3 * kMostColours + kKnots) + 3 * GuidedPlane::kMostWeightBits;
   [[nodiscard]] bool decode_header(const TileShape& shape, uint32_t base, const DepthPlane& depth, int reach,
                                    BitReader& bits);
-  /// Row y from its symbols, into colours of all its pixels.
+  /// Makes the colours of all pixels of row y from its symbols.
   void decode_row(const TileShape& shape, size_t y, uint32_t* colours);
 
   Mode mode = kPlain;
@@ -44,10 +44,10 @@ struct ColourPlanes {
 
   uint32_t base_ = 0;
   std::vector<uint32_t> palette_;
-  std::optional<RampAxis> ramp_;  ///< by which the palette is sorted, and the index that each height stands for
+  std::optional<RampAxis> ramp_;  ///< sorts the palette; knots_ has the index at each height
   std::array<int16_t, kKnots> knots_;
-  ColourLattice lattice_{0};          ///< of channels
-  std::array<GuidedPlane, 3> plane_;  ///< the index, or green, red and blue
+  ColourLattice lattice_{0};          ///< lattice of all three channels
+  std::array<GuidedPlane, 3> plane_;  ///< the palette's index, or green, red and blue
   Samples samples_;
 };
 

@@ -5,8 +5,8 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr size_t kUnchecked = 1024;  // bits of a header between two looks at its end
-constexpr uint8_t kMoved = 4;        // beside the way of colours: states follow the words
+constexpr size_t kUnchecked = 1024;  // bits of a header read between two checks of its end
+constexpr uint8_t kMoved = 4;        // flag in the byte of the colour mode: states follow the words
 
 template <class T>
 PixelRows<T> rows_of(const std::vector<T>& plane, const TileRect& rect) {
@@ -19,12 +19,12 @@ SymbolPlane& DenseCoder::plane(size_t i) {
   return i == 0 ? depth_.symbols : i < 3 ? normals_.plane[i - 1].symbols : colours_.symbols(i - 3);
 }
 
-// The number of planes of the parts before `part`.
+// Returns the number of planes of the parts before `part`.
 size_t DenseCoder::planes_until(size_t part) const {
   return part == 0 ? 0 : part == 1 ? 1 : part == 2 ? 3 : 3 + colours_.planes();
 }
 
-// Appends a part's header as a block of its own: what the writer holds, and the tables of the part's planes.
+// Appends a part's header as a block of its own: the writer's bits, and the tables of the part's planes.
 void DenseCoder::put_header(std::vector<uint8_t>& out, size_t part) {
   for (size_t i = planes_until(part); i < planes_until(part + 1); ++i)
     encoders_[i].prepare(plane(i), shape_, writer_.sink);
@@ -64,7 +64,7 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   if (put_words(out)) out[mode] |= kMoved;
 }
 
-// Puts symbols in the reverse of the order in which they are decoded. Returns whether states follow.
+// Puts symbols in the reverse of the order of decoding. Returns true if states follow.
 bool DenseCoder::put_words(std::vector<uint8_t>& out) {
   const size_t symbols = shape_.total * planes_until(kPartCount);
   words_.resize(std::max(words_.size(), symbols * kMostSymbolBytes + 2));
@@ -154,7 +154,7 @@ bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const T
   return source_.end == source_.begin;
 }
 
-// Takes all symbols of a part, row by row; their values are found afterwards.
+// Takes all symbols of a part, row by row; get_values() makes values of them later.
 bool DenseCoder::get_symbols(size_t part) {
   const size_t begin = planes_until(part), end = planes_until(part + 1);
   for (size_t i = begin; i < end; ++i)
@@ -193,7 +193,7 @@ bool DenseCoder::skip(Reader& in, StreamInfo& info) {
   const size_t normals = parts->headers[1].size() + parts->word_bytes[1],
                colours = parts->headers[2].size() + parts->word_bytes[2];
   info.normal_bytes += normals, info.colour_bytes += colours;
-  info.depth_bytes += before - in.left() - normals - colours;  // with what belongs to all: states, sizes
+  info.depth_bytes += before - in.left() - normals - colours;  // with the shared bytes: states, sizes
   return true;
 }
 

@@ -16,17 +16,17 @@
 
 namespace telesplat::codec::detail {
 
-/// Codes dense tiles. One a thread: it keeps its memory.
+/// Codes dense tiles. Use one a thread: it keeps its buffers.
 class DenseCoder {
  public:
-  /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them; its depth is an
-  /// index of the bounds' lattice, if there is one. axes: of the room, from the tile's centre, or null.
+  /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them; with a depth
+  /// bound its depth is a lattice index. axes: of the room, from the tile's centre, or null.
   void put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
            const Pixel& base, const TileBounds& bounds, const RoomAxes* axes);
-  /// Writes the covered pixels of `rect`; false where the stream is damaged.
+  /// Writes the covered pixels of `rect`. False: the stream is damaged.
   [[nodiscard]] bool get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask,
                          const Pixel& base, const TileBounds& bounds);
-  /// Adds the bytes of a tile to `info`; false where the stream is cut off.
+  /// Adds the bytes of a tile to `info`. False: the stream is cut off.
   [[nodiscard]] static bool skip(Reader& in, StreamInfo& info);
 
  private:

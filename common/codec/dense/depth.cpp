@@ -23,7 +23,7 @@ void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
   row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
 }
 
-// Calls covered(begin, end) for the runs of row y, in order. Pixels that are not covered become L + U - UL.
+// Calls covered(begin, end) for the covered runs of row y, in order. Sets other pixels to L + U - UL.
 template <class F>
 void with_holes(const uint32_t* above, const TileShape& shape, size_t y, uint32_t* row, F covered) {
   ptrdiff_t from = 0;
@@ -40,13 +40,13 @@ void with_holes(const uint32_t* above, const TileShape& shape, size_t y, uint32_
   fill(static_cast<ptrdiff_t>(shape.width));
 }
 
-// Four times the mean of L + U - UL, 2 L - LL, 2 U - UU and L + UR - U, all but the terms of L and LL, and 2.
+// Four times the mean of L + U - UL, 2 L - LL, 2 U - UU and L + UR - U, without the terms of L and LL, plus 2.
 uint32_t mean_terms(const uint32_t* above2, const uint32_t* above, ptrdiff_t x) {
   return 2 * above[x] - above[x - 1] - above2[x] + above[x + 1] + 2;
 }
 
-// The mean is rounded up from half. Where it was rounded down, a pixel lies rather above than below it: there signs are
-// turned, so that what is likelier has the smaller number.
+// mean_of() rounds halves up. If it rounded the mean down, a pixel lies more likely above it than below: then the sign
+// is turned, so that the likelier sign has the smaller number.
 uint32_t turn_if_rounded_down(uint32_t off, uint32_t sum) { return (sum & 3) == 3 ? 0 - off : off; }
 uint32_t mean_of(uint32_t sum) { return static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2); }
 
@@ -72,7 +72,7 @@ void DepthPlane::find_residuals(const TileShape& shape, size_t y, Way by) {
   tokens_of(z, shape.width, tokens);
 }
 
-// Estimates from every sixteenth row.
+// Estimates the bits from every sixteenth row.
 double DepthPlane::bits_by(const TileShape& shape, Way by) {
   std::array<uint32_t, kSymbols> counts{};
   uint64_t raw = 0;
@@ -105,11 +105,11 @@ void DepthPlane::encode(const TileShape& shape, bool may_mean) {
 void DepthPlane::to_indices(const TileShape& shape, const DepthLattice& lattice) {
   for (size_t y = 0; y < shape.height; ++y) {
     uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
-    for (size_t x = 0; x < shape.width; ++x) row[x] = lattice.index(row[x]);  // 0, nothing, is an index of its own
+    for (size_t x = 0; x < shape.width; ++x) row[x] = lattice.index(row[x]);  // 0, a hole, has its own index
   }
 }
 
-// What is predicted of pixels that are not covered may be no index: the last one.
+// Pixels that are not covered may have predictions beyond the last index: those become the last one.
 void DepthPlane::to_codes(const TileShape& shape, const DepthLattice& lattice) {
   const uint32_t* const codes = lattice.codes();
   const uint32_t last = lattice.last();
@@ -137,7 +137,7 @@ void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
     uint32_t left = row[x - 1], slope = left - row[x - 2];
     for (; x < end; ++x) {
       const uint32_t next = terms[x] + (left & take_left[x]) + (slope & take_slope[x]);
-      slope = next - left, left = next;  // modulo 2^32, which is as good
+      slope = next - left, left = next;  // modulo 2^32, which the mask below makes exact
       row[x] = next & kMaxDepthCode;
     }
   });
@@ -164,7 +164,7 @@ bool DepthPlane::decode_row(const TileShape& shape, size_t y, uint32_t most) {
       }
     });
   end_row(depth, y, shape.width);
-  uint32_t largest = 0;  // less 1: 0 becomes the largest number
+  uint32_t largest = 0;  // largest depth - 1, so that 0 wraps to the largest number
   shape.for_each_run(y, [&](size_t x, size_t end) {
     for (; x < end; ++x) largest = std::max(largest, row[x] - 1);
   });

@@ -1,6 +1,6 @@
-// Depth of a dense tile: predicted as L + U - UL, which is exact on planes. Where triangles are as small as a few
-// pixels, most pixels lie in the plane of some neighbours, but not of those three: there it is said of which. Within
-// bounds, where steps are larger than what surfaces are rough, a mean of four such planes adds up less of the steps.
+// Depth of a dense tile: predicted as L + U - UL, which is exact on planes. If triangles are only a few pixels large,
+// most pixels lie in a plane through other neighbours: then each symbol names the plane. Within bounds, if steps exceed
+// the roughness of surfaces, the mean of four such planes adds up less of the steps' rounding.
 #pragma once
 
 #include <cstdint>
@@ -18,21 +18,20 @@ struct DepthPlane {
   enum Way : uint8_t { kLinear = 0, kPlanes = 1, kMean = 2 };
   Way way = kLinear;
 
-  /// What lies above and to the left of the first pixel is `base`.
+  /// Sets the pixels above the first row to `base`.
   void reset(const TileShape& shape, uint32_t base);
-  /// depth -> symbols, once all rows were set. Gives pixels that are not covered their predictions.
-  /// may_mean: kMean may be chosen.
+  /// depth -> symbols, once all rows are set. Sets pixels that are not covered to their predictions. may_mean: kMean is
+  /// allowed.
   void encode(const TileShape& shape, bool may_mean);
-  /// Before the first decode_row().
+  /// To be called before the first decode_row().
   [[nodiscard]] bool begin_decoding(const TileShape& shape, BitReader& bits);
   static constexpr unsigned kWayBits = 2;
-  /// Indices of `lattice` <-> the codes that they stand for, for all pixels, or those that are covered. What is coded
-  /// within bounds are indices.
+  /// Converts covered or all pixels between codes and their indices in `lattice`. Within bounds, indices are coded.
   void to_indices(const TileShape& shape, const DepthLattice& lattice);
   void to_codes(const TileShape& shape, const DepthLattice& lattice);
-  /// The next row from its symbols. False where a covered depth would be 0, or above `most`.
+  /// Decodes the next row from its symbols. False: a covered depth is 0, or above `most`.
   [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t most);
-  /// Continues slopes beyond the tile's edges, as geometry needs it, once all rows are known.
+  /// Continues slopes beyond the tile's edges, for geometry(). To be called once all rows are known.
   void extend(const TileShape& shape);
 
  private:

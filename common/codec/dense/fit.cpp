@@ -11,10 +11,10 @@ namespace telesplat::codec::detail {
 namespace {
 
 constexpr size_t kLeastSlopes = 32, kEnoughSlopes = 100;
-constexpr double kLeastAgreement = 0.7;  // mean cosine between normals and what a geometry says
+constexpr double kLeastAgreement = 0.7;  // mean cosine between normals and those of the fitted geometry
 
 struct Slope {
-  double h[3];  // slopes and height, as geometry() has them
+  double h[3];  // slopes and height, as in geometry()
   double n[3];  // unit normal
 };
 
@@ -40,7 +40,7 @@ Differences differences_at(const Plane<uint32_t>& depth, const Samples::Place& p
           static_cast<int>(depth.row(p.y + 1)[p.x] - depth.row(p.y - 1)[p.x])};
 }
 
-// The same numbers as in geometry(), but for the last shift. False where they are too large.
+// The same numbers as in geometry(), before its last shift. False: a slope is too large.
 bool slope_at(const Plane<uint32_t>& depth, const Samples::Place& p, int x0, int y0, int shift, double h[3]) {
   const Differences d = differences_at(depth, p);
   const int u = d.right >> shift, v = d.down >> shift;
@@ -109,7 +109,7 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   }
   if (slopes.empty() || !(agreement(slopes, matrix) > kLeastAgreement)) return false;
   model.height_shift = shift_for(std::max(1.0, nine_of_ten(sizes)) * 2, 32767);
-  // Integers of the sum that geometry() allows.
+  // Scales to integers whose sum geometry() allows.
   double total = 0, value[9];
   for (int a = 0; a < 9; ++a)
     total += std::abs(value[a] = a % 3 == 2 ? std::ldexp(matrix[a], model.height_shift) : matrix[a]);
@@ -121,10 +121,11 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
 
 namespace {
 
-// Features of a sample: 13 differences from the guide at the pixel, the residual, 1, and the value that is wanted.
+// Features of a sample: 13 differences from the guide at the pixel, the residual, 1, and the wanted value.
 constexpr int kUnknown = 14, kWanted = 14, kLeft = 0, kUp = 1, kCorner = 2;
-constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual};  // of weights
-// The rough rounds, and the step before them, take half of the samples.
+constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual};  // solutions' places in the
+                                                                                      // weights
+// The first solution and the first kRoughRounds rounds use half of the samples.
 constexpr int kRounds = 3, kRoughRounds = 1;
 
 struct Features {
@@ -146,7 +147,7 @@ Features features_at(const GuidedSamples& s, const Samples::Place& p) {
   return out;
 }
 
-// A x = b for symmetric positive A, in place; false where it is singular. Cholesky's method.
+// Solves A x = b for symmetric positive A, in place, by Cholesky's method. False: A is singular.
 bool solve(double a[kUnknown][kUnknown], double* b) {
   for (int j = 0; j < kUnknown; ++j) {
     for (int i = j; i < kUnknown; ++i) {
@@ -167,7 +168,7 @@ bool solve(double a[kUnknown][kUnknown], double* b) {
   return true;
 }
 
-// Weighted least squares of the first n samples; false where the system is singular.
+// Solves weighted least squares of the first n samples. False: the system is singular.
 bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, size_t n,
                     double solution[kUnknown]) {
   alignas(64) float sums[kFeatures][kFeatures];
@@ -182,7 +183,7 @@ bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& 
   return solve(system, solution);
 }
 
-// How far off a solution is in one sample.
+// Error of a solution in one sample.
 float miss(const Features& f, const double solution[kUnknown]) {
   float sum = -f.of[kWanted];
   for (int i = 0; i < kUnknown; ++i) sum += static_cast<float>(solution[i]) * f.of[i];
@@ -194,7 +195,7 @@ float median_miss(const Features& f) {
   return std::clamp(f.of[kLeft] + f.of[kUp] - f.of[kCorner], low, high) - f.of[kWanted];
 }
 
-// The mean token of what predictions leave, which grows as bits do; of some samples.
+// The mean token of prediction errors, over every third sample: it grows with the bits.
 template <class Off>
 double tokens_left(const std::vector<Features>& all, int bits, Off off) {
   const float scale = 2 / static_cast<float>(1 << bits);
@@ -204,7 +205,7 @@ double tokens_left(const std::vector<Features>& all, int bits, Off off) {
   return static_cast<double>(sum) / static_cast<double>(count);
 }
 
-// The differences' weights as those of the values themselves; false where they are too large.
+// Converts the weights of differences to weights of the values themselves. False: one is too large.
 bool quantise_weights(const double solution[kUnknown], GuidedFit& out) {
   int total = 0, sum = 0;
   for (int i = 0; i < 13; ++i) {

@@ -1,5 +1,5 @@
-// What an encoder fits to a tile: the geometry of its normals, and weights of predictions.
-// In floating point: what is fitted is sent, so that only encoders do it.
+// Fits of an encoder to a tile: the geometry of its normals, and weights of predictions. In floating point: decoders do
+// not fit, since the results are sent.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace telesplat::codec::detail {
 
-/// Pixels of a tile that stand for all: covered, with covered neighbours.
+/// Pixels that represent a tile: covered, with covered neighbours.
 struct Samples {
   struct Place {
     int x, y;
@@ -18,33 +18,33 @@ struct Samples {
   void choose(const TileShape& shape, size_t about);
 };
 
-/// Finds the integers that stand for a matrix, row by row, by which slopes of `depth` become the normals' lattice
-/// vectors. x0, y0: coordinates of the tile's first pixel. Returns false if normals do not follow it.
+/// Finds the integers that represent `matrix`, which turns slopes of `depth` into the normals' lattice vectors, row by
+/// row. x0, y0: coordinates of the tile's first pixel. Returns false if normals do not follow it.
 bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
                   int y0, const double matrix[9], GeometryModel& model);
 
-/// A plane of fixed-point values and what predicts it.
+/// A plane of fixed-point values and the planes that predict it.
 struct GuidedSamples {
   const Samples& samples;
   const Plane<int16_t>&values, &guide;
-  const Plane<int16_t>* residuals;  ///< of another plane, or null
-  int bits;                         ///< of the values' fraction
+  const Plane<int16_t>* residuals;  ///< residuals of another plane, or null
+  int bits;                         ///< bits of the values' fraction
 };
 
 /// Weights found by least squares.
 struct GuidedFit {
   bool better_than_median =
-      false;  ///< else weights are 0: on facets, whose pixels all have one normal, the median wins
+      false;  ///< false: weights are 0: on facets, whose pixels all have one normal, the median wins
   int16_t weights[kGuidedTerms] = {};
   int32_t constant = 0;
-  double left_over = 0;  ///< mean token of what is left; infinite if nothing could be fitted
+  double left_over = 0;  ///< mean token of the prediction errors; infinite if no fit was possible
 };
 GuidedFit fit_guided(const GuidedSamples& of);
 
-inline constexpr size_t kMostSamples = 450;  ///< of a tile: 700 bring 0.01 to 0.04 bits
+inline constexpr size_t kMostSamples = 450;  ///< samples of a tile: 700 gain 0.01 to 0.04 bits
 
-/// No sum of weights of this size leaves 32 bits.
+/// Sums with weights of at most this size fit 32 bits.
 inline constexpr int kMostWeight = 120000, kMostConstant = 1 << 27;
-inline constexpr int kMostMatrix = 32767;  ///< sum of a geometry's elements' sizes
+inline constexpr int kMostMatrix = 32767;  ///< sum of the absolute values of a geometry's elements
 
 }  // namespace telesplat::codec::detail

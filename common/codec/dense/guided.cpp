@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kConstantBits = 28;
 
-// Values of one plane, each from the one to its left: the longest chain of a decoder.
+// Decodes values of one plane, each from the one to its left: the longest chain of dependencies in a decoder.
 template <bool kMedian, bool kWraps>
 struct Chain {
   Chain(GuidedPlane& plane, size_t y)

@@ -6,8 +6,8 @@
 #include "common/codec/mask.h"
 #include "common/codec/poles.h"
 
-// Each loop is compiled once for every kind of vectors, and the first call chooses (CMakeLists.txt). They compute with
-// integers, or without contraction in one order, so that all give the same bits.
+// Each loop is compiled for every kind of vector unit, and its first call chooses one (CMakeLists.txt). Loops use
+// integers, or floats in one order without contraction, so that all versions give the same bits.
 #ifdef TELESPLAT_CODEC_CLONES
 #define VECTORS __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
@@ -20,13 +20,13 @@ namespace {
 
 inline uint32_t mask_if(bool condition) { return 0 - static_cast<uint32_t>(condition); }
 
-// A token if `off`, two more than how far a pixel lies from plane k, says that it lies there; else the one before.
+// Returns the token for plane k if the pixel lies within 2 of it (off: its distance from the plane + 2); else `before`.
 inline uint32_t hit(uint32_t before, uint32_t k, uint32_t off) {
   const uint32_t near = off & 0xFFFFFF, hit = mask_if(near < 5);
   return (before & ~hit) | ((5 * k + near) & hit);
 }
 
-// Calls run(axis) with constants, so that each loop has its own.
+// Calls run(axis) with a literal axis, so that the compiler makes a loop for each.
 template <class Run>
 inline void for_axis(int pole, Run run) {
   pole / 2 == 0 ? run(0) : pole / 2 == 1 ? run(1) : pole / 2 == 2 ? run(2) : run(3);
@@ -77,7 +77,7 @@ VECTORS void depth_residuals(const uint32_t* RESTRICT above, const uint32_t* RES
   for (size_t x = 0; x < n; ++x) z[x] = fold24(row[x] - row[x - 1] - above[x] + above[x - 1]);
 }
 
-// Planes are tried from the first to the last, so the other way round.
+// Tests the planes from the last to the first, so that the first that fits wins.
 VECTORS void plane_residuals(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above,
                              const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens) {
   for (size_t x = 0; x < n; ++x) {
@@ -103,7 +103,7 @@ VECTORS void plane_terms(const uint32_t* RESTRICT above2, const uint32_t* RESTRI
   for (size_t x = 0; x < n; ++x) {
     const uint32_t up = above[x], corner = above[x - 1], right = above[x + 1];
     const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
-    // All are made: what is read only where it is wanted takes longer.
+    // Computes all eight: reading only the wanted ones takes longer.
     const uint32_t lines[8] = {up - corner,
                                0,
                                right - up,
@@ -183,8 +183,8 @@ VECTORS void median_residuals(const GuidedRows& rows, size_t n, uint32_t* RESTRI
   }
 }
 
-// Slopes of the reciprocal depth at a pixel, and what it would be at the tile's centre, are linear in the surface's
-// normal, whatever the camera (docs/codec.md). 31-bit integers; the quotient by Newton's method.
+// Slopes of the reciprocal depth at a pixel, and its value extrapolated to the tile's centre, are linear in the
+// surface's normal, for any camera (docs/codec.md). 31-bit integers; the quotient by Newton's method.
 VECTORS void geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
                       int16_t* RESTRICT gx, int16_t* RESTRICT gy) {
   const uint32_t *RESTRICT above = depth[0], *RESTRICT here = depth[1], *RESTRICT below = depth[2];

@@ -1,4 +1,4 @@
-// The loops over pixels, in standard C++ that compilers turn into vectors. Integers give the same bits on all machines.
+// The loops over pixels, in standard C++ that compilers vectorise. Integers give the same bits on all machines.
 #pragma once
 
 #include <array>
@@ -10,14 +10,14 @@
 
 namespace telesplat::codec::detail {
 
-/// How a sum of tokens becomes one of kContexts classes: clamp((sum - bias) >> shift) >> merges. See make_contexts().
+/// Maps a sum of tokens to one of kContexts classes: clamp((sum - bias) >> shift) >> merges. See make_contexts().
 struct ContextScale {
   int bias = 0, shift = 0, merges = 0;
 };
 
-/// Rows of tokens around those whose contexts are wanted. Each may be read one element beyond both ends.
+/// Rows of tokens around those whose contexts are computed. Each may be read one element beyond both ends.
 struct ContextRows {
-  const uint8_t* above;   ///< of the same plane
+  const uint8_t* above;   ///< the row above in the same plane
   const uint8_t* above2;  ///< the row above that
   const uint8_t* other;   ///< the same row of a plane that is already known, or null
   int sum(size_t x) const {
@@ -28,9 +28,9 @@ struct ContextRows {
 
 inline constexpr unsigned kHits = 40;  ///< eight planes, five distances: -2 to 2
 
-/// The context of a token of planes by the kinds of those above and above right, as kind above * 16 + kind above right.
-/// Kinds that are followed by similar tokens share a context: 256 clusters of tokens of two isosurfaces were merged to
-/// 16, always those two whose merging cost the fewest bits.
+/// The context of a token of planes by the kinds of the tokens above and above right, as kind above * 16 + kind above
+/// right. Kinds that are followed by similar tokens share a context: 256 clusters of tokens of two isosurfaces were
+/// merged to 16, always those two whose merging cost the fewest bits.
 inline constexpr auto kPlaneContexts = [] {
   constexpr std::string_view kDigits =
       "0092535355ceeefe0151441444cccccc0595535356defffea59bbbbbbbbeeefe"
@@ -43,24 +43,24 @@ inline constexpr auto kPlaneContexts = [] {
   return out;
 }();
 
-inline constexpr int kFeatures = 16;  ///< of what least squares sum up
+inline constexpr int kFeatures = 16;  ///< columns of the least-squares sums
 /// Terms of guided prediction: L, U, UL, UR; the guide's 3 x 3, the fifth at the pixel's own place; the residual of
 /// another plane.
 inline constexpr int kGuidedTerms = 14, kGuideHere = 8, kOtherResidual = 13;
 
-/// What predicts a row of a plane of fixed-point values.
+/// Rows from which a row of a plane of fixed-point values is predicted.
 struct GuidedRows {
   const int16_t *own, *above;  ///< the plane's row, used to the left of the pixel, and the one above
   const int16_t* guide[3];     ///< the guide's rows above, here, below
   const int16_t* residual;     ///< the same row of another plane's residuals, or null
-  const int16_t* weights;      ///< of kGuidedTerms, in 2^-13
+  const int16_t* weights;      ///< kGuidedTerms weights, in 2^-13
   int32_t constant;            ///< in 2^-13 of the plane's unit
-  int bits;                    ///< of a value's fraction
-  int32_t most;                ///< the largest value that is predicted
+  int bits;                    ///< bits of a value's fraction
+  int32_t most;                ///< upper limit of a prediction
   bool wraps;                  ///< residuals are modulo 256
 };
 
-/// A matrix that turns what depth says of a surface into the direction of its normal. See geometry().
+/// A matrix that turns slopes of depth and a height into the direction of the normal. See geometry().
 struct GeometryModel {
   int16_t matrix[3][3] = {};
   int slope_shift = 0, height_shift = 0;
@@ -69,7 +69,7 @@ struct GeometryModel {
 /// fold: 0, -1, 1, -2, ... -> 0, 1, 2, 3, ...
 constexpr uint32_t fold(int32_t v) { return static_cast<uint32_t>(v) << 1 ^ static_cast<uint32_t>(v >> 31); }
 constexpr int32_t unfold(uint32_t z) { return static_cast<int32_t>(z >> 1) ^ -static_cast<int32_t>(z & 1); }
-/// The same of a difference modulo 2^24.
+/// The same for a difference modulo 2^24.
 constexpr uint32_t fold24(uint32_t v) { return fold(static_cast<int32_t>(v << 8)) >> 8; }
 
 /// The median of L, U and L + U - UL.
@@ -81,42 +81,42 @@ constexpr int median_of(int left, int up, int corner) {
 void tokens_of(const uint32_t* z, size_t n, uint8_t* tokens);
 /// Contexts of n tokens.
 void make_contexts(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
-/// Kinds of tokens of planes: token / 5, or by how large what is missed is 8 + (token - kHits) / 16, at most 15.
+/// Kinds of tokens of planes: token / 5, or for a missed pixel 8 + (token - kHits) / 16, at most 15.
 void plane_kinds(const uint8_t* tokens, size_t n, uint8_t* kinds);
 /// z = fold(row - (left + above - above_left)) mod 2^24.
 void depth_residuals(const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z);
-/// The same where surfaces are flat and small: tokens below kHits say in which of eight planes through known pixels
-/// a pixel lies, and how far off; others are kHits + those of z.
+/// The same for flat and small surfaces. Tokens below kHits name which of eight planes through known pixels the pixel
+/// lies in, and its distance from it; others are kHits + the token of z.
 void plane_residuals(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
                      uint8_t* tokens);
-/// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]).
+/// Terms of each pixel: its depth is terms[x] + (left & take_left[x]) + ((left - one before) & take_slope[x]).
 void plane_terms(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
                  uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
-/// Coordinates in 64ths of codes that are turned by a pole (poles.h), and the inverse.
+/// Turns codes by a pole (poles.h) and returns their coordinates in 64ths; the next is the inverse.
 void turn_normals(const uint16_t* codes, size_t n, int pole, int16_t* x, int16_t* y);
 void turn_normals_back(const int16_t* x, const int16_t* y, size_t n, int pole, uint16_t* codes);
 /// row = max(row + offset, 0) * share / 2^18, rounded down: a division by a NormalLattice's step (codec/lattice.h).
 void divide(int16_t* row, size_t n, int offset, uint32_t share);
-/// Numbers that were folded, times 2^bits.
+/// Unfolds numbers, times 2^bits.
 void unfold_row(const uint32_t* z, size_t n, int bits, int16_t* out);
-/// All terms of guided prediction but L's, and a half.
+/// Sums all terms of guided prediction except L's, plus a half.
 void guided_sums(const GuidedRows& rows, size_t n, int32_t* sums);
-/// Folded residuals of a row whose sums are known.
+/// Folds the residuals of a row whose sums are known.
 void guided_residuals(const GuidedRows& rows, const int32_t* sums, size_t n, uint32_t* z);
-/// The same by the median predictor.
+/// Folds the residuals from the median predictor.
 void median_residuals(const GuidedRows& rows, size_t n, uint32_t* z);
-/// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
-/// Columns x0 to x0 + n - 1 and the row y are counted from the tile's centre.
+/// Computes the turned octahedral coordinates, in 64ths, of the normal of the surface at each pixel. depth: rows above,
+/// here and below. Columns x0 to x0 + n - 1 and the row y are counted from the tile's centre.
 void geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
               int16_t* gy);
-/// How much the guide varies around each pixel, as tokens.
+/// Measures the variation of the guide around each pixel, as tokens.
 void activity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
-/// Heights of n pixels: (sum + step * column) * scale / depth - low, kept within 0 and 16383, rounded down.
+/// Heights of n pixels: (sum + step * column) * scale / depth - low, limited to 0 to 16383, rounded down.
 struct HeightScale {
   double step, scale, low;
 };
 void heights(const uint32_t* depth, size_t n, double sum, const HeightScale& by, int16_t* out);
-/// Heights -> values between knots, which lie 256 heights apart.
+/// Replaces heights by values interpolated between knots, which lie 256 heights apart.
 inline constexpr size_t kKnots = 65;
 void values_of_heights(const std::array<int16_t, kKnots>& knots, size_t n, int16_t* row);
 /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order.

@@ -9,10 +9,10 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr double kSmooth = 3.0;  // mean tokens of both coordinates, added up
+constexpr double kSmooth = 3.0;  // sum of both coordinates' mean tokens
 
-// Makes the matrix that turns slopes and height into normals, which look towards the eye, turned by `pole`: -1 times
-// the inverse of the axes' transpose. Returns false if there is no inverse.
+// Makes the matrix that turns slopes and height into normals towards the eye, turned by `pole`: -1 times the inverse of
+// the axes' transpose. Returns false if there is no inverse.
 bool normals_of(const RoomAxes& axes, int pole, double out[9]) {
   RoomAxes cofactors;
   double determinant = 0;
@@ -57,7 +57,7 @@ void NormalPlanes::reset(const TileShape& shape, int reach) {
 
 int NormalPlanes::choose_pole(const TileShape& shape, const PixelRows<uint16_t>& codes) const {
   bool canonical = true;
-  if (lattice_.step() == 1)  // within bounds another code of the same direction is as good
+  if (lattice_.step() == 1)  // within bounds, any code of the same direction will do
     for (size_t y = 0; y < shape.height; ++y)
       shape.for_each_run(y, [&, row = codes.row(y)](size_t x, size_t end) {
         for (; x < end; ++x) canonical &= image::canonical_normal16(row[x]) == row[x];
@@ -70,7 +70,7 @@ int NormalPlanes::choose_pole(const TileShape& shape, const PixelRows<uint16_t>&
 
 void NormalPlanes::use_exact_codes() { exact_ = true, lattice_ = NormalLattice(0); }
 
-// Tells whether normals as they are take few bits.
+// True if exact normals take few bits.
 bool NormalPlanes::are_smooth(const TileShape& shape) {
   double left_over = 0;
   for (GuidedPlane& p : plane) {
@@ -80,7 +80,7 @@ bool NormalPlanes::are_smooth(const TileShape& shape) {
   return left_over < kSmooth;
 }
 
-// Turns the guide, which is in 64ths of a code, into the lattice's steps.
+// Converts the guide from 64ths of a code to the lattice's steps.
 void NormalPlanes::to_lattice(const TileShape& shape) {
   if (lattice_.step() == 1) return;
   for (GuidedPlane& p : plane) {
@@ -91,7 +91,7 @@ void NormalPlanes::to_lattice(const TileShape& shape) {
   }
 }
 
-// Without geometry the guide is the first pixel's normal everywhere.
+// Fills the guide from depth's geometry; without a geometry, with the first pixel's normal.
 void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base) {
   const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
   const uint16_t turned = turn_normal(base, pole_);

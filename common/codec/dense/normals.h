@@ -12,16 +12,16 @@
 namespace telesplat::codec::detail {
 
 struct NormalPlanes {
-  /// reach: of a NormalLattice; 0: all codes.
+  /// reach: of a NormalLattice; 0: exact codes.
   void reset(const TileShape& shape, int reach);
   /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code. one_colour: all pixels
-  /// have the same, so that normals are all that is seen of them: where they are smooth they are coded as they are,
-  /// whatever the bound. axes: of the room, from the tile's centre, or null.
+  /// have the same colour, so that only normals show the surface: if they are smooth they are coded exactly, even with
+  /// a bound. axes: of the room, from the tile's centre, or null.
   void encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth, uint16_t base,
               bool one_colour, const RoomAxes* axes, BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * GuidedPlane::kMostWeightBits;
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
-  /// Codes of all pixels of row y, once decode_values() made its values.
+  /// Makes codes of all pixels of row y, once decode_values() made its values.
   void get_codes(const TileShape& shape, size_t y, uint16_t* codes);
 
   GuidedPlane plane[2];
@@ -39,7 +39,7 @@ struct NormalPlanes {
   Samples samples_;
   std::vector<int16_t> row_of_codes_[2];
   NormalLattice lattice_{0};
-  bool may_be_exact_ = false, exact_ = false;  ///< of streams with a bound of normals
+  bool may_be_exact_ = false, exact_ = false;  ///< streams with a bound of normals may code them exactly; do
   int pole_ = kRaw;
   bool has_geometry_ = false;
   GeometryModel geometry_;

@@ -7,14 +7,14 @@
 
 namespace telesplat::codec::detail {
 
-/// width x height elements, two rows more above and two below, kLead elements more to the left and kTail to the right
-/// of each row. Kernels may read and write to the end of a vector.
+/// width x height elements, with two more rows above and below each, kLead more elements to the left and kTail to the
+/// right of each row. Kernels may read and write whole vectors beyond a row's end.
 template <class T>
 class Plane {
  public:
   static constexpr size_t kLead = 32, kTail = 64;
   static constexpr ptrdiff_t kRows = 2;
-  /// What the elements hold afterwards is not said.
+  /// Sets the size. Elements are undefined afterwards.
   void reset(size_t width, size_t height) {
     stride_ = (width + kLead + kTail + 31) / 32 * 32;
     const size_t needed = stride_ * (height + 2 * kRows);
@@ -22,7 +22,7 @@ class Plane {
   }
   T* row(ptrdiff_t y) { return elements_.data() + stride_ * static_cast<size_t>(y + kRows) + kLead; }
   const T* row(ptrdiff_t y) const { return elements_.data() + stride_ * static_cast<size_t>(y + kRows) + kLead; }
-  /// Elements [-kLead, width + kTail) of row y.
+  /// Sets elements [-kLead, width + kTail) of row y.
   void fill_row(ptrdiff_t y, T value) {
     T* const first = row(y) - kLead;
     for (size_t i = 0; i < stride_; ++i) first[i] = value;
@@ -33,7 +33,7 @@ class Plane {
   std::vector<T> elements_;
 };
 
-/// Rows of an image that a tile has, or that were copied.
+/// A tile's rows within its image, or a copy of them.
 template <class T>
 struct PixelRows {
   const T* first = nullptr;

@@ -5,8 +5,8 @@
 // bits. State x in [2^15, 2^31):
 //   token of frequency f that starts at s:  x -> x / f * 2048 + x % f + s
 //   k raw bits, k <= 15:                    x -> x * 2^k + bits
-// Before either, the lower 16 bits of a state that would become too large are written. Decoding undoes this from the
-// last word to the first: it takes a symbol's token, its raw bits above the lowest 15, and then the lowest 15.
+// Before either, the lower 16 bits of a state that would become too large are written. Decoding reverses this from the
+// last word to the first: it takes a symbol's token, then its raw bits above the lowest 15, then the lowest 15.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ inline uint32_t token_of(uint32_t z) {
 }
 inline constexpr unsigned kNumberTokens = 169, kByteTokens = 41;
 
-/// A token's range of 2048.
+/// A token's part of the 2048.
 struct EncodeEntry {
   uint16_t start = 0, frequency = 0;
 };
@@ -47,12 +47,12 @@ inline constexpr auto kReciprocals = [] {
 /// Puts symbols, the last one first.
 class SymbolEncoder {
  public:
-  /// symbols: how many follow. out: room for kMostSymbolBytes of each, and for two bytes.
+  /// symbols: number of puts that follow. out: room for kMostSymbolBytes of each, and two bytes.
   void start(size_t symbols, uint8_t* out) {
     std::fill_n(states_, kStates, kStateLow);
     next_ = symbols, out_ = out;
   }
-  /// bits: raw ones, of z + 8.
+  /// bits: number of raw bits, taken from z + 8.
   void put(EncodeEntry entry, uint32_t z, unsigned bits) {
     uint32_t& x = states_[--next_ % kStates];
     const uint32_t v = z + 8;
@@ -64,7 +64,7 @@ class SymbolEncoder {
     x += quotient * (kFrequencyOne - entry.frequency) + entry.start;
   }
   uint8_t* end() const { return out_; }
-  /// After the last symbol: kStateBytes.
+  /// To be called after the last symbol: writes kStateBytes.
   void put_states(uint8_t* to) const { std::memcpy(to, states_, kStateBytes); }
   bool at_rest() const {
     return std::all_of(states_, states_ + kStates, [](uint32_t x) { return x == kStateLow; });
@@ -88,7 +88,7 @@ class SymbolEncoder {
 /// Takes symbols, the first one first, from words, the last one first.
 class SymbolDecoder {
  public:
-  /// states: what put_states() wrote; null: they are at rest. False where one is out of range.
+  /// states: kStateBytes of put_states(); null: all at rest. False: one is out of range.
   [[nodiscard]] bool start(const uint8_t* states) {
     std::fill_n(states_, kStates, kStateLow);
     if (states != nullptr) std::memcpy(states_, states, kStateBytes);
@@ -98,8 +98,8 @@ class SymbolDecoder {
   bool at_rest() const {
     return std::all_of(states_, states_ + kStates, [](uint32_t x) { return x == kStateLow; });
   }
-  /// `count` symbols from the words [begin, end): table is that of make_decode_tables(), tokens below `first` have no
-  /// raw bits. Returns false if words are missing; `end` becomes the end of what is left.
+  /// Decodes `count` symbols from the words [begin, end). table: of make_decode_tables(); tokens below `first` have no
+  /// raw bits. Returns false if words are missing; sets `end` to the end of the words that remain.
   [[nodiscard]] bool get(const uint32_t* table, const uint8_t* contexts, size_t count, unsigned first, uint8_t* tokens,
                          uint32_t* z, const uint8_t* begin, const uint8_t*& end) {
     const bool plenty = static_cast<size_t>(end - begin) >= kMostSymbolBytes * count;

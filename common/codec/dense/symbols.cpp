@@ -23,9 +23,9 @@ void find_contexts(SymbolPlane& plane, const TileShape& shape, size_t y) {
     out[x] = static_cast<uint8_t>(kPlaneContexts[size_t{above[x]} * 16 + above[x + 1]] >> plane.scale.merges);
 }
 
-// Chooses from some covered pixels of some rows.
+// Chooses the scale from a sample of covered pixels.
 ContextScale choose_scale(const SymbolPlane& plane, const TileShape& shape) {
-  constexpr size_t kMostSum = 16 * (kNumberTokens - 1);  // of a number's tokens with weights 3, 2, 2, 1 and 4, 2, 2
+  constexpr size_t kMostSum = 16 * (kNumberTokens - 1);  // a number's tokens with weights 3, 2, 2, 1, 4, 2, 2
   constexpr uint32_t kEnough = 500;
   std::vector<uint32_t> sums;
   uint32_t total = 0;
@@ -75,7 +75,7 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
 
 void TileShape::add_runs(const uint64_t* words) {
   const auto end = static_cast<uint32_t>(width);
-  uint32_t begin = end;  // of the run that has not ended
+  uint32_t begin = end;  // begin of the current run; `end`: no run is open
   for (uint32_t at = 0; at < end; at += 64) {
     uint64_t changes = words[at / 64] ^ (words[at / 64] << 1 | uint64_t{begin != end});
     for (; changes != 0; changes &= changes - 1) {
@@ -134,7 +134,7 @@ void PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, siz
   const uint8_t *const tokens = plane.tokens.row(r), *const contexts = plane.contexts.row(r);
   const uint32_t* const z = plane.z.row(r);
   const unsigned first = plane.first;
-  SymbolEncoder coder = out;  // a copy, which the bytes that it writes cannot alias
+  SymbolEncoder coder = out;  // a local copy, which the written bytes cannot alias
   shape.for_each_run_back(y, [&](size_t begin, size_t x) {
     while (x-- > begin) {
       const unsigned token = tokens[x], bits = (std::max(token, first) - first) >> 3;

@@ -13,7 +13,7 @@
 
 namespace telesplat::codec::detail {
 
-/// Which pixels of a tile are coded.
+/// The covered pixels of a tile: only they are coded.
 struct TileShape {
   size_t width = 0, height = 0;
   const Mask* mask = nullptr;     ///< null: all pixels are covered
@@ -22,25 +22,25 @@ struct TileShape {
   struct Run {
     uint32_t begin, end;
   };
-  std::vector<Run> runs;            ///< of covered pixels, of rows that are not full
+  std::vector<Run> runs;            ///< runs of covered pixels, in rows that are not full
   std::vector<uint32_t> first_run;  ///< index of each row's first run; one more entry marks the end
 
   void reset(size_t tile_width, size_t tile_height, const Mask* tile_mask);
   bool full(size_t y) const { return covered[y] == width; }
   bool at(size_t x, size_t y) const { return mask == nullptr || mask->at(static_cast<int>(x), static_cast<int>(y)); }
-  /// Calls f(begin, end) for the runs of pixels of row y that are covered.
+  /// Calls f(begin, end) for each run of covered pixels of row y.
   template <class F>
   void for_each_run(size_t y, F f) const {
     if (full(y)) return f(size_t{0}, width);
     for (size_t i = first_run[y]; i < first_run[y + 1]; ++i) f(size_t{runs[i].begin}, size_t{runs[i].end});
   }
-  /// The same from the last one to the first.
+  /// Calls f for the same runs, from the last one to the first.
   template <class F>
   void for_each_run_back(size_t y, F f) const {
     if (full(y)) return f(size_t{0}, width);
     for (size_t i = first_run[y + 1]; i-- > first_run[y];) f(size_t{runs[i].begin}, size_t{runs[i].end});
   }
-  /// Calls f(begin, end) for the runs between them.
+  /// Calls f(begin, end) for the runs of pixels between them.
   template <class F>
   void for_each_gap(size_t y, F f) const {
     size_t from = 0;
@@ -55,27 +55,27 @@ struct TileShape {
   void add_runs(const uint64_t* words);
 };
 
-/// Symbols of one plane: tokens, their contexts, and the numbers that they stand for.
+/// Symbols of one plane: tokens, their contexts, and the numbers that they represent.
 struct SymbolPlane {
-  /// bytes: numbers are below 256, else below 2^24. Tokens below `first_number` are no numbers.
+  /// bytes: numbers are below 256, else below 2^24. Tokens below `first_number` are hits, without a number.
   void reset(const TileShape& shape, bool bytes, unsigned first_number = 0);
 
   Plane<uint8_t> tokens, contexts;
-  Plane<uint8_t> kinds;  ///< of tokens of planes (`first` is kHits): their contexts follow from those above
+  Plane<uint8_t> kinds;  ///< kinds of tokens of planes (`first` is kHits): they choose the contexts of the row below
   Plane<uint32_t> z;     ///< numbers
   unsigned first = 0, alphabet = 0;
-  const Plane<uint8_t>* other = nullptr;  ///< tokens of the same pixels that are known before
+  const Plane<uint8_t>* other = nullptr;  ///< tokens of the same pixels in a plane known before
   ContextScale scale;
 };
 
-/// Gives pixels that are not covered the tokens above them, and borders those beside them.
+/// Sets pixels that are not covered to the tokens above them, and borders to their neighbours.
 void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y);
 
 /// Chooses contexts and tables of one plane, and puts them into `bits`.
 class PlaneEncoder {
  public:
   void prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits);
-  /// The row's symbols, the last one first.
+  /// Puts the row's symbols, the last one first.
   void put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, SymbolEncoder& out) const;
   static constexpr size_t kMostBits = 32 + kMostLevelBits;
 
@@ -94,7 +94,7 @@ struct WordSource {
 class PlaneDecoder {
  public:
   [[nodiscard]] bool prepare(SymbolPlane& plane, BitReader& bits);
-  /// Row y of the plane's tokens and numbers, those before being known. False where words are missing.
+  /// Decodes row y of the plane; earlier rows must be known. False: words are missing.
   [[nodiscard]] bool get_row(SymbolPlane& plane, const TileShape& shape, size_t y, WordSource& source) const;
 
  private:
@@ -102,7 +102,7 @@ class PlaneDecoder {
   std::vector<uint32_t> tables_;
 };
 
-/// The finest classes that nearly all of `total` sums fit into. sums: how often each came.
+/// Returns the finest classes that nearly all of `total` sums fit into. sums[v]: number of sums of value v.
 ContextScale scale_of(std::span<const uint32_t> sums, uint32_t total);
 inline constexpr unsigned kBiasBits = 13, kShiftBits = 4;
 inline constexpr int kMostShift = 14;

@@ -9,18 +9,18 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr uint32_t kSteps[4] = {64, 76, 91, 108};  // of weights of four levels, which double then
+constexpr uint32_t kSteps[4] = {64, 76, 91, 108};  // weights of levels 2 to 5; every fourth level doubles
 
-// In 256ths of a frequency, beyond the 1 that every token has.
+// The weight of a level, in 256ths of a frequency, beyond the 1 that every token has.
 constexpr uint32_t weight_of(unsigned level) { return level < 2 ? 0 : kSteps[(level - 2) & 3] << ((level - 2) >> 2); }
 
-// The level whose weight is nearest, by ratio.
+// Returns the level whose weight is nearest, by ratio.
 unsigned level_of(uint32_t weight) {
-  // By the seven bits after the highest one: how many geometric means of steps are below.
+  // Looks up the seven bits after the highest one: number of geometric means of steps that lie below.
   static constexpr auto kNearest = [] {
     std::array<uint8_t, 128> out{};
     for (uint32_t i = 0; i < out.size(); ++i) {
-      const uint32_t w = 2 * (128 + i) + 1;  // the middle of those that have these bits, in quarters of a step's unit
+      const uint32_t w = 2 * (128 + i) + 1;  // middle of the weights with these bits, in quarters of a step's unit
       for (uint32_t k = 0; k < 4; ++k) {
         const uint64_t next = k == 3 ? 2 * kSteps[0] : kSteps[k + 1];
         out[i] = static_cast<uint8_t>(out[i] + (uint64_t{w} * w >= 16 * kSteps[k] * next));
@@ -35,7 +35,7 @@ unsigned level_of(uint32_t weight) {
   return std::min(2 + 4 * (bits - 7) + kNearest[after], kLevels - 1u);
 }
 
-// What a level is expected to be: from the token before and, but for the first context, what that context has.
+// Predicts a level from the tokens before it and, except in the first context, from the context before.
 struct Expected {
   const std::array<uint8_t, kSymbols>* before;
   int left = 0, left2 = 0;
@@ -52,13 +52,13 @@ struct Expected {
 
 constexpr uint32_t kFirstMean = 4;
 
-// Walks the levels alike for both directions: code(difference, context) -> difference; false ends it.
+// Walks the levels, for both directions of coding: code(difference, context) -> difference. False: a level is invalid.
 template <class Code>
 bool for_each_level(TokenLevels& levels, Code code) {
   GolombContext lengths, first, later;
   lengths.start(8), first.start(kFirstMean), later.start(kFirstMean);
   const std::array<uint8_t, kSymbols>* before = nullptr;
-  int length = 0;  // tokens up to the last one that has a level
+  int length = 0;  // number of tokens up to the last with a level
   for (auto& of : levels.of) {
     int own = static_cast<int>(levels.alphabet);
     while (own > 0 && of[static_cast<size_t>(own - 1)] == 0) --own;
@@ -79,18 +79,18 @@ bool for_each_level(TokenLevels& levels, Code code) {
   return true;
 }
 
-constexpr unsigned kMostOfNone = 12;  // the largest level of a token that never comes
-constexpr uint32_t kMany = 70;        // tokens from which on only the ideal level pays
+constexpr unsigned kMostOfNone = 12;  // largest level of a token that does not occur
+constexpr uint32_t kMany = 70;        // from this count on only the ideal level pays
 
-// Bits of a level that is `steps` from what is expected.
+// Bits of a level that is `steps` from its prediction.
 constexpr int kMostStepsThatCost = 6;
 constexpr float cost_of(int steps) { return 1.5f * static_cast<float>(std::min(steps, kMostStepsThatCost)); }
 
-// The level between `ideal` and what is expected that costs the fewest bits: d steps from the ideal one cost `count`
-// tokens 0.0216 d^2 bits each.
+// The level between `ideal` and `expected` that costs the fewest bits: d steps away from the ideal one, `count` tokens
+// cost 0.0216 d^2 bits more each.
 int nearer_level(uint32_t count, int ideal, int expected) {
   constexpr float kLoss = 0.0216f;
-  // How many steps pay: the next one costs (2 d + 1) kLoss count more.
+  // Number of steps that pay, by count: one more costs (2 d + 1) kLoss count.
   static constexpr auto kThatPay = [] {
     std::array<uint8_t, kMany> out{};
     for (uint32_t n = 1; n < out.size(); ++n)
@@ -99,7 +99,7 @@ int nearer_level(uint32_t count, int ideal, int expected) {
   }();
   const int towards = std::max(expected, 1), most = std::abs(ideal - towards), apart = std::abs(ideal - expected);
   int d = std::min<int>(kThatPay[count], most);
-  if (apart > kMostStepsThatCost) {  // the first steps save nothing
+  if (apart > kMostStepsThatCost) {  // below kMostStepsThatCost steps nothing is saved
     d = std::min(std::max(d, apart - kMostStepsThatCost), most);
     const float n = static_cast<float>(count), off = static_cast<float>(d);
     if (kLoss * n * off * off + cost_of(apart - d) >= cost_of(apart)) d = 0;
@@ -107,7 +107,7 @@ int nearer_level(uint32_t count, int ideal, int expected) {
   return towards < ideal ? ideal - d : ideal + d;
 }
 
-// The level of a token that never comes: none, or one that is near to what is expected.
+// The level of a token that does not occur: 0, or one near the prediction.
 int level_of_none(uint64_t total, int expected) {
   static constexpr auto kWeights = [] {
     std::array<float, kMostOfNone + 1> out{};
@@ -125,8 +125,8 @@ int level_of_none(uint64_t total, int expected) {
   return best;
 }
 
-// The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
-// share_of_one: of a count of 1, in 256ths of a frequency.
+// The level of a token that occurs `count` times in `total`: near the prediction if few bits depend on it.
+// share_of_one: frequency of one occurrence, in 256ths.
 int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected) {
   if (count == 0) return level_of_none(total, expected);
   const auto share = static_cast<uint32_t>(count * share_of_one);
@@ -134,9 +134,9 @@ int choose_level(uint32_t count, uint64_t total, double share_of_one, int expect
   return count >= kMany ? ideal : nearer_level(count, ideal, expected);
 }
 
-constexpr double kTokenCost = 6;  // bits of a level
+constexpr double kTokenCost = 6;  // bits of a token's level in a table
 
-// n log2 n.
+// Returns n log2 n.
 float entropy_of(uint32_t n) {
   static const auto table = [] {
     std::array<float, 4096> out{};
@@ -231,7 +231,7 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
     if (levels[t] != 0) total += weight_of(levels[t]), ++present, last = t;
   if (present == 0) return;
   const uint32_t free = kFrequencyOne - present;
-  // Products are below 2^53, so that quotients are rounded down as those of integers are. Doubles are divided faster.
+  // Products are below 2^53, so that quotients of doubles are rounded down like those of integers, and divide faster.
   static_assert(uint64_t{kSymbols} * weight_of(kLevels - 1) * kFrequencyOne < uint64_t{1} << 53);
   uint64_t sum = 0;
   uint32_t given = 0;
@@ -243,7 +243,7 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
     out[t] = static_cast<uint16_t>(1 + upto - given);
     given = upto;
   }
-  out[last] = static_cast<uint16_t>(out[last] + free - given);  // where all weigh nothing
+  out[last] = static_cast<uint16_t>(out[last] + free - given);  // if all weights are 0
 }
 
 void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out) {

@@ -1,9 +1,9 @@
-// What bounded streams leave out.
-//   refinement = magic, version, varint width, varint height; of each tile in which something is: u8 kind, and
-//     kSame: nothing, all pixels are as they are known
+// Refinements: the difference between an exact image and a bounded one.
+//   refinement = magic, version, varint width, varint height; then for each tile with covered pixels: u8 kind, and
+//     kSame: no more bytes, since all pixels equal the known ones
 //     kScattered: reach (varint depth, u8 pole + 8 * normal, u8 colour), and scattered pixels
 //     kAnew: the tile as in a lossless stream
-//   scattered = of the pixels row by row: stored block of bits (depth), [block of bytes (normals)], [3 blocks of bytes
+//   scattered = for the pixels row by row: stored block of bits (depth), [block of bytes (normals)], [3 blocks of bytes
 //     (green, red, blue)]
 #include <fmt/format.h>
 
@@ -30,18 +30,18 @@ using image::DepthImage;
 constexpr uint8_t kMagic = 0xD8, kVersion = 11;
 enum Kind : uint8_t { kSame = 0, kScattered = 1, kAnew = 2 };
 constexpr int kShifts[3] = {8, 16, 0};   // green, red, blue
-constexpr unsigned kMostDepthBits = 25;  // of a scattered pixel
-constexpr size_t kPlentyBits = 8;        // a pixel, from which on a tile is tried anew
+constexpr unsigned kMostDepthBits = 25;  // bits of a scattered pixel's depth
+constexpr size_t kPlentyBits = 8;        // bits a pixel; above, coding the tile anew is tried
 
-/// How far the exact pixels of a tile are from those that are known.
+/// Largest difference between the exact and the known pixels of a tile.
 struct Reach {
-  uint32_t depth = 0;  ///< a code c is known within floor(c * depth / 2^32)
-  int pole = 0;        ///< by which normals are turned: 0 to kPoles - 1
-  int normal = 0;      ///< of each coordinate on that map
-  int colour = 0;      ///< of each channel
+  uint32_t depth = 0;  ///< a code c differs by at most floor(c * depth / 2^32)
+  int pole = 0;        ///< pole that turns the normals: 0 to kPoles - 1
+  int normal = 0;      ///< largest difference of each coordinate on that map
+  int colour = 0;      ///< largest difference of each channel
   bool none() const { return depth == 0 && normal == 0 && colour == 0; }
 
-  /// Between which codes the exact one lies.
+  /// Range of the exact code.
   struct Codes {
     uint32_t low, high;
   };
@@ -72,7 +72,7 @@ Scratch& scratch() {
   return s;
 }
 
-// What is covered, into s.mask and s.covered.
+// Sets s.mask and s.covered from the covered pixels.
 void look_at_mask(Scratch& s, const DepthImage& image, const TileRect& rect) {
   s.mask.reset(rect.width, rect.height);
   for (int y = 0; y < rect.height; ++y)
@@ -80,7 +80,7 @@ void look_at_mask(Scratch& s, const DepthImage& image, const TileRect& rect) {
   s.covered = s.mask.count();
 }
 
-// f(index) of each covered pixel, row by row.
+// Calls f(index) for each covered pixel, row by row.
 template <class F>
 void for_each_covered(const Scratch& s, const TileRect& rect, F f) {
   for (int y = 0; y < rect.height; ++y) {
@@ -89,12 +89,12 @@ void for_each_covered(const Scratch& s, const TileRect& rect, F f) {
   }
 }
 
-// How far two normals, both turned, are from each other.
+// Largest difference between the coordinates of two turned normals.
 int distance(uint16_t p, uint16_t q) {
   return std::max(std::abs((p & 255) - (q & 255)), std::abs((p >> 8) - (q >> 8)));
 }
 
-// Nothing where normals are too far from each other on each map, or not canonical.
+// False: normals differ by more than ErrorBounds::kMostNormal on each map, or are not canonical.
 bool reach_of_normals(const Scratch& s, const TileRect& rect, const DepthImage& exact, const DepthImage& known,
                       Reach& reach) {
   uint32_t differ = 0;
@@ -119,7 +119,7 @@ bool reach_of_normals(const Scratch& s, const TileRect& rect, const DepthImage& 
   const auto turned = [&](uint16_t code) { return detail::turn_normal(code, reach.pole); };
   int largest = 0;
   for (int y = 0; y < rect.height; ++y) {
-    const size_t row = rect.index(0, y);  // what is not covered is alike
+    const size_t row = rect.index(0, y);  // pixels that are not covered are equal
     for (size_t x = 0; x < static_cast<size_t>(rect.width); ++x)
       largest = std::max(largest, distance(turned(exact.normal[row + x]), turned(known.normal[row + x])));
   }
@@ -127,11 +127,11 @@ bool reach_of_normals(const Scratch& s, const TileRect& rect, const DepthImage& 
   return largest <= ErrorBounds::kMostNormal;
 }
 
-// False where the exact tile is so far from what is known that this says little.
+// False: the differences exceed the limits of ErrorBounds, so that known pixels help little.
 bool reach_of(const Scratch& s, const TileRect& rect, const DepthImage& exact, const DepthImage& known, Reach& reach) {
-  int32_t share_bits = 0, colour = 0;  // numbers that are not negative have the order of their bits
+  int32_t share_bits = 0, colour = 0;  // bits of floats that are not negative have the floats' order
   for (int y = 0; y < rect.height; ++y) {
-    const size_t row = rect.index(0, y);  // what is not covered is alike
+    const size_t row = rect.index(0, y);  // pixels that are not covered are equal
     const uint32_t *const a = exact.depth.data() + row, *const b = known.depth.data() + row;
     const uint32_t *const p = exact.colour.data() + row, *const q = known.colour.data() + row;
     for (size_t x = 0; x < static_cast<size_t>(rect.width); ++x) {
@@ -147,11 +147,11 @@ bool reach_of(const Scratch& s, const TileRect& rect, const DepthImage& exact, c
   const auto share = static_cast<double>(std::bit_cast<float>(share_bits));
   if (share * 4294967296.0 >= ErrorBounds::kMostDepth || colour > ErrorBounds::kMostColour) return false;
   if (share > 0)
-    reach.depth = static_cast<uint32_t>(share * 4294967296.0 * (1 + 1e-6)) + 1;  // not less: shares are rounded
+    reach.depth = static_cast<uint32_t>(share * 4294967296.0 * (1 + 1e-6)) + 1;  // a rounded share may be too small
   return reach_of_normals(s, rect, exact, known, reach);
 }
 
-// A number of `count`, which all are as likely: with two lengths that differ by a bit.
+// Codes a number below `count`, all equally likely: in two lengths that differ by a bit.
 struct Even {
   explicit Even(uint32_t count)
       : bits(static_cast<unsigned>(std::bit_width(count)) - 1), short_ones((2u << bits) - count) {}
@@ -252,7 +252,7 @@ void put_tile(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exact, co
   out.push_back(static_cast<uint8_t>(reach.pole + 8 * reach.normal));
   out.push_back(static_cast<uint8_t>(reach.colour));
   put_scattered(s, out, exact, known, rect, reach);
-  // Wide bounds may leave so much that neighbours say more.
+  // With wide bounds, predicting from neighbours may take fewer bytes.
   if (8 * (out.size() - begin) <= kPlentyBits * s.covered) return;
   std::vector<uint8_t> anew{kAnew};
   detail::put_tile(anew, exact, rect, TileBounds({}));
@@ -266,7 +266,7 @@ std::optional<Reach> get_reach(Reader& in) {
   const auto normal = in.u8(), colour = in.u8();
   if (!colour) return std::nullopt;
   const Reach reach{*depth, *normal % 8, *normal / 8, *colour};
-  // A share that is rounded up may be a little more than a bound.
+  // A share that was rounded up may slightly exceed a bound.
   const bool known = reach.depth <= 2 * ErrorBounds::kMostDepth && reach.pole < detail::kPoles &&
                      reach.normal <= ErrorBounds::kMostNormal && reach.colour <= ErrorBounds::kMostColour;
   return known && !reach.none() ? std::optional(reach) : std::nullopt;

@@ -1,4 +1,4 @@
-// What is fitted decides which bytes a tile becomes: compiled without contraction, as what predicts (CMakeLists.txt).
+// The fit decides the bytes of a tile: compiled without contraction, like the predictions (CMakeLists.txt).
 #include "common/codec/sparse/ramp.h"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-// The share of colours' changes along rows that their changes from one height to the next may reach.
+// Limit of the colours' changes from one height to the next, as a share of their changes along rows.
 constexpr double kMostOfRows = 0.5;
 
 void put_i32(std::vector<uint8_t>& out, int32_t value) {
@@ -21,7 +21,7 @@ uint32_t bits_of(int distance) {
   return std::min(static_cast<uint32_t>(std::bit_width(static_cast<uint32_t>(distance) >> 3)), Ramp::kNothing - 1);
 }
 
-// From one colour to another, `part` of `whole` of the way, each channel rounded.
+// Interpolates from one colour to another, `part` of `whole` of the way; rounds each channel.
 uint32_t between(uint32_t from, uint32_t to, int part, int whole) {
   uint32_t out = 0;
   for (int shift = 0; shift < 24; shift += 8) {
@@ -43,7 +43,7 @@ using Axis = std::array<double, 3>;
 
 double height_of(const Axis& axis, const RampSample& s) { return (axis[0] * s.x + axis[1] * s.y + axis[2]) / s.code; }
 
-// How much colours change from one height to the next; heights become those of the samples, from below.
+// Sums the changes of colour from one height to the next. Sets `heights` to the samples' heights, in rising order.
 double roughness(const Axis& axis, const std::vector<RampSample>& samples,
                  std::vector<std::pair<double, uint32_t>>& heights) {
   heights.clear();
@@ -69,7 +69,7 @@ std::optional<RampAxis> fit_ramp(const RoomAxes& axes, const std::vector<RampSam
       least = rough, axis = candidate, by_height = heights;
   if (by_height.empty()) return std::nullopt;
   const double low = by_height.front().first, high = by_height.back().first;
-  // As precise as 31 bits are, and as many steps as there are heights at most.
+  // Uses the precision of 31 bits, and at most as many steps as there are heights.
   const double largest = std::max({std::abs(axis[0]), std::abs(axis[1]), std::abs(axis[2])});
   const double most = std::abs(axis[0]) * width + std::abs(axis[1]) * height + std::abs(axis[2]);
   if (!(largest > 0 && high > low)) return std::nullopt;

@@ -1,5 +1,5 @@
-// Colours of scattered pixels where a ramp gave them: pixels at like heights in the room have like colours, however far
-// apart they lie. What is known of one says that of the next one at about its height.
+// Colours of scattered pixels that a ramp coloured: pixels at similar heights in the room have similar colours, even if
+// they lie far apart. A known colour predicts the next one at about its height.
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@
 
 namespace telesplat::codec::detail {
 
-/// A pixel's height is floor((a x + b y + c) 2^shift / depth code) - low, kept within 0 and kMost; x and y are counted
-/// from the tile's centre. In the picture, a coordinate of room space is such a quotient.
+/// A pixel's height is floor((a x + b y + c) 2^shift / depth code) - low, limited to 0 to kMost; x and y are counted
+/// from the tile's centre. A coordinate of room space has this form.
 struct RampAxis {
   static constexpr int kMost = 16383, kMostShift = 23;
-  static constexpr int64_t kMostSum = int64_t{1} << 39;  ///< of |a| width + |b| height + |c|
+  static constexpr int64_t kMostSum = int64_t{1} << 39;  ///< largest |a| width + |b| height + |c|
   int32_t a = 0, b = 0, c = 0, low = 0;
   int shift = 0;
 
@@ -29,20 +29,20 @@ struct RampAxis {
   }
 };
 
-/// A pixel of which depth and colour are known; x and y from the tile's centre.
+/// A pixel with known depth and colour; x and y from the tile's centre.
 struct RampSample {
   double x, y, code;
   uint32_t colour;
 };
 
-/// The axis of the room, counted from the tile's centre, along which colours of samples change least; nothing where
-/// none explains them. width, height: of the tile.
+/// The axis of the room, counted from the tile's centre, along which colours of samples change least; nothing if no
+/// axis explains them. width, height: of the tile.
 std::optional<RampAxis> fit_ramp(const RoomAxes& axes, const std::vector<RampSample>& samples, int width, int height);
 void put_ramp(std::vector<uint8_t>& out, const RampAxis& axis);
-/// Nothing where the stream is damaged. width, height: of the tile.
+/// Nothing: the stream is damaged. width, height: of the tile.
 std::optional<RampAxis> get_ramp(Reader& in, int width, int height);
 
-/// What is known of a tile's colours by height.
+/// The known colours of a tile, by height.
 class Ramp {
  public:
   /// width, height: of the tile.
@@ -57,10 +57,10 @@ class Ramp {
   static constexpr uint32_t kNothing = 11;
   struct Said {
     uint32_t colour = 0;
-    /// Bits of the distance in heights between the two colours that were used; kNothing: no colour is known.
+    /// Bits of the distance in heights between the two colours used; kNothing: no colour is known.
     uint32_t gap = kNothing;
   };
-  /// What is between those below and above.
+  /// Interpolates between the known colours below and above.
   Said at(int height) const;
   void add(int height, uint32_t colour) {
     const auto cell = static_cast<size_t>(height >> kCellBits);
@@ -79,7 +79,7 @@ class Ramp {
 
   RampAxis axis_;
   int x0_ = 0, y0_ = 0;
-  std::array<Known, kCells> known_;  // the last one of each cell
+  std::array<Known, kCells> known_;  // the last colour of each cell
   std::array<uint64_t, kCells / 64> taken_{};
 };
 

@@ -1,5 +1,5 @@
 // Encoder and decoder must predict alike on every machine: this file is compiled without contraction of products and
-// sums, and its operations are those whose rounding IEEE 754 prescribes.
+// sums, and uses only operations whose rounding IEEE 754 prescribes.
 #include "common/codec/sparse/scatter.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr float kFlatten = 1e-3f;  // pulls slopes to 0 where neighbours lie on a line; 1e-1 to 1e-4 were tried
+constexpr float kFlatten = 1e-3f;  // pulls slopes to 0 if neighbours lie on a line; 1e-1 to 1e-4 were tried
 
 using Four = float __attribute__((vector_size(16)));
 constexpr size_t kMost = ScatterWalk::kMostNeighbours;
@@ -23,7 +23,7 @@ Four load(const float* p) {
   return v;
 }
 
-// Distance to the power of -3, of -2 to -4 the best; by its square.
+// Returns the distance to the power of -3, the best of -2 to -4; takes its square.
 float near_weight(uint32_t square) { return 1 / (static_cast<float>(square) * std::sqrt(static_cast<float>(square))); }
 constexpr uint32_t kWeights = 1024;
 const auto kWeightOf = [] {
@@ -32,7 +32,7 @@ const auto kWeightOf = [] {
   return out;
 }();
 
-// Each rounded, within [lo, hi], also where it is no number.
+// Rounds each number and limits it to [lo, hi]; NaN becomes lo.
 using FourInt = int __attribute__((vector_size(16)));
 FourInt rounded(Four v, Four lo, Four hi) {
   const Four inside = v > lo ? (v < hi ? v : hi) : lo;
@@ -40,11 +40,11 @@ FourInt rounded(Four v, Four lo, Four hi) {
 }
 
 struct Near {
-  float x[kMost], y[kMost], weight[kMost], depth[kMost];  // relative to what is predicted; to the nearest
+  float x[kMost], y[kMost], weight[kMost], depth[kMost];  // relative to the predicted pixel; depth: to the nearest
   size_t count;
 };
 
-// Weighted sums over neighbours: (1, x, y, depth) by 1, x and y. What solves the normal equations of
+// Weighted sums over neighbours: (1, x, y, depth) by 1, x and y. They solve the normal equations of
 // depth = a + b x + c y: a is row . (sum of depth, of x depth, of y depth).
 struct Moments {
   explicit Moments(const Near& near) {
@@ -68,7 +68,7 @@ struct Moments {
 void ScatterWalk::start(const Mask& mask) {
   for (int level = 0; level < kLevels; ++level) {
     Grid& grid = grids_[static_cast<size_t>(level)];
-    if (coded_.size() > grid.pixels.size() / 16)  // of the tile before
+    if (coded_.size() > grid.pixels.size() / 16)  // clears the cells of the tile before
       std::fill(grid.pixels.begin(), grid.pixels.end(), kNone);
     else
       for (const Place p : coded_) cell(level, p) = kNone;
@@ -84,7 +84,7 @@ void ScatterWalk::start(const Mask& mask) {
     });
 }
 
-// Has no branches: processors would mispredict them.
+// Appends the pixels of the ring around p. Without branches: processors would mispredict them.
 void ScatterWalk::add_ring(int level, Place p) {
   const size_t stride = grids_[static_cast<size_t>(level)].stride;
   const uint16_t* row = &cell(level, p) - stride - 1;
@@ -95,7 +95,7 @@ void ScatterWalk::add_ring(int level, Place p) {
     }
 }
 
-// Pixels of the ring of a coarser level that do not lie in the ring of level `inner`, where they have been found.
+// Appends pixels of a coarser level's ring that lie outside the ring of level `inner`, which was searched before.
 void ScatterWalk::add_outer_ring(int level, int inner, Place p) {
   const size_t stride = grids_[static_cast<size_t>(level)].stride;
   const uint16_t* row = &cell(level, p) - stride - 1;
@@ -112,7 +112,7 @@ void ScatterWalk::add_outer_ring(int level, int inner, Place p) {
   found_count_ = std::min(found_count_, kMostNeighbours);
 }
 
-// Five are enough (bytes, of 3 to 7 tried), for they lie all around in most places.
+// Five neighbours are enough (3 to 7 were tried for bytes): in most places they lie all around.
 void ScatterWalk::look_around(int level, Place p) {
   found_count_ = 0;
   if (coded_.empty()) return;
@@ -156,7 +156,7 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
     const Known& k = known_[neighbours[i]];
     const int dx = k.x - x, dy = k.y - y;
     const uint32_t square = static_cast<uint32_t>(dx) * static_cast<uint32_t>(dx) +
-                            static_cast<uint32_t>(dy) * static_cast<uint32_t>(dy);  // below 2^32: a tile is that small
+                            static_cast<uint32_t>(dy) * static_cast<uint32_t>(dy);  // below 2^32: tiles are small
     near.x[i] = static_cast<float>(dx), near.y[i] = static_cast<float>(dy);
     near.weight[i] = square < kWeights ? kWeightOf[square] : near_weight(square);
     if (square < least) least = square, nearest = &k;
@@ -165,7 +165,7 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
 
   const Moments moments(near);
   const Four at = load(&nearest->depth), colour_at = load(nearest->colour);
-  const Four most{1e30f, 127.5f, 127.5f, 1e30f}, turn{0, 256, 256, 0};  // a normal's bytes wrap: the shorter way
+  const Four most{1e30f, 127.5f, 127.5f, 1e30f}, turn{0, 256, 256, 0};  // a normal's bytes wrap: takes the shorter way
   Four sum = {}, colour = {}, sizes = {}, mean = {}, squares = {};
   for (size_t i = 0; i < near.count; ++i) {
     const Known& k = known_[neighbours[i]];

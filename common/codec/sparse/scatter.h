@@ -1,4 +1,4 @@
-// Sparse tiles: the order in which scattered pixels are coded, and what predicts each from those before it.
+// Sparse tiles: the order in which scattered pixels are coded, and the prediction of each from earlier ones.
 //
 // Order: from coarse to fine. On the way from cells of 128 x 128 pixels down to single pixels, a cell without a coded
 // pixel has its first one coded. So most pixels have coded ones on all sides, as near as the mask allows, and are
@@ -25,8 +25,8 @@ class ScatterWalk {
  public:
   static constexpr size_t kMostNeighbours = 16;
 
-  /// Calls f(x, y, neighbours) -> bool for every pixel until one is false; returns whether none was. neighbours: which
-  /// of the pixels before, counted in the order of the walk, lie around it.
+  /// Calls f(x, y, neighbours) -> bool for every pixel until one returns false; returns true if none did. neighbours:
+  /// indices, in the order of the walk, of earlier pixels around it.
   template <class F>
   bool operator()(const Mask& mask, F f) {
     start(mask);
@@ -53,7 +53,7 @@ class ScatterWalk {
   struct Place {
     uint16_t x, y;
   };
-  // Which pixel stands for each cell; a border of empty cells all around. It is the first that was coded there.
+  // The first coded pixel in each cell, with a border of empty cells all around.
   struct Grid {
     size_t stride = 0;
     std::vector<uint16_t> pixels;
@@ -70,12 +70,11 @@ class ScatterWalk {
 
   std::array<Grid, kLevels> grids_;
   std::vector<Place> coded_, left_;
-  std::array<uint16_t, kMostNeighbours + 9> found_;  // what a ring appends may have to be cut off
+  std::array<uint16_t, kMostNeighbours + 9> found_;  // the last ring appended may be cut off
   size_t found_count_ = 0;
 };
 
-/// How wrong predictions were: of depth and of the normal's bytes by error_log(), of the colour the bits of its largest
-/// residual.
+/// Sizes of prediction errors: error_log() for depth and the normal's bytes, bits of its largest residual for colour.
 struct Magnitudes {
   uint8_t depth = 0, normal[2] = {0, 0}, colour = 0;
 };
@@ -83,16 +82,16 @@ struct Magnitudes {
 struct Guess {
   int depth = 0, normal[2] = {0, 0};  ///< in 16ths of a code
   uint32_t colour = 0;
-  Magnitudes expected;        ///< as those of the neighbours were
-  uint32_t plain_colour = 0;  ///< 0..3: how many neighbours had colours as predicted, from none to all
-  uint32_t distance = 1;      ///< the square of that to the nearest neighbour, at most kMostDistance
+  Magnitudes expected;        ///< means of the neighbours' magnitudes
+  uint32_t plain_colour = 0;  ///< 0..3: share of neighbours whose colours were as predicted, from none to all
+  uint32_t distance = 1;      ///< square of the distance to the nearest neighbour, at most kMostDistance
   bool few = true;            ///< there are fewer than three neighbours
-  int spread[3] = {0, 0, 0};  ///< of the neighbours' depths and normals' bytes, the standard deviation; 16ths
-  int slope = 0;              ///< how far the plane lies from the neighbours' mean depth; 16ths
+  int spread[3] = {0, 0, 0};  ///< standard deviation of the neighbours' depths and normals' bytes; 16ths
+  int slope = 0;              ///< distance of the plane from the neighbours' mean depth; 16ths
   static constexpr uint32_t kMostDistance = 1u << 20;
 };
 
-/// What is known of the pixels that were coded, in the order of the walk.
+/// Predicts pixels from those that were coded before, in the order of the walk.
 class ScatterPredictor {
  public:
   void start(const Pixel& base) {
@@ -103,9 +102,9 @@ class ScatterPredictor {
   void add(int x, int y, const Pixel& pixel, const Magnitudes& magnitudes);
 
  private:
-  // All numbers are whole ones, which floats hold exactly.
+  // All numbers are whole; floats hold them exactly.
   struct alignas(64) Known {
-    float depth, normal[2], plain;  // the normal's bytes; 1 where the colour was as predicted
+    float depth, normal[2], plain;  // the normal's bytes; 1 if the colour was as predicted
     float colour[3], none;          // blue, green, red
     float sizes[4];                 // Magnitudes: depth, normal, colour
     int x, y;

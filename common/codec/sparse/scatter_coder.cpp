@@ -13,14 +13,14 @@ unsigned size_of(int residual) {
 uint32_t byte_at(uint32_t word, int i) { return word >> 8 * i & 255; }
 unsigned byte_size(unsigned size) { return std::min<unsigned>(size, ScatterContexts::kByteBits); }
 
-// Green first, the others less what green had, as places of bytes.
+// Green first, then red and blue less green's residual: bytes of a colour.
 constexpr int kChannels[3] = {1, 0, 2};
 
-// What tells how far from its prediction a number is expected to lie: as log8() and error_log() say it.
+// Predicts the spread of a number around its prediction, in units of log8() and error_log().
 struct SpreadContext {
-  int error[3], spread[3], slope;  // of the neighbours
+  int error[3], spread[3], slope;  // figures of the neighbours
   int distance, few;
-  int before[2] = {0, 0};  // errors of this pixel's depth, and of the normal's first byte
+  int before[2] = {0, 0};  // errors of this pixel's depth, and of its normal's first byte
 };
 
 SpreadContext context_of(const Guess& guess, const TileBounds& bounds) {
@@ -34,8 +34,8 @@ SpreadContext context_of(const Guess& guess, const TileBounds& bounds) {
   return out;
 }
 
-// By least bits for walks over two terrains, a head and a bone, half of their images; 256ths. Of depth and of the
-// normal's bytes.
+// Fitted to the least bits on half of the images of walks over two terrains, a head and a bone; 256ths. For depth and
+// for the normal's bytes.
 struct Weights {
   int constant, error, next_error, other_error, coarse_error, distance, few, before[2], spread[3], slope;
 };
@@ -55,14 +55,14 @@ int scale_of(int kind, bool bounded, const SpreadContext& s) {
          w.spread[1] * s.spread[1] + w.spread[2] * s.spread[2] + w.slope * s.slope;
 }
 
-// A number that is predicted, in 16ths.
+// A prediction in 16ths, split into the nearest whole number and the rest.
 struct Predicted {
   explicit Predicted(int sixteenths) : nearest((sixteenths + 8) >> 4), rounding(sixteenths + 8 - 16 * nearest) {}
   int nearest, rounding;
   int error(int64_t residual) const { return error_log(16 * residual + 8 - rounding); }
 };
 
-// Where among a lattice's intervals a depth in 16ths of a code lies, in 16ths.
+// Index of a depth in a lattice; both are in 16ths.
 int on_lattice(const DepthLattice& lattice, int depth) {
   const int code = std::min((depth + 8) >> 4, static_cast<int>(image::kMaxDepthCode));
   const uint32_t index = lattice.index(static_cast<uint32_t>(code));
@@ -72,7 +72,7 @@ int on_lattice(const DepthLattice& lattice, int depth) {
   return 16 * static_cast<int>(index) + (step == 0 ? 0 : static_cast<int>(16 * int64_t{above} / step));
 }
 
-// `depth` and `normal` become what is decoded. False where there is no such number.
+// Codes `depth` and sets it to the decoded value. False: the stream gives an invalid one.
 template <class Coder>
 bool code_depth(ScatterContexts& contexts, const DepthLattice* lattice, const Guess& guess, SpreadContext& context,
                 uint32_t& depth, Magnitudes& out, const Coder& coder) {
@@ -122,7 +122,7 @@ bool is_near(uint32_t a, uint32_t b, int reach) {
   return most <= reach;
 }
 
-// How far blue and red of `colour` are from what is expected of them where green is `green` more than predicted: 0..3.
+// Distance of blue and red of `colour` from their prediction plus `green`, green's difference to its own: 0..3.
 size_t farness(uint32_t colour, uint32_t predicted, int green) {
   int sum = 0;
   for (const int channel : {kChannels[1], kChannels[2]})
@@ -133,7 +133,7 @@ size_t farness(uint32_t colour, uint32_t predicted, int green) {
 
 size_t sign_of(int residual) { return residual < 0 ? 0 : residual == 0 ? 1 : 2; }
 
-// What a pixel's colour is predicted to be, and by which models it is coded.
+// The predicted colour of a pixel, and the models that code it.
 struct ColourGuess {
   uint32_t colour;
   AdaptiveBit* plain;
@@ -146,7 +146,7 @@ ColourGuess guess_colour(ScatterContexts& contexts, const Guess& guess, const Ra
   return {guess.colour, &contexts.plain[guess.plain_colour], &contexts.colour[0][byte_size(guess.expected.colour)]};
 }
 
-// `pixel` has its depth; its colour becomes what is decoded. False where there is no such step.
+// Codes the colour of `pixel`, whose depth is known, and sets it to the decoded one. False: no such step exists.
 template <class Coder>
 bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, Ramp* ramp, int x, int y, Pixel& pixel,
                  Magnitudes& out, const Coder& coder) {
@@ -192,7 +192,7 @@ bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, Ramp*
   return good;
 }
 
-// All of a pixel; false where there is no such one.
+// Codes a whole pixel. False: the stream gives an invalid one.
 template <class Coder>
 bool code_pixel(ScatterContexts& contexts, const TileBounds& bounds, Ramp* ramp, int x, int y, const Guess& guess,
                 Pixel& pixel, Magnitudes& out, const Coder& coder) {

@@ -7,10 +7,10 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kSpreadSteps = 16, kLast = 12 * kSpreadSteps;  // of the spread; the last one that the table tells
+constexpr int kSpreadSteps = 16, kLast = 12 * kSpreadSteps;  // steps of a spread; the table's last step
 
-// The distribution function at 16ths of the spread, in 2^-16. None of these numbers, nor of those below, comes nearer
-// to a half than a thousandth, so that all machines round alike.
+// The distribution function at 16ths of the spread, in 2^-16. All these numbers, and those below, are more than a
+// thousandth away from a half, so that all machines round alike.
 const auto kBelow = [] {
   std::array<uint32_t, kLast + 2> out{};
   for (int i = 0; i <= kLast; ++i) {
@@ -24,7 +24,7 @@ const auto kBelow = [] {
 
 constexpr int kScales = SpreadShares::kMostScale + SpreadShares::kOther + 1;
 
-// 2^20 / spread in 16ths.
+// 2^20 / spread, by scale: 16ths of cells for i = 8 log2.
 const auto kInverse = [] {
   std::array<int, kScales> out{};
   for (int i = 0; i < kScales; ++i)

@@ -1,9 +1,8 @@
-// Numbers that are predicted to a 16th: how far they are expected to lie from there, and the bits of where they do.
-//
-// Residuals of scattered pixels are spread as Student's t with 3 degrees of freedom, nearly, however rough a surface
-// is. How widely follows from what is known: how far neighbours lie and how alike they are, how wrong their predictions
-// were, and how wrong those of this pixel are that came before. So a tile of a hundred pixels has nothing to learn but
-// by how much its scales differ from those of others.
+// Numbers with a prediction in 16ths: their expected distance from it, and the bits of the actual one.
+// Residuals of scattered pixels are nearly distributed as Student's t with 3 degrees of freedom, on rough and smooth
+// surfaces alike. The width follows from known figures: how far neighbours lie, how alike they are, how large their
+// errors were, and the errors of this pixel's earlier numbers. So a tile of a hundred pixels has to learn only how its
+// scales differ from those of others.
 #pragma once
 
 #include <algorithm>
@@ -27,28 +26,28 @@ constexpr int error_log(int64_t sixteenths) {
   return log8(static_cast<uint32_t>(std::min(sixteenths < 0 ? -sixteenths : sixteenths, kMost) + 8));
 }
 
-/// How likely a number lies where, around what is predicted.
+/// Probabilities of a number's cells around its prediction.
 class SpreadShares {
  public:
   static constexpr int kMostScale = 56, kOther = 4;
-  /// scale: 8 log2 of the spread in 16ths, 0 to kMostScale. rounding: what is between the lower edge of cell 0 and the
+  /// scale: 8 log2 of the spread in 16ths, 0 to kMostScale. rounding: distance from the lower edge of cell 0 to the
   /// prediction, 0 to 15, in 16ths of a cell.
   SpreadShares(int scale, int rounding)
       : scale_(scale), rounding_(rounding), reach_(kReach[static_cast<size_t>(scale)]) {}
-  /// Places: below all cells, cells -reach to reach, above all.
+  /// Places: one below all cells, cells -reach to reach, one above all.
   int places() const { return 2 * reach_ + 3; }
   int place(int64_t cell) const {
     return cell < -reach_ ? 0 : cell > reach_ ? places() - 1 : static_cast<int>(cell) + reach_ + 1;
   }
   int reach() const { return reach_; }
-  /// Where a place begins, of kAll; places() is where the last one ends.
+  /// Begin of a place, in kAll; begin(places()) is the end of the last one.
   uint32_t begin(int place) const {
     if (place == 0) return 0;
     if (place == places()) return kAll;
     const uint32_t given = 2 * static_cast<uint32_t>(places());
     return (below(place - reach_ - 1, scale_) * (kAll - given) >> kAllBits) + 2 * static_cast<uint32_t>(place);
   }
-  /// Whether a cell is likelier where numbers spread more: -256, for none, to 256.
+  /// Tells if a wider spread makes a cell likelier: 256: much likelier; -256: much less.
   int wider(int place) const;
 
   static constexpr unsigned kAllBits = 16;
@@ -56,7 +55,7 @@ class SpreadShares {
 
  private:
   static const std::array<int, kMostScale + 1> kReach;
-  // The share of what lies below the lower edge of a cell.
+  // Probability of numbers below the lower edge of a cell.
   uint32_t below(int cell, int scale) const;
 
   int scale_, rounding_, reach_;
@@ -67,9 +66,8 @@ class SpreadModel {
  public:
   static constexpr int kMostScale = 232;
   void start() { correction_ = 0, seen_ = 0; }
-  /// residual: a number less the whole one that is nearest to its prediction. rounding: the
-  /// prediction less that whole one, in 16ths, and 8. scale: 256 times 8 log2 of the spread in 16ths. Any bytes give
-  /// some number, below 2^50 in size.
+  /// residual: a number minus n, the whole number nearest to its prediction. rounding: the prediction minus n, in
+  /// 16ths, plus 8. scale: 256 times 8 log2 of the spread in 16ths. Any bytes give some number of size below 2^50.
   template <class Coder>
   int64_t code(const Coder& coder, int64_t residual, int rounding, int scale) {
     const int at = std::clamp((scale + correction_) >> 8, 0, kMostScale);
@@ -92,7 +90,7 @@ class SpreadModel {
   }
 
  private:
-  // Elias' gamma code of a number from 0, by raw bits; at most kMostGamma below its highest.
+  // Elias' gamma code of a number from 0, in raw bits; at most kMostGamma bits below its highest.
   static constexpr unsigned kMostGamma = 26;
   template <class Coder>
   static uint64_t gamma(const Coder& coder, int64_t number) {

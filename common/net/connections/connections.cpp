@@ -22,8 +22,7 @@ namespace telesplat::net {
 
 namespace {
 
-constexpr size_t kMostEnded = 4096;  // ended connections; above, all are judged at once, though messages may still
-                                     // come
+constexpr size_t kMostEnded = 4096;  // ended connections; above, all are judged at once, even unread ones
 constexpr double kLatePeriod_s = 0.1;
 constexpr uint64_t kNobodyKnows = ~uint64_t(0);  // not a TCP connection
 
@@ -116,8 +115,8 @@ bool Connections::may_shake_hands(const Name& name, double now_s) const {
   return !c.has_spoken && now_s - c.accepted_s <= kHandshake_s;
 }
 
-// Hangs up on the oldest connection that may still be shaking hands, so that silent peers cannot keep others out; if
-// there is none, on the newest of all.
+// Hangs up on the oldest connection that may still be shaking hands, so that silent peers cannot keep others out;
+// without any such connection, on the newest.
 void Connections::hang_up_on_one() {
   const double now_s = monotonic_s();
   while (!young_.empty()) {
