@@ -129,7 +129,7 @@ void for_each_repeat(const Mask& mask, const Mask& pattern, F f) {
 
 // Finds pixels that are covered in two or more periods of sparse areas. Returns how many covered pixels they match.
 size_t find_pattern(const Mask& mask, Mask& pattern) {
-  constexpr int kFew = 12;  // of 64: a fuller word is a covered area, not a pattern
+  constexpr int kFew = 12;  // bits of 64: a fuller word is a covered area, not a pattern
   pattern.reset(kPeriod, kPeriod);
   uint64_t once[kPeriod] = {};
   for (int y = 0; y < mask.height(); ++y)

@@ -123,8 +123,7 @@ namespace {
 
 // Features of a sample: 13 differences from the guide at the pixel, the residual, 1, and the wanted value.
 constexpr int kUnknown = 14, kWanted = 14, kLeft = 0, kUp = 1, kCorner = 2;
-constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual};  // solutions' places in the
-                                                                                      // weights
+constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, kOtherResidual};  // places in weights
 // The first solution and the first kRoughRounds rounds use half of the samples.
 constexpr int kRounds = 3, kRoughRounds = 1;
 
