@@ -23,12 +23,12 @@ namespace {
 
 constexpr int kMargin = kMaxSplatSide;
 constexpr size_t kRunsAtOnce = 512;
-constexpr int kRowsAtOnce = 32;  // that are doubled
+constexpr int kRowsAtOnce = 32;  // rows that are doubled
 constexpr size_t kBoxesAhead = 8;
 
-// Keys of a tile of full size, its reach, and the margin that splats hang over into.
+// Layout of the keys of a full-size tile, of the pixels in its reach, and of the margin for splats that hang over.
 struct Layout {
-  int width = 0, height = 0;  // of a tile; 0: none yet
+  int width = 0, height = 0;  // size of a tile; 0: none yet
   int reach = 0;
 
   int stride() const { return width + 2 * (reach + kMargin); }
@@ -39,10 +39,10 @@ struct Layout {
   }
 };
 
-// What one thread needs, kept from frame to frame.
+// Buffers of one thread, kept from frame to frame.
 struct Workspace {
   hwy::AlignedFreeUniquePtr<uint64_t[]> keys;
-  Layout layout;  // that `keys` was made for
+  Layout layout;  // layout of `keys`
   EwaBuffer ewa;
   std::vector<uint64_t> row;
   FinishScratch finish;
@@ -53,8 +53,8 @@ geometry::Rect grown(const geometry::Rect& r, int by) {
   return {r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
 }
 
-// Empties the pixels to the right of and below a tile that the image's edge cuts, into which splats hang over: a whole
-// tile needs them empty.
+// Empties the pixels to the right of and below a tile that the image's edge cuts. Splats hang over into them, and a
+// whole tile needs them empty.
 void empty_beyond(const ResolvedTile& tile, const Layout& layout) {
   const int reach = layout.reach, right = tile.width + reach, lower = tile.height + reach;
   const auto fill = [&](int y, int x0) {
@@ -72,7 +72,7 @@ void write_background(const geometry::Rect& rect, uint32_t background, const Til
   }
 }
 
-// What is prepared for one view.
+// Data prepared for one view.
 struct Sight {
   SurfelInput surfels;
   std::vector<SurfelSource> sources;
@@ -80,7 +80,7 @@ struct Sight {
   ResolveInput resolve;
   ItemRuns runs;
   std::vector<ItemStyle> styles;
-  /// How far the largest splat reaches from its centre, pixels. Surfels reach farther by what reach_of() says.
+  /// Reach of the largest splat from its centre, pixels. Surfels reach reach_of() farther.
   float overhang = 0;
   TileBinning binning;
 };
@@ -115,7 +115,7 @@ struct CpuSplatter::Impl {
   TileGrid grid;
   std::array<Sight, 2> sights;
   std::vector<uint8_t> intensity = std::vector<uint8_t>(65536 + 3);
-  std::vector<uint32_t> half_colour;  // of a halved frame, before it is doubled
+  std::vector<uint32_t> half_colour;  // colours of a halved frame, before it is doubled
   std::vector<float> half_depth_m;
 };
 
@@ -137,7 +137,7 @@ void CpuSplatter::Impl::prepare(const DrawList& list, std::span<const geometry::
     }
     if (i == 0 || kernel->surfel) {
       prepare_items(list, cameras[i], sight);
-    } else {  // flat splats are the same for both
+    } else {  // flat splats are the same for both cameras
       sight.styles = sights[0].styles;
       sight.overhang = sights[0].overhang;
       sight.resolve.rim = sights[0].resolve.rim;
@@ -177,7 +177,7 @@ void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera
   crew.run((count + kRunsAtOnce - 1) / kRunsAtOnce, [&](size_t part, int) {
     const size_t last = std::min((part + 1) * kRunsAtOnce, count);
     for (size_t i = part * kRunsAtOnce; i < last; ++i) {
-      // Clusters lie scattered in memory.
+      // Prefetches: clusters lie scattered in memory.
       if (i + kBoxesAhead < last) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
       runs.transform(i, list.items, room_to_pixel, eye);
       sight.binning.place(i, runs.transforms[i], reach_of(list, runs.runs[i], sight), static_cast<float>(kMargin));
@@ -186,7 +186,7 @@ void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera
   sight.binning.list();
 }
 
-// How far contours of a run reach, in pixels, times depth. Bins grown by kMargin for all had each point met
+// Reach of a run's contours, in pixels times depth. With bins grown by kMargin for all splats, each point was processed
 // 1.63 times at 256 x 256 (bench splat_ellipse).
 float CpuSplatter::Impl::reach_of(const DrawList& list, const ItemRun& run, const Sight& sight) const {
   if (!kernel->surfel) return 0;
@@ -218,7 +218,7 @@ void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspa
   };
   const ResolvedTile content = crop_to_content(tile, layout.reach);
   if (content.width == 0 || content.height == 0) return;
-  // Each stage leaves as much around the tile as those after it read.
+  // Each stage writes as many pixels around the tile as later stages read.
   const int left_after_fill = finish_reach({false, finish.smooth, finish.antialias});
   const int left_after_smooth = finish_reach({false, false, finish.antialias});
   if (finish.fill) fill_holes(content, left_after_fill, gaps_to_fill(finish), workspace.finish), lap(stats.fill_ms);
@@ -242,7 +242,7 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const Sight& 
     return;
   }
 
-  // Buffers are empty between tiles: writing empties them. Their margins need not be.
+  // Buffers are empty between tiles: writing a tile empties them, except their margins.
   const ResolvedTile tile = layout.tile(workspace.keys.get(), rect);
   const TileInput input{grown(rect, layout.reach),
                         rect,
@@ -292,7 +292,7 @@ SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geome
   prepare(list, cameras, options, shading);
   const double prepare_ms = (monotonic_s() - start) * 1e3;
   for (Workspace& w : workspaces) {
-    // Emptied whole where the layout changes; else every tile leaves its pixels empty.
+    // Empties all of a new layout; later, every tile leaves its pixels empty.
     if (w.layout != layout) {
       w.keys = hwy::AllocateAligned<uint64_t>(layout.size());
       std::fill_n(w.keys.get(), layout.size(), static_cast<uint64_t>(kEmptyKey));

@@ -10,19 +10,19 @@
 
 namespace telesplat::splat {
 
-/// Where a frame goes. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the same shape, or
-/// null.
+/// Images that a frame is drawn into. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the
+/// same shape, or null.
 struct FrameTarget {
   int width = 0, height = 0;
   uint32_t* colour = nullptr;
-  float* depth_m = nullptr;  ///< metres along the view axis; +infinity where nothing is
+  float* depth_m = nullptr;  ///< metres along the view axis; +infinity for empty pixels
   size_t pitch = 0;          ///< pixels from a row to the next one, of both; 0: width
   size_t row() const { return pitch > 0 ? pitch : static_cast<size_t>(width); }
 };
 
 struct SplatStats {
   uint64_t points_projected = 0, points_drawn = 0;
-  double prepare_ms = 0;                                ///< wall-clock: what comes before the first tile
+  double prepare_ms = 0;                                ///< wall-clock time before the first tile
   double project_ms = 0, resolve_ms = 0;                ///< splatting and shading, summed over threads
   double fill_ms = 0, smooth_ms = 0, antialias_ms = 0;  ///< the finish, summed over threads
 
@@ -35,18 +35,18 @@ class CpuSplatter {
   explicit CpuSplatter(int threads = 0);
   ~CpuSplatter();
 
-  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish
-  /// has on (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
-  /// options.halved: colours between the pixels drawn are interpolated (finish.h); depths are the nearest pixel's.
+  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages of options.finish
+  /// (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's. options.halved:
+  /// interpolates colours between drawn pixels (finish.h); depths are the nearest pixel's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
-  /// Two views of one list, as fast as can be: what they have in common is prepared once, and threads draw both at a
-  /// time. Each is what render() makes of it. Preconditions: the cameras have one size and one near distance, and next
-  /// to one focal length (flat splats are those of the first); shading is of either.
+  /// Draws two views of one list: prepares their common data once, and shares all threads between them. Each image is
+  /// the same as from render(). Preconditions: the cameras have one size and one near distance, and about one focal
+  /// length (both use the flat splats of the first); shading fits both.
   SplatStats render_pair(const DrawList& list, const std::array<geometry::Camera, 2>& cameras,
                          const RenderOptions& options, const image::Shading& shading,
                          const std::array<FrameTarget, 2>& targets);
-  /// Without any finish.
+  /// Draws without any finish.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading,
                     const FrameTarget& target) {
     return render(list, camera, {kernel, {false, false, false}}, shading, target);

@@ -28,7 +28,7 @@ HWY_NOINLINE void DepthLevel(const LeafTransform& transform_reference, const glm
   const auto width = hn::Set(di, rect.width), height = hn::Set(di, rect.height), minus_one = hn::Set(di, -1);
   HWY_ALIGN uint32_t place[kMaxLanes];
   HWY_ALIGN uint32_t bits[kMaxLanes];
-  // A point met twice changes nothing, so lanes that overlap are not left out.
+  // A point that is drawn twice changes nothing, so lanes that overlap are not left out.
   ForVectors(0, level.count, [&](size_t offset, size_t, size_t valid) HWY_ATTR {
     const Projected p = Project(transform, LoadLanes(level, offset), near_m, 1 << kReferenceSubBits, 0.0f);
     const auto px = hn::Sub(hn::ShiftRight<kReferenceSubBits>(p.x), x0),

@@ -1,5 +1,5 @@
-// Which points and mosaics face away from the eye. The reference depth map, the viewers' selection and every kernel use
-// this one test, so that a point that viewers leave out does not count as seen.
+// Finds points and mosaics that face away from the eye. The reference depth map, the viewers' selection and every
+// kernel use this one test, so that a point that viewers leave out does not count as seen.
 #pragma once
 
 #include <cmath>
@@ -18,9 +18,9 @@ inline constexpr float kCosFacingMargin = 0.98480775f, kSinFacingMargin = 0.1736
 /// A leaf's cube as seen from the eye: the part of the test that all its points share.
 struct LeafView {
   glm::vec3 to_eye;  ///< from the cube's centre
-  /// beta = 10 degrees + half the angle under which the cube's sphere is seen. cos_beta < 0: nothing faces away.
+  /// beta = 10 degrees + half the angle under which the cube's sphere is seen. cos_beta < 0: all points face the eye.
   float sin_beta, cos_beta;
-  float distance;  ///< of the centre; 0 if the eye is inside the sphere
+  float distance;  ///< from its centre to the eye; 0 if the eye is inside the sphere
 };
 
 inline LeafView leaf_view(const geometry::Box& leaf, const glm::vec3& eye) {
@@ -35,7 +35,7 @@ inline LeafView leaf_view(const geometry::Box& leaf, const glm::vec3& eye) {
 enum class Facing {
   kAway,    ///< every point faces away
   kMixed,   ///< points must be tested one by one
-  kTowards  ///< none does
+  kTowards  ///< no point faces away
 };
 
 /// By the mosaic's normal cone: away if the angle between its axis and the direction to the eye exceeds 90 degrees +
@@ -44,7 +44,7 @@ inline Facing facing_of(const points::Mosaic& m, const LeafView& view) {
   if (view.cos_beta <= 0) return Facing::kTowards;
   const glm::vec3 axis = m.cone_axis_direction();
   const float towards = glm::dot(axis, view.to_eye), cos_cone = m.cone_cosine();
-  // Most mosaics that are drawn face the eye. All points do if axis and eye are at most 90 degrees - cone - beta apart.
+  // Tests first for mosaics that face the eye, as most do: axis and eye at most 90 degrees - cone - beta apart.
   if (cos_cone <= 0) return Facing::kMixed;
   const float sin_cone = std::sqrt(1.0f - cos_cone * cos_cone);
   const float scale = view.distance * std::sqrt(glm::dot(axis, axis));
@@ -53,7 +53,7 @@ inline Facing facing_of(const points::Mosaic& m, const LeafView& view) {
   return towards < -(sin_cone * view.cos_beta + cos_cone * view.sin_beta) * scale ? Facing::kAway : Facing::kMixed;
 }
 
-/// A point with the normal n, not of unit length, faces away if dot(n, this) < -|n|. Zero: nothing does.
+/// A point with the normal n, not of unit length, faces away if dot(n, this) < -|n|. Zero: no point does.
 inline glm::vec3 facing_vector(const LeafView& view) {
   return view.cos_beta <= 0 ? glm::vec3(0) : view.to_eye / (view.distance * view.sin_beta);
 }

@@ -1,4 +1,4 @@
-// Included once a target, by finish.cpp. The definition stands in finish.h.
+// Included once a target, by finish.cpp. finish.h defines the stages.
 #if defined(TELESPLAT_FINISH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_FINISH_INL_H_
 #undef TELESPLAT_FINISH_INL_H_
@@ -38,7 +38,7 @@ ResolvedTile FindContent(const ResolvedTile& tile, int reach) {
     left = std::min(left, first);
     top = std::min(top, y);
     bottom = y + 1;
-    // From the right only as far as is not known yet.
+    // Looks from the right only as far as the content's known right edge.
     int last = tile.width + reach;
     while (last > right && empty(last - lanes)) last -= lanes;
     right = std::max(right, last);
@@ -53,7 +53,7 @@ ResolvedTile FindContent(const ResolvedTile& tile, int reach) {
 
 // ---- fill ----
 
-// Calls visit(x offset, y offset, whether at a side) for the eight neighbours.
+// Calls visit(x offset, y offset, true if the neighbour shares a side) for the eight neighbours.
 template <class Visit>
 HWY_INLINE void ForNeighbours(const Visit& visit) {
   for (int j = -1; j <= 1; ++j)
@@ -61,7 +61,7 @@ HWY_INLINE void ForNeighbours(const Visit& visit) {
       if (i != 0 || j != 0) visit(i, j, i == 0 || j == 0);
 }
 
-// Which of the holes have enough supports, and the info within kEdge of which they lie.
+// The holes that have enough supports, and the info that their supports lie within kEdge of.
 struct Closing {
   hn::Mask<U32> holes;
   hn::Vec<U32> target;
@@ -102,7 +102,7 @@ HWY_INLINE void CloseHoles(const ResolvedTile& tile, int x, int y, const Closing
   ForNeighbours([&](int i, int j, bool side) HWY_ATTR {
     const auto info = hn::LoadU(d, tile.info(y + j) + x + i), colour = hn::LoadU(d, tile.colour(y + j) + x + i);
     const auto apart = hn::Gt(Difference(info, closing.target), edge);
-    // Counted once at a corner, twice at a side.
+    // Weighs neighbours at corners once, at sides twice.
     const auto rb = hn::IfThenZeroElse(apart, hn::And(colour, even));
     const auto g = hn::IfThenZeroElse(apart, hn::And(hn::ShiftRight<8>(colour), low));
     const auto z = hn::IfThenZeroElse(apart, hn::ShiftRight<8>(info));
@@ -112,7 +112,7 @@ HWY_INLINE void CloseHoles(const ResolvedTile& tile, int x, int y, const Closing
     depth = hn::Add(depth, side ? hn::Add(z, z) : z);
     weights = hn::Add(weights, side ? hn::Add(one, one) : one);
   });
-  // Quotients of integers below 2^24: exact, since no quotient that is not whole is nearer to one than 1 / 12.
+  // Quotients of integers below 2^24 are exact: one that is not whole is at least 1 / 12 away from a whole number.
   const auto divisor = hn::ConvertTo(df, hn::BitCast(di, hn::Max(weights, hn::Set(d, 1u))));
   const auto over = [&](hn::Vec<U32> v) HWY_ATTR {
     return hn::BitCast(d, hn::ConvertTo(di, hn::Div(hn::ConvertTo(df, hn::BitCast(di, v)), divisor)));
@@ -136,7 +136,7 @@ int FillHoles(const ResolvedTile& tile, int grow, Gaps gaps, FinishScratch& scra
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto edge = hn::Set(d, kEdgeInfo);
   const int first = -grow, end = tile.width + grow;
-  // Rows y - 1, y, y + 1 of the least code around each pixel, and of the largest of three of those along the row.
+  // Rows y - 1, y, y + 1 of the least code around each pixel, and of the largest of each three along the row.
   const auto row_words = static_cast<size_t>(end - first + 2 + 2 * lanes);
   scratch.rows.resize(std::max(scratch.rows.size(), 4 * row_words));
   scratch.pixels.clear();
@@ -177,7 +177,7 @@ int FillHoles(const ResolvedTile& tile, int grow, Gaps gaps, FinishScratch& scra
 
 // ---- smooth ----
 
-// Two channels in 16-bit fields, and one.
+// Colour channels in 16-bit fields: red and blue, and green.
 struct Channels {
   hn::Vec<U32> red_blue, green;
 };
@@ -205,7 +205,7 @@ HWY_INLINE hn::Vec<U32> Join(const Channels& c) {
   return hn::Or(hn::And(red_blue, hn::Set(d, 0x00ff00ffu)), hn::ShiftLeft<8>(hn::And(green, hn::Set(d, 255u))));
 }
 
-// 8 times the centre smoothed with its two neighbours, by its spacing class.
+// Returns 8 times the centre smoothed with its two neighbours, by its spacing class.
 HWY_INLINE Channels Smooth3(const Channels& before, const Channels& centre, const Channels& after,
                             hn::Vec<U32> info_before, hn::Vec<U32> info, hn::Vec<U32> info_after) {
   const U32 d;
@@ -224,7 +224,7 @@ void Smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
   const int first = -grow, end = tile.width + grow;
   const auto row_words = static_cast<size_t>(end - first + lanes);
   scratch.rows.resize(std::max(scratch.rows.size(), 6 * row_words));
-  // Rows y - 1, y and y + 1 smoothed along themselves: red and blue, then green.
+  // Rows y - 1, y and y + 1, smoothed along the row: red and blue, then green.
   const auto row = [&](int y) { return scratch.rows.data() + static_cast<size_t>((y + grow + 1) % 3) * 2 * row_words; };
   const auto along = [&](int y) HWY_ATTR {
     const uint32_t *colour = tile.colour(y), *info = tile.info(y);
@@ -257,11 +257,11 @@ void Smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
 
 // ---- antialias ----
 
-// Sums with weights, of the near pixels and of all: of red and blue, and of green, above which weights are counted.
+// Weighted sums of the near pixels and of all: red and blue, and green, with the sum of weights above it.
 struct Sums {
   Channels near, all;
 };
-// Of three neighbours in a row, weights [1 2 1]. colour, info: of the left one.
+// Sums three neighbours in a row with weights [1 2 1]. colour, info: point to the left one.
 HWY_INLINE Sums SumRow(const uint32_t* colour, const uint32_t* info, hn::Vec<U32> least) {
   const U32 d;
   const auto edge = hn::Set(d, kEdgeInfo), one = hn::Set(d, 1u << 16);
@@ -275,8 +275,8 @@ HWY_INLINE Sums SumRow(const uint32_t* colour, const uint32_t* info, hn::Vec<U32
   return {Add(Add(left.near, right.near), Times<1>(middle.near)), Add(Add(left.all, right.all), Times<1>(middle.all))};
 }
 
-// A vector of pixels, blended from the 3x3 around each by how much what is near covers them.
-//   colours, infos: of the pixels to the left of theirs in the rows above, of them and below.
+// Blends a vector of pixels from the 3x3 around each, by the share that near pixels cover.
+//   colours, infos: of the pixel to the left, in the rows above, of the pixel and below.
 HWY_INLINE hn::Vec<U32> Blend(const uint32_t* const colours[3], const uint32_t* const infos[3], hn::Vec<U32> least) {
   const U32 d;
   const Sums above = SumRow(colours[0], infos[0], least), here = SumRow(colours[1], infos[1], least),
@@ -303,7 +303,7 @@ void Antialias(const ResolvedTile& tile, FinishScratch& scratch) {
   const U32 d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto edge = hn::Set(d, 2 * kEdgeInfo);
-  // Vectors with silhouettes, written once all have been read.
+  // Vectors with silhouettes: written after all have been read.
   scratch.places.clear();
   scratch.rows.resize(std::max(scratch.rows.size(), static_cast<size_t>(tile.height) * (tile.width + lanes)));
   uint32_t* blended = scratch.rows.data();

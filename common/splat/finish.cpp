@@ -15,7 +15,7 @@
 namespace telesplat::splat {
 namespace {
 
-// Means of four channels at once: one rounded down, one up, so that pictures become no darker.
+// Mean of four channels at once: one function rounds down, one up, so that pictures become no darker.
 uint32_t mean_down(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); }
 uint32_t mean_up(uint32_t a, uint32_t b) { return (a | b) - (((a ^ b) & 0xfefefefeu) >> 1); }
 
@@ -49,7 +49,7 @@ void double_rows(const FrameTarget& half, const FrameTarget& to, int first, int 
     uint32_t* row = between.data() + 1;
     for (int x = 0; x < half.width; ++x) row[x] = mean_down(a[x], mean_up(a[x], b[x]));
     row[-1] = row[0], row[half.width] = row[half.width - 1];
-    uint32_t* out = doubled.data();  // checked access would not be vectorised
+    uint32_t* out = doubled.data();  // a pointer: checked access would not be vectorised
     for (int x = 0; x < half.width; ++x) {
       out[2 * x] = mean_up(row[x], mean_down(row[x], row[x - 1]));
       out[2 * x + 1] = mean_up(row[x], mean_down(row[x], row[x + 1]));

@@ -1,5 +1,5 @@
-// The finish: what happens to a tile's resolved pixels before they are shown. Each stage is optional and works inside
-// the tile, while it is in the cache. Every SIMD target computes the same pixels.
+// The finish: stages that change a tile's resolved pixels before they are shown. Each stage is optional and works
+// inside the tile, while it is in the cache. Every SIMD target computes the same pixels.
 //
 // Two pixels belong to different surfaces if their depth codes (pixel_key.h: 2^14 steps an octave) differ by more than
 // kEdge, about 2 % of depth. An empty pixel counts as farther than everything.
@@ -44,13 +44,13 @@ inline constexpr int kFillReach = 2;    ///< pixels
 inline constexpr uint32_t kFillSupports = 4;
 inline constexpr uint32_t kPinHoleSupports = 9, kFlatSupports = 6, kBetweenSupports = 10;
 inline constexpr uint32_t kFlat = 128;  ///< depth codes: 0.4 to 0.8 % of depth
-/// How much of a pixel is covered by what is near in the 3x3 pixels around it, in 64ths; [whether the pixel is near]
-/// [the weight of the near, of 16]. Chosen from means over the silhouettes of bones and a head along walk-around-a,
+/// Share of a pixel that near surfaces cover, from the 3x3 pixels around it, in 64ths; [1 if the pixel is
+/// near][weight of the near, in 16ths]. Chosen from means over the silhouettes of bones and a head along walk-around-a,
 /// displayed at 640x400 and 1280x800, sampled with steering and without, against 16 rays a pixel.
 inline constexpr std::array<std::array<uint32_t, 17>, 2> kCoverage{
     {{0, 0, 0, 0, 1, 3, 5, 11, 19, 38, 45, 58, 61, 61, 61, 61, 61},
      {13, 13, 13, 13, 13, 16, 19, 21, 22, 26, 19, 32, 40, 54, 61, 63, 64}}};
-/// What the near and the far pixels' weighted sums are multiplied with, in 2^-16; [17 * is near + weight of the near].
+/// Factors of the near and the far pixels' weighted sums, in 2^-16; [17 * is near + weight of the near].
 struct CoverageWeights {
   std::array<uint32_t, 34> near{}, far{};
 };
@@ -64,9 +64,9 @@ constexpr CoverageWeights coverage_weights() {
   return w;
 }
 inline constexpr CoverageWeights kCoverageWeights = coverage_weights();
-inline constexpr int kFinishSlack = 16;  ///< pixels that vectors may read and write beyond what a stage asks for
+inline constexpr int kFinishSlack = 16;  ///< pixels that vectors may read and write beyond a stage's area
 
-/// How many pixels around a tile must be valid for the stages that are on.
+/// Number of valid pixels that the selected stages need around a tile.
 constexpr int finish_reach(const Finish& f) {
   return (f.fill ? kFillReach : 0) + (f.smooth ? 1 : 0) + (f.antialias ? 1 : 0);
 }
@@ -88,8 +88,8 @@ struct ResolvedTile {
   uint32_t* info(int y) const { return colour(y) + stride; }
 };
 
-/// The part of the tile in which a stage may change anything: pixels farther than kFillReach from all that is not empty
-/// stay empty. Width or height 0: the tile is empty.
+/// The part of the tile that a stage may change: pixels farther than kFillReach from all non-empty ones stay empty.
+/// Width or height 0: the tile is empty.
 ResolvedTile crop_to_content(const ResolvedTile& tile, int reach);
 
 /// Working memory of the stages, kept from tile to tile.
@@ -103,21 +103,21 @@ struct FinishScratch {
   std::vector<uint32_t*> places;
 };
 
-/// Which gaps are closed.
+/// Rule that selects the gaps to close.
 enum class Gaps { kPinHoles, kAll };
-/// Where nothing is antialiased, a gap left open is not softened either.
+/// Without antialiasing, gaps left open would not be softened: closes all.
 constexpr Gaps gaps_to_fill(const Finish& f) { return f.antialias ? Gaps::kPinHoles : Gaps::kAll; }
 
-/// Closes gaps in the tile grown by `grow` pixels. Reads kFillReach pixels more. Returns how many pixels it closed.
+/// Closes gaps in the tile grown by `grow` pixels. Reads kFillReach pixels more. Returns the number of closed pixels.
 int fill_holes(const ResolvedTile& tile, int grow, Gaps gaps, FinishScratch& scratch);
 /// Smooths the tile grown by `grow` pixels. Reads one pixel more.
 void smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch);
 /// Antialiases the tile. Reads one pixel more.
 void antialias(const ResolvedTile& tile, FinishScratch& scratch);
 
-/// Rows [first, last) of `to`: bilinear between the pixels of `half`, whose centres lie at (2 i + 1, 2 j + 1); beyond
-/// the outermost centres the outermost pixels go on. Channels are 2 of 255 off at most. Depths are those of the pixel
-/// of `half` that covers a pixel. Preconditions: half has half of to's size, rounded up, and depths if `to` has.
+/// Rows [first, last) of `to`: bilinear between the pixels of `half`, whose centres lie at (2 i + 1, 2 j + 1); the
+/// outermost pixels continue beyond their centres. Channels are off by at most 2 in 255. Depths are those of the
+/// pixel of `half` that covers a pixel. Preconditions: half has half of to's size, rounded up, and depths if `to` has.
 void double_rows(const FrameTarget& half, const FrameTarget& to, int first, int last);
 
 }  // namespace telesplat::splat

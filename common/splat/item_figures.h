@@ -1,4 +1,4 @@
-// The figures of a draw item that do not depend on where its points lie. Both renderers take them from here.
+// Figures of a draw item that do not depend on its points' positions. Both renderers take them from here.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 namespace telesplat::splat {
 
 struct ItemFigures {
-  uint32_t spacing = 0;             ///< spacing_class of its samples; 0 where the kernel is not smoothed
+  uint32_t spacing = 0;             ///< spacing_class of its samples; 0 if the kernel is not smoothed
   const FlatSplat* flat = nullptr;  ///< flat kernels; lives as long as the FrameFigures
   SurfelSource source;              ///< surfel kernels
 };
@@ -22,14 +22,14 @@ struct ItemFigures {
 /// The figures of one frame's items, and the mean of their biases.
 class FrameFigures {
  public:
-  /// scale: DrawList::scale. Keeps a reference to the kernel alone.
+  /// scale: DrawList::scale. Keeps only a reference to the kernel.
   FrameFigures(const KernelTraits& kernel, const geometry::Camera& camera, float scale);
 
   /// To be called once for each item: its bias counts in rim().
   ItemFigures add(const DrawItem& item);
 
   /// Mean bias on the contour for each class of spacing, weighted by points. Ellipses differ from point to point: the
-  /// bias at the item's leaf's centre stands for them, and items whose centre is nearer than the near plane do not
+  /// bias at the centre of the item's leaf represents them, and items whose centre is nearer than the near plane do not
   /// count.
   RimBias rim() const;
 
@@ -74,7 +74,7 @@ struct ItemRuns {
     transforms.resize(runs.size());
     facing.resize(runs.size());
   }
-  /// The same for another view of the items that `other` was built for.
+  /// Takes the runs of `other`, for another view of the same items.
   void like(const ItemRuns& other) {
     runs = other.runs;
     transforms.resize(runs.size());

@@ -17,13 +17,13 @@ TileCounts splat_ewa(const TileWork& w) {
   return ewa_tile(w.input, w.surfels, w.light, w.ewa, w.tile, w.reach, w.background);
 }
 
-// Keys. Set by bench splat_square, 3 pixels, one thread: 14.5 ms at 256 x 256, 13.3 ms here (384 KiB of keys, which
-// leaves the second-level cache some room), 14.0 ms at 256 x 128, 15.1 ms at 128 x 128 (more clusters straddle tiles),
-// 13.4 ms at 320 x 160.
+// Tile for kernels with keys. Set by bench splat_square, 3 pixels, one thread: 14.5 ms at 256 x 256, 13.3 ms here (384
+// KiB keys, which leaves the second-level cache some room), 14.0 ms at 256 x 128, 15.1 ms at 128 x 128 (more clusters
+// straddle tiles), 13.4 ms at 320 x 160.
 constexpr int kTileWidth = 256, kTileHeight = 192;
 
-// ewa keeps 36 bytes more a pixel. Points across borders cost more than the second-level cache gives: a million splats
-// of three pixels took 62.6 ms at 96 x 96, 60.3 ms at 128 x 64, 56.7 ms at 128 x 96, 55.7 ms here.
+// ewa keeps 36 bytes more a pixel. Points across borders cost more than the second-level cache gains: a million splats,
+// 3 pixels each, took 62.6 ms at 96 x 96, 60.3 ms at 128 x 64, 56.7 ms at 128 x 96, 55.7 ms here.
 constexpr int kEwaTileWidth = 192, kEwaTileHeight = 128;
 
 constexpr KernelTraits kTable[] = {

@@ -1,4 +1,4 @@
-// The splat kernels. One row of a table says what the program must know of a kernel: both renderers, the flags, the
+// The splat kernels. One row of a table has all that the program must know of a kernel: both renderers, the flags, the
 // window and `telesplat compare` read it. Rows are read once a frame or once an item, never once a point.
 #pragma once
 
@@ -19,14 +19,14 @@ enum class Kernel {
 };
 inline constexpr std::array kKernels{Kernel::kSquare, Kernel::kDisc, Kernel::kEllipse, Kernel::kEwa};
 
-/// How splats become pixels.
+/// Passes that turn splats into pixels.
 enum class Passes {
   kKeys,  ///< one pass: splats are opaque, and each pixel keeps its least key (pixel_key.h)
-  kSums,  ///< two passes: the depth of opaque splats, then weighted sums of what is visible; leaves shaded colours
+  kSums,  ///< two passes: the depth of opaque splats, then weighted sums of the visible ones; leaves shaded colours
 };
 
-/// No splat touches pixels farther from its projected centre than growth * widest_contour() * radius over depth +
-/// least_px, nor farther than kMaxSplatSide. growth: the factor of the contour; least_px: the low-pass, and a pixel.
+/// A splat touches only pixels within growth * widest_contour() * radius over depth + least_px of its projected centre,
+/// and within kMaxSplatSide. growth: the factor of the contour; least_px: the low-pass, and a pixel.
 struct SurfelReach {
   float growth = 0, least_px = 0;
 };
@@ -41,23 +41,21 @@ struct KernelTraits {
 
   /// Scale factor of splat sizes (T eq. 4.8) that suits the kernel.
   float suitable_scale;
-  /// Whether the finish may interpolate between its splats: keys then carry the class of their spacing (spacing_class).
+  /// True if the finish may interpolate between its splats: keys then carry the class of their spacing (spacing_class).
   bool smoothed;
   Passes passes;
 
-  /// True: a splat is its sample's disc on the surface (DrawItem::radius_m and to_eye). False: it is flat and faces the
-  /// screen, and DrawItem::splat_px is its size.
+  /// True: a splat is its sample's disc on the surface (DrawItem::radius_m and to_eye). False: it is flat, faces the
+  /// screen and has the size DrawItem::splat_px.
   bool surfel;
 
-  /// Flat: squared distance of the offset (dx, dy) in the metric in which a splat is a ball of radius size / 2. Else
-  /// null.
+  /// Flat: squared length of the offset (dx, dy), in the metric whose ball of radius size / 2 is the splat. Else null.
   double (*flat_distance2)(double dx, double dy) = nullptr;
   /// Flat: squared radius of the contour (the circle on which q = 1), as a share of the squared size.
   double flat_contour_r2 = 0;
 
   SurfelReach reach;  ///< surfels
-  /// Surfels: bias of the depth code on the contour of a splat of this radius at this depth. Null: the kernel has no
-  /// bias.
+  /// Surfels: bias of the depth code on the contour of a splat of this radius at this depth. Null: no bias.
   float (*surfel_bias)(float radius_m, float depth_m) = nullptr;
 
   /// The CPU splatter: its tiles in pixels, and the kernel inside one tile (tile_work.h).
@@ -76,9 +74,9 @@ const std::vector<std::string>& kernel_names();
 /// All names for a help text: "square, disc, ellipse or ewa".
 std::string kernel_list();
 
-/// Splats about as large as their samples are apart suit best: larger ones blur and grow silhouettes. The gaps that
-/// this leaves are pin-holes, which the finish fills. Set by comparing frames along walk-around-a.csv at 2560x1600: on
-/// a head, discs of 1.5 without finish 31.9 dB, ellipses of 1.0 with finish 36.3 dB.
+/// Splats suit best if they are about as large as the distance of their samples: larger ones blur and grow silhouettes.
+/// The remaining gaps are pin-holes, which the finish fills. Set by comparing frames along walk-around-a.csv at
+/// 2560x1600: on a head, discs of 1.5 without finish 31.9 dB, ellipses of 1.0 with finish 36.3 dB.
 inline float suitable_scale(Kernel kernel) { return traits_of(kernel).suitable_scale; }
 
 }  // namespace telesplat::splat

@@ -3,20 +3,20 @@
 //   bit 63       1 in every key; 0 outside a splat (kOutsideSplat flips it): larger than all keys
 //   bits 62..45  depth code, 18 bits: (bits of the depth as float - bits of `near` as float) >> 9, that is 2^14
 //                steps an octave, 16 octaves from `near` on; positive floats are ordered as their bits are
-//   bits 44..43  spacing class: how far apart the samples lie on the screen (spacing_class)
+// bits 44..43  spacing class: distance of the samples on the screen (spacing_class)
 //   bits 42..40  ring: floor(8 q), at most 7; q = squared distance from the splat's centre, 1 on its contour
 //   bits 39..24  normal (image/normal.h, 16 bits)
 //   bits 23..0   albedo, RRGGBB
 //
-// The depth code is that of the surface at the pixel plus a bias that grows with q, so that where splats of one surface
-// overlap the nearest centre wins, not the nearest depth, and generous splats do not blur.
+// The depth code is that of the surface at the pixel plus a bias that grows with q. So where splats of one surface
+// overlap, the nearest centre wins, not the nearest depth, and large splats do not blur.
 // Based on: M. Schuetz, M. Wimmer, "High-quality point-based rendering using fast single-pass interpolation", 2015
 // (paraboloids).
 //
 // Resolving turns each key into the shaded colour, 0x00RRGGBB, and the info word
-//   depth code << 8 | spacing class << 3 | ring, or kEmptyInfo where nothing is,
-// which take the keys' place row by row (finish.h, ResolvedTile). Finish stages work on these; where they are written
-// out the ring's mean bias is taken off the depth again (RimBias).
+// depth code << 8 | spacing class << 3 | ring, or kEmptyInfo for an empty pixel, which take the keys' place row by row
+// (finish.h, ResolvedTile). Finish stages work on these; where they are written out the ring's mean bias is taken off
+// the depth again (RimBias).
 #pragma once
 
 #include <algorithm>
@@ -29,21 +29,22 @@ namespace telesplat::splat {
 inline constexpr int kDepthCodeBits = 18;
 inline constexpr int kDepthCodeShift = 9;  ///< a step of the depth code = 2^9 units of a float's last place
 inline constexpr uint32_t kMaxBias = 81;   ///< 81 * 2^9 / 2^23 = 0.5 % of depth at most
-inline constexpr uint32_t kMaxDepthCode = (1u << kDepthCodeBits) - 2;  ///< all ones is the empty key's
-/// A centre's code ends here, so that no bias takes it beyond kMaxDepthCode.
+inline constexpr uint32_t kMaxDepthCode = (1u << kDepthCodeBits) - 2;  ///< all ones means an empty key
+/// Largest code of a centre, so that no bias takes it beyond kMaxDepthCode.
 inline constexpr uint32_t kMaxCentreCode = kMaxDepthCode - kMaxBias;
 inline constexpr int kKeyDepthBit = 45, kKeyClassBit = 43, kKeyRingBit = 40, kKeyNormalBit = 24;
 inline constexpr uint64_t kKeySign = 1ull << 63;
-inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: larger than every key, as signed numbers
-inline constexpr int64_t kEmptyKey = -1;               ///< nothing there: larger than every key
-inline constexpr uint32_t kEmptyInfo = 0xffffffffu;    ///< nothing there
+inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: larger than every key, as signed
+                                                       ///< numbers
+inline constexpr int64_t kEmptyKey = -1;               ///< an empty pixel: larger than every key
+inline constexpr uint32_t kEmptyInfo = 0xffffffffu;    ///< an empty pixel
 
 /// Depth code of a depth in metres, for a splat's centre. depth_m >= near_m > 0.
 inline uint32_t encode_depth_code(float depth_m, float near_m) {
   return std::min((std::bit_cast<uint32_t>(depth_m) - std::bit_cast<uint32_t>(near_m)) >> kDepthCodeShift,
                   kMaxCentreCode);
 }
-/// The middle of the depths, in metres, that have this code: off by at most 2^-15 of itself.
+/// The middle, in metres, of the depths that have this code: relative error at most 2^-15.
 inline float decode_depth_code(uint32_t code, float near_m) {
   return std::bit_cast<float>(std::bit_cast<uint32_t>(near_m) + (code << kDepthCodeShift) +
                               (1u << (kDepthCodeShift - 1)));
@@ -79,11 +80,10 @@ constexpr uint32_t info_depth_code(uint32_t info) { return info >> 8; }
 constexpr uint32_t info_spacing(uint32_t info) { return info >> 3 & 3; }
 constexpr uint32_t info_ring(uint32_t info) { return info & 7; }
 
-/// For each spacing class, the bias (in depth codes) that splats of a frame have on their contours: the mean over their
-/// points.
+/// For each spacing class, the bias (in depth codes) of a frame's splats on their contours: the mean over their points.
 using RimBias = std::array<uint32_t, 4>;
-/// The depth code without its bias, taken to be rim * (ring + 1/2) / 8: at most rim / 16 codes off where all splats of
-/// a class have the same bias. Rounded; never below 0.
+/// The depth code minus its bias, which is estimated as rim * (ring + 1/2) / 8: at most rim / 16 codes off if all
+/// splats of a class have the same bias. Rounded; at least 0.
 constexpr uint32_t unbiased_depth_code(uint32_t info, const RimBias& rim) {
   const uint32_t bias = (rim[info_spacing(info)] * (2 * info_ring(info) + 1) + 8) >> 4;
   const uint32_t code = info_depth_code(info);

@@ -1,4 +1,4 @@
-// Vectors of points: loading, projecting, moving those that stay to the front; and what makes many short levels fast.
+// Vectors of points: loads and projects them, moves kept lanes to the front, and speeds up many short levels.
 // Included once a target, by splat_kernels.cpp and surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_PROJECTION_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_PROJECTION_INL_H_
@@ -27,8 +27,8 @@ using I32 = hn::RebindToSigned<F32>;
 using U32 = hn::RebindToUnsigned<F32>;
 using U16 = hn::Rebind<uint16_t, F32>;
 
-constexpr size_t kMaxLanes = 64;  // float lanes of the widest vectors there are
-// Points of an item taken at once: room for a whole piece is made before it is projected.
+constexpr size_t kMaxLanes = 64;  // float lanes of the widest vectors
+// Points of an item processed at once: room for a whole piece is made before it is projected.
 constexpr size_t kPiece = 384;
 
 // Positions of a vector of points, in steps of the leaf's grid.
@@ -50,12 +50,12 @@ HWY_INLINE hn::Vec<F32> Row(const std::array<float, 4>& row, const Lanes& p) {
   return hn::Add(hn::Add(xy, hn::Mul(p.z, hn::Set(d, row[2]))), hn::Set(d, row[3]));
 }
 
-// floor(v), as integers. Values that do not fit lie far outside every image and must only stay outside.
+// floor(v), as integers. Values that do not fit lie far outside every image; they only need to stay outside.
 HWY_INLINE hn::Vec<I32> FloorToInt(hn::Vec<F32> v) {
   const F32 d;
   const auto limit = hn::Set(d, 1e6f);
-  // Added to 1.5 * 2^23 a whole number below 2^22 stands in the float's last bits: ConvertTo also guards against what
-  // cannot be here.
+  // A whole number below 2^22 plus 1.5 * 2^23 has the number in the float's last bits. Faster than ConvertTo, which
+  // also guards against values that cannot occur here.
   constexpr float kWhole = 12582912.0f;
   const auto floor = hn::Floor(hn::Max(hn::Min(v, limit), hn::Neg(limit)));
   return hn::Sub(hn::BitCast(I32(), hn::Add(floor, hn::Set(d, kWhole))),
@@ -95,7 +95,7 @@ HWY_INLINE Projected Project(const LeafTransform& t, const Lanes& p, float near_
           w};
 }
 
-// Lane numbers that are set in a mask of 8 bits, in order; 0 beyond.
+// Numbers of the lanes that are set in a mask of 8 bits, in order; 0 beyond.
 struct CompressTable {
   uint8_t lane[256][8];
 };
@@ -108,7 +108,7 @@ constexpr CompressTable make_compress_table() {
 }
 alignas(64) constexpr CompressTable kCompress = make_compress_table();
 
-// Moves the lanes of a mask to the front, the same for several vectors. (Highway's own Compress in 1.0 copies its 1 KiB
+// Moves the lanes of a mask to the front, the same for several vectors. (Highway 1.0's own Compress copies its 1 KiB
 // table to the stack at each call when GCC compiles it: bench splat_square was 1.7 times slower with it.)
 class Compressor {
  public:
@@ -132,8 +132,8 @@ class Compressor {
   uint32_t bits_ = 0;
 };
 
-// Collects the points of levels that have fewer of them than a vector has lanes: after many small updates most mosaics
-// do.
+// Collects the points of levels with fewer points than a vector has lanes, as most mosaics have after many small
+// updates.
 class Stage {
  public:
   bool has_room(size_t n) const { return count_ + n <= kCapacity; }
@@ -141,7 +141,7 @@ class Stage {
     count_ = 0;
     may_face_away_ = false;
   }
-  /// Whether points of any staged item may face away: then all points are tested.
+  /// True if points of any staged item may face away: then all points are tested.
   bool may_face_away() const { return may_face_away_; }
   HWY_INLINE void append(const DrawItem& item) {
     const points::Mosaic::Level& l = item.level;
@@ -152,13 +152,13 @@ class Stage {
     copy(l.colour, colour_ + count_, n);
     count_ += n;
   }
-  /// Whole vectors can be read wherever a point is.
+  /// The staged points; whole vectors can be read from any point on.
   points::Mosaic::Level level() const { return {static_cast<uint32_t>(count_), x_, y_, z_, normal_, colour_}; }
 
  private:
   static constexpr size_t kCapacity = 128;
 
-  // Few elements go by two moves of fixed size that overlap, instead of a loop.
+  // Copies few elements by two overlapping moves of fixed size, instead of a loop.
   template <class T>
   static HWY_INLINE void copy(const T* HWY_RESTRICT from, T* HWY_RESTRICT to, size_t n) {
     if (n >= 8)
@@ -184,20 +184,20 @@ class Stage {
 };
 
 // Calls visit(offset, skip, valid) for vectors that cover the points [first, last) of a level: lanes skip..valid-1 are
-// points not visited yet. The last vector overlaps the one before, so that nothing is read beyond the arrays of a level
-// that has at least a vector of points; a Stage may have fewer.
+// points not visited yet. The last vector overlaps the one before, so that nothing is read beyond the arrays of levels
+// with at least a vector; a Stage may have fewer points.
 template <class Visit>
 HWY_INLINE void ForVectors(size_t first, size_t last, const Visit& visit) {
   const size_t lanes = hn::Lanes(F32());
-  // One call, so that it is compiled into the loop.
+  // A single call site, so that it is inlined into the loop.
   for (size_t i = first; i < last; i += lanes) {
     const size_t offset = i + lanes <= last || last < lanes ? i : last - lanes;
     visit(offset, i - offset, std::min(lanes, last - offset));
   }
 }
 
-// Mosaics lie scattered in memory, so those that come next are prefetched. A level's arrays lie next to each other,
-// except for mean colours: prefetching lines from x on finds nearly all of them.
+// Prefetches the next mosaics, which lie scattered in memory. A level's arrays lie next to each other, except for mean
+// colours: prefetching lines from x on finds nearly all of them.
 constexpr uint32_t kItemsAhead = 8;
 HWY_INLINE void PrefetchLevel(const points::Mosaic::Level& level) {
   const auto* p = reinterpret_cast<const std::byte*>(level.x);
@@ -208,7 +208,7 @@ HWY_INLINE void PrefetchRun(const TileInput& input, const TileBinning::Entry* en
   const TileBinning::Entry* end = input.entries.data() + input.entries.size();
   if (entry == end) return;
   const ItemRun run = input.runs[entry->box];
-  // The items of the run after it, so that its points can be prefetched without waiting.
+  // Prefetches the items of the run after it, so that its points can be prefetched without waiting.
   if (entry + 1 != end) {
     const auto* items = reinterpret_cast<const std::byte*>(input.items + input.runs[entry[1].box].first);
     for (size_t i = 0; i < kItemsAhead * sizeof(DrawItem); i += 64) hwy::Prefetch(items + i);

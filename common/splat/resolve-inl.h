@@ -21,7 +21,7 @@ HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Pixels at once. A row's last vector may reach beyond it, into the buffer's margin: never wider than that.
+// Pixels processed at once. A row's last vector may reach beyond it, into the buffer's margin: never wider than that.
 using PixelU32 = hn::CappedTag<uint32_t, kMaxSplatSide>;
 using PixelI32 = hn::RebindToSigned<PixelU32>;
 using PixelF32 = hn::RebindToFloat<PixelU32>;
@@ -44,8 +44,8 @@ HWY_INLINE void StoreEmpty(uint64_t* p) {
 }
 HWY_INLINE hn::Mask<PixelU32> IsEmpty(Pixels high) { return hn::Eq(high, hn::Set(PixelU32(), kEmptyInfo)); }
 
-// image::Shading::apply on each lane, of intensities in bytes: (c * i + 127) / 255 for each channel;
-// v / 255 = (v + 1 + (v >> 8)) >> 8 for v < 65535.
+// image::Shading::apply on each lane, with intensities in bytes: (c * i + 127) / 255 for each channel; v / 255 = (v + 1
+// + (v >> 8)) >> 8 for v < 65535.
 HWY_INLINE Pixels Shade(Pixels albedo, const uint8_t* HWY_RESTRICT light) {
   const PixelU32 d;
   const auto i = hn::PromoteTo(d, hn::LoadU(hn::Rebind<uint8_t, PixelU32>(), light));
@@ -57,7 +57,8 @@ HWY_INLINE Pixels Shade(Pixels albedo, const uint8_t* HWY_RESTRICT light) {
   return hn::Or(hn::And(hn::ShiftRight<8>(rb_over), red_blue), hn::And(g_over, hn::Set(d, 0xff00u)));
 }
 
-// Intensities of `n` keys' normals. By scalars: gathers of 8 lanes took longer (bench splat_square, resolve_ms).
+// Looks up intensities of `n` keys' normals, by scalars: gathers of 8 lanes took longer (bench splat_square,
+// resolve_ms).
 HWY_INLINE void LookUpLight(const uint64_t* HWY_RESTRICT keys, size_t n, const uint8_t* HWY_RESTRICT intensity,
                             uint8_t* HWY_RESTRICT light) {
 #pragma GCC unroll 8
@@ -71,7 +72,7 @@ HWY_INLINE Pixels InfoOf(Pixels high) {
                 hn::And(hn::ShiftRight<8>(high), hn::Set(d, 31)));
 }
 
-// decode_depth_code(unbiased_depth_code(info)) of each lane; of empty ones, anything.
+// decode_depth_code(unbiased_depth_code(info)) of each lane; undefined for empty ones.
 HWY_INLINE hn::Vec<PixelF32> DepthOf(Pixels info, const ResolveInput& input) {
   const PixelU32 d;
   const PixelI32 di;
@@ -86,8 +87,8 @@ HWY_INLINE hn::Vec<PixelF32> DepthOf(Pixels info, const ResolveInput& input) {
   return hn::BitCast(PixelF32(), hn::Add(hn::ShiftLeft<kDepthCodeShift>(hn::BitCast(d, code)), hn::Set(d, first)));
 }
 
-// Pixels are made a chunk at a time in the first-level cache. They leave it as whole lines, past the other caches:
-// nobody reads them soon, and a line that is not written in one go would first be read from memory.
+// Pixels are made a chunk at a time in the first-level cache. They leave it as whole lines, past the other caches: they
+// are not read again soon, and a line that is not written in one go would first be read from memory.
 constexpr size_t kChunk = 256;
 
 HWY_INLINE void StreamOut(const uint32_t* HWY_RESTRICT from, uint32_t* HWY_RESTRICT to, size_t n) {
@@ -102,7 +103,7 @@ HWY_INLINE void StreamOut(const uint32_t* HWY_RESTRICT from, uint32_t* HWY_RESTR
   std::memcpy(to + i, from + i, (n - i) * sizeof(uint32_t));
 }
 
-// A chunk's way out: put vectors of pixels, then flush. kDepth: whether depths are wanted.
+// Writes a chunk: put vectors of pixels, then flush. kDepth: writes depths, too.
 template <bool kDepth>
 class ChunkWriter {
  public:
@@ -143,7 +144,7 @@ void ResolveTile(const ResolvedTile& tile, int reach, const ResolveInput& input,
   const PixelU32 d;
   const size_t lanes = hn::Lanes(d);
   HWY_ALIGN uint8_t light[kChunk + kMaxSplatSide];
-  // A row's keys leave their place before its colours and infos take it.
+  // Copies a row's keys before its colours and infos take their place.
   const auto columns = static_cast<size_t>(tile.width + 2 * reach);
   scratch.resize(std::max(scratch.size(), columns + kMaxSplatSide));
   for (int y = -reach; y < tile.height + reach; ++y) {

@@ -1,10 +1,10 @@
-// What the CPU splatter does inside one tile, on the widest vectors the machine has (Highway, chosen at run time).
-// Every target computes the same pixels: no fused multiply-add, no approximate reciprocal.
+// Work of the CPU splatter inside one tile, on the widest vectors of the machine (Highway, chosen at run time). Every
+// target computes the same pixels: no fused multiply-add, no approximate reciprocal.
 //
 // A point's position:  h = row . (x, y, z, 1)  for the three rows of its leaf's transform, summed from left to right,
 //   fixed = floor(h.xy * (2^sub_bits / h.w) + shift)      (2^-sub_bits pixels; single precision)
 //   first pixel = fixed >> sub_bits,  place within it = fixed & (2^sub_bits - 1)
-// and its key: see pixel_key.h; what a splat adds to it in each pixel it covers: see flat/splat_table.h.
+// and its key: see pixel_key.h; its addend in each pixel it covers: see flat/splat_table.h.
 #pragma once
 
 #include <cstdint>
@@ -26,9 +26,9 @@ struct ItemRun {
 
 /// The part of a view that a tile draws. All arrays belong to the caller and are only read.
 struct TileInput {
-  /// What is drawn: the tile, grown by the pixels around it that the finish reads. So it may reach beyond the image.
+  /// The area to draw: the tile, grown by the pixels around it that the finish reads. It may reach beyond the image.
   geometry::Rect rect;
-  geometry::Rect own;  ///< the tile itself, inside the image: points are counted where they fall into it
+  geometry::Rect own;  ///< the tile itself, inside the image: counts the points that fall into it
   float near_m = 0;    ///< nearer points are not drawn
   std::span<const TileBinning::Entry> entries;
   const ItemRun* runs = nullptr;              ///< one a box of the binning
@@ -37,7 +37,7 @@ struct TileInput {
   const DrawItem* items = nullptr;
 };
 
-/// How an item's points are drawn.
+/// Style of an item's points.
 struct ItemStyle {
   const SplatShape* shape = nullptr;
   uint32_t spacing = 0;  ///< spacing_class of its samples
@@ -54,23 +54,23 @@ struct KeyBuffer {
 };
 
 struct TileCounts {
-  uint64_t projected = 0;  ///< points, counted again in each tile that they are tested for
+  uint64_t projected = 0;  ///< points, counted in each tile that tests them
   uint64_t drawn = 0;      ///< points whose splat's first pixel lies in `own`
 };
 
-/// Splats squares or discs into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h).
+/// Splats squares or discs into buffer, whose pixels hold kEmptyKey or keys drawn before (pixel_key.h).
 ///   styles: one an item.
 TileCounts splat_tile(const TileInput& input, const ItemStyle* styles, const KeyBuffer& buffer);
 
-/// How keys become colours and depths.
+/// Parameters that turn keys into colours and depths.
 struct ResolveInput {
-  const uint8_t* intensity = nullptr;  ///< 65536 of 1/255, followed by 3 readable bytes
+  const uint8_t* intensity = nullptr;  ///< 65536 intensities in 1/255, followed by 3 readable bytes
   uint32_t background = 0;             ///< 0x00RRGGBB
   float near_m = 0;
   RimBias rim{};
 };
 
-/// The tile's place in the frame: its first pixel in images of `pitch` pixels a row.
+/// The tile's first pixel in images of `pitch` pixels a row.
 struct TileTarget {
   uint32_t* colour = nullptr;
   float* depth_m = nullptr;  ///< may be null
@@ -89,13 +89,13 @@ void write_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, 
 /// resolve_tile and write_tile in one pass, for tiles without reach.
 void resolve_and_write_tile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target);
 
-/// The last bits of a reference depth tell where in its pixel the point lies: x, and above it y, in
-/// 2^-kReferenceSubBits pixels. So depths are off by at most 2^-15 of themselves.
+/// The last bits of a reference depth hold the point's place in its pixel: x, and above it y, in 2^-kReferenceSubBits
+/// pixels. So relative errors of depths are at most 2^-15.
 inline constexpr int kReferenceSubBits = 4;
 inline constexpr uint32_t kReferencePlaceMask = (1u << 2 * kReferenceSubBits) - 1;
 
 /// Least depth of all points in each pixel, one pixel a point, as the bits of a positive float with the point's place
-/// (kReferenceSubBits). depth_bits: rect.width * rect.height, row-major, holding +infinity or what is there already.
+/// (kReferenceSubBits). depth_bits: rect.width * rect.height, row-major, holding +infinity or depths drawn before.
 void depth_tile(const TileInput& input, uint32_t* depth_bits);
 
 /// The name of the instruction set in use.

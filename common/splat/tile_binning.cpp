@@ -7,13 +7,13 @@
 namespace telesplat::splat {
 namespace {
 
-// Where a leaf's cube projects: bounds in pixels, or unbounded where it reaches nearer than the near plane.
+// Bounds of a leaf's cube on the screen, in pixels; unbounded if it reaches nearer than the near plane.
 struct Footprint {
   float x0, x1, y0, y1;
   float nearest, farthest;
 };
 
-// Least and greatest of eight; halves are compared whole, which the compiler does by vectors.
+// Least and greatest of eight; compares halves as a whole, which the compiler vectorises.
 std::pair<float, float> extremes(const float (&v)[8]) {
   float lo[4], hi[4];
   for (int i = 0; i < 4; ++i) lo[i] = v[i] < v[i + 4] ? v[i] : v[i + 4];
@@ -65,7 +65,7 @@ void TileBinning::build(const TileGrid& grid, std::span<const LeafTransform> tra
 void TileBinning::begin(const TileGrid& grid, size_t boxes, float near_m, float margin_px) {
   grid_ = grid;
   near_m_ = near_m;
-  margin_px_ = margin_px + 1.0f;  // 1: rounding, here and where the points are projected
+  margin_px_ = margin_px + 1.0f;  // 1: for rounding, here and in the projection of points
   ranges_.resize(boxes);
 }
 
@@ -77,8 +77,8 @@ void TileBinning::place(size_t box, const LeafTransform& transform, float reach,
   Range& r = ranges_[box];
   r = {1, 0, 1, 0, false};
   if (!(f.farthest >= near_m_)) return;
-  // A cube that reaches nearer than half the near plane has no bounded footprint. It is rare: such cubes are in your
-  // face.
+  // A cube that reaches nearer than half the near plane has no bounded footprint: it goes into all tiles. Such cubes,
+  // right before the eye, are rare.
   if (!(f.nearest > 0.5f * near_m_)) {
     r = {0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
     return;

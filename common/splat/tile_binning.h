@@ -1,4 +1,4 @@
-// The screen cut into tiles, and which boxes of a view touch which tile. A tile's keys stay in a core's cache from
+// Cuts the screen into tiles, and lists the boxes of a view that touch each. A tile's keys stay in a core's cache from
 // splatting to the end of the finish, so only finished colours are written to memory.
 #pragma once
 
@@ -23,15 +23,14 @@ struct TileGrid {
   geometry::Rect rect(int index) const;
 };
 
-/// Leaf coordinates (uint16 x, y, z) -> homogeneous pixels in single precision, dequantisation folded in: row . (x, y,
-/// z, 1) = (x_pix w, y_pix w, w), w = depth in metres. Off the exact position by less than 0.01 pixel on images of
-/// 16384 pixels.
+/// Leaf coordinates (uint16 x, y, z) -> homogeneous pixels in single precision, dequantisation included: row . (x, y,
+/// z, 1) = (x_pix w, y_pix w, w), w = depth in metres. Less than 0.01 pixel off on images of 16384 pixels.
 struct LeafTransform {
   std::array<float, 4> x, y, w;
 };
 LeafTransform leaf_transform(const geometry::Camera::PixelTransform& room_to_pixel, const geometry::Box& leaf_room);
 
-/// Which boxes touch which tiles. The buffers are kept from one frame to the next.
+/// Lists of the boxes that touch each tile. The buffers are kept from one frame to the next.
 class TileBinning {
  public:
   struct Entry {
@@ -57,7 +56,7 @@ class TileBinning {
 
  private:
   struct Range {
-    int16_t column0, column1, row0, row1;  // inclusive; column1 < column0: nowhere
+    int16_t column0, column1, row0, row1;  // inclusive; column1 < column0: in no tile
     bool whole;
   };
   TileGrid grid_;

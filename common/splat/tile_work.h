@@ -1,4 +1,4 @@
-// What a kernel may use to splat one tile on the CPU (KernelTraits::splat_tile).
+// Inputs and buffers of a kernel that splats one tile on the CPU (KernelTraits::splat_tile).
 #pragma once
 
 #include "common/splat/ewa/shading.h"
@@ -8,7 +8,7 @@
 
 namespace telesplat::splat {
 
-/// All of it belongs to the splatter. Only what `keys`, `tile` and `ewa` point to is written.
+/// The splatter owns all of it. The kernel writes only through `keys`, `tile` and `ewa`.
 struct TileWork {
   const TileInput& input;
 

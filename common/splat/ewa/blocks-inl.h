@@ -1,4 +1,4 @@
-// Batches of splats that wait to be drawn by one of the two passes of the kernel `ewa`, and the pixels of a splat.
+// Batches of splats that wait for one of the two passes of the kernel `ewa`, and the pixels of a splat.
 // Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_EWA_BLOCKS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_EWA_BLOCKS_INL_H_
@@ -34,7 +34,7 @@ struct SplatBatch {
   }
 };
 
-// The fields of both passes, then those of the second.
+// Fields that both passes use, then those of the second.
 enum EwaField {
   kPlaceE,
   kSizeE,
@@ -60,7 +60,7 @@ enum EwaField {
 using EwaBatch = SplatBatch<kEwaFields>;
 using SumBatch = SplatBatch<kSumFields>;
 
-constexpr uint32_t kCutBit = 1 << 16;  // of kSizeE: the box ends before the ellipse does
+constexpr uint32_t kCutBit = 1 << 16;  // bit of kSizeE: the box ends before the ellipse does
 
 template <size_t kFields>
 HWY_INLINE void PutConics(SplatBatch<kFields>& batch, const Compressor& compress, const Conics& c, const Depths& depth,
@@ -81,10 +81,10 @@ HWY_INLINE void PutConics(SplatBatch<kFields>& batch, const Compressor& compress
   put_float(kCodeE, depth.centre), put_float(kCodeXE, depth.x), put_float(kCodeYE, depth.y);
 }
 
-// Calls pixels(first pixel's place, which of the row's pixels lie in the ellipse, q, depth code) for kRows rows of
-// kColumns pixels of splat i: the block that begins (x, y) pixels into its box. Without kCut the block is not cut to
-// the box: its pixels beyond the box lie outside the ellipse, or beyond the tile where nobody reads them. Rows come as
-// vectors of up to 8 pixels.
+// Calls pixels(first pixel's index, mask of the row's pixels in the ellipse, q, depth code) for kRows rows of kColumns
+// pixels of splat i: the block that begins (x, y) pixels into its box. Without kCut the block is not cut to the box:
+// pixels beyond the box lie outside the ellipse, or beyond the tile where they are never read. Rows come as vectors of
+// up to 8 pixels.
 template <bool kCut, int kColumns, int kRows, size_t kFields, class PixelsOfRow>
 HWY_INLINE void ForRows(const SplatBatch<kFields>& batch, size_t i, int stride, int x, int y,
                         const PixelsOfRow& pixels) {
@@ -113,8 +113,8 @@ HWY_INLINE void ForRows(const SplatBatch<kFields>& batch, size_t i, int stride, 
   }
 }
 
-// The same for a whole splat, by the size of its box. Blocks have fixed sizes, so that no end of a loop is predicted
-// wrongly: the splats of a view are of similar size.
+// Calls pixels() for a whole splat, by the size of its box. Blocks have fixed sizes, so that no end of a loop is
+// mispredicted: the splats of a view are of similar size.
 template <size_t kFields, class PixelsOfRow>
 HWY_INLINE void ForBlocks(const SplatBatch<kFields>& batch, size_t i, int stride, const PixelsOfRow& pixels) {
   const uint32_t size = batch.at(kSizeE, i);

@@ -1,4 +1,4 @@
-// The kernel `ewa`: which surface is visible in each pixel, then the weighted mean of all splats of that surface.
+// The kernel `ewa`: finds the visible surface of each pixel, then the weighted mean of all splats of that surface.
 // Based on: M. Zwicker, H. Pfister, J. van Baar, M. Gross, "EWA splatting", IEEE TVCG 8(3), 2002; M. Botsch, L.
 // Kobbelt, "High-quality point-based rendering on modern GPUs", 2003 (visibility with an epsilon, then accumulation and
 // normalisation).
@@ -23,9 +23,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 
-// What splats add to EwaSum: its first four and its last four terms, for a whole batch. Made splat by splat instead,
-// from scalars written and then read as a vector, each read waited for all stores before it: a seventh of the second
-// pass.
+// Terms that splats add to EwaSum: its first four and its last four, for a whole batch. Made splat by splat, from
+// scalars written and then read as a vector, each read waited for all stores before it: a seventh of the second pass.
 struct EwaTerms {
   HWY_ALIGN float low[4 * SumBatch::kCapacity], high[4 * SumBatch::kCapacity];
 };
@@ -57,7 +56,7 @@ HWY_INLINE void TermsOfBatch(const SumBatch& batch, EwaTerms& terms) {
 #endif
   }
 }
-// All terms of splat i, or half of them where vectors have four lanes.
+// Loads all terms of splat i, or half of them if vectors have four lanes.
 template <class D>
 HWY_INLINE hn::Vec<D> TermsOf(D d, const EwaTerms& terms, size_t i, int half) {
 #if HWY_TARGET != HWY_SCALAR
@@ -69,7 +68,7 @@ HWY_INLINE hn::Vec<D> TermsOf(D d, const EwaTerms& terms, size_t i, int half) {
   return hn::LoadU(d, (half ? terms.high : terms.low) + 4 * i);
 }
 
-// Second pass: sums of what lies on the visible surface.
+// Second pass: sums the splats of the visible surface.
 HWY_NOINLINE void EwaDrawSums(const SumBatch& batch, const EwaBuffer& buffer) {
   const hn::CappedTag<float, 8> d8;
   constexpr size_t kLanes8 = MaxLanes(d8);
@@ -84,7 +83,7 @@ HWY_NOINLINE void EwaDrawSums(const SumBatch& batch, const EwaBuffer& buffer) {
               [&](auto columns, auto d, int part, size_t at, auto inside, auto q, auto depth) HWY_ATTR {
                 const auto there = hn::LoadU(d, visible + at);
                 const auto counts = hn::And(inside, hn::Le(hn::Sub(depth, hn::Set(d, epsilon)), there));
-                // No branch on whether any counts: it would be guessed wrong too often.
+                // Without a branch on "any counts", which would be mispredicted too often.
                 const auto t = hn::Sub(hn::Set(d, 1.0f), q), t2 = hn::Mul(t, t);
                 HWY_ALIGN float weights[8];
                 hn::Store(hn::IfThenElseZero(counts, hn::Mul(hn::Set(d, peak), hn::Mul(t2, t2))), d, weights);
@@ -106,7 +105,7 @@ HWY_NOINLINE void EwaDrawSums(const SumBatch& batch, const EwaBuffer& buffer) {
   }
 }
 
-// Adds the splats among s to a batch for the second pass: batch_with_room() is asked for one where there are any.
+// Adds the kept splats of s to a batch of the second pass; calls batch_with_room() only if there are any.
 template <class Next>
 HWY_INLINE void EwaPutSums(const Surfels& s, hn::Mask<I32> keep, float near_m, const geometry::Rect& rect, int stride,
                            const Next& batch_with_room) {
@@ -129,8 +128,8 @@ HWY_INLINE void EwaPutSums(const Surfels& s, hn::Mask<I32> keep, float near_m, c
   batch.count += compress.count();
 }
 
-// The splats of the second pass, kept from the first pass so that each contour is computed once. Batches lie one after
-// the other in the buffer's memory.
+// The splats of the second pass, kept from the first so that each contour is computed once. Batches lie one after the
+// other in the buffer's memory.
 class EwaRecord {
  public:
   explicit EwaRecord(EwaBuffer& buffer) {
@@ -139,7 +138,7 @@ class EwaRecord {
     next();
   }
 
-  /// False: there was no room for all, so the tile's points must be met again.
+  /// False: the splats did not all fit, so the tile's points must be processed again.
   bool complete() const { return !overflown_; }
   HWY_INLINE SumBatch& with_room() {
     if (HWY_UNLIKELY(batch(used_ - 1).full())) next();
@@ -191,7 +190,7 @@ class EwaVisibility {
     const Conics c = ConicOf(s, Const(1.0f), kOpaqueVariance, rect_);
     const Depths depth = DepthsOf(s, near_m_);
     const auto in_rect = CentreIn(c, rect_);
-    // The pixel that holds the centre, always.
+    // Always draws the pixel that holds the centre.
     const auto centre = hn::And(keep, in_rect);
     if (!hn::AllFalse(di, centre)) {
       const auto dx = hn::Sub(hn::Add(hn::ConvertTo(d, c.pixel_x), Const(0.5f)), c.centre_x),
@@ -234,7 +233,7 @@ class EwaVisibility {
   EwaBatch batch_;
 };
 
-// Second pass where the first could not keep all: from the points again.
+// Second pass for records that overflowed: processes the points again.
 class EwaAccumulation {
  public:
   static constexpr SurfelReach kReach = kEwaReach;
@@ -260,7 +259,7 @@ class EwaAccumulation {
 };
 
 // Buffers are empty between tiles: resolving empties them, except for the pixels beyond the tile into which splats hang
-// over. Nobody reads those unless the next tile is larger.
+// over. Only a larger tile would read those.
 void PrepareEwa(const geometry::Rect& rect, EwaBuffer& buffer) {
   if (buffer.width == rect.width && buffer.height == rect.height) return;
   const int stride = (rect.width + kMaxSplatSide + 7) / 8 * 8, rows = rect.height + kMaxSplatSide;

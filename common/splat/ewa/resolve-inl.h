@@ -1,4 +1,4 @@
-// The end of the kernel `ewa`: sums to shaded colours and infos.
+// The end of the kernel `ewa`: turns sums into shaded colours and infos.
 // Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_EWA_RESOLVE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_EWA_RESOLVE_INL_H_
@@ -21,7 +21,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr float kNothingVisible = std::numeric_limits<float>::infinity();
 
-// ewa_colour and ewa_depth_code of whole rows. Leaves the buffer's pixels empty, while they are in the cache.
+// Computes ewa_colour and ewa_depth_code of whole rows. Empties the buffer's pixels while they are in the cache.
 #if HWY_TARGET == HWY_SCALAR
 void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTile& tile, int reach,
                 uint32_t background) {
@@ -55,11 +55,11 @@ void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTi
       if (hn::AllFalse(d, shown)) {
         hn::StoreU(paper, du, colours + x);
         hn::StoreU(empty, du, infos + x);
-        // Sums may hold splats that lie on no visible surface.
+        // Empties sums, too: they may hold splats that lie on no visible surface.
         for (size_t i = 0; i < 8; ++i) hn::Store(hn::Zero(d), d, buffer.sums.get() + 8 * at + i * lanes);
         continue;
       }
-      // Every pixel is two groups of four: they come out by turns.
+      // Each pixel has two groups of four, which alternate in the loaded vectors.
       float* sum = buffer.sums.get() + 8 * at;
       V a0, a1, a2, a3, b0, b1, b2, b3;
       hn::LoadInterleaved4(d, sum, a0, a1, a2, a3);

@@ -20,7 +20,7 @@ inline EwaLight ewa_light(const image::ShadingParameters& p, const SurfelCamera&
   return {p.ambient, p.head, p.key, {dot(c.right, x, y, z), dot(c.down, x, y, z), dot(c.forward, x, y, z)}};
 }
 
-/// What the second pass gathers in a pixel: sums of weight times each.
+/// Sums that the second pass gathers in a pixel: weight times each value.
 struct EwaSum {
   float red = 0, green = 0, blue = 0, weight = 0;
   float normal_x = 0, normal_y = 0, normal_z = 0, depth_code = 0;
@@ -30,7 +30,7 @@ struct EwaSum {
 inline uint32_t ewa_colour(const EwaSum& s, const EwaLight& light) {
   const auto [kx, ky, kz] = light.key_direction;
   const float length2 = (s.normal_x * s.normal_x + s.normal_y * s.normal_y) + s.normal_z * s.normal_z;
-  // Normals that cancel are lit as if they lay across.
+  // Normals that cancel are lit as if they lay across the view.
   const float scale = 1.0f / std::sqrt(std::max(length2, 1e-30f));
   const float head = std::abs(s.normal_z) * scale;
   const float key = std::max(((s.normal_x * kx + s.normal_y * ky) + s.normal_z * kz) * scale, 0.0f);

@@ -17,19 +17,19 @@
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 
-// Projected points held before they are splatted: their arrays stay in the first-level cache.
+// Projected points held before they are splatted: few enough for the first-level cache.
 constexpr size_t kBatch = 512;
 constexpr size_t kApart = 8;
 
 // Projected points, waiting to be splatted.
 struct Batch {
-  // Where: index of the first pixel << 2 sub_bits | sub_y << sub_bits | sub_x.
+  // index of the first pixel << 2 sub_bits | sub_y << sub_bits | sub_x
   HWY_ALIGN uint32_t place[kBatch + kMaxLanes];
   HWY_ALIGN uint64_t key[kBatch + kMaxLanes];
   size_t count = 0;
 };
 
-// One row of a splat after the other, whole vectors: what lies beyond the splat's side is written back unchanged.
+// Draws the rows of a splat, in whole vectors: pixels beyond the splat's side are written back unchanged.
 template <int kSide>
 HWY_INLINE void SplatOne(uint64_t* HWY_RESTRICT pixels, size_t stride, const uint64_t* HWY_RESTRICT addends,
                          int64_t key) {
@@ -50,9 +50,9 @@ void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& b
   const int shift = 2 * shape.sub_bits;
   const uint32_t sub_mask = (1u << shift) - 1;
   const auto stride = static_cast<size_t>(buffer.stride);
-  // Neighbours in the batch often overlap on the screen. A row that is read right after one was written across its ends
-  // waits for that write to leave the store buffer. So points far apart in the batch follow one another: the least key
-  // wins in any order.
+  // Neighbours in the batch often overlap on the screen. Reading a row right after it was written across its ends waits
+  // for that write to leave the store buffer. So points far apart in the batch follow one another: the least key wins
+  // in any order.
   const size_t step = (batch.count + kApart - 1) / kApart;
   for (size_t j = 0; j < step; ++j)
     for (size_t i = j; i < batch.count; i += step) {
@@ -67,8 +67,8 @@ void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& b
     }
 }
 
-// Which points of a tile's rect are drawn, and which of those are counted, by the first pixel of their splat (from the
-// rect's first pixel). As vectors.
+// Selects the points of a tile's rect that are drawn, and those that are counted, by the first pixel of their splat
+// (from the rect's first pixel). As vectors.
 class TileArea {
  public:
   HWY_INLINE TileArea(const TileInput& input, int side) {
@@ -89,7 +89,7 @@ class TileArea {
   hn::Vec<I32> width_, height_, outside_, own_x0_, own_y0_, own_x1_, own_y1_;
 };
 
-// The halves of keys.
+// The two halves of keys.
 struct KeyHalves {
   hn::Vec<U32> low, high;
 };
@@ -103,7 +103,7 @@ HWY_INLINE KeyHalves KeysOf(hn::Vec<F32> w, hn::Vec<U32> normal, hn::Vec<U32> co
           hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head)};
 }
 
-// Without the lanes outside [skip, valid): see ForVectors.
+// Clears lanes outside [skip, valid): see ForVectors.
 HWY_INLINE hn::Mask<I32> OnlyNew(hn::Mask<I32> keep, size_t skip, size_t valid) {
   const I32 di;
   if (valid - skip == hn::Lanes(di)) return keep;
@@ -115,7 +115,7 @@ HWY_INLINE size_t StoreKept(hn::Mask<I32> keep, hn::Vec<U32> place, const KeyHal
                             uint64_t* keys) {
   const U32 du;
   auto* const halves = reinterpret_cast<uint32_t*>(keys);
-  // Mosaics are scanned in order: most vectors of a cluster that crosses a tile's border lie on one side of it.
+  // Mosaics are scanned in order: most vectors of a cluster across a tile's border lie on one side of it.
   if (hn::AllTrue(I32(), keep)) {
     hn::StoreU(place, du, places);
     hn::StoreInterleaved2(key.low, key.high, du, halves);
@@ -169,7 +169,7 @@ class TileSplatter {
     batch_.count = 0;
   }
 
-  // Stage -> batch. What is staged belongs to one cluster and has one shape.
+  // Moves the staged points to the batch. They belong to one cluster and have one shape.
   void drain(const TileBinning::Entry& entry) {
     const points::Mosaic::Level level = stage_.level();
     if (level.count > 0) add(entry, level, stage_.may_face_away());
@@ -195,7 +195,7 @@ class TileSplatter {
                               const points::Mosaic::Level& level_reference, size_t first, size_t last) {
     const I32 di;
     const U32 du;
-    // Copies, which no store can change: the compiler need not read them again.
+    // Local copies, which no store can change: the compiler need not read them again.
     const LeafTransform transform = transform_reference;
     const points::Mosaic::Level level = level_reference;
     const glm::vec3 facing = facing_reference;
@@ -237,8 +237,8 @@ class TileSplatter {
           const auto [low, high] = KeysOf(p.w, normal, hn::LoadU(du, level.colour + offset), near_bits, head);
 
           if (kWhole && !kMayFaceAway) {
-            // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there
-            // if the batch was emptied in between; then they are splatted twice, which changes nothing.)
+            // Lanes below `skip` are the batch's last points: they are written once more, unchanged. (If the batch was
+            // emptied in between, they are splatted twice, which changes nothing.)
             const size_t at = count >= skip ? count - skip : 0;
             hn::StoreU(place, du, places + at);
             hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + at));

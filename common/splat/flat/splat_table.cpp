@@ -15,8 +15,7 @@ uint32_t bias_at(double r2, double growth) {
 
 double contour_r2(const KernelTraits& kernel, double size) { return kernel.flat_contour_r2 * size * size; }
 
-// What each pixel of the splat's square adds to the key of a centre that lies at (cx, cy), from the square's upper left
-// corner.
+// Fills the addend of each pixel of the splat's square, for a centre at (cx, cy) from the square's upper left corner.
 void fill_addends(const KernelTraits& kernel, const FlatSplat& flat, double cx, double cy, int row_stride,
                   uint64_t* out) {
   const double contour = contour_r2(kernel, flat.size), radius2 = 0.25 * flat.size * flat.size;
@@ -58,7 +57,7 @@ float disc_diameter(float splat_px) { return square_size(splat_px); }
 int square_side(float splat_px) { return static_cast<int>(std::ceil(square_size(splat_px))); }
 
 int sub_bits(int side) {
-  // Finer steps are not seen, but finer tables would leave the first-level cache: 8 KiB at side 4, 32 KiB at side 16.
+  // Finer steps are invisible, and their tables would leave the first-level cache: 8 KiB at side 4, 32 KiB at 16.
   return side == 1 ? 0 : side <= 4 ? 3 : 2;
 }
 
@@ -75,7 +74,7 @@ uint32_t splat_bias(double r2, int side, double focal_px) { return bias_at(r2, s
 FlatSplat flat_splat(const KernelTraits& kernel, float size, double focal_px) {
   const int side = static_cast<int>(std::ceil(size));
   const double growth = splat_bias_growth(side, focal_px);
-  // A splat of one pixel has no contour beside its centre.
+  // A splat of one pixel has no contour apart from its centre.
   return {size, side, sub_bits(side), growth, side == 1 ? 0 : bias_at(contour_r2(kernel, size), growth)};
 }
 

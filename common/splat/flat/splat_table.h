@@ -1,6 +1,6 @@
-// Splat shapes: what a splat adds to its centre's key (pixel_key.h) in each pixel it covers: a bias of the depth code
-// that grows with the squared distance from the centre, and the ring. Adding steps to a depth code multiplies the depth
-// by nearly a constant, so one integer a pixel does it.
+// Splat shapes: the addends of a splat's pixels to its centre's key (pixel_key.h): a bias of the depth code that grows
+// with the squared distance from the centre, and the ring. Adding steps to a depth code multiplies the depth by nearly
+// a constant, so one integer a pixel does it.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,12 @@ namespace telesplat::splat {
 inline constexpr int kMaxSplatSide = 16;
 inline constexpr int kBiasShift = kDepthCodeShift;  ///< one bias step = 2^9 units of a float's last place
 
-/// A flat splat of one size: what both renderers know of it.
+/// A flat splat of one size: the figures that both renderers use.
 struct FlatSplat {
   float size = 1;          ///< side of a square, diameter of a disc, pixels: a multiple of 0.25, 1..kMaxSplatSide
-  int side = 1;            ///< of the square of pixels that holds it wherever its centre lies, 1..kMaxSplatSide
-  int sub_bits = 0;        ///< the projected centre's place within a pixel is told to 2^-sub_bits pixels on each axis
+  int side = 1;            ///< side of the square of pixels that holds it for any place of its centre,
+                           ///< 1..kMaxSplatSide
+  int sub_bits = 0;        ///< the projected centre's place in a pixel is known to 2^-sub_bits pixels on each axis
   double bias_growth = 0;  ///< splat_bias_growth
   uint32_t rim_bias = 0;   ///< bias on the contour, q = 1
 };
@@ -42,11 +43,11 @@ struct SplatShape {
 /// 1..kMaxSplatSide.
 float square_size(float splat_px);
 float disc_diameter(float splat_px);
-/// Side of the square of pixels that holds a square splat wherever its centre lies.
+/// Side of the square of pixels that holds a square splat for any place of its centre.
 int square_side(float splat_px);
 
-/// The shapes of one view, built when first asked for. With the projected centre's place told to 1/8 or, above 4
-/// pixels, 1/4 of a pixel (the middle of that step taken), a splat covers the pixel nearest to it and
+/// The shapes of one view, built when first requested. The projected centre's place is known to 1/8 or, above 4 pixels,
+/// 1/4 of a pixel (the middle of that step counts). A splat covers the pixel nearest to it and
 ///   square: the pixels whose centres lie within size / 2 of it on both axes; contour (q = 1): the circle through
 ///     its corners;
 ///   disc: the pixels whose centres lie within diameter / 2 of it; contour: that circle.
@@ -63,7 +64,7 @@ class SplatTable {
   std::unique_ptr<SplatShape> shapes_[kKernels.size()][kMaxSplatSide * 4 + 1];
 };
 
-/// The projected centre's place within a pixel is told to 2^-sub_bits pixels, for a splat of this side.
+/// For a splat of this side, the projected centre's place within a pixel is known to 2^-sub_bits pixels.
 int sub_bits(int side);
 /// The bias grows by this many steps a squared pixel; it ends at kMaxBias.
 double splat_bias_growth(int side, double focal_px);

@@ -21,12 +21,12 @@ namespace {
 
 constexpr int kSpanWidth = 256, kSpanHeight = 256;  // 256 KiB of depths
 
-// Its mosaics that may be seen: all of them, whole.
+// Adds the cluster's mosaics that may be seen, whole.
 void add_items(const points::Cluster& cluster, std::span<const points::Mosaic> mosaics, const glm::vec3& eye,
                std::vector<DrawItem>& items) {
   const LeafView view = leaf_view(cluster.leaf_room, eye);
   for (const points::Mosaic& mosaic : mosaics) {
-    if (mosaic.provisional()) continue;  // its points will be gone
+    if (mosaic.provisional()) continue;  // its points will be removed
     const Facing facing = facing_of(mosaic, view);
     if (facing == Facing::kAway) continue;
     items.push_back(
@@ -44,7 +44,7 @@ std::vector<DrawItem> visible_items(const points::PointModel& model, const geome
   return items;
 }
 
-// Points of a view by tiles.
+// A view's points, sorted into tiles.
 struct BinnedPoints {
   BinnedPoints(const std::vector<DrawItem>& all, const geometry::Camera& camera)
       : items(all),
@@ -53,7 +53,7 @@ struct BinnedPoints {
     runs.build(items, camera);
     binning.build(grid, runs.transforms, near_m, 1.0f);
   }
-  // Those of a tile, into what `bits` holds: the tile's pixels.
+  // Draws the points of a tile into `bits`, the depths of the tile's pixels.
   void draw(int index, uint32_t* bits) const {
     const geometry::Rect rect = grid.rect(index);
     depth_tile({rect, rect, near_m, binning.tile(index), runs.runs.data(), runs.transforms.data(), runs.facing.data(),
@@ -68,8 +68,8 @@ struct BinnedPoints {
   TileBinning binning;
 };
 
-// Whether the model has a point of a sample's surface in one of the pixels around the sample's: the second condition of
-// eliminate_redundancy().
+// Tests if the model has a point of a sample's surface in one of the pixels around the sample's: the second condition
+// in eliminate_redundancy().
 class NearPoints {
  public:
   NearPoints(const geometry::Camera& camera, std::span<const float> reference_depth_m, float relative_epsilon,
@@ -82,7 +82,7 @@ class NearPoints {
         nearest2_(nearest * nearest),
         reference_m_(reference_depth_m) {}
 
-  // Of a sample in pixel (px, py) of the frame.
+  // True if the model shows a sample in pixel (px, py) of the frame.
   bool show(uint32_t depth_code, uint16_t normal, int px, int py) const {
     const float depth_m = depth_scale_ / static_cast<float>(depth_code), epsilon_m = relative_epsilon_ * depth_m;
     const PlaneSlope slope = planes_.at(normal, px, py);
@@ -115,7 +115,7 @@ class NearPoints {
 
 void clear_pixel(image::DepthImage& image, size_t i) { image.depth[i] = 0, image.colour[i] = 0, image.normal[i] = 0; }
 
-// The second condition. Returns how many pixels it cleared.
+// Applies the second condition. Returns the number of cleared pixels.
 uint64_t drop_near_points(const NearPoints& near, const geometry::Rect& tile, image::DepthImage& image) {
   uint64_t dropped = 0;
   for (int y = 0; y < tile.height; ++y)
@@ -197,7 +197,7 @@ Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry:
     uint32_t samples = 0, kept = 0;
     for (int x = 0; x < tile.width; ++x) {
       const uint32_t code = depth[x];
-      // Where code is 0 this is false (0 * infinity is not a number).
+      // False if code is 0 (0 * infinity is NaN).
       const bool keep = numerator < static_cast<float>(static_cast<int32_t>(code)) * reference[x];
       const uint32_t mask = keep ? ~0u : 0u;
       samples += code != 0;

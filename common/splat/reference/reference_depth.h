@@ -11,15 +11,13 @@
 
 namespace telesplat::splat {
 
-/// Depth in metres of the nearest point in each pixel of `camera`, +infinity where none: all level-0 points of the
-/// model, one pixel each, without those that face away. The last bits of a depth tell where in the pixel the point lies
-/// (splat_kernels.h, kReferenceSubBits): depths are off by at most 2^-15 of themselves. SIMD; `threads` oneTBB threads
-/// (0 = all).
+/// Depth in metres of the nearest point in each pixel of `camera`, +infinity for empty pixels: of all level-0 points of
+/// the model, one pixel each, without those that face away. The last bits of a depth hold the point's place in the
+/// pixel (splat_kernels.h, kReferenceSubBits): relative error at most 2^-15. SIMD; `threads` oneTBB threads (0 = all).
 void render_reference_depth(const points::PointModel& model, const geometry::Camera& camera, int threads,
                             std::vector<float>& depth_m);
 
-/// The same as if the points of a patch were in the model too: of a model that holds none of them yet. depth_m: of the
-/// model without them.
+/// Updates depth_m, of a model without the patch's points, as if the model had them.
 void add_to_reference_depth(const points::PreparedPatch& patch, const points::ModelConfig& model,
                             const geometry::Camera& camera, std::vector<float>& depth_m);
 
@@ -27,7 +25,7 @@ struct Elimination {
   uint64_t samples = 0, kept = 0;
 };
 
-/// A sample is not needed where the model has a point of its surface within this many pixels, since that point's splat
+/// A sample is not needed if the model has a point of its surface within this many pixels, since that point's splat
 /// reaches as far. This bounds a model's points, from any number of views. No two points are nearer to each other than
 /// this times the sample distance of the finer one, unless a nearer point of the same pixel hid one of them. So a
 /// surface has at most about 2 / sqrt 3 / kNearestSample^2 points a pixel.
@@ -37,13 +35,13 @@ inline constexpr float kNearestSample = 0.6f;
 ///   it is nearer than the reference by more than epsilon (T4.3.1), epsilon = relative_epsilon * depth; and
 ///   no point of the eight pixels around it lies within `nearest` pixels of its centre and within epsilon of its
 ///   tangent plane.
-/// Keeps canonical form. nearest 0: the first condition alone.
+/// Keeps canonical form. nearest 0: tests only the first condition.
 Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry::Rect& tile,
                                  const std::vector<float>& reference_depth_m, float relative_epsilon,
                                  image::DepthImage& image, float nearest = kNearestSample);
 
-/// The same where few pixels were sampled: those of `cast`, which is of the tile's size. All other pixels of the image
-/// are empty. reference_depth_m: of the whole frame.
+/// The same for a tile in which only the pixels of `cast` were sampled; all other pixels of the image are empty. cast:
+/// has the tile's size. reference_depth_m: of the whole frame.
 Elimination eliminate_where_cast(const geometry::Camera& camera, const geometry::Rect& tile,
                                  const image::PixelMask& cast, std::span<const float> reference_depth_m,
                                  float relative_epsilon, image::DepthImage& image, float nearest = kNearestSample);

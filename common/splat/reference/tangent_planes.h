@@ -1,4 +1,4 @@
-// How the depth of a sample's tangent plane goes on from its pixel to the pixels around it.
+// Continues the depth of a sample's tangent plane from its pixel to the pixels around it.
 #pragma once
 
 #include <algorithm>
@@ -8,16 +8,16 @@
 
 namespace telesplat::splat {
 
-/// Depth (1 + x dx + y dy) at an offset in pixels.
+/// Slopes of a plane whose depth at an offset of (dx, dy) pixels is depth * (1 + x dx + y dy).
 struct PlaneSlope {
   float x, y;
 };
 
-/// Slopes are limited to those that splats follow (surfel/splat.h): normals are too coarse for more.
+/// Slopes are limited to those that splats follow (surfel/splat.h): steeper ones are beyond the precision of normals.
 class TangentPlanes {
  public:
   explicit TangentPlanes(const geometry::Camera& camera) : c_(surfel_camera(camera)) {}
-  /// normal: of 16 bits, of a sample at the centre of pixel (x, y).
+  /// normal: 16 bits, of a sample at the centre of pixel (x, y).
   PlaneSlope at(uint16_t normal, int x, int y) const {
     const auto [nx, ny, nz] = surfel_normal(normal);
     const float mx = dot(c_.right, nx, ny, nz), my = dot(c_.down, nx, ny, nz), mz = dot(c_.forward, nx, ny, nz);

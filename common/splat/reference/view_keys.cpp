@@ -18,15 +18,15 @@ namespace telesplat::splat {
 namespace {
 
 constexpr int kKeyMargin = kMaxSplatSide, kReach = ViewKeys::kReach;
-constexpr size_t kMaxVectorPixels = 64;  // who reads rows by vectors reads so many beyond
+constexpr size_t kMaxVectorPixels = 64;  // readers by vectors read at most this many pixels beyond a row
 constexpr uint32_t kNothing = std::bit_cast<uint32_t>(std::numeric_limits<float>::infinity());
 
-// What one thread needs, kept from view to view. Keys are empty between tiles, except for the margin into which splats
+// Buffers of one thread, kept from view to view. Keys are empty between tiles, except for the margin into which splats
 // hang over.
 struct KeyWorkspace {
   hwy::AlignedFreeUniquePtr<uint64_t[]> keys;
   std::vector<uint32_t> depth_bits;
-  int width = 0, height = 0;  // of a tile with its reach; 0: none yet
+  int width = 0, height = 0;  // size of a tile with its reach; 0: none yet
 
   int stride() const { return width + 2 * kKeyMargin; }
   void resize(int tile_width, int tile_height) {
@@ -45,7 +45,7 @@ struct KeyWorkspace {
   }
 };
 
-// Every mosaic that may be seen, whole, with splats of its own samples' distance.
+// Chooses every mosaic that may be seen, whole, with splats as large as its own samples' distance.
 class Chooser {
  public:
   Chooser(const geometry::Camera& camera, bool rests)
@@ -56,7 +56,7 @@ class Chooser {
     const double leaf_m = double{cluster.leaf_room.hi.x} - double{cluster.leaf_room.lo.x};
     const float range = points::pixel_range(camera_, cluster.leaf_room.centre(), leaf_m);
     for (const points::Mosaic& mosaic : cluster.mosaics) {
-      if (mosaic.provisional() && !(rests_ && mosaic.of_rest())) continue;  // its points will be gone
+      if (mosaic.provisional() && !(rests_ && mosaic.of_rest())) continue;  // its points will be removed
       const Facing facing = facing_of(mosaic, view);
       if (facing == Facing::kAway) continue;
       const float px = std::min(kClosedScale * range / mosaic.pixel_range(), static_cast<float>(kMaxSplatSide));
@@ -76,8 +76,8 @@ class Chooser {
 
 }  // namespace
 
-// Discs on the screen take two thirds of the time of ellipses on the surface, and the pixels that lack something are
-// the same but for a twentieth of those at edges (a terrain of 2.5 million points at 2560x1600).
+// Discs on the screen take two thirds of the time of ellipses on the surface. They find the same pixels that lack
+// something, except for a twentieth of those at edges (a terrain of 2.5 million points at 2560x1600).
 constexpr Kernel kKernel = Kernel::kDisc;
 
 struct ViewKeys::Impl {
@@ -98,7 +98,7 @@ struct ViewKeys::Impl {
   std::vector<DrawItem> items;
   std::vector<ItemStyle> styles;
   SplatTable table;
-  float overhang = 0;  // how far the largest splat reaches from its centre, pixels
+  float overhang = 0;  // reach of the largest splat from its centre, pixels
   ItemRuns runs;
   TileBinning binning;
   RimBias rim{};

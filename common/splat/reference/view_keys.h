@@ -1,5 +1,5 @@
-// What a model shows in a view, tile by tile, as the packer looks at it: the surface that its splats make, and where
-// its points lie within the pixels. All level-0 points count, so nothing that was packed is overlooked.
+// The model as the packer sees it in a view, tile by tile: the surface of its splats, and the places of its points
+// within the pixels. All level-0 points count, so no packed point is overlooked.
 #pragma once
 
 #include <functional>
@@ -18,13 +18,13 @@ inline constexpr float kClosedScale = 1.45f;
 
 class ViewKeys {
  public:
-  /// Pixels around a tile that are valid too, also outside the image.
+  /// Valid pixels around a tile, also outside the image.
   static constexpr int kReach = 2;
 
   struct Tile {
     int index = 0;
     geometry::Rect rect;  ///< in the view, inside the image
-    bool empty = true;    ///< no point comes near: there are no keys
+    bool empty = true;    ///< no point comes near: keys is null
     const uint64_t* keys = nullptr;
     int key_stride = 0;
     const uint32_t* depth_bits = nullptr;
@@ -46,12 +46,12 @@ class ViewKeys {
   void begin(const points::PointModel& model, const geometry::Camera& camera, int tile_width, int tile_height,
              bool rests = false);
   const TileGrid& grid() const;
-  /// Of the keys' depth codes: unbiased_depth_code().
+  /// Bias of the keys' depth codes, for unbiased_depth_code().
   const RimBias& rim() const;
   uint64_t points() const;
 
-  /// Draws tiles and calls visit(tile) for each, several at a time on several threads; the tile's rows belong to the
-  /// call.
+  /// Draws tiles and calls visit(tile) for each, several at a time on several threads; the tile's rows are valid during
+  /// the call.
   void draw(std::span<const int> tiles, const std::function<void(const Tile&)>& visit);
   void draw_all(const std::function<void(const Tile&)>& visit);
 

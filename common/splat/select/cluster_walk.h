@@ -1,4 +1,4 @@
-// The clusters of a model that a view may show, brick by brick.
+// Walks the clusters of a model that a view may show, brick by brick.
 #pragma once
 
 #include <hwy/cache_control.h>
@@ -12,10 +12,10 @@
 
 namespace telesplat::splat {
 
-/// The bricks that the frustum meets, nearest first.
+/// A brick that the frustum meets; bricks are sorted, nearest first.
 struct SeenBrick {
   float distance2;
-  bool whole;  ///< the brick lies wholly inside
+  bool whole;  ///< the brick lies wholly inside the frustum
   points::ClusterKey key;
   const points::Brick* brick;
 };
@@ -31,8 +31,8 @@ inline std::vector<SeenBrick> seen_bricks(const points::PointModel& model, const
   return out;
 }
 
-/// Calls visit(cluster) for each cluster of a brick that the frustum meets. Clusters lie scattered in memory, so those
-/// that come next are prefetched.
+/// Calls visit(cluster) for each cluster of a brick that the frustum meets. Prefetches the next ones, since clusters
+/// lie scattered in memory.
 template <class Visit>
 void for_seen_clusters(const SeenBrick& seen, const geometry::Frustum& frustum, const Visit& visit) {
   constexpr size_t kClustersAhead = 8, kMosaicsAhead = 4;

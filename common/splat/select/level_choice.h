@@ -1,4 +1,4 @@
-// How many points of a mosaic are drawn: level of detail as a function without steps (T4.4.3.1).
+// The number of a mosaic's points to draw: level of detail as a function without steps (T4.4.3.1).
 #pragma once
 
 #include <algorithm>
@@ -12,15 +12,15 @@ namespace telesplat::splat {
 struct Drawn {
   uint32_t count, mean;
   int fine;
-  float spacing;  ///< of evenly spread points of the same density
-  float widest;   ///< spacing where the points lie farthest apart: what splats must bridge
+  float spacing;  ///< mean spacing: of evenly spread points of the same density
+  float widest;   ///< largest spacing between neighbours, which splats must bridge
 };
 
-/// A mosaic whose next level adds fewer points than this switches as a whole, each at a ratio of its own: nobody sees a
-/// few points come, and one draw item costs less than two.
+/// A mosaic whose next level adds fewer points than this switches as a whole, each at its own ratio: a few new points
+/// are not noticed, and one draw item costs less than two.
 inline constexpr uint32_t kSmallStep = 32;
 
-/// Levels pass into each other within a quarter of an octave to both sides of the ratio at which the closest one
+/// Levels blend into each other within a quarter of an octave on both sides of the ratio at which the closest one
 /// changes. Set by bench lod_transitions, away from a terrain and back. Whole levels: 31.0 dB and 7 popping blocks a
 /// second. This width: 30.8 dB and 0.75. Half an octave (all ratios in transition): 30.1 dB and 22, since then even
 /// views at the samples' own rate change. Along a recorded movement, which hardly switches levels, this width costs
@@ -35,9 +35,9 @@ inline Drawn closest_level(const points::Mosaic& m, float wanted) {
   return {m.count(l), 0, l, side, side};
 }
 
-/// How far apart points lie at most, in samples of a level, where `share` of that level's additional points is drawn.
-/// It follows from the order of ranks (decimate.h): 2 until half of the level is drawn (share 1/3), then a quincunx's
-/// sqrt 2, and 1 when all points are. Each step is spread over a share of 0.2.
+/// Largest spacing of points, in samples of a level, if `share` of that level's additional points is drawn. It follows
+/// from the order of ranks (decimate.h): 2 until half of the level is drawn (share 1/3), then a quincunx's sqrt 2, and
+/// 1 when all points are. Each step is spread over a share of 0.2.
 inline float widest_spacing(float share) {
   const auto ramp_down = [share](float from, float to) { return std::clamp((to - share) / (to - from), 0.0f, 1.0f); };
   return 1.0f + 0.58578644f * ramp_down(0.23f, 0.43f) + 0.41421356f * ramp_down(0.8f, 1.0f);
@@ -45,8 +45,8 @@ inline float widest_spacing(float share) {
 
 /// As closest_level, but near the ratio at which the level changes only a share of the finer level's additional points
 /// is drawn. The share rises continuously from 0 to 1 with `wanted`, so that the density is quadratic in `wanted`. The
-/// same share of the coarse level's points has its own colours instead of mean ones.
-///   dither: in [0, 1), differs from mosaic to mosaic: where small ones switch.
+/// same share of the coarse level's points has its own colours instead of mean ones. dither: in [0, 1), different for
+/// each mosaic: sets the ratio at which a small one switches.
 inline Drawn between_levels(const points::Mosaic& m, float wanted, float dither) {
   static_assert(points::kLevels == 3);
   int fine = 0;

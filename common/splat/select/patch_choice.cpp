@@ -10,11 +10,12 @@ namespace telesplat::splat {
 namespace {
 
 constexpr float kMinCosine = 0.35f;     // samples taken at a steeper slope count as taken at this one
-constexpr float kPixelRadius2 = 0.25f;  // of the low-pass
+constexpr float kPixelRadius2 = 0.25f;  // variance of the low-pass, squared pixels
 constexpr float kMoreCovered = 1.1f, kApart = 0.1f;
-constexpr float kAreaOff = 1.5f, kCentreOff = 0.5f;  // of n samples: kAreaOff / sqrt n of the area, kCentreOff spacings
+constexpr float kAreaOff = 1.5f, kCentreOff = 0.5f;  // for n samples: kAreaOff / sqrt n of the area, kCentreOff
+                                                     // spacings
 
-// Cosine of the slope by which samples were taken, not below kMinCosine.
+// Cosine of the slope at which samples were taken, at least kMinCosine.
 float sampled_cosine(const glm::vec3& normal, const glm::vec3& to_eye) {
   return std::max(glm::dot(normal, to_eye), kMinCosine);
 }
@@ -28,7 +29,7 @@ PatchView patch_view(const geometry::Camera& camera) {
 
 namespace {
 
-// surfel_quality() of a surfel at `centroid_room`; pixel_range and to_eye_room: of how it was sampled.
+// surfel_quality() of a surfel at `centroid_room` that was sampled with pixel_range from to_eye_room.
 float quality_of(const glm::vec3& centroid_room, const glm::vec3& normal_room, const glm::vec3& to_eye_room,
                  float pixel_range, float leaf_m, const PatchView& view) {
   const glm::vec4 centre = view.view * glm::vec4(centroid_room, 1.0f);
@@ -74,7 +75,7 @@ float surface_covered(const points::Mosaic& m) {
          (m.pixel_range() * m.pixel_range() * sampled_cosine(m.cone_axis(), m.direction_to_eye()));
 }
 
-// Whether what `patch` shows of the cluster is shown by a better one.
+// True if `better` shows the part of the cluster that `patch` shows.
 bool PatchChooser::shows(const Patch& better, const Patch& patch, float leaf_m) const {
   const float larger = kMoreCovered + patch.covered_off + better.covered_off;
   if (patch.covered > larger * better.covered) return false;
@@ -87,7 +88,7 @@ bool PatchChooser::shows(const Patch& better, const Patch& patch, float leaf_m) 
 void PatchChooser::choose(const geometry::Box& leaf_room, const PatchView& view,
                           std::vector<const points::Mosaic*>& mosaics) {
   if (mosaics.size() < 2) return;
-  // Mosaics of one frame need not follow each other: blocks of several frames come in turns.
+  // Mosaics of one frame need not follow each other: blocks of several frames alternate.
   patches_.clear();
   patch_of_.clear();
   for (const points::Mosaic* m : mosaics) {

@@ -1,4 +1,4 @@
-// Which patches of a cluster are drawn where packing kept redundant ones (T4.4.3.3).
+// Chooses the patches of a cluster to draw if packing kept redundant ones (T4.4.3.3).
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -8,7 +8,7 @@
 
 namespace telesplat::splat {
 
-/// The camera figures that the choice needs, made once a frame.
+/// The camera figures for the choice, made once a frame.
 struct PatchView {
   glm::mat4 view;  ///< room -> X right, Y up, Z backward
   float focal_x, focal_y, near_m;
@@ -19,11 +19,11 @@ PatchView patch_view(const geometry::Camera& camera);
 /// pixels, of a surfel's output contour (T4.4.1). The surfel lies at the mosaic's centroid, with its cone's axis as
 /// normal. Its footprint on the tangent plane is a circle of half the samples' spacing, stretched along the slope by
 /// which the sampling view saw it. The conic of its projection is taken in its dual form, and a pixel's own variance is
-/// added: samples much finer than a pixel do not count as better. In (0, 2]; 0 where the surfel is behind the camera.
+/// added: samples much finer than a pixel do not count as better. In (0, 2]; 0 if the surfel is behind the camera.
 float surfel_quality(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const PatchView& view);
 
-/// Area of surface that the mosaic's samples cover, in faces of its leaf: count * (spacing / leaf size)^2 / cosine of
-/// the slope by which they were taken.
+/// Surface area that the mosaic's samples cover, in faces of its leaf: count * (spacing / leaf size)^2 / cosine of the
+/// slope at which they were taken.
 float surface_covered(const points::Mosaic& mosaic);
 
 /// Chooses among the patches of one cluster. A patch is all mosaics with one frame tag, in any number of blocks.
@@ -37,11 +37,10 @@ float surface_covered(const points::Mosaic& mosaic);
 /// half the samples' spacing. Without this a coarse patch would count as larger than a fine one only because its few
 /// samples round up.
 ///
-/// The best patch is always drawn. Where it is partial, as while its frame is coming in, others fill what it leaves
-/// open.
+/// The best patch is always drawn. If it is partial, as while its frame is coming in, others fill the rest.
 class PatchChooser {
  public:
-  /// Removes from `mosaics` those of patches that are not drawn. Order is kept.
+  /// Removes from `mosaics` those of patches that are not drawn. Keeps the order.
   void choose(const geometry::Box& leaf_room, const PatchView& view, std::vector<const points::Mosaic*>& mosaics);
 
  private:
@@ -50,12 +49,12 @@ class PatchChooser {
     float pixel_range;
     glm::vec3 to_eye;
     float covered = 0, points = 0, quality = 0;
-    float covered_off = 0, centre_off = 0;  // errors of the estimates: as a share of `covered`, and in leaves
+    float covered_off = 0, centre_off = 0;  // errors of the estimates: share of `covered`, and in leaves
     glm::vec3 centre{0}, normal{0};         // sums while gathering, then means
     bool drawn = false;
   };
   bool shows(const Patch& better, const Patch& patch, float leaf_m) const;
-  std::vector<Patch> patches_;  // kept for their memory
+  std::vector<Patch> patches_;  // members, so that their memory is reused
   std::vector<uint32_t> patch_of_, by_quality_;
 };
 

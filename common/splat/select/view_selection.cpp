@@ -15,23 +15,23 @@
 namespace telesplat::splat {
 namespace {
 
-// A mosaic chosen from the cluster at hand, before its size is final.
+// A mosaic chosen from the current cluster, before its size is final.
 struct Chosen {
   const points::Mosaic* mosaic;
   Drawn drawn;
-  float size;      // splat size by T eq. 4.8 for points spread evenly, not clamped
+  float size;      // splat size by T eq. 4.8 for evenly spread points, not clamped
   float coverage;  // share of the leaf's face that its points cover: points * (sample size / leaf size)^2
   bool may_face_away;
 };
 
-// 0 up to `from`, 1 from `to` on.
+// 0 up to `from`, rising to 1 at `to`.
 float ramp(float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0f, 1.0f); }
 
-// T4.4.3: where a low-rate mosaic would hide high-rate ones its splats shrink. We deviate in two things.
-// After redundancy elimination a low-rate mosaic may be all there is in most of the cluster, and a handful of high-rate
+// T4.4.3: splats of a low-rate mosaic shrink if they would hide high-rate ones. We deviate in two points. After
+// redundancy elimination a low-rate mosaic may be the only one in most of the cluster, and a handful of high-rate
 // points elsewhere in it would tear holes. So splats shrink only if mosaics of higher rate cover at least as much of
-// the cluster as the low-rate one does.
-// And nothing jumps: sizes and coverages pass the two thresholds over a quarter of their height.
+// the cluster as the low-rate one does. And sizes do not jump: they change over a quarter of the height of the two
+// thresholds.
 void revise_sizes(const SelectionOptions& options, std::vector<Chosen>& chosen) {
   float smallest = chosen.front().size, largest = smallest;
   for (const Chosen& c : chosen) smallest = std::min(smallest, c.size), largest = std::max(largest, c.size);
@@ -49,13 +49,13 @@ void revise_sizes(const SelectionOptions& options, std::vector<Chosen>& chosen) 
   }
 }
 
-// In [0, 1), the same in every frame, as if drawn at random for each mosaic.
+// A pseudo-random number in [0, 1) for each mosaic, the same in every frame.
 float dither_of(points::ClusterKey key, const points::Mosaic& m) {
   const uint64_t h = (m.sequence().value << 32 ^ key) * 0x9e3779b97f4a7c15ull;
   return static_cast<float>(h >> 40) * 0x1p-24f;
 }
 
-// Notes the patches to which the mosaics drawn from a cluster belong.
+// Lists the patches of the mosaics that are drawn from a cluster.
 void note_patches(points::ClusterKey key, const std::vector<const points::Mosaic*>& drawn, DrawList& out) {
   const auto first = static_cast<ptrdiff_t>(out.frames_seen.size());
   for (const points::Mosaic* m : drawn) {
@@ -66,7 +66,7 @@ void note_patches(points::ClusterKey key, const std::vector<const points::Mosaic
   }
 }
 
-// Points [first, last) of a mosaic's level.
+// Makes an item of points [first, last) of a mosaic's level.
 DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int l, uint32_t first, uint32_t last) {
   const points::Mosaic::Level a = m.level(l);
   return {.cluster = &cluster,
@@ -78,7 +78,7 @@ DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int 
           .of = a.count};
 }
 
-// A summary is made again once its brick has changed more often than this. Until then the mosaics that it lacks are
+// A summary is wanted anew once its brick has changed more often than this. Until then the mosaics that it lacks are
 // drawn whole, beside it.
 constexpr uint64_t kStaleChanges = 16;
 
@@ -100,7 +100,7 @@ class Selector {
     views_.resize(eyes_.size());
   }
 
-  /// The brick's summary and what it lacks; false if its clusters must be drawn.
+  /// Adds the brick's summary and the mosaics that it lacks. False: its clusters must be drawn.
   bool add_summary(const SeenBrick& seen, const geometry::Frustum& frustum, const points::Summaries& summaries) {
     const points::Brick& brick = *seen.brick;
     const float range = pixel_range(brick.box_room, double{brick.box_room.hi.x} - double{brick.box_room.lo.x});
@@ -108,7 +108,7 @@ class Selector {
     const auto found = summaries.find(seen.key);
     const points::Summary* summary = found == summaries.end() ? nullptr : found->second.get();
     const bool valid = summary && summary->removals == brick.removals, fits = valid && range <= summary->most_range;
-    // One that does not fit may do so once the brick is sampled more finely: that takes many changes.
+    // One that does not fit may do so once the brick is sampled more finely, which takes many changes.
     const uint64_t most_changes = fits ? kStaleChanges : kStaleChanges + brick.changes / 2;
     if (!valid || brick.changes - summary->changes > most_changes) out_.summaries_wanted.push_back(seen.key);
     if (!fits) return false;
@@ -123,7 +123,7 @@ class Selector {
     return true;
   }
 
-  /// after: mosaics of this event and of earlier ones are left out.
+  /// after: leaves out mosaics of this event and of earlier ones.
   void add(const points::Cluster& cluster, Sequence after = {}) {
     const geometry::Box& leaf = cluster.leaf_room;
     const float leaf_m = leaf.hi.x - leaf.lo.x;
@@ -156,7 +156,7 @@ class Selector {
     return static_cast<float>(leaf_m * focal_ / std::max(depth, 0.5 * leaf_m));
   }
 
-  // What faces one eye alone is tested point by point when it is drawn for the other one.
+  // Points of a mosaic that only one of two eyes might see are tested one by one when they are drawn.
   Facing facing(const points::Mosaic& m) const {
     if (!options_.cone_culling) return Facing::kTowards;
     const Facing first = facing_of(m, views_.front());
@@ -178,7 +178,7 @@ class Selector {
     for (const Visible& v : visible_) candidates_.push_back(v.mosaic);
     chooser_.choose(cluster.leaf_room, patches_, candidates_);
     note_patches(cluster.key, candidates_, out_);
-    // Both are in the cluster's order.
+    // Both lists are in the cluster's order.
     auto next = candidates_.begin();
     std::erase_if(visible_, [&](const Visible& v) {
       if (next == candidates_.end() || *next != v.mosaic) return true;
@@ -209,8 +209,8 @@ class Selector {
   const glm::dvec3 backward_, position_;
   const double focal_;
   const PatchView patches_;
-  std::vector<glm::vec3> eyes_;  // that points may face: the camera's, or those of SelectionOptions::eyes
-  std::vector<LeafView> views_;  // of the cluster at hand, from each of them
+  std::vector<glm::vec3> eyes_;  // eyes that points may face: the camera's, or those of SelectionOptions::eyes
+  std::vector<LeafView> views_;  // views of the current cluster, from each eye
   PatchChooser chooser_;
   std::vector<Visible> visible_;
   std::vector<const points::Mosaic*> candidates_;

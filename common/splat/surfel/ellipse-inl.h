@@ -33,7 +33,7 @@ class EllipseSink {
     const auto bias = hn::Min(ShareOf(s, kBiasPerRadius, kLeastBias, kMostBias), Const(static_cast<float>(kMaxBias)));
     const SharedKey shared = shared_key(s);
 
-    // The pixel that holds the centre is drawn by itself where the ellipse covers no other or misses it.
+    // The pixel that holds the centre is drawn separately if the ellipse covers no other pixel or misses this one.
     const auto half = Const(0.5f);
     const auto dx = hn::Sub(hn::Add(hn::ConvertTo(d, c.pixel_x), half), c.centre_x),
                dy = hn::Sub(hn::Add(hn::ConvertTo(d, c.pixel_y), half), c.centre_y);
@@ -60,8 +60,8 @@ class EllipseSink {
 
   void flush() {
     for (size_t i = 0; i < count_; ++i) {
-      // Most splats fit into four by four pixels, and are drawn without any loop whose end could be predicted wrongly:
-      // what lies outside the ellipse stays as it is.
+      // Most splats fit into four by four pixels, and are drawn without a loop whose end could be mispredicted: pixels
+      // outside the ellipse stay unchanged.
       const uint32_t size = batch_[kSize][i];
       if ((size & 255) <= 4 && size >> 8 <= 4)
         draw<false>(i, 4, size >> 8 <= 2 ? 2 : 4);
@@ -114,7 +114,7 @@ class EllipseSink {
     return {high, low};
   }
 
-  // Index in the buffer.
+  // Index of a pixel in the buffer.
   HWY_INLINE VU place_of(VI x, VI y) const {
     const I32 di;
     const auto row = hn::Sub(y, hn::Set(di, rect_.y - buffer_.margin)),
@@ -122,7 +122,7 @@ class EllipseSink {
     return hn::BitCast(U32(), hn::Add(hn::Mul(row, hn::Set(di, buffer_.stride)), column));
   }
 
-  // Draws the pixels that hold the centres. code: their depth codes, bias included.
+  // Draws the pixels that hold the centres. code: their depth codes with bias.
   HWY_INLINE void draw_centres(const Conics& c, hn::Mask<I32> wanted, VF code, VF q, const SharedKey& shared) {
     const F32 d;
     const I32 di;
@@ -184,9 +184,9 @@ class EllipseSink {
       }
   }
 #else
-  // Two rows of pixels at a time, half a vector of each, so that keys come out of their halves by interleaving within
-  // blocks: 8 lanes are the pixels 0 1 of both rows, then 2 3. Groups of four pixels on every target: the same pixels
-  // are met.
+  // Draws two rows of pixels at a time, half a vector of each, so that interleaving within blocks joins the halves of
+  // keys: 8 lanes are the pixels 0 1 of both rows, then 2 3. Every target uses groups of four pixels, and so covers the
+  // same pixels.
   //   kCut: the box ends before the ellipse does, so pixels beyond the box are left out.
   template <bool kCut>
   HWY_INLINE void draw(size_t i, uint32_t columns, uint32_t rows) {

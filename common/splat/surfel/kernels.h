@@ -1,5 +1,5 @@
-// The kernels `ellipse` and `ewa` inside one tile, on the widest vectors the machine has (Highway, chosen at run time).
-// Every target computes the same pixels: those of the plain functions in ewa/shading.h, and of those that tests have.
+// The kernels `ellipse` and `ewa` inside one tile, on the widest vectors of the machine (Highway, chosen at run time).
+// Every target computes the same pixels as the plain functions in ewa/shading.h and in the tests.
 #pragma once
 
 #include <hwy/aligned_allocator.h>
@@ -12,7 +12,7 @@
 
 namespace telesplat::splat {
 
-/// What these kernels need of a view, in addition to TileInput.
+/// Data of a view that these kernels need in addition to TileInput.
 struct SurfelInput {
   SurfelCamera camera;
   const SurfelSource* sources = nullptr;  ///< one an item
@@ -23,25 +23,25 @@ struct SurfelInput {
 inline constexpr SurfelReach kEllipseReach{1.0f, 1.5f}, kEwaReach{1.6f, 2.0f};
 static_assert(kEwaReach.growth * kEwaReach.growth >= kSupportGrowth);
 
-/// Splats ellipses into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h). One pass.
+/// Splats ellipses into buffer, whose pixels hold kEmptyKey or keys drawn before (pixel_key.h). One pass.
 TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer);
 
 /// Working memory of ewa, one a thread, kept from tile to tile: 36 bytes a pixel, and the splats between the two
-/// passes. Between tiles `width` x `height` pixels are empty (nothing visible, sums 0). Splats hang over to the right
-/// and below.
+/// passes. Between tiles `width` x `height` pixels are empty (visible: infinity, sums: 0). Splats hang over to the
+/// right and below.
 struct EwaBuffer {
-  /// Splats kept between the passes; a tile with more meets its points twice. 72 bytes each.
+  /// Splats kept between the passes; a tile with more processes its points twice. 72 bytes each.
   static constexpr size_t kRecordSplats = 32768;
   hwy::AlignedFreeUniquePtr<float[]> visible;  ///< least depth code of the opaque ellipses
   hwy::AlignedFreeUniquePtr<float[]> sums;     ///< 8 a pixel: EwaSum
   hwy::AlignedFreeUniquePtr<std::byte[]> record;
   int width = 0, height = 0, stride = 0;
-  size_t pixels = 0;  ///< that there is room for
+  size_t pixels = 0;  ///< pixels that the arrays have room for
 };
 
 /// Splats `input.rect`, which is the tile and `reach` pixels around it, in two passes and writes it as shaded colours
 /// and infos. Pixels within kFinishSlack to the right of it may change too. Depth codes carry no bias. background:
-/// 0x00RRGGBB, of empty pixels.
+/// 0x00RRGGBB, for empty pixels.
 TileCounts ewa_tile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
                     const ResolvedTile& tile, int reach, uint32_t background);
 

@@ -1,5 +1,5 @@
-// Where a sample's footprint on the surface appears on the screen, and what pixels the kernels `ellipse` and `ewa` make
-// of it: constants, and the figures of whole items. surfel-inl.h has what is done for each point.
+// Constants and figures of whole items for the kernels `ellipse` and `ewa`: the place of a sample's footprint on the
+// screen, and its pixels. surfel-inl.h has the work for each point.
 #pragma once
 
 #include <algorithm>
@@ -18,10 +18,10 @@ namespace telesplat::splat {
 /// splats of samples taken at silhouettes would reach far beyond them.
 inline constexpr float kMinSampledCosine = 0.35f;
 /// Steepest surface, as the tangent of its angle to the screen, whose depth is followed across a splat: tan(78
-/// degrees). Beyond it normals of 16 bits are too coarse to give the depth.
+/// degrees). For steeper ones, normals of 16 bits are too coarse to give the depth.
 inline constexpr float kSteepest = 4.7f;
-/// Footprint radius over distance is taken as this at most: larger splats are cut to their largest size on the screen
-/// anyway, and no product overflows.
+/// Largest footprint radius over distance: larger splats are cut to their largest size on the screen anyway, and no
+/// product overflows.
 inline constexpr float kMaxRadiusOverDepth = 1.0f;
 
 /// The camera figures that contours need. Camera axes: X right, Y down, Z forward; a point w (u, v, 1) lies at pixel
@@ -49,8 +49,8 @@ inline SurfelCamera surfel_camera(const geometry::Camera& c) {
           axis(2, -1)};
 }
 
-/// How an item's samples were taken: the circle that each stands for where the surface faced the sampling view, and the
-/// direction towards that view, unit length, in camera axes.
+/// Source of an item's samples: the radius of the circle that each represents if the surface faces the sampling view,
+/// and the direction to that view, unit length, in camera axes.
 struct SurfelSource {
   float radius_m = 0;
   std::array<float, 3> to_eye{0, 0, -1};
@@ -73,19 +73,19 @@ inline std::array<float, 3> surfel_normal(uint16_t code) {
 }
 
 /// Low-pass of an opaque ellipse, squared pixels: S' = S + this. At equal sampling and display resolution the contour
-/// then still ends before the next sample; where samples crowd, each still reaches about a third of a pixel.
+/// still ends before the next sample; where samples crowd, each still reaches about a third of a pixel.
 inline constexpr float kOpaqueVariance = 0.1f;
 /// Bias on the contour, as a multiple of radius over depth, and its bounds, as shares of depth.
 inline constexpr float kBiasPerRadius = 1.5f, kLeastBias = 1.0f / 2048, kMostBias = 0.005f;
 
-/// Support of ewa's kernel: V = kFilterVariance I + max(1, kSupportGrowth - kSupportDrop / sqrt(det S)) S. The weight
-/// of a pixel at offset d from the ellipse's centre is (1 - d^T V^-1 d)^4 inside, a Gaussian of variance V / 8 cut
+/// Support of ewa's kernel: V = kFilterVariance I + max(1, kSupportGrowth - kSupportDrop / sqrt(det S)) S. A pixel at
+/// offset d from the ellipse's centre has the weight (1 - d^T V^-1 d)^4 inside, a Gaussian of variance V / 8 cut
 /// smoothly where it would be below 0.02, divided by det V: samples taken more densely count more. It is narrow where
 /// samples lie a pixel apart, so that each pixel shows its own sample, and reaches over the neighbours where they are
 /// magnified. V contains S', and every pixel's corner from its centre.
 inline constexpr float kFilterVariance = 0.51f, kSupportGrowth = 2.5f, kSupportDrop = 0.85f;
-/// How far behind the visible surface a splat still counts, as a multiple of radius over depth, and its bounds, as
-/// shares of depth.
+/// Depth behind the visible surface within which a splat still counts, as a multiple of radius over depth, and its
+/// bounds, as shares of depth.
 inline constexpr float kEpsilonPerRadius = 2.0f, kLeastEpsilon = 1.0f / 512, kMostEpsilon = 1.0f / 32;
 
 /// Change of the depth code as depth changes by its own size: 2^14 times the mantissa of w, in [1, 2).
@@ -98,8 +98,8 @@ inline float surfel_share(float radius_m, float w, float factor, float least, fl
   return codes_per_depth(w) * std::clamp(factor * std::min(radius_m / w, kMaxRadiusOverDepth), least, most);
 }
 
-/// No contour in the image reaches farther from its splat's centre than this times radius over depth, in pixels (unless
-/// it reaches farther than kMaxSplatSide): the footprint stretched most, where perspective stretches most; a tenth for
+/// Largest distance of a contour in the image from its splat's centre, in pixels, as a multiple of radius over depth
+/// (unless it exceeds kMaxSplatSide): the footprint stretched most, where perspective stretches most; plus a tenth for
 /// its centre's offset.
 inline float widest_contour(const geometry::Camera& c) {
   const double u = std::max(std::abs(c.left), std::abs(c.right)), v = std::max(std::abs(c.top), std::abs(c.bottom));
@@ -112,8 +112,8 @@ inline float ellipse_bias(float radius_m, float w) {
   return std::min(surfel_share(radius_m, w, kBiasPerRadius, kLeastBias, kMostBias), static_cast<float>(kMaxBias));
 }
 
-/// spacing_class of the samples' mean distance on the screen, by det S = radius^4: how many of these limits it reaches.
-///   scale: that splats were drawn with (DrawList::scale): their radius is scale / 2 distances.
+/// Limits of det S = radius^4: the number of limits that it reaches is the spacing_class of the samples' mean distance
+/// on the screen. scale: of the drawn splats (DrawList::scale): their radius is scale / 2 distances.
 using SpacingLimits = std::array<float, 3>;
 inline SpacingLimits spacing_limits(float scale) {
   const auto limit = [&](float spacing_px) {

@@ -1,4 +1,4 @@
-// What feeds the surfel kernels with a tile's points.
+// Feeds the points of a tile to the surfel kernels.
 // Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_SURFEL_STREAM_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_SURFEL_STREAM_INL_H_
@@ -16,9 +16,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 
-// A tile's points, in the order of the list: projects them, keeps those that may touch the tile, and counts. No part of
-// it depends on the kernel, so it is compiled once a target; the one virtual call is made for some hundred points at a
-// time.
+// A tile's points, in the order of the list: projects them, keeps those that may touch the tile, and counts. It does
+// not depend on the kernel, so it is compiled once a target; one virtual call serves some hundred points.
 class SurfelPoints {
  public:
   SurfelPoints(const TileInput& input, const SurfelInput& surfels, const SurfelReach& reach)
@@ -63,7 +62,7 @@ class SurfelPoints {
     size_t count = 0;
   };
 
-  // Draws points_ and empties it. source: that of all points, unless they are staged.
+  // Draws points_ and empties it. source: of all points, unless they are staged.
   virtual void draw_points(bool staged, const SurfelSource& source) = 0;
 
   const TileInput& input_;
@@ -71,7 +70,7 @@ class SurfelPoints {
   Points points_;
 
  private:
-  // Levels of less than a vector wait here, each point with its own source.
+  // Stages a level smaller than a vector, each point with its own source.
   void stage(const DrawItem& item, const SurfelSource& s) {
     const size_t at = stage_.level().count;
     stage_.append(item);
@@ -95,7 +94,7 @@ class SurfelPoints {
                         const points::Mosaic::Level& level_reference, const SurfelSource& source) {
     const F32 d;
     const U32 du;
-    // Copies, which no store can change: the compiler need not read them again.
+    // Local copies, which no store can change: the compiler need not read them again.
     const LeafTransform transform = transform_reference;
     const points::Mosaic::Level level = level_reference;
     const glm::vec3 facing = facing_reference;
@@ -186,7 +185,7 @@ class SurfelStream final : public SurfelPoints {
       if (kStaged)
         sources = {hn::LoadU(d, points_.radius + i), hn::LoadU(d, points_.eye_x + i), hn::LoadU(d, points_.eye_y + i),
                    hn::LoadU(d, points_.eye_z + i)};
-      // Lanes beyond the last point hold older points, or zeros: what comes of them is not kept.
+      // Lanes beyond the last point hold older points, or zeros: their results are not kept.
       const size_t left = points_.count - i;
       s.w = hn::Max(s.w, Const(input_.near_m));
       ContourOf(camera, sources, s);

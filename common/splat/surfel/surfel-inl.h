@@ -1,10 +1,9 @@
-// Where a sample's footprint on the surface appears on the screen: a point, its normal and the view that sampled it
-// give an ellipse of pixels and the slope of depth across it (T4.4.1, eq. 4.2-4.7); many points at a time.
+// The footprint of a sample on the screen: a point, its normal and the view that sampled it give an ellipse of pixels
+// and the slope of depth across it (T4.4.1, eq. 4.2-4.7); many points at a time.
 // Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics
 // Interface 2004. We project the footprint in its dual form: the conic's adjugate, p p^T - V for a centre p and a
 // footprint V in space, needs neither a basis of the tangent plane nor matrices to be inverted, and gives the bounding
-// box at once. The contour is the same. Tests have the same operations in the same order on numbers, which give the
-// same bits.
+// box at once. The contour is the same. Tests do the same operations in the same order on scalars, with the same bits.
 // Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_SURFEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_SURFEL_INL_H_
@@ -36,12 +35,12 @@ struct Sources {
   VF radius, x, y, z;
 };
 
-// A vector of points, and the footprint on the screen of each, in pixels: a pixel at offset d from the contour's centre
+// A vector of points, and the footprint of each on the screen, in pixels: a pixel at offset d from the contour's centre
 // is inside if d^T S^-1 d <= 1.
 struct Surfels {
   VF x, y, w;                       // projected centre, depth
   VF rho;                           // radius over depth, limited
-  VF offset_x, offset_y;            // of the ellipse's centre from the projected centre
+  VF offset_x, offset_y;            // from the projected centre to the ellipse's centre
   VF xx, xy, yy;                    // S
   VF slope_x, slope_y;              // depth of the tangent plane = w / (1 + slope . offset from the projected centre)
   VF normal_x, normal_y, normal_z;  // in camera axes, not of unit length
@@ -70,7 +69,7 @@ HWY_INLINE void DecodeNormals(VU code, VF& x, VF& y, VF& z) {
   y = hn::Sub(y, hn::CopySign(fold, y));
 }
 
-// s: x, y, w, normal_code set.
+// Preconditions: x, y, w and normal_code of s are set.
 // With m the normal, i = 1 / m.m, n n^T = i m m^T, e the direction to the sampling view and d = e - (e.n) n, the
 // footprint is
 //   V = radius^2 (I - n n^T + kappa d d^T),  kappa = 1 / max((e.n)^2, kMinSampledCosine^2)
@@ -117,8 +116,8 @@ HWY_INLINE void ContourOf(const SurfelCamera& c, const Sources& e, Surfels& s) {
   s.xy = hn::Add(hn::Mul(hn::Mul(ax, fy), gxy), hn::Mul(s.offset_x, s.offset_y));
   s.yy = hn::Add(hn::Mul(hn::Mul(ay, fy), gyy), hn::Mul(s.offset_y, s.offset_y));
 
-  // The tangent plane m . P = m . p, P on the ray through the pixel. Seen edge-on it has no depth to follow: it gets
-  // the steepest.
+  // The tangent plane is m . P = m . p, with P on the ray through the pixel. A plane seen edge-on gets the steepest
+  // slope.
   const auto along = hn::Add(hn::Add(hn::Mul(mx, u), hn::Mul(my, v)), mz);
   const auto inverse = hn::Div(one, hn::CopySign(hn::Max(hn::Abs(along), Const(1e-3f)), along));
   const auto limit_x = Const(kSteepest * c.step_x), limit_y = Const(kSteepest * c.step_y);
@@ -130,16 +129,16 @@ HWY_INLINE void ContourOf(const SurfelCamera& c, const Sources& e, Surfels& s) {
 // The conic of grow S + add I: d^T S^-1 d = dx (xx dx + xy dy) + yy dy dy about the centre, in pixels of the image. Its
 // box [x0, x1) x [y0, y1) holds the pixels whose centres lie in it, cut to kMaxSplatSide and to the rectangle.
 struct Conics {
-  VF centre_x, centre_y, xx, xy, yy, determinant;  // of S
+  VF centre_x, centre_y, xx, xy, yy, determinant;  // centre and matrix of the conic; determinant of S
   VI x0, y0, x1, y1;
-  VI pixel_x, pixel_y;  // that holds the centre
+  VI pixel_x, pixel_y;  // pixel that holds the centre
   hn::Mask<I32> cut;    // the box was cut to kMaxSplatSide
 };
 HWY_INLINE Conics ConicOf(const Surfels& s, VF grow, float add, const geometry::Rect& rect) {
   const I32 di;
   Conics c;
   constexpr int kHalf = kMaxSplatSide / 2;
-  const auto farthest = Const(kHalf - 1);  // no farther than binning allows for
+  const auto farthest = Const(kHalf - 1);  // binning allows for no more
   c.centre_x = hn::Add(s.x, Clamp(s.offset_x, hn::Neg(farthest), farthest));
   c.centre_y = hn::Add(s.y, Clamp(s.offset_y, hn::Neg(farthest), farthest));
   const auto xx = hn::Add(hn::Mul(grow, s.xx), Const(add)), xy = hn::Mul(grow, s.xy),
