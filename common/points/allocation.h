@@ -1,4 +1,4 @@
-// What a block costs, for truthful accounts of memory.
+// Memory that the allocator takes for a block, for truthful accounts.
 #pragma once
 
 #include <algorithm>

@@ -13,11 +13,11 @@
 namespace telesplat::points {
 namespace {
 
-// Points on their way from some mosaics to another.
+// Points that are gathered from several mosaics for a new one.
 struct PointSet {
   std::vector<uint16_t> x, y, z, normal;
   std::vector<uint32_t> colour;
-  double range_sum = 0;  // of pixel ranges, by points
+  double range_sum = 0;  // sum of pixel ranges, weighted by points
   glm::dvec3 to_eye_sum{0};
 
   uint32_t size() const { return static_cast<uint32_t>(x.size()); }
@@ -47,14 +47,14 @@ struct PointSet {
     const double alike = 0.94 * size();
     return glm::dot(to_eye_sum, to_eye_sum) < alike * alike ? glm::vec3(0) : glm::vec3(to_eye_sum);
   }
-  // How `points` of m's points were sampled, as if at `range`.
+  // Notes how `points` of m's points were sampled: from m's direction, at `range`.
   void note_source(const Mosaic& m, uint32_t points, float range) {
     range_sum += static_cast<double>(points) * static_cast<double>(range);
     to_eye_sum += static_cast<double>(points) * glm::dvec3(m.direction_to_eye());
   }
 };
 
-// The axis that a normal is closest to, and its sign: 0..5.
+// Returns the axis that a normal is closest to, and its sign: 0..5.
 uint32_t face_of(uint16_t normal) {
   const int x = std::min(normal & 255, 254) - 127, y = std::min(normal >> 8, 254) - 127;
   const int ax = std::abs(x), ay = std::abs(y), az = std::abs(127 - ax - ay);
@@ -68,7 +68,7 @@ uint32_t face_of(uint16_t normal) {
   return ax >= ay ? (x < 0 ? 1u : 0u) : (y < 0 ? 3u : 2u);
 }
 
-// Cell keys -> numbers in order of appearance: open addressing, at most half full.
+// Cell keys -> numbers in order of appearance, by open addressing, at most half full.
 class CellTable {
  public:
   void begin(size_t most) {
@@ -78,7 +78,7 @@ class CellTable {
     std::fill_n(numbers_.begin(), slots, 0u);
     count_ = 0;
   }
-  // The number of that cell; a new one if it has none yet.
+  // Returns the cell's number; gives a new cell the next one.
   uint32_t number(uint64_t key) {
     const size_t at = slot(key);
     if (numbers_[at] == 0) keys_[at] = key, numbers_[at] = ++count_;
@@ -108,12 +108,12 @@ struct Grid {
     return uint64_t{along(x)} | uint64_t{along(y)} << 16 | uint64_t{along(z)} << 32 | uint64_t{face} << 48;
   }
   bool is_odd(uint16_t x, uint16_t y, uint16_t z) const { return (along(x) + along(y) + along(z)) & 1; }
-  // Twice the distance from the cell's centre along one axis, in parts of the cell's side: -65536..65536.
+  // Returns twice the distance from the cell's centre along one axis, in parts of the cell's side: -65536..65536.
   int64_t off(uint16_t q) const { return 2 * static_cast<int64_t>(q * side & 0xffff) - 65536; }
   int64_t off2(uint16_t x, uint16_t y, uint16_t z) const { return off(x) * off(x) + off(y) * off(y) + off(z) * off(z); }
 };
 
-// Cells a side that have about `distances` sample distances each.
+// Number of cells a side whose sides are about `distances` sample distances long.
 uint32_t cells_a_side(double pixel_range, double distances) {
   return static_cast<uint32_t>(std::clamp(std::floor(pixel_range / distances + 0.5), 1.0, 4096.0));
 }
@@ -125,22 +125,22 @@ struct Cell {
   uint32_t mean() const { return (r + n / 2) / n << 16 | (g + n / 2) / n << 8 | (b + n / 2) / n; }
 };
 
-// What merging needs, kept from merge to merge.
+// Buffers of a merge, kept from merge to merge.
 struct Scratch {
   PointSet points, rest;
   CellTable table;
   std::vector<Cell> cells1, cells2;
-  std::vector<uint32_t> cell1, cell2;  // of each point; of each cell of level 1
+  std::vector<uint32_t> cell1, cell2;  // cell1: cell of each point; cell2: of each cell1
   std::vector<uint32_t> counts;
   std::vector<uint8_t> rank, surrounded;
 };
 thread_local Scratch scratch;
 
-// of a coarser mosaic one point in four is taken in, or none: it is built anew for it
+// Takes points from a coarser mosaic only if at least 1 / kLeastTaken of them go: the rest must be built anew.
 constexpr uint32_t kLeastTaken = 4;
-constexpr int kMergedRanks = 5;  // of level 2; of level 1 alone, two halves; of level 0 alone, two halves
+constexpr int kMergedRanks = 5;  // level 2 has one rank, levels 1 and 0 two halves each
 
-// Gathers points into cells: `count` of them, point i at place(i), with key(i).
+// Gathers `count` points into cells: point(i) lies in the cell grid key of i.
 void fill_cells(const PointSet& p, const Grid& grid, CellTable& table, std::vector<Cell>& cells,
                 std::vector<uint32_t>& cell_of, uint32_t count, const auto& point, const auto& add_colour) {
   table.begin(count);
@@ -158,7 +158,7 @@ void fill_cells(const PointSet& p, const Grid& grid, CellTable& table, std::vect
   }
 }
 
-// The same points as a mosaic without coarser levels.
+// Builds a mosaic of the same points without coarser levels.
 Mosaic build_plain(const PointSet& p, Sequence sequence, FrameId frame) {
   const uint32_t n = p.size();
   MosaicBuilder out(sequence, frame, {n, n, n});
@@ -191,7 +191,7 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
         cell.r += fine.r, cell.g += fine.g, cell.b += fine.b, cell.n += fine.n;
       });
 
-  // Ranks, and where each begins.
+  // Computes ranks, and the begin of each.
   s.rank.resize(n);
   std::array<uint32_t, kMergedRanks> count{};
   for (uint32_t i = 0; i < n; ++i) {
@@ -218,15 +218,15 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
   return out.finish(p.pixel_range(), p.direction_to_eye());
 }
 
-// Whether finer points surround those of a coarser mosaic: for each cell of one of its sample distances, how many there
-// are, and in which of its eight octants.
+// Tests if finer points surround those of a coarser mosaic: counts finer points in each cell, one sample distance wide,
+// and notes which of its eight octants they lie in.
 class FinerPoints {
  public:
   FinerPoints(const Mosaic& coarse, int finest_class)
       : grid_{cells_a_side(coarse.pixel_range(), 1)},
         halves_{2 * grid_.side},
-        // Density goes with the square: an octave is four times as many. Three quarters of what covers a cell must be
-        // there: half of it may be the neighbours of a sample around which nothing finer was sampled.
+        // Density grows with the square: an octave is four times as many points. Three quarters of a full cell must be
+        // there: half of it may belong to neighbours of a sample without finer samples around it.
         enough_(3u << 2 * std::clamp(finest_class - density_class(coarse.pixel_range()) - 1, 0, 6)) {}
 
   void begin(size_t most) {
@@ -252,14 +252,14 @@ class FinerPoints {
 
  private:
   static constexpr uint32_t kOctants = 24, kMostCounted = (1u << kOctants) - 1;  // a word: octants above, count below
-  // A surface crosses four octants at least. Fewer are a clump of many samples, beside which there is nothing.
+  // A surface crosses at least four octants. Fewer mean a clump of many samples with nothing beside it.
   static constexpr int kLeastOctants = 3;
   Grid grid_, halves_;
   uint32_t enough_;
 };
 
-// Whether a mosaic is merged with another one: those of one group and class. The mean of a class is the size of its
-// splats, so samples an octave coarser would have gaps between them.
+// True if the mosaics have the same group and class. The mean of a class sets the size of its splats, so samples an
+// octave coarser would have gaps between them.
 bool may_merge(const Mosaic& m, const Mosaic& fresh) {
   return m.group() == fresh.group() && density_class(m.pixel_range()) == density_class(fresh.pixel_range());
 }
@@ -268,7 +268,7 @@ bool contains(const std::vector<uint32_t>& list, uint32_t i) {
   return std::find(list.begin(), list.end(), i) != list.end();
 }
 
-// The mosaics that `fresh` is merged with, ascending: smallest first, as long as they are of a size with what there is.
+// Returns the mosaics to merge with `fresh`, ascending: chosen from the smallest on, while they are of similar size.
 std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic& fresh) {
   std::vector<uint32_t> out;
   uint32_t total = fresh.count(0);
@@ -288,8 +288,8 @@ std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic
   return out;
 }
 
-// Which points of `coarse` are surrounded by the first `own` of p and by those of finer mosaics that stay:
-// scratch.surrounded. Returns how many.
+// Marks, in scratch.surrounded, the points of `coarse` that are surrounded by the first `own` of p and by finer mosaics
+// that stay. Returns their number.
 uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<uint32_t>& replaced,
                          const Mosaic& coarse, int merged_class, const PointSet& p, uint32_t own) {
   FinerPoints finer(coarse, merged_class);
@@ -363,7 +363,7 @@ Mosaic merge_levels(const std::vector<PlacedLevel>& parts, int shift, float pixe
 Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence) {
   PointSet& p = scratch.points;
   gather(parts, shift, 2 * pixel_range, p);
-  // With samples half as far apart, level 1 is what is wanted.
+  // With samples half as far apart, level 1 has the wanted points.
   const Mosaic dense = build(p, sequence, {});
   const Mosaic::Level l1 = dense.level(1), l2 = dense.level(2);
   MosaicBuilder out(sequence, {}, {l1.count, l2.count, l2.count});
@@ -409,7 +409,7 @@ Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
   }
   std::sort(out.replaced.begin(), out.replaced.end());
   if (out.replaced.empty())
-    out.added.push_back(std::move(fresh));  // as it came
+    out.added.push_back(std::move(fresh));  // unchanged
   else
     out.added.push_back(build(p, fresh.sequence(), FrameId{fresh.frame_tag()}));
   return out;

@@ -12,7 +12,7 @@ bool near_in_depth(uint32_t code_first, uint32_t code) {
   return difference * 50 <= code;
 }
 
-// First rank of each pixel of a 2x2 block; the upper left one never needs it, being the first of its group.
+// First rank of each pixel of a 2x2 block; the upper left one needs none, since it is the first of its group.
 constexpr int kRankOfPixel[4] = {0, kFirstRankOfLevel0 + 4, kFirstRankOfLevel0 + 8, kFirstRankOfLevel0};
 
 // Sums of many colours, channel by channel.
@@ -22,7 +22,7 @@ struct ColourSum {
   uint32_t mean() const { return (r + n / 2) / n << 16 | (g + n / 2) / n << 8 | (b + n / 2) / n; }
 };
 
-// The mean of four, all channels at once; the same rounding.
+// The mean of four colours, all channels at once, rounded in the same way.
 uint32_t mean_of_four(uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   constexpr uint32_t kRedBlue = 0x00ff00ff;
   const uint32_t rb = (a & kRedBlue) + (b & kRedBlue) + (c & kRedBlue) + (d & kRedBlue) + 0x00020002;
@@ -30,7 +30,7 @@ uint32_t mean_of_four(uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   return (rb >> 2 & kRedBlue) | (g >> 2 & 255) << 8;
 }
 
-// Leaf keys -> indices in order of appearance: open addressing, at most half full.
+// Leaf keys -> indices in order of appearance, by open addressing, at most half full.
 class LeafTable {
  public:
   explicit LeafTable(std::vector<DecimatedTile::Leaf>& leaves) : leaves_(leaves), slots_(1024) {}
@@ -85,7 +85,7 @@ class Decimator {
   }
 
  private:
-  static constexpr int kStretch = 64;  // pixels of four rows: most of a tile with few rays is passed over by them
+  static constexpr int kStretch = 64;  // pixels of four rows skipped at once: most of a tile with few rays
 
   bool any_covered(int x0, int y0) const {
     const int begin = std::max(x0, 0), end = std::min(x0 + kStretch, width_);
@@ -114,7 +114,7 @@ class Decimator {
     bool taken;
   };
 
-  // The block in one go, if it is one leaf's and flat (or empty); false if it is not.
+  // Takes a block that is empty, or flat and in one leaf, as a whole. False: it is neither.
   bool take_whole(int x, int y) {
     const uint32_t pixel = static_cast<uint32_t>(y * width_ + x);
     const ClusterKey key = keys_[pixel];
@@ -129,7 +129,7 @@ class Decimator {
     }
     if (nothing == kNoCluster) return true;
     if (differs != 0) return false;
-    // Stricter than asking each against its first: whatever passes here is one group at every level.
+    // Stricter than comparing each with the first: a block that passes is one group at every level.
     if (!near_in_depth(most, least)) return false;
 
     BlockEntry block{pixel, leaves_.index_of(key), {}};
@@ -145,7 +145,7 @@ class Decimator {
     return true;
   }
 
-  // The block sample by sample: grouped by leaf and depth, first within 2x2 blocks, then those groups in the 4x4 block.
+  // Takes the block sample by sample: grouped by leaf and depth, first within 2x2 blocks, then within the 4x4 block.
   void take_parts(int x, int y) {
     Candidate c[16];
     const int n = gather(x, y, c);
@@ -161,7 +161,7 @@ class Decimator {
         c[j].taken = true;
         sum.add(colour_[c[j].entry.pixel]);
       }
-      // All four lie as near to the 2x2 block's centre; the first is it.
+      // All four lie equally near to the 2x2 block's centre: takes the first.
       c[i].entry.rank = static_cast<uint32_t>(std::max(kBlockPlace[c[i].sub], 1));
       c[i].entry.mean[0] = sum.mean();
     }
@@ -198,7 +198,7 @@ class Decimator {
         const uint32_t pixel = static_cast<uint32_t>((y + j) * width_ + x + i);
         if (keys_[pixel] == kNoCluster) continue;
         const int dx = 2 * i - 3, dy = 2 * j - 3;
-        // The rank is that of a sample which is not the first of its group, until it turns out to be one.
+        // Starts with the rank of a sample that is not the first of its group; first ones get their rank later.
         out[n++] = {
             {pixel, leaves_.index_of(keys_[pixel]), static_cast<uint32_t>(kRankOfPixel[p] + kBlockPlace[s]), {}},
             keys_[pixel],

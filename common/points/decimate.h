@@ -1,5 +1,5 @@
-// Decimation (T4.3.2, T7.2): which samples of a tile stand for their neighbourhood at the coarser levels, in which
-// colour.
+// Decimation (T4.3.2, T7.2): chooses the samples of a tile that represent their neighbourhood at coarser levels, and
+// their colours.
 #pragma once
 
 #include <array>
@@ -19,14 +19,14 @@ namespace telesplat::points {
 /// (ordered dithering, Bayer 1973): half of the points are a quincunx. Consecutive points lie four pixels apart: a
 /// splatter that draws neighbouring pixels one after the other waits for its own stores.
 inline constexpr int kRanks = 16;
-inline constexpr int kFirstRankOfLevel0 = 4;  ///< ranks below are of level 1 too
+inline constexpr int kFirstRankOfLevel0 = 4;  ///< lower ranks also belong to level 1
 
 /// The 2x2 blocks (0 upper left, 1 upper right, 2 lower left, 3 lower right) in the order in which ranks take them:
-/// after each the one diagonally across.
+/// each is followed by the one diagonally across.
 inline constexpr std::array<int, 4> kBlockOrder{3, 0, 1, 2};
-/// The same backwards: the place of each 2x2 block in that order.
+/// The inverse: the position of each 2x2 block in that order.
 inline constexpr std::array<int, 4> kBlockPlace{1, 2, 3, 0};
-/// The pixels of a 2x2 block that are of level 0 alone (1 right, 2 lower, 3 lower right), in the order of their ranks.
+/// The pixels of a 2x2 block that only level 0 has (1 right, 2 lower, 3 lower right), in the order of their ranks.
 inline constexpr std::array<int, 3> kPixelOrder{3, 1, 2};
 
 /// One sample, or a whole 4x4 block of one leaf and of nearly one depth (the common case).
@@ -52,7 +52,7 @@ struct DecimatedTile {
   std::vector<SampleEntry> samples;  ///< in scan order of 4x4 blocks, 2x2 blocks, pixels; those outside `blocks`
 };
 
-/// keys: what unproject_row gave for every pixel of the tile.
+/// keys: those of unproject_row, for every pixel of the tile.
 DecimatedTile decimate(const geometry::Rect& tile, const image::DepthImage& image, const ClusterKey* keys);
 
 }  // namespace telesplat::points

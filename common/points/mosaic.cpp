@@ -15,7 +15,7 @@ static_assert(sizeof(Mosaic) == 40, "most mosaics hold a few points: their heade
 
 namespace {
 
-// Decoded normals in 1/32767, so that sums do not depend on their order.
+// Decoded normals in 1/32767: sums of integers do not depend on their order.
 struct IntegerNormal {
   int16_t x, y, z, unused;
 };
@@ -50,7 +50,7 @@ Cone normal_cone(const uint16_t* normals, uint32_t n) {
   Cone cone{image::encode_normal16(glm::vec3(sum / length)), -127};
 
   const IntegerNormal a = table[cone.axis];
-  int32_t least = INT32_MAX;  // |a . v| < 2^31, as are its partial sums
+  int32_t least = INT32_MAX;  // |a . v| < 2^31, and so are its partial sums
   for (uint32_t i = 0; i < n; ++i) {
     const IntegerNormal v = table[normals[i]];
     least = std::min(least, a.x * v.x + a.y * v.y + a.z * v.z);

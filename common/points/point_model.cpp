@@ -13,15 +13,15 @@
 namespace telesplat::points {
 namespace {
 
-// A node of the map (link, key, pointer), the cluster it points to, without its mosaics.
+// Bytes of a node of the map (link, key, pointer) and of its cluster, without mosaics.
 constexpr uint64_t kClusterBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Cluster));
 
-// Makes room for one more, by a quarter instead of doubling: most clusters hold many small mosaics.
+// Grows by a quarter instead of doubling: most clusters hold many small mosaics.
 void reserve_one_more(auto& list) {
   if (list.size() == list.capacity()) list.reserve(list.size() + 1 + list.size() / 4);
 }
 
-// The same of a brick, without its list of clusters.
+// Bytes of a brick, likewise, without its list of clusters.
 constexpr uint64_t kBrickBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Brick));
 
 uint64_t list_bytes(const Brick& brick) { return allocated_bytes(brick.clusters.capacity() * sizeof(void*)); }
@@ -119,7 +119,7 @@ std::vector<Mosaic> PointModel::commit(Insertion insertion) {
       replaced.push_back(std::move(mosaic));
     }
     if (!change.replaced.empty()) {
-      // What stays closes up.
+      // Moves the mosaics that stay together.
       auto next = change.replaced.begin();
       size_t end = *next;
       for (size_t i = end; i < mosaics.size(); ++i) {
@@ -193,7 +193,7 @@ std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const Clust
       dropped.push_back(std::move(whole.front()));
       continue;
     }
-    // What stays closes up, in order of sequence.
+    // Moves the mosaics that stay together, in order of sequence.
     mosaics.clear();
     auto end = first;
     for (auto m = first; m != cluster.mosaics.end(); ++m) {
@@ -243,7 +243,7 @@ uint64_t PointModel::points_in(ClusterKey key) const {
 }
 
 uint64_t PointModel::digest() const {
-  uint64_t sum = 0x7e1e5;  // where 0 means that no digest is told, an empty model has one, too
+  uint64_t sum = 0x7e1e5;  // not 0, which means "no digest", even for an empty model
   for (const auto& [key, cluster] : clusters_) {
     uint64_t hash = key;
     for (const Mosaic& mosaic : cluster->mosaics) {

@@ -24,25 +24,25 @@
 
 namespace telesplat::points {
 
-inline constexpr int kLevels = 3;           ///< level 0 = every sample, 1 = one of 2x2 pixels, 2 = one of 4x4
+inline constexpr int kLevels = 3;           ///< level 0: every sample, 1: one of 2x2 pixels, 2: one of 4x4
 inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 
 /// The 24 bits of a frame tag, which tagged() makes.
 inline constexpr uint32_t kFrameTagMask = (1u << 24) - 1;
 /// The bit of a frame tag that coarse passes have.
 inline constexpr uint32_t kProvisionalTag = 1u << 23;
-/// The bit of a frame tag that points of a head at rest have; what follows it is the number of that rest.
+/// The bit of a frame tag that points of a head at rest have; the other bits are the number of that rest.
 inline constexpr uint32_t kRestTag = 1u << 22;
-/// What prepare_patch() is told of a frame: its number, or that of a head's rest (not 0), with the bits for a coarse
-/// pass (step > 1) and a rest.
+/// Tag of a frame, for prepare_patch(): its number, or that of a head's rest (if not 0), with the bits of a coarse pass
+/// (step > 1) and of a rest.
 constexpr FrameId tagged(FrameId frame, uint64_t step, uint64_t rest = 0) {
   if (rest != 0) return {(rest & (kRestTag - 1)) | kRestTag};
   return {(frame.value & (kRestTag - 1)) | (step > 1 ? kProvisionalTag : 0)};
 }
-/// The tag, if its points are provisional; else 0.
+/// Returns the tag if its points are provisional, else 0.
 constexpr uint32_t group_of(uint32_t tag) { return (tag & (kProvisionalTag | kRestTag)) != 0 ? tag : 0; }
 
-/// Where a cluster's leaf lies: its integer coordinates, `depth` bits each, in the octree's cube; x in the low bits
+/// The place of a cluster's leaf: its integer coordinates, `depth` bits each, in the octree's cube; x in the low bits
 /// (x | y << 10 | z << 20).
 using ClusterKey = uint32_t;
 
@@ -59,13 +59,13 @@ struct ModelConfig {
 /// configurations that arrive from outside; every other function here requires a configuration that passed.
 Status validate(const ModelConfig& config);
 
-/// Points of one cluster, of about equal density: the part of one patch (of one tile) inside it, or what several such
-/// parts were merged to (compaction.h). One allocation with three levels of detail.
-/// Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB
-/// (top byte = flags, 0). A coarse level's points are the first ones of the finer level, so that it shares their
-/// positions and normals and adds its mean colours alone. With n0 >= n1 >= n2 points the allocation holds
-///   uint16 x[n0], y[n0], z[n0], normal[n0]; uint32 colour0[n0]; colour1[n1] if n1 < n0; colour2[n2] if n2 < n1
-/// (where two levels have equally many points they are the same points): 12 to 14 bytes a point.
+/// Points of one cluster, of about equal density: the part of one patch (of one tile) inside it, or several such parts
+/// after a merge (compaction.h). One allocation with three levels of detail. Positions are fractions of the leaf:
+/// position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB (top byte = flags, 0). A coarse
+/// level's points are the first ones of the finer level, so that it shares their positions and normals and adds its
+/// mean colours alone. With n0 >= n1 >= n2 points the allocation holds uint16 x[n0], y[n0], z[n0], normal[n0]; uint32
+/// colour0[n0]; colour1[n1] if n1 < n0; colour2[n2] if n2 < n1 (where two levels have equally many points they are the
+/// same points): 12 to 14 bytes a point.
 class Mosaic {
  public:
   /// Arrays of `count` elements; colour starts at a multiple of 4 bytes, the others of 2.
@@ -84,36 +84,36 @@ class Mosaic {
   }
   uint32_t count(int l) const { return counts_[l]; }
 
-  /// Of the event that brought it, or of the newest that was merged into it, modulo 2^40.
+  /// Sequence of the event that brought it, or of the newest one merged into it, modulo 2^40.
   Sequence sequence() const { return {sequence_and_frame_ & ((uint64_t{1} << kSequenceBits) - 1)}; }
   /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch
   /// (T4.3.2).
   uint32_t frame_tag() const { return static_cast<uint32_t>(sequence_and_frame_ >> kSequenceBits); }
-  /// Its points are forgotten by their tag, and show nothing to redundancy elimination: those of a coarse pass when the
+  /// Its points are removed by their tag, and redundancy elimination ignores them: those of a coarse pass when the
   /// complete frame is there, those of a head at rest when it has moved on.
   bool provisional() const { return group() != 0; }
-  /// The tag, if provisional; else 0. Mosaics of one group are merged, but not those of a coarse pass.
+  /// The tag, if provisional; else 0. Mosaics of one group are merged, except those of a coarse pass.
   uint32_t group() const { return group_of(frame_tag()); }
   bool of_rest() const { return (frame_tag() & kRestTag) != 0; }
   /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
-  /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l. Of merged mosaics the mean.
+  /// (the linear "pixel range" in T4.3.2). Level l has pixel_range() / 2^l. A merged mosaic has the mean.
   float pixel_range() const { return pixel_range_; }
   /// Normal cone [Shirman 93]: every normal n of the mosaic has dot(n, axis) >= cosine. cosine = -1: no cone.
   glm::vec3 cone_axis() const { return image::decode_normal16(cone_axis_); }
   float cone_cosine() const { return static_cast<float>(cone_cosine_) / 127.0f; }
   /// cone_axis() before it is normalised.
   glm::vec3 cone_axis_direction() const { return image::octahedral16(cone_axis_); }
-  /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it tells how far apart
-  /// the samples lie on the surface (T4.4.1). Zero of points merged from views in different directions: they are as far
-  /// apart along all directions.
+  /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it gives the
+  /// distance of the samples on the surface (T4.4.1). Zero if points from views in different directions were merged:
+  /// then the distance is the same along all directions.
   glm::vec3 direction_to_eye() const {
     return direction_to_eye_ == kNoDirection ? glm::vec3(0) : glm::normalize(image::octahedral16(direction_to_eye_));
   }
   /// Mean position of the level-0 points, room space, to 1/256 of the leaf.
   glm::vec3 centroid_room(const geometry::Box& leaf) const;
-  /// Bytes this mosaic occupies: header, points and what the allocator adds.
+  /// Memory of this mosaic: header, points and the allocator's overhead.
   size_t bytes() const;
-  /// Hash of everything in it.
+  /// Hash of all its content.
   uint64_t digest() const;
 
  private:
@@ -131,7 +131,7 @@ class Mosaic {
   uint16_t direction_to_eye_ = 0;
 };
 
-/// A point as a mosaic holds it.
+/// A point in the form that mosaics hold.
 struct LeafPoint {
   uint16_t x, y, z;  ///< fractions of the leaf, as in Mosaic
   uint16_t normal;
@@ -145,28 +145,28 @@ struct Cluster {
   std::vector<Mosaic> mosaics;  ///< in order of sequence
 };
 
-/// A cube of 4 x 4 x 4 leaves, two levels above them (fewer where the octree is less deep), and the clusters in it: so
-/// that who walks the model looks at cubes first.
+/// A cube of 4 x 4 x 4 leaves, two levels above them (fewer if the octree is less deep), and the clusters in it: a walk
+/// over the model tests cubes first.
 struct Brick {
   geometry::Box box_room;
   std::vector<const Cluster*> clusters;  ///< in no particular order; at least one
   uint64_t changes = 0;                  ///< counts insertions and removals
-  /// differs after every removal of points from it, also when it was gone in between
+  /// differs after every removal of points from it, even if the brick itself was removed in between
   uint64_t removals = 0;
 };
 
-/// The points of one patch part, sorted into leaves and levels, ready to be inserted. Made without touching a model, so
-/// a viewer's worker makes it while its display thread reads the model.
+/// The points of one patch part, sorted into leaves and levels, ready to be inserted. Making it needs no model, so a
+/// viewer's worker makes it while its display thread reads the model.
 struct PreparedPatch {
   Sequence sequence;
   std::vector<std::pair<ClusterKey, Mosaic>> mosaics;  ///< ascending keys
   uint64_t points = 0;                                 ///< level-0 points
-  uint64_t outside = 0;  ///< samples outside the octree's cube: dropped (none if the data set's box is true)
+  uint64_t outside = 0;  ///< samples outside the octree's cube: dropped (0 if the data set's box is correct)
 };
 
 /// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes
 /// each mosaic's attributes.
-///   frame: the sampling frame that the tile is of (tagged()), so that its mosaics know each other.
+/// frame: tag (tagged()) of the tile's sampling frame, which its mosaics share.
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
 ///   Level l+1 makes one point of covered pixels in each block of 2x2 pixels of level l (blocks are aligned to the
 ///   frame's pixel grid): of those that fall in the same leaf and lie within 2 % of the first one's depth. The point is
@@ -178,16 +178,16 @@ struct PreparedPatch {
 PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,
                             const geometry::Rect& tile, const image::DepthImage& image, FrameId frame = {});
 
-/// Projected pixels across a leaf's cube: leaf_size * focal_x / depth of its centre (of half a leaf where it is less).
+/// Projected pixels across a leaf's cube: leaf_size * focal_x / depth of its centre (at least half a leaf).
 float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_room, double leaf_size_m);
 
-/// What inserting a patch, or a refinement (refinement.h), does to each of its clusters.
+/// Changes to each cluster when a patch, or a refinement (refinement.h), is inserted.
 struct Insertion {
   struct Change {
     ClusterKey key;
-    std::vector<uint32_t> replaced;  ///< of the cluster's mosaics, ascending
-    std::vector<Mosaic> added;       ///< follow those that stay
-    /// Take the places of these ones, ascending, and have as many points; then the other two are empty.
+    std::vector<uint32_t> replaced;  ///< indices among the cluster's mosaics, ascending
+    std::vector<Mosaic> added;       ///< appended after the mosaics that stay
+    /// New mosaics for these indices, ascending, with as many points; `replaced` and `added` are empty then.
     std::vector<std::pair<uint32_t, Mosaic>> renewed = {};
   };
   Sequence sequence;
@@ -199,24 +199,24 @@ class PointModel {
   explicit PointModel(const ModelConfig& config);
 
   const ModelConfig& config() const { return config_; }
-  /// Event "patch". Sequences must rise. Where mosaics are merged, points are copied; else every mosaic is taken over.
+  /// Event "patch". Sequences must rise. Copies points if mosaics are merged; else takes every mosaic over.
   void insert(PreparedPatch patch) { commit(plan(std::move(patch))); }
-  /// The same in two steps, the first of which only reads the model, so that others may read it too. No event may come
+  /// The same in two steps. The first only reads the model, so others may read it at the same time. No event may come
   /// between them.
   Insertion plan(PreparedPatch patch) const;
-  /// O(mosaics). Returns those that were replaced: a viewer keeps them alive until its frame is drawn.
+  /// O(mosaics). Returns the replaced mosaics: a viewer keeps them alive until its frame is drawn.
   std::vector<Mosaic> commit(Insertion insertion);
-  /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns what was dropped.
+  /// Event "forget": drops whole clusters. Ignores unknown keys. Returns the dropped clusters.
   std::vector<Cluster> forget(std::span<const ClusterKey> keys);
-  /// The same, but the clusters stay where they are in memory: a viewer keeps them alive until its frame is drawn,
-  /// since draw lists point to clusters and not only to their points.
+  /// The same, but the clusters stay in place in memory: a viewer keeps them alive until its frame is drawn, since draw
+  /// lists point to clusters and not only to their points.
   std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys);
   /// Event "forget" of single patches: drops the mosaics with frame tag frames[i] from cluster keys[i], and the cluster
-  /// when none is left. What is not there is ignored. Returns what was dropped: clusters with the dropped mosaics
-  /// alone, one for each i that found some. Precondition: as many frames as keys.
+  /// if it becomes empty. Ignores unknown ones. Returns clusters with the dropped mosaics alone, one for each i that
+  /// found some. Precondition: as many frames as keys.
   std::vector<Cluster> forget(std::span<const ClusterKey> keys, std::span<const uint32_t> frames);
-  /// The same for a viewer: while it keeps what is returned, draw lists made before stay drawable. A cluster that has
-  /// none left is returned as it lay in memory; one that stays does so with other mosaics, whose points do not move.
+  /// The same for a viewer: draw lists made before stay drawable while it keeps the result. A cluster that becomes
+  /// empty is returned in place; one that stays has other mosaics, whose points do not move.
   std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys, std::span<const uint32_t> frames);
   /// Event "new epoch": drops everything.
   void clear();
@@ -241,8 +241,8 @@ class PointModel {
   std::unordered_map<ClusterKey, std::unique_ptr<Cluster>> clusters_;
   std::unordered_map<ClusterKey, std::unique_ptr<Brick>> bricks_;  // by brick_key
   uint64_t points_ = 0;
-  uint64_t removals_ = 0;       // of clusters or mosaics, so far
-  uint64_t cluster_bytes_ = 0;  // of all clusters and what they hold
+  uint64_t removals_ = 0;       // removals of clusters or mosaics so far
+  uint64_t cluster_bytes_ = 0;  // memory of all clusters and their content
 };
 
 /// A leaf's brick: its coordinates without their last two bits.
@@ -252,7 +252,7 @@ constexpr ClusterKey brick_key(ClusterKey leaf) { return leaf & ~(3u | 3u << 10 
 geometry::Box octree_cube(const ModelConfig& config);
 geometry::Box leaf_box(const ModelConfig& config, ClusterKey key);
 
-/// The same cube, unrounded: points are sorted into leaves with these. leaf = floor((p - lo) / leaf_size) on each axis.
+/// The same cube, unrounded, for sorting points into leaves: leaf = floor((p - lo) / leaf_size) on each axis.
 struct OctreeGrid {
   glm::dvec3 lo{0};
   double leaf_size = 0;

@@ -1,4 +1,4 @@
-// A depth-image tile becomes mosaics: unproject, decimate, sort into leaves (T4.3.2, T7.2).
+// Turns a depth-image tile into mosaics: unproject, decimate, sort into leaves (T4.3.2, T7.2).
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <numeric>
@@ -9,8 +9,8 @@
 namespace telesplat::points {
 namespace {
 
-// Where each pixel of the tile lies; no value is written twice, so nothing is cleared first. Rows without a sample are
-// no leaf's.
+// Leaf and position of each pixel of the tile. All values are written, so they need not be cleared first. Rows without
+// a sample have kNoCluster.
 struct UnprojectedTile {
   std::unique_ptr<ClusterKey[]> keys;
   std::unique_ptr<uint16_t[]> x, y, z;
@@ -27,7 +27,7 @@ UnprojectedTile unproject(const OctreeGrid& grid, const geometry::Camera& camera
     const uint32_t* depth = image.depth.data() + first;
     uint32_t any = 0;
     for (int x = 0; x < tile.width; ++x) any |= depth[x];
-    // Decimation looks at four rows at once where one of them has a sample.
+    // Decimation reads four rows at once if one of them has a sample.
     if (any == 0) {
       std::fill_n(out.keys.get() + first, tile.width, kNoCluster);
       continue;
@@ -66,8 +66,8 @@ std::vector<OpenMosaic> open_mosaics(const std::vector<DecimatedTile::Leaf>& lea
 
 void place_block(const BlockEntry& block, const UnprojectedTile& tile, const image::DepthImage& image, OpenMosaic& m) {
   const size_t w = image.width;
-  // First pixels of the four 2x2 blocks: the one near the centre is of all levels. A mosaic that holds a block has
-  // coarser levels of fewer points, hence mean colours.
+  // First pixels of the four 2x2 blocks: the one near the centre belongs to all levels. A mosaic that holds a block has
+  // coarser levels with fewer points, hence mean colours.
   const uint32_t centre = m.place(0, tile, image, block.pixel + 2 * w + 2);
   m.arrays.mean1[centre] = block.mean[3];
   m.arrays.mean2[centre] = block.mean[4];

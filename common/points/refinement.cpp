@@ -24,7 +24,7 @@ struct UnprojectedRow {
   }
 };
 
-// A position along one axis in leaf `from`, of a point that lies in leaf `to`: on the side between them.
+// Returns a position along one axis in leaf `from`, for a point that lies in leaf `to`: on the side between them.
 uint16_t within(ClusterKey from, ClusterKey to, int axis, uint16_t q) {
   const uint32_t a = from >> (10 * axis) & 1023, b = to >> (10 * axis) & 1023;
   return a == b ? q : a < b ? uint16_t{65535} : uint16_t{0};
@@ -37,7 +37,7 @@ struct HashOfPoint {
   }
 };
 
-// The exact points of a part by the bounded ones, in order: of those that are alike the first one first.
+// Finds the exact point of a bounded one. Equal bounded points are taken in order.
 class ExactPoints {
  public:
   explicit ExactPoints(const PreparedRefinement::Part& part) : part_(part), next_(part.bounded.size(), kNone) {
@@ -46,7 +46,7 @@ class ExactPoints {
       if (!fresh) next_[i] = std::exchange(place->second, i);
     }
   }
-  // Null: it is none of them, or all that are like it were taken.
+  // Null: no point matches, or all matching ones are used.
   const LeafPoint* take(const LeafPoint& bounded) {
     const auto found = first_.find(bounded);
     if (found == first_.end() || found->second == kNone) return nullptr;
@@ -113,7 +113,7 @@ Insertion plan_refinement(const PointModel& model, const PreparedRefinement& ref
     std::vector<std::pair<uint32_t, LeafPoint>> found;
     for (uint32_t m = 0; m < cluster->mosaics.size(); ++m) {
       const Mosaic& mosaic = cluster->mosaics[m];
-      // What was merged has the newest sequence of its parts, so an older mosaic has no point of that patch.
+      // A merged mosaic has the newest sequence of its parts, so an older mosaic has no point of that patch.
       if (mosaic.sequence() < refinement.of || mosaic.group() != refinement.group) continue;
       const Mosaic::Level l = mosaic.level(0);
       found.clear();

@@ -8,7 +8,7 @@ namespace telesplat::points {
 
 std::unique_ptr<Summary> summarise(const PointModel& model, ClusterKey brick_key, const Brick& brick,
                                    Sequence applied) {
-  // Leaves along the brick's edge.
+  // Number of leaves along the brick's edge.
   const int shift = std::min(2, model.config().depth);
   const auto leaves = static_cast<float>(1 << shift);
   float range = kMostSummaryRange;
@@ -24,13 +24,13 @@ std::unique_ptr<Summary> summarise(const PointModel& model, ClusterKey brick_key
       points += m.count(0);
       range_sum += static_cast<double>(m.count(0)) * static_cast<double>(m.pixel_range());
     }
-  // Where they are few, all of them.
+  // If there are few points, takes all of them.
   const bool all = points <= kMostSummaryPoints;
   std::vector<PlacedLevel> parts;
   for (const Cluster* cluster : brick.clusters) {
     const auto place = [&](int axis) { return static_cast<uint16_t>(cluster->key >> (10 * axis) & 3); };
     for (const Mosaic& m : cluster->mosaics) {
-      // The coarsest level that has a point for each cell.
+      // Finds the coarsest level that has a point for each cell.
       int level = 0;
       while (!all && level + 1 < kLevels && leaves * m.pixel_range() >= range * static_cast<float>(2 << level)) ++level;
       parts.push_back({&m, level, place(0), place(1), place(2)});

@@ -1,4 +1,4 @@
-// The SIMD kernel of unproject.h, one instance for each instruction set.
+// The SIMD kernel of unproject.h, compiled for each instruction set.
 #if defined(TELESPLAT_POINTS_UNPROJECT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_POINTS_UNPROJECT_INL_H_
 #undef TELESPLAT_POINTS_UNPROJECT_INL_H_
@@ -27,12 +27,12 @@ void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, Cluster
   size_t i = 0;
   for (; i + lanes <= n; i += lanes) {
     const auto code = hn::LoadU(di, reinterpret_cast<const int32_t*>(codes + i));
-    // Most of a patch is nothing, in long runs.
+    // Most pixels of a patch are empty, in long runs.
     if (hn::AllTrue(di, hn::Eq(code, hn::Zero(di)))) {
       hn::StoreU(hn::Set(di, -1), di, reinterpret_cast<int32_t*>(keys + i));
       continue;
     }
-    // Code 0 gives an infinite depth, hence coordinates that are infinite or NaN and outside.
+    // Code 0 gives an infinite depth, hence coordinates that are infinite or NaN: outside.
     const auto depth = hn::Div(scale, hn::PromoteTo(df, code));
     const auto column = hn::Iota(df, rays.x_first + static_cast<double>(i));
     auto key = hn::Zero(di);

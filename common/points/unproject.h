@@ -9,7 +9,7 @@
 
 namespace telesplat::points {
 
-/// Key of a pixel without a point: nothing there, or outside the octree's cube.
+/// Key of a pixel without a point: an empty pixel, or one outside the octree's cube.
 inline constexpr ClusterKey kNoCluster = 0xffffffffu;
 
 /// A row's rays in grid units (1/65536 of a leaf's side, from the cube's low corner). The point at depth z (metres) of
@@ -26,11 +26,11 @@ struct RowRays {
 /// The rays of row `y` of the frame, from pixel `x` on.
 RowRays row_rays(const OctreeGrid& grid, const geometry::Camera& camera, int x, int y);
 
-/// For each of n depth codes: its leaf's key, or kNoCluster if it is 0 or outside the cube, and the position in the
-/// leaf (16 bits an axis; undefined where there is no key). Arrays of n elements each. SIMD, run-time dispatch.
+/// Returns for each of n depth codes its leaf's key, or kNoCluster if it is 0 or outside the cube, and the position in
+/// the leaf (16 bits an axis; undefined without a key). Arrays of n elements each. SIMD, run-time dispatch.
 void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x, uint16_t* y,
                    uint16_t* z);
-/// The same, plainly: the oracle of the SIMD one.
+/// The same without SIMD: the oracle for tests.
 void unproject_row_scalar(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x,
                           uint16_t* y, uint16_t* z);
 

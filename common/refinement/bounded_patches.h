@@ -1,4 +1,4 @@
-// What those keep who apply refinements: patches that came with bounded errors, until what they left out follows.
+// Keeps patches with bounded errors until their refinements follow, for packer and viewers.
 #pragma once
 
 #include <algorithm>
@@ -15,17 +15,16 @@
 
 namespace telesplat::refinement {
 
-/// The newest bounded patches, of which a refinement may come. The packer refines what its book holds; a viewer's book
-/// holds all of that, because it has seen no more since.
-/// T: what is kept of a patch.
+/// The newest bounded patches, which may still be refined. The packer refines only patches in its book; a viewer's book
+/// holds all of them, because it has seen no newer ones. T: data kept for a patch.
 template <class T>
 class RefinableBook {
  public:
-  /// After that many bytes of later patches, or so many of them, a patch is not refined any more.
+  /// A patch is not refined after this many bytes of later patches, or this many of them.
   static constexpr uint64_t kMostBytes = 64u << 20;
   static constexpr uint64_t kMostPatches = 8192;
 
-  /// bytes: of its image, coded. Sequences rise.
+  /// bytes: size of its coded image. Sequences rise.
   void add(Sequence sequence, uint64_t bytes, T what) {
     bytes_ += bytes;
     ++patches_;
@@ -33,7 +32,7 @@ class RefinableBook {
     while (bytes_ - entries_.front().bytes > kMostBytes || patches_ - entries_.front().patches >= kMostPatches)
       entries_.pop_front();
   }
-  /// The newest one that is wanted, which goes. Nothing: there is none.
+  /// Removes and returns the newest entry for which wanted() is true. Nothing: no such entry.
   std::optional<std::pair<Sequence, T>> take_newest(const auto& wanted) {
     for (auto e = entries_.end(); e != entries_.begin();) {
       --e;
@@ -44,7 +43,7 @@ class RefinableBook {
     }
     return std::nullopt;
   }
-  /// The one with that sequence, which goes. Nothing: it is not here.
+  /// Removes and returns the entry with that sequence. Nothing: it is not here.
   std::optional<T> take(Sequence sequence) {
     const auto found = std::lower_bound(entries_.begin(), entries_.end(), sequence,
                                         [](const Entry& e, Sequence s) { return e.sequence < s; });
@@ -59,7 +58,7 @@ class RefinableBook {
  private:
   struct Entry {
     Sequence sequence;
-    uint64_t bytes, patches;  // so far, this one included
+    uint64_t bytes, patches;  // totals up to this entry
     T what;
   };
   std::deque<Entry> entries_;  // oldest first
@@ -68,22 +67,22 @@ class RefinableBook {
 
 /// A bounded patch, as it was published.
 struct BoundedPatch {
-  geometry::Camera camera;  ///< of the whole frame
+  geometry::Camera camera;  ///< camera of the whole frame
   geometry::Rect rect;      ///< the patch in it
   std::vector<uint8_t> stream;
   FrameId tag;  ///< points::tagged()
 };
 
-/// Book of those who follow the packer.
+/// The book of a process that follows the packer.
 class BoundedPatches {
  public:
-  /// Precondition: the stream was decoded, so it is good.
+  /// Precondition: the stream was decoded, so it is valid.
   void add(Sequence sequence, const geometry::Camera& camera, const geometry::Rect& rect,
            std::span<const uint8_t> stream, FrameId tag = {}) {
     book_.add(sequence, stream.size(), {camera, rect, {stream.begin(), stream.end()}, tag});
   }
-  /// What event `sequence` with that stream makes of patch `of`. Nothing: that patch is not here; then all of its
-  /// points were forgotten. Error: the stream does not fit it.
+  /// Reads the stream of event `sequence`, which refines patch `of`. Nothing: that patch is not here, because all of
+  /// its points were forgotten. Error: the stream does not fit it.
   Result<std::optional<points::PreparedRefinement>> refine(const points::ModelConfig& config, Sequence sequence,
                                                            Sequence of, std::span<const uint8_t> stream);
   void clear() { book_.clear(); }

@@ -37,7 +37,7 @@ Status validate(const Grid& grid) {
         return Error{fmt::format("the volume's placement has {} in row {}, column {}", m[c][r], r, c)};
   if (m[0][3] != 0 || m[1][3] != 0 || m[2][3] != 0 || m[3][3] != 1)
     return Error{"the volume's placement is not affine"};
-  // A voxel much flatter than its sides are long has no inverse worth computing with.
+  // The inverse of a voxel much flatter than its sides would be inaccurate.
   const double sides = glm::length(glm::dvec3(m[0])) * glm::length(glm::dvec3(m[1])) * glm::length(glm::dvec3(m[2]));
   const double volume = std::abs(glm::determinant(glm::dmat3(m)));
   if (!(sides > 1e-30) || volume < 1e-3 * sides)

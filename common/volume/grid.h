@@ -1,5 +1,5 @@
-// A regular grid of voxels in the room: any affine placement, so spacing may differ by axis and axes need not be those
-// of the room.
+// A regular grid of voxels in the room: any affine placement, so spacing may differ by axis, and axes need not be the
+// room's.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@
 namespace telesplat::volume {
 
 inline constexpr int kMaxSide = 4096;               ///< voxels along an axis
-inline constexpr uint64_t kMaxVoxels = 1ull << 34;  ///< of a grid
+inline constexpr uint64_t kMaxVoxels = 1ull << 34;  ///< voxels of a grid
 
-/// Voxel (i, j, k) has its centre at index coordinates (i, j, k). What lies between is interpolated; from the outermost
-/// centres the field falls to nothing over one more voxel, so that the grid's box is [-1, n] on each axis.
+/// Voxel (i, j, k) has its centre at index coordinates (i, j, k). The field is interpolated between centres; beyond the
+/// outermost ones it falls to zero over one more voxel, so that the grid's box is [-1, n] on each axis.
 struct Grid {
   std::array<int, 3> size{1, 1, 1};
   glm::dmat4 index_to_room{1.0};  ///< affine: room = index_to_room * (i, j, k, 1), metres
@@ -24,9 +24,9 @@ struct Grid {
 
   uint64_t voxels() const { return uint64_t(size[0]) * uint64_t(size[1]) * uint64_t(size[2]); }
   glm::dmat4 room_to_index() const { return glm::inverse(index_to_room); }
-  /// The length that transfer functions count opacity by: the cube root of a voxel's volume, metres.
+  /// The unit of length for opacity in transfer functions: the cube root of a voxel's volume, metres.
   double unit_m() const;
-  /// The smallest box in room space that holds [-0.5, n - 0.5] of every axis.
+  /// The smallest box in room space that holds [-0.5, n - 0.5] on every axis.
   geometry::Box box_room() const;
   /// Centre of the box, room space.
   glm::dvec3 centre_room() const;

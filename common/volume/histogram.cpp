@@ -12,7 +12,7 @@
 namespace telesplat::volume {
 namespace {
 
-// Takes a number off the front of a text, and `after` behind it, if there is one.
+// Takes a number off the front of a text, and the character `after` behind it, if present.
 template <class Number>
 bool take(std::string_view& text, Number& value, char after) {
   const auto read = std::from_chars(text.data(), text.data() + text.size(), value);

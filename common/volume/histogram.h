@@ -1,4 +1,4 @@
-// How often values are in a volume, for people who choose a transfer function. It travels as a fact of the session.
+// Frequencies of a volume's values, for people who choose a transfer function. Sent as a fact of the session.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,19 @@ namespace telesplat::volume {
 inline constexpr int kMostBins = 512;
 inline constexpr const char* kHistogramFact = "histogram";
 
-/// Voxels of evenly spaced bins from lo to hi.
+/// Numbers of voxels in evenly spaced bins from lo to hi.
 struct Histogram {
   double lo = 0, hi = 1;
   std::vector<uint64_t> counts;
   bool operator==(const Histogram&) const = default;
 };
 
-/// Of the voxels of every level, in at most `bins` bins over all levels. Precondition: as many counts as levels.
+/// Sums the voxels of all levels into at most `bins` bins. Precondition: one count a level.
 Histogram histogram_of(std::span<const uint64_t> level_counts, const Levels& levels, int bins = 256);
 
-/// "LO:HI:COUNT,COUNT,..."; histogram_from_text of it gives the same again.
+/// Writes "LO:HI:COUNT,COUNT,..."; histogram_from_text reads the same histogram from it.
 std::string to_text(const Histogram& histogram);
-/// Error: no such text, no bin or more than kMostBins, a range that is none.
+/// Error: another form, no bin or more than kMostBins, an invalid range.
 Result<Histogram> histogram_from_text(std::string_view text);
 
 }  // namespace telesplat::volume

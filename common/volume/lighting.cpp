@@ -7,7 +7,7 @@
 namespace telesplat::volume {
 
 std::vector<float> normal_intensities(const Grid& grid, const glm::dvec3& eye_room) {
-  // A camera turned to the centre of the volume; an eye that is there keeps a camera's own orientation.
+  // A camera turned to the volume's centre; if the eye is at the centre, with the default orientation.
   const glm::dvec3 centre = grid.centre_room();
   geometry::Camera camera;
   camera.pose.position_room = eye_room;

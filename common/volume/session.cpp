@@ -8,13 +8,13 @@
 namespace telesplat::volume {
 namespace {
 
-constexpr double kMaxValue = 1e30;  // of data: what float volumes hold, and their differences stay finite
+constexpr double kMaxValue = 1e30;  // limit of data: float volumes hold it, and differences stay finite
 constexpr double kMaxStepsPerSecond = 1000;
 constexpr int kMaxParts = 1024;
 
 std::string placement_name(int row, int column) { return fmt::format("volume.m{}{}", row, column); }
 
-// Takes numbers out of the map by name; the first that is missing or beyond its limits is remembered.
+// Takes numbers out of the map by name; remembers the first that is missing or beyond its limits.
 class ParameterReader {
  public:
   explicit ParameterReader(const std::map<std::string, double>& parameters) : parameters_(parameters) {}
@@ -25,7 +25,7 @@ class ParameterReader {
       fail(fmt::format("{} is missing", name));
       return least;
     }
-    if (found->second >= least && found->second <= most) return found->second;  // false for what is not a number, too
+    if (found->second >= least && found->second <= most) return found->second;  // false for NaN, too
     fail(fmt::format("{} is {}, limits are {}..{}", name, found->second, least, most));
     return least;
   }
@@ -97,7 +97,7 @@ Result<Session> read_session(const std::map<std::string, double>& parameters,
   s.steps = in.whole("volume.steps", 1, kMaxSteps);
   s.step = in.whole("volume.step", 0, s.steps - 1);
   s.steps_per_s = in.number("volume.steps-per-s", 0, kMaxStepsPerSecond);
-  s.parts = in.whole("volume.parts", 1, std::min(kMaxParts, s.grid.size[2]));  // every part has a slice
+  s.parts = in.whole("volume.parts", 1, std::min(kMaxParts, s.grid.size[2]));  // every part has at least one slice
   s.part = in.whole("volume.part", 0, s.parts - 1);
   if (!in.complaint().empty()) return Error{"volume session: " + in.complaint()};
   if (const Status valid = validate(s.grid); !valid) return valid.error();

@@ -1,5 +1,5 @@
-// What everyone knows of a volume scene, as it travels in Hello and Welcome: numbers in `parameters`, texts in `facts`.
-// Changes with the epoch: step and transfer function.
+// Description of a volume scene, as sent in Hello and Welcome: numbers in `parameters`, texts in `facts`. Step and
+// transfer function change with the epoch.
 #pragma once
 
 #include <map>
@@ -16,15 +16,15 @@ struct Session {
   Grid grid;
   Levels levels;
   ValueRange range;
-  std::string array;          ///< of a file that names its values; facts["volume_array"]; at most kMaxArrayName bytes
+  std::string array;          ///< the file's array, if named; facts["volume_array"]; at most kMaxArrayName bytes
   TransferFunction transfer;  ///< facts["transfer"]: its text form
-  bool lit = true;            ///< voxels carry normals of their gradient and are shaded
-  int steps = 1;              ///< of a time-varying volume
-  int step = 0;               ///< parameters["volume.step"]: the one that this epoch shows
-  double steps_per_s = 0;     ///< how fast it plays; 0: it does not
+  bool lit = true;            ///< voxels have normals from their gradient and are shaded
+  int steps = 1;              ///< steps of a time-varying volume
+  int step = 0;               ///< parameters["volume.step"]: the step that this epoch shows
+  double steps_per_s = 0;     ///< speed of playing; 0: stands still
   int part = 0,
       parts =
-          1;  ///< of a data server's hello: it holds the slices [size_z * part / parts, size_z * (part + 1) / parts)
+          1;  ///< in a data server's hello: it holds the slices [size_z * part / parts, size_z * (part + 1) / parts)
   bool operator==(const Session&) const = default;
 };
 
@@ -32,7 +32,7 @@ struct Session {
 std::map<std::string, double> to_parameters(const Session& session);
 /// "transfer".
 std::map<std::string, std::string> to_facts(const Session& session);
-/// Others' names are ignored. Error: something is missing or beyond its limits.
+/// Ignores other names. Error: a value is missing or beyond its limits.
 Result<Session> read_session(const std::map<std::string, double>& parameters,
                              const std::map<std::string, std::string>& facts);
 

@@ -11,10 +11,10 @@ namespace telesplat::volume {
 namespace {
 
 constexpr double kSteepest =
-    8.0;  // slopes beyond this, in voxels a voxel, are not sampled: near the plane of the eye they have no end
+    8.0;  // limit of slopes, in voxels a voxel: they grow without end near the plane of the eye
 
-// Of an eye near the grid or inside: slices nearer than this part of the farthest one's distance do not make the raster
-// coarser.
+// If the eye is near the grid or inside, slices nearer than this part of the farthest one's distance do not make the
+// raster coarser.
 constexpr double kNearPart = 0.4;
 
 glm::dvec3 transform(const glm::dmat4& m, const glm::dvec3& p) { return m * glm::dvec4(p, 1); }
@@ -29,7 +29,7 @@ struct PrincipalAxis {
   int axis, direction;
 };
 
-// Whether the ray from `eye` along d meets the grid's box in front.
+// True if the ray from `eye` along d meets the grid's box in front.
 bool meets_box(const Grid& grid, const glm::dvec3& eye, const glm::dvec3& d) {
   double enter = 0, leave = 1e300;
   for (int a = 0; a < 3; ++a) {
@@ -42,8 +42,8 @@ bool meets_box(const Grid& grid, const glm::dvec3& eye, const glm::dvec3& d) {
   return enter < leave;
 }
 
-// The axis to which the rays that meet the grid are closest: of each candidate the steepest ray counts, and the mean of
-// all, in room slopes.
+// Chooses the axis closest to the rays that meet the grid: compares the candidates' steepest rays, and the means of all
+// rays, in room slopes.
 PrincipalAxis choose_axis(const Grid& grid, std::span<const geometry::Camera> cameras, const glm::dmat4& to_index) {
   constexpr int kRays = 17;  // a side
   constexpr double kUseless = 16;
@@ -70,7 +70,7 @@ PrincipalAxis choose_axis(const Grid& grid, std::span<const geometry::Camera> ca
         if (meets_box(grid, eye, d)) count(d);
       }
   }
-  // A grid that falls between the rays: the one through its centre.
+  // If the grid falls between the rays, takes the ray through its centre.
   const glm::dvec3 centre((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0);
   if (rays == 0) count(centre - transform(to_index, cameras[0].pose.position_room));
   PrincipalAxis best{2, 1};
@@ -87,8 +87,8 @@ struct Span {
   void extend(double v) { lo = std::min(lo, v), hi = std::max(hi, v); }
 };
 
-// A convex polygon or polyhedron's vertices, clipped by a plane: keeps where distance(p) >= 0. Works on the edges of
-// all pairs, which for the few vertices here is cheap and needs no adjacency.
+// Clips the vertices of a convex polygon or polyhedron by a plane: keeps the part with distance(p) >= 0. Uses the
+// edges of all pairs, which is cheap for few vertices and needs no adjacency.
 void clip(std::vector<glm::dvec3>& vertices, const auto& distance) {
   std::vector<glm::dvec3> out;
   for (size_t i = 0; i < vertices.size(); ++i) {
@@ -102,11 +102,11 @@ void clip(std::vector<glm::dvec3>& vertices, const auto& distance) {
   vertices = std::move(out);
 }
 
-// First slice in front of the eye, and the one behind the last; none: equal.
+// Slices [first, last) in front of the eye; equal if no slice is.
 std::pair<int, int> slices_in_front(const ShearFrame& frame, int slices, double near_slices) {
   const double near = std::max(near_slices, 0.25);
   int begin = 0, end = slices;
-  const double eye = frame.eye[frame.axis];  // of any size
+  const double eye = frame.eye[frame.axis];  // may be any number
   if (frame.direction > 0)
     begin = int(std::ceil(std::clamp(eye + near, 0.0, double(slices))));
   else
@@ -127,7 +127,7 @@ std::vector<glm::dvec3> corners_of_slices(const Grid& grid, const ShearFrame& fr
   return out;
 }
 
-// Keeps what lies between the planes through the camera's eye and two neighbouring corner rays.
+// Keeps the part between the planes through the camera's eye and two neighbouring corner rays.
 void clip_by_frustum(std::vector<glm::dvec3>& vertices, const geometry::Camera& camera, const glm::dmat4& to_index) {
   const glm::dvec3 eye = transform(to_index, camera.pose.position_room);
   const double w = camera.width, h = camera.height;
@@ -142,7 +142,7 @@ void clip_by_frustum(std::vector<glm::dvec3>& vertices, const geometry::Camera& 
   }
 }
 
-// What cameras see of some slices: slopes of the rays, and how far the seen parts are.
+// Parts of some slices that cameras see: slopes of the rays, and the distances of the seen parts.
 struct Seen {
   Span u, v;
   double nearest_t = 1e300, farthest_t = 0;
@@ -167,8 +167,8 @@ Seen see(const Grid& grid, const ShearFrame& frame, std::span<const geometry::Ca
   return out;
 }
 
-// Slope between pixels along index axis `of`: as fine as the display where the display is finest in slopes, which is
-// where it sees the principal axis most squarely. The raster's point nearest to slope 0 lies there.
+// Slope between pixels along index axis `of`: as fine as the display's pixels at the point where they are finest in
+// slopes, which is where the display sees the principal axis most squarely: the raster's point nearest to slope 0.
 double finest_pitch(const Grid& grid, const ShearFrame& frame, const Seen& seen, const geometry::Camera& display,
                     double finest, int of) {
   glm::dvec3 d;
@@ -179,7 +179,7 @@ double finest_pitch(const Grid& grid, const ShearFrame& frame, const Seen& seen,
   glm::dvec3 side(0.0);
   side[of] = 1;
   const glm::dvec3 across = direction_of(grid.index_to_room, side);
-  // Angle that one unit of slope spans there, against the angle of a display pixel in its middle.
+  // Compares the angle that one unit of slope spans there with that of a display pixel in its middle.
   const double distance = glm::length(at);
   const glm::dvec3 perpendicular = across - at * (glm::dot(across, at) / (distance * distance));
   const double angle_per_slope = glm::length(perpendicular) / distance;
@@ -188,8 +188,8 @@ double finest_pitch(const Grid& grid, const ShearFrame& frame, const Seen& seen,
   return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), fine_enough);
 }
 
-// Pixels of one side of the raster. One pixel more at both ends: look-ups between pixels reach half a pixel beyond what
-// is seen. Without it pictures fade at their borders, which shows where they are tiles of a wall. `pitch` grows where
+// Pixels of one side of the raster. Adds a pixel at both ends: look-ups between pixels reach half a pixel beyond the
+// seen part. Without it pictures fade at their borders, which shows between the tiles of a wall. Enlarges `pitch` if
 // the side would be too long.
 int raster_side(const Span& slopes, double& pitch) {
   constexpr int kMost = kMaxRasterSide - 2;
@@ -238,8 +238,8 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
   out.u0 = seen.u.lo - out.du;
   out.v0 = seen.v.lo - out.dv;
 
-  // Layers: bounds at multiples of the same thickness, whatever part of the grid is in front of the eye, so that they
-  // stay in place.
+  // Cuts layers at multiples of the same thickness, so that they stay in place when another part of the grid is in
+  // front of the eye.
   const int layers = std::clamp(options.layers, 1, std::min(kMaxLayers, slices));
   for (int l = 0; l < layers; ++l) {
     const int from = std::max(begin, int(int64_t{slices} * l / layers));
@@ -263,7 +263,7 @@ Status validate(const ShearFrame& frame, const Grid& grid) {
   if (frame.layers.empty() || frame.layers.size() > size_t(kMaxLayers))
     return Error{fmt::format("{} layers, limits 1 and {}", frame.layers.size(), kMaxLayers)};
   const int slices = grid.size[size_t(frame.axis)];
-  int next = frame.direction > 0 ? 0 : slices;  // layers go on from here
+  int next = frame.direction > 0 ? 0 : slices;  // the next layer begins here or later
   for (const auto& l : frame.layers) {
     const bool in_order = frame.direction > 0 ? l.begin >= next : l.end <= next;
     if (l.begin < 0 || l.end > slices || l.begin >= l.end || !in_order)
@@ -290,8 +290,8 @@ std::optional<glm::dmat3> warp(const Grid& grid, const ShearFrame& frame, double
   const glm::dvec3 d0 = direction_of(to_index, ray(display, 0, 0));
   const glm::dvec3 dx = direction_of(to_index, ray(display, 1, 0)) - d0;
   const glm::dvec3 dy = direction_of(to_index, ray(display, 0, 1)) - d0;
-  // It meets the plane at eye + d * gap / d_p, in front where d_p and gap have the same sign. Raster x = ((eye_u + d_u
-  // gap / d_p - e_u) / t - u0) / du; times w = d_p * sign(gap) it is linear in (px, py).
+  // It meets the plane at eye + d * gap / d_p, in front if d_p and gap have the same sign. Raster x = ((eye_u + d_u gap
+  // / d_p - e_u) / t - u0) / du; times w = d_p * sign(gap) it is linear in (px, py).
   const double sign = gap > 0 ? 1 : -1;
   const auto row = [&](int of, double origin, double pitch) {
     const double a = gap / (t * pitch), b = ((eye[of] - frame.eye[of]) / t - origin) / pitch;
@@ -308,7 +308,7 @@ std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, doub
   const double t = frame.t(slice), eye = frame.eye[2];
   const double origin = rows ? frame.v0 : frame.u0, pitch = rows ? frame.dv : frame.du;
   const int pixels = rows ? frame.height : frame.width;
-  // The first pixel whose centre lies at or beyond k - 0.5.
+  // Returns the first pixel whose centre lies at or beyond k - 0.5.
   const auto first_at = [&](int k) {
     const double x = ((k - 0.5 - eye) / t - origin) / pitch - 0.5;
     return int(std::clamp(std::ceil(x), 0.0, double(pixels)));

@@ -31,15 +31,15 @@ using BytePlane = std::vector<uint8_t>;
 
 constexpr uint8_t kMark = 'V';
 constexpr uint8_t kLit = 1, kWide = 2;
-constexpr size_t kGroupVoxels = 1u << 15;  // below it Huffman tables would be a noticeable part of a group
+constexpr size_t kGroupVoxels = 1u << 15;  // smaller groups would spend a noticeable part on Huffman tables
 
 // A block is varint(size << 2 | kind) and then `size` bytes.
 enum BlockKind : uint32_t { kConstant = 0, kStored = 1, kZstd = 2 };
 
-// Level 1 looks for strings; a very negative level finds next to none, which is faster, and mostly shorter, too: short
-// strings in noise cost more than their Huffman codes .
+// Level 1 looks for strings. A very negative level finds nearly none, which is faster and mostly shorter, too: short
+// strings in noise cost more than their Huffman codes.
 constexpr int kStringsLevel = 1, kHuffmanOnlyLevel = -1000;
-constexpr size_t kTooShort = 32;  // bytes: a Huffman table takes about what it saves, and 10 us
+constexpr size_t kTooShort = 32;  // bytes: a Huffman table takes about as many as it saves, and 10 us
 
 using Compressor = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
 Compressor make_compressor(int level) {
@@ -78,9 +78,9 @@ std::optional<Block> next_block(Reader& in) {
   return Block{*head & 3, *bytes};
 }
 
-// More than 7 of 8 sampled bytes are the same as the one sampled before.
+// True if more than 7 of 8 sampled bytes equal the one sampled before.
 bool is_repetitive(std::span<const uint8_t> raw) {
-  constexpr size_t kStep = 7;  // no divisor of usual row lengths
+  constexpr size_t kStep = 7;  // not a divisor of usual row lengths
   size_t same = 0, sampled = 0;
   for (size_t i = kStep; i < raw.size(); i += kStep, ++sampled) same += raw[i] == raw[i - kStep];
   return same * 8 > sampled * 7;
@@ -91,8 +91,8 @@ void append(std::vector<uint8_t>& out, uint32_t kind, std::span<const uint8_t> b
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
-// Appends `raw` as one self-delimiting block: constant, stored or zstd, whichever is shorter. Looks for repeated
-// strings only where one byte value is so frequent that a Huffman code, of a bit at least, would waste much on it.
+// Appends `raw` as one self-delimiting block: constant, stored or zstd, the shortest. Looks for repeated strings only
+// if one byte value is so frequent that a Huffman code, at least a bit long, would waste much on it.
 void put_zstd_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
   if (raw.size() < 2) return append(out, kStored, raw);
   if (std::memcmp(raw.data(), raw.data() + 1, raw.size() - 1) == 0) return append(out, kConstant, raw.first(1));
@@ -108,8 +108,7 @@ void put_zstd_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
     append(out, kStored, raw);
 }
 
-// Fills all of `raw` from the block at the reader's place; false where the block is damaged or holds another number of
-// bytes.
+// Fills all of `raw` from the next block. False: the block is damaged or holds another number of bytes.
 bool get_zstd_block(Reader& in, std::span<uint8_t> raw) {
   const auto block = next_block(in);
   if (!block) return false;
@@ -135,7 +134,7 @@ struct Sample {
   uint16_t level = 0, normal = kNoNormal;
 };
 
-// What the neighbours say of a voxel: the one to the left, if it is there, and the one in the row before.
+// Predicts a voxel from its neighbours: the one to the left, if present, and the one in the row before.
 class Predictor {
  public:
   explicit Predictor(int size_x) : above_(size_t(size_x)) {}
@@ -153,7 +152,7 @@ class Predictor {
       if (left_.normal == kNoNormal) out.normal = up.sample.normal;
       return out;
     }
-    // Both coordinates at once: the mean of each byte.
+    // Takes the mean of both coordinates, a byte each, at once.
     const uint32_t a = left_.normal, b = up.sample.normal;
     out.normal = uint16_t((a & b) + (((a ^ b) & 0xfefe) >> 1));
     return out;
@@ -171,7 +170,7 @@ class Predictor {
   };
   std::vector<Above> above_;
   uint32_t row_ = 1;
-  Sample left_, start_;  // start_: of the run before; surfaces begin with much the same level
+  Sample left_, start_;  // start_: first sample of the run before; surfaces begin with similar levels
   bool at_start_ = true;
 };
 
@@ -270,7 +269,7 @@ class GroupDecoder {
  private:
   uint32_t count(size_t row) const { return counts_low_[row] | uint32_t{counts_high_[row]} << 8; }
 
-  // As many numbers below 2^14.
+  // Reads how_many numbers below 2^14.
   bool get_varints(Reader& in, uint64_t how_many, std::vector<uint16_t>& out) {
     const auto bytes = in.varint();
     if (!bytes || *bytes < how_many || *bytes > 2 * how_many) return false;
@@ -288,7 +287,7 @@ class GroupDecoder {
     return at == packed_.size();
   }
 
-  // Gaps become the runs' first places; none reaches beyond its row.
+  // Converts gaps to the runs' begins. False: a run reaches beyond its row.
   bool place_runs(size_t rows) {
     size_t run = 0;
     for (size_t r = 0; r < rows; ++r) {

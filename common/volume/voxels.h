@@ -1,4 +1,4 @@
-// Non-transparent voxels, sparse: what data servers send and samplers hold. A *row* is all voxels of one (j, k); a
+// Non-transparent voxels, sparse: data servers send and samplers hold them. A *row* is all voxels of one (j, k); a
 // *slice* all rows of one k.
 #pragma once
 
@@ -26,10 +26,10 @@ struct Voxels {
   bool operator==(const Voxels&) const = default;
 };
 
-/// Normal of a voxel whose gradient says nothing. encode_normal16 never gives it.
+/// Normal of a voxel without a usable gradient. encode_normal16 never gives it.
 inline constexpr uint16_t kNoNormal = 0xffff;
 
-/// A set of levels: bit l of byte l / 8. Which levels a sampler holds already, which ones a transfer function shows.
+/// A set of levels: bit l of byte l / 8. For levels that a sampler holds already, or that a transfer function shows.
 class LevelSet {
  public:
   LevelSet() : bits_(kMaxLevels / 8) {}
@@ -47,20 +47,20 @@ class LevelSet {
   std::vector<uint8_t> bits_;
 };
 
-inline constexpr size_t kMaxVoxelsCoded = size_t{1} << 25;  ///< in one coded set; a slice has at most half as many
+inline constexpr size_t kMaxVoxelsCoded = size_t{1} << 25;  ///< in one coded set; a slice has at most half of that
 
-/// Compact form, about two to four bytes a voxel: occupancy as runs, levels and normals as differences from their
-/// neighbours', in byte planes, entropy-coded. Precondition: at most kMaxVoxelsCoded voxels; rows and order as Voxels
-/// says.
+/// Writes a compact form, about two to four bytes a voxel: occupancy as runs, levels and normals as differences from
+/// their neighbours', in byte planes, entropy-coded. Precondition: at most kMaxVoxelsCoded voxels, with rows and order
+/// as in Voxels.
 std::vector<uint8_t> encode_voxels(const Voxels& voxels, int size_x, int size_y);
-/// Reads it; bytes come from outside. k_begin, k_end: the slices asked for; the answer may have fewer. Error:
-/// truncated, more than kMaxVoxelsCoded, slices, places or levels beyond those asked for or the grid. Memory grows with
-/// the rows asked for and with voxels that are there.
+/// Reads the compact form; bytes come from outside. k_begin, k_end: the requested slices; the answer may have fewer.
+/// Error: truncated, more than kMaxVoxelsCoded, slices, places or levels beyond the request or the grid. Memory grows
+/// with the requested rows and with the voxels in the bytes.
 Result<Voxels> decode_voxels(std::span<const uint8_t> bytes, int size_x, int size_y, int k_begin, int k_end,
                              int level_count);
 
-/// The union of two disjoint sets of the same slices (a sampler's own, and what a new transfer function adds). Both
-/// lit, or neither; a set without voxels is either.
+/// The union of two disjoint sets of the same slices (a sampler's own voxels, and those that a new transfer function
+/// adds). Both lit, or neither; a set without voxels counts as either.
 Voxels merge(const Voxels& a, const Voxels& b);
 
 }  // namespace telesplat::volume

@@ -16,10 +16,10 @@ namespace {
 using namespace codec::detail;
 
 constexpr size_t kSide = kBlockSide, kPlanes = 4, kGroupWidth = 16, kGroupHeight = 4;
-constexpr std::array<size_t, kPlanes> kOrder{3, 1, 0, 2};  // bytes of a pixel, as they are coded
+constexpr std::array<size_t, kPlanes> kOrder{3, 1, 0, 2};  // bytes of a pixel, in the order of coding
 constexpr size_t kMaskBytes = 8, kHead = kMaskBytes + kStateBytes, kMostBytes = 65535;
 
-// A block's residuals and tokens, planes in the order of kOrder.
+// Residuals and tokens of a block; planes are in the order of kOrder.
 struct Symbols {
   Symbols() {
     for (auto& p : tokens) {
@@ -32,7 +32,7 @@ struct Symbols {
   uint32_t z[kPlanes][kSide][kSide];
 };
 
-// Bytes of a word added or subtracted, each for itself.
+// Adds or subtracts the bytes of two words, each separately.
 uint32_t add(uint32_t a, uint32_t b) {
   constexpr uint32_t kHigh = 0x80808080u;
   return ((a & ~kHigh) + (b & ~kHigh)) ^ ((a ^ b) & kHigh);
@@ -91,7 +91,7 @@ ContextRows rows_around(const Symbols& s, size_t p, size_t y) {
   return {s.tokens[p].row(r - 1), s.tokens[p].row(r - 2), p > 0 ? s.tokens[p - 1].row(r) : nullptr};
 }
 
-// Places of the mask's groups in a row.
+// Calls f with the begins of the mask's groups in a row.
 template <class F>
 void for_each_group(uint64_t mask, size_t y, F f) {
   for (unsigned left = static_cast<unsigned>(mask >> (y / kGroupHeight * 4)) & 15; left != 0; left &= left - 1)
@@ -107,7 +107,7 @@ struct BlockCoder::Parts {
   std::array<std::vector<EncodeEntry>, kPlanes> tables;
   std::vector<uint8_t> words;
 
-  // Calls f(first place, contexts of the row, tokens) for the mask's groups of a row.
+  // Calls f(begin, contexts of the row, tokens) for the mask's groups of a row.
   template <class F>
   void for_each_row_group(const Symbols& s, size_t p, size_t y, F f) const {
     uint8_t contexts[kSide + Plane<uint8_t>::kTail];
@@ -200,7 +200,7 @@ struct BlockDecoder::Parts {
   SymbolDecoder coder;
   Symbols symbols;
 
-  // Takes row y of plane p, those before being known. False where words are missing; `end` is the end of those left.
+  // Takes row y of plane p, after all earlier ones. False: words are missing. `end` becomes the end of the rest.
   bool get_row(size_t p, size_t y, const uint8_t* begin, const uint8_t*& end) {
     uint8_t* const tokens = symbols.tokens[p].row(static_cast<ptrdiff_t>(y));
     uint32_t* const z = symbols.z[p][y];

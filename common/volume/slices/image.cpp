@@ -30,7 +30,7 @@ void put_head(std::vector<uint8_t>& out, const EncodedSlice& slice, size_t block
 
 int blocks_across(int pixels) { return (pixels + kSliceBlock - 1) / kSliceBlock; }
 
-// The part of an image that lies in a block, the rest transparent. False: it is all transparent.
+// Copies the part of an image that lies in a block; other pixels become transparent. False: all are transparent.
 bool cut_out(const SliceImage& image, int block_x, int block_y, uint32_t* block) {
   const auto& r = image.rect;
   const int x0 = block_x * kSliceBlock, y0 = block_y * kSliceBlock;

@@ -15,8 +15,8 @@ SliceView::SliceView(const Grid& grid, const ShearFrame& shear, const geometry::
 
 bool SliceView::may_see(int layer, int x, int y) const {
   const double plane = shear_.layers[size_t(layer)].plane;
-  // Wholly on the outer side of one of the frustum's planes, which are d = 0 and four through the eye; for points
-  // behind it, too, their sides are those of half-spaces, so that a quadrangle that reaches behind the eye is not lost.
+  // Not seen if all corners lie outside of one of the frustum's planes, which are d = 0 and four through the eye.
+  // Corners behind the eye are tested against the same half-spaces, so quadrangles that reach behind it are not lost.
   int behind = 0, beyond_left = 0, beyond_right = 0, beyond_bottom = 0, beyond_top = 0;
   for (int corner = 0; corner < 4; ++corner) {
     const int px = std::min((x + corner % 2) * kSliceBlock, shear_.width);

@@ -21,7 +21,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
 }
 
-// "#rrggbb" or "r/g/b", each 0 to 1.
+// Reads "#rrggbb" or "r/g/b", each 0 to 1.
 bool read_colour(std::string_view text, TransferFunction::Point& point) {
   float* const channels[] = {&point.r, &point.g, &point.b};
   if (text.size() == 7 && text[0] == '#') {
@@ -62,9 +62,9 @@ Result<TransferFunction::Point> read_point(std::string_view text, const ValueRan
   return point;
 }
 
-bool in_unit(float v) { return v >= 0 && v <= 1; }  // false for what is not a number, too
+bool in_unit(float v) { return v >= 0 && v <= 1; }  // false for NaN, too
 
-// Channels that are whole 255ths are written as such.
+// Writes "#rrggbb" if all channels are whole 255ths.
 std::string colour_text(const TransferFunction::Point& p) {
   uint32_t rgb = 0;
   for (const float c : {p.r, p.g, p.b}) {
@@ -81,8 +81,8 @@ TransferFunction::Point mix(const TransferFunction::Point& a, const TransferFunc
   return {value, between(a.r, b.r), between(a.g, b.g), between(a.b, b.b), between(a.opacity, b.opacity)};
 }
 
-// How far the points between `begin` and `end` are from the line between these two: the largest difference of any
-// channel.
+// Largest difference, in any channel, of the points between `begin` and `end` from the line through these two. Sets
+// `farthest` to that point.
 double distance_from_line(const std::vector<TransferFunction::Point>& points, size_t begin, size_t end,
                           size_t& farthest) {
   double most = -1;
@@ -92,7 +92,7 @@ double distance_from_line(const std::vector<TransferFunction::Point>& points, si
     const auto& p = points[n];
     const auto q = b.value > a.value ? mix(a, b, p.value) : a;
     double off = std::max({std::abs(p.r - q.r), std::abs(p.g - q.g), std::abs(p.b - q.b)});
-    off = std::max(off, 4.0 * std::abs(p.opacity - q.opacity));  // opacities add up along a ray
+    off = std::max(off, 4.0 * std::abs(p.opacity - q.opacity));  // weighs more: opacities add up along a ray
     if (off > most) most = off, farthest = n;
   }
   return most;
@@ -159,8 +159,8 @@ std::string to_text(const TransferFunction& transfer) {
 }
 
 // Douglas and Peucker, "Algorithms for the Reduction of the Number of Points Required to Represent a Digitized Line",
-// Cartographica 10(2), 1973; with the farthest point of all taken first, so that any number of points is the best so
-// far.
+// Cartographica 10(2), 1973; adds the farthest point of all first, so that the result is the best so far at any
+// number of points.
 TransferFunction shortened(const TransferFunction& transfer, size_t max_bytes) {
   if (to_text(transfer).size() <= max_bytes || transfer.points.size() < 3) return transfer;
   const auto& points = transfer.points;

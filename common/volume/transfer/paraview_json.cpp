@@ -1,4 +1,4 @@
-// ParaView's colour maps as transfer functions: common/colour reads the file, opacities are straightened here.
+// ParaView's colour maps as transfer functions: common/colour reads the file; opacities become piecewise linear here.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,8 +13,8 @@ namespace {
 using Colour = colour::ParaviewMap::Colour;
 using Opacity = colour::ParaviewMap::Opacity;
 
-// vtkPiecewiseFunction between two points: the midpoint is where it is half way; sharpness 0 is linear, 1 a step at the
-// midpoint. Between 0.01 and 0.99 VTK draws a Hermite curve through a position that the sharpness bends.
+// vtkPiecewiseFunction between two points: half way at the midpoint; sharpness 0 is linear, 1 a step at the midpoint.
+// Between 0.01 and 0.99 VTK draws a Hermite curve through a position that the sharpness bends.
 double between(const Opacity& a, const Opacity& b, double s) {
   s = s < a.midpoint ? 0.5 * s / a.midpoint : 0.5 + 0.5 * (s - a.midpoint) / (1 - a.midpoint);
   if (a.sharpness > 0.99) return s < 0.5 ? a.opacity : b.opacity;
@@ -28,7 +28,7 @@ double between(const Opacity& a, const Opacity& b, double s) {
   return std::clamp(opacity, std::min(a.opacity, b.opacity), std::max(a.opacity, b.opacity));
 }
 
-// As straight pieces.
+// Approximates the curves by straight pieces.
 std::vector<Opacity> straightened(const std::vector<Opacity>& points) {
   std::vector<Opacity> out;
   for (size_t n = 0; n < points.size(); ++n) {
@@ -50,7 +50,7 @@ std::vector<Opacity> straightened(const std::vector<Opacity>& points) {
   return out;
 }
 
-// Colours and opacities at all values that one of them has a point at; jumps of either stay jumps.
+// Combines colours and opacities at all values at which either has a point; jumps of either stay jumps.
 TransferFunction joined(const std::vector<Colour>& colours, const std::vector<Opacity>& opacities) {
   TransferFunction colour, opacity;
   for (const auto& c : colours) colour.points.push_back({c.value, float(c.r), float(c.g), float(c.b), 0});
@@ -61,7 +61,7 @@ TransferFunction joined(const std::vector<Colour>& colours, const std::vector<Op
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
 
-  // Just below a value a jump has its first point's colour or opacity.
+  // Returns the colour or opacity just below a value: at a jump, that of its first point.
   const auto below = [](const TransferFunction& f, double value) {
     const auto at =
         std::lower_bound(f.points.begin(), f.points.end(), value, [](const auto& p, double v) { return p.value < v; });
@@ -69,7 +69,7 @@ TransferFunction joined(const std::vector<Colour>& colours, const std::vector<Op
   };
   TransferFunction out;
   const auto add = [&](double value, const TransferFunction::Point& c, const TransferFunction::Point& o) {
-    // 8 bits a channel: colours were chosen on screens, and the text stays short.
+    // Rounds to 8 bits a channel: colours were chosen on screens, and the text stays short.
     const auto round = [](float v) { return std::floor(std::clamp(v, 0.0f, 1.0f) * 255 + 0.5f) / 255.0f; };
     const float opaque = float(std::floor(double(std::clamp(o.opacity, 0.0f, 1.0f)) * 1e5 + 0.5) / 1e5);
     const TransferFunction::Point p{value, round(c.r), round(c.g), round(c.b), opaque};
@@ -91,7 +91,7 @@ Result<TransferFunction> parse_paraview_json(std::string_view content, const std
   std::vector<Colour>& colours = map->colours;
   std::vector<Opacity>& opacities = map->opacity;
 
-  // A map from 0 to 1 (or -1 to 1, as older ones of ParaView have it) is one for any range.
+  // A map from 0 to 1 (or -1 to 1, as in older ParaView) fits any range.
   const double lo = colours.front().value, hi = colours.back().value;
   const bool normalised = (lo == 0 || lo == -1) && hi == 1 && range.hi - range.lo > 2;
   const auto placed = [&](double v) {

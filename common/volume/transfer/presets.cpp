@@ -13,7 +13,7 @@ struct PresetPoint {
   float opacity;
 };
 
-// Of CTs in Hounsfield units (air -1000, water 0, muscle 50, contrast agent in vessels 150 to 500, dense bone 1000 and
+// For CTs in Hounsfield units (air -1000, water 0, muscle 50, contrast agent in vessels 150 to 500, dense bone 1000 and
 // more).
 constexpr PresetPoint kBoneHu[] = {{-3024, 0x3a2418, 0},  {140, 0x5a3420, 0},     {260, 0xb87848, 0.08f},
                                    {450, 0xe8c898, 0.3f}, {900, 0xfff4e0, 0.75f}, {3071, 0xffffff, 0.9f}};
@@ -24,8 +24,8 @@ constexpr PresetPoint kCtAngioHu[] = {{-3024, 0x200000, 0},  {110, 0x400800, 0},
                                       {300, 0xe84830, 0.4f}, {450, 0xf0b090, 0.45f}, {800, 0xffecd0, 0.7f},
                                       {3071, 0xffffff, 0.9f}};
 
-// Of anything: relative to where the values are that are not background.
-// They begin above 0, so that the background's noise stays out.
+// For any data: relative to the range of the values beyond the background. They begin above 0, so that the background's
+// noise stays transparent.
 constexpr PresetPoint kPlain[] = {{0.12, 0x284868, 0},     {0.2, 0x3868a0, 0.015f}, {0.38, 0x58a898, 0.07f},
                                   {0.65, 0xe0b860, 0.25f}, {1, 0xf8f0e0, 0.6f},     {1.6, 0xffffff, 0.85f}};
 constexpr PresetPoint kBone[] = {
@@ -41,7 +41,7 @@ constexpr PresetPoint kFire[] = {{0.05, 0x200008, 0},   {0.15, 0x580818, 0.02f},
 constexpr PresetPoint kGrey[] = {{0.02, 0x000000, 0}, {1, 0xffffff, 0.5f}};
 
 struct Preset {
-  std::span<const PresetPoint> relative, hounsfield;  // hounsfield: empty if the same serves
+  std::span<const PresetPoint> relative, hounsfield;  // hounsfield: empty if `relative` serves both
 };
 constexpr TransferPreset kPresets[] = {
     {"plain", "blue mist over green and amber to white: for data nobody knows"},

@@ -1,4 +1,4 @@
-// What is computed stands in kernels.h and warper.h; this is how, with every rounding:
+// Rounding of the computations that kernels.h and warper.h define:
 //
 //   place    in 128ths of texels: round(clamp(X / W)), by adding 2^23 in floats; texel place >> 7,
 //            weights of 128ths fx, fy = place & 127
@@ -7,8 +7,8 @@
 //   over     T = 32640 - A, 0 if below 64;  C += round(c (T + T / 256) / 32768), saturated; the same for A
 //   at last  the background's colour like a layer's; colour = (min(C, 32640) + 64) >> 7
 //
-// Sums of products of 8-bit numbers, signed by unsigned, are one instruction, if colours are taken less 128: since
-// weights add up to 128, so is what comes out.
+// Sums of products of 8-bit numbers, signed by unsigned, are one instruction if 128 is subtracted from colours: since
+// weights add up to 128, the same 128 is missing from the result.
 #include "common/volume/warp/kernels.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -36,7 +36,7 @@ using F32 = hn::ScalableTag<float>;
 
 constexpr int kPartPixels = kWarpPartWidth * kWarpPartHeight;
 
-// What a part's pixels have come to, and where the layer at hand is looked up; pixels in order of rows.
+// Results of a part's pixels, and the places where they look up the current layer; pixels in order of rows.
 struct PartPixels {
   HWY_ALIGN_MAX uint32_t colour[kPartPixels];
   HWY_ALIGN_MAX float depth_m[kPartPixels];
@@ -69,17 +69,17 @@ struct Wide {
   hn::Vec<S16> first, second;
 };
 
-constexpr uint8_t kNone = 128;  // of no byte, a zero
+constexpr uint8_t kNone = 128;  // selects no byte: gives zero
 // Bytes of two neighbouring texels, for two pixels -> pairs of the same channel.
 alignas(16) constexpr uint8_t kPairs[16] = {0, 4, 1, 5, 2, 6, 3, 7, 8, 12, 9, 13, 10, 14, 11, 15};
-// The lower or upper word of 32 bits a pixel, four times, of a block's first or second two pixels.
+// The lower or upper half of a pixel's 32 bits, four times, for a block's first or second two pixels.
 alignas(16) constexpr uint8_t kLowerOfFirst[16] = {0, 1, 0, 1, 0, 1, 0, 1, 4, 5, 4, 5, 4, 5, 4, 5};
 alignas(16) constexpr uint8_t kUpperOfFirst[16] = {2, 3, 2, 3, 2, 3, 2, 3, 6, 7, 6, 7, 6, 7, 6, 7};
 alignas(16) constexpr uint8_t kLowerOfSecond[16] = {8, 9, 8, 9, 8, 9, 8, 9, 12, 13, 12, 13, 12, 13, 12, 13};
 alignas(16) constexpr uint8_t kUpperOfSecond[16] = {10, 11, 10, 11, 10, 11, 10, 11, 14, 15, 14, 15, 14, 15, 14, 15};
 // The fourth of a pixel's words, four times.
 alignas(16) constexpr uint8_t kAlpha[16] = {6, 7, 6, 7, 6, 7, 6, 7, 14, 15, 14, 15, 14, 15, 14, 15};
-// Low bytes of words, into the lower or upper half of a block.
+// Low bytes of words, moved into the lower or upper half of a block.
 alignas(16) constexpr uint8_t kLowBytes[16] = {0,     2,     4,     6,     8,     10,    12,    14,
                                                kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
 alignas(16) constexpr uint8_t kHighBytes[16] = {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone,
@@ -98,7 +98,7 @@ HWY_INLINE hn::Vec<S16> Shuffled(V v, const uint8_t* table) {
 
 // ---- place ----
 
-// Fills in at, weights and, if wanted, inverse.
+// Computes at, weights and, if kInverse, inverse.
 template <bool kInverse>
 HWY_INLINE void Place(const WarpLayer& layer, int left, int top, PartPixels& part) {
   const F32 df;
@@ -122,7 +122,7 @@ HWY_INLINE void Place(const WarpLayer& layer, int left, int top, PartPixels& par
       const auto inverse = hn::Div(one, hn::Max(w, nearest));
       const auto near_x = hn::Mul(hn::Add(row_x, hn::Mul(px, step_x)), inverse);
       const auto near_y = hn::Mul(hn::Add(row_y, hn::Mul(px, step_y)), inverse);
-      // Rays that do not meet the plane look at texel column 0, where nothing is.
+      // Rays that do not meet the plane look at texel column 0, which is empty.
       const auto in_x = hn::IfThenElse(hn::Ge(w, nearest), hn::Min(hn::Max(near_x, least_x), most_x), least_x);
       const auto in_y = hn::Min(hn::Max(near_y, least_y), most_y);
       const auto at_x = hn::BitCast(d, hn::Add(in_x, shift_x)), at_y = hn::BitCast(d, hn::Add(in_y, shift_y));
@@ -138,7 +138,7 @@ HWY_INLINE void Place(const WarpLayer& layer, int left, int top, PartPixels& par
 
 // ---- look-up ----
 
-// weights' even byte times colours' even byte plus the same of the odd ones. Weights are unsigned, colours signed.
+// Multiplies even and odd bytes of weights (unsigned) and colours (signed); returns the sum of each pair of products.
 HWY_INLINE hn::Vec<S16> SumOfPairs(hn::Vec<S16> weights, hn::Vec<S16> colours) {
 #if HWY_TARGET == HWY_SSSE3 || HWY_TARGET == HWY_SSE4
   return hn::Vec<S16>{_mm_maddubs_epi16(weights.raw, colours.raw)};
@@ -153,13 +153,13 @@ HWY_INLINE hn::Vec<S16> SumOfPairs(hn::Vec<S16> weights, hn::Vec<S16> colours) {
 #endif
 }
 
-// Texels at + 0 and + 1 of two places.
+// Loads texels at + 0 and + 1 of two places.
 HWY_INLINE hn::Vec<hn::FixedTag<uint32_t, 4> > LoadTwo(const uint32_t* texels, const int32_t* at) {
   const hn::FixedTag<uint32_t, 2> pair;
   return hn::Combine(hn::FixedTag<uint32_t, 4>(), hn::LoadU(pair, texels + at[1]), hn::LoadU(pair, texels + at[0]));
 }
 
-// The texels at + 0 and + 1 of a block's first (at) or second (at + 2) two pixels; less 128, in pairs.
+// Loads texels at + 0 and + 1 of a block's first (at) or second (at + 2) two pixels; minus 128, in pairs.
 HWY_INLINE hn::Vec<S16> LoadPairs(const uint32_t* texels, const int32_t* at) {
 #if HWY_MAX_BYTES == 16
   const auto loaded = LoadTwo(texels, at);
@@ -181,7 +181,7 @@ HWY_INLINE hn::Vec<S16> Between(hn::Vec<S16> weights, hn::Vec<S16> upper, hn::Ve
   return hn::Add(hn::Add(a, hn::MulFixedPoint15(hn::Sub(b, a), down)), hn::Set(S16(), 16384));
 }
 
-// Of the pixels that `at` and `weights` begin with.
+// Looks up a vector of pixels, from `at` and `weights` on.
 HWY_INLINE Wide LookUp(const WarpLayer& layer, const int32_t* at, const uint32_t* weights) {
   const auto w = hn::Load(U32(), weights);
   const uint32_t *upper = layer.texels, *lower = layer.texels + layer.pitch;
@@ -196,7 +196,7 @@ HWY_INLINE hn::Vec<S16> Transparency(hn::Vec<S16> sum) {
   return hn::Sub(hn::Set(S16(), kWarpOpaque), Shuffled(sum, kAlpha));
 }
 
-// As a fraction of 15 bits.
+// Converts it to a fraction of 15 bits.
 HWY_INLINE hn::Vec<S16> Factor(hn::Vec<S16> transparency) {
   const auto done = hn::Gt(hn::Set(S16(), kWarpDone), transparency);
   return hn::IfThenZeroElse(done, hn::Add(transparency, hn::ShiftRight<8>(transparency)));
@@ -211,7 +211,7 @@ HWY_INLINE hn::Vec<S16> EightBits(hn::Vec<S16> sum) {
   return hn::ShiftRight<7>(hn::Add(hn::Min(sum, hn::Set(d, kWarpOpaque)), hn::Set(d, 64)));
 }
 
-// The layer's samples, behind what is there. Returns false if nothing behind it can be seen any more.
+// Adds the layer's samples behind those before. Returns false if nothing behind it can be seen any more.
 template <bool kDepth>
 HWY_INLINE bool Composite(const WarpLayer& layer, PartPixels& part) {
   const S16 d;
@@ -263,7 +263,7 @@ uint64_t WarpPart(const WarpTile& tile, uint64_t layers, int left, int top, Part
     Place<kDepth>(layer, left, top, part);
     if (!Composite<kDepth>(layer, part)) break;
   }
-  // Words of eight bits, shifted into 128ths.
+  // Eight-bit words, shifted into 128ths.
   const auto bytes = hn::BitCast(d8, hn::Set(du, tile.background));
   const auto words = hn::BitCast(U16(), hn::InterleaveLower(d8, bytes, hn::Zero(d8)));
   const auto background = hn::BitCast(d, hn::ShiftLeft<7>(words));

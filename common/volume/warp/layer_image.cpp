@@ -56,7 +56,7 @@ void find_filled(LayerImage& image) {
       blocks[b] = any != 0;
     }
   }
-  // In place: what lies to the right and below has not been changed yet.
+  // In place: blocks to the right and below are still unchanged.
   for (int by = 0; by < blocks_y; ++by) {
     uint8_t *here = image.filled.data() + static_cast<ptrdiff_t>(by) * image.block_pitch,
             *below = here + image.block_pitch;

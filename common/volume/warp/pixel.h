@@ -1,5 +1,5 @@
-// The warp of one pixel, plainly: what every instruction set's kernel (kernels.cpp) gives, bit for bit, and what
-// machines without any of those use.
+// The warp of one pixel, without vectors: every instruction set's kernel (kernels.cpp) gives the same bits, and
+// machines without such a set use this.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace telesplat::volume {
 inline int32_t times_15(int32_t a, int32_t b) { return (a * b + 16384) >> 15; }
 
 struct WarpedPixel {
-  uint32_t colour = 0;  ///< 0xffRRGGBB
+  uint32_t colour = 0;  ///< 0xAARRGGBB, AA: the volume's coverage
   float depth_m = std::numeric_limits<float>::infinity();
 };
 
@@ -39,7 +39,7 @@ inline WarpedPixel warp_pixel(const WarpTile& tile, uint64_t layers, int x, int 
     };
     const float near_x = ((layer.x0 + py * layer.xy) + px * layer.xx) * inverse;
     const float near_y = ((layer.y0 + py * layer.yy) + px * layer.yx) * inverse;
-    // Rays that do not meet the plane look at texel column 0, where nothing is.
+    // Rays that do not meet the plane look at texel column 0, which is empty.
     const int32_t cx = place(w >= kWarpNearestW ? near_x : layer.least_x, layer.least_x, layer.most_x, layer.shift_x);
     const int32_t cy = place(near_y, layer.least_y, layer.most_y, layer.shift_y);
     const int32_t fx = cx & 127, fy = cy & 127;

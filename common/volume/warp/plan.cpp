@@ -15,7 +15,7 @@ int64_t floor_to(int64_t value, int64_t step) {
   return value - (rest < 0 ? rest + step : rest);
 }
 
-// A pixel's corner at whole lattice numbers: what to_texel is made from.
+// A camera with a pixel's corner at each whole lattice number: to_texel is made from it.
 geometry::Camera of_lattice(const geometry::Camera& camera, const PixelLattice& across, const PixelLattice& down) {
   geometry::Camera out = camera;
   out.width = out.height = 1;
@@ -38,7 +38,7 @@ PixelLattice PixelLattice::make(double lo, double hi, int pixels) {
   int exponent = 0;
   const double mantissa = std::frexp((hi - lo) / pixels, &exponent);
   out.pitch = std::ldexp(std::nearbyint(std::ldexp(mantissa, 36)), exponent - 36);
-  // Whole and half numbers are the usual ones: what splits numbers from offsets lies away from both.
+  // Whole and half numbers are frequent: the split of numbers from offsets lies away from both.
   const double at = std::nearbyint(lo / out.pitch * 4096) / 4096;
   out.first = static_cast<int64_t>(std::floor(at + 0.3));
   out.offset = at - static_cast<double>(out.first);
@@ -84,13 +84,13 @@ geometry::Rect WarpPlan::rect(int tx, int ty) const {
   return {left, top, std::min(x0 + kWarpTileWidth, width_) - left, std::min(y0 + kWarpTileHeight, height_) - top};
 }
 
-// A layer against one tile: where the tile's pixels meet its image.
+// Places the pixels of one tile in a layer's image.
 struct WarpPlan::Placing {
   const PlacedLayer& layer;
   int64_t x, y;                       // the tile's first pixel on the lattice
-  double scale = 0;                   // that makes W at most 1
-  bool whole = false;                 // false: the plane's horizon goes through the tile, or nearly
-  double middle_x = 0, middle_y = 0;  // the texel in the tile's middle, from which X and Y are counted
+  double scale = 0;                   // makes W at most 1
+  bool whole = false;                 // false: the plane's horizon crosses the tile, or nearly
+  double middle_x = 0, middle_y = 0;  // texel in the tile's middle, the origin of X and Y
 
   double at(int row, double px, double py) const {
     return glm::dot(layer.to_texel[row], glm::dvec3(double(x) + px, double(y) + py, 1));
@@ -124,7 +124,7 @@ WarpLayer WarpPlan::Placing::kernel_layer() const {
   glm::dvec3 rows[3] = {layer.to_texel[0] * scale, layer.to_texel[1] * scale, layer.to_texel[2] * scale};
   rows[0] = (rows[0] - middle_x * rows[2]) * double(kWarpSubtexels);
   rows[1] = (rows[1] - middle_y * rows[2]) * double(kWarpSubtexels);
-  // Pixel (0, 0) of the tile, at its centre.
+  // The centre of the tile's pixel (0, 0).
   const glm::dvec3 first(double(x) + 0.5, double(y) + 0.5, 1);
   const auto f = [](double v) { return float(v); };
   return {.x0 = f(glm::dot(rows[0], first)),
@@ -151,8 +151,8 @@ namespace {
 
 constexpr int kCornersX = kWarpPartsX + 1, kCornersY = kWarpPartsY + 1;
 
-// Where the corners of a tile's parts meet a layer's image, in texels. A part's pixels lie between its corners' places,
-// since W > 0.
+// Corners of a tile's parts in a layer's image, in texels. A part's pixels lie between its corners' places, since W >
+// 0.
 class PartCorners {
  public:
   PartCorners(const WarpLayer& layer, double middle_x, double middle_y)
@@ -176,9 +176,9 @@ class PartCorners {
   float x_[kCornersY][kCornersX], y_[kCornersY][kCornersX];
 };
 
-// True if there may be anything between these texels; beyond the image there is nothing.
+// True if texels in these ranges may be visible; beyond the image they are not.
 bool may_fill(const LayerImage& image, const Range& x, const Range& y) {
-  constexpr float kSlack = 0.02f;  // what floats may be off by, texels
+  constexpr float kSlack = 0.02f;  // error of floats, texels
   const auto last_x = float(image.rect.width + 1), last_y = float(image.rect.height + 1);
   if (x.hi + kSlack < 0 || y.hi + kSlack < 0 || x.lo - kSlack > last_x || y.lo - kSlack > last_y) return false;
   const auto cell = [](float v, float last) { return int(std::clamp(v, 0.0f, last)); };

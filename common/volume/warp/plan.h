@@ -1,5 +1,4 @@
-// What the warp needs to know before the first pixel: where display pixels lie, and which parts of a tile each layer
-// fills.
+// Plans the warp before the first pixel: the places of display pixels, and the parts of a tile that each layer fills.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +17,11 @@ struct PixelLattice {
   double offset = 0;  ///< about [-0.5, 1), in steps of 2^-12
   double pitch = 1;   ///< rounded to 36 bits, since crop() computes it anew
 
-  /// lo: the tangent where pixel 0 begins; hi: where the last of `pixels` ends. hi > lo.
+  /// lo: the tangent at the begin of pixel 0; hi: at the end of the last of `pixels`. hi > lo.
   static PixelLattice make(double lo, double hi, int pixels);
 };
 
-/// A layer, and where the rays of display pixels meet it.
+/// A layer, and the map from display pixels to its texels.
 struct PlacedLayer {
   const LayerImage* image;
   /// (X, Y, W) = column i . (x, y, 1): the ray through continuous pixel position (x, y) meets texel (X / W, Y / W) of
@@ -33,20 +32,20 @@ struct PlacedLayer {
 /// The layers of a frame that the camera's rays may meet, in front_to_back order. image points into frame.
 std::vector<PlacedLayer> place_layers(const VolumeFrame& frame, const geometry::Camera& camera);
 
-/// One display image's plan, to be used by all tiles.
+/// The plan of one display image, used by all its tiles.
 class WarpPlan {
  public:
-  /// frame must stay.
+  /// Precondition: frame outlives the plan.
   WarpPlan(const VolumeFrame& frame, const geometry::Camera& camera);
 
   size_t layers() const { return layers_.size(); }
-  /// Tiles begin at multiples of their size of the lattice.
+  /// Tiles begin at multiples of their size on the lattice.
   int tiles_x() const { return tiles_x_; }
   int tiles_y() const { return tiles_y_; }
 
   /// Display pixels of tile (tx, ty).
   geometry::Rect rect(int tx, int ty) const;
-  /// Fills in layers, parts and the range of pixels; tile.layers points into `layers` then.
+  /// Sets layers, parts and the range of pixels; tile.layers then points into `layers`.
   void place(int tx, int ty, WarpTile& tile, std::vector<WarpLayer>& layers) const;
 
  private:
