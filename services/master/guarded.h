@@ -8,7 +8,7 @@
 
 namespace telesplat::master {
 
-/// Runs handle(), which works on `message`. An exception that escapes it counts and is logged as the message's fault.
+/// Runs handle(), which works on `message`. If an exception escapes, rejects the message: counted and logged.
 void guarded(net::Socket& from, const net::Message& message, auto&& handle) {
   try {
     handle();

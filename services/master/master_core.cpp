@@ -18,12 +18,12 @@ namespace {
 
 constexpr size_t kMaxDeparted = 1024;  // processes that left and are remembered
 constexpr size_t kMaxWalls = 64;
-constexpr size_t kMostOfTableName = 32;  // in messages
-constexpr double kCatchUp_s = 0.5;       // after this process stood still, until all that has come is read
-constexpr double kProbeEvery_s = 0.25;   // of samplers that are overdue
-constexpr size_t kReports = 5;           // of a process, one a second: rates are of the time from the first to the last
+constexpr size_t kMostOfTableName = 32;  // bytes, in error texts
+constexpr double kCatchUp_s = 0.5;       // after this process stood still: time to read all that has come
+constexpr double kProbeEvery_s = 0.25;   // between probes of an overdue sampler
+constexpr size_t kReports = 5;           // kept of each process, one a second; rates compare the first and the last
 
-// Data servers of one volume: neither is the other's new life, whatever they are called.
+// True for data servers of two parts of a volume: neither is the other's new life, even if their names are equal.
 bool hold_different_parts(const wire::Hello& a, const wire::Hello& b) {
   const auto of_a = a.parameters.find("volume.part"), of_b = b.parameters.find("volume.part");
   return of_a != a.parameters.end() && of_b != b.parameters.end() && of_a->second != of_b->second;
@@ -86,7 +86,7 @@ std::string MasterCore::packer() const {
   return longest == peers_.end() ? std::string() : longest->first;
 }
 
-// Another packer has nothing of what the one before it had.
+// Begins anew with another packer: it has nothing of what the packer before it had.
 void MasterCore::follow_packer() {
   const std::string now = packer();
   if (now.empty() || now == leading_packer_) return;
@@ -94,7 +94,7 @@ void MasterCore::follow_packer() {
   plan_->new_packer();
 }
 
-// One that waited takes the place of one that is gone: everyone is told where.
+// If a packer that waited takes the place of one that is gone, sends its endpoints to everyone.
 void MasterCore::follow_another_packer(double now_s) {
   const bool gone = leading_packer_.empty();
   follow_packer();
@@ -115,7 +115,7 @@ std::string MasterCore::lacks() const {
   return fmt::format("{}", fmt::join(out, ","));
 }
 
-// Forgets someone who left if there are too many. False: all are here.
+// Makes room for a process: forgets one that left if kMaxDeparted are remembered. False: max_peers are here.
 bool MasterCore::make_room(const std::string& peer) {
   const auto before = peers_.find(peer);
   if (before != peers_.end() && !before->second.gone) return true;
@@ -144,8 +144,8 @@ void MasterCore::forget_departed(double now_s) {
   });
 }
 
-// A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet. Two that
-// both live stay: they would replace each other for ever.
+// A restarted process replaces the old one of its name, whose socket may not be known to be dead yet. If both live,
+// both stay: they would replace each other for ever.
 void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s) {
   const auto before = peers_.find(peer);
   const bool here = before != peers_.end() && !before->second.gone && before->second.hello.instance == m.instance;
@@ -176,7 +176,7 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   }
   if (p.hello.instance != m.instance || p.hello.role != m.role || p.gone)
     p.joined = ++joined_, p.process.replaced = false;
-  live_.set_here(p.hello.role, p.hello.name, false);  // if it has another name now
+  live_.set_here(p.hello.role, p.hello.name, false);  // its name may be another now
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
   p.hello = m;
@@ -205,7 +205,7 @@ bool MasterCore::admit(const std::string& peer, double now_s) {
   return packer || gate_.admit(peer, now_s);
 }
 
-// It is told why, and ends: it could do nothing here.
+// Sends the reason with Shutdown, so that the process ends: it could do nothing here.
 void MasterCore::refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s) {
   gate_.refuse_hello();
   if (gate_.may_log(now_s)) log::warn("{} {} is refused: {}", printable(m.role, 64), printable(m.name, 128), why);
@@ -228,7 +228,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
                        before->second.hello.endpoints != m.endpoints;
   if (changed && peer == leading_packer_) leading_packer_.clear();
   if (changed && m.role == "sampler")
-    for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new one holds nothing yet
+    for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new process holds no leases yet
   Peer& p = enter(peer, m, now_s);
   if (m.role == "packer") follow_packer();
   if (changed && m.role != "ctl" && gate_.may_log(now_s)) log::info("{} {} joined", m.role, m.name);
@@ -247,7 +247,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   dispatch(now_s);
 }
 
-// A scene that did not fit beside one that has left.
+// Adopts scenes that were refused because they did not fit beside the scene of a data server that has left.
 void MasterCore::adopt_refused(double now_s) {
   for (auto& [id, p] : peers_) {
     if (p.gone || !p.refused || p.hello.role != "data" || !adopt_scene(id, p.hello, now_s)) continue;
@@ -266,7 +266,7 @@ void MasterCore::take_put_off_hellos(double now_s) {
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
   Peer* p = known(peer, now_s);
-  if (!p || m.values.empty()) return;  // without values it is a sign of life, of a process that works
+  if (!p || m.values.empty()) return;  // a report without values is only a sign of life
   p->process.values = m.values;
   if (p->hello.role == "viewer") record_.add_status(p->process);
   p->reports.push_back(m.values);
@@ -275,7 +275,7 @@ void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double
 
 void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_s) {
   auto it = peers_.find(peer);
-  // A process whose own connection is busy says it over another.
+  // A process whose own connection is busy says goodbye over another.
   if (const auto by = instances_.find(m.instance); it == peers_.end() && by != instances_.end())
     it = peers_.find(by->second);
   if (it == peers_.end() || it->second.gone) return;
@@ -292,7 +292,7 @@ void MasterCore::undeliverable(const std::string& peer) {
   if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "cannot be reached");
 }
 
-// Also of plans that led when it was here.
+// Forgets the viewer in all plans, too: others may have led while it was here.
 void MasterCore::forget_viewer(const wire::Hello& hello) {
   if (hello.role != "viewer") return;
   for (auto& [pipeline, plan] : plans_) plan->views().forget_viewer(hello.instance);
@@ -336,7 +336,7 @@ void MasterCore::on(const std::string& peer, const wire::SwapReady& m, double no
   now_s_ = now_s;
   const auto by = instances_.find(m.viewer);
   const auto viewer = by == instances_.end() ? peers_.end() : peers_.find(by->second);
-  // It says hello over its other connection, and this again.
+  // An unknown viewer says hello over its other connection, and then sends this again.
   if (viewer == peers_.end() || viewer->second.gone || viewer->second.hello.role != "viewer") return;
   viewer->second.seen_s = now_s;
   if (walls_.size() >= kMaxWalls && !walls_.contains(m.wall)) return;
@@ -369,7 +369,7 @@ std::optional<double> MasterCore::due_s() const {
 void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double now_s, const std::string& guest) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
-  // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
+  // The coarse pass goes a little beyond the view's edges, maybe further than a lease may: such a view is dropped.
   wire::ViewRequest request = gate_.admit(m);
   if (!geometry::validate(geometry::subsample(request.camera, kCoarseStep))) return;
   request.moments = {.requested_s = m.moments.requested_s, .received_s = now_s};
@@ -416,7 +416,7 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   dispatch(now_s);
 }
 
-// Refused by whom it was leased to: of a sampler that is gone nothing is known any more, and its leases are back.
+// Passes a refusal on with the sampler's routing id. One that is gone is not known any more, and its leases are back.
 void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double now_s) {
   const Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return;
@@ -471,7 +471,7 @@ void MasterCore::tick(double now_s) {
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
   const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);
-  // A message to a process that died is undeliverable, which is sooner known than that its lease ran out.
+  // Send a message to each overdue sampler: if it died, the message is undeliverable, long before its lease runs out.
   for (const auto& sampler : ticked.overdue)
     if (const auto p = peers_.find(sampler); p != peers_.end() && now_s - p->second.probed_s > kProbeEvery_s) {
       p->second.probed_s = now_s;
@@ -483,8 +483,8 @@ void MasterCore::tick(double now_s) {
 bool MasterCore::begin_view(double now_s) {
   if (!plan_->may_begin(idle_)) return false;
   if (!plan_->playing()) return plan_->begin(epoch_, false, now_s);
-  // One view at a time, so that each epoch has a complete one; all who wait when an epoch begins are served from it, in
-  // turn.
+  // One view at a time, so that each epoch has a complete one. All viewers that wait when an epoch begins are served
+  // from it, in turn.
   if (plan_->views().views_in_flight() > 0) return false;
   if (!plan_->views().turn_waiting()) {
     if (plan_->step(now_s)) next_epoch(now_s);
@@ -496,7 +496,7 @@ bool MasterCore::begin_view(double now_s) {
 void MasterCore::dispatch(double now_s) {
   plan_->prepare(now_s);
   const bool early = plan_->begins_early(now_s) && samplers_here();
-  // Before that nothing tells which pipeline the session has: samplers may know it from another master.
+  // Before a scene is known, the pipeline is not; samplers that served another master may ask for leases already.
   if (stop_ || !scene_known_ || (idle_.empty() && !early) || packer().empty()) return;
   do plan_->give_leases(idle_, now_s);
   while ((!idle_.empty() || early) && begin_view(now_s));

@@ -1,5 +1,5 @@
-// The master (T3.2) without sockets and clocks: messages and times come in, messages go out. It knows who takes part,
-// which epoch it is and what each is told; what a scene is and how its views become leases is its plan's (plan.h).
+// The master (T3.2) without sockets and clocks: messages and times come in, messages go out. It keeps the processes,
+// the epoch and the welcomes; its plan (plan.h) keeps the scene and turns views into leases.
 #pragma once
 
 #include <deque>
@@ -31,16 +31,16 @@ class MasterCore {
   MasterCore(const MasterCore&) = delete;  // plans refer to it
   MasterCore& operator=(const MasterCore&) = delete;
 
-  /// One more message of this peer may be handed to on(): it does not send more than its part. False: it is dropped.
+  /// True if one more message of this peer may go to on(). False: drop it, the peer sends more than --max-messages.
   bool admit(const std::string& peer, double now_s);
-  /// A data server, a packer or a sampler, which the session lives of.
+  /// True for a data server, a packer or a sampler: the session needs them.
   bool serves(const std::string& peer) const;
-  /// For all others: net::WorkShares.
+  /// For all other peers; see net::WorkShares.
   bool admit_work(const std::string& payer, double now_s) { return gate_.admit_work(payer, now_s); }
   void worked(const std::string& payer, double seconds, double now_s) { gate_.worked(payer, seconds, now_s); }
   void on(const std::string& peer, const wire::Hello& m, double now_s);
   void on(const std::string& peer, const wire::StatusReport& m, double now_s);
-  /// guest: the owner of the viewer's key that let it in; empty: another key, or none.
+  /// guest: the owner of the viewer key that let the viewer in; empty: another kind of key, or no key.
   void on(const std::string& peer, const wire::ViewRequest& m, double now_s, const std::string& guest = {});
   void on(const std::string& peer, const wire::LeaseRequest& m, double now_s);
   void on(const std::string& peer, const wire::LeaseExtend& m, double now_s);
@@ -61,30 +61,30 @@ class MasterCore {
 
   /// A message to this peer could not be delivered: it is gone.
   void undeliverable(const std::string& peer);
-  /// To be called every 50 ms or so: expires leases, notices the dead.
+  /// Expires leases and notices dead processes. To be called every 50 ms or so.
   void tick(double now_s);
-  /// This process did not run for so long: nobody else's silence counts, and leases are given a moment to be told of.
-  /// To be called before what has come meanwhile is taken.
+  /// This process did not run for for_s: others do not count as silent for that time, and leases do not expire for
+  /// kCatchUp_s. To be called before messages that came meanwhile are read.
   void stood_still(double for_s, double now_s);
-  /// tick() should come every few ms.
+  /// True if tick() should be called every few ms.
   bool hurried() const { return !idle_.empty() && plan_->hurried(); }
-  /// tick() should come then, if nothing comes before: a wall waits for a viewer that may be late. Nothing: none does.
+  /// Time by which tick() should be called: a wall waits for a viewer that may be late. nullopt: no wall waits.
   std::optional<double> due_s() const;
-  /// Tells everyone to finish.
+  /// Sends Shutdown to every process.
   void shut_down(const std::string& reason);
 
   std::vector<Outgoing> take_outgoing() { return outbox_.take(); }
   size_t outgoing() const { return outbox_.size(); }
-  /// Processes of which anything is remembered but for the record.
+  /// Number of processes that are here or left lately, for tests.
   size_t remembered() const { return peers_.size(); }
   InstanceId instance() const { return instance_; }
   bool stop_requested() const { return stop_; }
   const std::string& stop_reason() const { return stop_reason_; }
-  /// True once everyone who was told to finish has said goodbye.
+  /// True once all processes except ctl have left.
   bool everyone_left() const;
 
-  /// Who the session is, for status; the core adds scene and kind once they are known.
-  /// run_id: of the record's folder, by which viewers know it; empty: there is none.
+  /// Sets the session's description, for status; the core adds scene and kind once they are known.
+  /// run_id: id of the record's folder, by which viewers recognise it; empty: no record is written.
   void introduce(const net::RunningSession& session, const std::string& run_id = {}) {
     session_ = session;
     run_id_ = run_id;
@@ -93,21 +93,21 @@ class MasterCore {
   LimitsHit limits_hit() const { return gate_.hit(); }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
-  /// For those who watch; what figures() and live() do not have of it is left to the caller: version, and the master
-  /// itself.
+  /// Returns a snapshot for programs that watch. The caller adds the version, and the master itself to the processes;
+  /// live() has the rest.
   LiveSnapshot live_snapshot() const;
   const LiveFigures& live() const { return live_; }
-  Figures figures() const;  ///< of all plans together
-  /// What the socket counts, for status.
+  Figures figures() const;  ///< sum over all plans
+  /// Counts and limits of the control socket, for status.
   struct Door {
     uint64_t messages_rejected = 0, keys_refused = 0, connections_refused = 0, queue_refused = 0;
-    uint64_t max_connections = 0;  ///< its limits
+    uint64_t max_connections = 0;  ///< a limit, as is queue_limit_mb
     double queue_limit_mb = 0;
   };
   void tell_door(const Door& door) { door_ = door; }
   bool progressive() const { return plan_->progressive(); }
   std::string animation() const { return plan_->animation(); }
-  /// As everyone is told them: what was left to the kind of scene is decided.
+  /// Values as all processes get them: those that depend on the kind of scene are decided.
   uint64_t octree_depth() const { return options_.octree_depth; }
   wire::SessionSettings settings() const { return scene_as_told().settings; }
 
@@ -117,19 +117,19 @@ class MasterCore {
     metrics::Process process;
     std::deque<std::map<std::string, double>> reports;  ///< the newest few, for rates
     double seen_s = 0;
-    uint64_t joined = 0;  ///< rises with each process that joins, in whichever life
+    uint64_t joined = 0;  ///< rises with each process that joins or comes back
     bool gone = false;
     bool refused = false;                   ///< a data server whose scene cannot be shown
-    std::optional<CouplingOrder> coupling;  ///< a viewer's, if it was ordered one
-    int leases_at_once = 0;                 ///< a sampler's: Idle::Sampler::at_once
-    Pace hello_pace{8, 4};                  ///< as its facts become known; then as often as one that is not welcomed
-    std::optional<wire::Hello> put_off;     ///< its newest hello, if it says more than the pace allows
-    double probed_s = -1e9;                 ///< when it was last asked whether it still is there
+    std::optional<CouplingOrder> coupling;  ///< ordered for this viewer; nullopt: not ordered
+    int leases_at_once = 0;                 ///< for samplers: see Idle::Sampler::at_once
+    Pace hello_pace{8, 4};               ///< burst for new facts; then the rate of a process that waits for its welcome
+    std::optional<wire::Hello> put_off;  ///< newest hello, while hello_pace allows no more
+    double probed_s = -1e9;              ///< when an overdue lease last had it probed
   };
-  // Who takes part.
+  // Processes that take part.
   Peer* known(const std::string& peer, double now_s);
   Peer* known_sampler(const std::string& peer, double now_s);
-  /// The packer that has been here for longest: others wait for it to leave.
+  /// Routing id of the packer that has been here for longest; others wait for it to leave. Empty: no packer is here.
   std::string packer() const;
   void follow_packer();
   void follow_another_packer(double now_s);
@@ -161,7 +161,7 @@ class MasterCore {
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
   void answer_of_launcher(const std::string& peer, const wire::Control& m);
   Status pass_on(const Errands::Asker& asker, const wire::Control& m, const std::string& role, double now_s);
-  /// all: facts are told whole.
+  /// all: facts are not shortened.
   nlohmann::ordered_json process_json(const std::string& routing_id, const Peer& peer, double now_s, bool all) const;
   std::string status_json(double now_s, bool all) const;
   wire::ControlReply health(const wire::Control& m, double now_s) const;
@@ -183,31 +183,31 @@ class MasterCore {
   std::string run_id_;
   Door door_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
-  Plan* plan_;  // of these, the one that leads
+  Plan* plan_;  // the plan in plans_ that leads
   Clipping clipping_;
   Errands errands_;
-  std::optional<scene::Kind> kind_;  // of its scene
+  std::optional<scene::Kind> kind_;  // kind of the scene; nullopt: unknown
   bool scene_known_ = false;
   EpochId epoch_{1};
   std::map<std::string, Peer> peers_;                      // by routing id
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
   Namesakes namesakes_;
   Departed departed_;
-  std::string shows_;  // the data server that the scene is of
+  std::string shows_;  // routing id of the data server whose scene is shown
   uint64_t joined_ = 0;
-  std::string leading_packer_;  // that frames were begun with; empty: none, or it is gone
+  std::string leading_packer_;  // packer of the frames; empty: no packer yet, or it is gone
   Idle idle_;
   LiveFigures live_;
-  std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
-  SwapBarrier::Figures swaps_;                // of walls that are gone
+  std::map<std::string, SwapBarrier> walls_;  // by the name that their viewers send
+  SwapBarrier::Figures swaps_;                // sums over walls that are gone
   uint64_t leases_expired_ = 0;
-  log::RateLimiter refused_tiles_;  // of lines about them
+  log::RateLimiter refused_tiles_;  // limits log lines about refused tiles
   double leases_rest_until_s_ = -1e9;
   Pace announcements_{8, 20};
   bool announce_due_ = false;
-  bool data_left_ = false;  // a data server, since the last tick
-  std::string told_lacks_;  // lacks(), as everyone was told it
-  double now_s_ = 0;        // of what came last
+  bool data_left_ = false;  // a data server left since the last tick
+  std::string told_lacks_;  // lacks() in the last welcome to everyone
+  double now_s_ = 0;        // time of the last tick or SwapReady
   bool stop_ = false;
   std::string stop_reason_ = "the session was ended";
 };

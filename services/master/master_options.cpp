@@ -49,7 +49,7 @@ options::Table steering_table(wire::SessionSettings& s) {
        .fits = points}};
 }
 
-// A view arrives coarse first, or not.
+// Makes the row of --progressive: views arrive coarse first, or not.
 options::Row progressive_row(Progressive& value) {
   const auto read = [&value](const std::string& text) {
     for (const auto p : {Progressive::kAuto, Progressive::kOn, Progressive::kOff})
@@ -84,7 +84,7 @@ options::Table lease_table(MasterOptions& o) {
            .fits = Kinds::of(Pipeline::kSlices)}};
 }
 
-// "1/32", "0.03" or "2".
+// Reads "1/32", "0.03" or "2".
 std::optional<double> number_or_fraction(const std::string& text) {
   const char* const end = text.data() + text.size();
   double value = 0, divisor = 1;
@@ -94,7 +94,7 @@ std::optional<double> number_or_fraction(const std::string& text) {
   return value / divisor;
 }
 
-// How far from what was sampled points may be: -1 is auto, 0 off.
+// Makes the row of an allowed error of points: -1 is auto, 0 off.
 options::Row error_row(double& value, const char* flag, double most, bool whole, const char* help) {
   options::Row row{.flag = flag, .value = {}, .help = help, .fits = Kinds::of(Pipeline::kPoints)};
   row.value = options::Text{
@@ -125,7 +125,7 @@ options::Table error_table(wire::SessionSettings& s) {
                     "likewise each channel of colours, of 255; auto: 1 behind slow links")};
 }
 
-// What pictures are like, where views come as pictures.
+// Flags for pictures, if views come as pictures.
 options::Table image_table(wire::SessionSettings& s) {
   const auto points = Kinds::of(Pipeline::kPoints);
   return {

@@ -53,7 +53,7 @@ std::string process_table(const metrics::Process& p) {
   return out;
 }
 
-// Of the first of a role that tells something; of viewers, of the one that records into the folder itself.
+// Returns the tables of the first process of a role that sent some; a viewer that records into the folder itself wins.
 std::string told_by(const Processes& processes, const std::string& role) {
   const metrics::Process* found = nullptr;
   for (const auto& p : processes) {
@@ -80,7 +80,7 @@ std::string session_text(const MasterServiceOptions& o, const MasterCore& core, 
 
 namespace {
 
-constexpr size_t kMostNumbers = 16;  // of an array
+constexpr size_t kMostNumbers = 16;  // elements of an array
 
 template <class Map>
 std::vector<std::string> keys_of(const Map& map, std::vector<std::string> more = {}) {

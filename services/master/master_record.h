@@ -1,4 +1,4 @@
-// What the master writes into a run's folder beside the figures: session.toml.
+// Writes session.toml, which a run's folder has beside the figures.
 #pragma once
 
 #include <cstddef>
@@ -12,26 +12,26 @@
 
 namespace telesplat::master {
 
-// What data servers and viewers tell session.toml of themselves. They may be anybody, and the file is read again by
-// `telesplat compare` and its like.
+// Data servers and viewers send tables of session.toml. The master does not trust them: `telesplat compare` and its
+// like read the file again.
 
-/// A table of session.toml that a role tells, and its keys, in the order in which they are written.
+/// A table of session.toml that a role sends, and its keys in the order in which they are written.
 struct ToldTable {
   std::string name;
   std::vector<std::string> keys;
 };
-/// Empty: that role tells none.
+/// Returns the tables that a role may send; empty: none.
 const std::vector<ToldTable>& told_tables(const std::string& role);
 
 struct Told {
   std::string text;     ///< lines of TOML
-  size_t left_out = 0;  ///< tables and keys that are not the role's, and values that are no text, number or boolean
+  size_t left_out = 0;  ///< tables and keys that the role may not send, and values of types that are not written
 };
-/// What a process of this role says, written anew from what is understood of it, texts in quotes. Error: it is no TOML.
+/// Writes the tables that a process of this role sent anew: its told_tables() only, texts in quotes. Error: not TOML.
 Result<Told> checked(const std::string& role, const std::string& said);
 
-/// session.toml: what was run, the effective configuration of everyone who took part, and what data server and viewer
-/// tell of scene and display (metrics::kRecordFact).
+/// Returns session.toml: the run, the effective configuration of all processes that took part, and what data server and
+/// viewer sent about scene and display (metrics::kRecordFact).
 std::string session_text(const MasterServiceOptions& options, const MasterCore& core, const metrics::About& about,
                          const std::vector<metrics::Process>& processes);
 

@@ -27,12 +27,12 @@
 namespace telesplat::master {
 namespace {
 
-// How long others may take to say goodbye; less where someone waits for the master itself to end.
+// Time for others to say goodbye; shorter after a signal, when someone waits for the master to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
 constexpr int kMessagesAtOnce = 1000;   // between two ticks
 constexpr size_t kMostOutgoing = 2000;  // messages that wait to be sent before more are read
 constexpr double kMetricsPeriod_s = 1;
-constexpr double kStandstill_s = 1;  // the loop comes by every 20 ms; stopped, it does not know that others spoke
+constexpr double kStandstill_s = 1;  // the loop runs every 20 ms; after a longer gap others only seem silent
 
 Result<MasterOptions> core_options(const MasterServiceOptions& o) {
   MasterOptions out = o.master;
@@ -54,7 +54,7 @@ net::RunningSession introduction(const MasterServiceOptions& o, const std::strin
           .keys = net::absolute_path(o.service.keys)};
 }
 
-// What ctl must be told where it finds no file of the session.
+// Returns the flags that ctl needs if it finds no file of the session.
 std::string flags_of_ctl(const net::ServiceOptions& o, const std::string& endpoint) {
   return " --master " + net::local_address(endpoint) + (o.keys.empty() ? "" : " --keys " + o.keys);
 }
@@ -70,7 +70,7 @@ class MasterTurns final : public MasterService {
         run_id_(std::move(run_id)),
         core_(core, net::make_instance_id(), *record_) {}
 
-  /// Serves figures to programs that watch, where that was asked for.
+  /// Serves figures to programs that watch, if --metrics-port was given.
   Status open_metrics() {
     if (options_.metrics_port == 0) return ok_status();
     auto opened = HttpEndpoint::open(
@@ -90,7 +90,7 @@ class MasterTurns final : public MasterService {
     return ok_status();
   }
 
-  // Says on stdout that it listens: whoever started this process waits for the line. From then on it can be found.
+  // Publishes the session's file, so that ctl finds it, and prints that it listens: the launcher waits for that line.
   void announce() {
     if (auto file = net::SessionFile::publish(core_.session()))
       file_.emplace(std::move(*file));
@@ -103,7 +103,7 @@ class MasterTurns final : public MasterService {
                   file_ ? "" : flags_of_ctl(options_.service, endpoint_).c_str(),
                   net::announced(endpoint_, {}).c_str());
     else
-      log::info("listening on {}", endpoint_);  // stdout is read by who started it, and goes nowhere
+      log::info("listening on {}", endpoint_);  // only the launcher reads stdout
     if (!options_.service.keys.empty())
       log::info("keys of {}: others need theirs", options_.service.keys);
     else
@@ -114,7 +114,7 @@ class MasterTurns final : public MasterService {
 
   std::optional<net::Wait> turn() override {
     if (!leaves_since_s_ && (net::stop_requested() || core_.stop_requested())) {
-      file_.reset();  // nobody shall find what ends
+      file_.reset();  // ctl must not find a session that ends
       core_.shut_down(net::stop_requested() ? "the session's master was told to stop" : core_.stop_reason());
       leaves_since_s_ = monotonic_s();
     }
@@ -145,7 +145,7 @@ class MasterTurns final : public MasterService {
                                .end_unix_ns = metrics::begin_now().unix_ns,
                                .settings = wire::numbers_of(core_.settings()),
                                .label = options_.label};
-    // It is among the files that finish() tells of.
+    // Before finish(), which lists the record's files.
     if (const Status s = record_->write_file("session.toml", session_text(options_, core_, about, processes)); !s)
       log::error("{}", s.error().text);
     const Status finished = record_->finish(processes, core_.counters(), about);
@@ -154,7 +154,6 @@ class MasterTurns final : public MasterService {
   }
 
  private:
-  // How long others may take for their last words.
   static double patience_s() { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; }
 
   void serve() {
@@ -177,7 +176,7 @@ class MasterTurns final : public MasterService {
       if (!control_.send_frames(out.peer, out.type, std::move(out.body))) core_.undeliverable(out.peer);
   }
 
-  // A process may be stopped anywhere: before anyone is found to be silent, or late, it is known how long it was.
+  // Returns the time. Reports it to the core first if this process was stopped: others then only seem silent or late.
   double look_at_the_clock() {
     const double now_s = monotonic_s(), passed_s = now_s - std::exchange(looked_s_, now_s);
     if (passed_s > kStandstill_s) {
@@ -204,7 +203,7 @@ class MasterTurns final : public MasterService {
     metrics_->publish(exposition(snapshot, core_.live()));
   }
 
-  // The session's file says what it shows as soon as that is known.
+  // Updates the session's file as soon as its scene is known.
   void tell_news() {
     if (!file_ || core_.session() == told_) return;
     told_ = core_.session();
@@ -212,7 +211,7 @@ class MasterTurns final : public MasterService {
   }
 
   void take(const net::Message& message, double now_s) {
-    // At once: what lies between the question and the answer makes the clock's error.
+    // Answer at once: the time between question and answer adds to the clock's error.
     if (message.type == wire::ClockRequest::kName) {
       if (const auto asked = control_.decode<wire::ClockRequest>(message))
         control_.send(wire::ClockReply{core_.instance(), asked->sent_s, message.arrived_s, monotonic_s(), clock_id()},
@@ -247,7 +246,7 @@ class MasterTurns final : public MasterService {
         });
   }
 
-  // Answers a hello or a command of another version as that version has it.
+  // Answers a hello or a command of another version, encoded as in that version.
   void turn_away(const net::Message& message, uint64_t version) {
     const std::string why = wire::about_versions(version);
     control_.reject(message, why);
@@ -258,7 +257,7 @@ class MasterTurns final : public MasterService {
                            wire::encode_for(version, wire::ControlReply{false, why}));
   }
 
-  // Whoever gave a command or said hello waits for an answer.
+  // The sender of a command or a hello waits for an answer.
   void refuse(const net::Message& message, const auto& m, const Error& why) {
     control_.reject(message, why.text);
     if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
@@ -282,11 +281,11 @@ class MasterTurns final : public MasterService {
   std::string endpoint_;
   const std::string run_id_;  // empty: no record is written
   MasterCore core_;
-  net::RunningSession told_;  // in the file
+  net::RunningSession told_;  // content of the session's file
   std::optional<net::SessionFile> file_;
-  std::optional<double> leaves_since_s_;   // everyone was told to finish
-  double looked_s_ = monotonic_s();        // when it was looked at the clock last
-  std::unique_ptr<HttpEndpoint> metrics_;  // null: nobody watches
+  std::optional<double> leaves_since_s_;   // time at which all got Shutdown; nullopt: not yet
+  double looked_s_ = monotonic_s();        // last time of look_at_the_clock()
+  std::unique_ptr<HttpEndpoint> metrics_;  // null: without --metrics-port
   double published_s_ = -1e9;
 };
 

@@ -10,7 +10,7 @@ namespace telesplat::master {
 
 class MasterCore;
 
-/// Ends when it is told to, once everyone who was told to finish has gone, or patience is over.
+/// Ends after a signal or "stop", once all processes have left or the time that run() gives them is over.
 class MasterService : public net::Turns {
  public:
   /// Begins the record and binds the control socket. Context and options must outlive it.
@@ -20,7 +20,7 @@ class MasterService : public net::Turns {
   virtual Status write_record() = 0;
 };
 
-/// Serves until SIGINT, SIGTERM or a "stop" command; then tells everyone to finish, waits for them (3 s at most, 1 s
+/// Serves until SIGINT, SIGTERM or a "stop" command; then sends Shutdown to all, waits for them (3 s at most, 1 s
 /// after a signal) and writes the record. Prints "listening on ENDPOINT" on stdout when ready. Returns the exit code.
 Result<int> run(const MasterServiceOptions& options);
 

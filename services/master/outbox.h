@@ -1,4 +1,4 @@
-// What the master sends: plans and MasterCore put messages in, the service takes them out.
+// Messages that the master is to send: plans and MasterCore put them in, the service takes them out.
 #pragma once
 
 #include <functional>
@@ -19,26 +19,26 @@ struct Outgoing {
 
 class Outbox {
  public:
-  /// instance_of: of the sampler with this routing id.
+  /// instance_of: returns the instance of the sampler with this routing id.
   Outbox(InstanceId master, std::function<InstanceId(const std::string& sampler)> instance_of)
       : master_(master), instance_of_(std::move(instance_of)) {}
 
-  /// A lease: wire::Lease or wire::SliceLease, with the master's mark and seal. sampler: the routing id of who gets it.
+  /// Sends a wire::Lease or wire::SliceLease with the master's mark and seal. sampler: routing id of its receiver.
   template <class L>
   void send_lease(const std::string& sampler, L& lease) {
     lease.master = master_;
     wire::seal(lease, instance_of_(sampler), lease_key_);
     send(sampler, lease);
   }
-  /// For the packer.
+  /// Key of the seals, for the packer.
   const std::vector<uint32_t>& lease_key() const { return lease_key_; }
-  /// Not one that no receiver would take.
+  /// Sends m, unless it is too large for receivers.
   template <class M>
   void send(const std::string& peer, const M& m) {
     std::string body = wire::encode(m);
     if (fits<M>(body)) messages_.push_back({peer, std::string(M::kName), std::move(body)});
   }
-  /// Whether receivers take the encoded M; if not, it is told, once for the whole outbox.
+  /// True if receivers take an encoded M of this size. If not, the outbox logs it, once for all messages.
   template <class M>
   bool fits(const std::string& body) {
     if (body.size() <= wire::kBodyLimit<M>) return true;
@@ -55,7 +55,7 @@ class Outbox {
   InstanceId master_;
   std::function<InstanceId(const std::string&)> instance_of_;
   std::vector<uint32_t> lease_key_ = wire::make_lease_key();
-  bool told_ = false;  // that one was too large
+  bool told_ = false;  // logged that a message was too large
   std::vector<Outgoing> messages_;
 };
 

@@ -1,4 +1,4 @@
-// What the master knows of processes: who may take part, under which name, how often it speaks, and who left.
+// Helps the master with processes: checks of a hello, the pace of messages, processes of one name, processes that left.
 #pragma once
 
 #include <algorithm>
@@ -13,14 +13,14 @@
 
 namespace telesplat::master {
 
-// How often something may be done: some times in a row, then so often a second. No clocks.
+// Limits how often something is done: in_a_row times at once, then rate_s times a second. No clocks.
 
 class Pace {
  public:
   Pace(double in_a_row, double rate_s) : in_a_row_(in_a_row), rate_s_(rate_s), left_(in_a_row) {}
 
   bool allows(double now_s) const { return left(now_s) >= 1; }
-  /// It is done, allowed or not.
+  /// Counts one that is done, allowed or not.
   void count(double now_s) {
     left_ = std::max(0.0, left(now_s) - 1);
     at_s_ = now_s;
@@ -31,28 +31,28 @@ class Pace {
   double in_a_row_, rate_s_, left_, at_s_ = 0;
 };
 
-// Tells the new life of a process from a second process of the same name: the old life does not speak again. No
-// sockets, no clocks.
+// Distinguishes a restarted process from a second process of the same name: after a restart the old one does not speak
+// again. No sockets, no clocks.
 
 class Namesakes {
  public:
-  static constexpr double kMemory_s = 10;       ///< who was replaced speaks again within a second, if it lives
-  static constexpr size_t kMostKept = 1 << 12;  ///< beyond, the one that was replaced first is forgotten
+  static constexpr double kMemory_s = 10;       ///< a replaced process that lives speaks again within a second
+  static constexpr size_t kMostKept = 1 << 12;  ///< one more pushes out the one that was replaced first
 
   /// Another process of its role and name took this one's place.
   void replaced(InstanceId instance, double now_s);
-  /// This process says hello. True: it was replaced a moment ago, and yet it lives. Told once for each time.
+  /// To be called for each hello. True: the process was replaced within kMemory_s, yet it lives; once per replacement.
   bool lives_on(InstanceId instance, double now_s);
 
  private:
-  std::map<InstanceId, double> replaced_;  // when
+  std::map<InstanceId, double> replaced_;  // time of the replacement, s
 };
 
-// Processes that left long ago, for the run's record: the newest whole, the others counted.
+// Processes that left long ago, for the run's record: keeps the newest and counts the others.
 
 class Departed {
  public:
-  static constexpr double kAfter_s = 60;  ///< so long those who left are told of among the others
+  static constexpr double kAfter_s = 60;  ///< until then a process that left is listed with the others
   static constexpr size_t kMostKept = 1000;
 
   void add(metrics::Process process) {
@@ -71,7 +71,7 @@ class Departed {
   uint64_t forgotten_ = 0;
 };
 
-// What a process may say of itself: all of it is remembered, and parts of it are told to everyone.
+// Limits of a hello: the master remembers all of it and sends parts of it to everyone.
 
 inline constexpr size_t kMaxNameBytes = 128;
 inline constexpr size_t kMaxEndpoints = 16;
@@ -79,8 +79,8 @@ inline constexpr size_t kMaxFacts = 64;
 inline constexpr size_t kMaxFactsBytes = 512u << 10;  ///< all of them together: a welcome with them is a message
 inline constexpr size_t kMaxParameters = 256;
 
-/// Error: which of these is exceeded, a role that is none of "data", "sampler", "packer", "viewer", "ctl", an instance
-/// that is 0 or not below 2^53, a name that is missing or has control characters: it is shown and written to files.
+/// Error: one of these is exceeded; the role is not "data", "sampler", "packer", "viewer" or "ctl"; the instance is 0
+/// or not below 2^53; the name, which is shown and written to files, is missing or has control characters.
 Status check_hello(const wire::Hello& hello);
 
 }  // namespace telesplat::master

@@ -1,4 +1,4 @@
-// What a session shows: its scene, its epochs, and the commands that begin them.
+// The scene of a session, its epochs, and the commands that begin them.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -18,8 +18,8 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMostNamed = 16;     // viewers, in an answer
-constexpr size_t kMostOfEnder = 100;  // bytes of who ends the session
+constexpr size_t kMostNamed = 16;     // names of viewers in an answer
+constexpr size_t kMostOfEnder = 100;  // bytes of the sender's name in the reason to end
 
 }  // namespace
 
@@ -30,7 +30,7 @@ Plan& MasterCore::plan_of(const wire::Hello& data) {
 }
 
 Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data, double now_s) {
-  // As the packer and viewers demand it, for whom an empty box is no scene.
+  // The packer and viewers refuse a bad box; an empty one means to them that there is no scene.
   if (!data.box_room.empty())
     if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
   Plan& plan = plan_of(data);
@@ -68,8 +68,8 @@ wire::Welcome MasterCore::scene_as_told() const {
   return w;
 }
 
-// Each from the process that has it, whatever others say. Each part of a volume has its own "voxels": samplers get them
-// in their sheets.
+// Adds each endpoint from the process that has it; claims of others do not count. Each part of a volume has its own
+// "voxels", which samplers get in their sheets.
 void MasterCore::add_endpoints(wire::Welcome& w) const {
   const auto add = [&](const std::string& id, std::initializer_list<const char*> names) {
     const auto p = peers_.find(id);
@@ -79,7 +79,7 @@ void MasterCore::add_endpoints(wire::Welcome& w) const {
         w.endpoints.insert(*at);
   };
   add(shows_, {"chunks"});
-  // While that one is away another one of the same mesh will do.
+  // While that data server is away, another one with the same mesh will do.
   const std::string hash = scene::value_or(w.facts, "content_hash", std::string());
   for (const auto& [id, p] : peers_)
     if (!hash.empty() && p.hello.role == "data" && !p.refused &&
@@ -95,7 +95,7 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   w.clock = clock_id();
   w.epoch = epoch_;
   add_endpoints(w);
-  w.facts.erase(metrics::kRecordFact);  // of the master alone
+  w.facts.erase(metrics::kRecordFact);  // for the master only
   if (std::string lacking = lacks(); !lacking.empty()) w.facts["lacks"] = std::move(lacking);
   if (!run_id_.empty()) {
     w.facts["run_folder"] = session_.run_folder;
@@ -109,7 +109,7 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   return w;
 }
 
-// What changes again and again is told so often at most.
+// Sends a welcome to everyone now, or later if that would exceed the pace announcements_.
 void MasterCore::announce_soon(double now_s) {
   announce_due_ = !announcements_.allows(now_s);
   if (!announce_due_) announce(now_s);
@@ -160,7 +160,7 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   if (m.command == "stop") {
     outbox_.send(peer, wire::ControlReply{true, "stopping"});
     stop_ = true;
-    // What the command says of its sender is its own word; the key is known.
+    // The sender chooses the argument "by" freely; its key is proven.
     if (const std::string by = scene::value_or(m.arguments, "by", std::string()); !by.empty())
       stop_reason_ = "the session was ended by " + printable(by, kMostOfEnder);
     if (!key.empty()) stop_reason_ += fmt::format(" (key {})", key);
@@ -192,9 +192,9 @@ wire::ControlReply MasterCore::health(const wire::Control& m, double now_s) cons
   return {answer.ok(), answer ? *answer : answer.error().text};
 }
 
-// To the viewer that is named, else of a setting to all that are here, and of what is asked to the first one; to all
-// data servers of the scene, of which each knows its part. Of viewers that have one name the one that was heard last is
-// meant: it may be another's new life.
+// Sends an order to the viewer that it names; without a name, a setting goes to all viewers, a question to the first.
+// An order to data servers goes to all of the scene: each knows its part. If viewers share a name, the one heard last
+// is meant: the others may be its former lives.
 Status MasterCore::pass_on(const Errands::Asker& asker, const wire::Control& m, const std::string& role, double now_s) {
   if (role == Errands::kLauncher) {
     const auto number = errands_.ask_launcher(asker, m, session_.started_by, now_s);
@@ -203,7 +203,7 @@ Status MasterCore::pass_on(const Errands::Asker& asker, const wire::Control& m, 
   const std::string wanted = role == "viewer" ? scene::value_or(m.arguments, "viewer", std::string()) : std::string();
   struct Here {
     std::string name;
-    double unheard_s;  // for so long
+    double unheard_s;  // since its last message
     std::string id;
     auto operator<=>(const Here&) const = default;
   };
@@ -235,7 +235,7 @@ void MasterCore::on(const std::string& peer, const wire::OrderAnswer& m, double 
   if (const auto reply = errands_.answered(peer, m)) outbox_.send(reply->peer, reply->reply);
 }
 
-// Of the viewers that are here; those that come later begin with their own.
+// Sets the coupling of viewers that are here; viewers that come later begin with their own.
 Result<std::string> MasterCore::order_coupling(const wire::Control& m, double now_s) {
   if (options_.settings.pictures)
     return Error{

@@ -1,4 +1,4 @@
-// What the master says of a session: to `telesplat ctl status`, and to the run's record at the end.
+// The master's report on a session: for `telesplat ctl status`, and for the run's record at the end.
 #include <fmt/chrono.h>
 
 #include <algorithm>
@@ -14,19 +14,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// As a program wants it: what was counted as a whole number.
+// Returns a whole number as an integer, as programs expect of counts.
 Json number(double value) {
-  constexpr double kMostWhole = 9007199254740992.0;  // 2^53: above it a double does not know them all
+  constexpr double kMostWhole = 9007199254740992.0;  // 2^53: above it doubles skip whole numbers
   if (value == std::floor(value) && std::abs(value) <= kMostWhole) return Json(int64_t(value));
   return Json(value);
 }
 
-// What processes count on and on, so that it has a rate.
+// Counters of processes, which only grow: they have rates.
 constexpr const char* kCounters[] = {"frames", "updates", "bytes_received", "points_received", "tiles_sampled",
                                      "tiles",  "blocks",  "bytes_sent",     "requests",        "volume_frames_complete",
                                      "busy_s"};
 
-// A second, between the first and the last of a process' newest reports, by its own clock.
+// Returns how much each counter grew per second between a process' oldest and newest kept report, by its own clock.
 std::map<std::string, double> rates(const std::deque<std::map<std::string, double>>& reports) {
   std::map<std::string, double> out;
   if (reports.size() < 2) return out;
@@ -42,14 +42,14 @@ std::map<std::string, double> rates(const std::deque<std::map<std::string, doubl
 // Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.
 std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
-constexpr size_t kMostBytes = 768u << 10;  // of an answer, whose other fields are few
+constexpr size_t kMostBytes = 768u << 10;  // limit of an answer; all but its processes is short
 constexpr size_t kMostFactBytes = 4096;    // a path is shorter, a transfer function may be longer
 
 std::string shortened(const std::string& fact) {
   return fact.size() <= kMostFactBytes ? fact : fact.substr(0, kMostFactBytes - 3) + "...";
 }
 
-// What the launcher is asked for (docs/protocol.md).
+// Adds the orders that the launcher has to answer (docs/protocol.md).
 void add_wishes(const Errands& errands, Json& out) {
   for (const auto& [number, wish] : errands.wishes())
     out["wishes"].push_back({{"number", number}, {"command", wish.command}, {"arguments", wish.arguments}});
@@ -162,7 +162,7 @@ Json MasterCore::process_json(const std::string& id, const Peer& p, double now_s
 std::string MasterCore::status_json(double now_s, bool all) const {
   const Figures f = figures();
   const LimitsHit hit = gate_.hit();
-  // With what everyone else counted.
+  // Adds the counts of all processes to the master's own.
   const auto of_all = [&](uint64_t own, const char* key) {
     double sum = double(own);
     const auto add = [&](const metrics::Process& p) {
@@ -204,7 +204,7 @@ std::string MasterCore::status_json(double now_s, bool all) const {
   add_wishes(errands_, out);
   plan_->add_status(out);
   out["departed"] = departed_.count();
-  // Those who are here first: an answer is one message.
+  // Processes that are here come first: an answer is one message, and what is too much is left out.
   out["processes"] = Json::array();
   size_t bytes = dumped(out).size(), left_out = 0;
   for (const bool gone : {false, true})

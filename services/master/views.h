@@ -1,5 +1,5 @@
-// What every schedule does with views: they wait, are begun in turn, are complete or wait again. What a frame is cut
-// into is the schedule's own.
+// Views in every schedule: they wait, are begun in turn, are complete or wait again. Each schedule cuts its frames in
+// its own way.
 #pragma once
 
 #include <cmath>
@@ -14,16 +14,17 @@
 
 namespace telesplat::master {
 
-inline constexpr uint64_t kBufferedInFlight =
-    3;  ///< views in flight for the sake of one viewer's buffers, at most (T6.4: three buffers)
+/// Views in flight for the sake of one viewer's buffers, at most (T6.4: three buffers).
+inline constexpr uint64_t kBufferedInFlight = 3;
 
-/// Guests are told apart by their keys. Everybody else, and everybody where there are no keys, is one person.
+/// Counts the rays that each person spends. Each guest's key is a person; all others together, and all without keys,
+/// are one person.
 class Spending {
  public:
-  static constexpr double kHalfLife_s = 2;  ///< of what was spent
-  static constexpr double kActive_s = 2;    ///< a person who asked for nothing for so long wants nothing
+  static constexpr double kHalfLife_s = 2;  ///< half-life of the rays spent
+  static constexpr double kActive_s = 2;    ///< a person who asked for no view in this time wants none
 
-  /// A view of this viewer, whom the guest's key `person` let in; empty: no guest.
+  /// Notes a view request. person: the guest's key that let the viewer in; empty: not a guest.
   void asked(InstanceId viewer, const std::string& person, double now_s) {
     if (person.empty())
       persons_.erase(viewer);
@@ -43,12 +44,12 @@ class Spending {
     const auto found = persons_.find(viewer);
     return found == persons_.end() ? kNoGuest : found->second;
   }
-  /// Rays lately.
+  /// Returns the rays that the viewer's person spent lately.
   double spent(InstanceId viewer, double now_s) const {
     const auto found = people_.find(person(viewer));
     return found == people_.end() ? 0 : left(found->second, now_s);
   }
-  /// Somebody else than this viewer's person asks for views, too.
+  /// True if another person than this viewer's asked for views within kActive_s.
   bool others_ask(InstanceId viewer, double now_s) const {
     for (const auto& [name, p] : people_)
       if (name != person(viewer) && now_s - p.asked_s < kActive_s) return true;
@@ -62,45 +63,45 @@ class Spending {
   };
   static double left(const Person& p, double now_s) { return p.rays * std::exp2((p.at_s - now_s) / kHalfLife_s); }
 
-  std::map<InstanceId, std::string> persons_;  // of guests
+  std::map<InstanceId, std::string> persons_;  // persons of guests
   std::map<std::string, Person> people_;
 };
 
-/// How many views may be in flight when one is begun for a viewer that has `buffers` buffers.
+/// Returns the most views in flight if one of them is begun for a viewer that has `buffers` buffers.
 size_t views_at_once(int frames_in_flight, uint64_t buffers);
 
 /// View requests that wait at the master. Asynchronous viewers have one at most, their newest; the others (T6.4) have
-/// as many in order as they have buffers. Viewers take turns; guests by the rays that their views cost.
+/// one per buffer at most, in order. Viewers take turns; guests by the rays that their views cost.
 class ViewQueue {
  public:
-  /// buffers 0: it replaces the viewer's requests that wait. Otherwise it waits behind them, or takes the place of the
-  /// one with its id, and asynchronous ones of the viewer go. It is dropped where as many wait as the viewer has
-  /// buffers (at most wire::kMaxBuffers).
+  /// A request with 0 buffers replaces the viewer's requests that wait. Another one waits behind them, or takes the
+  /// place of the one with its id, and asynchronous ones of the viewer go; it is dropped if as many wait as the viewer
+  /// has buffers (at most wire::kMaxBuffers).
   void add(const wire::ViewRequest& request);
-  /// The view was begun and its frame dropped: it waits again, before all others of its viewer; not at all if it is
-  /// asynchronous and a newer one waits. Where several are put back, the newest comes first.
+  /// A view whose frame was dropped waits again, before all others of its viewer; not if it is asynchronous and another
+  /// one waits, or if the newest that waits is asynchronous. Several are put back one by one, the newest first.
   void put_back(const wire::ViewRequest& request);
   void forget(InstanceId viewer) { viewers_.erase(viewer); }
 
   bool empty() const { return viewers_.empty(); }
   size_t waiting(InstanceId viewer) const;
-  size_t waiting() const;  ///< of all viewers
-  /// The viewer's first request; nullptr: none waits.
+  size_t waiting() const;  ///< sum over all viewers
+  /// The viewer's first request; nullptr: no request waits.
   const wire::ViewRequest* first(InstanceId viewer) const;
 
-  /// The viewers that wait now have a turn; those who come later have none. A turn ends when a request of the viewer is
-  /// taken.
+  /// Gives a turn to each viewer that waits now; viewers that come later have no turn. A turn ends when a request of
+  /// the viewer is taken.
   void begin_turns();
   bool turn_waiting() const;
 
-  /// Whose turn it is: its first request. turns_only: only of viewers that have a turn; served: only of those for which
-  /// it is true; spent: who has spent least comes first. nullptr: none.
+  /// Returns the first request of the viewer that is next. turns_only: among viewers that have a turn; served: among
+  /// viewers for which it is true; spent: the viewer with the least comes first. nullptr: no such viewer.
   const wire::ViewRequest* next(
       bool turns_only = false, const std::function<bool(InstanceId)>& served = [](InstanceId) { return true; },
       const std::function<double(InstanceId)>& spent = [](InstanceId) { return 0.0; }) const;
   /// Takes the first request of a viewer; the turn goes to the next viewer. Precondition: it has one.
   wire::ViewRequest take(InstanceId viewer);
-  /// Takes the first requests of all viewers where they are wanted, `most` at most; nobody's turn changes.
+  /// Takes the first request of each viewer if wanted() is true for it, at most `most`; the next viewer stays the same.
   std::vector<wire::ViewRequest> take_all(const std::function<bool(const wire::ViewRequest&)>& wanted, size_t most);
 
  private:
@@ -119,9 +120,9 @@ struct ScheduleOptions {
   int frames_in_flight = 2;  ///< views begun and not complete, at most
   /// Longest time before a lease goes to another sampler; shorter once tile times are known.
   double lease_timeout_s = 2.0;
-  double longest_fetch_s = 30.0;  ///< a sampler that says that it needs longer has a lease no longer than this
-  double max_rate_mbit = 0;       ///< to each viewer, wished; 0: as much as its link carries
-  double lease_target_s = 0.004;  ///< what a lease of rows should take its sampler
+  double longest_fetch_s = 30.0;  ///< most time for a lease whose sampler asks for more
+  double max_rate_mbit = 0;       ///< wished rate to each viewer; 0: as fast as its link carries
+  double lease_target_s = 0.004;  ///< sampling time that a lease of rows should take
 };
 
 /// A mean in which each new value has the same share.
@@ -140,26 +141,26 @@ class Views {
  public:
   /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
   virtual void request_view(const wire::ViewRequest& request);
-  /// Whose request it is, and whose turns they are.
+  /// Rays that persons have spent: they decide the turns.
   Spending& spending() { return spending_; }
   virtual void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
-  /// A view of a viewer waits for which this is true.
+  /// True if a view waits of a viewer for which of() is true.
   bool view_waits(const std::function<bool(InstanceId)>& of) const { return waiting_.next(false, of) != nullptr; }
-  /// A view waits of a person none of whose views is in flight, while those of another are.
+  /// True if a person's view waits who has no view in flight, while others have.
   bool another_waits() const;
-  /// Of this viewer, the first; nullptr: none.
+  /// The viewer's first request that waits; nullptr: no request waits.
   const wire::ViewRequest* waiting_of(InstanceId viewer) const { return waiting_.first(viewer); }
   size_t views_waiting() const { return waiting_.waiting(); }
   /// See ViewQueue.
   void begin_turns() { waiting_.begin_turns(); }
   bool turn_waiting() const { return waiting_.turn_waiting(); }
-  /// Views begun and not complete.
+  /// Number of views begun and not complete.
   size_t views_in_flight() const { return in_flight_.size(); }
-  uint64_t frames_completed() const { return completed_; }  ///< of whole views
+  uint64_t frames_completed() const { return completed_; }  ///< frames of whole views
 
-  /// Another plan leads the session from now on: what waits there goes on here, and frames and leases are numbered
-  /// on. Precondition: no view is in flight there.
+  /// This plan leads the session from now on: takes the views that wait in `from`, and continues its numbers of frames
+  /// and leases. Precondition: `from` has no view in flight.
   void take_over(Views& from);
 
  protected:
@@ -171,10 +172,10 @@ class Views {
   LeaseId next_lease();
 
   enum class InFlight { kAny, kOneAViewer };
-  /// The view to begin; viewers take turns. turns_only: only those that have a turn. kOneAViewer: only those that have
-  /// no view in flight. nullopt: none waits, or as many are in flight as may be (views_at_once()).
-  /// ready: only viewers for which it is true; null: all. Guests take turns by what they spend; one of them leaves a
-  /// place for views of others, where others ask.
+  /// Takes the view to begin; viewers take turns. turns_only: among viewers that have a turn. kOneAViewer: among
+  /// viewers without a view in flight. ready: among viewers for which it is true; null: all. Guests take turns by the
+  /// rays they spend; each leaves a place for views of others, if others ask. nullopt: no view waits, or as many are in
+  /// flight as views_at_once() allows.
   std::optional<wire::ViewRequest> take_view(bool turns_only, double now_s, InFlight allowed = InFlight::kAny,
                                              const std::function<bool(InstanceId)>& ready = {});
   const Spending& spending() const { return spending_; }
@@ -184,12 +185,12 @@ class Views {
   }
   /// `frame` shows these views: they are in flight until complete() or put_back().
   void begin(FrameId frame, const std::vector<wire::ViewRequest>& views);
-  /// whole: it counts as completed.
+  /// Ends a frame. whole: it counts as completed.
   void complete(FrameId frame, bool whole = true);
   /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no
-  /// newer request does. Where several are put back, the newest comes first.
+  /// newer request does. Several are put back one by one, the newest first.
   void put_back(FrameId frame);
-  /// All whose views `frame` shows are gone. Precondition: it is in flight.
+  /// True if all viewers whose views `frame` shows are gone. Precondition: it is in flight.
   bool left(FrameId frame);
 
  private:

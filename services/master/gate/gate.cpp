@@ -32,10 +32,10 @@ Status Senders::admit(const net::Message& from, const wire::Hello& m) {
     auto& instances = of_user_[from.user];
     owners_[m.instance] = {from.peer, from.user, instances.insert(instances.end(), m.instance)};
   } else if (owner->second.peer != from.peer) {
-    // It came back over another connection, and the one before speaks for it no more.
+    // The process came back over another connection; its old connection does not speak for it any more.
     instances_.erase(std::exchange(owner->second.peer, from.peer));
   }
-  // Or it is another process from now on.
+  // Forget the process for which this connection spoke before.
   const auto before = instances_.find(from.peer);
   if (before != instances_.end() && before->second != m.instance) forget(before->second);
   instances_[from.peer] = m.instance;
@@ -56,10 +56,10 @@ void Senders::forget(InstanceId instance) {
   owners_.erase(owner);
 }
 
-// A process whose own connection is busy says it over another.
+// A process whose own connection is busy says goodbye over another.
 Status Senders::admit(const net::Message& from, const wire::Goodbye& m) { return speaks_for(from, m.instance); }
 
-// Viewers of walls have a connection of its own for this.
+// Viewers of walls send this over a second connection.
 Status Senders::admit(const net::Message& from, const wire::SwapReady& m) { return is_same_user(from, m.viewer); }
 
 Status Senders::admit(const net::Message& from, const wire::Control& m) {

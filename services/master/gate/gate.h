@@ -1,5 +1,5 @@
-// Who may take part in a session, and how much of the master each may have: one peer that floods it, or says hello with
-// a name that would deceive a terminal, is no other's business.
+// Decides who may take part in a session, and limits the share of the master that each peer gets: one that floods it,
+// or says hello with a name that would deceive a terminal, does not disturb the others.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,12 @@
 namespace telesplat::master {
 
 struct Limits {
-  uint64_t max_sampling_pixels = 1u << 24;  ///< of a view; larger ones are sampled coarser
+  uint64_t max_sampling_pixels = 1u << 24;  ///< pixels of a view; larger views are sampled coarser
   uint64_t max_peers = 512;                 ///< processes at a time
-  double max_messages = 5000;               ///< of a peer, a second; the packer, which tells of every tile, is exempt
+  double max_messages = 5000;  ///< messages of a peer per second; the packer, which reports every tile, is exempt
 };
 
-/// How often each limit bit.
+/// Counts how often each limit was hit.
 struct LimitsHit {
   uint64_t views_coarser = 0, hellos_refused = 0, messages_refused = 0;
 };
@@ -31,15 +31,15 @@ class Gate {
  public:
   explicit Gate(const Limits& limits) : limits_(limits), rates_(limits.max_messages) {}
 
-  /// One more message of this peer may be looked at.
+  /// True if one more message of this peer may be handled; else it counts as refused.
   bool admit(const std::string& peer, double now_s) { return rates_.admit(peer, now_s); }
   bool admit_work(const std::string& payer, double now_s) { return work_.admit(payer, now_s); }
   void worked(const std::string& payer, double seconds, double now_s) { work_.worked(payer, seconds, now_s); }
-  /// The view as it is sampled: where it has more pixels than the limit, every k-th of every k-th row.
+  /// Returns the view as it is sampled: if it has more pixels than the limit, every k-th pixel of every k-th row.
   wire::ViewRequest admit(const wire::ViewRequest& view);
   /// Counts a hello that is refused.
   void refuse_hello() { ++hit_.hellos_refused; }
-  /// A line of the log about who comes and goes: not more often than a person reads.
+  /// True if the log may have one more line about a process that comes or goes: at most what a person can read.
   bool may_log(double now_s) { return log_.take(now_s); }
   const Limits& limits() const { return limits_; }
   LimitsHit hit() const {
@@ -56,16 +56,16 @@ class Gate {
   TokenBucket log_{10, 200};
 };
 
-/// What a sender may say, beyond what the table of roles tells by a message's name alone: who it says it is, in whose
-/// name it speaks, and which commands it gives.
+/// Checks senders further than the table of roles, which knows only a message's name: the role that a sender claims,
+/// the process in whose name it speaks, and the commands that it gives.
 class Senders {
  public:
-  /// Processes that are remembered. Of more, the first one of the key that has the most is forgotten, so that no key's
-  /// owner can make this forget another's.
+  /// Processes that are remembered. One more pushes out the oldest of the key that has most, so that no key's owner can
+  /// make this forget another's.
   static constexpr size_t kMost = 8192;
 
-  /// Errors are the sender's fault; the message must not reach the core then. A sender who is not known, and does not
-  /// speak for a process of another key, is let pass: the core asks who it is.
+  /// Error: the sender's fault; the message must not reach the core. An unknown sender passes, unless it speaks for a
+  /// process of another key: the core asks it who it is.
   Status admit(const net::Message& from, const wire::Hello& m);
   Status admit(const net::Message& from, const wire::Goodbye& m);
   Status admit(const net::Message& from, const wire::SwapReady& m);
@@ -83,7 +83,7 @@ class Senders {
   }
 
  private:
-  // Messages of a viewer or sampler that name their sender; in others these fields mean somebody else.
+  // Messages of viewers and samplers that name their sender; in other messages these fields name another process.
   template <class M>
   static constexpr bool is_request = std::is_same_v<M, wire::ViewRequest> || std::is_same_v<M, wire::LeaseRequest> ||
                                      std::is_same_v<M, wire::LeaseExtend> || std::is_same_v<M, wire::SlabReady>;
@@ -102,7 +102,7 @@ class Senders {
 
   std::unordered_map<InstanceId, Owner> owners_;
   std::unordered_map<std::string, InstanceId> instances_;  // by routing id
-  std::map<std::string, std::list<InstanceId>> of_user_;   // owners_, the first hello first
+  std::map<std::string, std::list<InstanceId>> of_user_;   // instances in owners_ by user, oldest hello first
 };
 
 }  // namespace telesplat::master

@@ -12,12 +12,12 @@ namespace telesplat::master {
 
 namespace {
 
-/// A family of series, one a process that reports the value.
+/// A family of series: one for each process that reports the value.
 struct Family {
   const char* name;  ///< after "telesplat_"; those of counters end in _total
-  const char* role;  ///< whose; empty: everyone's, with a label that tells whose
-  const char* key;   ///< of LiveProcess::values
-  double unit;       ///< what a value is multiplied with, to be in seconds or bytes
+  const char* role;  ///< role of the processes; empty: all, with a label for the role
+  const char* key;   ///< in LiveProcess::values
+  double unit;       ///< factor that turns a value into seconds or bytes
   const char* help;
 };
 
@@ -63,7 +63,7 @@ constexpr Family kGauges[] = {
     {"packer_model_bytes", "packer", "model_bytes", 1, "Memory of the model."},
 };
 
-/// The same of LiveProcess::rates.
+/// Families whose keys are in LiveProcess::rates.
 constexpr Family kRates[] = {
     {"viewer_frames_per_second", "viewer", "frames", 1, "Displayed frames a second, of the last seconds."},
     {"viewer_updates_per_second", "viewer", "updates", 1, "Complete view updates a second, of the last seconds."},
@@ -101,7 +101,7 @@ std::string labels_of(const LiveProcess& p) {
   return fmt::format("{{role=\"{}\",name=\"{}\"}}", escaped_label(p.role), escaped_label(p.name));
 }
 
-// One a role and name, those that are here first, as many as are told of.
+// Returns one process for each role and name, at most kMostTold of a role, those that are here first.
 std::vector<const LiveProcess*> told(const LiveSnapshot& s) {
   std::vector<const LiveProcess*> out;
   std::set<std::pair<std::string, std::string>> seen;
@@ -218,7 +218,7 @@ std::string exposition(const LiveSnapshot& snapshot, const LiveFigures& figures)
 
 namespace {
 
-// Drops the one of those that left that was measured longest ago. False: all are here.
+// Among entries that left, drops the one measured longest ago. False: all are here.
 template <class V>
 bool make_room(std::map<std::string, V>& map) {
   auto oldest = map.end();
@@ -229,7 +229,7 @@ bool make_room(std::map<std::string, V>& map) {
   return true;
 }
 
-// The column's values that count by that of another column of their row (none: all do).
+// Calls add() with the values of column `name`, except in rows whose column `unless`, if there is one, is not 0.
 template <class Add>
 void each(const wire::MetricRows& rows, const char* name, const char* unless, Add&& add) {
   const auto place = [&](const char* column) {
@@ -257,7 +257,7 @@ uint64_t Histogram::up_to(size_t bucket) const {
   return out;
 }
 
-// Null: there is no room for another name.
+// Returns the entry of this name, a new one if need be. Null: there is no room for another name.
 template <class V>
 V* LiveFigures::entry(std::map<std::string, V>& map, const std::string& name, bool here) {
   auto found = map.find(name);
@@ -285,7 +285,7 @@ void LiveFigures::add_rows(const std::string& viewer, const wire::MetricRows& ro
     return each(rows, "start_up_ms", "", add_to(v->start_up));
   }
   each(rows, "inter_frame_ms", "still", [&](double ms) {
-    if (ms != 0) v->inter_frame.add(ms / 1e3);  // a first frame has no delay and tells 0
+    if (ms != 0) v->inter_frame.add(ms / 1e3);  // a first frame has no delay and reports 0
   });
   each(rows, "motion_to_photon_ms", "still", add_to(v->motion_to_photon));
   each(rows, "missed", "",

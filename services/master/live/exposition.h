@@ -14,21 +14,21 @@
 
 namespace telesplat::master {
 
-// What the master counts for people who watch: how long frames and updates take, and who sampled how much. It follows
-// the rows and tiles that the record gets, in bounded memory.
+// Figures for people who watch: the time that frames and updates take, and the work of each sampler. They follow the
+// rows and tiles that the record gets, in bounded memory.
 
-/// How many values were at most as large as each bound.
+/// Counts values up to each bound.
 class Histogram {
  public:
   /// Seconds; the last bucket has no bound.
   static constexpr std::array<double, 18> kBounds{0.002, 0.005, 0.0084, 0.0112, 0.014, 0.0168, 0.025, 0.034, 0.05,
                                                   0.1,   0.15,  0.2,    0.3,    0.5,   1,      2,     5,     10};
 
-  /// Values that are no number do not count, negative ones count as 0.
+  /// NaN and infinities do not count; negative values count as 0.
   void add(double seconds);
   uint64_t count() const { return count_; }
   double sum_s() const { return sum_s_; }
-  /// Of values up to kBounds[bucket].
+  /// Returns the number of values up to kBounds[bucket].
   uint64_t up_to(size_t bucket) const;
 
  private:
@@ -39,7 +39,7 @@ class Histogram {
 
 class LiveFigures {
  public:
-  /// Viewers, and samplers. Of more, those that left make room, the one that was measured longest ago first; where all
+  /// Limit for viewers and for samplers. One more replaces the one that left and was measured longest ago; while all
   /// are here, nothing is kept of a new one.
   static constexpr size_t kMostNames = 256;
 
@@ -56,12 +56,12 @@ class LiveFigures {
     double busy_s = 0;  ///< sampling and encoding
   };
 
-  /// A process of this role and name takes part from now on, or does not any more. Roles that are not measured change
+  /// Notes that the process of this role and name takes part, or has left. Roles other than viewer and sampler change
   /// nothing.
   void set_here(const std::string& role, const std::string& name, bool here);
-  /// Rows of frames.csv or updates.csv that the record took, of a viewer that takes part; others change nothing.
+  /// Adds rows of frames.csv or updates.csv that the record took from a viewer that takes part; ignores other tables.
   void add_rows(const std::string& viewer, const wire::MetricRows& rows);
-  /// here: the sampler takes part; one that has left may have tiles that come later.
+  /// here: the sampler takes part; tiles of one that has left may come later.
   void add_tile(const std::string& sampler, const wire::TileDone& tile, bool here = true);
 
   const std::map<std::string, Viewer>& viewers() const { return viewers_; }
@@ -76,11 +76,11 @@ class LiveFigures {
   uint64_t measured_ = 0;
 };
 
-/// What the master knows of a process.
+/// A process, as the master knows it.
 struct LiveProcess {
   std::string role, name;
   bool alive = false;
-  std::optional<double> leases;  ///< of a sampler, that are out
+  std::optional<double> leases;  ///< leases that a sampler holds
   std::map<std::string, double> values, rates;
 };
 
@@ -93,13 +93,13 @@ struct LiveSnapshot {
   std::vector<LiveProcess> processes;
 };
 
-/// Processes that are told of, of each role; those that are here come first.
+/// Processes of each role in the text, at most; those that are here come first.
 inline constexpr size_t kMostTold = 256;
 
-/// Every series has # HELP and # TYPE. Names of processes are escaped; what is not UTF-8 in them is replaced.
+/// Returns all series, each with # HELP and # TYPE. Escapes names of processes; replaces what is not UTF-8 in them.
 std::string exposition(const LiveSnapshot& snapshot, const LiveFigures& figures);
 
-/// A label's value between its quotes.
+/// Returns a label's value as it stands between its quotes.
 std::string escaped_label(const std::string& text);
 
 }  // namespace telesplat::master

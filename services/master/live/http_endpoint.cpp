@@ -26,11 +26,11 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
 
-constexpr auto kAfterFailure = std::chrono::milliseconds(200);  // of accepting: no descriptors are left
+constexpr auto kAfterFailure = std::chrono::milliseconds(200);  // wait after accept() failed: no descriptors are left
 constexpr int kBacklog = 16;
 
-// Programs of this machine call it by these names. A page in a browser here, whose own name was made to point to this
-// address, does not.
+// True for names by which programs of this machine call it. A page in a browser here, whose own name was made to point
+// to this address, sends that name instead.
 bool is_loopback_name(std::string_view host) {
   if (const size_t colon = host.rfind(':'); colon != host.npos && host.find(']', colon) == host.npos)
     host = host.substr(0, colon);
@@ -45,7 +45,7 @@ struct Shared {
   bool local = true;  // bound to loopback
   std::mutex mutex;
   std::shared_ptr<const std::string> text = std::make_shared<const std::string>();
-  size_t connections = 0;  // the thread's alone
+  size_t connections = 0;  // used by the thread alone
 
   std::shared_ptr<const std::string> now() {
     const std::lock_guard lock(mutex);
@@ -53,7 +53,7 @@ struct Shared {
   }
 };
 
-/// A connection: one request, one answer, within the patience.
+/// A connection: one request and one answer, within kPatience_s.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(tcp::socket socket, Shared& shared) : stream_(std::move(socket)), shared_(shared) {
@@ -130,7 +130,7 @@ struct HttpEndpoint::Impl {
   tcp::acceptor acceptor{io};
   asio::steady_timer again{io};
   std::string url;
-  log::RateLimiter limiter;  // the thread's alone
+  log::RateLimiter limiter;  // used by the thread alone
   std::thread thread;
 
   void accept() {
@@ -148,7 +148,7 @@ struct HttpEndpoint::Impl {
     });
   }
 
-  // A connection for which there is no memory is closed; the others go on.
+  // Runs work() and logs its exceptions: a connection for which there is no memory is closed, the others go on.
   template <class Work>
   void guard(Work&& work) {
     try {
@@ -158,7 +158,7 @@ struct HttpEndpoint::Impl {
     }
   }
 
-  // Signals are for the master's loop.
+  // Starts the thread with all signals blocked: they are for the master's loop.
   void start() {
     sigset_t all, before;
     sigfillset(&all);

@@ -1,5 +1,5 @@
-// A text that is served over HTTP, for programs that watch: /metrics. It has a thread of its own; nothing that comes
-// over the network reaches the master's loop. Only http_endpoint.cpp sees the library behind it.
+// Serves a text over HTTP at /metrics, for programs that watch. It has a thread of its own; nothing that comes over the
+// network reaches the master's loop. Only http_endpoint.cpp includes the library behind it.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace telesplat::master {
 class HttpEndpoint {
  public:
   static constexpr size_t kMostConnections = 32;     ///< at once; more are closed
-  static constexpr size_t kMostRequestBytes = 8192;  ///< of a request, its header included
+  static constexpr size_t kMostRequestBytes = 8192;  ///< size of a request with its header
   static constexpr double kPatience_s = 5;           ///< for a whole request and its answer
 
   struct Options {
@@ -21,14 +21,14 @@ class HttpEndpoint {
     int port = 0;
     bool insecure = false;  ///< the address need not be loopback
   };
-  /// Binds and begins to serve; on loopback those alone who call it by a name of loopback. Error: names the flag, the
-  /// address and what is wrong.
+  /// Binds and begins to serve; on loopback it serves only requests that name loopback as their host. Error: names the
+  /// flag, the address and the cause.
   static Result<std::unique_ptr<HttpEndpoint>> open(const Options& options);
   ~HttpEndpoint();
   HttpEndpoint(const HttpEndpoint&) = delete;
   HttpEndpoint& operator=(const HttpEndpoint&) = delete;
 
-  /// What /metrics answers from now on.
+  /// Sets the text that /metrics answers with from now on.
   void publish(std::string text);
   /// "http://127.0.0.1:9464/metrics"
   const std::string& url() const;

@@ -82,7 +82,7 @@ using nlohmann::ordered_json;
 
 ordered_json text_or_null(const std::string& text) { return text.empty() ? ordered_json() : ordered_json(text); }
 
-// A fact that is a number. Whole numbers stay whole.
+// Returns a fact that is a number, else null. Whole numbers stay whole.
 ordered_json number_or_null(const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
@@ -95,7 +95,7 @@ ordered_json number_or_null(const std::string& text) {
 
 std::string fact(const Process& p, const char* key) { return scene::value_or(p.facts, key, std::string()); }
 
-// Each machine that took part, and who ran on it.
+// Returns each machine that took part, with its processes.
 ordered_json machines(const std::vector<Process>& processes) {
   ordered_json out = ordered_json::array();
   for (const Process& p : processes) {
@@ -120,7 +120,7 @@ ordered_json machines(const std::vector<Process>& processes) {
   return out;
 }
 
-// The launcher's command line; of a session that was started by hand everyone's own.
+// Returns the launcher's command line; for a session that was started by hand, that of each process.
 ordered_json commands(const std::vector<Process>& processes) {
   auto by_hand = ordered_json::object();
   for (const Process& p : processes) {
@@ -155,7 +155,7 @@ ordered_json trajectory_of(const Roster& roster) {
           {"hash", text_or_null(roster.fact("viewer", "trajectory_hash"))}};
 }
 
-// What the first viewer was asked to do.
+// Returns the tasks that the first viewer was given.
 ordered_json asked_of(const Roster& roster) {
   ordered_json out;
   for (const char* key : {"duration_s", "frames", "hold_s", "verify_every", "target_fps", "update_rate", "fov_deg"})

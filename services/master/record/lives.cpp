@@ -22,9 +22,9 @@ namespace {
 
 constexpr const char* kFiles[kCsvs] = {"frames.csv", "updates.csv", "stages.csv",    "tiles.csv",
                                        "plans.csv",  "epochs.csv",  "assignment.csv"};
-constexpr size_t kOwnColumns = 6;       // before those of the tables
-constexpr uint64_t kTail = 4u << 20;    // no row is longer
-constexpr size_t kMostLives = 100'000;  // of a file that is not ours
+constexpr size_t kOwnColumns = 6;       // columns before those of the tables
+constexpr uint64_t kTail = 4u << 20;    // bytes; no row is longer
+constexpr size_t kMostLives = 100'000;  // a file with more is not ours
 
 struct Row {
   size_t number;
@@ -56,7 +56,7 @@ bool read(const std::string& text, T& out) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// The end of a file, and where it begins.
+// Reads the last kTail bytes of a file; begin: their place in it.
 std::string tail_of(const std::string& path, uint64_t& begin) {
   std::error_code error;
   const uint64_t size = std::filesystem::file_size(path, error);
@@ -123,7 +123,7 @@ uint64_t whole_events(const std::string& path) {
     if (text.ends_with(end)) text.resize(text.size() - end.size());
   };
   cut("\n]\n");
-  // The last one may be cut off; each has a line.
+  // Each event has a line; the last one may be cut off.
   if (const size_t line = text.rfind('\n');
       line != text.npos && line + 1 < text.size() && !nlohmann::json::accept(std::string_view(text).substr(line + 1)))
     text.resize(line);
@@ -143,8 +143,8 @@ double number(const std::string& cell, double none = 0) {
 
 constexpr size_t kMostOfLine = 1 << 16;  // a viewer's row of all columns has 2 KiB
 
-/// The next whole line: what follows its first kMostOfLine bytes is left out. Returns the bytes that it takes with its
-/// end; 0 where none is left that has one.
+/// Reads the next whole line, its first kMostOfLine bytes only. Returns its full size in bytes with its end; 0: no
+/// whole line is left.
 uint64_t take_line(std::istream& in, std::string& line) {
   line.clear();
   uint64_t bytes = 0;
@@ -156,7 +156,7 @@ uint64_t take_line(std::istream& in, std::string& line) {
   }
 }
 
-/// The column that tells when what a row is about began; of the others nobody asks.
+/// Returns the column with the time when the thing in a row began; empty: the table is not filtered by time.
 const char* began_in(Csv csv) {
   switch (csv) {
     case Csv::kFrames:
@@ -175,8 +175,8 @@ const char* began_in(Csv csv) {
   return "requested_s";
 }
 
-/// The rows of a table, one after the other. Those that are cut off, too long or of another number of cells are left
-/// out.
+/// Reads the rows of a table one after the other. Leaves out rows that are cut off, too long or of another number of
+/// cells.
 class Rows {
  public:
   Rows(const std::string& directory, Csv csv, const std::vector<Life>& lives, double from_s)
@@ -197,7 +197,7 @@ class Rows {
     }
     return false;
   }
-  /// Which master wrote the row; they count from 1.
+  /// Number of the master that wrote the row, from 1.
   size_t life() const { return life_; }
   const Cells& columns() const { return columns_; }
   const Cells& cells() const { return cells_; }
@@ -219,7 +219,7 @@ class Rows {
   uint64_t at_ = 0;
 };
 
-// Of a viewer's table: its name comes first. What is empty did not happen.
+// Reads a table of viewers, whose names come first. An empty cell did not happen: it is read as -1.
 void read_table(Rows rows, const std::string& table, Measured& out) {
   if (rows.columns().size() < 2) return;
   wire::MetricRows one{{}, table, {rows.columns().begin() + 1, rows.columns().end()}, {}};
@@ -267,7 +267,7 @@ PlanRow plan_of(const Rows& row) {
   return p;
 }
 
-// A frame's plan counts before its tiles do.
+// Adds tiles and plans: a frame's plan before its tiles.
 void read_sampled(Rows tiles, Rows plans, Measured& out) {
   size_t life = 1;
   const auto reach = [&](size_t reached) {

@@ -16,12 +16,12 @@ namespace telesplat::metrics {
 
 namespace {
 
-constexpr double kError = 0.005;                              // of a percentile, relative
-constexpr double kLeast = 1e-9, kGreatest = 1e15;             // what is smaller or larger counts as these
-const double kWidth = std::log1p(2 * kError / (1 - kError));  // of a bucket, in logarithms
+constexpr double kError = 0.005;                              // relative error of a percentile
+constexpr double kLeast = 1e-9, kGreatest = 1e15;             // smaller or larger sizes count as these
+const double kWidth = std::log1p(2 * kError / (1 - kError));  // logarithmic width of a bucket
 
 int bucket_of(double size) { return int(std::ceil(std::log(std::clamp(size, kLeast, kGreatest)) / kWidth)); }
-// The value that is no further than kError from all of its bucket.
+// Returns the value that is within kError of all values of its bucket.
 double value_of(int bucket) { return std::exp(bucket * kWidth) * (1 - kError); }
 
 }  // namespace
@@ -147,7 +147,7 @@ void TileSums::begin_life() {
 namespace {
 
 constexpr size_t kMostCouplings = 256, kMostOpenSkews = 1024;
-constexpr double kMostLost = 1e6;  // frames in a row: a larger step is no loss but another count
+constexpr double kMostLost = 1e6;  // frames in a row: after a larger step the viewer counts anew
 
 std::string coupling_name(double mode, double buffers) {
   if (mode == 0) return "async";
@@ -237,8 +237,7 @@ void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
   add_skew(row);
 }
 
-// Viewers number their frames: where numbers are missing the rows were lost on the way. A viewer that was started again
-// begins at a lower one.
+// Counts missing frame numbers as rows that were lost on the way. A restarted viewer begins at a lower number.
 void Measured::add_lost(ViewerFigures& viewer, const Row& row) {
   const auto frame = row.of("frame");
   if (!frame) return;
@@ -251,7 +250,7 @@ void Measured::add_lost(ViewerFigures& viewer, const Row& row) {
   frame_rows_lost += lost;
 }
 
-// Of a still frame nothing was drawn: how long it took says nothing.
+// A still frame's delay does not count: nothing was drawn for it.
 void Measured::add_delay(ViewerFigures& viewer, const Row& row) {
   const double ms = row.of("inter_frame_ms").value_or(0);  // 0: a viewer's first frame has none
   if (row.of("still").value_or(0) > 0) {
@@ -290,7 +289,7 @@ void Measured::add_coupling(ViewerFigures& viewer, const Row& row) {
   viewer.coupling = name;
 }
 
-// Each of a wall's frames counts once, whoever told of it.
+// Counts each of a wall's frames once, though several viewers report it.
 void Measured::add_skew(const Row& row) {
   const auto number = row.of("wall_frame"), skew = row.of("swap_skew_ms");
   if (!number || !skew || !(*number > 0) || !(*skew >= 0)) return;
@@ -334,14 +333,14 @@ void Measured::add_update(ViewerFigures& viewer, const Row& row) {
 void Measured::add_stages(const Row& row) {
   if (const auto ms = row.of("latency_ms")) stages_latency_ms += *ms;
   for (const auto& stage : kStageColumns) row.add_to(stages_ms[stage.name], stage.name);
-  if (const auto ms = row.of("display_ms"); ms && *ms >= 0) display_ms.add(*ms);  // else no frame showed it
+  if (const auto ms = row.of("display_ms"); ms && *ms >= 0) display_ms.add(*ms);  // below 0: no frame showed it
 }
 
 namespace {
 
 using Names = std::vector<std::string>;
 
-// Of a text with spaces between them.
+// Splits a text at its spaces.
 Names split(const char* text) {
   std::istringstream in(text);
   return {std::istream_iterator<std::string>(in), {}};
@@ -358,7 +357,7 @@ const Names kUpdates = split(
     "request frame requested_s first_s complete_s latency_ms start_up_ms tiles samples points bytes eliminated "
     "sampling_width sampling_height epoch extra_points extra_bytes left_out");
 
-// The stages themselves come between.
+// Columns of "stages" before and after those of the stages.
 const Names kBeforeStages{"request", "frame", "tile", "requested_s", "complete_s"},
     kAfterStages{"latency_ms", "patches", "display_ms"};
 

@@ -1,4 +1,4 @@
-// What a run has measured so far, in memory: what its summary is made from. It is bounded, however long the run lasts.
+// Figures that a run has measured so far, in memory, for its summary. They are bounded, however long it lasts.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -21,9 +21,8 @@
 namespace telesplat::metrics {
 
 /// Distributions of values that go on for hours, in bounded memory.
-///   Keeps values as they are while they are few; then how many lie in each of buckets whose bounds grow by 1 %, which
-/// gives percentiles to half a percent of their value. Count, sum, greatest value and standard
-/// deviation are exact always.
+///   Keeps values as they are while they are few; then counts them in buckets whose bounds grow by 1 %, which gives
+/// percentiles to half a percent of their value. Count, sum, greatest value and standard deviation are always exact.
 class Quantiles {
  public:
   static constexpr size_t kExact = 8192;  ///< values that are kept as they are
@@ -33,50 +32,50 @@ class Quantiles {
   uint64_t count() const { return count_; }
   bool empty() const { return count_ == 0; }
   double sum() const { return sum_; }
-  /// All 0 for no values.
+  /// Without values, all figures are 0.
   Distribution distribution() const;
 
  private:
   void put(double value);
   double at(double p) const;
 
-  std::vector<double> exact_;              // empty once there are more
-  std::map<int, uint64_t> below_, above_;  // buckets of what is negative and positive, by the logarithm of its size
+  std::vector<double> exact_;              // empty once there are more than kExact
+  std::map<int, uint64_t> below_, above_;  // buckets of negative and positive values, by the logarithm of their size
   uint64_t zeros_ = 0, count_ = 0;
   double sum_ = 0, max_ = 0;
-  double mean_ = 0, squares_ = 0;  // of differences from it (Welford 1962)
+  double mean_ = 0, squares_ = 0;  // squares_: of differences from mean_ (Welford 1962)
 };
 
-/// null if there are no values: nothing was measured.
+/// Returns the distribution as JSON; null if there are no values.
 nlohmann::ordered_json distribution_json(const Quantiles& values);
 
-/// How long each frame took. Coarse frames are a part of their view only, and extra ones come after it: they would
-/// flatter these figures.
+/// Times that each frame took. Coarse frames, which are only a part of their view, and extra frames, which come after
+/// it, do not count: they would flatter these figures.
 struct FrameDurations {
   Quantiles leased_ms, sampling_ms, packing_ms;
 };
 
-/// What tiles and plans add up to, for the summary: a session leases thousands of them a second.
+/// Sums over tiles and plans, for the summary: a session leases thousands of tiles a second.
 class TileSums {
  public:
-  static constexpr size_t kMostSamplers = 1024;  ///< by name; further ones are "others"
+  static constexpr size_t kMostSamplers = 1024;  ///< samplers by name; further ones are "others"
 
   void add(const std::string& sampler, const wire::TileDone& tile);
-  /// Before the tiles of its frame.
+  /// To be called before the tiles of the plan's frame are added.
   void add(const PlanRow& plan);
-  /// Another master counts frames anew: what comes belongs to none of those before.
+  /// Another master counts frames anew: its tiles do not belong to earlier frames of the same number.
   void begin_life();
 
   double samples() const { return samples_; }
   double kept() const { return kept_; }
   double bytes_sent() const { return bytes_sent_; }
-  /// Tiles that were published with an error, and the largest of each (wire::TileDone).
+  /// Number of tiles that were published with an error, and the largest error of each kind (wire::TileDone).
   uint64_t bounded() const { return bounded_; }
   double depth_error_m() const { return depth_error_m_; }
   double normal_error_deg() const { return normal_error_deg_; }
   double colour_error() const { return colour_error_; }
   double rays_cast() const { return rays_cast_; }
-  double rays_full() const { return rays_full_; }  ///< without plans
+  double rays_full() const { return rays_full_; }  ///< rays that would be cast without plans
   /// Sample begin to encode end, s, by sampler.
   const std::map<std::string, double>& busy_s() const { return busy_s_; }
   FrameDurations durations() const;
@@ -97,45 +96,45 @@ class TileSums {
   double depth_error_m_ = 0, normal_error_deg_ = 0, colour_error_ = 0;
   std::map<std::string, double> busy_s_;
   std::map<uint64_t, Times> open_;  // frames that may have further tiles
-  uint64_t closed_ = 0;             // frames up to this one have none
+  uint64_t closed_ = 0;             // frames up to this number have no further tiles
   FrameDurations durations_;
-  std::set<uint64_t> planned_;  // the newest frames that have the rays of a plan
+  std::set<uint64_t> planned_;  // the newest frames that follow a plan
   uint64_t plans_ = 0, plans_late_ = 0;
   Quantiles plan_ms_, plan_answer_ms_;
 };
 
-/// A table that viewers fill: the columns of the first that sent rows, which all have, and how many rows came.
+/// A table that viewers fill: the columns of the first viewer that sent rows, which all must have, and the row count.
 struct Table {
   std::vector<std::string> columns;
   uint64_t rows = 0;
 };
 
-/// What one viewer did.
+/// Figures of one viewer.
 struct ViewerFigures {
   uint64_t frames = 0, updates = 0;
-  uint64_t still = 0;            ///< of its frames: nothing was drawn for them
-  uint64_t frames_of_views = 0;  ///< frames that showed a view that was complete, or what came later
+  uint64_t still = 0;            ///< frames for which nothing was drawn
+  uint64_t frames_of_views = 0;  ///< frames that showed a complete view, or later points
   double duration_s = 0;
-  double still_s = 0;  ///< part of it that ended with these
+  double still_s = 0;  ///< part of duration_s that ended with still frames
   Quantiles inter_frame_ms, motion_to_photon_ms, latency_ms;
-  uint64_t rows_lost = 0;  ///< of its frames: they were displayed, and their rows never came
-  double last_s = -1e300;  ///< of its frames
-  double last_frame = -1;  ///< its number; below 0: none
-  double last_ms = 0;      ///< delay of the last one; 0: it has none, or is still
-  std::string coupling;    ///< of the last one
+  uint64_t rows_lost = 0;  ///< frames that were displayed, and whose rows never came
+  double last_s = -1e300;  ///< time of its last frame
+  double last_frame = -1;  ///< number of its last frame; below 0: no frame
+  double last_ms = 0;      ///< delay of its last frame; 0: it has no delay, or is still
+  std::string coupling;    ///< coupling of its last frame
 
   double per_second(uint64_t count) const;
-  /// Frames that were drawn, in the time that was not spent on still ones; 0: there were fewer than two.
+  /// Drawn frames a second, without the time of still ones; 0: fewer than two were drawn.
   double fps() const;
 };
 
 class Measured {
  public:
-  static constexpr size_t kMostViewers = 256;  ///< by name; further ones are "others"
+  static constexpr size_t kMostViewers = 256;  ///< viewers by name; further ones are "others"
 
   /// "frames", "updates" or "stages"; null for other names.
   Table* table(const std::string& name);
-  /// Refuses, and keeps nothing of, rows whose shape does not fit. Precondition: table(more.table).
+  /// Adds rows. Error: their shape does not fit; then all of them are dropped. Precondition: table(more.table).
   Status add(const std::string& viewer, const wire::MetricRows& more);
   void add_epoch() { ++epochs_; }
   TileSums& tiles() { return tiles_; }
@@ -145,36 +144,36 @@ class Measured {
   const Table& frames() const { return frames_; }
   const TileSums& tiles() const { return tiles_; }
   uint64_t epochs() const { return epochs_; }
-  /// Each by itself: they need not have begun, nor ended, together.
+  /// Figures of each viewer by itself: viewers need not begin or end together.
   const std::map<std::string, ViewerFigures>& viewers() const { return viewers_; }
 
-  // Of all viewers' frames that were drawn.
+  // Drawn frames of all viewers.
   Quantiles inter_frame_ms, construction_ms, motion_to_photon_ms;
-  /// From one delay to the next of the same viewer: how much they differ, in sum, and how often there were two.
+  /// Sum of the differences between successive delays of the same viewer, and their number.
   double jitter_sum_ms = 0;
   uint64_t jitters = 0;
-  // Of all their frames.
+  // All frames of all viewers.
   Quantiles points_drawn, update_age_ms;
   uint64_t frames_shown = 0, frames_still = 0, frame_rows_lost = 0;
-  bool headset = false;  ///< some frame had a lead
+  bool headset = false;  ///< true if a frame had a lead
   uint64_t frames_late = 0;
-  bool refreshed = false;  ///< some frame had a refresh to be in time for
+  bool refreshed = false;  ///< true if a frame had a refresh to be in time for
   double refreshes_missed = 0;
-  bool coupled = false;  ///< their couplings are known
+  bool coupled = false;  ///< true if couplings are known
   uint64_t coupling_changes = 0;
   std::vector<std::pair<std::string, uint64_t>> frames_by_coupling;  ///< in the order in which they came up
-  /// Of each of a wall's frames, whoever told of it.
+  /// Skew of each of a wall's frames once, though several viewers report it.
   Quantiles swap_skew_ms() const;
 
-  // Of their view updates, without those of which something was left out.
+  // View updates of all viewers, except those from which something was left out.
   Quantiles latency_ms;
-  // Of all.
+  // All view updates.
   Quantiles start_up_ms;
   double points_received = 0, extra_points = 0;
 
-  // Of the stages of updates.
+  // Stages of updates.
   std::map<std::string, Quantiles> stages_ms;
-  double stages_latency_ms = 0;  ///< the sum of all
+  double stages_latency_ms = 0;  ///< sum over all updates
   Quantiles display_ms;
 
  private:
@@ -191,17 +190,17 @@ class Measured {
 
   Table frames_, updates_, stages_;
   std::map<std::string, ViewerFigures> viewers_;
-  std::map<double, double> open_skews_;  // by the wall's frame: others may tell of these yet
-  double closed_skew_ = 0;               // of frames up to this one nobody does
+  std::map<double, double> open_skews_;  // by the wall's frame: other viewers may still report these
+  double closed_skew_ = 0;               // frames up to this one are not reported any more
   Quantiles skews_;
   TileSums tiles_;
   uint64_t epochs_ = 0;
 };
 
-// What viewers tell row by row: the columns of frames.csv, updates.csv and stages.csv (docs/metrics.md).
+// Columns of the rows that viewers send, for frames.csv, updates.csv and stages.csv (docs/metrics.md).
 
 /// Names of the columns of "frames", "updates" or "stages", in their order, without the viewer's; empty: no such table.
-/// Every viewer tells all of them: rows with others are nobody's.
+/// Every viewer sends all of them: rows with other columns are not a viewer's.
 const std::vector<std::string>& viewer_columns(std::string_view table);
 
 }  // namespace telesplat::metrics

@@ -26,15 +26,15 @@ const char* name_of(PlanRow::Outcome outcome) {
 struct PlanLine {
   const std::string& viewer;
   const PlanRow& row;
-  double begin_s;  // of the run
+  double begin_s;  // the run's begin, on the master's clock
 
   std::string moment(double master_s) const { return fmt::format("{:.9f}", master_s - begin_s); }
-  // Of the packer's; empty: it did not tell.
+  // Returns one of the packer's figures; empty: it did not send it.
   std::string figure(const char* name) const {
     const auto found = row.figures.find(name);
     return found == row.figures.end() ? std::string() : fmt::format("{}", found->second);
   }
-  // What the answer took beyond the planning: two ways, and the packer's queue.
+  // Returns the time of the answer without the planning: two ways, and the packer's queue.
   std::string wait_ms() const {
     const auto plan_ms = row.figures.find("plan_ms");
     if (plan_ms == row.figures.end()) return {};

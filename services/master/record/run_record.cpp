@@ -25,15 +25,15 @@ namespace telesplat::metrics {
 namespace {
 
 std::string seconds(double v) { return fmt::format("{:.9f}", v); }
-// With as many digits as it has: displayed frames are made again from poses and times.
+// Returns all digits of a number: displayed frames are made again from poses and times.
 std::string exact(double v) { return fmt::format("{}", v); }
 
 struct TileRow {
   const std::string& sampler;
   const wire::TileDone& tile;
-  double begin_s;  // of the run
+  double begin_s;  // the run's begin, on the master's clock
 
-  // Empty: it did not happen.
+  // Returns seconds since the run's begin; empty: it did not happen.
   std::string moment(double master_s) const { return master_s > 0 ? seconds(master_s - begin_s) : ""; }
 };
 constexpr Column<TileRow, std::string> kTileColumns[] = {
@@ -75,14 +75,14 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
 bool is_time(const std::string& column) { return column.ends_with("_s"); }
 bool is_moment(const std::string& column) { return is_time(column) && column != "t_s"; }
 
-// Of a viewer's table. Moments count from the run's beginning.
+// Returns a cell of a viewer's table. Moments count from the run's begin.
 std::string cell_of(const std::string& column, double value, double begin_s) {
   if (is_moment(column)) return seconds(value - begin_s);
-  if ((column == "display_ms" || column == "motion_to_photon_ms") && value < 0) return "";  // there was none
+  if ((column == "display_ms" || column == "motion_to_photon_ms") && value < 0) return "";  // it did not happen
   return is_time(column) ? seconds(value) : exact(value);
 }
 
-// The scene's parameters and texts follow.
+// The first columns of epochs.csv; the scene's parameters and texts follow.
 struct EpochRow {
   EpochId epoch;
   double t_s;
@@ -117,7 +117,7 @@ Error cannot_write(const std::string& path) {
   return Error{fmt::format("{}: cannot write into it: {}", path, std::strerror(errno))};
 }
 
-// What the system said, which ends such an error.
+// Returns the system's text, which ends such an error.
 std::string reason_of(const Error& error) { return error.text.substr(error.text.rfind(": ") + 2); }
 
 void append(std::vector<std::string>& cells, const std::vector<std::string>& more) {
@@ -143,7 +143,7 @@ RunRecord::~RunRecord() {
   if (!directory_.empty()) unlink(path_of(kRoom).c_str());
 }
 
-// A disk that is full has room for the summary all the same.
+// Reserves room on the disk, so that the summary fits even if the disk is full.
 void RunRecord::keep_room() {
   const int fd = ::open(path_of(kRoom).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, kPrivate);
   if (fd < 0) return;
@@ -161,7 +161,7 @@ Status RunRecord::open_files() {
   return begin_life();
 }
 
-// Rows go on behind those that are there, of which the last may be cut off.
+// Continues the files behind their last whole rows.
 Status RunRecord::go_on() {
   auto before = read_lives(directory_);
   if (!before) return before.error();
@@ -226,7 +226,7 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
   return ok_status();
 }
 
-// Viewers and samplers send rows once a second: what a master that is killed loses is not much more.
+// Called as rows come, once a second from viewers and samplers: a master that is killed loses little more than that.
 void RunRecord::flush() {
   for (TextFile& file : files_) file.flush();
   trace_.file().flush();
@@ -270,7 +270,7 @@ void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string,
   out.flush();
 }
 
-// False: it cannot be opened, which counts as a file that could not be written.
+// Opens a table at its first row. False: it cannot be opened, which counts as a file that could not be written.
 bool RunRecord::open_late(Csv csv, const std::vector<std::string>& columns) {
   if (file(csv).is_open()) return true;
   if (!file(csv).open(path_of(file_of(csv)), options_.table_bytes)) {

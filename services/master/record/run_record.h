@@ -1,7 +1,7 @@
 // The record of a run: frames.csv, updates.csv, stages.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv,
-// trace.json, lives.csv and summary.json in one folder (docs/metrics.md tells every column and figure). The master
-// writes it as rows arrive: what was measured survives, however the run ends. A disk that is full ends nothing, and is
-// told.
+// trace.json, lives.csv and summary.json in one folder (docs/metrics.md lists every column and figure). The master
+// writes it as rows arrive: they survive, however the run ends. A full disk does not end the run; it is logged and
+// reported.
 #pragma once
 
 #include <array>
@@ -33,23 +33,23 @@ struct Assignment {
 };
 
 struct RecordOptions {
-  uint64_t table_bytes = 0;  ///< of a table's file at most; 0: no limit
-  uint64_t trace_bytes = 0;  ///< of trace.json
-  bool goes_on = false;      ///< with the record that another master left in the folder
+  uint64_t table_bytes = 0;  ///< size of a table's file at most; 0: no limit
+  uint64_t trace_bytes = 0;  ///< size of trace.json at most; 0: no limit
+  bool goes_on = false;      ///< continues the record that another master left in the folder
 };
 
-/// Counts rows of viewers that never reached the record: what they say that they have sent, against what came. Of
-/// frames.csv the numbers of frames tell it (Measured).
+/// Counts rows of viewers that never reached the record: rows that they report as sent, less rows that came. For
+/// frames.csv, frame numbers show the losses (Measured).
 class RowLosses {
  public:
-  static constexpr size_t kMostKept = 512;  ///< viewers and tables; of further ones no loss is known
-  static constexpr double kMostLost = 1e6;  ///< at once: a larger step is no loss but another count
+  static constexpr size_t kMostKept = 512;  ///< pairs of viewer and table; losses of further ones are not known
+  static constexpr double kMostLost = 1e6;  ///< rows at once: after a larger step the viewer counts anew
 
   void came(const Process& viewer, const std::string& table, uint64_t rows) {
     if (Rows* r = rows_of(viewer, table)) r->came += double(rows);
   }
-  /// sent: in its life, before it says this, over the same connection. What a viewer sent before it said so first is
-  /// another record's.
+  /// sent: rows that it sent over this connection in its life, before this report. The first report sets the base: rows
+  /// that were missing by then belong to another record.
   void told(const Process& viewer, const std::string& table, double sent) {
     Rows* r = rows_of(viewer, table);
     if (!r || !(sent >= 0)) return;
@@ -64,7 +64,7 @@ class RowLosses {
   struct Rows {
     uint64_t pid = 0;
     double came = 0;
-    std::optional<double> missing;  // as it was told last
+    std::optional<double> missing;  // by its last report
   };
   Rows* rows_of(const Process& viewer, const std::string& table) {
     const std::pair key(viewer.name, table);
@@ -81,20 +81,20 @@ class RowLosses {
 class RunRecord {
  public:
   /// Opens a folder for writing, and makes it if need be. `directory` may be empty: nothing is written, summaries still
-  /// work. begin: from here on count the times of all files, which come on the master's clock; of a record that goes
-  /// on, from where they did before.
+  /// work. begin: times of all files, which come on the master's clock, count from it; in a record that goes on,
+  /// from its first begin.
   static Result<std::unique_ptr<RunRecord>> open(const std::string& directory, const Beginning& begin = {},
                                                  const RecordOptions& options = {});
   ~RunRecord();
 
-  /// Rows of "frames", "updates", "stages" or "spans" from `process`. Refuses unknown tables and shapes that do not
-  /// fit. Columns whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from
-  /// its own.
+  /// Rows of "frames", "updates", "stages" or "spans" from `process`. Error: unknown table, or a shape that does not
+  /// fit. Columns whose names end in _s are moments on the master's clock, except t_s, which each viewer counts from
+  /// its own begin.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
-  /// What this process says of itself: rows that it has sent and that did not come are lost.
+  /// Takes the process' report of rows that it sent: rows that did not come are lost.
   void add_status(const Process& process);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
-  /// The scene's parameters and texts (quoted in the file) from t_s on. epochs.csv has the names of the first epoch.
+  /// Adds the scene's parameters and texts (quoted in the file) from t_s on. epochs.csv has the first epoch's names.
   void add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
                  const std::map<std::string, std::string>& texts = {});
   void add_assignment(const std::vector<Assignment>& transfers);
@@ -102,11 +102,11 @@ class RunRecord {
   void add_plan(const std::string& viewer, const PlanRow& plan);
 
   /// The figures of docs/metrics.md, "summary.json", from everything so far. processes: all that took part; counters:
-  /// the master's ("leases_expired", "tiles_released", ...); about: what was done, its beginning left out.
+  /// the master's ("leases_expired", "tiles_released", ...); about: the run; its begin, lives and losses are filled in.
   nlohmann::ordered_json summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
                                  About about = {}) const;
 
-  /// Another file of the record, written as a whole. Error: it cannot be, which is counted.
+  /// Writes another file of the record as a whole. Error: it cannot be written, which is counted.
   Status write_file(const std::string& name, const std::string& text);
 
   /// Writes summary.json. If something was displayed, runs/latest is this run from now on. Error: something could not
@@ -114,7 +114,7 @@ class RunRecord {
   Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
                 const About& about = {});
   const Beginning& begin() const { return begin_; }
-  /// Masters that wrote it so far, this one included.
+  /// Number of masters that wrote the record so far, with this one.
   size_t lives() const { return lives_.size(); }
   RecordLosses losses() const;
 
@@ -141,7 +141,7 @@ class RunRecord {
   TextFile lives_file_;
   TraceFile trace_;
   std::vector<std::string> unwritten_;  // other files
-  std::string why_;                     // what the system said of the last of them
+  std::string why_;                     // the system's text for the last of them
 };
 
 }  // namespace telesplat::metrics

@@ -22,40 +22,40 @@ constexpr double kRawBytesPerSlicePixel = 4, kRawBytesPerPoint = 12;
 
 double hundredths(double v) { return std::round(v * 100) / 100; }
 double thousandths(double v) { return std::round(v * 1000) / 1000; }
-/// What others say may be any number.
+/// Returns a number as a whole one from 0 to 2^53: peers may send any number.
 uint64_t whole(double v) {
   constexpr double kMostWhole = 9007199254740992;  // 2^53
   return v > 0 ? uint64_t(std::min(v, kMostWhole)) : 0;
 }
 
 ordered_json or_null(const std::string& text) { return text.empty() ? ordered_json() : ordered_json(text); }
-/// By file; null: there are none.
+/// Returns the rows by file; null: there are no rows.
 ordered_json rows_of(const std::map<std::string, uint64_t>& rows) {
   return rows.empty() ? ordered_json() : ordered_json(rows);
 }
-/// Those that no file took, and those of frames that never came.
+/// Rows that no file took, and rows of frames that never came.
 std::map<std::string, uint64_t> lost_rows(const Measured& measured, const RecordLosses& losses) {
   auto out = losses.lost;
   if (measured.frame_rows_lost > 0) out["frames.csv"] += measured.frame_rows_lost;
   return out;
 }
-/// A figure that means something only if `measured` is so.
+/// Returns a figure that has a meaning only if `measured`; else null.
 template <class V>
 ordered_json if_measured(bool measured, V value) {
   return measured ? ordered_json(value) : ordered_json();
 }
 
-/// Rates need two frames.
+/// Returns a rate; null with fewer than two frames.
 ordered_json rate(const ViewerFigures& v, uint64_t count) {
   return if_measured(v.duration_s > 0, hundredths(v.per_second(count)));
 }
 
-/// What samplers made, what was sent of it, what viewers took.
+/// Data that samplers made, data that was sent, and data that viewers took.
 struct Traffic {
   double bytes_raw = 0, bytes_sent = 0, bytes_consumed = 0;
   double redundancy = 0;   ///< share of the samples that elimination left out
-  bool sampled = false;    ///< something was
-  bool eliminates = true;  ///< points: of slice images nothing is eliminated
+  bool sampled = false;    ///< true if there were samples
+  bool eliminates = true;  ///< true for points; nothing is eliminated from slice images
 };
 
 bool has_slices(const std::string& kind_name) {
@@ -63,7 +63,7 @@ bool has_slices(const std::string& kind_name) {
   return kind && scene::pipeline_of(*kind) == scene::Pipeline::kSlices;
 }
 
-/// points: that viewers inserted.
+/// points: number that viewers inserted.
 Traffic traffic(const Measured& m, bool slices, double points) {
   Traffic out;
   const double samples = m.tiles().samples(), kept = m.tiles().kept();
@@ -71,7 +71,7 @@ Traffic traffic(const Measured& m, bool slices, double points) {
   out.sampled = samples > 0;
   out.bytes_consumed = points * kRawBytesPerPoint;
   if (slices) {
-    // Samples are voxels, and kept are pixels that they made.
+    // `samples` counts voxels, and `kept` the pixels that they made.
     out.eliminates = false;
     out.bytes_raw = kept * kRawBytesPerSlicePixel;
     out.bytes_consumed += m.points_received * kRawBytesPerSlicePixel;
@@ -82,7 +82,7 @@ Traffic traffic(const Measured& m, bool slices, double points) {
   return out;
 }
 
-/// How evenly samplers were kept busy: (most - least) / mean.
+/// Returns how evenly samplers were kept busy: (most - least) / mean.
 ordered_json busy_spread(const std::map<std::string, double>& busy_s) {
   double least = 1e300, most = 0, sum = 0;
   auto by_name = ordered_json::object();
@@ -96,7 +96,7 @@ ordered_json busy_spread(const std::map<std::string, double>& busy_s) {
   return {{"spread", if_measured(sum > 0, std::round(spread * 1e4) / 1e4)}, {"busy_s", by_name}};
 }
 
-/// One number where there is one process of a role, a list where there may be several.
+/// Returns one number for roles with one process, a list for roles that may have several.
 ordered_json peak_rss(const Roster& roster) {
   const auto tenths = [](double v) { return std::round(v * 10) / 10; };
   ordered_json out = ordered_json::object();
@@ -127,7 +127,7 @@ ordered_json renderer_of(const Roster& roster) {
   return kept.front() > 0 ? "gl" : "cpu";
 }
 
-/// Median milliseconds a frame of both, which it was chosen by; null: there was no choice.
+/// Returns the median milliseconds a frame of both, by which it was chosen; null: there was no choice.
 ordered_json renderer_times(const Roster& roster) {
   const auto cpu = roster.each("viewer", "renderer_cpu_ms"), gl = roster.each("viewer", "renderer_gl_ms");
   if (cpu.empty() || gl.empty()) return nullptr;
@@ -140,7 +140,7 @@ ordered_json what_was_shown(const std::vector<Process>& processes, const Roster&
     if (roster.number("viewer", width) <= 0) return nullptr;
     return {whole(roster.number("viewer", width)), whole(roster.number("viewer", height))};
   };
-  // Data servers of earlier versions told one of the other two.
+  // Data servers of earlier versions sent triangles or voxels.
   double primitives = roster.number("data", "primitives");
   if (primitives == 0) primitives = roster.number("data", "triangles") + roster.number("data", "voxels");
   return {{"scene", or_null(roster.fact("data", "scene"))},
@@ -162,7 +162,7 @@ ordered_json what_was_shown(const std::vector<Process>& processes, const Roster&
           {"links", links_of(processes)}};
 }
 
-/// Where the time of view updates went: each stage's distribution, and its share of the sum of all latencies.
+/// Returns each stage's distribution of time in view updates, and its share of the sum of all latencies.
 ordered_json where_time_went(const Measured& m) {
   const double sum = m.stages_latency_ms;
   auto out = ordered_json::object();
@@ -176,7 +176,7 @@ ordered_json where_time_went(const Measured& m) {
   return if_measured(!out.empty(), out);
 }
 
-/// How well the processes' clocks are known: the worst of each.
+/// Returns how well the processes' clocks are known: the largest offset and error of all.
 ordered_json clocks(const std::vector<Process>& processes) {
   double offset_ms = 0, error_ms = -1;
   for (const Process& p : processes) {
@@ -225,7 +225,7 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
           {"frames_sampled", whole(frames_completed)}};
 }
 
-/// Which couplings were in force, and how often a viewer went from one to another.
+/// Returns the frames under each coupling, and how often viewers went from one to another.
 ordered_json how_coupled(const Measured& m) {
   if (!m.coupled) return {{"coupling_changes", nullptr}, {"frames_by_coupling", nullptr}};
   auto frames = ordered_json::object();
@@ -233,7 +233,7 @@ ordered_json how_coupled(const Measured& m) {
   return {{"coupling_changes", m.coupling_changes}, {"frames_by_coupling", frames}};
 }
 
-/// How well the displays of a wall kept in step: each of the wall's frames counts once, whoever told of it.
+/// Returns how well the displays of a wall kept in step: each of the wall's frames counts once.
 ordered_json how_together(const Measured& m, double incomplete) {
   const Quantiles ms = m.swap_skew_ms();
   return {{"swap_skew_ms", distribution_json(ms)},
@@ -268,7 +268,7 @@ ordered_json how_much(const Traffic& t, double run_s, double viewers) {
           {"redundancy_eliminated", if_measured(t.sampled && t.eliminates, t.redundancy)}};
 }
 
-/// How far from what was sampled points were published, at most, and what of that was made exact.
+/// Returns the largest errors with which points were published, and how much was made exact later.
 ordered_json how_exact(const TileSums& t, const Roster& roster) {
   const bool any = t.bounded() > 0;
   return {{"errors_allowed",
@@ -281,7 +281,7 @@ ordered_json how_exact(const TileSums& t, const Roster& roster) {
                                          {"bytes_refined", whole(roster.counted("packer", "bytes_refined"))}})}};
 }
 
-/// What steering spared: rays of all tiles, against those of whole views.
+/// Returns the rays that steering saved: rays of all tiles, against those of whole views.
 ordered_json what_was_steered(const TileSums& t) {
   return {{"rays_cast", if_measured(t.rays_full() > 0, whole(t.rays_cast()))},
           {"rays_full", if_measured(t.rays_full() > 0, whole(t.rays_full()))},
@@ -305,7 +305,7 @@ ordered_json what_was_held(const Measured& m, const Roster& roster, double parti
           {"first_points_s", if_measured(first_points_s > 0, first_points_s / viewers)}};
 }
 
-/// Predictions of all viewers, each as often as it made them; null: none was made, or none could be judged.
+/// Returns mean errors of all viewers' predictions, weighted by their numbers; null: no prediction could be judged.
 ordered_json predicted(const Roster& roster, const std::string& what) {
   const auto counts = roster.each("viewer", what + "s");
   const double count = std::accumulate(counts.begin(), counts.end(), 0.0);

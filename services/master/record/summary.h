@@ -1,4 +1,4 @@
-// summary.json: a run in figures. docs/metrics.md says how each is computed.
+// summary.json: a run in figures. docs/metrics.md says how each figure is computed.
 #pragma once
 
 #include <map>
@@ -12,11 +12,11 @@
 
 namespace telesplat::metrics {
 
-/// processes: all that took part; counters: the master's ("leases_expired", "tiles_released", ...). Where nothing was
-/// measured, and where a figure has no meaning for the scene, it is null.
+/// processes: all that took part; counters: the master's ("leases_expired", "tiles_released", ...). A figure is null if
+/// it was not measured, or has no meaning for the scene.
 nlohmann::ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
                                  const std::map<std::string, double>& counters, const About& about);
-/// Puts what `measured` tells in the place of what this summary has of it; what only processes tell stays.
+/// Replaces the figures of a summary that come from `measured`; those that only processes report stay.
 void measure_again(const Measured& measured, nlohmann::ordered_json& summary);
 
 }  // namespace telesplat::metrics

@@ -18,7 +18,7 @@ namespace {
 
 constexpr size_t kBuffer = 64 << 10;
 
-// All of it, or errno.
+// Writes all of `text`. Returns 0, or errno.
 int write_all(int fd, std::string_view text) {
   while (!text.empty()) {
     const ssize_t n = ::write(fd, text.data(), text.size());
@@ -54,7 +54,7 @@ bool TextFile::open_behind(const std::string& path, uint64_t keep_bytes, uint64_
   path_ = path;
   limit_bytes_ = limit_bytes;
   bytes_ = keep_bytes;
-  // Some of what is written to need not be a file of this disk, and cannot be cut off.
+  // The path may be a device or a pipe, which cannot be cut off.
   fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | (keep_bytes ? 0 : O_TRUNC), kPrivate);
   if (fd_ < 0 || keep_bytes == 0) return is_open();
   if (ftruncate(fd_, off_t(keep_bytes)) == 0 && lseek(fd_, 0, SEEK_END) == off_t(keep_bytes)) return true;

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-// To the nanosecond.
+// Returns microseconds, rounded to the nanosecond.
 double microseconds(double s) { return std::round(s * 1e9) / 1e3; }
 
 std::string text_of(const json& event) { return event.dump(-1, ' ', false, json::error_handler_t::replace); }
@@ -23,12 +23,12 @@ const char* lane_name(const std::string& role, int lane) {
   return "work";
 }
 
-constexpr double kMostNumber = 9007199254740992;  // 2^53: peers may say anything
+constexpr double kMostNumber = 9007199254740992;  // 2^53: peers may send any number
 constexpr int kMostLanes = 16;
-constexpr int kMostProcesses = 10000;  // of a life; further ones are one
+constexpr int kMostProcesses = 10000;  // in a life; further ones share a number
 constexpr size_t kMostTraceLives = 100000;
 
-// What of these is known.
+// Returns those of the three that are known, above or equal to 0.
 json args_of(double frame, double tile, double request) {
   json out = json::object();
   const auto add = [&](const char* key, double number) {
@@ -69,7 +69,7 @@ void TraceFile::event(const json& event) {
   has_events_ = true;
 }
 
-// Processes of several machines may have the same pid.
+// Returns the number of a process in the file: processes of several machines may have the same pid.
 int TraceFile::number_of(const std::string& process, const std::string& role, uint64_t pid) {
   if (processes_.size() >= size_t(kMostProcesses) - 1 && !processes_.contains(process))
     return first_number_ + kMostProcesses - 1;
@@ -119,7 +119,7 @@ void TraceFile::add(const Process& process, const wire::MetricRows& rows) {
   }
 }
 
-// Two events, told apart from others of their kind by an id.
+// Adds a span as two events with an id, so that it may overlap others of its kind.
 void TraceFile::overlapping(int process, const std::string& name, const std::string& category, double begin_s,
                             double end_s, json args) {
   json out{{"ph", "b"},

@@ -1,4 +1,4 @@
-// trace.json: who did what when, in Chrome's trace format (docs/metrics.md).
+// trace.json: the work of each process over time, in Chrome's trace format (docs/metrics.md).
 #pragma once
 
 #include <map>
@@ -14,21 +14,21 @@
 
 namespace telesplat::metrics {
 
-/// A JSON list that grows event by event and ends when this does.
+/// A JSON list that grows event by event and ends when this object does.
 class TraceFile {
  public:
   ~TraceFile() { close(); }
   /// begin_s: on the master's clock; times in the file count from there. limit_bytes: as TextFile::open().
   bool open(const std::string& path, double begin_s, uint64_t limit_bytes = 0);
-  /// The same, but goes on behind the first keep_bytes of what is there (whole_events()). life: of the record, from 2
-  /// on: its processes are told apart from those of lives before.
+  /// Likewise, but goes on behind the file's first keep_bytes bytes (whole_events()). life: number of this life of the
+  /// record, from 2 on, which distinguishes its processes from those of earlier lives.
   bool open_behind(const std::string& path, double begin_s, uint64_t keep_bytes, size_t life, uint64_t limit_bytes = 0);
-  /// Rows of "spans" (recorder.h). Rows whose name is not among the columns are left out. Precondition: kSpanWidth
+  /// Adds rows of "spans" (recorder.h). Leaves out rows whose name is not among the columns. Precondition: kSpanWidth
   /// values a row.
   void add(const Process& process, const wire::MetricRows& rows);
-  /// What the master had of a tile: its lease, until the packer had it.
+  /// Adds the master's span of a tile: from its lease until the packer had it.
   void add_lease(const std::string& sampler, const wire::TileDone& tile);
-  /// And of a plan: from the question to the answer.
+  /// Adds the master's span of a plan: from the question to the answer.
   void add_plan(const std::string& viewer, const PlanRow& plan);
   /// Ends the list.
   void close();
@@ -45,10 +45,10 @@ class TraceFile {
   TextFile file_;
   double begin_s_ = 0;
   bool has_events_ = false;
-  int first_number_ = 1;                  // of this life's processes
-  std::map<std::string, int> processes_;  // numbers of those whose names the file has
-  std::set<std::pair<int, int>> lanes_;   // that have names
-  uint64_t span_ = 0;                     // of those that may overlap: the last one's id
+  int first_number_ = 1;                  // number of this life's first process
+  std::map<std::string, int> processes_;  // numbers of processes whose names the file has
+  std::set<std::pair<int, int>> lanes_;   // lanes whose names the file has
+  uint64_t span_ = 0;                     // id of the last span that may overlap others
 };
 
 }  // namespace telesplat::metrics

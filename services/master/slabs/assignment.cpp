@@ -48,15 +48,15 @@ std::vector<AssignedTransfer> assignment(const Partition& partition, const Volum
 namespace {
 
 constexpr uint32_t kNone = ~0u;
-constexpr uint64_t kImproveSteps =
-    2'000'000;  // transfers looked at while rounds are improved: master_scatter says what that takes
+// Transfers that are looked at while rounds are improved, at most; bench master_scatter measures the time for it.
+constexpr uint64_t kImproveSteps = 2'000'000;
 
 uint64_t key(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
 
 // A bipartite multigraph whose edges get colours.
 class Colouring {
  public:
-  // A node of more than `colours` transfers is taken for several nodes of at most `colours` transfers each.
+  // Splits a node of more than `colours` transfers into several nodes of at most `colours` transfers each.
   Colouring(std::span<const Transfer> transfers, uint32_t colours) : colours_(colours), words_((colours + 63) / 64) {
     std::map<std::array<uint32_t, 3>, uint32_t> nodes;
     std::map<std::array<uint32_t, 2>, uint32_t> seen;
@@ -76,7 +76,7 @@ class Colouring {
     const auto [u, v] = edges_[e].ends;
     uint32_t free = lowest_free(u, v);
     if (free == kNone) {
-      // a is free at u, b at v. The path of a, b, a, ... from v does not end at u: coming there it would come by a.
+      // Colour a is free at u, b at v. The path of colours a, b, a, ... from v cannot end at u: it would arrive by a.
       const uint32_t a = lowest_free(u, u), b = lowest_free(v, v);
       recolour(path(v, a, b), a, b);
       free = a;
@@ -129,7 +129,7 @@ class Colouring {
       used_[node * words_ + colour / 64] |= uint64_t{1} << colour % 64;
     }
   }
-  // Edges of colours a and b change them. All of a path or cycle, or they collide.
+  // Swaps colours a and b of these edges, which must be all edges of a path or cycle, or colours collide.
   void recolour(const std::vector<uint32_t>& edges, uint32_t a, uint32_t b) {
     for (const uint32_t e : edges)
       for (const uint32_t node : edges_[e].ends) {
@@ -148,7 +148,7 @@ class Colouring {
     return out;
   }
 
-  // The path or cycle of the two colours that e is part of, marked.
+  // Marks and returns the path or cycle of the two colours to which e belongs.
   std::vector<uint32_t> component(uint32_t e, uint32_t a, uint32_t b) {
     std::vector<uint32_t> out{e};
     marks_[e] = mark_;
@@ -164,7 +164,7 @@ class Colouring {
   }
 
   // Recolours the edges of two colours such that the sum of their two longest edges is the smallest possible. False: it
-  // was.
+  // was so already.
   bool improve(uint32_t a, uint32_t b) {
     const auto longest = [&](const std::vector<uint32_t>& edges, uint32_t colour) {
       uint64_t most = 0;
@@ -174,8 +174,8 @@ class Colouring {
     };
     std::vector<uint32_t> both = by_colour_[a];
     both.insert(both.end(), by_colour_[b].begin(), by_colour_[b].end());
-    // The longest edge of all is in one of them, say a; b's longest is then at least the smaller side's of every
-    // component.
+    // The longest edge of all has one of the colours, say a; b's longest is then at least as long as that of the
+    // smaller side of every component.
     std::vector<uint32_t> turned;
     uint64_t most_a = 0, most_b = 0;
     ++mark_;
@@ -201,10 +201,10 @@ class Colouring {
   uint32_t colours_;
   size_t words_;
   std::vector<Edge> edges_;
-  std::vector<uint64_t> used_;                 // a bit a colour, by node
+  std::vector<uint64_t> used_;                 // a bit for each colour, by node
   std::unordered_map<uint64_t, uint32_t> at_;  // the edge of a colour at a node
   std::vector<std::vector<uint32_t>> by_colour_;
-  std::vector<uint64_t> marks_;  // of edges
+  std::vector<uint64_t> marks_;  // mark_ of the search that last reached each edge
   uint64_t mark_ = 0;
 };
 

@@ -11,8 +11,8 @@
 namespace telesplat::master {
 namespace {
 
-// The fewest ranges of weight at most `cap` that slices [i, n) can be cut into, for every i; sums[i]: weight of the
-// slices before i.
+// Returns, for every i, the fewest ranges of weight at most `cap` into which slices [i, n) can be cut; sums[i]:
+// weight of the slices before i.
 std::vector<int> ranges_needed(const std::vector<uint64_t>& sums, uint64_t cap) {
   const size_t n = sums.size() - 1;
   std::vector<int> needed(n + 1, 0);
@@ -24,7 +24,7 @@ std::vector<int> ranges_needed(const std::vector<uint64_t>& sums, uint64_t cap) 
   return needed;
 }
 
-// The lightest heaviest range.
+// Returns the least weight that the heaviest of at most `parts` ranges can have.
 uint64_t smallest_cap(const std::vector<uint64_t>& sums, std::span<const uint32_t> weights, int parts) {
   uint64_t lo = std::max<uint64_t>(*std::max_element(weights.begin(), weights.end()), sums.back() / uint64_t(parts));
   uint64_t hi = sums.back();
@@ -56,8 +56,8 @@ std::vector<SlabRange> cut_slabs(std::span<const uint32_t> weights, int parts) {
   std::vector<SlabRange> out;
   int begin = 0;
   for (int left = parts; left > 1; --left) {
-    // As near to an equal share of what is left as the cap allows, here and for the rest, of which each must have
-    // something.
+    // End as near to an equal share of the remaining weight as the cap allows, for this range and the later ones, and
+    // leave each later one a slice that weighs something.
     const double target = double(sums[size_t(n)] - sums[size_t(begin)]) / left;
     int best = -1;
     double best_off = 0;
@@ -68,7 +68,7 @@ std::vector<SlabRange> cut_slabs(std::span<const uint32_t> weights, int parts) {
       const double off = std::abs(double(weight) - target);
       if (best < 0 || off < best_off) best = end, best_off = off;
     }
-    CHECK(best > 0);  // the cap was chosen so that there is one
+    CHECK(best > 0);  // the cap was chosen so that a cut exists
     out.push_back({begin, best});
     begin = best;
   }
@@ -107,8 +107,8 @@ bool SlabPartitions::has(const std::string& sampler) const {
 
 void SlabPartitions::join(const std::string& sampler) {
   if (has(sampler)) return;
-  // In the middle, the bounds of the others' slabs move least: about a quarter of the volume goes to another sampler,
-  // half of it at an end.
+  // In the middle, the bounds of the others' slabs move least: about a quarter of the volume goes to another sampler;
+  // at an end it would be half.
   samplers_.insert(samplers_.begin() + std::ptrdiff_t((samplers_.size() + 1) / 2), sampler);
   changed_ = true;
 }
@@ -123,7 +123,7 @@ bool SlabPartitions::all_here(const Partition& p) const {
   return std::all_of(p.slabs.begin(), p.slabs.end(), [&](const Slab& s) { return has(s.sampler); });
 }
 
-// Whether the newest slabs weigh so differently now that others would be clearly better.
+// True if the newest slabs weigh so differently now that others would be clearly better.
 bool SlabPartitions::uneven() const {
   const auto heaviest = [&](const auto& ranges, const auto& range_of) {
     uint64_t most = 0;
@@ -164,8 +164,8 @@ std::shared_ptr<const Partition> SlabPartitions::update(double now_s) {
       in_use_ = newest_;
       none_since_s_.reset();
     } else if (!in_use_ && now_s - *none_since_s_ >= kReadyPatience_s) {
-      // The next one is not waited for either, if this happens again before one is ready: samplers may come and go all
-      // the time.
+      // none_since_s_ stays: if this happens again before a partition is ready, the next one is not waited for either.
+      // Samplers may come and go all the time.
       in_use_ = newest_;
     }
   }

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kGuessedBytesPerVoxel = 4;
 
-// The volume that a part is of.
+// True if two parts are of the same volume.
 bool same_volume(const volume::Session& a, const volume::Session& b) {
   return a.grid == b.grid && a.levels == b.levels && a.lit == b.lit && a.steps == b.steps && a.parts == b.parts;
 }
@@ -42,7 +42,7 @@ Status VolumeScene::fits(const volume::Session& session, const wire::Hello& data
   return ok_status();
 }
 
-// Forgets the volume before.
+// Begins a volume and forgets the one before.
 void VolumeScene::begin(const volume::Session& session) {
   const auto parts = size_t(session.parts);
   servers_.assign(parts, {});
@@ -81,7 +81,7 @@ Result<VolumeScene::Change> VolumeScene::adopt(const wire::Hello& data) {
   told_[p] = session;
   content_hash_[p] = scene::value_or(data.facts, "content_hash", std::string());
   known_[p] = true;
-  // The first part's server says what the volume looks like as it begins.
+  // The first part's server decides how the volume looks at the beginning.
   if (p == 0 && !says_the_same) {
     session_ = session;
     box_room_ = data.box_room;

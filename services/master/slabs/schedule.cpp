@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kLeastSilent_s = 0.25;
 
-// A frame without a picture: one pixel that looks past the grid on the plane of one slice in front of the eye.
+// Returns a frame without a picture: one pixel that looks past the grid on the plane of one slice in front of the eye.
 volume::ShearFrame empty_frame(const volume::Grid& grid, const glm::dvec3& eye_room) {
   volume::ShearFrame out;
   const glm::dvec4 eye = grid.room_to_index() * glm::dvec4(eye_room, 1);
@@ -28,7 +28,7 @@ volume::ShearFrame empty_frame(const volume::Grid& grid, const glm::dvec3& eye_r
       if (t > farthest) farthest = t, out.axis = a, out.direction = direction;
     }
   const int slice = out.direction > 0 ? grid.size[size_t(out.axis)] - 1 : 0;
-  if (farthest < 1) out.eye[out.axis] = slice - out.direction;  // in the middle of a single voxel
+  if (farthest < 1) out.eye[out.axis] = slice - out.direction;  // the eye is in the middle of a single voxel
   out.layers = {{slice, slice + 1, double(slice)}};
   // Where this slope meets the slice is beyond the grid's farthest voxel.
   out.u0 = (std::abs(out.eye[out.u()]) + 2.0 * volume::kMaxSide) / out.t(slice);
@@ -63,7 +63,7 @@ bool VolumeSchedule::wait_for_others(InstanceId viewer, double now_s) const {
   return view && WallViews::concerns(*view) && !walls_.ready(*view, waiting, now_s);
 }
 
-// Views of a wall's viewers go with each other, and late ones with them where they look from there.
+// True if `other` joins the frame of `first`: views of one ask of a wall do, and other views from the same eye.
 bool VolumeSchedule::in_one_frame(const wire::ViewRequest& first, const wire::ViewRequest& other) const {
   if (other.viewer == first.viewer) return false;
   if (WallViews::concerns(other)) {
@@ -75,8 +75,8 @@ bool VolumeSchedule::in_one_frame(const wire::ViewRequest& first, const wire::Vi
 
 bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only,
                                  double now_s) {
-  // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two
-  // they might not.
+  // Frames of one partition become complete in order, since every sampler has a part in each and works in order;
+  // frames of two partitions might not.
   if (!partition || (!frames_.empty() && frames_.back().partition != partition)) return false;
   const auto first =
       take_view(turns_only, now_s, InFlight::kAny, [&](InstanceId viewer) { return !wait_for_others(viewer, now_s); });
@@ -132,7 +132,7 @@ void VolumeSchedule::extend(LeaseId lease, const std::string& sampler, double no
     }
 }
 
-// Sampled again it would most likely be refused again.
+// Ends the frame: sampled again, its slab would most likely be refused again.
 void VolumeSchedule::refused(const wire::TileRefused& m, const std::string& sampler) {
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
   if (f == frames_.end() || m.tile >= f->slabs.size()) return;
@@ -162,7 +162,7 @@ bool VolumeSchedule::tile_done(const wire::TileDone& m, double now_s) {
 }
 
 int VolumeSchedule::drop_where(const std::function<bool(const Frame&)>& lost) {
-  // With a frame go the later ones of its viewers that take views in order.
+  // With a frame, drop later frames of its viewers that take views in order.
   std::vector<bool> dropped;
   std::set<InstanceId> in_order;
   for (const Frame& f : frames_) {
@@ -237,7 +237,7 @@ double VolumeSchedule::lease_time_s() const {
 
 namespace {
 
-constexpr size_t kMaxWallsWaiting = 64;  // others' views are sampled as they come
+constexpr size_t kMaxWallsWaiting = 64;  // views of further walls are sampled as they come
 
 }  // namespace
 
@@ -248,10 +248,10 @@ void WallViews::on(const wire::ViewRequest& view) {
   Wall& wall = place->second;
   if (fresh) wall.first_s = wall.since_s = now_s, wall.ask = view.ask;
   wall.viewers = view.wall_viewers;
-  // One that comes while the others have frames has not heard of what they ask for.
+  // A viewer that comes while the others have frames does not know yet what they ask for.
   Member& member = wall.members.try_emplace(view.viewer, Member{.waited_for = !wall.under_way}).first->second;
   if (!member.since_s) member.since_s = now_s;
-  // Views of viewers' own heads are together until there are some of one head.
+  // Views from viewers' own heads (ask 0) belong together until there are views of one head.
   const bool next = view.ask > wall.ask || (view.ask == 0 && wall.ask == 0 && wall.begun);
   if (!next) return;
   wall.ask = view.ask;

@@ -18,52 +18,52 @@
 
 namespace telesplat::master {
 
-// Which views of a wall's viewers are sampled together, and when: those that were asked for of one head (Swap::ask), as
-// one frame. A viewer that is late, stopped or gone does not hold up the others. No sockets, no clocks.
+// Decides which views of a wall's viewers are sampled together, and when: views that were asked for of one head
+// (Swap::ask) are one frame. A viewer that is late, stopped or gone does not hold up the others. No sockets, no clocks.
 
 class WallViews {
  public:
-  /// What viewers ask for together comes within this time. A frame begins without those who need longer.
+  /// Views that viewers ask for together come within this time. A frame begins without later ones.
   static constexpr double kTogether_s = 0.03;
-  /// From a wall's first view until its views begin, if not all of its viewers ask sooner.
+  /// Time from a wall's first view until its views begin, if not all of its viewers ask sooner.
   static constexpr double kGather_s = 1;
-  /// A viewer whose views belong to no frame of the others has one of its own after so long.
+  /// A viewer whose view belongs to no frame of the others gets a frame of its own after this time.
   static constexpr double kLeftOver_s = 0.25;
-  /// A viewer that was late is waited for again after so many views in time.
+  /// A viewer that was late is waited for again after this many views in time.
   static constexpr int kInTime = 3;
 
-  /// The first view of a viewer that waits; null: none does.
+  /// Returns a viewer's first view that waits; null: no view waits.
   using Waiting = std::function<const wire::ViewRequest*(InstanceId viewer)>;
 
-  /// Whether it is for this class: an asynchronous view of a wall's viewer.
+  /// True for views that this class handles: asynchronous views of a wall's viewers.
   static bool concerns(const wire::ViewRequest& view) { return !view.wall.empty() && view.buffers == 0; }
-  /// A view that concerns it was asked for, at moments.received_s.
+  /// Takes a view that concerns() and was asked for at moments.received_s.
   void on(const wire::ViewRequest& view);
   void forget(InstanceId viewer);
   bool empty() const { return walls_.empty(); }
-  /// Whether a frame may begin with this view, which waits and concerns it: with all others of together().
+  /// True if a frame may begin with this view, which waits and concerns(), and with all others of together().
   bool ready(const wire::ViewRequest& view, const Waiting& waiting, double now_s) const;
-  /// Whether another view that waits belongs to the frame that begins with `first`; both concern it.
+  /// True if another view that waits belongs to the frame that begins with `first`. Precondition: both concerns().
   static bool together(const wire::ViewRequest& first, const wire::ViewRequest& other) {
     return other.wall == first.wall && other.ask == first.ask;
   }
-  /// A frame of these views began; the first one concerns it, and was ready.
+  /// A frame of these views began. Precondition: the first one concerns() and was ready().
   void begun(const std::vector<wire::ViewRequest>& views);
-  /// It was dropped: its views are together again.
+  /// The frame of these views was dropped: they belong together again.
   void dropped(const std::vector<wire::ViewRequest>& views);
 
  private:
   struct Member {
     bool waited_for = true;
     int in_time = 0;                // views in a row, while it is not waited for
-    std::optional<double> since_s;  // it has had no view since then
+    std::optional<double> since_s;  // since then it waits for a frame
   };
   struct Wall {
     uint64_t viewers = 1;
-    double first_s = 0;      // of all of its views
-    uint64_t ask = 0;        // the newest
-    double since_s = 0;      // its first view came
-    bool begun = false;      // its frame
+    double first_s = 0;      // time of its first view
+    uint64_t ask = 0;        // newest number of a head asked for
+    double since_s = 0;      // when the first view of `ask` came
+    bool begun = false;      // the frame of `ask` began
     bool under_way = false;  // any frame began
     std::map<InstanceId, Member> members;
   };
@@ -71,19 +71,19 @@ class WallViews {
 };
 
 inline constexpr double kSameEye_m = 0.02;       ///< views from eyes that are no farther apart are sampled as one
-inline constexpr double kLongestLease_s = 60.0;  ///< however slow samplers are known to be
+inline constexpr double kLongestLease_s = 60.0;  ///< limit, however slow samplers are
 
-/// The frame that shows `requests` (at least one, seen from the first one's eye). Where nothing of the grid is in view:
-/// a raster of one pixel that looks past the grid, and one layer of one slice, so that the request is answered with an
-/// empty picture at hardly any cost.
+/// Returns the frame that shows `requests` (at least one, seen from the first one's eye). If nothing of the grid is in
+/// view: a raster of one pixel that looks past the grid, and one layer of one slice, so that the request is answered
+/// with an empty picture at hardly any cost.
 volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRequest>& requests, int layers);
 
 class VolumeSchedule : public Views {
  public:
-  /// The options' frames_in_flight and lease_timeout_s count here.
+  /// Uses frames_in_flight, lease_timeout_s and longest_fetch_s of the options.
   explicit VolumeSchedule(const ScheduleOptions& options) : Views(options) {}
 
-  /// For frames that begin from now on.
+  /// Set grid and layers of frames that begin from now on.
   void set_grid(const volume::Grid& grid) { grid_ = grid; }
   void set_layers(int layers) { layers_ = layers; }
   int layers() const { return layers_; }
@@ -94,39 +94,39 @@ class VolumeSchedule : public Views {
 
   /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within
   /// kSameEye_m of its. Views of a wall's viewers begin together (WallViews). Viewers take turns; turns_only: only
-  /// those that have a turn. False: none waits, or only some of a wall that wait for others; as many frames are in
-  /// flight as may be (views_at_once()); or some of another partition are: so all of a viewer's views become complete
-  /// in order.
+  /// those that have a turn. False: no view waits, or only views of a wall that wait for others; as many frames are
+  /// in flight as views_at_once() allows; or frames of another partition are, so that all of a viewer's views become
+  /// complete in order.
   bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false,
                    double now_s = 0);
 
-  /// The slab of `sampler` in the oldest frame that still needs it. nullopt: there is none.
+  /// Leases the slab of `sampler` in the oldest frame that still needs it. nullopt: no frame needs it.
   std::optional<wire::SliceLease> lease(const std::string& sampler, double now_s);
   /// Gives a lease of this sampler its full time again, until longest_fetch_s after it was leased (a lease without
   /// extensions if that is longer). Others are ignored.
   void extend(LeaseId lease, const std::string& sampler, double now_s);
-  /// What this sampler made of its slab cannot be used: the frame ends, and its viewers ask again when they want to.
+  /// The packer cannot use this sampler's slab image: the frame ends, and its viewers ask again when they want to.
   void refused(const wire::TileRefused& refused, const std::string& sampler);
   /// The packer has this slab. True the first time; false for duplicates, slabs never leased and unknown frames.
   bool tile_done(const wire::TileDone& tile, double now_s);
 
-  /// Drops the frames of leases that ran out; leases then last twice as long, until a frame is complete. lost_sampler
-  /// is told whose. Returns how many ran out.
+  /// Drops the frames of leases that ran out; leases then last twice as long, until a frame is complete. Calls
+  /// lost_sampler with each of their samplers. Returns the number of leases that ran out.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
-  /// A sampler is gone: drops the frames that lack its slab. Returns how many of its leases were out.
+  /// A sampler is gone: drops the frames that lack its slab. Returns the number of its leases that were out.
   int release_sampler(const std::string& sampler);
   /// Drops all frames (new epoch, new packer). Their views wait again; of asynchronous viewers only if no newer request
   /// does.
   void drop_frames();
 
   size_t leases_of(const std::string& sampler) const;
-  /// Samplers that have had a lease for longer than three typical ones: worth finding out whether they live.
+  /// Samplers that have had a lease for longer than three typical slab times: they may be dead.
   std::vector<std::string> overdue(double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
-  uint64_t given_up() const { return given_up_; }  ///< frames with slabs that cannot be used
+  uint64_t given_up() const { return given_up_; }  ///< frames that ended since a slab could not be used
   uint64_t slabs_released() const { return released_; }
-  /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled for
-  /// each time leases ran out.
+  /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled each
+  /// time leases ran out.
   double lease_time_s() const;
 
  private:
@@ -145,7 +145,7 @@ class VolumeSchedule : public Views {
   };
   bool wait_for_others(InstanceId viewer, double now_s) const;
   bool in_one_frame(const wire::ViewRequest& first, const wire::ViewRequest& other) const;
-  /// Drops where `lost`; returns how many leases were out.
+  /// Drops frames for which lost() is true; returns the number of their leases that were out.
   int drop_where(const std::function<bool(const Frame&)>& lost);
 
   volume::Grid grid_;

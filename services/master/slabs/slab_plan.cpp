@@ -15,9 +15,9 @@
 namespace telesplat::master {
 namespace {
 
-constexpr double kWeighPatience_s = 2.0;  // slabs wait no longer for data servers to say what slices weigh
-constexpr double kLeastWait_s = 2.0, kMostWait_s = 60.0;  // of a sampler that failed twice, or more often
-constexpr double kForgiven_s = 10.0;                      // after which it failed once
+constexpr double kWeighPatience_s = 2.0;  // slabs wait no longer for data servers to send the weights of slices
+constexpr double kLeastWait_s = 2.0, kMostWait_s = 60.0;  // without a slab, for samplers that failed at least twice
+constexpr double kForgiven_s = 10.0;                      // after this time a failure is forgotten
 
 }  // namespace
 
@@ -44,7 +44,7 @@ Result<Adopted> SlabPlan::adopt(const wire::Hello& data, double now_s) {
     since_s_ = now_s;
   }
   if (change->servers) partitions_.invalidate();
-  // Servers that came before the last part were told of an epoch without a scene: what they know now is another one.
+  // Servers that came before the last part were welcomed to an epoch without a scene: the scene begins another one.
   return Adopted{
       .whole = true, .changed = begins || change->another || change->values, .in_parts = volume_.servers().size() > 1};
 }
@@ -128,7 +128,7 @@ void SlabPlan::fail(const std::string& sampler, bool asks, double now_s) {
   failed_[sampler] = f;
 }
 
-// Once may be chance: another partition would cost more.
+// One refusal may be chance, and another partition would cost more: from the second on, the sampler loses its slab.
 void SlabPlan::refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) {
   schedule_.refused(refused, sampler);
   const auto [failed, first] = failed_.try_emplace(sampler);
@@ -139,7 +139,7 @@ void SlabPlan::refused(const wire::TileRefused& refused, const std::string& samp
 void SlabPlan::prepare(double now_s) {
   for (auto& [sampler, f] : failed_)
     if (now_s >= f.until_s && std::exchange(f.asks, false)) partitions_.join(sampler);
-  // Slabs cut without knowing what slices weigh would be fetched in vain.
+  // Slabs that are cut before the weights of slices are known would be fetched in vain.
   if (!whole_ || (!volume_.weighed() && now_s - since_s_ < kWeighPatience_s)) return;
   if (const auto made = partitions_.update(now_s)) assign(*made, now_s);
 }
@@ -209,7 +209,8 @@ bool SlabPlan::done(const wire::TileDone& tile, const std::string& sampler, doub
   return schedule_.tile_done(tile, now_s);
 }
 
-// A sampler that has asked for work since is through with its slab, though the packer has not said so: it asks no more.
+// A sampler that asked for work after its lease has finished its slab, though the packer did not report it. It will not
+// ask again, so it counts as asking.
 Ticked SlabPlan::tick(double now_s) {
   const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
     log::warn("a slice lease of sampler {} expired; its slab goes to others until it asks again",

@@ -13,8 +13,8 @@ class SlabPlan final : public Plan {
  public:
   SlabPlan(const MasterOptions& options, const PlanLinks& links);
 
-  /// A server of another volume than the one before, while servers of other parts of it are missing: nothing is shown
-  /// until they come.
+  /// If the server has another volume than before, and servers of its other parts are missing, nothing is shown until
+  /// they come.
   Result<Adopted> adopt(const wire::Hello& data, double now_s) override;
   void leave_data(InstanceId data) override { volume_.leave(data); }
   void describe(wire::Welcome& welcome) const override;
@@ -38,7 +38,7 @@ class SlabPlan final : public Plan {
   }
   void refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) override;
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override;
-  /// Views of a wall may be about to begin without one that is late.
+  /// True if views of a wall wait: they may soon begin without a late one.
   bool hurried() const override { return schedule_.walls_here() && schedule_.view_waiting(); }
   Ticked tick(double now_s) override;
   void join(const std::string& sampler, double now_s) override;
@@ -55,8 +55,8 @@ class SlabPlan final : public Plan {
   /// A sampler whose lease ran out, or whose slab cannot be used.
   struct Failed {
     double since_s = 0;
-    double wait_s = 0, until_s = 0;  ///< that long, until then, it gets no slab: twice as long each time
-    bool asks = false;               ///< it would like to have one again
+    double wait_s = 0, until_s = 0;  ///< it gets no slab for wait_s, until until_s; twice as long each time
+    bool asks = false;               ///< it wants a slab again
   };
   void fail(const std::string& sampler, bool asks, double now_s);
   Result<Obeyed> set(std::map<std::string, std::string> arguments);
@@ -68,9 +68,9 @@ class SlabPlan final : public Plan {
   SlabPartitions partitions_;
   std::map<std::string, Failed> failed_;
   std::set<std::string> asked_;  // samplers that ask for work since their newest lease
-  bool whole_ = false;        // all of the volume is known, and partitions and schedule are of it
-  double since_s_ = 0;        // since when
-  TokenBucket log_{10, 200};  // lines that hellos bring about: not more often than a person reads
+  bool whole_ = false;           // all parts of the volume are known; partitions and schedule follow it
+  double since_s_ = 0;           // when the volume became whole, or was replaced
+  TokenBucket log_{10, 200};     // limits log lines about hellos to what a person can read
 };
 
 }  // namespace telesplat::master

@@ -102,19 +102,19 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   const auto trusts = [&](const std::string& other) { return !trusted_here || trust_.has(other); };
   const double pixel_s = costs_.pixel_s(sampler);
   const auto extras = std::find_if(frames_.rbegin(), frames_.rend(), [](const Frame& f) { return !f.extra; });
-  const Frame* newest = extras == frames_.rend() ? nullptr : &*extras;  // of views
+  const Frame* newest = extras == frames_.rend() ? nullptr : &*extras;  // newest frame of a view
   for (Frame* frame : in_turn(now_s)) {
     Frame& f = *frame;
     if (!may_lease(f, now_s)) continue;
     const double row_s = pixel_s * f.camera.width;
-    // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would
-    // keep all waiting.
+    // The last rows, one for each sampler, go to samplers that hold no other lease: all would wait for a busy one that
+    // kept them for later.
     const bool last = &f == newest && f.tiles.rows_left() > 0 && f.tiles.rows_left() <= int(workers());
     if (last && !idle && (row_s == 0 || row_s > kDearRow_s) && leases_of(sampler) > 0) continue;
     const int rows = band_rows(target_s(), row_s, f.tiles.rows_left(), workers());
     if (const auto tile = f.tiles.take(sampler, rows, even_own)) return lease_tile(f, *tile, sampler, now_s);
     if (f.tiles.open() || f.extra) continue;
-    // A frame is finished before the next is fed: what is out too long gets a second sampler.
+    // A frame is finished before the next one gets samplers: a tile that is out too long goes to a second sampler.
     if (const auto tile = f.tiles.overdue(now_s - backup_after_s(f.planned), &sampler, trusts)) {
       ++backups_;
       return lease_tile(f, *tile, sampler, now_s);
@@ -123,7 +123,7 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   return std::nullopt;
 }
 
-// Views of a guest who spends much let those of others go first; of one person's frames the oldest does.
+// Orders frames for leases: frames of persons who spent less go first; of one person's frames, the oldest does.
 std::vector<FrameSchedule::Frame*> FrameSchedule::in_turn(double now_s) {
   std::vector<Frame*> out;
   for (Frame& f : frames_) out.push_back(&f);
@@ -134,7 +134,7 @@ std::vector<FrameSchedule::Frame*> FrameSchedule::in_turn(double now_s) {
   return out;
 }
 
-// So that it can show that it delivers, while a frame never waits for it.
+// Lets a failed sampler show that it delivers, with a tile that a trusted one has: no frame waits for it.
 std::optional<wire::Lease> FrameSchedule::lease_copy(const std::string& sampler, double now_s) {
   const auto trusts = [&](const std::string& other) { return trust_.has(other); };
   for (Frame& f : frames_)
@@ -144,7 +144,7 @@ std::optional<wire::Lease> FrameSchedule::lease_copy(const std::string& sampler,
 
 wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
   const LeaseId id = next_lease();
-  // One that has not finished a tile may have to fetch what it samples first, and to arrange it.
+  // A sampler that has not finished a tile may have to fetch its data first, and to arrange it.
   const double time_s = costs_.knows(sampler) ? lease_time_s(f.planned) : options().lease_timeout_s;
   f.tiles.lease(tile, id, sampler, now_s, now_s + time_s);
   spending().spend(f.request.viewer, double(f.tiles.tile(tile).rays), now_s);
@@ -190,7 +190,7 @@ void FrameSchedule::refused(const wire::TileRefused& m, const std::string& sampl
   end_hopeless();
 }
 
-// A frame that waits for a tile that cannot be had holds up its viewer, and one of the few places of frames in flight.
+// Ends frames with a tile that cannot be had: they would hold up their viewer, and one of the few places in flight.
 void FrameSchedule::end_hopeless() {
   for (Frame& f : frames_)
     if (!f.tiles.closed() && f.tiles.hopeless(kMostRefused, kMostLost)) {
@@ -200,7 +200,7 @@ void FrameSchedule::end_hopeless() {
   end_closed();
 }
 
-// A tile that another was faster with counts as well: a slow sampler is one that delivers.
+// A tile that another sampler delivered first counts as well: a slow sampler does deliver.
 void FrameSchedule::note_delivery(const wire::TileDone& m, const std::string& sampler, double now_s) {
   const auto held = [&](const Frame& f) {
     const auto* out = f.tiles.out(m.lease);
@@ -215,7 +215,7 @@ void FrameSchedule::note_delivery(const wire::TileDone& m, const std::string& sa
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
   note_delivery(m, sampler, now_s);
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
-  // What a block gives is counted to its last tile: of plans, and of views in squares, a block is a tile.
+  // A block's bytes are counted with its last tile; in plans, and in views in squares, a block is a tile.
   const bool known = f != frames_.end() && f->tiles.whole_blocks() && f->step == 1 && m.tile < f->tiles.tiles();
   if (known && !f->planned)
     gate_.published(m.bytes_sent, f->tiles.tile(m.tile).rays, now_s, LinkGate::Rays::kAll);
@@ -232,7 +232,7 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
     }
   if (!f->tiles.done(m.tile)) return false;
   if (took_s) (f->planned ? planned_time_s_ : tile_time_s_).add(*took_s);
-  // A sampler that cannot read a mask casts all.
+  // A sampler that cannot read a mask casts all pixels.
   const auto& tile = f->tiles.tile(m.tile);
   const uint64_t all = uint64_t(tile.rect.width) * uint64_t(tile.rect.height);
   const double work_s = m.moments.encode_end_s - m.moments.sample_begin_s;
@@ -249,7 +249,7 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
   const bool view = frame->step == 1 && !frame->extra;
   const PlannedView ended{.frame = frame->id, .epoch = frame->epoch, .view = frame->request};
   if (!view) return frames_.erase(frame);
-  if (left(frame->id)) {  // nobody waits for what is missing
+  if (left(frame->id)) {  // no viewer waits for what is missing
     frames_.erase(frame);
     complete(ended.frame, false);
     return frames_.end();
@@ -267,7 +267,7 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
   }
   frames_.erase(frame);
   view_complete(ended, whole);
-  // A coarse frame that is not there yet shows nothing any more.
+  // The view's coarse frame, if it is not complete yet, has nothing to show any more.
   std::erase_if(frames_, [&](const Frame& f) {
     return f.step != 1 && f.request.viewer == ended.view.viewer && f.request.request == ended.view.request;
   });
@@ -340,20 +340,20 @@ void FrameSchedule::drop_frames() {
   ends_.clear();
 }
 
-// ---- what waits for viewers' links, and what has waited too long ---------------------------------------------------
+// ---- views that wait for viewers' links, and views that waited too long --------------------------------------------
 
 bool FrameSchedule::may_lease(const Frame& f, double now_s) const {
   return open(f.request.viewer, now_s) && (!f.extra || gate_.idle(now_s));
 }
 
-// What a link would carry for long arrives coarse first, so that there is something to see.
+// A view that a link would carry for long arrives coarse first, so that there is something to see.
 bool FrameSchedule::arrives_coarse(const wire::ViewRequest& view) const {
   if (cut_.coarse) return true;
   const auto pixels = static_cast<double>(view.camera.width) * static_cast<double>(view.camera.height);
   return cut_.coarse_if_slow && gate_.takes_s(view.viewer, pixels).value_or(0) > kCoarseFrom_s;
 }
 
-// Nothing is lost by it: what came stays, and the newer view's plan asks for what is still lacking in that view.
+// To end such a view loses nothing: what came stays, and the newer view's plan asks for what that view still lacks.
 bool FrameSchedule::is_overtaken(const Frame& f, double now_s) const {
   if (f.extra || f.step != 1 || f.request.buffers > 0 || open(f.request.viewer, now_s)) return false;
   if (!f.tiles.open() || !f.tiles.whole_blocks() || now_s - f.begun_s < kOvertaken_s) return false;
@@ -371,17 +371,17 @@ void FrameSchedule::end_overtaken(double now_s) {
 }
 
 std::vector<wire::FrameEnd> FrameSchedule::take_ends(double now_s) {
-  for (wire::FrameEnd& end : ends_) end.moments.leased_s = now_s;  // what is left out waited until now
+  for (wire::FrameEnd& end : ends_) end.moments.leased_s = now_s;  // the tiles left out waited until now
   return std::exchange(ends_, {});
 }
 
-// A view of another viewer waits, whose link takes more.
+// True if a view of another viewer waits, and that viewer's link takes more.
 bool FrameSchedule::other_waits(InstanceId viewer, double now_s) const {
   return view_waits([&](InstanceId other) { return other != viewer && gate_.open(other, now_s); });
 }
 
-// Nothing is put back for the viewer's own sake: its samples would be made, and sent, once more. What is out of such a
-// frame still comes; its viewer's requests wait until the link takes more.
+// Puts back views whose links take nothing, but only to let other viewers begin: their samples are made, and sent, once
+// more. Tiles of such a frame that are out still come; its viewer's requests wait until the link takes more.
 void FrameSchedule::put_back_held(double now_s) {
   std::vector<wire::ViewRequest> held;
   for (Frame& f : frames_) {

@@ -40,7 +40,7 @@ FrameTiles FrameTiles::of_squares(int width, int height, int tile_size) {
 }
 
 FrameTiles FrameTiles::of_bands(int width, int height, size_t bands) {
-  constexpr int kRows = 16;  // of a JPEG block
+  constexpr int kRows = 16;  // rows of a JPEG block
   const auto most = int(wire::kMaxTilePixels / width);
   const int count = int(std::clamp<size_t>(bands, 1, 1024)), wanted = (height + count - 1) / count;
   const int rows = std::max(kRows, std::min((wanted + kRows - 1) / kRows, most / kRows) * kRows);

@@ -115,7 +115,7 @@ Result<bool> JuliaParameters::play(const PlayOrder& order) {
   return other;
 }
 
-// The instant `elapsed_s` of the timeline.
+// Takes the values at `elapsed_s` on the timeline. True: they changed.
 bool JuliaParameters::take(double elapsed_s) {
   elapsed_s_ = elapsed_s;
   auto next = julia::parameters_at(*julia_, timeline_, elapsed_s);

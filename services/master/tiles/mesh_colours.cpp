@@ -41,7 +41,7 @@ bool MeshColours::adopt(const wire::Hello& data, std::string& problem) {
   return before != now_;
 }
 
-// "N" or "N REASON".
+// Takes the answer to order N: "N", or "N REASON" if it failed. True: the mesh looks different.
 bool MeshColours::hear_answer(const std::string& answer, std::string& problem) {
   uint64_t number = 0;
   const auto read = std::from_chars(answer.data(), answer.data() + answer.size(), number);
@@ -72,7 +72,7 @@ std::string MeshColours::waits_for() const {
                      order_->colouring ? "is" : "are");
 }
 
-// What the command comes to, seen from what is shown or was ordered last.
+// Returns the colouring that the command asks for: changes the last order's, else the one that is shown.
 Result<std::optional<scene::Colouring>> MeshColours::wanted(const wire::Control& command) const {
   const auto& last = order_ ? order_->colouring : now_;
   const auto array = command.arguments.find("array"), map = command.arguments.find("map");

@@ -1,5 +1,5 @@
-// What a mesh is coloured by in the current epoch, what may change it, and what the data server was asked for so that
-// it can. No clocks.
+// The colouring of a mesh in the current epoch: carries out orders to change it, and asks the data server for the
+// arrays that they need. No clocks.
 #pragma once
 
 #include <optional>
@@ -14,19 +14,19 @@ namespace telesplat::master {
 
 class MeshColours {
  public:
-  /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: what was
-  /// chosen since then stays. True: the mesh looks otherwise. problem: what is wrong with what it says; then it is
-  /// taken for a mesh without arrays, or what was asked of it did not come.
+  /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: a colouring
+  /// chosen since then stays. True: the mesh looks different. problem: what is wrong with what it says; then it is
+  /// taken for a mesh without arrays, or an array that was asked for did not come.
   bool adopt(const wire::Hello& data, std::string& problem);
-  /// Fills in what everyone is told, and what the data server shall have ready.
+  /// Adds to a welcome the colouring, for everyone, and the order for the data server.
   void describe(wire::Welcome& welcome) const;
-  /// For the run's record; empty: the file's own colours.
+  /// The colouring as text, for the run's record; empty: the file's own colours.
   std::string text() const { return now_ ? scene::to_text(*now_) : std::string(); }
 
-  /// nullopt: by nothing, in the file's own colours.
+  /// The colouring that is shown; nullopt: the file's own colours.
   const std::optional<scene::Colouring>& now() const { return now_; }
 
-  /// For people: what is on its way, or why the last array that was asked for did not come; empty: neither.
+  /// For people: the array that is being fetched, or why the last one did not come; empty: neither.
   std::string waits_for() const;
 
   /// "colour": arguments "array" (as scene::parse_colour_by() takes it) and "map" (as colour::from_text() takes it),
@@ -43,13 +43,13 @@ class MeshColours {
   Result<std::optional<scene::Colouring>> wanted(const wire::Control& command) const;
 
   bool is_mesh_ = false;
-  std::string content_hash_, told_;  // by the data server
+  std::string content_hash_, told_;  // as the data server sent them
   std::vector<scene::ArrayInfo> arrays_;
-  colour::ColourMap map_;  // of an array, unless another one is chosen with it
+  colour::ColourMap map_;  // map for an array, unless another one is chosen with it
   std::optional<scene::Colouring> now_;
-  std::optional<Order> order_;  // that waits for its answer
+  std::optional<Order> order_;  // order that waits for its answer
   uint64_t orders_ = 0;
-  std::string failure_;  // of the last order
+  std::string failure_;  // why the last order failed
 };
 
 }  // namespace telesplat::master

@@ -10,7 +10,7 @@ void LinkGate::report(const wire::LinkReport& told, double now_s) {
   if (is_new) link.wished_s = now_s;
   link.told = told;
   link.told_s = now_s;
-  link.since_bytes = 0;  // the packer says it in the order in which it publishes
+  link.since_bytes = 0;  // the packer reports in the order in which it publishes
 }
 
 double LinkGate::wished_backlog(const Link& link, double now_s) const {
@@ -92,8 +92,8 @@ std::map<std::string, double> LinkGate::figures(InstanceId viewer) const {
   return out;
 }
 
-// Older tiles fade: rows of the frame's middle cost more than those of its edges, so ten tiles tell more than a
-// hundred.
+// Older tiles fade: rows of the frame's middle cost more than those of its edges, so a mean of ten tiles is better
+// than one of a hundred.
 void SamplingCosts::Mean::add(double s, double n) {
   seconds = 0.9 * seconds + s;
   pixels = 0.9 * pixels + n;

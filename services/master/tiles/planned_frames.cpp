@@ -1,4 +1,4 @@
-// The part of the schedule that is steered: plans are asked for, and become frames.
+// The steered part of FrameSchedule: asks for plans, and makes frames of them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,46 +26,45 @@ auto answered_by(const wire::Plan& plan) {
   return [&](const auto& asked) { return asked.request.frame == plan.frame && asked.request.epoch == plan.epoch; };
 }
 
-// Refining rays of a view: edges may have four times as many, and what is new has no limit.
+// Refining rays get this part of a link's update: edges may have four times as many rays, and new places any number.
 constexpr uint64_t kRefiningPart = 3;
 
 uint64_t within(uint64_t rays, uint64_t link_rays) {
   return link_rays == 0 ? rays : std::max<uint64_t>(1, std::min(rays, link_rays));
 }
 
-// Before anything is known of what rays cost.
+// Rays of a tile and of an extra frame while the cost of a ray is unknown.
 constexpr uint64_t kFirstTileRays = 8192, kFirstExtraRays = 65536;
-// Of fewer rays the lease costs more than the rays.
+// With fewer rays than kLeastTileRays a lease costs more than its rays.
 constexpr double kLeastTileRays = 1024, kMostRays = 1 << 24;
-// Tiles of plans have longer sides, for the same reason: with 256 pixels a view of 1280x800 had 24 tiles of 260 rays,
-// and two thirds of the time samplers waited for leases. Where few samplers share them a view of few rays is one tile:
-// packer and viewers pay for each tile, too, in every cluster that it adds points to, and links in what stands around
-// its image. With 1024 pixels that view had a second tile with a fifth of its rays.
+// Sides of a plan's tiles, in tile sizes; long ones for the same reason: with 256 pixels a view of 1280x800 had 24
+// tiles of 260 rays, and samplers waited for leases two thirds of the time. With few samplers a view of few rays is one
+// tile: packer and viewers pay for each tile in every cluster to which it adds points, and links pay for the
+// overhead of its image. With 1024 pixels that view had a second tile with a fifth of its rays.
 constexpr int kPlannedSide = 2, kPlannedSideOfFew = 8;
-constexpr double kTargetsOfFew = 3;  // of lease_target_s
+constexpr double kTargetsOfFew = 3;  // lease targets that a tile may take
 constexpr size_t kFewSamplers = 2;
-constexpr uint64_t kUnknownTileRays = 16384;  // of rays beyond views, while nothing is known of any link
-constexpr double kMuchUnseen = 0.25;          // of a view's pixels
-constexpr uint64_t kTilesPerUpdate = 4;       // that a link carries in LinkGate::kUpdate_s
+constexpr uint64_t kUnknownTileRays = 16384;  // rays of an extra frame's tile while no link is known
+constexpr double kMuchUnseen = 0.25;          // share of a view's pixels
+constexpr uint64_t kTilesPerUpdate = 4;       // tiles that a link carries in LinkGate::kUpdate_s
 
 double figure_of(const wire::Plan& plan, const char* name) {
   const auto found = plan.figures.find(name);
   return found == plan.figures.end() ? 0.0 : found->second;
 }
 
-// The wait for its plan is over.
+// Notes that the view's wait for its plan is over.
 PlannedView planned(PlannedView view, double now_s) {
   view.view.moments.planned_s = now_s;
   return view;
 }
 
-// More than any plan has. Hostile masks of as many pixels take up to 0.4 s to decode.
+// More than any plan has. Hostile masks of this many pixels take up to 0.4 s to decode.
 constexpr uint64_t kMaxMaskedPixels = uint64_t{1} << 24;
 
-// Error: the plan of a view is of another camera than was asked for; a tile's mask is none of its size, or has another
-// number of rays than the plan says; all masks together have more than kMaxMaskedPixels. What wire::check(plan)
-// refuses need not be looked for.
-// Cost: that of decoding the masks; those of plans take 0.1 to 0.6 ms a million pixels.
+// Error: a view's plan has another camera than was asked for; a tile's mask is not of its size, or has another
+// number of rays than the plan says; all masks together have more than kMaxMaskedPixels. Relies on wire::check(plan)
+// for the rest. Cost: that of decoding the masks; masks of plans take 0.1 to 0.6 ms a million pixels.
 Status check_answer(const wire::PlanRequest& asked, const wire::Plan& plan) {
   if (plan.full) return ok_status();
   if (!asked.extra && plan.camera != asked.camera)
@@ -177,7 +176,7 @@ bool PlanQuestions::extra_open() const {
   return std::any_of(open_.begin(), open_.end(), [](const Asked& a) { return a.request.extra; });
 }
 
-// Of the view that it was about; a newer one may want more.
+// Ends extra questions for the view that `extra` was about; a newer view may want more.
 void PlanQuestions::exhaust(const wire::PlanRequest& extra) {
   const auto seen = viewers_.find(extra.viewer);
   if (seen != viewers_.end() && seen->second.view.view.request == extra.request) seen->second.exhausted = true;
@@ -201,7 +200,7 @@ PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer, double now_s)
   const size_t samplers = std::max<size_t>(workers(), 1);
   out.refining_rays = refining_.most(samplers);
   out.link_rays = viewer ? gate_.update_rays(*viewer) : gate_.least_update_rays(now_s);
-  // Tiles are leased at the pace of a link: one is no more than a part of what it carries for an update.
+  // Tiles are leased at the pace of a link: each has at most 1 / kTilesPerUpdate of an update's rays.
   const auto of_link = [&](uint64_t rays) {
     if (out.link_rays == 0) return !viewer && !gate_.known() ? std::min(rays, kUnknownTileRays) : rays;
     return std::min(rays, std::max(uint64_t(kLeastTileRays), out.link_rays / kTilesPerUpdate));
@@ -296,8 +295,8 @@ void FrameSchedule::view_complete(const PlannedView& view, bool whole) {
   plans_.known(view);
 }
 
-// One extra frame at a time, so that the packer has seen what came of it. While views wait for each other the samplers
-// do its tiles in between; it is planned while they are busy with a view, as the packer is not.
+// One extra frame at a time, so that the packer knows its samples before it plans the next. While views wait for each
+// other, samplers do its tiles in between; it is planned while they are busy with a view and the packer is not.
 void FrameSchedule::begin_extra(EpochId epoch, double now_s) {
   const bool extra_out = std::any_of(frames_.begin(), frames_.end(), [](const Frame& f) { return f.extra; });
   if (!plans_.on(now_s) || plans_.extra_open() || extra_out || !gate_.idle(now_s)) return;
@@ -307,7 +306,7 @@ void FrameSchedule::begin_extra(EpochId epoch, double now_s) {
   questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(std::nullopt, now_s), now_s));
 }
 
-// A view makes what is beyond others old, but not what is beyond itself: a head that rests asks for it every second.
+// Closes extra frames beyond older views, but not those beyond this view: a head that rests asks for it every second.
 void FrameSchedule::close_extras(const wire::ViewRequest& view, double now_s) {
   for (Frame& f : frames_) {
     const bool same = f.request.viewer == view.viewer && f.request.camera == view.camera;
@@ -321,7 +320,7 @@ void FrameSchedule::end_closed() {
     f = f->tiles.closed() && f->tiles.complete() ? end_frame(f) : std::next(f);
 }
 
-// What is out of its frames may still come; the rest is not sampled.
+// Tiles of the viewer's frames that are out may still come; the others are not sampled.
 void FrameSchedule::forget_viewer(InstanceId viewer) {
   Views::forget_viewer(viewer);
   for (Frame& f : frames_)

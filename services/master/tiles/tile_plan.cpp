@@ -78,7 +78,7 @@ void TilePlan::new_packer() {
   schedule_.drop_frames();
 }
 
-// The packer forgets what it published of this plan's scene, so nobody will hear that it arrived.
+// The packer forgets what it published of this plan's scene, so it will not report that it arrived.
 void TilePlan::put_aside() {
   schedule_.forget_links();
   schedule_.drop_frames();
@@ -99,7 +99,7 @@ bool TilePlan::begin(EpochId epoch, bool turns_only, double now_s) {
   return begun;
 }
 
-// What is only beyond views is not for animations: their next epoch has no use for it.
+// Animations get no rays beyond views: their next epoch has no use for them.
 void TilePlan::begin_extra(EpochId epoch, double now_s) {
   if (playing()) return;
   schedule_.begin_extra(epoch, now_s);

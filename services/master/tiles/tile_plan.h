@@ -26,7 +26,7 @@ class TilePlan final : public Plan {
   void drop_frames() override { schedule_.drop_frames(); }
   void new_packer() override;
   void put_aside() override;
-  /// Views whose plans are late are sampled without; views that a newer one overtook end.
+  /// Begins views whose plans are late without a plan; ends views that a newer one overtook.
   void prepare(double now_s) override;
   bool may_begin(const Idle&) override { return schedule_.view_waiting(); }
   bool begins_early(double now_s) const override { return schedule_.begins_early(now_s); }
@@ -45,7 +45,7 @@ class TilePlan final : public Plan {
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override {
     return schedule_.tile_done(tile, sampler, now_s);
   }
-  /// Samplers idle while tiles are out: a backup may soon be due.
+  /// True while frames are in flight: a backup for an idle sampler may soon be due.
   bool hurried() const override { return schedule_.frames_in_flight() > 0; }
   Ticked tick(double now_s) override;
   void heard_of(const std::string& sampler) override { schedule_.heard_of(sampler); }
@@ -67,7 +67,7 @@ class TilePlan final : public Plan {
   FrameSchedule schedule_;
   JuliaParameters scene_;
   MeshColours colours_;
-  geometry::Box box_room_;  // of the last data server
+  geometry::Box box_room_;  // as the last data server sent it
   std::map<std::string, std::string> facts_;
 };
 

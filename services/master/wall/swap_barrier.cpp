@@ -8,13 +8,14 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kFramesRemembered = 8;  // whose presenting is not told by all yet
-constexpr double kPeriodShare = 0.1;     // of a frame in the mean of their distances
-constexpr double kSourcePatience_s = 1;  // until viewers show another packer's model without the one that lacks it
+constexpr size_t kFramesRemembered = 8;  // until all viewers have reported that they presented them
+constexpr double kPeriodShare = 0.1;     // share of the newest frame in between_s_
+constexpr double kSourcePatience_s = 1;  // until the wall shows another packer's model without a viewer that lacks it
 constexpr uint64_t kMostFirstFrame = uint64_t{1} << 52;  // wire::check() refuses 2^53 and more
 constexpr double kLeadGrows = 0.5, kLeadShrinks = 0.99;
 
-// Bit n of a mask of frames is the frame n before the newest. The same frames, by another newest one.
+// Bit n of a mask of frames is the frame n before the newest. Returns the mask of the same frames for
+// another newest one.
 uint64_t seen_from(uint64_t newest, const wire::ShownState& state) {
   const uint64_t earlier = newest > state.newest ? newest - state.newest : 0;
   const uint64_t later = state.newest > newest ? state.newest - newest : 0;
@@ -30,7 +31,7 @@ double SwapBarrier::frame_s() const {
   return std::min(std::max(period_s, between_s_), kMostFrame_s);
 }
 
-// Those who are ready have waited for a frame beyond the time at which they would have swapped.
+// Time at which ready viewers have waited one frame longer than to the end of their last frame.
 double SwapBarrier::deadline_s() const {
   double period_s = 0;
   for (const auto& [id, m] : members_) period_s = std::max(period_s, m.said.period_s);
@@ -43,7 +44,7 @@ bool SwapBarrier::gathered(double now_s) const {
                      [&](const auto& m) { return members_.size() >= m.second.said.viewers; });
 }
 
-// Nobody is waited for. While none is waited for, as all were late, all are.
+// True if no viewer is waited for any more. If all were late, so that no viewer is waited_for, all must be ready.
 bool SwapBarrier::complete() const {
   const bool any = std::any_of(members_.begin(), members_.end(), [](const auto& m) { return m.second.waited_for; });
   return std::all_of(members_.begin(), members_.end(),
@@ -51,10 +52,10 @@ bool SwapBarrier::complete() const {
 }
 
 void SwapBarrier::note_presented(const wire::SwapReady& m) {
-  // What nobody was told to present yet nobody has presented.
+  // Ignore frames that were not due yet, and those too old to remember.
   if (m.presented == 0 || m.presented >= frame_ || m.presented + kFramesRemembered < frame_) return;
   const auto before = members_.find(m.viewer);
-  if (before != members_.end() && before->second.said.presented == m.presented) return;  // said again
+  if (before != members_.end() && before->second.said.presented == m.presented) return;  // reported again
   Presented& p = presented_[m.presented];
   p.first_s = p.viewers == 0 ? m.presented_s : std::min(p.first_s, m.presented_s);
   p.last_s = p.viewers == 0 ? m.presented_s : std::max(p.last_s, m.presented_s);
@@ -64,18 +65,18 @@ void SwapBarrier::note_presented(const wire::SwapReady& m) {
 
 void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double now_s) {
   if (members_.empty()) first_s_ = now_s, begun_ = false;
-  // A viewer that was started again takes its place.
+  // A restarted viewer takes the place of the old one with its number.
   std::erase_if(members_, [&](const auto& o) { return o.first != m.viewer && o.second.said.number == m.number; });
   note_presented(m);
   const auto [place, fresh] = members_.try_emplace(m.viewer);
   Member& member = place->second;
-  const bool again = !fresh && member.said.frame == m.frame;  // no answer came
+  const bool again = !fresh && member.said.frame == m.frame;  // it got no answer
   member.peer = peer;
   member.said = m;
   if (fresh) member.waited_for = !begun_;
   lead_s_ = m.late_s > 0 ? std::min(lead_s_ + kLeadGrows * m.late_s, kMostLead_s) : lead_s_;
   if (begun_ && m.frame < frame_) {
-    // It is late, or new: it goes on with the others. So little late that they could have waited, it may be waited for.
+    // It is late, or new: it goes on with the others. If they could have waited that long, it counts as in time.
     const bool little = !again && m.frame == last_.frame && now_s <= deadline_before_s_;
     note_pace(member, m.frame, little);
     if (fresh || again || member.told < last_.frame) tell(member, last_);
@@ -85,7 +86,7 @@ void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double n
   go_on(now_s);
 }
 
-// A viewer that is not waited for was in time for this frame, or was not.
+// Notes whether a viewer was in time for this frame; one that was so for kInTime frames is waited for again.
 void SwapBarrier::note_pace(Member& member, uint64_t frame, bool in_time) {
   if (member.waited_for) return;
   const bool next = member.in_time_for + 1 == frame;  // else it was absent meanwhile
@@ -94,7 +95,7 @@ void SwapBarrier::note_pace(Member& member, uint64_t frame, bool in_time) {
   member.waited_for = member.in_time >= kInTime;
 }
 
-// As forget(), by where it is.
+// As forget(), by the viewer's routing id.
 void SwapBarrier::unreachable(const std::string& peer, double now_s) {
   if (std::erase_if(members_, [&](const auto& m) { return m.second.peer == peer; }) > 0) go_on(now_s);
 }
@@ -117,7 +118,7 @@ void SwapBarrier::go_on(double now_s) {
   if (!begun_) {
     if (!gathered(now_s)) return;
     begun_ = true;
-    // Viewers that another master led have numbers already, of which no wall is near the last: years of frames remain.
+    // Viewers that another master led have frame numbers already: go on from the highest. Years of frames remain.
     for (const auto& [id, m] : members_)
       if (m.said.frame <= kMostFirstFrame) frame_ = std::max(frame_, m.said.frame);
     return swap(now_s);
@@ -141,7 +142,7 @@ const SwapBarrier::Member& SwapBarrier::leader() const {
       ->second;
 }
 
-// Of those who have the source that most have, of as many that of the least number, the state of the first.
+// Returns the state of the viewer with the lowest number among those that have the most common source.
 const wire::ShownState& SwapBarrier::first_of_most(const std::vector<const Member*>& members) {
   const auto having = [&](InstanceId source) {
     return std::count_if(members.begin(), members.end(), [&](const auto* m) { return m->said.state.source == source; });
@@ -152,7 +153,7 @@ const wire::ShownState& SwapBarrier::first_of_most(const std::vector<const Membe
   return (*first)->said.state;
 }
 
-// What all who are in time can show. Numbers of one source never fall.
+// Chooses the newest state that all viewers in time can show. Numbers of one source never fall.
 void SwapBarrier::choose_state(double now_s) {
   wire::ShownState& state = last_.state;
   for (auto& [id, m] : members_) {
@@ -165,7 +166,7 @@ void SwapBarrier::choose_state(double now_s) {
     if (m.ready) ready.push_back(&m);
     if (m.ready && m.waited_for && !m.behind) counted.push_back(&m);
   }
-  // Who has received nothing yet has no say in what is shown, while anybody has received something.
+  // A viewer that has received nothing yet does not count, as long as another one has received something.
   const auto empty = [](const Member* m) { return m->said.state.source.value == 0; };
   if (!std::all_of(ready.begin(), ready.end(), empty)) {
     std::erase_if(counted, empty);
@@ -183,7 +184,7 @@ void SwapBarrier::choose_state(double now_s) {
     replica = std::min(replica, own.replica);
     held &= seen_from(first.newest, own);
   }
-  // Of frames each may lack others, so the least of the newest ones need not be with all.
+  // Viewers may lack different frames, so not all need have the least of their newest ones: take one that all have.
   if (first.held != 0 && held != 0)
     least = first.newest - uint64_t(std::countr_zero(held));
   else if (first.held != 0 && state.source == first.source)
@@ -199,7 +200,7 @@ void SwapBarrier::choose_state(double now_s) {
     reached_.clear();
   }
   if (reached_.empty() || reached_.back().newest < most) reached_.push_back({now_s, most});
-  // What someone had so long ago is shown, whoever lacks it.
+  // A state that a viewer had kModelPatience_s ago is shown, even if others lack it.
   while (!reached_.empty() && reached_.front().at_s <= now_s - kModelPatience_s) {
     if (least < reached_.front().newest) note_behind(least = reached_.front().newest);
     reached_.pop_front();
@@ -208,7 +209,7 @@ void SwapBarrier::choose_state(double now_s) {
   state.replica = std::max(state.replica, replica);
 }
 
-// The others do not wait for those who had less for so long.
+// Marks viewers that lack state `newest` as behind: the others do not wait for them.
 void SwapBarrier::note_behind(uint64_t newest) {
   for (auto& [id, m] : members_)
     if (m.ready && m.said.state.source == last_.state.source && m.said.state.newest < newest)
@@ -240,7 +241,7 @@ void SwapBarrier::swap(double now_s) {
     between_s_ = between_s_ == 0 ? between_s : (1 - kPeriodShare) * between_s_ + kPeriodShare * between_s;
   }
   lead_s_ = std::max(kLead_s, lead_s_ * kLeadShrinks);
-  // Of the frame before, which all who are ready have told of.
+  // The frame before: all ready viewers have reported when they presented it.
   if (const auto p = presented_.find(frame_ - 1); frame_ > 0 && p != presented_.end() && p->second.viewers > 1) {
     last_.skew_frame = p->first;
     last_.skew_s = p->second.last_s - p->second.first_s;

@@ -1,4 +1,4 @@
-// When the viewers of one wall present their frames: together, all from one head, all of one state of the model. A
+// Makes the viewers of one wall present their frames together, all from one head, all of one state of the model. A
 // viewer that is late or dead does not hold the others for longer than a frame. No sockets, no clocks: messages and
 // times come in, messages go out. Times are the master's.
 #pragma once
@@ -15,17 +15,17 @@ namespace telesplat::master {
 
 class SwapBarrier {
  public:
-  /// From word to present a frame until it is presented, at least: what a message takes to be there and wake someone.
+  /// Least time from the Swap message to the presentation: the message must arrive and wake the viewer.
   static constexpr double kLead_s = 1.5e-3;
-  static constexpr double kMostLead_s = 8e-3;  ///< where words come late
-  /// From the first viewer of a wall until its frames begin, if not all come sooner.
+  static constexpr double kMostLead_s = 8e-3;  ///< limit of that time if messages come late
+  /// Time from a wall's first viewer until its frames begin, if not all viewers come sooner.
   static constexpr double kGather_s = 5;
-  /// A viewer that was late is waited for again after so many frames in time.
+  /// A viewer that was late is waited for again after this many frames in time.
   static constexpr int kInTime = 3;
-  /// A frame is taken for no longer than this, however slow a wall is.
+  /// A frame counts for no longer than this, however slow a wall is.
   static constexpr double kMostFrame_s = 0.25;
-  /// A viewer that receives the model so much later than the others does not hold back what they show, until it has had
-  /// what they show for kInTime frames.
+  /// A viewer that receives the model this much later than the others does not hold them back, until it has had the
+  /// state that they show for kInTime frames.
   static constexpr double kModelPatience_s = 0.5;
 
   struct Outgoing {
@@ -33,20 +33,20 @@ class SwapBarrier {
     wire::Swap swap;
   };
   struct Figures {
-    uint64_t frames = 0;      ///< presented
-    uint64_t incomplete = 0;  ///< of these: without a viewer that was waited for
+    uint64_t frames = 0;      ///< frames presented
+    uint64_t incomplete = 0;  ///< frames presented without a viewer that was waited for
   };
 
   explicit SwapBarrier(InstanceId master) : master_(master) {}
 
-  /// peer: where answers go.
+  /// A viewer is ready for a frame. peer: routing id for the answer.
   void on(const std::string& peer, const wire::SwapReady& m, double now_s);
-  /// It is gone: nobody waits for it.
+  /// The viewer is gone: the others do not wait for it.
   void forget(InstanceId viewer, double now_s);
   void unreachable(const std::string& peer, double now_s);
   /// To be called when due_s() has come, and may be called at any time.
   void tick(double now_s);
-  /// When tick() has something to do, if nothing comes before.
+  /// Time at which tick() has something to do, if no message comes before; nullopt: it has nothing to do.
   std::optional<double> due_s() const;
   std::vector<Outgoing> take_outgoing();
 
@@ -57,13 +57,13 @@ class SwapBarrier {
   struct Member {
     std::string peer;
     wire::SwapReady said;
-    bool ready = false;        // for the frame at hand
-    bool waited_for = true;    // it was in time, or has been again for long enough
+    bool ready = false;        // ready for the next frame
+    bool waited_for = true;    // it was in time, or has been so again for kInTime frames
     int in_time = 0;           // frames in a row, while it is not waited for
-    uint64_t in_time_for = 0;  // the last of them
-    uint64_t told = 0;         // the newest frame that it was told to present
-    bool behind = false;       // it receives what is shown later than the others, who do not wait for it
-    int caught_up = 0;         // frames in a row for which it had what is shown, while it is behind
+    uint64_t in_time_for = 0;  // the last of these frames
+    uint64_t told = 0;         // newest frame in a Swap that it was sent
+    bool behind = false;       // it receives the model later than the others, which do not wait for it
+    int caught_up = 0;         // frames in a row for which it had the state shown, while it is behind
   };
 
   double frame_s() const;
@@ -84,23 +84,23 @@ class SwapBarrier {
   InstanceId master_;
   std::map<InstanceId, Member> members_;
   bool begun_ = false;
-  uint64_t frame_ = 0;            // that is presented next
-  double first_s_ = 0;            // someone came, and nobody was there
-  double ready_s_ = 0;            // someone became ready last
-  double between_s_ = 0;          // of frames, on average
-  double deadline_before_s_ = 0;  // of the frame that was presented last
+  uint64_t frame_ = 0;            // number of the next frame
+  double first_s_ = 0;            // when the first viewer came
+  double ready_s_ = 0;            // when a viewer last became ready
+  double between_s_ = 0;          // mean time between frames
+  double deadline_before_s_ = 0;  // deadline of the last frame
   double lead_s_ = kLead_s;
-  wire::Swap last_;  // what was told last
+  wire::Swap last_;  // the last one sent
   struct Presented {
     double first_s = 0, last_s = 0;
     size_t viewers = 0;
   };
-  std::map<uint64_t, Presented> presented_;  // the newest few
+  std::map<uint64_t, Presented> presented_;  // newest frames, by number
   struct Reached {
     double at_s;
     uint64_t newest;
   };
-  std::deque<Reached> reached_;   // what any viewer could show, of last_.state.source
+  std::deque<Reached> reached_;   // newest state that any viewer could show, of last_.state.source
   double source_differs_s_ = -1;  // viewers receive from several sources since then; < 0: they do not
   std::vector<Outgoing> outgoing_;
   Figures figures_;
