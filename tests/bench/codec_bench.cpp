@@ -21,7 +21,7 @@ namespace {
 using image::DepthImage;
 using Bytes = std::vector<uint8_t>;
 
-// Name -> image, rendered once. full_*: all covered. patch_*: what redundancy elimination may leave of one.
+// Name -> image, rendered once. full_*: every pixel is covered. patch_*: pixels that redundancy elimination may leave.
 const DepthImage& test_image(const std::string& name) {
   static std::map<std::string, DepthImage> cache;
   if (const auto known = cache.find(name); known != cache.end()) return known->second;
@@ -37,7 +37,7 @@ const DepthImage& test_image(const std::string& name) {
   return cache.emplace(name, std::move(image)).first->second;
 }
 
-// As a session cuts its frames: 20 tiles of 256 x 200.
+// Cuts an image as a session does: 20 tiles of 256 x 200.
 std::vector<DepthImage> tiles_of(const DepthImage& image) {
   std::vector<DepthImage> tiles;
   for (int y = 0; y < image.height; y += 200)
@@ -78,7 +78,7 @@ void decode_tiles(benchmark::State& state, const std::string& name) {
   report(state, test_image(name), bytes);
 }
 
-// Byte planes, interleaved by `channels`.
+// Returns byte planes, interleaved by `channels`.
 Bytes depth_bytes(const DepthImage& image) {
   Bytes out;
   for (const uint32_t d : image.depth)
@@ -110,7 +110,7 @@ void image_file(benchmark::State& state, const std::string& name, const std::str
   for (auto _ : state) {
     size_t depth_size = size(std::span(depth), 3, 1);
     const size_t colour_size = size(std::span(colour), 3, 1), normal_size = size(std::span(normal), 2, 1);
-    // Whichever suits the format better: three bytes, or one number.
+    // Take the smaller file: of three bytes, or of one number, a pixel.
     if (extension == "tif")
       if (const size_t whole = size(std::span(image.depth), 1, 4); whole != 0) depth_size = std::min(depth_size, whole);
     if (depth_size == 0 || colour_size == 0 || normal_size == 0) return state.SkipWithError("not written");
@@ -148,7 +148,7 @@ const bool registered = [] {
       add(name + "zstd_" + std::to_string(level),
           [image, level](benchmark::State& s) { zstd_planes(s, image, level); });
   }
-  // Beside full_smooth and full_rough: what a pixel costs in a masked tile.
+  // Masked tiles: compare the time a pixel with full_smooth and full_rough.
   for (const std::string image :
        {"patch_outlines", "patch_random_0.3", "patch_random_0.03", "patch_random_0.001", "sparse_spread_smooth",
         "sparse_spread_rough", "sparse_bands_rough", "sparse_lines_rough", "sparse_random_0.1_rough"}) {

@@ -25,7 +25,7 @@ JuliaScene scene_of(const julia::Preset& preset) {
   return {preset.parameters, julia::place(julia::bounds(preset.parameters), 0.8)};
 }
 
-// target: 0 is the scalar oracle. rows: of a lease; the frame is sampled lease after lease.
+// target: 0 is the scalar oracle. rows: rows of a lease; the frame is sampled lease after lease.
 void frame(benchmark::State& state, const julia::Preset& preset, double distance_m, int64_t target, int rows) {
   const testing::OnTarget on(target == 0 ? testing::simd_targets().front() : target);
   JuliaSampler sampler(1, target == 0 ? julia_trace_plainly : julia_trace);
@@ -46,7 +46,7 @@ void frame(benchmark::State& state, const julia::Preset& preset, double distance
   state.counters["thesis/this"] = benchmark::Counter(kThesis_s * frames, benchmark::Counter::kIsRate);
 }
 
-// Masked tiles of 128 x 128, as plans lease them; us/ray says what a mask costs beside all rays.
+// Masked tiles of 128 x 128, as plans lease them; compare us/ray with that of all rays.
 void masked(benchmark::State& state, double share) {
   JuliaSampler sampler(1);
   const JuliaScene scene = scene_of(julia::presets()[0]);
@@ -60,7 +60,7 @@ void masked(benchmark::State& state, double share) {
   state.counters["us/ray"] = benchmark::Counter(rays / 1e6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
-// Presets go by their number: while benchmarks register themselves, what they hold is not there yet.
+// Takes a preset's number: while benchmarks register themselves, presets are not initialised yet.
 void add(int preset, double distance_m, int64_t target, int rows, const std::string& what) {
   const std::string name = "JuliaFrame/preset:" + std::to_string(preset) + "/" + what;
   benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {

@@ -1,4 +1,4 @@
-// Seen space at 2560x1600: what a step along a walk around the scene costs, after a walk that has seen most of it.
+// Seen space at 2560x1600: times a step of a walk around the scene, after a walk that has seen most of it.
 #include <benchmark/benchmark.h>
 
 #include <limits>

@@ -1,5 +1,5 @@
-// lod/*: what a viewer sees of the level of detail while the head moves. Frames are splatted from one fixed model, so
-// that nothing changes but the view.
+// lod/*: changes in the picture by the level of detail while the head moves. Frames are splatted from one fixed model,
+// so that only the view changes.
 //   switching: difference between two pictures from the same pose: one with the levels chosen for it, one with those
 //     chosen for the frame before. Mean over pixels and channels in 8-bit steps; movement and aliasing are in neither.
 //   pops: blocks of 20 x 20 pixels whose switching exceeds 4 steps in a frame.
@@ -28,7 +28,7 @@ constexpr int kBlock = 20;
 
 geometry::Camera camera_at(const geometry::Pose& pose) { return geometry::make_camera(pose, 90, kWidth, kHeight); }
 
-// 0: away from the surface and back, the distance changing by the same factor from frame to frame. 1: a recorded head
+// 0: away from the surface and back, each frame's distance is the last one's times the same factor. 1: a recorded head
 // movement, leaning in and out.
 std::vector<geometry::Camera> movement(int which) {
   std::vector<geometry::Camera> out;
@@ -86,7 +86,7 @@ struct Changes {
   }
 };
 
-using Blocks = std::vector<double>;  // of a picture, row-major
+using Blocks = std::vector<double>;  // one value a block, row-major
 
 // The mean of each block over pixels and channels of |(a - b) - (c - d)|; b and d may be null.
 Blocks differences(const image::View& a, const image::View* b, const image::View& c, const image::View* d) {
@@ -108,8 +108,8 @@ Blocks differences(const image::View& a, const image::View* b, const image::View
 
 double mean(const Blocks& v) { return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()); }
 
-// Blocks whose value exceeds 4 steps. Not those at the border: what comes into view there was not chosen in the frame
-// before.
+// Counts blocks whose value exceeds 4 steps, except those at the border: the frame before did not choose levels for a
+// place that comes into view.
 size_t count_pops(const Blocks& blocks) {
   constexpr size_t kColumns = kWidth / kBlock, kRows = kHeight / kBlock;
   size_t pops = 0;
@@ -180,7 +180,7 @@ BENCHMARK(lod_transitions)
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
 
-// What less detail saves, in percent: of the first view, on a display of 2560x1600, where all samples are magnified.
+// Time saved by less detail, in percent; first view, display of 2560x1600, where all samples are magnified.
 void lod_detail(benchmark::State& state) {
   const Moving& m = moving(0);
   geometry::Camera camera = m.cameras[0];

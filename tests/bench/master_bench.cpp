@@ -1,4 +1,4 @@
-// What a lease costs the master: requests, leases and completions of frames of rows through MasterCore, without the
+// Costs of a lease for the master: requests, leases and completions of frames of rows through MasterCore, without the
 // network.
 #include <benchmark/benchmark.h>
 
@@ -81,7 +81,7 @@ void master_leases(benchmark::State& state) {
         }
       });
     } while (!out.empty());
-    // Idle requests stay; they are the next frame's first ones.
+    // Idle requests stay: the next frame answers them first.
     leases += frame_leases;
     state.SetIterationTime(std::chrono::duration<double>(spent).count());
   }
@@ -101,9 +101,9 @@ BENCHMARK(master_leases)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 
-// Arguments: senders, receivers, transfers. Baseline in the same run: the same transfers coloured in the order in which
-// they come. `rounds_ratio`: rounds over the least there can be (1); `time`, `time_plain`: the rounds' longest
-// transfers, summed, over the busiest node's bytes, with and without regard for bytes.
+// Arguments: senders, receivers, transfers. Baseline in the same run: the same transfers coloured in their given order.
+// `rounds_ratio`: rounds over the least possible number (1); `time`, `time_plain`: the sum of each round's longest
+// transfer, over the busiest node's bytes, with and without regard for bytes.
 void master_scatter(benchmark::State& state) {
   std::mt19937 random(1);
   std::lognormal_distribution<double> bytes(10, 1);

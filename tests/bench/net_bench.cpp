@@ -1,5 +1,5 @@
-// Messages as large as tiles over loopback, in the clear and encrypted by keys: what a sampler and the packer spend.
-// MB/s: bodies that arrived. ms: from the moment that one is given to the socket until it is received, one at a time.
+// Messages as large as tiles over loopback, in the clear and encrypted: times of a sampler and the packer. MB/s: bodies
+// that arrived. ms: from giving one to the socket until it is received, one at a time.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kWait_ms = 2000;
 
-/// Keys that go when the program does.
+/// Keys that the destructor deletes.
 class BenchKeys {
  public:
   BenchKeys() : path_(std::filesystem::temp_directory_path() / ("telesplat-bench-keys-" + std::to_string(getpid()))) {
@@ -49,7 +49,7 @@ struct Ends {
   Socket pull, push;
 };
 
-// `ahead` messages are under way at once. False: nothing came.
+// Keeps `ahead` messages under way at once. False: a message did not arrive.
 bool pass(Ends& ends, const std::string& tile, int ahead) {
   for (int i = 0; i < ahead; ++i)
     while (!ends.push.send_frames({}, "depth_tile", tile)) wait_readable({&ends.pull}, 1);
@@ -65,7 +65,7 @@ void send_tiles(benchmark::State& state, bool encrypted, int ahead) {
   if (encrypted) keys.emplace();
   Ends ends(keys ? &*keys : nullptr);
   const std::string tile(size_t(state.range(0)), 'x');
-  if (!pass(ends, tile, 1)) return state.SkipWithError("nothing arrives");  // the connection is there from here on
+  if (!pass(ends, tile, 1)) return state.SkipWithError("nothing arrives");  // from here on the connection exists
   for (auto _ : state)
     if (!pass(ends, tile, ahead)) return state.SkipWithError("a tile is lost");
   const auto bytes = double(state.iterations()) * double(ahead) * double(tile.size());

@@ -52,10 +52,10 @@ void packer_frame(benchmark::State& state) {
 }
 BENCHMARK(packer_frame)->Arg(0)->Arg(1)->Iterations(16)->Unit(benchmark::kMillisecond);
 
-// Leases of rows, keep mode: a frame of 1024x640 arrives as messages of `rows` rows each, in blocks of 64; everything
-// the packer does but the sockets: messages decoded, blocks gathered, packed, encoded, inserted, what is too much
-// forgotten, each row reported done. 64 rows: tiles that are blocks, the baseline. Frames turn slowly, so that clusters
-// have the six patches they may have.
+// Leases of rows, keep mode: a frame of 1024x640 arrives as messages of `rows` rows each, in blocks of 64; all that the
+// packer does except the sockets: decodes messages, gathers blocks, packs, encodes, inserts, forgets points over the
+// limit, reports each row done. 64 rows: tiles that are blocks, the baseline. Frames turn slowly, so that clusters have
+// the six patches that they may have.
 void packer_rows(benchmark::State& state) {
   constexpr int kWidth = 1024, kHeight = 640, kBlock = 64, kViews = 8;
   const int rows = static_cast<int>(state.range(0));
@@ -80,7 +80,7 @@ void packer_rows(benchmark::State& state) {
   packer::PackerCore core(config, test::kEpoch);
   packer::BlockGatherer gatherer;
   uint64_t frame = 0, samples = 0;
-  double longest_ms = 0;  // that one message took
+  double longest_ms = 0;  // for a single message
   const auto pack_frame = [&] {
     ++frame;
     for (const std::string& body : frames[frame % kViews]) {
@@ -122,8 +122,7 @@ void packer_rows(benchmark::State& state) {
 }
 BENCHMARK(packer_rows)->ArgName("rows")->Arg(1)->Arg(4)->Arg(64)->Unit(benchmark::kMillisecond);
 
-// What the packer decides once a second: 17000 clusters of six patches. Argument: how many per cent of the points must
-// go.
+// The packer's choice once a second: 17000 clusters of six patches. Argument: per cent of the points that must go.
 void packer_choose_patches(benchmark::State& state) {
   packer::PatchObsolescence obsolescence;
   uint64_t points = 0, patches = 0;

@@ -1,4 +1,4 @@
-// What general picture formats make of planes of numbers: a baseline for codecs.
+// Sizes of planes of numbers in general picture formats: a baseline for codecs.
 #pragma once
 
 #include <cstddef>

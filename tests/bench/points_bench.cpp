@@ -1,4 +1,4 @@
-// Packing: what a sampled frame of 1280x800 costs the packer and each viewer, in tiles of 256x256.
+// Packing: costs of a sampled frame of 1280x800 for the packer and for each viewer, in tiles of 256x256.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -94,7 +94,7 @@ void points_baseline_std_sort(benchmark::State& state) {
 }
 BENCHMARK(points_baseline_std_sort)->Arg(100)->Arg(20)->Arg(1)->Unit(benchmark::kMillisecond);
 
-// Baseline: the bytes of the points moved once.
+// Baseline: the points' bytes, moved once.
 void points_baseline_memcpy(benchmark::State& state) {
   const Frame& f = frame(100);
   std::vector<std::byte> from(f.samples * 13), to(f.samples * 13);

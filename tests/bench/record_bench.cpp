@@ -1,5 +1,5 @@
-// What recording costs a display frame: its row of frames.csv and its span, and once a second the message that takes
-// them to the master.
+// Costs of recording a display frame: its row of frames.csv and its span, and once a second the message that takes them
+// to the master.
 #include <benchmark/benchmark.h>
 
 #include "client/viewer/display/frame_table.h"
@@ -24,7 +24,7 @@ void record_frames(benchmark::State& state) {
     if (++n % fps) continue;
     for (const auto& rows : {frames.flush({1}), spans.flush({1})}) bytes += wire::encode(*rows).size();
   }
-  // Of a frame's time at this rate.
+  // Share of a frame's period at this rate.
   state.counters["share_of_frame"] =
       benchmark::Counter(1.0 / fps, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
   state.counters["bytes_a_frame"] = benchmark::Counter(double(bytes) / double(std::max(n, 1)));

@@ -58,7 +58,7 @@ void SamplerRenderDirectly(benchmark::State& state) {
   count(state, 2560.0 * 1600);
 }
 
-// From chunks in memory to the first ray.
+// Time from chunks in memory to the first ray.
 void SamplerBuild(benchmark::State& state) {
   const geometry::Camera camera = view(90);
   for (auto _ : state) {
@@ -70,7 +70,7 @@ void SamplerBuild(benchmark::State& state) {
       benchmark::Counter(2 * 724 * 724 / 1e6 * double(state.iterations()), benchmark::Counter::kIsRate);
 }
 
-// Frames in masked tiles of 256 x 200, as plans lease them. us/ray beside that of SamplerRay says what a mask costs.
+// Frames in masked tiles of 256 x 200, as plans lease them. Compare us/ray with that of SamplerRay.
 enum class Rays { kAll, kHalf, kTenth, kBands, kSpread };
 void sample_masked(benchmark::State& state, Sampler& sampler) {
   if (!sampler.add_chunks(terrain()).ok()) return state.SkipWithError("chunks refused");

@@ -1,9 +1,9 @@
-// splat/*: one million points on a display of 2560x1600, beside GL_POINTS and what the machine's memory gives, in the
+// splat/*: one million points on a display of 2560x1600, beside GL_POINTS and the machine's memory bandwidth, in the
 // same run. The points are those of one 1280x800 depth image of a wavy surface, seen from where it was sampled. Times
-// are wall-clock; core_ms is what all threads together spent. bytes_floor: what must cross the memory bus for a frame,
-// each point read once (12 bytes) and each pixel written once; floor_ms: the time that takes at the bandwidth measured
-// here on two threads; times_floor: how many times that the frame took. times_gl_points: how many times as long
-// GL_POINTS of that size take.
+// are wall-clock; core_ms is the sum over all threads. bytes_floor: bytes that must cross the memory bus for a frame,
+// each point read once (12 bytes) and each pixel written once; floor_ms: the time for them at the bandwidth measured
+// here on two threads; times_floor: the frame's time over floor_ms. times_gl_points: time of GL_POINTS of that size
+// over the frame's.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -79,7 +79,7 @@ splat::DrawList draw_list(int patches, float splat_px) {
   return list;
 }
 
-// Every point of one depth image of about that many million pixels, each a pixel large.
+// Every point of one depth image of about `millions` million pixels, each a pixel large.
 splat::DrawList many_points(int millions) {
   static std::map<int, points::PointModel> models;
   const int width = millions == 4 ? 2560 : 3584, height = width * 5 / 8;
@@ -103,7 +103,7 @@ struct Bandwidth {
 };
 const Bandwidth& memory_bandwidth() {
   static const Bandwidth measured = [] {
-    constexpr size_t kWords = size_t{8} << 20;  // a thread, of 8 bytes
+    constexpr size_t kWords = size_t{8} << 20;  // words of 8 bytes a thread
     constexpr int kThreads = 2;
     std::vector<uint64_t> from(kThreads * kWords, 1), to(kThreads * kWords, 2);
     const auto best = [&](double bytes, const auto& pass) {
@@ -135,7 +135,7 @@ const Bandwidth& memory_bandwidth() {
   return measured;
 }
 
-// Milliseconds of a frame of draw_list(1, splat_px) as GL_POINTS, read back included; 0 where there is no GL.
+// Milliseconds of a frame of draw_list(1, splat_px) as GL_POINTS, reading back included; 0 without OpenGL.
 double gl_points_ms(float splat_px) {
   static std::map<float, double> known;
   const auto [at, fresh] = known.try_emplace(splat_px, 0.0);
@@ -195,7 +195,7 @@ void splat_disc(benchmark::State& state) { splat_million(state, splat::Kernel::k
 void splat_ellipse(benchmark::State& state) { splat_million(state, splat::Kernel::kEllipse, 1); }
 void splat_ewa(benchmark::State& state) { splat_million(state, splat::Kernel::kEwa, 1); }
 void splat_square_64_patches(benchmark::State& state) { splat_million(state, splat::Kernel::kSquare, 64); }
-// How many points of one pixel a second: many in view, so that the frame's own cost does not hide the rate.
+// Points of one pixel drawn in a second: many in view, so that the frame's own cost does not hide the rate.
 void splat_pixels_rate(benchmark::State& state) {
   splat_points(state, splat::Kernel::kSquare, many_points(static_cast<int>(state.range(0))), 2, false);
 }
@@ -256,8 +256,7 @@ void splat_select_best(benchmark::State& state) {
 }
 BENCHMARK(splat_select_best)->ArgName("best")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
-// A frame as the display makes it, finish included, for one eye or for both: what is drawn is chosen once for the two
-// of them.
+// A frame as the display makes it, finish included, for one eye or for both: one selection serves both eyes.
 void splat_eyes(benchmark::State& state) {
   const auto kernel = static_cast<splat::Kernel>(state.range(0));
   const auto eyes = static_cast<size_t>(state.range(1));
@@ -326,7 +325,7 @@ void splat_eliminate_redundancy(benchmark::State& state) {
 }
 BENCHMARK(splat_eliminate_redundancy)->Unit(benchmark::kMillisecond);
 
-// Baseline: the same frames as GL_POINTS (on a machine without GPU: Mesa's llvmpipe on all cores), read back included.
+// Baseline: the same frames as GL_POINTS (without GPU: Mesa's llvmpipe on all cores), reading back included.
 void splat_baseline_gl_points(benchmark::State& state) {
   auto gl = viewer::make_renderer("gl", 1);
   if (!gl) return state.SkipWithError(gl.error().text.c_str());

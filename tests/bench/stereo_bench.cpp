@@ -1,4 +1,4 @@
-// stereo/*: one picture made of two eyes', per frame; copying both into it is the baseline.
+// stereo/*: making one picture of two eyes', per frame; copying both into it is the baseline.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ void copied(benchmark::State& state) {
   }
 }
 
-// state.range(0): the eyes move from frame to frame.
+// state.range(0): 1 if the eyes move from frame to frame.
 void interleaved(benchmark::State& state) {
   const image::View left = noise(kEyeWidth, kEyeHeight, 1), right = noise(kEyeWidth, kEyeHeight, 2);
   stereo::Interleaver interleaver(panel());

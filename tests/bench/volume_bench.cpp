@@ -1,5 +1,5 @@
-// Volumes on one core: splats a second by pixels a voxel, beside a plain scatter of the same voxels and the time that
-// merely reading them takes; frames of 256^3 with about a million visible voxels at 1600 x 1200; rays of the reference.
+// Volumes on one core: splats a second by pixels a voxel, beside a plain scatter of the same voxels and the time of
+// only reading them; frames of 256^3 with about a million visible voxels at 1600 x 1200; rays of the reference.
 #include <benchmark/benchmark.h>
 
 #include <cstring>
@@ -28,7 +28,7 @@ geometry::Camera camera(int width, int height) {
   return geometry::make_camera(geometry::look_at({0.15, 0.2, 0.65}, {0, 0, 0}), 60, width, height);
 }
 
-// Every voxel to the four pixels about it, slice by slice, one after the other: what the kernels are measured against.
+// Adds every voxel to the four pixels about it, slice by slice, one after the other: the baseline of the kernels.
 uint64_t scatter_plainly(const test::VolumeScene& scene, const volume::ShearFrame& frame, std::vector<glm::vec4>& slice,
                          std::vector<glm::vec4>& image) {
   std::fill(image.begin(), image.end(), glm::vec4(0));
@@ -104,7 +104,7 @@ void VolumeScatterPlainly(benchmark::State& state) {
 }
 BENCHMARK(VolumeScatterPlainly)->Unit(benchmark::kMillisecond);
 
-// No splatter is faster than this: voxels read once, as they are held.
+// A lower bound for splatters: reads the voxels once, as they are stored.
 void VolumeReadVoxels(benchmark::State& state) {
   const auto& scene = crusts(192);
   const ShearRows rows = arrange(scene.grid, scene.voxels, 0);
@@ -124,7 +124,7 @@ void VolumeArrange(benchmark::State& state) {
 }
 BENCHMARK(VolumeArrange)->DenseRange(0, 2)->Unit(benchmark::kMillisecond);
 
-// opacity in percent: of the most opaque level.
+// Argument: opacity of the most opaque level, percent.
 void VolumeFrame(benchmark::State& state) {
   const auto& scene = crusts(256);
   const auto colours = test::ramp(double(state.range(0)) / 100);

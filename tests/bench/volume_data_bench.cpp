@@ -1,5 +1,5 @@
-// What a data server does with a volume: classification and the voxel codec, beside a copy of the dense slab and zstd
-// of it. Mvoxel/s: visible voxels per second on one core (classify: on all). B/voxel: bytes per visible voxel.
+// A data server's work on a volume: classification and the voxel codec, beside a copy of the dense slab and zstd on it.
+// Mvoxel/s: visible voxels per second on one core (classify: on all). B/voxel: bytes per visible voxel.
 #include <benchmark/benchmark.h>
 #include <zstd.h>
 
@@ -14,7 +14,7 @@
 namespace telesplat::data {
 namespace {
 
-constexpr int kSide = 256, kSlices = 64;  // slices that are coded at a time, as in an answer
+constexpr int kSide = 256, kSlices = 64;  // slices coded at a time, as in an answer
 
 // Shells and tubes with the noise of a scanner: surfaces, thin parts and solid ones.
 Volume made_up(int side, VoxelType type) {
@@ -47,7 +47,7 @@ Volume made_up(int side, VoxelType type) {
 struct Scene {
   std::unique_ptr<VolumeStore> store;
   volume::LevelSet shown;
-  volume::Voxels voxels;  // of kSlices slices in the middle
+  volume::Voxels voxels;  // voxels of kSlices slices in the middle
 };
 
 // name: "u8", "u16", or a volume of the real data.

@@ -1,5 +1,5 @@
-// The codec of slice images beside memcpy and plain zstd, block by block, on one core. B/px and Mpx/s: of pixels that
-// are not transparent.
+// The codec of slice images beside memcpy and plain zstd, block by block, on one core. B/px and Mpx/s count the pixels
+// that are not transparent.
 #include <benchmark/benchmark.h>
 #include <zstd.h>
 
@@ -15,8 +15,8 @@ namespace {
 
 constexpr int kSide = 1024;
 
-// A field of waves: soft is a translucent fog with a rim, hard are shells that are opaque where they begin, noisy like
-// hard with noise as of scanners.
+// A field of waves: soft is a translucent fog with a rim, hard has shells with an opaque surface, noisy is hard with a
+// scanner's noise.
 const SliceImage& test_image(const std::string& name) {
   static std::map<std::string, SliceImage> cache;
   if (const auto known = cache.find(name); known != cache.end()) return known->second;

@@ -1,8 +1,7 @@
 // volume_warp/*: sixteen layers over most of the display, a third of each layer's pixels not empty, seen a few degrees
-// aside from where they were sampled. Times are wall-clock; core_ms is what all threads together spent. samples_ns:
-// core time a bilinear look-up. bytes_floor: what must cross the memory bus, each block of texels that is not empty
-// read once and each pixel written once; floor_ms: the time that takes at the bandwidth measured here on as many
-// threads.
+// aside from where they were sampled. Times are wall-clock; core_ms is the sum over all threads. samples_ns: core time
+// a bilinear look-up. bytes_floor: bytes that must cross the memory bus, each block of texels that is not empty read
+// once and each pixel written once; floor_ms: the time for them at the bandwidth measured here on as many threads.
 #include <benchmark/benchmark.h>
 
 #include <cstring>
@@ -32,7 +31,7 @@ geometry::Camera view(int width, int height, double around) {
 
 enum Content { kOpaque, kThin };
 
-// Blobs in a third of the pixels; thin: none ends the search for more behind it.
+// Blobs in a third of the pixels; thin: no blob is opaque enough to end the search behind it.
 const VolumeFrame& frame_of(int width, int height, int content) {
   static std::map<std::array<int, 3>, VolumeFrame> made;
   const auto [at, is_new] = made.try_emplace({width, height, content});
@@ -50,7 +49,7 @@ const VolumeFrame& frame_of(int width, int height, int content) {
   return at->second;
 }
 
-// Bytes a second, reading and writing as much.
+// Returns bytes a second, half of them read, half written.
 double bandwidth(int threads) {
   static std::map<int, double> measured;
   double& out = measured[threads];
@@ -146,7 +145,7 @@ BENCHMARK(volume_warp_gl)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-// What the display does without any volume: one colour into every pixel.
+// Baseline: a display without a volume fills every pixel with one colour.
 void volume_warp_baseline_fill(benchmark::State& state) {
   std::vector<uint32_t> colour(static_cast<size_t>(state.range(0) * state.range(0) * 3 / 4));
   for (auto _ : state) {
@@ -161,7 +160,7 @@ BENCHMARK(volume_warp_baseline_fill)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-// The worker's part, once a frame: images as decoded -> what is warped; beside a copy of them.
+// The worker's part, once a frame: turns decoded images into layers to warp; beside a copy of the images.
 void volume_warp_merge(benchmark::State& state) {
   const VolumeFrame& frame = frame_of(1600, 1200, kThin);
   std::vector<volume::SliceImage> images;

@@ -108,12 +108,12 @@ class Files(unittest.TestCase):
 
     def test_each_has_its_own_keys_alone(self):
         keys = {
-            # Whoever may enter its container may ask and end the session: telesplat ctl.
+            # A person who may enter the master's container may ask and end the session: telesplat ctl.
             "master": {"server.key", "server.pub", "allowed.toml", "operator.key"},
             "data": {"server.key", "server.pub", "allowed.toml", "data.key"},
             "packer": {"server.key", "server.pub", "allowed.toml", "packer.key"},
             "sampler": {"server.pub", "sampler.key"},
-            # Its run over, the viewer of the main job ends the session.
+            # When its run is over, the viewer of the main job ends the session.
             "viewer": {"server.pub", "viewer.key", "operator.key"},
         }
         for file, name, service in self.each():

@@ -193,7 +193,7 @@ case $1 in image) exit {0 if image else 1} ;; run) touch tree/compose/keys/serve
         (self.path / "stop").touch()
         self.assertEqual(self.run_script(*serve, **environment).returncode, 0)
         self.assertEqual(self.lines("parts")[-1], "--part=0/2")
-        # A swarm says which.
+        # A swarm names the part.
         self.run_script(*serve, **dict(environment, TELESPLAT_PART="2"))
         self.assertEqual(self.lines("parts")[-1], "--part=1/2")
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 @dataclass
 class Command:
     text: str  # as a shell takes it: continuation lines joined, without the comment at its end
-    line: int  # of the page, from 1
-    words: list = field(default_factory=list)  # settings of the environment in front of the program left out
+    line: int  # in the page, from 1
+    words: list = field(default_factory=list)  # without settings of the environment in front of the program
 
 
 @dataclass
 class Block:
     language: str  # "" for commands
-    line: int  # of its first line inside
+    line: int  # its first line inside the block
     lines: list
-    beside: str = ""  # a command that runs meanwhile; the page says so in a comment above the block
+    beside: str = ""  # a command that runs meanwhile, from a comment above the block
 
     @property
     def text(self):

@@ -29,7 +29,7 @@ import time
 import blocks
 from files import Files
 
-# What a command begins with, and why it is not run.
+# The begins of commands that are not run, and the reasons.
 SKIPPED = {
     r"tools/(demo|test|setup)\b": "it sets up and builds this tree",
     r"(cmake|ctest)\b": "it builds this tree",
@@ -41,7 +41,7 @@ SKIPPED = {
 SERVICES = {f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay")}
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
-SECONDS, WIDTH, HEIGHT, VERIFY_EVERY = 0.7, 320, 240, 100  # of runs
+SECONDS, WIDTH, HEIGHT, VERIFY_EVERY = 0.7, 320, 240, 100  # for runs
 
 
 def small(size):
@@ -66,7 +66,7 @@ def shortened_sweep(text):
     """A `telesplat sweep`, of one short and small run for each configuration."""
     own, behind, flags = text.partition(" -- ")
     if not behind:
-        return text  # it goes on
+        return text  # the command goes on
     return f"{own} --repeat 1 -- {shortened(flags)}"
 
 
@@ -97,8 +97,8 @@ class Page:
     def __init__(self, root, programs, folder, display):
         self._folder, self._programs, self._display = folder, programs, display
         self._files = Files(programs, folder)
-        self._background = []  # (text, process, output) of services, or of a session that ctl talks to
-        self._beside = ""  # what `telesplat ctl` wants to have running
+        self._background = []  # (text, process, output) of services, or of a session for ctl
+        self._beside = ""  # the command that must run while `telesplat ctl` does
         self.failures = 0
         self.ran = 0
         for name in ("examples", "tools"):
@@ -257,7 +257,7 @@ class Page:
         """Sends a signal, or none where they were told to stop; all must end with exit code 0."""
         if signal_number:
             for _, process, output in self._background:
-                # A program that has said nothing may not yet hear signals.
+                # A program without output may not handle signals yet.
                 until_s = time.monotonic() + 20
                 while process.poll() is None and not os.fstat(output.fileno()).st_size and time.monotonic() < until_s:
                     time.sleep(0.05)

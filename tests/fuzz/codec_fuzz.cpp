@@ -1,5 +1,5 @@
-// Any bytes through the depth-image decoder: an error, or a canonical image that survives another round trip, and one
-// within the same bounds, whose refinement makes it exact.
+// Decodes any bytes as a depth image: gives an error, or a canonical image that survives another round trip, and a
+// bounded one whose refinement makes it exact.
 #include <cstdlib>
 #include <span>
 

@@ -1,5 +1,5 @@
-// Any bytes through the decoder of JPEG pictures: an error, or a picture of the size that was said. The size stands in
-// the first two bytes.
+// Decodes any bytes as a JPEG picture: gives an error, or a picture of the expected size. The first two bytes are that
+// size.
 #include "common/image/jpeg.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

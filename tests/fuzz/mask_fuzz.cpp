@@ -1,4 +1,4 @@
-// Any words as the mask of a tile: an error, or a mask that comes back the same. The first two bytes are its size.
+// Decodes any words as a tile's mask: gives an error, or a mask that comes back the same. Two bytes are its size.
 #include <cstdlib>
 #include <cstring>
 #include <vector>

@@ -1,5 +1,4 @@
-// What all fuzz targets of mesh readers do with a result: whatever passes validation must go through placement and
-// chunking, too.
+// Shared by all fuzz targets of mesh readers: a mesh that passes validation must pass placement and chunking, too.
 #pragma once
 
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// Any bytes as the refinement of one of a few images: an error, or a canonical image that covers the same pixels and
-// survives another round trip. The first byte says of which image.
+// Decodes any bytes as the refinement of an image: gives an error, or a canonical image that covers the same pixels and
+// survives another round trip. The first byte chooses the image.
 #include <cstdlib>
 
 #include "common/codec/depth_codec.h"

@@ -1,5 +1,5 @@
-// Runs a fuzz target over the files of a corpus, and over each of them damaged in a few ways, as an ordinary test.
-// A damaged input that ends the program is left in the file damaged-input.
+// Runs a fuzz target over the files of a corpus, and over each of them damaged in a few ways, as an ordinary test. An
+// input that ends the program is left in the file damaged-input.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 using Bytes = std::vector<uint8_t>;
 
-// The damaged input that the target has, for whoever wants to know which one ended it.
+// The input that the target runs on; keep_input() writes it if it ends the program.
 const Bytes* at_hand = nullptr;
 
 extern "C" void keep_input(int signal) {
@@ -32,7 +32,7 @@ extern "C" void keep_input(int signal) {
   std::raise(signal);
 }
 
-// Bits, bytes and numbers that are other ones, parts that are missing, doubled or of another file.
+// Changes bits, bytes and numbers; leaves out, doubles or inserts parts, also from another file.
 Bytes damaged(Bytes bytes, const Bytes& other, std::mt19937& random) {
   const auto below = [&](size_t n) { return n == 0 ? 0 : size_t(random()) % n; };
   for (size_t n = 1 + below(4); n-- > 0;) {
@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
   std::sort(files.begin(), files.end());
   for (const Bytes& bytes : files) LLVMFuzzerTestOneInput(bytes.data(), bytes.size());
   for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE}) std::signal(signal, keep_input);
-  // TELESPLAT_DAMAGED: how many inputs are made of all files together. Which they are is the same every time.
+  // TELESPLAT_DAMAGED: number of damaged inputs made of all files together, the same ones every time.
   const char* wanted = std::getenv("TELESPLAT_DAMAGED");
   const size_t most = wanted ? std::strtoull(wanted, nullptr, 10) : 200;
   std::mt19937 random(1);
@@ -97,5 +97,5 @@ int main(int argc, char** argv) {
     at_hand = nullptr;
   }
   std::printf("%zu inputs, %zu damaged ones\n", files.size(), made);
-  return files.empty() ? 1 : 0;  // a corpus that is not there is a mistake
+  return files.empty() ? 1 : 0;  // a missing corpus is a mistake
 }

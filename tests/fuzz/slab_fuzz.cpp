@@ -1,5 +1,5 @@
-// Any bytes as the answer of a data server: a sampler's store refuses them, or holds what its header says. The first
-// bytes choose the header: whether voxels are lit, begin and end of the slices, a second answer for other levels.
+// Gives a sampler's store any bytes as a data server's answer: the store refuses them, or holds what the header says.
+// The first bytes choose the header: lit voxels or not, begin and end of the slices, a second answer for other levels.
 #include <cstdlib>
 
 #include "services/sampler/volume/slab_store.h"
@@ -19,7 +19,7 @@ struct PlainSlab final : sampler::Slab {
   }
 };
 
-// What is arranged can be encoded and read again: its rows fit its voxels.
+// Checks that arranged voxels survive encoding and decoding: their rows fit them.
 std::shared_ptr<const sampler::Slab> arranged(const volume::Grid&, volume::Voxels voxels) {
   const auto bytes = volume::encode_voxels(voxels, kSizeX, kSizeY);
   const auto again = volume::decode_voxels(bytes, kSizeX, kSizeY, voxels.k_begin, voxels.k_end, kLevels);

@@ -1,5 +1,5 @@
-// Any bytes through the decoder of slice images: an error, or images that survive another round trip. The raster's size
-// stands in the first two bytes.
+// Decodes any bytes as slice images: gives an error, or images that survive another round trip. The first two bytes are
+// the raster's size.
 #include <cstdlib>
 
 #include "common/volume/slices/image.h"
@@ -15,12 +15,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const auto image = decode_slice(slice, width, height);
     if (!image.ok()) continue;
     const auto bytes = encode_slice(*image);
-    if (bytes.empty()) continue;  // blocks may hold nothing
+    if (bytes.empty()) continue;  // all blocks may be empty
     const auto again = parse_slices(bytes, width, height, layers);
     if (!again.ok() || again->size() != 1) std::abort();
     const auto back = decode_slice(again->front(), width, height);
     if (!back.ok()) std::abort();
-    // What is left is the same; what was transparent may have been cropped.
+    // The remaining pixels are equal; transparent ones may have been cropped.
     const auto at = [](const SliceImage& i, int x, int y) {
       const auto& r = i.rect;
       if (x < r.x || y < r.y || x >= r.x + r.width || y >= r.y + r.height) return uint32_t{0};

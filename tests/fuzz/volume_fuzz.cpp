@@ -1,5 +1,5 @@
-// The parsers of all volume headers, of VTK's files and of TIFF directories: whatever a header says, what passes the
-// checks must be a grid whose voxels the data can hold.
+// The parsers of all volume headers, of VTK's files and of TIFF directories: a header that passes the checks must
+// describe a grid whose voxels the data can hold.
 #include <cstdint>
 #include <cstdlib>
 

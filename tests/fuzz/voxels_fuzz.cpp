@@ -1,4 +1,4 @@
-// Any bytes through the voxel decoder: an error, or voxels that survive another round trip. The first bytes choose the
+// Decodes any bytes as voxels: gives an error, or voxels that survive another round trip. The first bytes choose the
 // grid.
 #include <cstdlib>
 
@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const auto bytes = volume::encode_voxels(*voxels, size_x, size_y);
   const auto again = volume::decode_voxels(bytes, size_x, size_y, voxels->k_begin, voxels->k_end, levels);
   if (!again.ok()) std::abort();
-  // Normals of no voxels leave no trace.
+  // Normals without voxels must not remain.
   if (!(*again == *voxels)) std::abort();
   return 0;
 }

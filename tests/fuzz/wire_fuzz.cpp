@@ -1,5 +1,5 @@
-// Any bytes through the decoder of any message (the first byte selects which): an error, or a message that survives a
-// round trip and has no text that is not UTF-8.
+// Decodes any bytes as any message (the first byte selects which): gives an error, or a message that survives a round
+// trip and has only valid UTF-8 texts.
 #include <cstdint>
 #include <cstdlib>
 #include <string>

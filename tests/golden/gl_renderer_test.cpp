@@ -1,4 +1,4 @@
-// What only the GL renderer has: limits of the GPU, and ways to move data that must make no difference.
+// Tests of the GL renderer alone: limits of the GPU, and ways to move data that must make no difference.
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ using viewer::GlRenderer;
 
 constexpr splat::Finish kNoFinish{false, false, false};
 
-// The same points in every test; the size varies from frame to frame, and so does how much there is to send.
+// The same points in every test; the size, and with it the amount of data, varies from frame to frame.
 struct Scene {
   explicit Scene(int frame = 0)
       : camera(testing::front_camera(frame % 3 == 2 ? 75 : 150, frame % 3 == 2 ? 60 : 100)),
@@ -48,7 +48,7 @@ std::unique_ptr<GlRenderer> made(Result<std::unique_ptr<GlRenderer>> renderer) {
 
 class GlRendererTest : public ::testing::Test {
  protected:
-  // Machines without any OpenGL skip; renderers that cannot be made where there is one fail.
+  // Skips on machines without any OpenGL; fails if a renderer cannot be made with OpenGL.
   void SetUp() override {
     auto context = gl::EglContext::make();
     if (!context) GTEST_SKIP() << context.error().text;
@@ -61,7 +61,7 @@ TEST_F(GlRendererTest, WaysToMoveDataMakeNoDifference) {
   const auto plain = made(GlRenderer::make(false));
   const auto mapped = made(GlRenderer::make(true));
   ASSERT_TRUE(plain && mapped);
-  for (int frame = 0; frame < 8; ++frame) {  // growing
+  for (int frame = 0; frame < 8; ++frame) {  // frames grow
     const Scene scene(frame);
     const splat::RenderOptions options{splat::kKernels[static_cast<size_t>(frame) % std::size(splat::kKernels)],
                                        {frame % 2 == 0, true, frame % 3 == 0}};
@@ -71,7 +71,7 @@ TEST_F(GlRendererTest, WaysToMoveDataMakeNoDifference) {
   }
 }
 
-// Two frames into the same renderer do not show through each other, after any frame before.
+// Frames of one renderer do not show through in later ones.
 TEST_F(GlRendererTest, FramesDoNotDependOnTheOnesBefore) {
   const auto worn = made(GlRenderer::make());
   ASSERT_TRUE(worn);
@@ -86,7 +86,7 @@ TEST_F(GlRendererTest, FramesDoNotDependOnTheOnesBefore) {
     }
 }
 
-// Another packer numbers its events from 1 again, and memory comes back at the same address.
+// A new packer numbers its events from 1 again, and memory comes back at the same address.
 TEST_F(GlRendererTest, PointsOfAnotherReplicaAreNotTakenForThoseKept) {
   const auto worn = made(GlRenderer::make()), fresh = made(GlRenderer::make());
   ASSERT_TRUE(worn && fresh);
@@ -142,7 +142,7 @@ TEST_F(GlRendererTest, RefusesWhatTheGpuCannotHold) {
   const testing::Frame shown = render(*renderer, scene, {});
   EXPECT_EQ(shown.colour, std::vector<uint32_t>(shown.colour.size(), 0xff000000u | scene.shading.background()));
   EXPECT_TRUE(std::isinf(shown.depth_m.front()) && std::isinf(shown.depth_m.back()));
-  // And goes on with what it can.
+  // The renderer goes on with frames that it can draw.
   const Scene small;
   const testing::Frame after = render(*renderer, small, {});
   EXPECT_NE(after.colour, std::vector<uint32_t>(after.colour.size(), after.colour[0]));
@@ -152,7 +152,7 @@ TEST_F(GlRendererTest, RefusesWhatTheGpuCannotHold) {
 
 constexpr int kMargin = 24;  // pixels around the image that the stages may look at
 
-// testing::ellipse_plainly, of the image and a margin around it.
+// testing::ellipse_plainly, for the image and a margin around it.
 std::vector<uint64_t> keys_with_margin(const Scene& scene) {
   const int width = scene.camera.width + 2 * kMargin, height = scene.camera.height + 2 * kMargin;
   std::vector<uint64_t> keys(size_t(width) * size_t(height), uint64_t(splat::kEmptyKey));
@@ -227,7 +227,7 @@ TEST_F(GlRendererTest, FinishesAsTheCpuDoes) {
     }
     const std::string what = std::string(finish.fill ? "fill " : "") + (finish.smooth ? "smooth " : "") +
                              (finish.antialias ? "antialias" : "");
-    // Where depths tie another point may win. A stage changes far more than that.
+    // Where depths are equal another point may win. A stage changes far more than that.
     EXPECT_LE(differing, plain.size() / 200) << what;
     if (what != "") {
       EXPECT_GE(changed, plain.size() / 100) << what;

@@ -1,4 +1,4 @@
-// Both renderers of volumes show the same picture. On failure the CPU's, GL's and their difference are kept.
+// Both renderers of volumes show the same picture. A failure keeps the CPU's picture, GL's and their difference.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -18,7 +18,7 @@ constexpr uint32_t kBackground = 0x203040;
 
 class GlVolumeTest : public ::testing::Test {
  protected:
-  // Machines without any OpenGL skip; renderers that cannot be made where there is one fail.
+  // Skips on machines without any OpenGL; fails if a renderer cannot be made with OpenGL.
   void SetUp() override {
     if (const auto context = gl::EglContext::make(); !context) GTEST_SKIP() << context.error().text;
     auto made = viewer::make_volume_renderer("gl", 1);
@@ -43,7 +43,7 @@ class GlVolumeTest : public ::testing::Test {
     EXPECT_LE(most, 4) << what;
     // GL may round each look-up to eight bits, and llvmpipe does.
     EXPECT_LT(sum / static_cast<double>(cpu.colour.size()), 0.75) << what;
-    // Opacity reaches kSolid a layer earlier or later by rounding alone.
+    // By rounding alone, opacity may reach kSolid a layer earlier or later.
     EXPECT_LT(depths_off, 1 + static_cast<int>(cpu.colour.size()) / 200) << what;
     const char* keep = std::getenv("TELESPLAT_KEEP_IMAGES");
     if (!HasFailure() && !keep) return;
@@ -64,7 +64,7 @@ TEST_F(GlVolumeTest, ShowsWhatTheCpuShows) {
     const double around = 1.1 * n, above = 0.4 * std::sin(2.0 * n);
     const auto sampled = looking_at(grid.centre_room(), orbit(grid, 0.8, around, above), 320, 240);
     volume::VolumeFrame frame = blob_frame(grid, sampled);
-    // Frames of one number are one frame: their texels may lie where the last ones did.
+    // Two frames of one number are one frame: give each its own, since texels may lie where the last ones did.
     frame.frame = FrameId{static_cast<uint64_t>(n + 1)};
     const auto display = looking_at(grid.centre_room(), orbit(grid, 0.7, around + 0.12, above + 0.06), 300 + n, 220);
     expect_alike(&frame, display, "aside-" + std::to_string(n));
@@ -76,7 +76,7 @@ TEST_F(GlVolumeTest, ShowsWhatTheCpuShows) {
 TEST_F(GlVolumeTest, ShowsEachFrameAfterTheOtherAndNothing) {
   const volume::Grid grid = turned_grid();
   const auto camera = looking_at(grid.centre_room(), orbit(grid, 0.8, 0.3, 0.2), 200, 150);
-  // Frames differ in size and number of layers, and lie in the same place in memory.
+  // Frames differ in size and number of layers, and use the same place in memory.
   for (int n = 0; n < 4; ++n) {
     const auto sampled = looking_at(grid.centre_room(), orbit(grid, 0.8, 0.3, 0.2), n % 2 ? 90 : 320, n % 2 ? 70 : 240);
     volume::VolumeFrame frame = blob_frame(grid, sampled, n == 2 ? 64 : 5 + n);

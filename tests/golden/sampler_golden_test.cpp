@@ -1,5 +1,5 @@
-// What the samplers make of a small analytic mesh (a tessellated torus over a chequered floor), against committed
-// pictures: direct rendering, and a depth image's planes as colours. A failing case leaves reference, rendered and
+// Compares the samplers' pictures of a small analytic mesh (a tessellated torus over a chequered floor) with committed
+// ones: direct rendering, and a depth image's planes as colours. A failing case leaves reference, rendered and
 // difference pictures in the build folder (golden-failures/). To accept new pictures, look at them and run with
 // TELESPLAT_UPDATE_GOLDEN=1.
 #include <gtest/gtest.h>
@@ -69,8 +69,8 @@ image::View planes(const image::DepthImage& image) {
 }
 image::View albedo(const image::DepthImage& image) { return {image.width, image.height, image.colour, {}}; }
 
-// Edges may fall to the other side of a pixel where another processor rounds differently: few pixels may differ by
-// much, and the others by a step of quantisation.
+// Another processor's rounding may move an edge to the next pixel: few pixels may differ by much, and the others by a
+// step of quantisation.
 void expect_golden(const std::string& name, const image::View& rendered, size_t allowed_pixels) {
   const std::string path = kFolder + name + ".png";
   if (std::getenv("TELESPLAT_UPDATE_GOLDEN")) {

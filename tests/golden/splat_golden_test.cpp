@@ -98,7 +98,7 @@ image::View direct_view(const geometry::Camera& camera, const image::Shading& sh
   return out;
 }
 
-// Squares need a little more than the samples' distance, discs its diagonal, to close a surface.
+// Squares need a little more than the samples' distance to close a surface, discs its diagonal.
 float splat_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kSquare ? 1.1f : 1.5f; }
 
 image::View render(viewer::Renderer& renderer, splat::Kernel kernel, float scale) {
@@ -116,8 +116,8 @@ image::View render(viewer::Renderer& renderer, splat::Kernel kernel, float scale
 }
 
 struct Difference {
-  int largest = 0;            ///< of a channel
-  double mean = 0;            ///< of all channels
+  int largest = 0;            ///< in one channel
+  double mean = 0;            ///< over all channels
   double largest_window = 0;  ///< mean over the worst 8x8 window
   double pixels = 0;          ///< share that differs at all
   std::vector<uint32_t> image;
@@ -148,7 +148,7 @@ Difference difference(const image::View& a, const image::View& b) {
   return d;
 }
 
-// How far a picture may be from the committed one.
+// Limits of a picture's difference from the committed one.
 struct Tolerance {
   double mean, window, pixels;
 };
@@ -173,8 +173,7 @@ void expect_like(const image::View& reference, const image::View& rendered, cons
   keep("difference", {kWidth, kHeight, d.image, {}});
 }
 
-// A renderer that cannot be made fails the test, unless the machine has no OpenGL at all: then it is null, and the
-// reason is told.
+// Fails the test if a renderer cannot be made. On a machine without OpenGL it returns null and the reason instead.
 std::unique_ptr<viewer::Renderer> make(const std::string& kind, std::string& why_not) {
   if (kind == "gl")
     if (const auto context = gl::EglContext::make(); !context) {
@@ -203,7 +202,7 @@ TEST_P(SplatGolden, LooksAsCommitted) {
   ASSERT_TRUE(reference) << reference.error().text;
   ASSERT_EQ(reference->width, kWidth);
   ASSERT_EQ(reference->height, kHeight);
-  // The CPU's arithmetic is exact; what the compiler's library does in the scene's sines may move a sample. GPUs round
+  // The CPU's arithmetic is exact; the sines of the compiler's library may move a sample of the scene. GPUs round
   // divisions their own way.
   const Tolerance tolerance = kind == "cpu" ? Tolerance{0.02, 1.0, 0.001} : Tolerance{0.03, 4.0, 0.003};
   expect_like(*reference, rendered, tolerance, "splat-" + shape + "-" + kind);
@@ -217,10 +216,10 @@ TEST_P(SplatGolden, IsCloseToTracingTheScene) {
   const geometry::Camera camera = display_camera();
   const image::View direct = direct_view(camera, image::Shading({}, camera));
   const image::Quality q = image::compare(direct, render(*renderer, kernel, splat_scale(kernel)));
-  // Sampled at two thirds of the display's resolution: edges of the pattern are steps of one and a half pixels.
+  // Sampled at two thirds of the display's resolution: edges of the pattern become steps of one and a half pixels.
   EXPECT_GT(q.psnr_db, 19.0);
   EXPECT_GT(q.ssim, 0.65);
-  // Some of the scene no sampling view saw.
+  // No sampling view saw some parts of the scene.
   EXPECT_LT(q.hole_fraction, 0.05);
   std::printf("%s: PSNR %.2f dB, SSIM %.3f, holes %.4f\n", kind.c_str(), q.psnr_db, q.ssim, q.hole_fraction);
 }
@@ -232,7 +231,7 @@ INSTANTIATE_TEST_SUITE_P(Renderers, SplatGolden,
                                   std::string(splat::kernel_name(std::get<1>(info.param)));
                          });
 
-// ewa adds up floats, in another order on each renderer.
+// ewa adds up floats, in a different order on each renderer.
 bool same_colour(uint32_t a, uint32_t b, splat::Kernel kernel) {
   const int tolerance = kernel == splat::Kernel::kEwa ? 2 : 0;
   for (int shift : {16, 8, 0})
@@ -240,8 +239,8 @@ bool same_colour(uint32_t a, uint32_t b, splat::Kernel kernel) {
   return true;
 }
 
-// The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept
-// copies, items that it may not keep, and changes of size are tried too.
+// Compares the two renderers: colours and depths, frame after frame from one GL renderer, so that its kept copies,
+// items that it may not keep, and changes of size are tested too.
 TEST(RenderersAgree, FrameAfterFrame) {
   std::string why_not;
   const auto gl = make("gl", why_not);
@@ -270,8 +269,8 @@ TEST(RenderersAgree, FrameAfterFrame) {
       colours += !same_colour(a.colour[i], b.colour[i], kernel);
       depths += !(a.depth_m[i] == b.depth_m[i] || std::abs(a.depth_m[i] - b.depth_m[i]) < 1e-4f * a.depth_m[i]);
     }
-    // Stated tolerance: at most 0.5 % of pixels show another point, where depths tie (ewa: another mean); antialiasing
-    // shows it in the neighbours too.
+    // Stated tolerance: at most 0.5 % of pixels show another point, where depths are equal (ewa: another mean);
+    // antialiasing spreads that to the neighbours.
     const size_t limit = a.colour.size() / (finish.antialias ? 50 : 200);
     EXPECT_LE(colours, limit) << "frame " << frame;
     EXPECT_LE(depths, limit) << "frame " << frame;

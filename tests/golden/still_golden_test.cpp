@@ -22,7 +22,7 @@ struct Pictures {
   int drawn = 0, tiles = 0;
 };
 
-// A model, and what the finer rays that it was made of have met.
+// A model, and the finer rays that it was made from.
 struct Sampled {
   points::PointModel model;
   std::unique_ptr<FineRays> rays = std::make_unique<FineRays>();
@@ -61,7 +61,7 @@ points::ModelConfig compact_config() {
   return config;
 }
 
-// Adds the display's picture with `by` times as many rays a side, of which only some are cast.
+// Adds the display's picture with `by` times as many rays a side; `cast` chooses those that are cast.
 template <class Cast>
 void add(Sampled& to, uint64_t sequence, int by, const Cast& cast) {
   const test::CastRays rays = test::cast_rays(display(), by, cast);
@@ -76,7 +76,7 @@ Sampled model_of(std::initializer_list<int> scales) {
   return out;
 }
 
-// Null, with the reason, where the machine has no OpenGL at all.
+// Returns null, with the reason, on a machine without OpenGL.
 std::unique_ptr<Renderer> make(const std::string& kind, std::string& why_not) {
   if (kind == "gl")
     if (const auto context = gl::EglContext::make(); !context) {
@@ -124,7 +124,7 @@ TEST_P(StillPictures, ApproachSixteenRaysAPixel) {
   }
 }
 
-// As refinement leaves it half way: clumps of finer samples among those a pixel apart, in merged mosaics.
+// A refinement half way: clumps of finer samples among those a pixel apart, in merged mosaics.
 TEST_P(StillPictures, HaveNoHolesWhereFineAndCoarseSamplesMix) {
   Sampled model = model_of({1});
   uint64_t sequence = 1;
@@ -143,8 +143,8 @@ TEST_P(StillPictures, HaveNoHolesWhereFineAndCoarseSamplesMix) {
   EXPECT_GT(still, plain + 1);
 }
 
-// Samples are missing here and there, and nothing is behind them; some samples are finer. A gap of a few
-// sub-pixels is no silhouette, at which finer samples alone would count.
+// Some samples are missing, with nothing behind them; some samples are finer. A gap of a few sub-pixels is no
+// silhouette, at which only finer samples would count.
 TEST_P(StillPictures, HaveNoDotsWhereSamplesAreMissing) {
   Sampled model{points::PointModel(compact_config())};
   std::mt19937 random(7);
@@ -182,12 +182,12 @@ TEST_P(StillPictures, HaveNoSeams) {
   EXPECT_EQ(whole.drawn, 1);
   size_t differ = 0;
   for (size_t i = 0; i < whole.still.colour.size(); ++i) differ += tiles.still.colour[i] != whole.still.colour[i];
-  // A point's place within a sub-pixel is rounded to 1/8, in another frame's numbers.
+  // A point's place within a sub-pixel is rounded to 1/8, and each frame rounds it differently.
   EXPECT_LT(double(differ), 0.03 * double(whole.still.colour.size()));
   EXPECT_GT(test::psnr_db(tiles.still, whole.still), 55);
 }
 
-// Samples 6 pixels apart would need splats of 26 sub-pixels; there are none above 16.
+// Samples 6 pixels apart would need splats of 26 sub-pixels; the largest splat has 16.
 TEST_P(StillPictures, HaveNoGapsWhereSamplesAreFarApart) {
   const points::ModelConfig config = test::scene_config();
   const image::View reference = test::traced(display(), 4, image::Shading({}, display()));
@@ -198,7 +198,7 @@ TEST_P(StillPictures, HaveNoGapsWhereSamplesAreFarApart) {
   geometry::Camera coarse = display();
   coarse.width /= 6, coarse.height /= 6;
   const geometry::Camera fine = test::finer(display(), 4);
-  // Fine samples in a narrow strip across the middle, then everywhere but in a corner.
+  // Fine samples in a narrow strip across the middle, then everywhere except in a corner.
   for (const geometry::Rect& there :
        {geometry::Rect{0, fine.height / 2, fine.width, 16}, {fine.width / 8, 0, 7 * fine.width / 8, fine.height}}) {
     Sampled model{points::PointModel(config)};
@@ -212,7 +212,7 @@ TEST_P(StillPictures, HaveNoGapsWhereSamplesAreFarApart) {
   }
 }
 
-// The properties above do not depend on how a kernel is drawn by OpenGL; here each is.
+// The properties above hold for any kernel in OpenGL; these tests draw each kernel.
 class CommittedStillPictures : public StillPictures {};
 
 TEST_P(CommittedStillPictures, LookAlike) {

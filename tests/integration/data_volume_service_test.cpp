@@ -1,4 +1,4 @@
-// A volume's data server among sockets: a master that welcomes it, a sampler that asks for voxels.
+// A volume's data server on sockets: a master that welcomes it, a sampler that asks for voxels.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kDeadline_s = telesplat::test::patient(30);
 
-// The next message of type M that a peer sends; others are passed over.
+// Returns the next message of type M that a peer sends; skips others.
 template <class M>
 std::optional<std::pair<M, net::Message>> next(net::Socket& socket) {
   for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until; net::wait_readable({&socket}, 20))
@@ -104,7 +104,7 @@ TEST_F(Service, SaysWhatItHasWeighsItAndSendsIt) {
   EXPECT_EQ(again->first.epoch, EpochId{2});
   sampler.send_frames({}, wire::VoxelRequest::kName, "nonsense");
   request.end = 500;
-  sampler.send(request);  // there are no such slices
+  sampler.send(request);  // these slices do not exist
   request.end = 90;
   uint64_t voxels = 0, bytes = 0;
   for (int answers = 0; request.begin < 90; ++answers) {
@@ -130,7 +130,7 @@ TEST_F(Service, SaysWhatItHasWeighsItAndSendsIt) {
     const auto report = next<wire::StatusReport>(master);
     ASSERT_TRUE(report);
     const auto& values = report->first.values;
-    if (values.at("voxels_sent") < double(voxels)) continue;  // an earlier second's
+    if (values.at("voxels_sent") < double(voxels)) continue;  // an earlier second's report
     EXPECT_EQ(values.at("voxels_sent"), double(voxels));
     EXPECT_EQ(values.at("bytes_sent"), double(bytes));
     EXPECT_NEAR(values.at("bytes_per_voxel"), double(bytes) / double(voxels), 1e-9);
@@ -216,7 +216,7 @@ TEST(DataServer, SendsTheChunksOfAMesh) {
   EXPECT_TRUE(none->first.data.empty());
 }
 
-// One chunk, of a mesh that nobody looks at.
+// A mesh of one chunk, whose content does not matter.
 class OneChunk final : public MeshStore {
  public:
   explicit OneChunk(size_t bytes)
@@ -232,7 +232,7 @@ class OneChunk final : public MeshStore {
   std::shared_ptr<const std::vector<std::byte>> bytes_;
 };
 
-// Its data server, and the master that it talks to.
+// A OneChunk's data server, and its master.
 class OneChunkService : public testing::Test {
  protected:
   void start(size_t bytes) {
@@ -254,7 +254,7 @@ class OneChunkService : public testing::Test {
     stop = true;
     if (server.joinable()) server.join();
   }
-  // The newest report, of a server that is welcome.
+  // Welcomes the server and returns a value of its newest report.
   double reported(const std::string& key) {
     master.send(wire::Welcome{.master = InstanceId{5}, .epoch = EpochId{3}}, peer);
     const auto report = next<wire::StatusReport>(master);
@@ -289,7 +289,7 @@ TEST_F(OneChunkService, AFloodOfRequestsIsDroppedAndCountedAndOthersAreServed) {
   EXPECT_LE(refused, kFlood - 200);
 }
 
-// As many at a time as samplers ask for, as fast as they are answered.
+// A sampler asks for as many chunks at a time as samplers do, as fast as the server answers.
 TEST_F(OneChunkService, ASamplerAtFullSpeedLosesNoRequest) {
   start(20'000);
   net::Socket sampler(context, net::Kind::kDealer, "sampler");
@@ -306,7 +306,7 @@ TEST_F(OneChunkService, ASamplerAtFullSpeedLosesNoRequest) {
   EXPECT_EQ(reported("queue_refused"), 0);
 }
 
-// Not many megabytes wait for who reads none, however many messages that are.
+// Few megabytes wait for a peer that does not read, for any number of messages.
 TEST_F(OneChunkService, AnswersThatNobodyReadsAreDroppedAndCounted) {
   options.service.queue_limit_mb = 4;
   start(1'000'000);
@@ -341,7 +341,7 @@ TEST(DataServer, AFloodOfChunkRequestsQueuesFew) {
   const std::string endpoint = hello ? hello->first.endpoints.at("chunks") : "inproc://nowhere";
   EXPECT_TRUE(flooder.connect(endpoint) && other.connect(endpoint));
   const double before_mb = net::resident_mb();
-  // Nothing of it is read.
+  // The peer reads none of the answers.
   const double until_s = monotonic_s() + kDeadline_s;
   for (int sent = 0; sent < 1000 && monotonic_s() < until_s;)
     if (flooder.send(wire::ChunkRequest{EpochId{3}, ChunkId{0}}))
@@ -379,7 +379,7 @@ class NoMemory final : public VolumeStore {
   std::shared_ptr<VolumeStore> store_;
 };
 
-// main() says it in one line and ends with code 1; so it must come out of the serve loop.
+// main() prints the error in one line and ends with code 1: the exception must leave the serve loop.
 TEST(DataServer, AnAnswerThatThrowsEndsTheServerInOrder) {
   DataServiceOptions options;
   options.service.name = "data-1", options.service.master = "inproc://master";

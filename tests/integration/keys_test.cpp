@@ -1,4 +1,4 @@
-// Sockets with keys: who comes in, who does not, and what each may send.
+// Sockets with keys: peers that are let in, peers that are not, and the messages that each may send.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ using test::receive_until;
 
 constexpr double kDeadline_s = test::patient(20);
 
-// A socket that binds with the keys of a folder.
+// A socket that binds with a folder's keys.
 struct Bound {
   Bound(const KeyFolder& keys, Kind kind, std::string_view serves)
       : context(keys.server()), socket(context, kind, "bound", {.serves = serves}) {
@@ -31,7 +31,7 @@ struct Bound {
     EXPECT_TRUE(bound.ok()) << (bound ? "" : bound.error().text);
     if (bound) endpoint = *bound;
   }
-  // Of a message that a friend with this access sends: what comes of it.
+  // Returns the next message that arrives; nothing if none comes in time.
   std::optional<Message> next() {
     std::vector<Message> got;
     receive_until(
@@ -47,7 +47,7 @@ struct Bound {
   std::string endpoint;
 };
 
-// Someone who connects.
+// A process that connects.
 struct Peer {
   Peer(Access access, const std::string& endpoint, Kind kind = Kind::kDealer)
       : context(std::move(access)), socket(context, kind, "peer", kControlSocket) {
@@ -75,7 +75,7 @@ TEST(Keys, WhoeverIsOnTheListIsServedAndKnown) {
     EXPECT_EQ(got->user, user);
     EXPECT_EQ(got->role, role);
     EXPECT_EQ(peer.socket.refusal().text, "");
-    // And it is answered.
+    // The master can answer it.
     ASSERT_TRUE(master.socket.send(wire::Shutdown{"test"}, got->peer));
     std::vector<Message> answers;
     ASSERT_TRUE(receive_until(
@@ -99,8 +99,8 @@ TEST(Keys, WithoutAKeyNobodyComesIn) {
   EXPECT_EQ(master.socket.rejected(), 0u);
 }
 
-// Listens, and closes each connection as soon as the other greeting is whole, before its own has named a mechanism:
-// what a peer sees of a busy server with keys.
+// Listens, and closes each connection as soon as the peer's greeting is complete, before its own names a mechanism: a
+// busy server with keys looks like that to a peer.
 class HastyServer {
  public:
   HastyServer() {
@@ -183,7 +183,7 @@ TEST(Keys, ARevokedKeyDoesNotComeInAgainWhileTheServerRuns) {
   peer.socket.send(kGoodbye);
   EXPECT_TRUE(master.refuses(1));
   EXPECT_FALSE(master.socket.receive());
-  // Someone new is let in without a restart.
+  // A new person is let in without a restart.
   ASSERT_TRUE(keys.maker().add_person("ben", Role::kViewer).ok());
   Peer ben(keys.named("ben"), master.endpoint);
   ASSERT_TRUE(ben.socket.send(kGoodbye));
@@ -192,7 +192,7 @@ TEST(Keys, ARevokedKeyDoesNotComeInAgainWhileTheServerRuns) {
   EXPECT_EQ(got->user, "ben");
 }
 
-// Whoever is in when the key is revoked, at any socket, goes; others stay.
+// A revoked key ends its connections at all sockets; others stay.
 TEST(Keys, WhoIsInWhenTheKeyIsRevokedHasToGo) {
   const KeyFolder keys;
   ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok());
@@ -360,7 +360,7 @@ TEST(Keys, RandomBytesAreCountedAndRefused) {
         master.socket, [&] { return master.socket.keys_refused() + master.socket.rejected() >= 1; }, nullptr, 8));
   }
   {
-    // A plain peer of our own protocol that shows no key.
+    // A plain peer of our own protocol without a key.
     test::RawPeer peer(master.endpoint);
     EXPECT_FALSE(peer.shake_hands("DEALER"));
   }
@@ -380,7 +380,7 @@ TEST(Keys, AddressesOfOtherMachinesNeedKeysOrTheWord) {
   EXPECT_TRUE(with.bind("tcp://0.0.0.0:*").ok());
 }
 
-// Once: a process that looks for its master connects again and again.
+// The warning comes once: a process that looks for its master connects again and again.
 TEST(Keys, WhoSpeaksToOtherMachinesInClearIsWarned) {
   log::initialise("keys", "warn");
   const KeyFolder keys;

@@ -1,4 +1,4 @@
-// A message whose handling fails is its sender's fault: it counts, and the loop goes on.
+// A message whose handling fails counts as its sender's fault, and the loop goes on.
 #include <gtest/gtest.h>
 
 #include <new>

@@ -1,5 +1,4 @@
-// The client side of the master against a master's socket: hello until welcomed, hello again after the master was
-// restarted.
+// The client side of the master, on a master's socket: says hello until welcomed, and again after the master restarts.
 #include <gtest/gtest.h>
 
 #include "common/core/clock.h"
@@ -13,7 +12,7 @@ namespace {
 
 constexpr double kDeadline_s = test::patient(20);
 
-// A master's socket and what a process said to it.
+// A master's socket, and the messages that a process sent it.
 struct FakeMaster {
   FakeMaster(const std::string& address, InstanceId instance)
       : socket(context, Kind::kRouter, "master"), instance(instance) {
@@ -21,7 +20,7 @@ struct FakeMaster {
     EXPECT_TRUE(bound) << bound.error().text;
     if (bound) endpoint = *bound;
   }
-  // Answers hellos; asks who strangers are.
+  // Answers hellos; asks unknown peers to introduce themselves.
   void serve() {
     while (const auto m = socket.receive()) {
       if (m->type == wire::Hello::kName) {
@@ -61,7 +60,7 @@ struct FakeMaster {
   std::string endpoint, peer;
   bool known = false;
   int hellos = 0, clock_requests = 0;
-  int refused = 0;  // the first instances that are refused: another key has them
+  int refused = 0;  // number of first instances to refuse, as if another key had them
   std::vector<InstanceId> instances;
   std::string clock = "another";
   std::map<std::string, std::string> facts;
@@ -77,7 +76,7 @@ class Link : public ::testing::Test {
     hello.name = "sampler-1";
     return MasterLink(context, endpoint, hello, give_up_after_s);
   }
-  // Lets link and master talk until `done`. The link's clock is run fast, so that its second between reports is short.
+  // Lets link and master exchange messages until `done`. The link's clock runs fast: reports come soon.
   template <class Done>
   bool talk(MasterLink& link, FakeMaster* master, Done done) {
     for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
@@ -122,14 +121,14 @@ TEST_F(Link, SaysHelloAgainToARestartedMaster) {
   ASSERT_TRUE(talk(link, &second, [&] { return !second.reports.empty(); }));
 }
 
-// What a process says while it waits: the link's clock is run fast, so a minute is short.
+// Log lines of a process that waits: the link's clock runs fast, so a minute is short.
 class WaitingLink : public Link {
  protected:
   void SetUp() override {
     log::initialise("link", "info");
     step_s = 0.4;
   }
-  // What is logged while link and master talk until `done`.
+  // Returns the log lines while link and master exchange messages until `done`.
   template <class Done>
   std::string said(MasterLink& link, FakeMaster* master, Done done) {
     testing::internal::CaptureStderr();
@@ -229,7 +228,7 @@ TEST_F(Link, BecomesAnotherInstanceWhereItsOwnIsTaken) {
   EXPECT_EQ(link.instance(), instances.back());
 }
 
-// Hellos that were on their way when the first of them was refused are refused, too.
+// Hellos that were under way when the first one was refused are refused, too.
 TEST_F(Link, BecomesAnotherInstanceOnceForAllItsHellos) {
   auto master = std::make_unique<FakeMaster>("tcp://127.0.0.1:*", InstanceId{1});
   MasterLink link = make_link(master->endpoint);
@@ -295,13 +294,13 @@ TEST_F(Link, ProcessesOfOneMachineShareAClock) {
   EXPECT_EQ(master.reports.back().at("clock_error_ms"), 0);
 }
 
-// A message that waits for its reader keeps the moment at which it came.
+// A message that waits for its reader keeps its time of arrival.
 TEST_F(Link, ArrivalsAreStampedWhileNobodyReads) {
   FakeMaster master("tcp://127.0.0.1:*", {1});
   MasterLink link = make_link(master.endpoint);
   ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
   std::vector<Message> got;
-  master.socket.send(wire::Shutdown{"soon"}, master.peer);  // behind it nothing else is under way
+  master.socket.send(wire::Shutdown{"soon"}, master.peer);  // no later message is under way
   ASSERT_TRUE(test::receive_until(
       link.socket(), [&] { return !got.empty() && got.back().type == wire::Shutdown::kName; }, &got));
   const double before_s = monotonic_s();
@@ -315,7 +314,7 @@ TEST_F(Link, ArrivalsAreStampedWhileNobodyReads) {
   EXPECT_LE(message->arrived_s, there_s);
 }
 
-// Whatever the master is: a message of the control plane has at most 1 MiB.
+// From any master: a message of the control plane has at most 1 MiB.
 TEST_F(Link, AControlMessageBeyondItsLimitIsDropped) {
   FakeMaster master("tcp://127.0.0.1:*", InstanceId{7});
   MasterLink link = make_link(master.endpoint);
@@ -326,7 +325,7 @@ TEST_F(Link, AControlMessageBeyondItsLimitIsDropped) {
   EXPECT_EQ(link.version(), version);
 }
 
-// A sampler may need seconds for a slab: meanwhile nobody calls tick().
+// A sampler may need seconds for a slab, and does not call tick() meanwhile.
 TEST_F(Link, AProcessThatWorksForSecondsIsHeardOf) {
   FakeMaster master("tcp://127.0.0.1:*", InstanceId{7});
   MasterLink link = make_link(master.endpoint);

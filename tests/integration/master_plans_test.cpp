@@ -1,5 +1,5 @@
 // The master process in a thread, among a packer, a sampler and a viewer made for the test: plans that come, come late,
-// never come, or are no plans.
+// never come, or are invalid.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@ struct Peer {
     socket.send(hello);
     EXPECT_TRUE(next<wire::Welcome>());
   }
-  // The next message of type M; others are dropped.
+  // Returns the next message of type M; drops others.
   template <class M>
   std::optional<M> next(double patience_s = kDeadline_s) {
     for (const double until = monotonic_s() + patience_s; monotonic_s() < until;) {
@@ -159,7 +159,7 @@ TEST_F(MasterPlans, APackerThatNeverAnswersCostsViewsNoMoreThanTheDeadline) {
       done(*lease);
     }
     EXPECT_TRUE(completed(uint64_t(view)));
-    packer->socket.send(plan_of(question, true));  // much too late: nobody takes notice
+    packer->socket.send(plan_of(question, true));  // much too late: it has no effect
     look(uint64_t(view) + 1);
   }
 }
@@ -168,11 +168,11 @@ TEST_F(MasterPlans, WhatIsNoPlanIsCountedAndTheViewIsSampledWhole) {
   look(1);
   const auto question = asked();
   wire::Plan outside = plan_of(question, true);
-  outside.tiles[0] = 500;  // its right side
+  outside.tiles[0] = 500;  // the tile at its right
   packer->socket.send(outside);
   packer->socket.send_frames({}, wire::Plan::kName, "nonsense");
   packer->socket.send_frames({}, wire::Plan::kName, wire::encode(plan_of(question, true)).substr(0, 40));
-  viewer->socket.send(plan_of(question, false));  // who is no packer
+  viewer->socket.send(plan_of(question, false));  // the viewer is no packer
   for (int tile = 0; tile < 2; ++tile) {
     const auto lease = sampler->next<wire::Lease>();
     ASSERT_TRUE(lease);

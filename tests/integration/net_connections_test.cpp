@@ -1,5 +1,5 @@
-// How many may be connected to a socket, with keys and without: those beyond the limit are refused and counted, those
-// who say nothing go, and friends stay.
+// Limits of a socket's connections, with keys and without: connections beyond the limit are refused and counted, silent
+// peers are closed, and friends stay.
 #include <gtest/gtest.h>
 
 #include <dirent.h>
@@ -53,7 +53,7 @@ struct Friend {
   Socket socket;
 };
 
-// It speaks, and is answered.
+// True if the friend's message arrives and is answered.
 bool is_served(Bound& bound, Friend& by, double deadline_s = kDeadline_s) {
   if (!by.socket.send(kGoodbye)) return false;
   std::vector<Message> got, answer;
@@ -94,7 +94,7 @@ TEST(HostilePeers, ConnectionsBeyondTheLimitAreRefusedAndFriendsStay) {
   }
   EXPECT_EQ(bound.socket.rejected(), kMost - 1) << "who is refused is not counted as one who sent nothing";
   EXPECT_TRUE(is_served(bound, before)) << "friends stay";
-  // Another friend waits until there is room, and does not have to be started again.
+  // Another friend waits until a place is free, and needs no restart.
   Friend after(bound);
   EXPECT_FALSE(is_served(bound, after, 1));
   strangers.pop_back();
@@ -113,20 +113,20 @@ TEST(HostilePeers, WhoHoldsPlacesWithoutAWordKeepsNobodyOut) {
 
 class OfEachKind : public ::testing::TestWithParam<Kind> {};
 
-// Whoever owns the socket does not even have to look.
+// The limit holds even if the socket's owner does not look.
 TEST_P(OfEachKind, NoMoreFilesAreOpenThanConnectionsMayBe) {
   Bound bound(GetParam());
   Peers strangers;
   for (int i = 0; i < 300; ++i) strangers.push_back(std::make_unique<RawPeer>(bound.endpoint));
   const double until = monotonic_s() + kDeadline_s;
   const auto few = [&] { return open_files() <= 300 + int(kMost) + 40; };
-  // At first most of them wait to be accepted, and are nobody's yet.
+  // At first most of them wait to be accepted, and count for no socket.
   while ((!few() || bound.socket.connections_refused() < 200) && monotonic_s() < until) wait_readable({}, 10);
   EXPECT_TRUE(few()) << open_files();
   EXPECT_GE(bound.socket.connections_refused(), 200u);
 }
 
-// Of the three who say nothing, or not enough, nothing is left after five seconds.
+// Three peers send nothing, or too little: all are closed after five seconds.
 TEST_P(OfEachKind, WhoDoesNotShakeHandsIsHungUpOn) {
   Bound bound(GetParam());
   RawPeer silent(bound.endpoint), greets(bound.endpoint), trickles(bound.endpoint);
@@ -164,7 +164,7 @@ TEST(Keys, ConnectionsBeyondTheLimitAreRefusedAndFriendsStay) {
   EXPECT_TRUE(receive_until(bound.socket, [&] { return is_served(bound, one_more, 1); }));
 }
 
-// Nobody who has no key can keep out those who have one.
+// Peers without a key cannot keep out peers with one.
 TEST(Keys, WhoHoldsPlacesWithoutAKeyKeepsNobodyOut) {
   const KeyFolder keys;
   Bound bound(Kind::kRouter, keys.server(), "control");

@@ -1,4 +1,4 @@
-// Sockets and peers that misbehave: everything bad is dropped and counted, everyone else is served.
+// Sockets and peers that misbehave: bad messages are dropped and counted, all other peers are served.
 #include <gtest/gtest.h>
 
 #include <pthread.h>
@@ -43,7 +43,7 @@ struct Bound {
 
 const wire::Goodbye kGoodbye{InstanceId{7}};
 
-// A friend who is answered, whatever others do.
+// Checks that a friend's message arrives in spite of others.
 void expect_served(Bound& bound) {
   Context context;
   Socket friendly(context, Kind::kDealer, "friend");
@@ -56,9 +56,9 @@ void expect_served(Bound& bound) {
   EXPECT_EQ(got.back().type, wire::Goodbye::kName);
 }
 
-// What it sent fills the queue, so that ZeroMQ reads no more from it; then the connection breaks, and nobody reads the
-// queue. ZeroMQ 4.3 ends the process when a heartbeat is due over such a connection (libzmq/issues/4841), so that no
-// socket has heartbeats.
+// A peer fills the queue, so that ZeroMQ reads no more from it; then the connection breaks, and the queue stays unread.
+// ZeroMQ 4.3 ends the process when a heartbeat is due over such a connection (libzmq/issues/4841): our sockets have no
+// heartbeats.
 TEST(HostilePeers, SocketsHaveNoHeartbeats) {
   zmq::context_t context;
   zmq::socket_t socket(context, zmq::socket_type::pull);
@@ -98,7 +98,7 @@ TEST(HostilePeers, FrameCountsAndSizesAreLimited) {
   ASSERT_TRUE(bound.rejects(2));
   peer.send(zmtp_frame("goodbye", true) + zmtp_frame(std::string(1001, 'x'), false));  // one byte too many
   ASSERT_TRUE(bound.rejects(3));
-  peer.send(zmtp_frame("", true) + zmtp_frame("", false));  // an empty type and body: whole, but of no known type
+  peer.send(zmtp_frame("", true) + zmtp_frame("", false));  // an empty type and body: complete, but of no known type
   std::vector<Message> got;
   ASSERT_TRUE(receive_until(
       bound.socket, [&] { return !got.empty(); }, &got));
@@ -134,7 +134,7 @@ TEST(HostilePeers, UnknownTypesWrongVersionsAndBadBodiesAreCounted) {
   EXPECT_EQ(bound.socket.rejected(), 5u);
 }
 
-// What a socket that binds must survive and count, whatever its kind.
+// Input that a binding socket of any kind must survive and count.
 class RawBytes : public ::testing::TestWithParam<Kind> {
  protected:
   static const char* friends_type() {
@@ -196,7 +196,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, RawBytes, ::testing::Values(Kind::kRouter, Kind:
                            return info.param == Kind::kRouter ? "Router" : info.param == Kind::kPull ? "Pull" : "Pub";
                          });
 
-// ZeroMQ keeps what a subscriber wants, of whom there may be one with millions of wishes.
+// ZeroMQ keeps each subscriber's wishes, and one may have millions.
 TEST(HostilePeers, StrangeSubscriptionsAreCountedAndHungUpOn) {
   Bound bound(Kind::kPub);
   uint64_t n = 0;
@@ -228,7 +228,7 @@ TEST(HostilePeers, FriendsWhoComeAndGoAreNotCounted) {
     ASSERT_TRUE(receive_until(
         sub, [&] { return pub.socket.send(kGoodbye), !c.empty(); }, &c));
   }
-  // Their hanging up is told in order, so that a stranger's after theirs is the first to count.
+  // Their ends are reported in order: the first that counts is a stranger's after theirs.
   for (Bound* b : {&router, &pull, &pub}) {
     { RawPeer stranger(b->endpoint); }
     ASSERT_TRUE(b->rejects(1));
@@ -265,7 +265,7 @@ TEST(HostilePeers, AFloodFromOneLeavesRoomForOthers) {
   }
   stop = true;
   EXPECT_TRUE(
-      receive_until(bound.socket, [&] { return stopped.load(); }));  // it may be waiting for room in its connection
+      receive_until(bound.socket, [&] { return stopped.load(); }));  // the sender may be waiting for room in its socket
   flood.join();
 }
 
@@ -322,7 +322,7 @@ TEST(HostilePeers, SignalsDoNotTearMessages) {
   EXPECT_EQ(bound.socket.rejected(), 0u);
 }
 
-// ZeroMQ's thread tells of connections; it must not wait for a socket that is about to end, or that nobody reads.
+// ZeroMQ's thread reports connections; it must not wait for a socket that is about to end, or that is not read.
 TEST(HostilePeers, SocketsEndWhilePeersComeAndGo) {
   std::atomic<bool> stop{false};
   std::mutex mutex;

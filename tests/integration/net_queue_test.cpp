@@ -1,4 +1,4 @@
-// What waits for peers who do not read it is bounded in bytes, and costs nobody else anything.
+// Messages for peers that do not read are bounded in bytes, and do not harm other peers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using test::RawPeer;
 using test::zmtp_frame;
 
 constexpr double kDeadline_s = test::patient(30);
-constexpr size_t kBody = 1 << 16, kLimit = 4 << 20, kKernel = 16 << 20;  // what kernels keep for a connection at most
+constexpr size_t kBody = 1 << 16, kLimit = 4 << 20, kKernel = 16 << 20;  // kernels keep less
 const wire::Goodbye kGoodbye{InstanceId{7}};
 
 struct Bound {
@@ -55,7 +55,7 @@ TEST(HostilePeers, WhatNobodyReadsIsBoundedInBytes) {
   EXPECT_LE(sent * kBody, kLimit + kKernel);
   EXPECT_EQ(bound.socket.queue_refused(), 5000 - sent);
   EXPECT_LT(resident_mb() - before_mb, 40);
-  // Another one gets all that it reads, however much that is.
+  // A peer that reads gets everything, any number of bytes.
   Context context;
   Socket reads(context, Kind::kDealer, "reads", {.max_message_bytes = wire::kMaxBulkBytes});
   ASSERT_TRUE(reads.connect(bound.endpoint).ok());
@@ -71,12 +71,12 @@ TEST(HostilePeers, WhatNobodyReadsIsBoundedInBytes) {
   }
   EXPECT_EQ(got, 1000);
   EXPECT_EQ(bound.socket.queue_refused(), 5000 - sent);
-  // One message may be as large as it is.
+  // A single message may exceed the limit.
   ASSERT_TRUE(bound.socket.send_frames(other->peer, "x", std::string(3 * kLimit, 'x')));
   EXPECT_TRUE(wait_readable({&reads}, 10000));
 }
 
-// A publisher, to one who reads and one who does not: with keys, and without.
+// A publisher with two subscribers, one that reads and one that does not: with keys, and without.
 void expect_reader_served(Bound& bound, Socket& reads, const std::function<bool()>& deaf_is_gone) {
   const double until = monotonic_s() + kDeadline_s;
   int published = 0, first = 0, got = 0, missed = 0;
@@ -90,12 +90,12 @@ void expect_reader_served(Bound& bound, Socket& reads, const std::function<bool(
     while (const auto m = reads.receive()) {
       int number = -1;
       if (m->body.size() >= sizeof number) std::memcpy(&number, m->body.data(), sizeof number);
-      if (got == 0) first = number;  // those before it came to nobody
+      if (got == 0) first = number;  // earlier messages had no subscriber
       missed += number != first + got;
       ++got;
     }
   };
-  while (got == 0 && monotonic_s() < until) {  // subscribed?
+  while (got == 0 && monotonic_s() < until) {  // until the subscription counts
     publish(100);
     wait_readable({&reads}, 20);
     receive();
@@ -103,7 +103,7 @@ void expect_reader_served(Bound& bound, Socket& reads, const std::function<bool(
   const double before_mb = resident_mb();
   double most_mb = 0;
   while ((published < 3000 || got < published - first) && monotonic_s() < until) {
-    // Half of what may wait for anybody: with more, who reads slowly would be late as well.
+    // Half of the limit for waiting messages: with more, a slow reader would be late as well.
     if (published < 3000 && published - first - got < 16) publish(kBody);
     if (published % 100 == 0) most_mb = std::max(most_mb, resident_mb() - before_mb);
     wait_readable({&reads}, published < 3000 ? 0 : 5);
@@ -132,7 +132,7 @@ TEST(Keys, ASubscriberWhoDoesNotReadIsHungUpOnAndFriendsMissNothing) {
   const KeyFolder keys;
   Bound bound(Kind::kPub, keys.server(), "patches");
   Context context(keys.of(Role::kViewer));
-  // Its owner never looks.
+  // Its owner never reads.
   Socket deaf(context, Kind::kSub, "deaf", {.high_water_mark = 1, .max_message_bytes = wire::kMaxBulkBytes});
   Socket reads(context, Kind::kSub, "reads", {.max_message_bytes = wire::kMaxBulkBytes});
   ASSERT_TRUE(deaf.connect(bound.endpoint).ok());

@@ -1,4 +1,4 @@
-// Sockets that connect through a SOCKS5 proxy: what comes through, and what is left when proxy or target are gone.
+// Sockets that connect through a SOCKS5 proxy: bytes pass, and sockets survive the end of proxy or target.
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kDeadline_s = test::patient(20);
 
-// A port of this machine where nobody listens.
+// Returns an address of this machine where no process listens.
 std::string nobody() {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
@@ -51,7 +51,7 @@ class Proxy {
   std::string address() const { return relay_->addresses().at(0); }
 
  private:
-  wan_relay::Options options_;  // which the relay refers to
+  wan_relay::Options options_;  // the relay refers to them
   std::unique_ptr<wan_relay::Relay> relay_;
   std::thread thread_;
 };
@@ -63,7 +63,7 @@ bool until(const auto& done) {
   return false;
 }
 
-// What ZeroMQ has for proxies ended the process here.
+// ZeroMQ's own support of proxies ends the process here.
 TEST(Tunnel, AProxyThatIsNotThereEndsNobody) {
   Context context(through(nobody()));
   Socket socket(context, Kind::kDealer, "viewer", {.linger_ms = 100, .watch_connecting = true});
@@ -81,7 +81,7 @@ TEST(Tunnel, ATargetThatIsNotThereIsAFailedConnection) {
   EXPECT_EQ(socket.refusal().text, "");
 }
 
-// Megabytes each way; then a server of another life at the same place, and last a message of a socket that is closed.
+// Sends megabytes each way; then to a new server at the same place, and last the message of a closed socket.
 TEST(Tunnel, WhatIsSentComesThroughAndConnectionsAreMadeAnew) {
   const Proxy proxy;
   Context here, there(through(proxy.address()));
@@ -92,7 +92,7 @@ TEST(Tunnel, WhatIsSentComesThroughAndConnectionsAreMadeAnew) {
                                          SocketOptions{.max_message_bytes = 8 << 20, .watch_connecting = true});
   for (uint64_t life = 1; life <= 2; ++life) {
     Socket server(here, Kind::kRouter, "data", {.max_message_bytes = 8 << 20});
-    ASSERT_TRUE(until([&] {  // ZeroMQ closes the one before in its own time
+    ASSERT_TRUE(until([&] {  // ZeroMQ takes its time to close the last one
       const auto bound = server.bind(endpoint);
       if (bound) endpoint = *bound;
       return bound.ok();
@@ -103,7 +103,7 @@ TEST(Tunnel, WhatIsSentComesThroughAndConnectionsAreMadeAnew) {
     uint64_t heard = 0, answered = 0;
     std::optional<double> asked_s;
     ASSERT_TRUE(until([&] {
-      if (!asked_s || monotonic_s() - *asked_s > 1) {  // what is sent while a connection breaks may be lost
+      if (!asked_s || monotonic_s() - *asked_s > 1) {  // a message may be lost while a connection breaks
         wire::Chunk big = chunk(life);
         big.data = bytes;
         client->send(big);

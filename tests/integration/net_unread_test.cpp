@@ -1,5 +1,5 @@
-// What came over a connection and was not read yet: whoever sends without end, or more than is read, is hung up on, and
-// nobody else is. ZeroMQ's own limits count whole messages.
+// Bytes that have arrived and wait unread: a peer that sends without end, or more than is read, is closed, and other
+// peers are not. ZeroMQ's own limits count whole messages.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -81,7 +81,7 @@ std::string parts(size_t bytes_of_one, size_t n) {
 
 class MessageWithoutEnd : public ::testing::TestWithParam<size_t> {};
 
-// The bytes that may come while nobody looks are many on a fast machine; the test is that there is an end.
+// On a fast machine many bytes may come between two looks; the test is that there is a limit.
 TEST_P(MessageWithoutEnd, IsCutOff) {
   Bound bound(Kind::kRouter, {.max_message_bytes = kMiB, .most_unread_bytes = 8 * kMiB});
   const Flood flood(bound.endpoint, "DEALER", parts(GetParam(), 100000 / (GetParam() + 2) + 1));
@@ -99,7 +99,7 @@ TEST(HostilePeers, WhoeverFillsAQueueWithLargeMessagesIsHungUpOn) {
   {
     const Flood flood(bound.endpoint, "PUSH", zmtp_frame("rubbish", true) + zmtp_frame(std::string(kMiB, 'x'), false));
     for (const double until = monotonic_s() + kDeadline_s; !flood.hung_up_on() && monotonic_s() < until;)
-      wait_readable({}, 5);  // nobody reads
+      wait_readable({}, 5);  // the messages stay unread
     EXPECT_TRUE(flood.hung_up_on()) << flood.sent() << " bytes";
   }
   EXPECT_EQ(bound.socket.connections_refused(), 1u);
@@ -108,7 +108,7 @@ TEST(HostilePeers, WhoeverFillsAQueueWithLargeMessagesIsHungUpOn) {
   EXPECT_TRUE(bound.serves_a_friend(Kind::kPush));
 }
 
-// A connection's number is used again, also by one that came after one that said nothing.
+// The system reuses a connection's number, also after one that sent no message.
 TEST(Connections, TheFirstMessageOfAReusedDescriptorIsOfTheOneThatIsThere) {
   constexpr uint64_t kMessage = 4 * kMiB;
   zmq::context_t context;
@@ -128,7 +128,7 @@ TEST(Connections, TheFirstMessageOfAReusedDescriptorIsOfTheOneThatIsThere) {
     zmq::pollitem_t item{router.handle(), 0, ZMQ_POLLIN, 0};
     return zmq::poll(&item, 1, std::chrono::milliseconds(int(kDeadline_s * 1e3))) == 1;
   };
-  // Tells which connection the next message came from.
+  // Returns the connection of the next message.
   const auto receive = [&] {
     zmq::message_t peer, body;
     if (!wait_message() || !router.recv(peer) || !router.recv(body)) return -1;
@@ -157,7 +157,7 @@ TEST(Connections, TheFirstMessageOfAReusedDescriptorIsOfTheOneThatIsThere) {
   EXPECT_EQ(connections.counts().refused, 0u) << "of two messages one was read";
 }
 
-// Twenty thousand messages of all lengths: what they have on their way is known to the byte, or it would add up.
+// Twenty thousand messages of all lengths: an error of one byte a message in the count would add up.
 void expect_kept(Bound& bound, Access access) {
   Context theirs(std::move(access));
   Socket friendly(theirs, Kind::kDealer, "friend");

@@ -43,7 +43,7 @@ class PackerServiceTest : public testing::Test {
     EXPECT_EQ(code, 0);
   }
 
-  // The next message of that type; others are dropped. ask: sent again now and then.
+  // Returns the next message of that type; drops others. ask: called now and then to send the request again.
   std::optional<net::Message> next(net::Socket& from, std::string_view type, const std::function<void()>& ask = {}) {
     double asked_s = -1e9;
     for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
@@ -85,7 +85,7 @@ class PackerServiceTest : public testing::Test {
     master.send(wire::WhoAreYou{{1}}, packer_peer);
     return next(master, wire::Hello::kName).has_value();
   }
-  // The mark that ends the answer to a viewer of points.
+  // Returns the mark that ends the answer to a viewer of points.
   std::optional<wire::StateMark> ask_for_points() {
     const auto message = next(viewer, wire::StateMark::kName, [this] {
       viewer.send(wire::StateRequest{{77}, {}, {}});
@@ -93,7 +93,7 @@ class PackerServiceTest : public testing::Test {
     if (!message) return std::nullopt;
     return viewer.decode<wire::StateMark>(*message);
   }
-  // A frame of slices, as soon as the packer knows the volume.
+  // Returns a frame of slices, as soon as the packer knows the volume.
   std::optional<wire::SliceFrame> ask_for_slices() {
     const auto camera = geometry::make_camera({{0, 0, 0.6}, {1, 0, 0, 0}}, 60, 64, 48);
     uint64_t frame = 0;
@@ -144,7 +144,7 @@ TEST_F(PackerServiceTest, FollowsASessionThatChangesFromPointsToSlicesAndBack) {
   EXPECT_NE(second->packer, first->packer) << "viewers start anew";
 }
 
-// Another one must not notice, and memory must not grow.
+// The other viewer must not notice, and memory must not grow.
 TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
   wire::Welcome session = mesh();
   session.settings.keep_redundant = 1;
@@ -182,7 +182,7 @@ TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
   const double before_mb = net::resident_mb();
   for (int n = 0; n < 30; ++n) {
     while (!idle.send(wire::StateRequest{{78}, {}, {}})) std::this_thread::yield();
-    ASSERT_TRUE(sampler.send(m));  // once more: dropped, and done all the same
+    ASSERT_TRUE(sampler.send(m));  // again: dropped, but reported as done
     ASSERT_TRUE(next(master, wire::TileDone::kName)) << n;
   }
   EXPECT_LT(net::resident_mb() - before_mb, 64);
@@ -200,7 +200,7 @@ TEST_F(PackerServiceTest, WhatComesBeforeItsSessionWaitsForIt) {
   ASSERT_TRUE(message) << "it was asked for once";
 }
 
-// The value that the packer reports, once it is what is expected.
+// Waits for the packer's reports to have an expected value.
 class PackerLimits : public PackerServiceTest {
  protected:
   PackerLimits() {
@@ -224,11 +224,11 @@ TEST_F(PackerLimits, WhatIsOnItsWayOfADataSetOfAnotherKindIsNoFault) {
   other.epoch = {3};
   master.send(other, packer_peer);
   ASSERT_TRUE(ask_for_points());
-  double before = -1;  // requests that came before the packer knew of the change
+  double before = -1;  // counts requests from before the packer knew of the change
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(reports("messages_rejected", [&](double n) { return (before = n) >= 0; }));
   sampler.send(wire::SliceImages{.sampler = {9}});
   viewer.send(wire::SliceAck{{77}, {0}, 2, false});
-  sampler.send(wire::PictureTile{});  // nothing of this session was ever pictures
+  sampler.send(wire::PictureTile{});  // this session never had pictures
   EXPECT_TRUE(reports("messages_rejected", [&](double n) { return n > before; }));
   EXPECT_TRUE(reports("messages_rejected", [&](double n) { return n == before + 1; }));
 }

@@ -1,4 +1,4 @@
-// Waiting for what a socket receives.
+// Waits for messages of a socket.
 #pragma once
 
 #include <utility>
@@ -10,7 +10,7 @@
 
 namespace telesplat::test {
 
-/// Receives until `done` holds; what is received goes to `got`. False: it did not within the deadline.
+/// Receives until `done` holds; messages go to `got`. False: it did not hold within the deadline.
 template <class Done>
 bool receive_until(net::Socket& socket, Done done, std::vector<net::Message>* got = nullptr,
                    double deadline_s = patient(20)) {

@@ -1,6 +1,5 @@
-// Steered sampling where the data change without an epoch: the model is right again within two seconds of updates, and
-// of data that do not change nothing is forgotten. Meshes, the ray sampler, packer and planner as they run, without
-// sockets.
+// Steered sampling of data that change without an epoch: the model is right again within two seconds of updates, and
+// nothing is forgotten if the data do not change. Uses real meshes, ray sampler, packer and planner, without sockets.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,7 +46,7 @@ geometry::Camera walk(int update, double height = 0.35) {
 struct Session : test::SteeredSession {
   using SteeredSession::SteeredSession;
 
-  // Pixels of a view in which the model shows something else than what is there, or nothing.
+  // Counts the pixels of a view where the model differs from the data, or shows nothing.
   size_t wrong(const geometry::Camera& camera) {
     splat::ViewKeys keys(2);
     ViewMap map;
@@ -75,7 +74,7 @@ struct Hills : Session {
   void put_ball(const glm::vec3& centre, uint32_t colour) {
     EXPECT_TRUE(sampler().add_chunk(kBall, ball(centre, 0.08f, colour)).ok());
   }
-  // Fewer than one pixel in 500 is wrong, where the eye is and beside it.
+  // Fewer than one pixel in 500 is wrong, at the eye's place and beside it.
   void expect_right_after_two_seconds() {
     const size_t first = wrong(walk(at));
     EXPECT_GT(first, size_t{kWidth} * kHeight / 200) << "nothing changed";
@@ -122,7 +121,7 @@ TEST(SteeredChanges, AThingThatChangesItsColourHasIt) {
   hills.expect_right_after_two_seconds();
 }
 
-// The real meshes: noisy, rough, thin.
+// Real meshes: noisy, rough, thin.
 class RealMesh : public testing::TestWithParam<const char*> {};
 
 TEST_P(RealMesh, NothingIsForgottenAlongAWalk) {

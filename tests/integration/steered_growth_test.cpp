@@ -1,5 +1,5 @@
-// Steered sampling along a loop that is walked again and again: the model does not grow by it. Meshes, the ray sampler,
-// packer and planner as they run, without sockets.
+// Steered sampling along a loop that is walked several times: the model does not grow by that. Uses real meshes, ray
+// sampler, packer and planner, without sockets.
 #include <cmath>
 #include <numbers>
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kWidth = 240, kHeight = 150, kUpdates = 40;
 
-// Upright rods that are few pixels thick, all around.
+// Upright rods, a few pixels thick, all around.
 geometry::ChunkBytes rods() {
   constexpr uint32_t kSides = 10, kRods = 30;
   constexpr float kTurn = 2 * std::numbers::pi_v<float>;
@@ -35,7 +35,7 @@ geometry::ChunkBytes rods() {
   return test::chunk_of(vertices, indices);
 }
 
-// Around the hills, at their border. No two rounds take the same views.
+// Walks around the hills, at their border. No two rounds take the same views.
 geometry::Camera walk(int round, int update) {
   const double at = 2 * std::numbers::pi * (update + 0.38 * round) / kUpdates;
   const glm::dvec3 eye(0.42 * std::sin(at), 0.22 + 0.04 * std::sin(3 * at), 0.42 * std::cos(at));
@@ -48,7 +48,7 @@ struct Garden : test::SteeredSession {
     EXPECT_TRUE(sampler().add_chunks(test::terrain(100, 50)).ok());
     EXPECT_TRUE(sampler().add_chunk(ChunkId{1000}, rods()).ok());
   }
-  // Returns how many points there are afterwards.
+  // Returns the number of points afterwards.
   double round() {
     for (int i = 0; i < kUpdates; ++i) {
       update(walk(rounds, i));
@@ -60,8 +60,8 @@ struct Garden : test::SteeredSession {
   int rounds = 0;
 };
 
-// Rays from beside once sampled whatever was shown more thinly than a head could see it that stood there: these two
-// rounds added a third of the points, and there were three times as many as without steering.
+// Rays from beside once sampled all surfaces that were shown more thinly than a head standing there could see: these
+// two rounds added a third of the points, three times as many as without steering.
 TEST(SteeredGrowth, ALoopThatIsWalkedAgainAddsNoMoreThanWithoutSteering) {
   constexpr int kRounds = 4;
   Garden steered(true), whole(false);

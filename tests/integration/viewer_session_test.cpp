@@ -1,5 +1,5 @@
-// A viewer - worker, caches, display loop, renderers - against a session under control: volumes and points, with every
-// coupling.
+// A viewer - worker, caches, display loop, renderers - in a session under the test's control: volumes and points, with
+// every coupling.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,11 +20,11 @@ struct Shown {
   std::vector<double> request, sequence, epoch, wait_ms, filled, drawn, coupling, buffers;
   std::vector<double> updates;
   std::map<std::string, double> status;
-  std::vector<std::string> sources;  // what each one drew: points, samples
+  std::vector<std::string> sources;  // kind of data in each frame: points, samples
   DisplayResult result;
 };
 
-// A whole life of a viewer: `frames` frames as fast as they come, or at target_fps.
+// Runs a viewer from start to end: `frames` frames as fast as they come, or at target_fps.
 Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames, double target_fps = 0,
            const std::string& renderer = "cpu", double most_wait_s = StallWatch::kMost_s) {
   static int number = 0;
@@ -62,7 +62,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   if (session_options.change_every == 0 && !session_options.taken) {
     EXPECT_EQ(out.sources, std::vector<std::string>{session_options.volume ? "samples" : "points"});
   }
-  // The worker's last rows and its last report are on their way.
+  // The worker's last rows and its last report are still on their way.
   const auto wait_until = [](const auto& there) {
     for (const double until = monotonic_s() + 20; !there() && monotonic_s() < until;) std::this_thread::yield();
   };
@@ -97,8 +97,8 @@ void expect_complete(const Shown& s, uint64_t frames) {
   for (const double drawn : s.drawn) EXPECT_GT(drawn, 0);
 }
 
-// Each frame shows another update, in the order of requests. (But the last, which waits for nothing once its time is
-// over.)
+// Each frame shows a new update, in the order of requests. (Except the last one: at the end of its time it waits no
+// longer.)
 void expect_one_update_a_frame(const Shown& s) {
   for (size_t i = 1; i < s.request.size(); ++i) EXPECT_GT(s.request[i], s.request[i - 1]) << "frame " << i;
 }
@@ -174,7 +174,7 @@ TEST(PointSession, SynchronouslyNoFrameShowsPartOfAnUpdate) {
   expect_one_update_a_frame(s);
   for (const double sequence : s.sequence) EXPECT_EQ(int(sequence) % 3, 0) << "coarse, upper, lower half: all or none";
   EXPECT_EQ(s.counts.most_open, 1u);
-  // The last frame, too, asks for an update; it may still come before the viewer leaves.
+  // The last frame, too, requests an update; it may still come before the viewer leaves.
   EXPECT_GE(s.updates.size(), s.request.size());
   EXPECT_LE(s.updates.size(), s.request.size() + 1);
 }
@@ -184,8 +184,8 @@ TEST(PointSession, LooselyUpdatesAreHeldUntilTheirFrame) {
   expect_complete(s, 30);
   expect_one_update_a_frame(s);
   EXPECT_LE(s.counts.most_open, 3u);
-  // Two patches an update, an event more where an epoch begins: after the n-th answer so many events are shown, and no
-  // more.
+  // Two patches an update, one event more where an epoch begins: after the n-th answer exactly that many events are
+  // shown.
   for (size_t i = 0; i < s.sequence.size(); ++i) {
     const double n = s.request[i];
     EXPECT_EQ(s.sequence[i], 2 * n + std::floor(n / 5)) << "frame " << i;
@@ -207,12 +207,12 @@ TEST(VolumeSession, GoesOnWithAnotherMaster) {
     if (mode == CouplingMode::kAsync) continue;
     expect_one_update_a_frame(s);
     EXPECT_GE(s.counts.repeated, 1u) << "what it had asked for is asked for again";
-    // A request that the new master had before it was asked again overtakes the older ones.
+    // A repeated request that the new master already knows may overtake older ones.
     EXPECT_LE(s.request.back(), 62);
   }
 }
 
-// Who knows a viewer's instance may be quicker to say hello to another master.
+// Another process that knows a viewer's instance may be the first to say hello to the new master.
 TEST(ChangingSession, GoesOnAsAnotherInstanceWhereItsOwnIsTaken) {
   for (const bool volume : {true, false})
     for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync}) {
@@ -224,7 +224,7 @@ TEST(ChangingSession, GoesOnAsAnotherInstanceWhereItsOwnIsTaken) {
     }
 }
 
-// Mesh, volume, mesh: the viewer follows, and what was on display stays there until the next scene has a picture.
+// Mesh, volume, mesh: the viewer follows, and the last picture stays until the next scene has one.
 TEST(ChangingSession, FramesThatWaitShowEachUpdateFromTheSceneItIsOf) {
   for (const auto mode : {CouplingMode::kSync, CouplingMode::kLoose}) {
     const Shown s = show({.volume = false, .change_every = 15, .changes = 2}, mode, 50);
@@ -247,7 +247,7 @@ TEST(ChangingSession, AsynchronouslyNoFrameIsEmpty) {
   EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0);
 }
 
-// The context of one renderer is gone before the next one is made.
+// The context of one renderer is destroyed before the next one is made.
 TEST(ChangingSession, OpenGlRenderersFollowEachOther) {
   if (const auto gl = Renderers::make("gl", 1); !gl) GTEST_SKIP() << gl.error().text;
   const Shown s = show({.volume = false, .change_every = 8, .changes = 2}, CouplingMode::kLoose, 28, 0, "gl");
@@ -262,7 +262,7 @@ TEST(ChangingSession, AVolumeMayBecomeAMeshToo) {
   EXPECT_EQ(s.sources, (std::vector<std::string>{"samples", "points"}));
 }
 
-// The settings of a session that goes through all couplings, forth and back, after so many answers.
+// Settings of a session that goes through all couplings, forth and back. Key: number of answers before the change.
 std::map<uint64_t, wire::SessionSettings> all_couplings() {
   using Order = wire::CouplingOrder;
   const auto told = [](Order coupling, uint64_t buffers = 1) {
@@ -273,7 +273,7 @@ std::map<uint64_t, wire::SessionSettings> all_couplings() {
           {62, told(Order::kSync)},     {70, told(Order::kAsync)}};
 }
 
-// Frames that waited show each another update, in the order of requests, none is left out, and none waited for long.
+// Each frame that waited shows a new update, in the order of requests; no update is left out, and no wait was long.
 void expect_changes_without_loss(const Shown& s) {
   ASSERT_EQ(s.coupling.size(), s.request.size());
   std::vector<std::pair<double, double>> order;  // couplings in force, with their buffers
@@ -291,7 +291,7 @@ void expect_changes_without_loss(const Shown& s) {
     for (const double update : updates)
       EXPECT_FALSE(update > s.request[i - 1] && update < s.request[i]) << "no frame shows update " << update;
   }
-  // On a busy machine the first change comes before the first frame.
+  // On a busy machine the first change may come before the first frame.
   if (!order.empty() && order.front() != std::pair(0.0, 0.0)) order.insert(order.begin(), {0, 0});
   const decltype(order) told{{0, 0}, {1, 1}, {2, 3}, {0, 0}, {2, 8}, {1, 1}, {0, 0}, {1, 1}, {0, 0}};
   if (test::kSlow) {  // a coupling may come and go between two frames
@@ -329,7 +329,7 @@ TEST(CouplingChange, WithEpochsNoFrameIsEmpty) {
   }
 }
 
-// A server that is silent for longer than the display waits: frames are drawn from what is there until it answers.
+// A server is silent for longer than the display waits: frames show the old data until it answers.
 TEST(Stall, TheDisplayGoesOnAfterItsLongestWait) {
   for (const bool volume : {false, true}) {
     const Shown s = show({.volume = volume, .silent_after_s = {{8, 3}}}, CouplingMode::kSync, 40, 0, "cpu", 1.5);
@@ -360,7 +360,7 @@ TEST(PointSession, AForgottenRequestIsMadeAgain) {
   expect_one_update_a_frame(s);
 }
 
-// What no event explains: it is noticed, counted and mended, and the display goes on.
+// An unexplained difference is noticed, counted and mended, and the display goes on.
 TEST(PointSession, AReplicaThatIsNotThePackersIsMadeAnew) {
   const Shown undisturbed = show({.volume = false}, CouplingMode::kAsync, 60, 60);
   const Shown s = show({.volume = false, .other_digest_after = 5}, CouplingMode::kAsync, 60, 60);

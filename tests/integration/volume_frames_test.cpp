@@ -1,5 +1,5 @@
-// Frames of a volume over real sockets: two samplers fetch their slabs from a data server, splat leases, the packer
-// joins what they send, a viewer gets what splatting the slabs directly gives.
+// Frames of a volume over real sockets: two samplers fetch their slabs from a data server and splat leases, the packer
+// joins the parts, and a viewer gets the same as by splatting the slabs directly.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -178,7 +178,7 @@ TEST(VolumeFrames, AViewerGetsWhatTheSamplersSplat) {
   ASSERT_EQ(done.size(), 2u);
   EXPECT_EQ(done[1].bytes_sent, frame->data.size());
 
-  // What each slab's voxels give directly.
+  // Splats each slab's voxels directly for comparison.
   const auto slices = volume::parse_slices({reinterpret_cast<const uint8_t*>(frame->data.data()), frame->data.size()},
                                            lease.shear.width, lease.shear.height, int(lease.shear.layers.size()));
   ASSERT_TRUE(slices) << slices.error().text;

@@ -1,5 +1,5 @@
-// Displays of a wall over real sockets, led by the barrier that the master has: they present together, go on without
-// one that stops, and by themselves without a master.
+// Displays of a wall over real sockets, led by the master's barrier: they present together, go on without one that
+// stops, and by themselves without a master.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -18,7 +18,7 @@ namespace {
 constexpr double kPeriod_s = 0.02;
 constexpr int kViewers = 3;
 
-// The part of a master that leads walls, in a thread of its own.
+// The part of a master that leads walls, in its own thread.
 class Leader {
  public:
   Leader() : socket_(context_, net::Kind::kRouter, "master"), barrier_({42}) {
@@ -55,7 +55,7 @@ class Leader {
   std::thread thread_;
 };
 
-// What displays presented, by the wall's frames.
+// Frames that displays presented, by the wall's frame number.
 struct Presented {
   std::mutex mutex;
   struct Frame {
@@ -75,7 +75,7 @@ struct Presented {
   }
 };
 
-// A display that draws for draw_s and whose own head is where nobody else's is.
+// A display that draws for draw_s; its own head is where no other display's is.
 void show(const std::string& master, int number, double draw_s, double stops_s, double resumes_s, double ends_s,
           Presented& presented, std::atomic<int>& alone) {
   net::Context context;
@@ -159,7 +159,7 @@ TEST(WallPace, OneThatStopsHoldsTheOthersOnceAndComesBack) {
   EXPECT_EQ(alone, 0);
 }
 
-// One that was started again counts from where it likes.
+// A master that was started again may begin at a lower number.
 TEST(WallPace, AnotherMastersNumbersMayBeLower) {
   net::Context context;
   net::Socket master(context, net::Kind::kRouter, "master");
@@ -176,7 +176,7 @@ TEST(WallPace, AnotherMastersNumbersMayBeLower) {
       net::wait_readable_s({&master}, 0.02);
       while (const auto m = master.receive()) {
         const auto ready = master.decode<wire::SwapReady>(*m);
-        if (!ready || (!drawn.empty() && drawn.back() == ready->frame)) continue;  // it is said again until answered
+        if (!ready || (!drawn.empty() && drawn.back() == ready->frame)) continue;  // repeated until answered
         drawn.push_back(ready->frame);
         if (drawn.size() > words.size()) continue;
         const Word& word = words[drawn.size() - 1];

@@ -1,4 +1,4 @@
-// A window in this process, whose window system ends at a moment of the test's choice.
+// A window in this process; the test chooses when its window system ends.
 #include <gtest/gtest.h>
 
 #include "client/displays/window/window.h"
@@ -7,8 +7,8 @@
 namespace telesplat::viewer {
 namespace {
 
-// Who finds that the connection is broken while a frame is swapped is the driver, which tells nobody. The next request
-// of Xlib's is written to no memory then ("request 18 length 24 would exceed buffer size").
+// If the connection breaks while a frame is swapped, only the driver finds out, and does not report it. Xlib's next
+// request would then be written to no memory ("request 18 length 24 would exceed buffer size").
 TEST(Window, IsFoundToBeLostWhereOnlyTheDriverFoundItsDisplayGone) {
   if (!test::VirtualDisplay::installed()) GTEST_SKIP() << "there is no Xvfb";
   test::VirtualDisplay display;

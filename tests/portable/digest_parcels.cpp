@@ -1,6 +1,6 @@
 // Decodes parcels (parcels.h) from its standard input with the portable part of the codec, and prints a line for each:
-// its number, its kind, the digest of what came out, and whether that is what went in. Built for the host and for
-// WebAssembly from the same list of sources.
+// its number, its kind, the digest of the result, and if that equals the digest in the parcel. Built for the host and
+// for WebAssembly from the same list of sources.
 #include <cstdio>
 
 #include "common/codec/depth_codec.h"
@@ -84,7 +84,7 @@ constexpr Row kRows[] = {{Kind::kGolomb, "golomb", golomb},
                          {Kind::kDepth, "depth", depth},
                          {Kind::kRefinement, "refinement", refinement}};
 
-// Whether it came out as it went in.
+// Prints a parcel's line; true if its digest is right.
 bool tell(int number, const Parcel& p) {
   for (const Row& row : kRows) {
     if (row.kind != p.kind) continue;
@@ -126,7 +126,7 @@ int run() {
 }  // namespace telesplat::portable
 
 #if defined(__wasm__)
-// WASI has no threads, and the C++ library does not say what is to happen at their ends: nothing.
+// WASI has no threads, and the C++ library leaves open what to do at their ends: nothing.
 extern "C" int __cxa_thread_atexit(void (*)(void*), void*, void*) { return 0; }
 #endif
 

@@ -1,4 +1,4 @@
-// Writes parcels (parcels.h) of made-up data with the codec as this machine runs it: make_parcels FILE.
+// Writes parcels (parcels.h) of made-up data with this machine's codec: make_parcels FILE.
 #include <cstdio>
 #include <fstream>
 #include <random>
@@ -100,7 +100,7 @@ uint64_t digest_of(const image::DepthImage& image) {
   return digest.value();
 }
 
-// Exact, within bounds, and what makes that exact.
+// Adds the exact image, the bounded one, and its refinement.
 void add_depth(File& file, const image::DepthImage& image) {
   file.add(Kind::kDepth, codec::encode(image), digest_of(image));
   image::DepthImage bounded;

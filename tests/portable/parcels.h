@@ -1,4 +1,4 @@
-// What make_parcels writes and digest_parcels reads: what the codec makes, with a digest of what went in.
+// The file from make_parcels to digest_parcels: streams of the codec, each with a digest of its source.
 //   file = (u8 kind, u32 bytes, the bytes, u64 digest)*, little-endian
 #pragma once
 
@@ -38,7 +38,7 @@ void put(std::vector<uint8_t>& out, T value) {
   std::memcpy(out.data() + at, &value, sizeof(T));
 }
 
-/// Precondition: there are so many bytes.
+/// Precondition: sizeof(T) bytes are left.
 template <class T>
 T take(const uint8_t*& at) {
   T out;
@@ -47,7 +47,7 @@ T take(const uint8_t*& at) {
   return out;
 }
 
-constexpr int kParts = 6;  ///< numbers of a pixel: depth, both of the normal, blue, green, red
+constexpr int kParts = 6;  ///< numbers of a pixel: depth, two of the normal, blue, green, red
 
 inline void parts_of(const codec::detail::Pixel& p, int* out) {
   out[0] = static_cast<int>(p.depth);

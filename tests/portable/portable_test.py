@@ -14,7 +14,7 @@ SKIPPED = 77
 PACKAGES = "Debian: clang lld wasi-libc libc++-dev-wasm32 libclang-rt-dev-wasm32 nodejs; tools/setup --developer"
 PROBE = "#include <vector>\nint main() { return int(std::vector<int>().size()); }\n"
 FLAGS = ("--target=wasm32-wasi", "-std=c++20", "-stdlib=libc++", "-O2", "-fno-exceptions", "-ffp-contract=off",
-         "-Wl,-z,stack-size=4194304")  # what hosts give; WASI gives 64 KB
+         "-Wl,-z,stack-size=4194304")  # the stack of hosts; WASI's has 64 KB
 
 
 def skip(why):

@@ -1,4 +1,4 @@
-// Whatever the mesh, chunks hold each of its triangles exactly once, in compact parts.
+// Chunks of any mesh hold each of its triangles exactly once, in compact parts.
 #include <algorithm>
 #include <map>
 
@@ -21,14 +21,14 @@ Mesh random_mesh(std::mt19937& random) {
     glm::dvec3 p(real(), shape == 1 ? 0.0 : real(), shape == 2 ? 0.01 * real() : real());
     if (shape == 3) p = glm::dvec3(pick(4), pick(4), pick(4));  // many at one place
     mesh.positions.push_back(p * scale + offset);
-    mesh.colours.push_back(i);  // tells vertices apart afterwards
+    mesh.colours.push_back(i);  // a different colour for each vertex
   }
   for (uint32_t i = 0; i < 3 * triangles; ++i) mesh.indices.push_back(pick(vertices));
   mesh.indices.insert(mesh.indices.end(), {0, 1, 2});
   return mesh;
 }
 
-// Corners by colour, starting with the least, orientation kept: the same for a triangle however it is rotated.
+// A triangle's corners by colour, starting with the least, orientation kept: the same for any rotation.
 std::array<uint32_t, 3> key_of(std::array<uint32_t, 3> corners) {
   std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
   return corners;
@@ -40,7 +40,7 @@ TEST(Chunks, HoldEveryTriangleOnceForRandomMeshes) {
   for (int round = 0; round < 200; ++round) {
     const Mesh mesh = random_mesh(random);
     const auto placed = place_mesh(Mesh(mesh), {.up = "y", .crease_deg = 180}, "random");
-    if (!placed) {  // all degenerate, or of no extent: said so
+    if (!placed) {  // all triangles degenerate, or no extent: it reports an error
       EXPECT_TRUE(placed.error().text.starts_with("random: ")) << placed.error().text;
       continue;
     }

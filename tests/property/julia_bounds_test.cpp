@@ -1,4 +1,4 @@
-// Slices, bounds and the distance estimate of Julia sets, against what is known of them.
+// Slices, bounds and the distance estimate of Julia sets, compared with known results.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -141,14 +141,14 @@ TEST(JuliaDistance, IsZeroInsideAndALowerBoundOutside) {
 }
 
 TEST(JuliaDistance, OfConnectedSetsReachesNoPointInside) {
-  // From points outside, steps of the estimate in random directions never end inside.
+  // Steps of the estimate from points outside, in random directions, never end inside.
   std::mt19937 random(19);
   std::uniform_real_distribution<double> coordinate(-1.4, 1.4);
   std::normal_distribution<double> normal;
   for (const auto& preset : presets()) {
     const auto& p = preset.parameters;
     const Slice s = slice(p);
-    Parameters longer = p;  // what lies near the set and takes more iterations to escape is not inside
+    Parameters longer = p;  // a point near the set that takes more iterations to escape is not inside
     longer.iterations = 1000;
     int outside = 0;
     for (int i = 0; i < 3000; ++i) {

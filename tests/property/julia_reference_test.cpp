@@ -1,6 +1,6 @@
 // Surface points of the Julia sampler against a slow marcher in double precision with 128 iterations, on random rays:
-// 99.9 % of those that meet the set must lie within half a pixel's footprint, measured along the ray; a ray of which
-// only one of the two meets anything counts as wrong. TELESPLAT_JULIA_RAYS sets how many rays there are in all.
+// 99.9 % of the rays that meet the set must agree within half a pixel's footprint, measured along the ray; a ray counts
+// as wrong if only one of the two meets the set. TELESPLAT_JULIA_RAYS sets the number of rays.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

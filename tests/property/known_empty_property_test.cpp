@@ -18,7 +18,7 @@ struct Bounds {
   double left = 1e30, right = -1e30, top = 1e30, bottom = -1e30, nearest = 1e30, farthest = -1e30;
 };
 
-// Of a cube of `side` metres at `lo`.
+// Projects a cube of `side` metres at `lo`.
 Bounds bounds_of(const geometry::Camera::PixelTransform& t, const glm::dvec3& lo, double side) {
   Bounds out;
   for (int i = 0; i < 8; ++i) {
@@ -46,7 +46,7 @@ geometry::Camera random_camera(std::mt19937_64& random) {
   return test::scene_camera(test::random_eye(random), kWidth, kHeight);
 }
 
-// Depths of a view, of which some rectangles were not cast.
+// Returns depths of a view; some rectangles have no rays.
 std::vector<float> random_clear(const geometry::Camera& camera, std::mt19937_64& random) {
   const image::DepthImage image = test::sample_scene(camera, {0, 0, kWidth, kHeight});
   std::vector<float> out(image.pixels(), kInfinity);
@@ -60,7 +60,7 @@ std::vector<float> random_clear(const geometry::Camera& camera, std::mt19937_64&
   return out;
 }
 
-// Least of the depths in the rectangle of pixels that a cell touches; 0 outside the image.
+// Returns the least depth in the rectangle of pixels that a cell touches; 0 outside the image.
 double least_touched(const std::vector<float>& clear_m, const Bounds& b) {
   const auto x0 = static_cast<int>(std::floor(b.left - 0.05)), x1 = static_cast<int>(std::floor(b.right + 0.05)),
              y0 = static_cast<int>(std::floor(b.top - 0.05)), y1 = static_cast<int>(std::floor(b.bottom + 0.05));
@@ -72,7 +72,7 @@ double least_touched(const std::vector<float>& clear_m, const Bounds& b) {
   return out;
 }
 
-// Least of the depths of rays in the rectangle around a cell; those up to `slack` outside of it may count or not.
+// Returns the least depth of rays in the rectangle around a cell; rays up to `slack` outside of it may count or not.
 double least_of_rays(const std::vector<float>& clear_m, const Bounds& b, double slack) {
   double out = kInfinity;
   for (int y = std::max(0, static_cast<int>(b.top) - 1); y <= b.bottom && y < kHeight; ++y)
@@ -106,7 +106,7 @@ TEST(KnownEmptyProperty, CellsAreCarvedIfAndOnlyIfAllRaysPassedThem) {
       // Slack: single precision, a hundredth of a pixel.
       wrong += seen && !(least_of_rays(clear_m, b, 0.01) > b.farthest - 1e-5);
       if (seen) continue;
-      // What is about half a pixel is carved as a whole or not at all.
+      // A node about half a pixel large is carved as a whole or not at all.
       glm::ivec3 at = cell;
       Bounds node = b;
       for (double longer = side; longer < 0.1; at /= 2) {
@@ -123,8 +123,8 @@ TEST(KnownEmptyProperty, CellsAreCarvedIfAndOnlyIfAllRaysPassedThem) {
   }
 }
 
-// Every block that hides something, one by one: the ray nearest its middle must be set, rays a pixel beside the
-// rectangle around it may not.
+// Checks every block that hides something: the ray nearest its middle must be set, rays a pixel beside the rectangle
+// around it may not.
 void check_projection(const Scene& scene, const geometry::Camera& camera, const std::vector<float>& shown_m,
                       const image::PixelMask& mask) {
   const auto t = camera.room_to_pixel();

@@ -1,5 +1,5 @@
-// Samplers do all they can - slow, fast, dying noticed or not, joining, delivering late or twice - every frame is
-// completed, and its tiles cover it exactly once.
+// Samplers may be slow, fast, join, die noticed or not, deliver late or twice: every frame is completed, and its tiles
+// cover it exactly once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,13 +24,13 @@ class Schedule : public ::testing::TestWithParam<Case> {
   };
   struct Sampler {
     std::string name;
-    double row_s;            // what a row of it takes
-    double free_s = 0;       // when it is through with what it has
-    double released_s = -1;  // dead: when the master notices; it never does if the leases are to run out
+    double row_s;            // time for one row
+    double free_s = 0;       // when it has finished its leases
+    double released_s = -1;  // dead: when the master notices; negative: never, its leases run out
     bool dead = false;
     std::vector<Work> works;
   };
-  // What the packer has of a frame.
+  // Tiles of a frame that the packer has.
   struct Packed {
     wire::Lease any;
     std::map<uint64_t, wire::Lease> tiles;
@@ -82,7 +82,7 @@ class Schedule : public ::testing::TestWithParam<Case> {
     }
   }
 
-  // The packer takes the first copy of a tile and says so.
+  // The packer takes the first copy of a tile and reports it.
   void deliver(const Sampler& s, const Work& w) {
     auto& p = packed[w.lease.frame.value];
     p.any = w.lease;
@@ -121,7 +121,7 @@ class Schedule : public ::testing::TestWithParam<Case> {
         schedule.release_sampler(s.name);
         s.released_s = -1;
       }
-      // What the dead had sent still arrives, late.
+      // Messages of a dead sampler still arrive, late.
       for (size_t i = 0; i < s.works.size();)
         if (s.works[i].done_s <= now) {
           deliver(s, s.works[i]);

@@ -1,6 +1,5 @@
-// All kinds of things happen to the samplers of a volume - they join, leave, die noticed or not, are slow, come back -
-// every frame's slabs are those of one partition and cover the volume once, buffered requests are answered in order,
-// and nobody starves.
+// Samplers of a volume join, leave, die noticed or not, are slow, come back: every frame's slabs belong to one
+// partition and cover the volume once, buffered requests are answered in order, and every viewer gets answers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +22,7 @@ class VolumeSession : public ::testing::TestWithParam<uint64_t> {
   struct Sampler {
     std::string peer, name;
     InstanceId instance;
-    bool alive = true, deaf = false;  // deaf: it lives, but says nothing for a while
+    bool alive = true, deaf = false;  // deaf: it lives, but sends nothing for a while
     double free_s = 0, speaks_s = 0, heard_s = 0;
     int asked = 0;
     EpochId epoch;
@@ -34,7 +33,7 @@ class VolumeSession : public ::testing::TestWithParam<uint64_t> {
   struct Viewer {
     uint64_t buffers = 0;
     uint64_t asked = 0, answered = 0;
-    std::vector<uint64_t> open;  // of a buffered one
+    std::vector<uint64_t> open;  // requests of a buffered viewer
   };
   struct Frame {
     wire::SliceLease first;
@@ -80,7 +79,7 @@ class VolumeSession : public ::testing::TestWithParam<uint64_t> {
     EXPECT_TRUE(core.on("data", w, now));
   }
 
-  // Everything that the master sent since the last time.
+  // Delivers all messages that the master sent since the last time.
   void deliver() {
     for (const auto& out : core.take_outgoing()) {
       const auto body = std::as_bytes(std::span(out.body));
@@ -149,7 +148,7 @@ class VolumeSession : public ::testing::TestWithParam<uint64_t> {
     r.viewer = {id};
     r.request = {++v.asked};
     r.buffers = v.buffers;
-    // Some stand together, some look elsewhere.
+    // Some viewers stand together, some look elsewhere.
     r.camera = geometry::make_camera({.position_room = {4.0 + (id > 102 ? double(id) : 0), 4, chance(0.1) ? -90 : 90}},
                                      40, 16, 16);
     if (v.buffers > 0) v.open.push_back(v.asked);
@@ -259,7 +258,7 @@ TEST_P(VolumeSession, EveryoneIsServedInOrder) {
   }
   const uint64_t during = completed();
   EXPECT_GT(during, 10u) << "the display goes on";
-  // The faults end; what was asked for is answered.
+  // The faults end; all open requests are answered.
   asking = false;
   add_sampler("last");
   for (auto& [id, v] : viewers)

@@ -1,4 +1,4 @@
-// Levels of detail against a plain, slow decimation written from the contract: any mask, any cut, any octree depth.
+// Levels of detail against a plain, slow decimation by the contract: any mask, any cut, any octree depth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ std::vector<Sample> unproject(const ModelConfig& config, const geometry::Camera&
   return out;
 }
 
-// Level l + 1 of level l, block by block.
+// Makes level l + 1 from level l, block by block.
 std::vector<Sample> decimate(const std::vector<Sample>& fine, int l) {
   const int side = 2 << l;
   const auto z_order = [&](const Sample& s) {
@@ -54,7 +54,7 @@ std::vector<Sample> decimate(const std::vector<Sample>& fine, int l) {
       const Sample first = rest.front();
       std::vector<Sample> group, left;
       for (const Sample& s : rest) {
-        const double ratio = static_cast<double>(first.code) / s.code;  // depth over the first one's
+        const double ratio = static_cast<double>(first.code) / s.code;  // depth over the first sample's
         (s.key == first.key && ratio > 0.98 - 1e-9 && ratio < 1.02 + 1e-9 ? group : left).push_back(s);
       }
       Sample nearest = group.front();
@@ -104,7 +104,7 @@ TEST_P(Decimation, MosaicsHoldWhatTheContractSays) {
     expected = decimate(expected, l);
   }
 
-  // And again: the same bytes.
+  // A second run gives the same bytes.
   PointModel a(config), b(config);
   a.insert(prepare_patch(config, {5}, camera, tile, image));
   b.insert(prepare_patch(config, {5}, camera, tile, image));

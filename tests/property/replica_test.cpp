@@ -1,4 +1,4 @@
-// Replicated state: whatever happens, a viewer that applies the packer's events holds the packer's clusters, byte for
+// Replicated state: after any events, a viewer that applies the packer's events holds the packer's clusters, byte for
 // byte.
 #include <gtest/gtest.h>
 
@@ -52,13 +52,13 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfterRandomEvents) {
   config.patches_per_cluster = GetParam() % 5 == 4 ? 0 : static_cast<uint32_t>(1 + GetParam() % 3);
   packer::PackerCore core(config, {1});
 
-  // One hears everything, one misses events now and then and asks for them, one joins anew each time.
+  // One replica hears everything, one misses some events and asks for them, one joins anew each time.
   test::Replica steady(config.model), gappy(config.model);
   uint64_t next_frame = 1, expected_sequence = 0;
   int patches = 0, forgets = 0, patch_forgets = 0, epochs = 0, gaps = 0, published = 0, refinements = 0;
   double now_s = 0;
   std::vector<packer::SampledTile> waiting;
-  // One joins while events go on: it is sent a few at a time, and keeps what is published meanwhile.
+  // One joins while events go on: it gets a few old ones at a time, and keeps new ones meanwhile.
   std::optional<test::Replica> joiner;
   packer::EventLog::Replay left;
   std::vector<packer::Event> kept;
@@ -103,7 +103,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfterRandomEvents) {
     }
   };
 
-  // At least 1000 events, and on until each kind has come.
+  // At least 1000 events, and more until each kind has come.
   for (int step = 0; published < 1000 || forgets < 3 || epochs < 1 || gaps < 3; ++step) {
     ASSERT_LT(step, 50000);
     now_s += 0.2;
@@ -115,7 +115,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfterRandomEvents) {
         if (const auto event = core.refine(now_s - 10)) publish(*event);
     } else if (chance(0.2)) {
       std::vector<points::ClusterKey> seen;
-      std::vector<uint32_t> frames;  // not told every other time
+      std::vector<uint32_t> frames;  // empty every other time
       const bool told = chance(0.5);
       for (const auto& [key, cluster] : core.model().clusters()) {
         if (!chance(0.3)) continue;
@@ -126,13 +126,13 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfterRandomEvents) {
       for (const auto& event : core.tick(now_s)) publish(event);
     } else {
       if (waiting.empty()) {
-        // Some are coarse; those are forgotten first, perhaps before they are complete.
+        // Some frames are coarse; those are forgotten first, perhaps before they are complete.
         const int width = chance(0.3) ? 40 : 160;
         waiting =
             test::sampled_frame({next_frame++}, test::scene_camera(test::random_eye(random), width, width * 5 / 8),
                                 width == 40 ? 16 : 64, core.epoch());
         for (auto& t : waiting) t.step = width == 40 ? 4 : 1;
-        // Others are of a head that rests; what they bring goes when it has moved on.
+        // Others come from a head at rest; their points go when it has moved on.
         if (width == 160 && chance(0.4))
           for (auto& t : waiting) t.extra = true, t.missed.reset(t.rect.width, t.rect.height);
         std::shuffle(waiting.begin(), waiting.end(), random);
@@ -166,14 +166,14 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfterRandomEvents) {
   expect_identical(core.model(), steady.model());
   expect_identical(core.model(), gappy.model());
   expect_identical(core.model(), late.model());
-  // A replica that stopped anywhere can go on from there.
+  // A replica that stopped at any event can go on from there.
   EXPECT_TRUE(core.events_since(core.sequence()).empty());
 }
 
-// Four seeds have each depth, limit and way of forgetting.
+// Four seeds cover each depth, limit and way of forgetting.
 INSTANTIATE_TEST_SUITE_P(Seeds, ReplicaCheck, testing::Range(1, 5));
 
-// From every sequence at which a replica may have stopped.
+// Replays from every sequence at which a replica may have stopped.
 class ReplicaResume : public testing::TestWithParam<packer::Redundancy> {};
 TEST_P(ReplicaResume, FromEverySequence) {
   std::mt19937_64 random(5);

@@ -1,4 +1,4 @@
-// Rays = raster: both samplers show the same surface, up to the edges of triangles; and what they say lies on the mesh.
+// Rays = raster: both samplers show the same surface, up to the edges of triangles; and their samples lie on the mesh.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,8 +91,8 @@ class RaysAndRaster : public testing::Test {
     ASSERT_TRUE(ray_->add_chunks(chunks).ok());
     ASSERT_TRUE(raster_->add_chunks(chunks).ok());
   }
-  // Differences summed over cameras; `allowed` is the fraction of covered pixels that may differ: those that edges
-  // cross. codes: of depth, that make no difference.
+  // Sums differences over cameras; `allowed`: share of covered pixels that may differ: those that edges cross. codes:
+  // depth codes that count as equal.
   void expect_agreement(const std::vector<Camera>& views, double allowed, int64_t codes = 8) {
     Difference sum;
     for (const Camera& c : views) {
@@ -124,7 +124,7 @@ TEST_F(RaysAndRaster, AgreeOnATerrainOfSmallTriangles) {
   expect_agreement(cameras(9, 8), 1e-3);
 }
 
-// A scalar at each vertex, one in a hundred missing.
+// Returns a scalar at each vertex, one in a hundred missing.
 test::ChunkList with_scalars(const test::ChunkList& chunks) {
   test::ChunkList out;
   for (const auto& [id, chunk] : chunks) {
@@ -148,7 +148,7 @@ TEST_F(RaysAndRaster, AgreeOnScalarsAndTheirMissingValues) {
   const Camera c = cameras(9, 1)[0];
   const geometry::Rect whole{0, 0, c.width, c.height};
   for (Sampler* sampler : {ray_.get(), raster_.get()}) {
-    for (const uint32_t colour : sampler->sample(c, whole).colour)  // nobody told the colours yet
+    for (const uint32_t colour : sampler->sample(c, whole).colour)  // before set_colours()
       ASSERT_TRUE(colour == 0 || colour == 0xc8c8c8);
     sampler->set_colours(table);
   }
@@ -169,7 +169,7 @@ TEST_F(RaysAndRaster, AgreeInsideTheSceneWhereTheNearPlaneCuts) {
   std::vector<Camera> views;
   for (int i = 0; i < 4; ++i)
     views.push_back(geometry::make_camera(geometry::look_at({0.05 * i, 0.02, 0}, {1, 0.1 * i, 1}), 90, 320, 200, 0.05));
-  // A triangle that is near and seen from its edge: what is rounded counts a hundred times.
+  // A near triangle seen from its edge: rounding counts a hundred times.
   expect_agreement(views, 3e-3, 64);
 }
 
@@ -205,7 +205,7 @@ TEST_F(RaysAndRaster, RasterRemovesAndRefusesChunksToo) {
   EXPECT_EQ(raster_->sample(c, whole), DepthImage(c.width, c.height));
 }
 
-// Unprojecting a sample gives a point on one of the triangles' planes, within depth quantisation and single precision.
+// An unprojected sample lies on one of the triangles' planes, within depth quantisation and single precision.
 TEST(SampledPoints, LieOnTheMeshAndInFrontOfNothing) {
   for (uint32_t seed = 1; seed <= 3; ++seed) {
     const auto chunks = random_triangles(seed, 24);
@@ -249,7 +249,7 @@ TEST(SampledPoints, LieOnTheMeshAndInFrontOfNothing) {
           if (code == 0) continue;
           const double depth = image::decode_depth(code, c.near_m),
                        step = nearest * nearest / (c.near_m * image::kMaxDepthCode);
-          // Half a code, and the slope of the triangle times what single precision makes of ray and corners.
+          // Half a code, and the slope of the triangle times the error of ray and corners in single precision.
           EXPECT_NEAR(depth, nearest, step + 2e-5 * nearest) << "seed " << seed << " pixel " << x << "," << y;
           EXPECT_LT(glm::length(c.unproject(x + 0.5, y + 0.5, depth) - (o + d * nearest)), 2 * (step + 2e-5 * nearest));
         }

@@ -14,7 +14,7 @@
 namespace telesplat::sampler {
 namespace {
 
-// Runs `body` once for each SIMD target, the others being switched off.
+// Runs `body` once for each SIMD target, with the others switched off.
 template <class Body>
 void for_each_target(const Body& body) {
   for (int64_t rest = hwy::SupportedTargets(); rest != 0; rest &= rest - 1) {

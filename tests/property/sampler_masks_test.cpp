@@ -1,4 +1,4 @@
-// A mask changes which pixels are sampled, not what they are: whatever the mask, the tile, the camera and the sampler.
+// A mask changes which pixels are sampled, not their values: for any mask, tile, camera and sampler.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -31,7 +31,7 @@ std::vector<PixelMask> masks(int width, int height, uint32_t seed) {
   return all;
 }
 
-// Cameras of frames up to 10240 x 6400, and tiles that begin and end anywhere.
+// Cameras of frames up to 10240 x 6400, with tiles at any place.
 struct View {
   Camera camera;
   Rect tile;
@@ -138,7 +138,7 @@ TEST(MaskedPixels, AreThoseOfTheMaskEachOnceAndCloseTogether) {
       ASSERT_EQ(seen.size(), mask.count());
     }
   }
-  // Full: every eight are a block of 4 x 2. One in 32: eight lie within 32 x 32, mostly.
+  // Full mask: every eight pixels are a block of 4 x 2. One in 32: eight lie mostly within 32 x 32.
   const auto full = gather(test::full_mask(64, 64));
   for (size_t i = 0; i < full.size(); i += 8)
     for (size_t k = 0; k < 8; ++k) {

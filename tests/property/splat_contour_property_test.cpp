@@ -1,5 +1,5 @@
-// The splatter's contour is the projection of the sample's footprint: against the thesis's matrices, and against points
-// of the footprint's rim projected one by one.
+// The splatter's contour is the projection of the sample's footprint: compared with the thesis's matrices, and with
+// points on the footprint's rim, projected one by one.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -23,8 +23,8 @@ class Cases {
  public:
   explicit Cases(uint32_t seed) : rng_(seed) {}
 
-  // A camera anywhere, a sample in its view. `steep`: its slope lies beyond the limit of stretch as its sampling view
-  // saw it.
+  // Returns any camera, with a sample in its view. `steep`: the sampling view saw it at a slope beyond the limit of
+  // stretch.
   Case next(bool steep) {
     Case c;
     const glm::dvec3 eye = 2.0 * direction();
@@ -38,7 +38,7 @@ class Cases {
     const auto cosine = [&] { return std::abs(glm::dot(c.sample.normal, c.sample.to_eye)); };
     do c.sample.to_eye = direction();
     while (cosine() < 0.02 || (cosine() < splat::kMinSampledCosine) != steep);
-    // Up to a tenth of the distance: far beyond where projection is nearly parallel.
+    // Up to a tenth of the distance: far more than where projection is nearly parallel.
     c.sample.radius_m = c.depth * std::exp(uniform(std::log(0.0005), std::log(steep ? 0.03 : 0.1)));
     return c;
   }
@@ -69,7 +69,7 @@ TEST_P(ContourProperty, EqualsTheMatricesOfTheThesis) {
   for (int i = 0; i < 4000; ++i) {
     const Case c = cases.next(GetParam());
     const testing::CentralConic exact = testing::contour_by_matrices(c.camera, c.sample, true);
-    if (!GetParam()) {  // below the limit the limit plays no part
+    if (!GetParam()) {  // below the limit of stretch it makes no difference
       const testing::CentralConic unlimited = testing::contour_by_matrices(c.camera, c.sample, false);
       ASSERT_LT(glm::distance(unlimited.centre, exact.centre), 1e-9);
     }

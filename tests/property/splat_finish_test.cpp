@@ -1,5 +1,5 @@
 // The finish gives the same pixels on every instruction set, for every width, as the plain loops of its definition; and
-// those do what they are for.
+// those loops do their job.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -69,7 +69,7 @@ TEST(Finish, EveryStageOnEveryTargetAndWidthEqualsThePlainLoops) {
 TEST(Finish, CroppingToContentLosesNothingThatAStageChanges) {
   std::mt19937 rng(5);
   for (int round = 0; round < 60; ++round) {
-    // A patch of surface with holes somewhere, maybe in the margin alone, maybe nowhere.
+    // A patch of surface with holes, maybe only in the margin, maybe outside.
     OwnTile tile(37, 29);
     const int reach = splat::finish_reach({});
     const int x0 = static_cast<int>(rng() % 50) - 10, y0 = static_cast<int>(rng() % 44) - 10;
@@ -109,7 +109,7 @@ OwnTile disc_tile() {
 TEST(Finish, FillClosesPinHolesAndNothingElse) {
   const OwnTile whole = disc_tile();
   OwnTile t = whole;
-  // One pixel, two, a 2x2 block, a diagonal pair: pin-holes. A gap of 8 pixels is none.
+  // One pixel, two, a 2x2 block, a diagonal pair: pin-holes. A gap of 8 pixels is too large.
   for (const auto& [x, y] :
        {std::pair{30, 30}, {35, 28}, {36, 28}, {25, 36}, {26, 36}, {25, 37}, {26, 37}, {40, 40}, {41, 41}})
     t.tile.info(y)[x] = splat::kEmptyInfo;
@@ -144,7 +144,7 @@ TEST(Finish, FillClosesHolesThroughWhichAFartherSurfaceShows) {
 }
 
 TEST(Finish, FillNeverReachesAcrossDepthEdges) {
-  // A slit of one pixel between a near and a far surface: its sides are no pair.
+  // A slit of one pixel between a near and a far surface: its sides do not match.
   OwnTile t(32, 32);
   for (int y = -5; y < 37; ++y)
     for (int x = -5; x < 37; ++x)
@@ -153,7 +153,7 @@ TEST(Finish, FillNeverReachesAcrossDepthEdges) {
   EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 0);
 }
 
-// Ribs two pixels wide, a pixel apart, each at a depth of its own.
+// Ribs two pixels wide, a pixel apart, each at its own depth.
 TEST(Finish, FillLeavesGapsBetweenRibsOpen) {
   OwnTile t(32, 32);
   for (int y = -5; y < 37; ++y)
@@ -163,14 +163,14 @@ TEST(Finish, FillLeavesGapsBetweenRibsOpen) {
   FinishScratch scratch;
   EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 0);
   expect_same(before, t, 0, "ribs");
-  // A hole in a rib is closed all the same, and a picture of sub-pixels closes everything.
+  // A hole in a rib is closed all the same, and with sub-pixels every gap is closed.
   t.tile.info(16)[13] = splat::kEmptyInfo;
   OwnTile all = t;
   EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 1);
   EXPECT_GT(splat::fill_holes(all.tile, 2, Gaps::kAll, scratch), 300);
 }
 
-// What a nearer surface hid until now: a row of empty pixels along its silhouette.
+// A row of empty pixels along a silhouette, which the nearer surface hid until now.
 TEST(Finish, FillShowsTheFartherSurfaceBesideASilhouette) {
   OwnTile t(32, 32);
   for (int y = -5; y < 37; ++y)
@@ -226,12 +226,12 @@ TEST(Finish, CoverageWeightsAreMeans) {
       const uint32_t near = splat::kCoverageWeights.near[i] * weight,
                      far = splat::kCoverageWeights.far[i] * (16 - weight);
       EXPECT_NEAR(near, 1024.0 * splat::kCoverage[near_there][weight], 8);
-      // One colour stays as it is, rounded.
+      // A constant colour stays as it is, rounded.
       EXPECT_LT(std::abs(int(near + far) - 65536) * 255, 32768) << i;
     }
 }
 
-// Splats reach beyond silhouettes: a straight edge is drawn where its outermost samples are, not half a pixel outside.
+// Splats reach beyond silhouettes: the antialiased edge lies at the outermost samples, not half a pixel outside.
 TEST(Finish, AntialiasDrawsSilhouettesThinner) {
   OwnTile t(32, 32);
   for (int y = -5; y < 37; ++y)
@@ -242,7 +242,7 @@ TEST(Finish, AntialiasDrawsSilhouettesThinner) {
   splat::antialias(t.tile, scratch);
   double covered = 0;
   for (int x = 10; x < 22; ++x) covered += (t.colour(x, 16) & 255) / 192.0;
-  EXPECT_NEAR(covered, 5.64, 0.05);  // of 6 pixels
+  EXPECT_NEAR(covered, 5.64, 0.05);  // 6 pixels before
   EXPECT_EQ(t.colour(14, 16), 0xc0c0c0u);
   EXPECT_LT(t.colour(16, 16) & 255, 6u);
 }

@@ -1,4 +1,4 @@
-// The reference depth map against projecting every point in double precision, and what redundancy elimination leaves.
+// The reference depth map against every point projected in double precision, and the rest that elimination keeps.
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
@@ -52,7 +52,7 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
     const glm::vec3 eye(camera.pose.position_room);
     const auto t = camera.room_to_pixel();
     const size_t pixels = size_t(camera.width) * camera.height;
-    // A point within 0.01 pixel of a border may fall on either side: expected lies between these two.
+    // A point within 0.01 pixel of a border may fall on either side: the right depth lies between these two.
     std::vector<double> nearest(pixels, INFINITY), farthest(pixels, INFINITY);
     for (const auto& [key, cluster] : model.clusters())
       for (const points::Mosaic& m : cluster->mosaics) {
@@ -60,7 +60,7 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
         const points::Mosaic::Level level = m.level(0);
         const glm::vec3 facing = splat::facing_vector(splat::leaf_view(cluster->leaf_room, eye));
         for (uint32_t i = 0; i < level.count; ++i) {
-          // Points that face away are not seen; where rounding decides they may be.
+          // Points that face away are not seen; at the border rounding decides.
           const glm::dvec3 n(image::octahedral16(level.normal[i]));
           const double away = -glm::dot(n, glm::dvec3(facing)) / glm::length(n);
           if (away > 1 + 1e-4) continue;
@@ -88,7 +88,7 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
       size_t wrong = 0, covered = 0;
       for (size_t i = 0; i < pixels; ++i) {
         covered += std::isfinite(depth[i]);
-        // The last bits tell where in its pixel the point lies.
+        // The last bits hold the point's place in its pixel.
         wrong += !(depth[i] >= nearest[i] * (1 - 4e-5) && (depth[i] <= farthest[i] * (1 + 4e-5)));
       }
       EXPECT_EQ(wrong, 0u) << threads << " threads, of " << pixels << " pixels";
@@ -106,7 +106,7 @@ TEST(ReferenceDepth, NothingIsInfinitelyFar) {
 }
 
 TEST(Elimination, WhatTheModelShowsIsNotSentAgain) {
-  // The same frame twice, whole and by tiles: nothing new.
+  // The same frame twice, whole and by tiles, brings no new points.
   points::PointModel model({{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}, 6});
   const geometry::Camera camera = camera_at(0.4);
   const image::DepthImage image = bumpy_image(camera, 2);
@@ -119,8 +119,8 @@ TEST(Elimination, WhatTheModelShowsIsNotSentAgain) {
   EXPECT_LT(result.kept, image.pixels() / 100) << "over 99 % are eliminated";
 }
 
-// Points of one plane that faces the camera, at random places of some pixels: what is kept lies farther from all of
-// them than `nearest`, and what is dropped does not.
+// Points of one plane that faces the camera, at random places of some pixels: a kept sample lies farther from all of
+// them than `nearest`, a dropped one does not.
 TEST(Elimination, DropsWhatHasAPointOfItsSurfaceNearby) {
   const geometry::Camera camera = camera_at(0.0, 64, 48);
   const geometry::Rect whole{0, 0, 64, 48};
@@ -137,7 +137,7 @@ TEST(Elimination, DropsWhatHasAPointOfItsSurfaceNearby) {
     for (int x = 0; x < 64; ++x) {
       if (rng() % 3 != 0) continue;
       const uint32_t sub = rng() & splat::kReferencePlaceMask;
-      // One in four is of another surface, farther away: it shows nothing of this one.
+      // One in four belongs to another surface, farther away, and must not count for this one.
       const bool other = rng() % 4 == 0;
       const float depth = float(other ? 1.1 * kDepth : kDepth);
       reference[size_t(y) * 64 + x] =
@@ -168,7 +168,7 @@ TEST(Elimination, DropsWhatHasAPointOfItsSurfaceNearby) {
   EXPECT_LT(kept, 64u * 48 * 3 / 4);
 }
 
-// Views of one surface from all around: points come to an end.
+// Views of one surface from all sides: the number of points is bounded.
 TEST(Elimination, PointsOfASurfaceAreBounded) {
   points::PointModel model({{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}, 4, true});
   std::mt19937 rng(11);

@@ -1,5 +1,5 @@
-// `ellipse` and `ewa` give the same bytes on every instruction set this machine has, for every number of left-over
-// lanes, on any number of threads; and they are those of plain loops.
+// `ellipse` and `ewa` give the same bytes on every instruction set of this machine, for every number of left-over
+// lanes, on any number of threads; and they equal plain loops.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
@@ -32,7 +32,7 @@ const std::vector<int64_t> kTargets = hwy::SupportedAndGeneratedTargets();
 
 struct Plain {
   std::vector<uint32_t> colour;
-  std::vector<uint32_t> info;  // kEmptyInfo where nothing is
+  std::vector<uint32_t> info;  // kEmptyInfo: no splat
 };
 
 Plain plainly(splat::Kernel kernel, const splat::DrawList& list, const geometry::Camera& camera,
@@ -57,7 +57,7 @@ void expect_equal(const Plain& expected, const Frame& actual, const geometry::Ca
     if (empty != std::isinf(actual.depth_m[i])) {
       ++depths;
     } else if (!empty) {
-      // Depth comes without its bias, which depends on the frame's mean: within what the key says.
+      // Depth comes without its bias, which depends on the frame's mean: the key bounds it.
       const float with = splat::decode_depth_code(splat::info_depth_code(expected.info[i]), float(camera.near_m));
       depths += !(actual.depth_m[i] <= with && actual.depth_m[i] >= with * 0.994f);
     }
@@ -91,7 +91,7 @@ TEST_P(SurfelTargets, RandomScenesEqualThePlainLoop) {
     std::mt19937 rng(seed);
     auto made = testing::random_items(seed, 60, 300);
     std::vector<splat::DrawItem> items;
-    // From a fraction of a pixel to far beyond the largest splat.
+    // Sizes from a fraction of a pixel to far beyond the largest splat.
     for (size_t i = 0; i < made.size(); ++i)
       items.push_back(surfel_item(made[i], 0.0005f * std::exp(0.09f * float(i)), rng));
     const auto list = testing::draw_list(std::move(items));
@@ -150,7 +150,7 @@ TEST_P(SurfelTargets, ThreadsAndReuseDoNotChangeThePicture) {
   for (int threads : {1, 3, 8})
     expect_equal(expected, render(GetParam(), list, camera, shading, threads), camera, std::to_string(threads));
 
-  // One splatter, frames of other sizes, splats and kernels in between.
+  // One splatter, with frames of other sizes, splats and kernels in between.
   splat::CpuSplatter splatter(2);
   Frame frame(700, 500), other(90, 33);
   for (const splat::Kernel between : splat::kKernels) {

@@ -1,5 +1,5 @@
-// The splatter gives the same bytes on every instruction set this machine has, for every number of left-over lanes, on
-// any number of threads; and they are those of a plain loop.
+// The splatter gives the same bytes on every instruction set of this machine, for every number of left-over lanes, on
+// any number of threads; and they equal a plain loop.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
@@ -33,7 +33,7 @@ void expect_equal(const Frame& expected, const Frame& actual, const std::string&
 class SplatTargets : public ::testing::TestWithParam<splat::Kernel> {};
 
 TEST_P(SplatTargets, RandomScenesEqualThePlainLoop) {
-  // Sizes that are no multiple of any vector or tile; an off-axis camera that does not look along an axis.
+  // Sizes that are no multiple of a vector or tile; an off-axis camera that does not look along an axis.
   geometry::Camera camera = geometry::make_camera(geometry::look_at({0.3, 0.2, 0.4}, {0.1, 0, -1}), 80, 531, 287, 0.05);
   camera.left -= 0.2;
   const image::Shading shading({}, camera);
@@ -91,7 +91,7 @@ TEST_P(SplatTargets, ThreadsAndReuseDoNotChangeThePicture) {
   for (int threads : {1, 2, 3, 8})
     expect_equal(expected, render(list, camera, GetParam(), shading, threads), std::to_string(threads));
 
-  // One splatter, frames of other sizes and splats in between.
+  // One splatter, with frames of other sizes and splats in between.
   splat::CpuSplatter splatter(2);
   const geometry::Camera small = testing::front_camera(90, 33);
   Frame frame(700, 500), other(90, 33);
@@ -109,7 +109,7 @@ TEST(SplatTargetList, HoldsSeveral) {
   EXPECT_GE(kTargets.size(), testing::kLeastTargets) << "nothing to compare on this machine";
   for (int64_t target : kTargets) {
     const OnTarget on(target);
-#ifndef TELESPLAT_SANITIZED  // kernels alone are compiled for a newer machine then
+#ifndef TELESPLAT_SANITIZED  // else only kernels are compiled for a newer machine
     EXPECT_STREQ(splat::kernel_target(), hwy::TargetName(target));
 #endif
   }

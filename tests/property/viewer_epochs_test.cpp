@@ -1,5 +1,5 @@
-// Whatever the order and the times of epochs, parts and restarts: a displayed list is of one epoch, displayed epochs
-// never go back, and something newer is shown within the promised time once there is something that covers a view.
+// For any order and times of epochs, parts and restarts: a displayed list belongs to one epoch, displayed epochs never
+// go back, and a newer epoch is shown within the promised time once its points cover a view.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -38,8 +38,8 @@ TEST_P(EpochsProperty, OneEpochAFrameNeverBackAndNeverStuck) {
   std::map<std::pair<uint64_t, uint64_t>, EpochId> epoch_of;  // (replica, sequence) -> epoch
   uint64_t sequence = 0, replica = 0, frame = 0, shown_epoch = 0, switches = 0;
   EpochId epoch{1};
-  bool known = false;  // the newest replica's epoch
-  // The promise, kept apart from the class under test.
+  bool known = false;  // true once the newest replica's epoch is known
+  // The promised time, computed apart from the class under test.
   double unshown_since_s = -1;
   bool covered = false, covered_by_own = false, any = false, coarse = false;
   const auto new_replica = [&] {
@@ -57,7 +57,7 @@ TEST_P(EpochsProperty, OneEpochAFrameNeverBackAndNeverStuck) {
       cache.select(camera, {}, list);
       displaying = true;
     }
-    if (restarts && chance(1)) {  // another packer; the scene may have changed meanwhile
+    if (restarts && chance(1)) {  // a new packer; the scene may have changed meanwhile
       if (chance(50)) ++epoch.value;
       sequence = 0;
       known = false;
@@ -91,7 +91,7 @@ TEST_P(EpochsProperty, OneEpochAFrameNeverBackAndNeverStuck) {
     }
     cache.free_dropped();
     if (displaying) {
-      uint64_t sum = 0;  // what is drawn is still there: for the address sanitizer
+      uint64_t sum = 0;  // reads all drawn points: the address sanitizer sees if they are gone
       for (const auto& item : list.items) sum += item.cluster->key + item.level.x[item.level.count - 1];
       EXPECT_TRUE(list.items.empty() || sum > 0);
       cache.end_frame();

@@ -1,4 +1,4 @@
-// Whatever the network does to published events, a viewer that may ask for what it missed applies all of them in order.
+// A viewer that may ask for missed events applies all of them in order, however the network treats published ones.
 #include <gtest/gtest.h>
 
 #include <deque>
@@ -26,7 +26,7 @@ wire::StateMark mark(InstanceId packer, uint64_t sequence, bool answer) {
   return m;
 }
 
-// A packer that keeps every event, and a viewer that writes down what it applied.
+// A packer that keeps every event, and a viewer that notes the events that it applied.
 struct Session {
   InstanceId packer = kPacker;
   uint64_t newest = 0;
@@ -48,14 +48,14 @@ struct Session {
     for (uint64_t s = after + 1; s <= newest; ++s) sequencer.on_replayed(event(packer, s));
     sequencer.on_mark(mark(packer, newest, true));
   }
-  // All there is, once each and in order.
+  // Checks that every event was applied once and in order.
   void expect_complete() const {
     ASSERT_EQ(applied.size(), newest);
     for (uint64_t i = 0; i < newest; ++i) ASSERT_EQ(applied[i], i + 1);
   }
 };
 
-// The answer leaves out events 1 to 3, whose points were forgotten, and with them what forgot them.
+// The answer leaves out events 1 to 3, whose points were forgotten, and with them the event that forgot them.
 TEST(EventSequencer, WhoHeardTheBeginningTakesNoAnswerThatBeginsThere) {
   Session s;
   s.sequencer.start();
@@ -88,7 +88,7 @@ TEST(EventSequencer, WhoHeardTheBeginningAndAllSinceNeedsNoAnswer) {
   EXPECT_TRUE(s.asked.empty());
 }
 
-// An answer to an older question is under way when a gap is asked for: it leaves out what this replica has to forget.
+// An older answer is under way when a gap is asked for: it leaves out points that this replica must forget.
 TEST(EventSequencer, AnAnswerIsTakenOnlyWhereItBegins) {
   std::vector<wire::StateRequest> asked;
   std::vector<uint64_t> applied;
@@ -120,7 +120,7 @@ TEST(EventSequencer, AnAnswerIsTakenOnlyWhereItBegins) {
   EXPECT_TRUE(sequencer.synchronised());
 }
 
-// The packer cannot take it for the request that it is answering.
+// The packer must not take it for the request that it is answering.
 TEST(EventSequencer, WhoBeginsAnewSaysSo) {
   std::vector<wire::StateRequest> asked;
   std::vector<uint64_t> applied;
@@ -143,7 +143,7 @@ TEST(EventSequencer, WhoBeginsAnewSaysSo) {
   EXPECT_TRUE(sequencer.synchronised());
 }
 
-// Its first question is answered late; a packer that came since is followed already.
+// Its first question is answered late, when it follows a newer packer already.
 TEST(EventSequencer, AnAnswerOfAPackerThatIsGoneChangesNothing) {
   Session s;
   s.sequencer.start();
@@ -167,7 +167,7 @@ TEST(EventSequencer, LostAndRepeatedEventsEndInTheSameOrderEverywhere) {
       if (chance(3)) {  // a restarted packer begins anew
         s.packer = s.packer == kPacker ? kNextPacker : InstanceId{s.packer.value + 1};
         s.newest = 0;
-        s.asked.clear();  // what was asked of the old one stays unanswered ...
+        s.asked.clear();  // requests to the old one stay unanswered ...
         s.sequencer.retry();
       }
       ++s.newest;
@@ -176,7 +176,7 @@ TEST(EventSequencer, LostAndRepeatedEventsEndInTheSameOrderEverywhere) {
       if (chance(20)) s.sequencer.on_mark(mark(s.packer, s.newest, false));
       if (!s.asked.empty() && chance(50)) s.answer();
     }
-    // The network is kind again: the next mark and its answers bring everything.
+    // The network works again: the next mark and its answers bring everything.
     s.sequencer.on_mark(mark(s.packer, s.newest, false));
     for (int i = 0; i < 10 && (s.sequencer.waiting() || !s.asked.empty()); ++i) {
       if (s.asked.empty()) s.sequencer.retry();

@@ -1,4 +1,4 @@
-// Splatted, layered, rounded to 8 bits and warped, against rays in double precision.
+// Splatted, layered, rounded to 8 bits and warped pictures, against rays in double precision.
 #include <gtest/gtest.h>
 
 #include "services/sampler/volume/raycaster.h"
@@ -62,7 +62,7 @@ TEST(VolumeReference, SplattedLayersLookLikeRays) {
                      test::warp_plainly(c.scene.grid, *frame, images, beside, kBackground), kBackground);
       EXPECT_GE(at_pose, 32) << c.name << ", view " << view;
       EXPECT_GE(moved, 26) << c.name << ", view " << view;
-      // A wrong picture is far from this: half as opaque.
+      // A wrong picture, half as opaque, is far outside these limits.
       if (view == 0) {
         auto half = c.scene.colours;
         for (auto& level : half) level.extinction /= 2;
@@ -91,8 +91,8 @@ TEST(VolumeReference, EyeInside) {
     glm::dvec3 at(0.1, 0.05, 0.08);
     at[view % 3] = view / 3 ? 1 : -1;
     const auto camera = geometry::make_camera(geometry::look_at({0.01, -0.02, 0.015}, at), 60, 160, 120);
-    // The nearest slice being one voxel away, PlanOptions::finest would make pixels of several voxels of the shell:
-    // sampled as fine as displayed.
+    // The nearest slice is one voxel away, and PlanOptions::finest would make pixels of several voxels of the shell:
+    // sample as finely as displayed.
     const auto frame = volume::plan_frame(grid, std::span(&camera, 1), {.finest = 0.01});
     ASSERT_TRUE(frame);
     const auto images = ShearSplatter(2).splat(volume, scene.colours, *frame, 0, 48);

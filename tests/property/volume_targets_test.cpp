@@ -1,4 +1,4 @@
-// Slice images depend on no instruction set, no number of threads, and not on how the grid is cut into slabs.
+// Slice images do not depend on instruction set, number of threads, or the grid's cut into slabs.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -22,7 +22,7 @@ geometry::Camera camera_of(std::mt19937& random, int round, double distance_m) {
 test::VolumeScene scene_of(std::mt19937& random, int round) {
   const auto grid = round % 2 ? test::make_grid({33, 40, 37}, 0.5, {1.4, 1, 0.8}, 35, glm::dvec3(0, 0, 1))
                               : test::make_grid({48, 36, 41}, 0.5);
-  // Blobs with noise, so that runs of voxels are long and short; some scenes are opaque.
+  // Blobs with noise make long and short runs of voxels; some scenes are opaque.
   const auto value = [&](glm::dvec3 p) { return test::blobs(p) * (0.5 + double(random() % 1000) / 1000); };
   return test::make_scene(grid, value, test::ramp(round % 3 == 0 ? 0.98 : 0.3, round % 4 == 1 ? 80 : 20),
                           round % 5 != 4);
@@ -60,8 +60,8 @@ TEST(VolumeTargets, ImagesAreTheSameToTheBit) {
   EXPECT_GT(pixels, 100000u);
 }
 
-// All images over each other, pixel by pixel of the raster, where slabs share out every slice's pixels: nearer layers
-// first, and within one the slabs that are nearer to the eye along k.
+// Composites all images, pixel by pixel of the raster; slabs share out every slice's pixels: nearer layers first, and
+// within a layer the slabs that are nearer to the eye along k.
 std::vector<glm::dvec4> composite(const volume::ShearFrame& frame, const std::vector<volume::SliceImage>& images) {
   std::vector<const volume::SliceImage*> order;
   for (const auto& image : images) order.push_back(&image);
@@ -81,8 +81,8 @@ std::vector<glm::dvec4> composite(const volume::ShearFrame& frame, const std::ve
   return out;
 }
 
-// One slab or three, composited: the same but for rounding. Tops and bottoms of slabs in and out of view, seen along
-// all axes both ways.
+// One slab or three give the same composite except for rounding. Ends of slabs lie in and out of view, seen along all
+// axes both ways.
 TEST(VolumeTargets, SlabsMeetWithoutSeams) {
   std::mt19937 random(5);
   for (int round = 0; round < 12; ++round) {

@@ -62,7 +62,7 @@ TEST(VolumeVoxels, ComeBackAsTheyWere) {
     const auto again = decode_voxels(bytes, s.x, s.y, s.k_begin, s.k_end, s.levels);
     ASSERT_TRUE(again) << again.error().text;
     ASSERT_EQ(*again, v);
-    // Asked for more than there is: the answer says what it has.
+    // Asked for more slices than the bytes hold, the answer has those that it holds.
     const auto fewer = decode_voxels(bytes, s.x, s.y, std::max(0, s.k_begin - 1), s.k_end + 2, s.levels);
     ASSERT_TRUE(fewer) << fewer.error().text;
     ASSERT_EQ(*fewer, v);
@@ -76,7 +76,7 @@ TEST(VolumeVoxels, SmoothDataTakeFewBytes) {
   EXPECT_LT(double(encode_voxels(v, s.x, s.y).size()), 1.0 * double(v.size()));
 }
 
-// What the decoder takes is what Voxels promises, whatever the bytes were.
+// Voxels that the decoder accepts fulfil the promises of Voxels, for any bytes.
 void expect_sound(const Voxels& v, const Shape& s) {
   ASSERT_GE(v.k_begin, s.k_begin);
   ASSERT_LE(v.k_end, s.k_end);
@@ -138,7 +138,7 @@ TEST(VolumeVoxels, RefusesSlicesPlacesAndLevelsThatWereNotAskedFor) {
 }
 
 TEST(VolumeVoxels, ClaimsWithoutBytesCostLittle) {
-  // A slice of 4096 x 4096 rows, each full by the claim of a constant block: more voxels than a coded set may have.
+  // A slice of 4096 x 4096 rows, all full by the claim of a constant block: more voxels than a coded set may have.
   const std::vector<uint8_t> claim{'V', 0, 0, 4, 4, 4, 1, 4, 0};
   const auto v = decode_voxels(claim, 4096, 4096, 0, 4, 256);
   ASSERT_FALSE(v);

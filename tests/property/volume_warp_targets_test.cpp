@@ -1,5 +1,5 @@
 // The warp gives the same pixels on every instruction set, for every width of tile and place of its borders, as the
-// plain pixel of its definition.
+// pixel by its definition.
 #include <gtest/gtest.h>
 
 #include "common/volume/warp/pixel.h"
@@ -14,7 +14,7 @@ using testing::blob_frame, testing::looking_at, testing::orbit, testing::turned_
 
 constexpr uint32_t kBackground = 0x305070;
 
-// As Warper::render, pixel by pixel, every layer everywhere.
+// Does the same as Warper::render, pixel by pixel, every layer everywhere.
 WarpedView plainly(const VolumeFrame& frame, const geometry::Camera& camera) {
   WarpedView out(camera);
   const WarpPlan plan(frame, camera);
@@ -78,7 +78,7 @@ TEST(VolumeWarp, EveryTargetEqualsThePlainPixelWhereverTheEyeIs) {
   }
 }
 
-// Pixels as no sampler makes them: colours above their opacity.
+// Pixels that no sampler makes: colours above their opacity.
 TEST(VolumeWarp, EveryTargetSaturatesAlike) {
   const Grid grid = turned_grid();
   const auto camera = looking_at(grid.centre_room(), orbit(grid, 0.9, 0.4, 0.2), 100, 80);

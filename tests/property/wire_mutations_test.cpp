@@ -1,5 +1,5 @@
-// Damaged messages: decoding ends with a message or an error, and a message that was accepted is within its limits: its
-// texts are UTF-8, and it survives another round trip.
+// Damaged messages: decoding gives a message or an error, and an accepted message is within its limits: its texts are
+// UTF-8, and it survives another round trip.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -33,7 +33,7 @@ TEST(WireMutations, EndInAMessageOrAnError) {
             break;
           case 3:
             body.insert(at, 1 + random() % 8, char(0xc0 + random() % 64));
-            break;  // msgpack's types
+            break;  // bytes of msgpack's types
           case 4:
             body.insert(at, original.substr(random() % original.size(), random() % 32));
             break;
@@ -50,7 +50,7 @@ TEST(WireMutations, EndInAMessageOrAnError) {
       ASSERT_TRUE(again) << sample.name << ": " << again.error().text;
     }
   }
-  EXPECT_GT(accepted, 1000u);  // changed values are still values
+  EXPECT_GT(accepted, 1000u);  // a changed value may be valid
   EXPECT_GT(refused, 10000u);
 }
 

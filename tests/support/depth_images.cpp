@@ -56,10 +56,10 @@ class Terrain {
                                      height(x, z - kStep) - height(x, z + kStep)));
   }
 
-  // Distance along `direction` (in units of its length) to the first hit, and the normal there.
+  // Finds the distance along `direction` (in units of its length) to the first hit, and the normal there.
   bool hit(const glm::dvec3& origin, const glm::dvec3& direction, double& t, glm::dvec3& n) const {
     bool found = false;
-    double last = (0.06 - origin.y) / direction.y;  // above all of the terrain
+    double last = (0.06 - origin.y) / direction.y;  // above the whole terrain
     double gap = 1;
     for (double at = last; at < 4; at += std::max(0.001, gap * 0.4)) {
       const glm::dvec3 p = origin + at * direction;

@@ -1,4 +1,4 @@
-// A head's two eyes.
+// The cameras of a head's two eyes.
 #pragma once
 
 #include <array>
@@ -9,9 +9,9 @@
 
 namespace telesplat::geometry {
 
-/// The cameras of both eyes, left then right, `separation_m` apart along the head's x axis, both looking along its -z.
-/// Each has an off-axis frustum, so that both see the same window `screen_m` before the head: what lies there is in the
-/// same place of both pictures. Infinity: each has the head camera's frustum. Precondition: screen_m > 0.
+/// Returns the cameras of both eyes, left then right, `separation_m` apart along the head's x axis, both looking along
+/// its -z. Each has an off-axis frustum, so that both see the same window `screen_m` before the head: a point there has
+/// the same place in both pictures. Infinity: each has the head camera's frustum. Precondition: screen_m > 0.
 inline std::array<Camera, 2> eye_cameras(const Camera& head, double separation_m,
                                          double screen_m = std::numeric_limits<double>::infinity()) {
   std::array<Camera, 2> eyes{head, head};

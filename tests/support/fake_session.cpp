@@ -128,7 +128,7 @@ void FakeSession::receive_master() {
 void FakeSession::receive_state() {
   while (const auto m = state_.receive()) {
     const std::lock_guard lock(mutex_);
-    if (m->peer == former_state_) continue;  // said before it heard of the change
+    if (m->peer == former_state_) continue;  // sent before the viewer knew of the change
     viewer_state_ = m->peer;
     if (m->type == wire::SliceAck::kName) {
       const auto ack = state_.decode<wire::SliceAck>(*m);
@@ -141,7 +141,7 @@ void FakeSession::receive_state() {
       }
       ++counts_.acknowledged;
       counts_.damaged += ack->damaged;
-      counts_.rising &= ack->frame.value >= last_acknowledged_;  // said again where the buffers change
+      counts_.rising &= ack->frame.value >= last_acknowledged_;  // repeated where the buffers change
       last_acknowledged_ = ack->frame.value;
       unacknowledged_.erase(ack->frame.value);
     } else if (m->type == wire::StateRequest::kName) {
@@ -156,7 +156,7 @@ void FakeSession::receive_state() {
   }
 }
 
-// Whether something happened in place of an answer.
+// Does what is due in place of an answer; true if something was.
 bool FakeSession::disturb() {
   if (options_.restart_after && answers_ == options_.restart_after) {
     master_id_ = {13};
@@ -248,7 +248,7 @@ void FakeSession::send_slices(const wire::ViewRequest& request) {
     volume::encode_slice(testing::blobs(*shear, l, {0, 0, shear->width, shear->height}), bytes);
   if (options_.damaged.contains(request.request.value)) {
     if (!bytes.empty()) bytes.pop_back();
-    // Asked for again it is answered well.
+    // A repeated request gets a good answer.
     options_.damaged.erase(request.request.value);
   }
   f.data = bytes_of(bytes);

@@ -1,5 +1,5 @@
-// The server side of a session as one thread: a master that answers every view request and a packer that sends what was
-// asked for, so that viewers are tested with every message under control.
+// The server side of a session as one thread: a master that answers every view request and a packer that sends the
+// answers' data, so that tests of viewers control every message.
 #pragma once
 
 #include <atomic>
@@ -20,40 +20,40 @@ class FakeSession {
  public:
   struct Options {
     bool volume = true;
-    int coarse_patches = 0;  ///< of points: parts that are published before the first part of full resolution
-    /// Answers of these requests (1, 2, ...) are damaged, or not given when they are asked for the first time.
+    int coarse_patches = 0;  ///< for points: parts published before the first part of full resolution
+    /// Numbers of requests (1, 2, ...) whose first answer is damaged, or left out.
     std::set<uint64_t> damaged, forgotten;
     uint64_t epoch_every = 0;  ///< a new epoch after N answers; 0: never
-    /// Another master after N answers: requests are lost, frames numbered anew; 0: never.
+    /// A new master after N answers: requests are lost, frames numbered anew; 0: never.
     uint64_t restart_after = 0;
-    bool taken = false;  ///< the other master knows the viewer's instance as another's
+    bool taken = false;  ///< the new master knows the viewer's instance as another process'
     /// The scene becomes one of the other kind after every N answers, `changes` times; 0: never. Another packer packs
     /// it, at the same endpoints; requests are lost.
     uint64_t change_every = 0, changes = 2;
-    /// After N answers the master tells of a box that no model can have, and another packer begins; 0: never.
+    /// After N answers the master sends a box that no model can have, and another packer begins; 0: never.
     uint64_t strange_after = 0;
-    /// Of points: after N answers a mark tells of a model with other points than were published; 0: never.
+    /// For points: after N answers a mark has the digest of another model than the published one; 0: never.
     uint64_t other_digest_after = 0;
-    wire::SessionSettings settings{.steering = false};  ///< of the welcome
-    /// The same, instead of these, after so many answers.
+    wire::SessionSettings settings{.steering = false};  ///< in the welcome
+    /// Number of answers -> settings from then on.
     std::map<uint64_t, wire::SessionSettings> settings_after;
-    /// After so many answers nobody answers for so many seconds.
+    /// Number of answers -> seconds of silence from then on.
     std::map<uint64_t, double> silent_after_s;
   };
   FakeSession(net::Context& context, const Options& options, std::string name);
   ~FakeSession();
 
   const std::string& master() const { return master_endpoint_; }
-  /// What of frames.csv arrived: columns by name.
+  /// Returns values of frames.csv that arrived, by the column's name.
   std::vector<double> column(const std::string& table, const std::string& name) const;
   std::map<std::string, double> status() const;
 
   struct Counts {
     uint64_t requests = 0, repeated = 0;  ///< view requests, and those whose id was known
-    uint64_t most_open = 0;               ///< requests not answered, at most at any time
-    uint64_t most_unacknowledged = 0;     ///< volume frames on their way, at most
+    uint64_t most_open = 0;               ///< most requests open at a time
+    uint64_t most_unacknowledged = 0;     ///< most volume frames on their way at a time
     uint64_t introductions = 0, acknowledged = 0, damaged = 0;
-    uint64_t began_anew = 0;  ///< state requests for everything
+    uint64_t began_anew = 0;  ///< state requests that ask for everything
     bool rising = true;       ///< acknowledgements came in the order of frames
     uint64_t buffers = 0;
     bool in_order = false;

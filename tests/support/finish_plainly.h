@@ -1,4 +1,4 @@
-// The finish pixel by pixel, straight from its definition in common/splat/finish.h: slow, and sharing no code with it.
+// The finish pixel by pixel, written from its definition in common/splat/finish.h: slow, and shares no code with it.
 #pragma once
 
 #include <cstdlib>
@@ -36,7 +36,7 @@ inline int channel(uint32_t colour, int c) { return static_cast<int>(colour >> 8
 
 inline void fill_plainly(OwnTile& t, int grow, splat::Gaps gaps) {
   const OwnTile before = t;
-  // In whole infos, like everything that the definition calls a code: what lies below the code's bits counts too.
+  // Compares whole infos, not only codes: the bits below the code count too.
   const int64_t edge = int64_t{splat::kEdge} * 256;
   const auto code = [&](int x, int y) { return static_cast<int64_t>(before.info(x, y)); };
   const auto least = [&](int x, int y) {
@@ -91,7 +91,7 @@ inline void smooth_plainly(OwnTile& t, int grow) {
     const int64_t a = before.info(x, y), b = before.info(i, j);
     return std::abs(a - b) <= int64_t{splat::kEdge} * 256;
   };
-  const auto weight = [&](int x, int y) {  // of a neighbour, the centre's being 8 - 2 of them
+  const auto weight = [&](int x, int y) {  // weight of a neighbour; the centre has 8 - 2 * weight
     const int spacing = static_cast<int>(before.info(x, y) >> 3 & 3);
     return spacing == 0 ? 0 : spacing == 1 ? 1 : 2;
   };

@@ -1,4 +1,4 @@
-// Masks of the kinds that plans consist of, for tests and benchmarks.
+// Masks like those of plans, for tests and benchmarks.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace telesplat::test {
 
-/// Each pixel with probability `share`.
+/// Sets each pixel with probability `share`.
 inline image::PixelMask random_mask(int width, int height, double share, uint32_t seed) {
   image::PixelMask mask(width, height);
   std::mt19937 random(seed);
@@ -22,7 +22,7 @@ inline image::PixelMask random_mask(int width, int height, double share, uint32_
   return mask;
 }
 
-/// One pixel in `n`, at a random place in each cell of about as many: as evenly spread as validation rays are.
+/// Sets one pixel in `n`, at a random place in each cell of about `n` pixels: as evenly spread as validation rays are.
 inline image::PixelMask spread_mask(int width, int height, int n, uint32_t seed) {
   image::PixelMask mask(width, height);
   std::mt19937 random(seed);
@@ -36,7 +36,7 @@ inline image::PixelMask spread_mask(int width, int height, int n, uint32_t seed)
   return mask;
 }
 
-/// Bands of `thickness` pixels along circles: what edges and newly uncovered places look like.
+/// Sets bands of `thickness` pixels along circles, like edges and newly uncovered places.
 inline image::PixelMask band_mask(int width, int height, int thickness) {
   image::PixelMask mask(width, height);
   for (int y = 0; y < height; ++y)
@@ -54,7 +54,7 @@ inline image::PixelMask full_mask(int width, int height) {
   return mask;
 }
 
-/// What is left of the image within the mask.
+/// Clears the image's pixels outside the mask.
 inline image::DepthImage masked(image::DepthImage image, const image::PixelMask& mask) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)

@@ -16,7 +16,7 @@ inline packer::Config packer_config() {
   return config;
 }
 
-/// The tiles of one frame, `side` pixels a side (the last ones less).
+/// Samples the tiles of one frame, `side` pixels a side (the last ones smaller).
 inline std::vector<packer::SampledTile> sampled_frame(FrameId id, const geometry::Camera& camera, int side,
                                                       EpochId epoch = kEpoch) {
   std::vector<packer::SampledTile> tiles;
@@ -35,7 +35,7 @@ inline std::vector<packer::SampledTile> sampled_frame(FrameId id, const geometry
   return tiles;
 }
 
-/// What a viewer does with events.
+/// Applies events as a viewer does.
 class Replica {
  public:
   explicit Replica(const points::ModelConfig& config) : model_(config) {}
@@ -64,12 +64,12 @@ class Replica {
           points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image, event.tag()));
     }
   }
-  /// Closes a gap.
+  /// Applies the events that it missed.
   void catch_up(const packer::PackerCore& core) {
     for (const packer::Event& event : core.events_since(applied_)) apply(event);
     applied_ = core.sequence();
   }
-  /// What was left out up to here changes nothing.
+  /// Skips events up to `sequence`, which change nothing here.
   void skip_to(Sequence sequence) { applied_ = std::max(applied_, sequence); }
   Sequence applied() const { return applied_; }
   const points::PointModel& model() const { return model_; }

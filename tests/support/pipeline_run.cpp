@@ -35,7 +35,7 @@ void put(std::string& out, T value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-// Processes whose command line holds `text`.
+// Lists processes whose command line holds `text`.
 std::vector<pid_t> running_with(const std::string& text) {
   std::vector<pid_t> out;
   std::error_code error;
@@ -108,7 +108,7 @@ std::string read_text(const std::string& path) try {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 } catch (const std::ios_base::failure&) {
-  return {};  // of /proc: its process has ended meanwhile
+  return {};  // a file of /proc, whose process has ended meanwhile
 }
 
 bool wait_until(const std::function<bool()>& condition, double deadline_s) {
@@ -132,7 +132,7 @@ Program::Program(const std::string& name, std::vector<std::string> arguments, co
   std::vector<char*> argv;
   for (auto& a : arguments) argv.push_back(a.data());
   argv.push_back(nullptr);
-  // Emptied before it begins: what a former program of this prefix said is not this one's.
+  // Emptied first: they may hold output of a former program with this prefix.
   const auto emptied = [&](const char* suffix) {
     return ::open((prefix + suffix).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   };
@@ -145,7 +145,7 @@ Program::Program(const std::string& name, std::vector<std::string> arguments, co
   }
   dup2(out, 1);
   dup2(err, 2);
-  // Sessions of tests and those of the person at this machine do not find each other.
+  // Sessions of tests and sessions of this machine's user must not find each other.
   setenv("TELESPLAT_RUNTIME", (prefix + ".runtime").c_str(), 0);
   execv(argv[0], argv.data());
   _exit(127);
@@ -186,14 +186,14 @@ PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::s
   if (mesh.empty()) write_terrain(terrain);
   std::vector<std::string> a{
       command, terrain, "--out", out_, "--sampling-size", "320x200", "--tile-size", "64", "--sampler-threads", "1"};
-  // The screens of a wall that a file describes have their own sizes.
+  // The screens of a described wall have their own sizes.
   const auto described = [](const std::string& word) { return word.ends_with(".toml"); };
   if (std::none_of(arguments.begin(), arguments.end(), described)) a.insert(a.end(), {"--size", "480x300"});
   const bool surface = std::find(arguments.begin(), arguments.end(), "--iso") != arguments.end();
   if (mesh.empty() || mesh.ends_with(".ply") || surface) a.insert(a.end(), {"--cache", folder_ / "cache"});
-  // Half the usual rate shows as much, and leaves time to others that run beside it.
+  // Half the usual rate tests as much, and leaves time to other tests.
   if (command == "run") a.insert(a.end(), {"--target-fps", "30"});
-  // Pictures show what is drawn, not what lies over it.
+  // Pictures must show only the scene, without the panel over it.
   if (command == "view" && std::find(arguments.begin(), arguments.end(), "--panel") == arguments.end())
     a.insert(a.end(), {"--panel", "off"});
   a.insert(a.end(), arguments.begin(), arguments.end());
@@ -263,7 +263,7 @@ bool PipelineRun::wait_at_rest() {
   struct Model {
     double points, updates;
   };
-  std::map<std::string, Model> last;  // of each viewer, when its points last changed
+  std::map<std::string, Model> last;  // each viewer's, when its points last changed
   return wait_status([&](const auto& s) {
     int viewers = 0, complete = 0;
     for (const auto& p : s["processes"]) {

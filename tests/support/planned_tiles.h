@@ -1,4 +1,4 @@
-// The tiles of a plan, sampled from the test scene.
+// Samples the tiles of a plan from the test scene.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -16,10 +16,10 @@ namespace telesplat::test {
 struct PlannedTile {
   packer::SampledTile tile;
   uint64_t rays = 0;
-  bool whole = false;  ///< it has no mask
+  bool whole = false;  ///< without a mask
 };
 
-/// What samplers make of a plan that is not full; pixels outside the masks are not covered. A mask that cannot be read,
+/// Samples the tiles of a plan that is not full; pixels outside the masks are not covered. A mask that cannot be read,
 /// or has another number of rays than its tile says, fails the test.
 inline std::vector<PlannedTile> planned_tiles(const wire::PlanRequest& asked, const wire::Plan& plan) {
   std::vector<PlannedTile> out;

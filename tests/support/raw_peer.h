@@ -1,4 +1,4 @@
-// A peer that speaks TCP, and as much of ZMTP 3.0 (rfc.zeromq.org/spec/23) as a test wants it to: hostile on demand.
+// A peer that uses TCP, and as much of ZMTP 3.0 (rfc.zeromq.org/spec/23) as a test wants: it can be hostile.
 #pragma once
 
 #include <arpa/inet.h>
@@ -17,7 +17,7 @@ namespace telesplat::test {
 
 class RawPeer {
  public:
-  /// Connects to "tcp://127.0.0.1:PORT"; connected() tells whether that worked.
+  /// Connects to "tcp://127.0.0.1:PORT"; connected() returns the result.
   explicit RawPeer(const std::string& endpoint) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -30,7 +30,7 @@ class RawPeer {
   RawPeer& operator=(const RawPeer&) = delete;
 
   bool connected() const { return connected_; }
-  /// False once the other side has hung up.
+  /// False once the other side has closed the connection.
   bool send(std::string_view bytes) {
     while (!bytes.empty()) {
       const ssize_t n = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -39,7 +39,7 @@ class RawPeer {
     }
     return true;
   }
-  /// Sends as much as the other side takes, until it has taken nothing for `quiet_ms`. Returns how often all went.
+  /// Sends `bytes` until the other side has taken nothing for `quiet_ms`. Returns the number of complete sends.
   size_t send_until_full(std::string_view bytes, int quiet_ms) {
     size_t sent = 0;
     for (pollfd p{fd_, POLLOUT, 0}; ::poll(&p, 1, quiet_ms) > 0 && p.revents == POLLOUT;) {
@@ -49,13 +49,13 @@ class RawPeer {
     }
     return sent;
   }
-  /// Both sides of the connection end at once.
+  /// Ends both sides of the connection at once.
   void reset() {
     const linger at_once{1, 0};
     ::setsockopt(fd_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
     ::close(std::exchange(fd_, -1));
   }
-  /// Reads whatever comes until the other side hangs up. False: it has not within `timeout_ms`.
+  /// Reads until the other side closes the connection. False: it has not within `timeout_ms`.
   bool wait_hung_up(int timeout_ms) {
     char buffer[4096];
     for (pollfd p{fd_, POLLIN, 0}; ::poll(&p, 1, timeout_ms) > 0;)
@@ -64,9 +64,9 @@ class RawPeer {
   }
 
   /// Opens a ZMTP connection as a socket of this type ("DEALER", ...): nothing may be sent before the other side is
-  /// ready. False: it hung up instead.
+  /// ready. False: it closed the connection instead.
   bool shake_hands(std::string_view socket_type);
-  /// After zmtp_opening() was sent: reads the other side's.
+  /// Reads the other side's opening, after zmtp_opening() was sent.
   bool wait_ready() { return read(64) && read(2) && read(last_byte_); }  // greeting; READY's flags and size; READY
 
  private:

@@ -9,7 +9,7 @@ namespace telesplat::testing {
 
 class OnTarget {
  public:
-  // Where there is no code for `target`, that for the next slower one is used.
+  // If no code exists for `target`, uses that of the next slower one.
   explicit OnTarget(int64_t target) { use(hwy::SupportedTargets() & ~(target - 1)); }
   ~OnTarget() { use(0); }
   OnTarget(const OnTarget&) = delete;
@@ -22,14 +22,14 @@ class OnTarget {
   }
 };
 
-/// How many there are at least: sanitized programs are compiled for one.
+/// Least number of targets: sanitized programs are compiled for one.
 #if defined(HWY_COMPILE_ONLY_STATIC)
 inline constexpr size_t kLeastTargets = 1;
 #else
 inline constexpr size_t kLeastTargets = 2;
 #endif
 
-/// Every instruction set that was compiled and that this machine has.
+/// Returns every compiled instruction set that this machine has.
 inline std::vector<int64_t> simd_targets() { return hwy::SupportedAndGeneratedTargets(); }
 
 }  // namespace telesplat::testing

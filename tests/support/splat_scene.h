@@ -1,4 +1,4 @@
-// Points for splatting tests: clusters made by hand, and an oracle that splats them in the plainest way.
+// Points for splatting tests: clusters made by hand, and an oracle that splats them in the simplest way.
 #pragma once
 
 #include <bit>
@@ -17,7 +17,7 @@
 
 namespace telesplat::testing {
 
-/// One mosaic level with its cluster, filled point by point, each array in an allocation of just its size.
+/// One mosaic level with its cluster, filled point by point; each array has an allocation of exactly its size.
 class HandMadeItem {
  public:
   explicit HandMadeItem(const geometry::Box& leaf) : cluster_(std::make_unique<points::Cluster>()) {
@@ -27,7 +27,7 @@ class HandMadeItem {
   void add(uint16_t x, uint16_t y, uint16_t z, uint32_t colour, uint16_t normal = image::encode_normal16({0, 0, 1})) {
     x_.push_back(x), y_.push_back(y), z_.push_back(z), normal_.push_back(normal), colour_.push_back(colour);
   }
-  /// The point of the leaf's grid nearest to `position_room`, which must lie in the leaf.
+  /// Adds the point of the leaf's grid nearest to `position_room`, which must lie in the leaf.
   void add_at(const glm::dvec3& position_room, uint32_t colour, uint16_t normal = image::encode_normal16({0, 0, 1})) {
     const geometry::Box& b = cluster_->leaf_room;
     const auto q = [](double p, float lo, float hi) {
@@ -78,7 +78,7 @@ inline image::Shading unlit(const geometry::Camera& camera, uint32_t background 
   return {p, camera};
 }
 
-/// `count` items of random points in boxes around the camera's axis, some reaching behind it; sizes from `sizes`.
+/// Makes `count` items of random points in boxes around the camera's axis, some behind the camera.
 inline std::vector<HandMadeItem> random_items(uint32_t seed, int count, int most_points) {
   std::mt19937 rng(seed);
   const auto uniform = [&](float lo, float hi) { return std::uniform_real_distribution<float>(lo, hi)(rng); };
@@ -94,8 +94,8 @@ inline std::vector<HandMadeItem> random_items(uint32_t seed, int count, int most
   return items;
 }
 
-/// One point after the other, one pixel after the other, by the formulas of splat_kernels.h, splat_table.h and
-/// pixel_key.h. With a finish, by tests/support/finish_plainly.h: there, nothing is beyond the image.
+/// Splats one point after the other, one pixel after the other, by the formulas of splat_kernels.h, splat_table.h and
+/// pixel_key.h. A finish follows tests/support/finish_plainly.h: pixels beyond the image are empty.
 inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                            const image::Shading& shading, const splat::Finish& finish = {false, false, false}) {
   Frame frame(camera.width, camera.height);

@@ -1,5 +1,5 @@
-// The kernels `ellipse` and `ewa` in the plainest way: one point after the other, one pixel after the other. What
-// surfel-inl.h, ellipse-inl.h and ewa-inl.h do on vectors is done here in the same order.
+// The kernels `ellipse` and `ewa` in the simplest way: one point after the other, one pixel after the other, with the
+// operations of surfel-inl.h, ellipse-inl.h and ewa-inl.h in the same order.
 #pragma once
 
 #include <vector>
@@ -13,13 +13,13 @@ namespace telesplat::splat {
 
 /// The footprint on the screen, in pixels. A pixel at offset d from the contour's centre is inside if d^T S^-1 d <= 1.
 struct SurfelContour {
-  float offset_x = 0, offset_y = 0;  ///< of the ellipse's centre from the projected centre of the splat
+  float offset_x = 0, offset_y = 0;  ///< ellipse's centre - projected centre of the splat
   float xx = 0, xy = 0, yy = 0;      ///< S
   float slope_x = 0, slope_y = 0;  ///< depth of the tangent plane = w / (1 + slope . offset from the projected centre)
   std::array<float, 3> normal{0, 0, -1};  ///< in camera axes, not of unit length
 };
 
-/// surfel-inl.h says what it calculates.
+/// Computes the contour that surfel-inl.h describes.
 ///   x_pix, y_pix, w: the projected centre. normal_room: see surfel_normal. No low-pass is added to S.
 inline SurfelContour surfel_contour(const SurfelCamera& c, const SurfelSource& source, float x_pix, float y_pix,
                                     float w, const std::array<float, 3>& normal_room) {
@@ -51,8 +51,8 @@ inline SurfelContour surfel_contour(const SurfelCamera& c, const SurfelSource& s
   out.xy = (ax * c.focal_y) * gxy + out.offset_x * out.offset_y;
   out.yy = (ay * c.focal_y) * gyy + out.offset_y * out.offset_y;
 
-  // The tangent plane m . P = m . p, P on the ray through the pixel. Seen edge-on it has no depth to follow: it gets
-  // the steepest.
+  // The tangent plane m . P = m . p, P on the ray through the pixel. A plane seen edge-on has no depth there: it gets
+  // the steepest slope.
   const float along = (mx * u + my * v) + mz;
   const float inverse = 1.0f / std::copysign(std::max(std::abs(along), 1e-3f), along);
   const float limit_x = kSteepest * c.step_x, limit_y = kSteepest * c.step_y;
@@ -74,7 +74,7 @@ struct SurfelConic {
   float xx = 0, xy = 0, yy = 0;
   /// Pixels whose centres lie in its box, [x0, x1) x [y0, y1), cut to kMaxSplatSide.
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-  float determinant = 0;  ///< of S
+  float determinant = 0;  ///< det S
 
   float at(float dx, float dy) const { return dx * (xx * dx + xy * dy) + (yy * dy) * dy; }
 };
@@ -83,7 +83,7 @@ struct SurfelConic {
 inline SurfelConic surfel_conic(const SurfelContour& c, float x_pix, float y_pix, float grow, float add) {
   SurfelConic out;
   constexpr int kHalf = kMaxSplatSide / 2;
-  // No farther than binning allows for.
+  // Not farther than the reach of binning.
   constexpr float kFarthest = kHalf - 1;
   out.centre_x = x_pix + std::clamp(c.offset_x, -kFarthest, kFarthest);
   out.centre_y = y_pix + std::clamp(c.offset_y, -kFarthest, kFarthest);
@@ -166,7 +166,7 @@ void for_pixels(const splat::SurfelConic& c, int width, int height, bool centre,
   if (centre) visit(ix, iy, true);
 }
 
-/// Keys of the image (pixel_key.h), row-major; kEmptyKey where nothing is.
+/// Keys of the image (pixel_key.h), row-major; kEmptyKey for empty pixels.
 inline std::vector<uint64_t> ellipse_plainly(const splat::DrawList& list, const geometry::Camera& camera) {
   std::vector<uint64_t> keys(size_t(camera.width) * camera.height, uint64_t(splat::kEmptyKey));
   const auto near_m = static_cast<float>(camera.near_m);

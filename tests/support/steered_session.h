@@ -1,4 +1,4 @@
-// A packer with its planner, and a sampler of meshes that casts what is planned: as they run, without sockets.
+// A packer with its planner, and a sampler of meshes that casts the planned rays: the real ones, without sockets.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ class SteeredSession {
   /// Clusters forgotten so far.
   size_t forgotten() const { return forgotten_; }
 
-  /// A view, kUpdate_s after the one before. Returns the number of rays.
+  /// Samples a view, kUpdate_s after the one before. Returns the number of rays.
   uint64_t update(const geometry::Camera& camera) {
     now_s_ += kUpdate_s;
     request_ = {
@@ -36,7 +36,7 @@ class SteeredSession {
     cast(camera, {0, 0, camera.width, camera.height}, nullptr, 0, 1);
     return uint64_t(camera.width) * uint64_t(camera.height);
   }
-  /// Frames of extra rays for the newest view, until nothing is left or there were `most`. Returns the number of rays.
+  /// Samples frames of extra rays for the newest view: `most`, or until a plan is empty. Returns the number of rays.
   uint64_t extra(int most) {
     uint64_t rays = 0;
     request_.extra = true;

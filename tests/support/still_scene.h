@@ -1,4 +1,4 @@
-// A view of the test scene with any number of rays a pixel: for tests of pictures of a camera that rests.
+// A view of the test scene with any number of rays a pixel: for tests of pictures of a resting camera.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@ inline geometry::Camera finer(geometry::Camera camera, int by) {
   return camera;
 }
 
-/// The scene with side x side rays a pixel, at even distances: mean of their displayed colours.
+/// Traces the scene with side x side evenly spaced rays a pixel: mean of their displayed colours.
 inline image::View traced(const geometry::Camera& camera, int side, const image::Shading& shading) {
   const geometry::Camera fine = finer(camera, side);
   const image::DepthImage rays = sample_scene(fine, {0, 0, fine.width, fine.height});
@@ -39,7 +39,7 @@ inline points::PreparedPatch whole_patch(const points::ModelConfig& config, uint
   return points::prepare_patch(config, Sequence{sequence}, fine, all, sample_scene(fine, all), FrameId{sequence});
 }
 
-/// Rays of such a view, of which only some are cast: where they lie, what they met, and which met nothing.
+/// Rays of such a view that were cast: their places, their hits, and the rays that met nothing.
 struct CastRays {
   geometry::Camera camera;
   geometry::Rect rect;
@@ -68,7 +68,7 @@ CastRays cast_rays(const geometry::Camera& camera, int by, const Cast& cast) {
   return out;
 }
 
-/// PSNR of the colours, dB; infinity where they are equal.
+/// PSNR of the colours, dB; infinity if they are equal.
 inline double psnr_db(const image::View& a, const image::View& b) {
   double sum = 0;
   for (size_t i = 0; i < a.colour.size(); ++i)

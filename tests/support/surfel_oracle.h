@@ -1,4 +1,4 @@
-// The contour in double precision, straight from the thesis's matrices (T4.4.1, eq. 4.2-4.7).
+// The contour in double precision, by the thesis's matrices (T4.4.1, eq. 4.2-4.7).
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace telesplat::testing {
 
-/// A sample: where it lies, which way its surface faces, and the view that took it. Room space, metres.
+/// A sample: its place, its surface's direction, and the view that took it. Room space, metres.
 struct Sample {
   glm::dvec3 position, normal, to_eye;  ///< the last two of unit length
   double radius_m = 0;
@@ -67,8 +67,8 @@ inline CentralConic contour_by_matrices(const geometry::Camera& camera, const Sa
   return {centre, glm::dmat2(a, b, b, c) / (f - d * centre.x - e * centre.y)};
 }
 
-/// A point of the footprint's rim, room space: the point of the tangent plane that the sampling view saw at this angle
-/// of its circle.
+/// Returns a point of the footprint's rim, room space: the sampling view saw this point of the tangent plane at `angle`
+/// on its circle.
 inline glm::dvec3 rim_point(const Sample& sample, double angle, bool limited) {
   const auto tangent = basis_across(sample.normal);
   const glm::dmat2 m(input_mapping(sample, tangent, limited));

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <vector>
 
-// Last: its macros take common words.
+// Included last: its macros are common words.
 #include <X11/Xatom.h>
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
@@ -36,7 +36,7 @@ void restore(const char* name, const std::optional<std::string>& value) {
     unsetenv(name);
 }
 
-// Windows come and go while they are looked at.
+// Windows come and go while a test reads them.
 int ignore_error(Display*, XErrorEvent*) { return 0; }
 
 }  // namespace
@@ -65,7 +65,7 @@ VirtualDisplay::VirtualDisplay() : display_before_(variable("DISPLAY")), wayland
     _exit(127);
   }
   ::close(ends[1]);
-  // It writes its number and a new line once it takes connections.
+  // Xvfb writes its number and a new line once it accepts connections.
   std::string number;
   for (char c = 0; c != '\n';) {
     pollfd readable{ends[0], POLLIN, 0};

@@ -23,7 +23,7 @@ concept Composed = requires(AnyVisitor f, M& m) {
   M::fields(f, m);
 };
 
-// Gives every field, whatever its type, a value that is not the default one.
+// Gives every field, of any type, a value other than its default.
 struct Filler {
   void operator()(const char*, bool& v, size_t = 0) { v = true; }
   void operator()(const char*, uint64_t& v, size_t = 0) { v = 1000 + ++n_; }
@@ -112,13 +112,13 @@ M sample_message() {
 
 inline wire::Bytes bytes_of(const std::string& s) { return std::as_bytes(std::span(s)); }
 
-/// A kind of message, without its type: what can be said of all of them alike.
+/// A kind of message, without its type: properties that all kinds have.
 struct MessageSample {
   std::string_view name;
   const std::type_info& type;
-  std::string body;          ///< a valid message, no field of which has its default value
-  std::string default_body;  ///< as encoded when nothing was set; need not be valid
-  /// Decodes a body and encodes what came out.
+  std::string body;          ///< a valid message; no field has its default value
+  std::string default_body;  ///< encoded with nothing set; need not be valid
+  /// Decodes a body and encodes the result.
   Result<std::string> (*round_trip)(wire::Bytes body);
 };
 
@@ -129,7 +129,7 @@ Result<std::string> round_trip(wire::Bytes body) {
   return wire::encode(*message);
 }
 
-/// One of every message.
+/// Returns one of every message.
 inline const std::vector<MessageSample>& message_samples() {
   static const std::vector<MessageSample> samples = []<class... M>(std::type_identity<std::tuple<M...>>) {
     return std::vector<MessageSample>{
@@ -138,7 +138,7 @@ inline const std::vector<MessageSample>& message_samples() {
   return samples;
 }
 
-/// One past the msgpack value at `at`; bytes must be well-formed. Tells `text` every string on the way.
+/// Returns the end of the msgpack value at `at`; bytes must be well-formed. Passes every string on the way to `text`.
 inline size_t value_end(const std::string& bytes, size_t at, const std::function<void(std::string_view)>& text = {}) {
   const auto u8 = [&](size_t i) { return static_cast<unsigned char>(bytes.at(i)); };
   const auto number = [&](size_t i, size_t n) {
@@ -173,7 +173,7 @@ inline size_t value_end(const std::string& bytes, size_t at, const std::function
 }
 
 struct Field {
-  std::string name;                    // a brief message's fields: their numbers
+  std::string name;                    // a brief message's fields have numbers
   size_t key = 0, value = 0, end = 0;  // offsets in the body
 };
 
@@ -192,7 +192,7 @@ inline std::vector<Field> fields_of(const std::string& body) {
   return out;
 }
 
-/// `body` with the value of a field replaced.
+/// Returns `body` with the value of a field replaced.
 inline std::string with_value(const std::string& body, const std::string& field, const std::string& value) {
   for (const Field& f : fields_of(body))
     if (f.name == field) return body.substr(0, f.value) + value + body.substr(f.end);

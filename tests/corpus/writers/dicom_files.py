@@ -197,7 +197,7 @@ def by_gdcm():
 
 
 def from_dicom():
-    shutil.rmtree("dcm2niix", ignore_errors=True)  # dcm2niix gives names that are taken another letter
+    shutil.rmtree("dcm2niix", ignore_errors=True)  # dcm2niix adds a letter to names that exist already
     shapes.note("dcm2niix", version(["dcm2niix", "--version"], r"(v\d\S+)"))
     for name, flags in (("plain", ["-z", "n"]), ("gz", ["-z", "i"]), ("nrrd", ["-z", "n", "-e", "y"])):
         path = shapes.place("dcm2niix", f"{name}/volume")

@@ -62,7 +62,7 @@ def cloudcompare():
 
 def meshlab():
     shapes.note("meshlab", package("meshlab"))
-    # Its reader of OBJ ends on the boxes, so it is given the prism alone.
+    # MeshLab's reader of OBJ fails on the boxes: it gets only the prism.
     for name, masks in {
         "prism.ply": "vc fc vn",
         "prism_faces.ply": "fc",

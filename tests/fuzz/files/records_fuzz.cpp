@@ -1,5 +1,5 @@
-// Any bytes as files of a run folder that viewers and samplers read again: events of points, slice frames, displayed
-// frames on their way to the disk, a replay of tiles. The first byte chooses.
+// Reads any bytes as a file of a run folder that viewers and samplers read again: events of points, slice frames,
+// displayed frames on their way to the disk, a replay of tiles. The first byte chooses.
 #include <cstdlib>
 
 #include "client/viewer/record/event_record.h"

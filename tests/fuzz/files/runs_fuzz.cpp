@@ -1,5 +1,5 @@
-// Any bytes as files of run folders and sweeps, and as scene files, as the launcher reads them: tables,
-// manifests, session.toml. The first byte chooses.
+// Reads any bytes as files of run folders and sweeps, and as scene files, as the launcher does: tables, manifests,
+// session.toml. The first byte chooses.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -19,7 +19,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// A folder of this process, in which one file at a time lies.
+// A folder of this process that holds one file at a time.
 class Folder {
  public:
   Folder() : path_("/tmp/telesplat-fuzz-XXXXXX") {

@@ -1,5 +1,5 @@
-// Any bytes as what data servers read besides meshes and headers of volumes: chunks of a store, a store, what the
-// program that imports says, glTF with its pictures, packed voxels and voxels in words. The first byte chooses.
+// Reads any bytes as a data server's input other than meshes and headers of volumes: chunks of a store, a store,
+// output of the importing program, glTF with its pictures, packed voxels and voxels in words. The first byte chooses.
 #include <cstdlib>
 #include <cstring>
 
@@ -19,7 +19,7 @@ namespace {
 
 using Bytes = std::span<const uint8_t>;
 
-// The sum of a chunk's numbers: they can be read.
+// Adds up a chunk's numbers, to check that they can be read.
 uint64_t use(const geometry::MeshChunkView& chunk) {
   uint64_t sum = 0;
   for (const uint32_t i : chunk.indices) {

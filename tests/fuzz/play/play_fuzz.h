@@ -1,4 +1,4 @@
-// A play as a fuzz target.
+// Runs a play as a fuzz target.
 #pragma once
 
 #include <cstdio>

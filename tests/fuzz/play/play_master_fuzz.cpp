@@ -1,4 +1,4 @@
-// What valid messages of anyone do to the master.
+// Sends the master valid messages of any role in any order.
 #include "tests/fuzz/play/play_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

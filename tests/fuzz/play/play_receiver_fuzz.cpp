@@ -1,4 +1,4 @@
-// What packers may say to a viewer of points.
+// Sends a viewer of points messages that packers may send.
 #include "tests/fuzz/play/play_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

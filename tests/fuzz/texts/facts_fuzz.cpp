@@ -1,4 +1,4 @@
-// Any lines "name=value" as what a data server says of its scene: an error, or a scene that is told again the same way.
+// Reads any lines "name=value" as a data server's facts: gives an error, or a scene that is written the same way again.
 #include <cmath>
 #include <cstdlib>
 #include <map>

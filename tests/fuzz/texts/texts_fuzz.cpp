@@ -1,5 +1,5 @@
-// Any bytes as each text that people, files and messages bring: an error that says something, or what comes back when
-// it is written and read again. The first byte chooses the reader, as the table below has it.
+// Reads any bytes as each text of people, files and messages: gives an error with a text, or a value that survives
+// writing and reading. The first byte chooses the reader in the table below.
 #include <cstdlib>
 
 #include "client/notes/book.h"

@@ -1,4 +1,4 @@
-// What bounds of error promise, in every pixel of many images; and refinements, which give the exact image back.
+// Bounds of error hold in every pixel of many images; and refinements give the exact image back.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -35,7 +35,7 @@ double angle_deg(uint16_t a, uint16_t b) {
   return std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v)) * 180 / std::numbers::pi;
 }
 
-// Depths as codes and in metres, normals in degrees, colours channel by channel, and what is covered.
+// Compares depths as codes and in metres, normals in degrees, colours channel by channel, and the covered pixels.
 void expect_within(const ErrorBounds& bounds, const DepthImage& a, const DepthImage& b) {
   constexpr double kNear = 0.02;
   ASSERT_EQ(a.width, b.width);
@@ -84,7 +84,7 @@ TEST(CodecBounds, HoldInEveryPixelAndRefinementsAreExact) {
       }
 }
 
-// Of a stream and of what refines it: every length, and bits that are other ones.
+// Damages a stream: cuts it at every length, and flips bits. Checks both streams and refinements.
 template <class Decode>
 void expect_damage_is_found(const std::vector<uint8_t>& bytes, std::mt19937& random, Decode decoded, size_t& refused) {
   for (size_t length = 0; length < bytes.size(); ++length) {

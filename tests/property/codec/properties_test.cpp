@@ -1,4 +1,4 @@
-// What must hold for any image and any bytes, over many seeded ones, on every instruction set this machine has.
+// Properties of any image and any bytes, over many seeded ones, on every instruction set of this machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,7 +72,7 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
 TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
   std::mt19937 random(12);
   std::vector<uint8_t> mark = encode(test::random_pixels(1, 1, 1, 1));
-  mark.resize(2);  // and the version
+  mark.resize(2);  // the mark and the version
   size_t accepted = 0;
   for (int trial = 0; trial < 20000; ++trial) {
     std::vector<uint8_t> bytes = mark;

@@ -1,5 +1,5 @@
-// Whatever link and traffic: order is kept, nothing comes out before half a round trip, in no span of time more than
-// the rate, and a link that is kept busy loses no time.
+// For any link and traffic: order is kept, no byte comes out before half a round trip, no span of time has more than
+// the rate, and a busy link loses no time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -68,19 +68,19 @@ TEST_P(AnyLink, KeepsItsPromises) {
     bytes += passed[i].bytes;
   }
   if (link.rate_bit_s == 0) return;
-  // What has come out by a time has passed the bottleneck since some earlier one; from the begin on in all spans.
+  // Bytes that have come out by a time passed the bottleneck before it; checks all spans from the begin.
   size_t so_far = 0;
   for (const Passed& p : passed) {
     so_far += p.bytes;
     const double least_s = double(so_far) * 8 / link.rate_bit_s;
     ASSERT_GE(p.out_s - from_s - link.rtt_s / 2, least_s - 1e-6) << "faster than the rate";
-    // Bounded: what waits in the queue, what passes, stalls, delay.
+    // The delay is bounded by the queue, the piece that passes, stalls and the link's delay.
     const double queue_s = double(std::max<uint64_t>(queue_bytes(link), 2 * shaper.piece())) * 8 / link.rate_bit_s;
     const double open = link.stall_s > 0 ? 1 - link.stall_s / link.stall_every_s : 1;
     ASSERT_LE(p.out_s - p.in_s, queue_s / open + link.stall_s * 2 + link.rtt_s / 2 + link.jitter_s + 1e-6);
   }
   EXPECT_EQ(so_far, bytes);
-  // Without jitter every span between two pieces is as long as the bytes in it take.
+  // Without jitter every span between two pieces is at least the time of its bytes.
   if (link.jitter_s > 0) return;
   for (size_t i = 1; i < passed.size(); ++i)
     ASSERT_GE(passed[i].out_s - passed[i - 1].out_s, double(passed[i].bytes) * 8 / link.rate_bit_s - 1e-6);

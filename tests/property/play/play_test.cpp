@@ -1,5 +1,5 @@
-// Whatever valid messages come, from whoever, in whatever order: nobody falls over, and those who are honest are
-// served. Fuzz targets (tests/fuzz/play) play the same with bytes that they look for.
+// Valid messages from any peer in any order: no process fails, and honest peers are served. Fuzz targets
+// (tests/fuzz/play) do the same with bytes that the fuzzer finds.
 #include "tests/support/play/play.h"
 
 #include <gtest/gtest.h>
@@ -15,9 +15,9 @@ namespace {
 
 constexpr size_t kBytes = 3000;
 
-// reaches: what some of the plays must have come to.
+// reaches: states that some of the plays must reach.
 void expect_no_complaint(Play play, uint64_t seeds, const std::vector<std::string>& reaches) {
-  // More of them, for people who look for mistakes.
+  // People who look for mistakes may ask for more seeds.
   if (const char* more = std::getenv("TELESPLAT_PLAYS")) seeds = std::strtoull(more, nullptr, 10);
   Reached reached;
   for (uint64_t seed = 1; seed <= seeds; ++seed) {

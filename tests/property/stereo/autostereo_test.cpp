@@ -1,5 +1,5 @@
-// The map from subpixels to eyes, against rays that are traced the other way: from an eye, through a slit or a lens,
-// into the plate, onto a subpixel.
+// The map from subpixels to eyes, against rays traced the other way: from an eye, through a slit or a lens, into the
+// plate, onto a subpixel.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace telesplat::stereo {
 namespace {
 
-// By how many lines interpolation between places may be off.
+// Lines that interpolation between places may be off.
 constexpr double kInterpolated = 0.004;
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
@@ -42,8 +42,8 @@ Eyes any_eyes(std::mt19937& rng) {
   return {middle - half, middle + half};
 }
 
-// A ray from the eye through a point of the plane of the lines, refracted where it enters the plate there and where it
-// leaves it towards the pixels; where it arrives. The plate comes first here: the model has it last, with equal result.
+// Traces a ray from the eye through a point of the lines' plane, refracted where it enters the plate there and where it
+// leaves; returns its place among the pixels. Here the plate comes first: the model has it last, with equal result.
 glm::dvec2 arrive(const LineScreen& l, const glm::dvec3& eye, const glm::dvec2& slit) {
   const double lines_z = l.gap_m + l.thickness_m;
   const glm::dvec2 aside = slit - glm::dvec2(eye);
@@ -56,7 +56,7 @@ glm::dvec2 arrive(const LineScreen& l, const glm::dvec3& eye, const glm::dvec2& 
 // The subpixel in which a place lies.
 struct Hit {
   int x = 0, y = 0, subpixel = 0;
-  double edge = 0;  // of its width: how far the place is from its middle
+  double edge = 0;  // distance of the place from the subpixel's middle, in its widths
 };
 std::optional<Hit> subpixel_at(const Panel& p, const glm::dvec2& place) {
   const double column = 3 * (place.x / p.pixel_m + 0.5 * p.width), row = 0.5 * p.height - place.y / p.pixel_m;
@@ -74,7 +74,7 @@ Shown shown_at(Interleaver& interleaver, const Eyes& eyes, const Hit& h) {
   return l ? Shown::kLeft : r ? Shown::kRight : Shown::kNothing;
 }
 
-// A point of a random line's slit, `off` lines from its middle.
+// Returns a point of a random line's slit, `off` lines from its middle.
 glm::dvec2 in_slit(std::mt19937& rng, const Panel& p, double off) {
   const double tilt = p.lines.tilt_deg * kDegree, half = 0.45 * p.width_m();
   const double line = std::nearbyint(uniform(rng, -half, half) / p.lines.pitch_m) + off;
@@ -82,8 +82,8 @@ glm::dvec2 in_slit(std::mt19937& rng, const Panel& p, double off) {
   return across * glm::dvec2(std::cos(tilt), std::sin(tilt)) + along * glm::dvec2(-std::sin(tilt), std::cos(tilt));
 }
 
-// How far from the middle of a line the eye's sight of a place is: by bisection along the lines' normal, with rays that
-// go from the eye to the place.
+// Returns the distance from a line's middle to the point where the eye sees a place, in lines: by bisection along the
+// lines' normal, with rays from the eye to the place.
 double off_line_by_rays(const Panel& p, const glm::dvec3& eye, const glm::dvec2& place) {
   glm::dvec2 guess = place;
   for (int i = 0; i < 60; ++i) guess += place - arrive(p.lines, eye, guess);
@@ -105,7 +105,7 @@ TEST(Autostereo, NoSubpixelThatOneEyeSeesAloneIsTheOthers) {
       const double off = uniform(rng, -0.5, 0.5) * p.lines.opening;
       const auto hit = subpixel_at(p, arrive(p.lines, eyes[eye], in_slit(rng, p, off)));
       if (!hit) continue;
-      // The map looks at the subpixel's middle: so does the test.
+      // The map uses the subpixel's middle: so does the test.
       const glm::dvec2 middle = place_of(p, hit->x, hit->y, hit->subpixel);
       const double own = off_line_by_rays(p, eyes[eye], middle), other = off_line_by_rays(p, eyes[1 - eye], middle);
       const Shown shown = shown_at(interleaver, eyes, *hit), mine = eye == 0 ? Shown::kLeft : Shown::kRight;
@@ -144,7 +144,7 @@ TEST(Autostereo, EveryShownSubpixelBelongsToTheEyeThatIsNearerToALine) {
   }
 }
 
-// Refraction in straight lines: what the map takes for a ray is one.
+// Sight through the plate is refracted by Snell's law, and the map's ray is such a line.
 TEST(Autostereo, SightIsRefractedAsSnellSays) {
   std::mt19937 rng(13);
   for (int i = 0; i < 2000; ++i) {
@@ -156,8 +156,8 @@ TEST(Autostereo, SightIsRefractedAsSnellSays) {
   }
 }
 
-// A sheet of cylindrical lenses whose focal plane are the pixels. All rays from an eye that meet one lens arrive where
-// the ray through its middle does, across the lens; along it they pass as through a plate. So an eye sees in each lens
+// A sheet of cylindrical lenses, with the pixels in their focal plane. All rays from an eye that meet one lens arrive
+// across it where the ray through its middle does; along it they pass as through a plate. So an eye sees in each lens
 // one stripe of places, as in the slit of a barrier, and the same map finds it.
 TEST(Autostereo, SlantedLensesWorkByTheSameMap) {
   std::mt19937 rng(14);
@@ -173,7 +173,7 @@ TEST(Autostereo, SlantedLensesWorkByTheSameMap) {
     const glm::dvec2 across(std::cos(tilt), std::sin(tilt));
     for (int ray = 0; ray < 60; ++ray) {
       const size_t eye = rng() % 2;
-      // Where it meets the lens: anywhere in it.
+      // The ray may meet the lens at any place.
       const double off = uniform(rng, -0.5, 0.5);
       const glm::dvec2 entry = in_slit(rng, p, off), middle = entry - across * (off * p.lines.pitch_m);
       const glm::dvec2 plain = arrive(p.lines, eyes[eye], entry), chief = arrive(p.lines, eyes[eye], middle);
@@ -182,7 +182,7 @@ TEST(Autostereo, SlantedLensesWorkByTheSameMap) {
       if (!hit) continue;
       const Shown shown = shown_at(interleaver, eyes, *hit);
       const glm::dvec2 at = place_of(p, hit->x, hit->y, hit->subpixel);
-      // Places that both eyes see in the middle of a lens can be shared by nobody.
+      // A place that both eyes see in the middle of a lens cannot be shared out.
       const double other = off_line_by_rays(p, eyes[1 - eye], at);
       const double subpixel = p.pixel_m / 3 / p.lines.pitch_m;  // in lines
       if (other < p.lines.guard + 2 * subpixel) continue;

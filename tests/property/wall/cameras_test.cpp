@@ -1,4 +1,4 @@
-// What the screens of a wall show together: random walls, heads and points.
+// Screens of a wall show one picture together: random walls, heads and points.
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
@@ -22,7 +22,7 @@ struct Random {
   }
 };
 
-// Of its pixel coordinates in the camera; nothing: it is behind.
+// Returns a point's pixel in the camera; nothing: it is behind.
 std::optional<glm::dvec2> pixel_of(const geometry::Camera& camera, const glm::dvec3& point) {
   const auto t = camera.room_to_pixel();
   const glm::dvec4 p(point, 1);
@@ -44,7 +44,7 @@ std::string plane(int columns, int rows, double width, double height, int across
       columns, rows, width, height, across, down);
 }
 
-// The same four corners, and so the same ray through each pixel.
+// Four corners are the same, and so is the ray through each pixel.
 TEST(WallCameras, APlaneOfFourIsOneLargeScreen) {
   Random random{std::mt19937_64(1)};
   for (const char* anchor : {"room", "head"}) {
@@ -70,12 +70,12 @@ TEST(WallCameras, APlaneOfFourIsOneLargeScreen) {
   }
 }
 
-// Where screens overlap, and where they meet, a point of the room is seen at one place of the wall, whichever shows it.
+// Where screens overlap or meet, any of them shows a point of the room at the same place of the wall.
 TEST(WallCameras, APointIsSeenAtOnePlaceOfTheWall) {
   Random random{std::mt19937_64(2)};
   int seen = 0;
   for (int n = 0; n < 300; ++n) {
-    // Two screens of one plane, shifted, of other sizes and pixels; a wall anywhere in the room.
+    // Two screens of one plane, shifted, with different sizes and pixels; a wall anywhere in the room.
     const double dx = random.in(-0.3, 0.3), dy = random.in(-0.2, 0.2);
     const std::string text = fmt::format(
         "[wall]\nposition = [{}, {}, {}]\nturn = [{}, {}, {}]\n[head]\nposition = [0, 0, 0.8]\n"
@@ -86,7 +86,7 @@ TEST(WallCameras, APointIsSeenAtOnePlaceOfTheWall) {
     const Wall wall = parsed(text);
     const glm::dvec3 eye =
         wall.in_room.position_room + wall.in_room.orientation * (random.point(0.4) + glm::dvec3(0, 0, 0.9));
-    const geometry::Pose head{eye, random.turn()};  // where it looks changes nothing
+    const geometry::Pose head{eye, random.turn()};  // its direction changes nothing
     for (int k = 0; k < 20; ++k) {
       const glm::dvec3 point = wall.in_room.position_room + wall.in_room.orientation * random.point(1);
       glm::dvec3 places[2];
@@ -138,7 +138,7 @@ TEST(WallCameras, NeighboursOfAnArcMeetAtTheirEdge) {
   }
 }
 
-// A head that the wall goes with sees all of it as if it were one display before its eyes, wherever it is.
+// A wall that moves with the head shows the same as one display before the eyes, at any place of the head.
 TEST(WallCameras, AWallThatTheHeadTakesAlongTurnsWithIt) {
   Random random{std::mt19937_64(4)};
   const Wall wall = parsed("[wall]\nanchor = \"head\"\n" + plane(2, 1, 0.5, 0.3, 100, 60));
@@ -153,7 +153,7 @@ TEST(WallCameras, AWallThatTheHeadTakesAlongTurnsWithIt) {
   }
 }
 
-// Heads that walk through a screen, or far beside it, still have a camera that everyone takes.
+// Heads that walk through a screen, or far beside it, still have a valid camera.
 TEST(WallCameras, AreValidWhereverTheHeadGoes) {
   Random random{std::mt19937_64(5)};
   const Wall wall = parsed(plane(2, 2, 0.5, 0.3, 200, 120));

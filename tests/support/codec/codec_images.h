@@ -1,4 +1,4 @@
-// Depth images of all kinds, for properties of the codec, and what bounds of error leave of some.
+// Depth images of all kinds, for properties of the codec, and bounded versions of some.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,15 @@
 
 namespace telesplat::test {
 
-/// One image of each kind there is, small enough to try many: planes, terrains, noise; full, of all densities,
-/// outlines, bands, patterns.
+/// Returns one image of each kind, small enough to try many: planes, terrains, noise; full, of all densities, outlines,
+/// bands, patterns.
 std::vector<image::DepthImage> codec_images(uint32_t seed);
 
 struct RefinedImage {
   image::DepthImage exact, bounded;
 };
 
-/// The same at all times: full, with holes, sparse, narrow, of several tiles; bounds of all kinds.
+/// Always the same images: full, with holes, sparse, narrow, of several tiles; bounds of all kinds.
 inline std::vector<RefinedImage> refined_images() {
   using codec::ErrorBounds;
   std::vector<RefinedImage> all;

@@ -20,7 +20,7 @@
 
 namespace telesplat::data::test {
 
-/// A folder that goes away with the object.
+/// A temporary folder; the destructor deletes it.
 class TempFolder {
  public:
   TempFolder() {
@@ -81,7 +81,7 @@ inline std::string ply_of(const Mesh& mesh) {
   return out;
 }
 
-/// Options for a test: no cache, data axes kept unless told otherwise.
+/// Options for a test: no cache, and the data's own axes.
 inline MeshOptions plain_options(const std::string& up = "y") {
   MeshOptions options;
   options.up = up;
@@ -89,7 +89,7 @@ inline MeshOptions plain_options(const std::string& up = "y") {
   return options;
 }
 
-/// Everything a store holds, triangle by triangle.
+/// Triangles of a store.
 struct Corner {
   glm::vec3 position, normal;
   uint32_t colour;

@@ -1,4 +1,4 @@
-// A folder for the files of a test program. Test programs run side by side, so no two may share names.
+// A folder for the files of a test program. Test programs run at the same time, so no two may share names.
 #pragma once
 
 #include <cstdlib>
@@ -7,7 +7,7 @@
 
 namespace telesplat::tests {
 
-/// Path, with a slash at its end, of a folder that this process alone uses; it goes when the process ends.
+/// Returns the path, with a slash at its end, of a folder of this process; the end of the process deletes it.
 inline const std::string& own_folder() {
   struct Folder {
     Folder() : path((std::filesystem::temp_directory_path() / "telesplat-test-XXXXXX").string()) {

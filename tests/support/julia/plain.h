@@ -1,5 +1,5 @@
-// The scalar oracle of the Julia kernels: one ray after the other, the same operations in the same order. Read this one
-// first.
+// The scalar oracle of the Julia kernels: one ray after the other, the same operations in the same order. Read this
+// file first.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ inline Vec4 along(const float* origin, const Vec4& d, float t) {
   for (int i = 0; i < 4; ++i) q.v[i] = origin[i] + t * d.v[i];
   return q;
 }
-// What a step of `length` set units in the room-space direction n gains in orbit coordinates.
+// Change of orbit coordinates for a step of n, set units, in room space.
 inline Vec4 orbit_vector(const Constants& k, const float* n) {
   Vec4 d;
   for (int i = 0; i < 4; ++i) d.v[i] = (n[0] * k.axes[0][i] + n[1] * k.axes[1][i]) + n[2] * k.axes[2][i];
@@ -57,7 +57,7 @@ inline float estimate(const Constants& k, const Vec4& q) {
 inline float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
 
 // Depths between which a line lies in the ball |q| <= radius, in the box and inside the clip's planes, all grown by
-// `margin`; none if t1 < t0.
+// `margin`; t1 < t0: it misses them.
 struct Interval {
   float t0, t1;
 };
@@ -89,7 +89,7 @@ inline float speed_of(const float* d) {
   return 0.5f * std::sqrt((d[0] * d[0] + d[1] * d[1]) + (d[2] * d[2] + d[3] * d[3]));
 }
 
-// Depth up to which the rays of a block are free, kNothing if they meet nothing.
+// Depth up to which the rays of a block are free; kNothing if they meet nothing.
 inline float cone_start(const Constants& k, const JuliaRays& rays, int block_x, int block_y) {
   float d[7];
   for (int i = 0; i < 7; ++i) d[i] = rays.block_column[i][block_x] + rays.block_row[i][block_y];
@@ -106,8 +106,8 @@ inline float cone_start(const Constants& k, const JuliaRays& rays, int block_x, 
   return t;
 }
 
-// Depths about the surface and what the estimate exceeds the threshold by there: g0 > 0 >= g1, or t0 = t1 where a ray
-// begins below it.
+// Depths before and behind the surface, and the estimate minus the threshold there: g0 > 0 >= g1, or t0 = t1 if a ray
+// begins below the surface.
 struct Bracket {
   float t0, g0, t1, g1;
 };
@@ -131,7 +131,7 @@ inline bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Inte
     // r + r' = step, r' = r + slope * step.
     const float slope = gone > 0 ? (r - last_r) / gone : -1.0f;
     const float ratio = std::max(kRelax / (1.0f - std::min(std::max(slope, -1.0f), kMaxSlope)), 1.0f);
-    // Close by, the surface may come within the threshold for less than a step: go carefully.
+    // Close by, the surface may stay within the threshold for less than a step: take short steps.
     const float most = r < kNear * (threshold * t) ? kNearRatio : ratio;
     last_t = t, last_r = r;
     t = std::min(t + r * std::min(ratio, most), range.t1);
@@ -139,7 +139,7 @@ inline bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Inte
   return false;
 }
 
-// Regula falsi, the Illinois way: an end that stays has its value halved.
+// Regula falsi by the Illinois rule: an end that stays has its value halved.
 inline float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Bracket b) {
   const float inverse = 1.0f / speed_of(d.v), threshold = (k.lod * rays.footprint) * inverse;
   const auto secant = [&] { return b.t0 + (b.t1 - b.t0) * (b.g0 / std::max(b.g0 - b.g1, kTiny)); };
@@ -154,15 +154,15 @@ inline float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Br
   return secant();
 }
 
-// The orbit of a surface point with its derivatives along X, Y, Z: half the gradient of N where it escaped (0 where it
-// did not), and the square of the least length that the colour asks for.
+// The orbit of a surface point with its derivatives along X, Y, Z: half the gradient of N at its escape (0 if it does
+// not escape), and the least square of the length that the colour uses.
 struct Orbit {
   float gradient[3], trap;
 };
 inline Orbit follow(const Constants& k, const Vec4& q) {
   const float r0 = q.v[2] * q.v[2] + q.v[3] * q.v[3];
   const float across = k.plane[1] * q.v[2] + k.plane[2] * q.v[3];
-  float w = q.v[0], p = q.v[1], s = 1;  // s: what r1 and r2 have been multiplied by
+  float w = q.v[0], p = q.v[1], s = 1;  // s: factor by which r1 and r2 have been multiplied
   float dw[3], dp[3], ds[3] = {0, 0, 0}, dr0[3];
   for (int i = 0; i < 3; ++i)
     dw[i] = k.axes[i][0], dp[i] = k.axes[i][1], dr0[i] = q.v[2] * k.axes[i][2] + q.v[3] * k.axes[i][3];
@@ -191,7 +191,7 @@ inline Orbit follow(const Constants& k, const Vec4& q) {
   return out;
 }
 
-// To unit length; false if it has none or is not finite.
+// Scales to unit length; false if n is zero or not finite.
 inline bool normalise(float* n) {
   const float most = std::max(std::max(std::abs(n[0]), std::abs(n[1])), std::abs(n[2]));
   for (int i = 0; i < 3; ++i)
@@ -203,18 +203,18 @@ inline bool normalise(float* n) {
   return true;
 }
 
-// A rim is where a surface turns away within a pixel: the surface is rounded by its threshold, which is less than a
-// pixel. One ray meets it anywhere between facing and edge-on, so rims would be dotted with dark pixels. A steep normal
-// becomes the mean of itself and the one half a pixel further in, away from the rim. Where nothing is there, as of a
-// thread thinner than a pixel, the direction towards the viewer stands for it. Flat surfaces keep their normals,
-// however steep. back: towards the viewer, unit length; reach: a pixel there, in set units.
+// At a rim a surface turns away within a pixel: the surface is rounded by its threshold, which is less than a pixel.
+// One ray meets it anywhere between facing and edge-on, so rims would be dotted with dark pixels. A steep normal
+// becomes the mean of itself and the one half a pixel further in, away from the rim. If nothing is there, as in a
+// thread thinner than a pixel, the direction towards the viewer replaces it. Flat surfaces keep their normals at any
+// steepness. back: towards the viewer, unit length; reach: a pixel there, in set units.
 inline void widen(const Constants& k, const Vec4& q, float reach, const float* back, float* n) {
   const float lean = dot(n, back), in = kInward * reach;
   if (!(lean < kSteep)) return;
   float side[3];
   for (int i = 0; i < 3; ++i) side[i] = n[i] - back[i] * lean;
   normalise(side);
-  // From before the surface on, as far as a flat one rises on the way in, and as much more.
+  // Starts before the surface: by the rise of a flat one on the way in, and as much more.
   const float slope = std::sqrt(std::max(1.0f - lean * lean, 0.0f)) / std::max(lean, kLeastLean);
   const Vec4 towards = orbit_vector(k, back), base = along(q.v, orbit_vector(k, side), -in);
   float ahead = in * (std::min(slope, kInwardSlope) + 1.0f), off = 0;
@@ -228,8 +228,8 @@ inline void widen(const Constants& k, const Vec4& q, float reach, const float* b
   normalise(n);
 }
 
-// The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the
-// viewer. What still faces away, at a silhouette, is turned until it just does not.
+// Returns the gradient if it is good; else the estimate's differences over a footprint; else the direction towards the
+// viewer. A normal that still faces away, at a silhouette, is turned until it just does not.
 inline void normal_at(const Constants& k, const Vec4& q, const float* gradient, float reach, const float* ray,
                       float* n) {
   float back[3] = {-ray[0], -ray[1], -ray[2]};
@@ -251,7 +251,7 @@ inline void normal_at(const Constants& k, const Vec4& q, const float* gradient, 
   widen(k, q, reach, back, n);
 }
 
-// Set units from a point of the room to where a line leaves what the clip keeps: what is cut away darkens nothing.
+// Set units from a point of the room to where a line leaves the part that the clip keeps: removed parts darken nothing.
 inline float exit_of(const Constants& k, const float* room, const float* towards) {
   float out = kNothing;
   for (int i = 0; i < k.planes; ++i) {

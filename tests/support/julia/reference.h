@@ -1,5 +1,5 @@
-// Where a ray meets a quaternion Julia set, slowly and in double precision: plain quaternions, short steps, bisection.
-// The same definition of the surface as the sampler's, none of its shortcuts.
+// Finds where a ray meets a quaternion Julia set, slowly and in double precision: plain quaternions, short steps,
+// bisection. It has the same definition of the surface as the sampler, and none of its shortcuts.
 #pragma once
 
 #include <cmath>
@@ -30,14 +30,14 @@ class JuliaReference {
     return 0;
   }
 
-  /// By how much the estimate at depth t of a ray exceeds the threshold there, in set units. footprint_m: of the pixel,
-  /// metres a metre.
+  /// Returns the estimate at depth t of a ray minus the threshold there, in set units. footprint_m: the pixel's, metres
+  /// a metre.
   double excess(const glm::dvec3& origin, const glm::dvec3& direction, double t, double footprint_m) const {
     return estimate(origin + t * direction) - parameters_.lod * footprint_m * t / placement_.scale;
   }
 
-  /// Depth of the first point of the ray, in the box and beyond `near_m`, at which the excess is not positive.
-  /// direction: a unit of depth long.
+  /// Returns the depth of the first point of the ray, in the box and beyond `near_m`, where the excess is not positive.
+  /// direction: for one unit of depth.
   std::optional<double> meet(const glm::dvec3& origin, const glm::dvec3& direction, double footprint_m,
                              double near_m) const {
     double enter = near_m, leave = 1e30;
@@ -48,7 +48,7 @@ class JuliaReference {
     }
     const double units = glm::length(direction) / placement_.scale,
                  threshold = parameters_.lod * footprint_m / placement_.scale;
-    // A quarter of what is free at most, but no less than a twentieth of the threshold, so that grazing rays come to an
+    // Steps a quarter of the free distance at most, but no less than a twentieth of the threshold, so that grazing rays
     // end.
     double before = enter;
     for (double t = enter; t <= leave;) {

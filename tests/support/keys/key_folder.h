@@ -1,4 +1,4 @@
-// A folder of keys that goes with the test.
+// A folder of keys that the destructor deletes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -34,10 +34,10 @@ class KeyFolder {
     return *std::move(opened);
   }
 
-  /// Of a process that binds, and connects by the key of `role`.
+  /// Access of a process that binds, and connects by the key of `role`.
   net::Access server(net::Role role = net::Role::kPacker) const { return access({role}, true); }
   net::Access of(net::Role role) const { return access({role}, false); }
-  /// By the key of this name.
+  /// Access by the key of this name.
   net::Access named(const std::string& name) const {
     auto keys = net::read_keys(path_, {}, false);
     EXPECT_TRUE(keys.ok());

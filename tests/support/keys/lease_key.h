@@ -1,4 +1,4 @@
-// The key with which masters of tests seal their leases.
+// The key that masters of tests seal their leases with.
 #pragma once
 
 #include "common/wire/lease_seal.h"
@@ -10,7 +10,7 @@ inline const std::vector<uint32_t>& lease_key() {
   return key;
 }
 
-/// As `master` leases it to `sampler`.
+/// Seals a lease as `master` does for `sampler`.
 template <class L>
 void seal_lease(L& lease, InstanceId sampler, InstanceId master = {1}) {
   lease.master = master;

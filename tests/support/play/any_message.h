@@ -1,5 +1,5 @@
-// Messages of any kind, out of bytes: fields have values that others know, or strange ones. What comes out has gone
-// through encoder and decoder, as if it had come over a socket: it is valid.
+// Makes messages of any kind from bytes: fields have known values, or strange ones. The result has gone through encoder
+// and decoder, as if it had come over a socket: it is valid.
 #pragma once
 
 #include <array>
@@ -17,14 +17,14 @@
 
 namespace telesplat::test {
 
-/// A message as it is received. Its bulk fields point into `body`.
+/// A received message. Its bulk fields point into `body`.
 template <class M>
 struct Arrived {
   M message;
   std::shared_ptr<const std::string> body;
 };
 
-/// As it is received; nothing: it is refused on the way.
+/// Encodes and decodes a message; nothing: the decoder refuses it.
 template <class M>
 std::optional<Arrived<M>> over_the_wire(const M& m) {
   auto body = std::make_shared<const std::string>(wire::encode(m));
@@ -33,7 +33,7 @@ std::optional<Arrived<M>> over_the_wire(const M& m) {
   return Arrived<M>{*std::move(decoded), std::move(body)};
 }
 
-/// What fields are filled with, besides strange numbers. Lists may be empty.
+/// Values for fields, beside strange numbers. Lists may be empty.
 struct Values {
   uint64_t ids = 6;  ///< small ones: 0 .. ids
   std::vector<uint64_t> other_ids;
@@ -42,7 +42,7 @@ struct Values {
   std::vector<wire::Bytes> bulk;
   std::vector<std::string> texts;
   std::vector<std::string> keys;
-  std::vector<std::pair<std::string_view, std::vector<std::string>>> texts_of;  ///< of fields with this name
+  std::vector<std::pair<std::string_view, std::vector<std::string>>> texts_of;  ///< values for fields of this name
 };
 
 /// Fills messages field by field.
@@ -50,7 +50,7 @@ class AnyMessage {
  public:
   AnyMessage(Dice& dice, const Values& values) : dice_(dice), values_(values) {}
 
-  /// Nothing: it is none that passes the decoder.
+  /// Makes a message; nothing: the decoder refuses it.
   template <class M>
   std::optional<Arrived<M>> make() {
     M m;
@@ -67,10 +67,8 @@ class AnyMessage {
   void operator()(const char*, double& v, size_t = 0) { v = real(); }
   void operator()(const char* name, std::string& v, size_t = 0) { v = text(name); }
   template <class E>
-    requires std::is_enum_v<E>
-  void operator()(const char*, E& v, uint64_t values) {
-    v = E(dice_.below(values));
-  }
+  requires std::is_enum_v<E>
+  void operator()(const char*, E& v, uint64_t values) { v = E(dice_.below(values)); }
   template <class Tag>
   void operator()(const char*, Id<Tag>& v, size_t = 0) {
     v.value = id();

@@ -1,4 +1,4 @@
-// Decisions out of bytes: a fuzzer's, or those of a seed. When the bytes are over every decision is the first.
+// Makes decisions from bytes: a fuzzer's, or a seed's. After the last byte every decision is the first choice.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ class Dice {
 
   bool over() const { return at_ >= bytes_.size(); }
   uint8_t byte() { return over() ? 0 : bytes_[at_++]; }
-  /// 0 .. most - 1. Precondition: most >= 1.
+  /// Returns 0 .. most - 1. Precondition: most >= 1.
   uint64_t below(uint64_t most) {
     uint64_t v = byte();
     if (most > 256) v = v << 8 | byte();
@@ -32,7 +32,7 @@ class Dice {
   size_t at_ = 0;
 };
 
-/// The bytes of a seed.
+/// Returns the bytes of a seed.
 inline std::vector<uint8_t> bytes_of_seed(uint64_t seed, size_t count) {
   std::mt19937_64 random(seed);
   std::vector<uint8_t> out(count);

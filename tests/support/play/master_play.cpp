@@ -18,7 +18,7 @@ using master::MasterCore;
 
 constexpr size_t kPeers = 8;
 constexpr size_t kMostSteps = 400;
-// Of what one message may lead to: welcomes for all, leases of all frames in flight.
+// Limits of the messages that one message may cause: welcomes for all, leases of all frames in flight.
 constexpr size_t kMostMessages = 2000, kMostBytes = 64u << 20;
 
 const std::array<std::string, kPeers> kPeerIds{"a", "b", "c", "d", "e", "f", "g", "h"};
@@ -92,7 +92,7 @@ class MasterPlay {
   explicit MasterPlay(std::span<const uint8_t> bytes) : dice_(bytes), any_(dice_, values()) {}
 
   Complaint run() {
-    // Most plays begin with a session that is under way.
+    // Most plays begin in a running session.
     if (dice_.chance(85)) {
       const uint64_t kind = dice_.below(kKinds.size());
       for (const std::string& peer : kPeerIds) on(peer, hello(peer, role_of(peer), kind));
@@ -106,7 +106,7 @@ class MasterPlay {
       act();
       if (!look_at_what_goes_out()) return complaint_;
     }
-    // Whatever they said: figures can be had.
+    // After any messages the master's figures can be read.
     record_->summary(core_.processes(), core_.counters());
     reached_["frames completed"] += core_.figures().frames_completed;
     core_.live_snapshot();
@@ -201,7 +201,7 @@ class MasterPlay {
   void on(const std::string& peer, const M& m) {
     if constexpr (std::is_same_v<M, wire::Hello>)
       if (m.role == "sampler") said_sampler_.insert(peer);
-    // Who says too much is not heard, as the service does it.
+    // A peer that sends too much is not heard, as in the service.
     if (core_.admit(peer, now_s_))
       (void)core_.on(peer, m, now_s_);
     else
@@ -212,7 +212,7 @@ class MasterPlay {
     return {dice_.chance(95) ? 1 + uint64_t(peer[0] - 'a') : dice_.below(12)};
   }
 
-  // As an honest process says it. salt: which of the roles' variants.
+  // The message of an honest process. salt: chooses among the role's variants.
   static const std::string& role_of(const std::string& peer) {
     // data, packer, two samplers, two viewers, ctl, another data server
     constexpr std::array<size_t, kPeers> kRoleOf{0, 2, 1, 1, 3, 3, 4, 0};
@@ -301,7 +301,7 @@ class MasterPlay {
     core_.tick(now_s_);
   }
 
-  // Keeps what there is to answer. False: there is something to complain about.
+  // Keeps outgoing messages that peers may answer. False: one of them is wrong.
   bool look_at_what_goes_out() {
     size_t bytes = 0;
     auto outgoing = core_.take_outgoing();
@@ -356,7 +356,7 @@ class MasterPlay {
     if (list.size() > 16) list.pop_front();
   }
 
-  // They fall silent and are forgotten. A mesh, a packer, a sampler and a viewer come, and the viewer gets its view.
+  // All peers fall silent and are forgotten. Then honest processes join, and the viewer gets its view.
   Complaint after_them() {
     if (core_.stop_requested()) return std::nullopt;
     for (int i = 0; i < 200; ++i) core_.tick(now_s_ += 0.1);
@@ -371,7 +371,7 @@ class MasterPlay {
     }
     for (int round = 0; round < 300; ++round) {
       core_.tick(now_s_ += 0.05);
-      // What was commanded before may still cut the scene, or play it.
+      // An earlier command may still clip the scene, or play it.
       on("sampler", wire::LeaseRequest{{1003}});
       if (round % 10 == 0) {
         for (const char* role : {"data", "packer", "sampler", "viewer"}) on(role, wire::StatusReport{});

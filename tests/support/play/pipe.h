@@ -1,4 +1,4 @@
-// A way into those who read from a socket, without a network.
+// Feeds code that reads from a socket, without a network.
 #pragma once
 
 #include <fmt/format.h>
@@ -7,7 +7,7 @@
 
 namespace telesplat::test {
 
-/// What is sent into `in` can be received from `out` at once, in the same thread.
+/// A message sent into `in` can be received from `out` at once, in the same thread.
 struct Pipe {
   explicit Pipe(net::Context& context)
       : in(context, net::Kind::kPush, "play"),
@@ -16,7 +16,7 @@ struct Pipe {
     const std::string endpoint = fmt::format("inproc://play-{}", ++number);
     CHECK(out.bind(endpoint).ok() && in.connect(endpoint).ok());
   }
-  /// Nothing of an earlier play is left in it.
+  /// Removes messages of an earlier play.
   void empty() {
     while (out.receive()) {
     }

@@ -1,5 +1,5 @@
-// Plays: bytes choose what happens to a part of the pipeline, message by message. Everyone may say anything that its
-// messages can say; nobody can do harm. Fuzz targets play what a fuzzer thinks of, property tests what seeds say.
+// Plays: bytes choose the messages to a part of the pipeline, one by one. Any peer may send anything that its messages
+// can express; none can do harm. Fuzz targets play a fuzzer's bytes, property tests those of seeds.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,22 @@
 
 namespace telesplat::test {
 
-/// What is wrong; nothing: all is well.
+/// Describes a fault; nothing: all is well.
 using Complaint = std::optional<std::string>;
 
-/// How often a play came to something, by name: so tests see that plays reach what they are about.
+/// Name of a state -> how often a play reached it: tests check that plays reach what they are about.
 using Reached = std::map<std::string, uint64_t>;
 
 /// A play. Its figures are added to `reached`, if there is one.
 using Play = Complaint (*)(std::span<const uint8_t> bytes, Reached* reached);
 
-/// Valid messages of anyone at the master, also those that nobody sends who is well. Whatever they were, what the
-/// master sends can be decoded, its messages are bounded, nobody gets a lease but samplers, and when those who played
-/// have gone, a session of honest processes gets its view.
+/// Sends the master valid messages of any peer, also ones that no healthy peer sends. After any of them, the master's
+/// messages can be decoded and are bounded, only samplers get leases, and when these peers have gone, a session of
+/// honest processes gets its view.
 Complaint play_master(std::span<const uint8_t> bytes, Reached* reached = nullptr);
 
-/// Events of several packers at a viewer, out of order, doubled, lost and made up. In the end one packer is there, and
-/// the replica has its digest.
+/// Sends a viewer events of several packers, out of order, doubled, lost and made up. At the end one packer is there,
+/// and the replica has its digest.
 Complaint play_receiver(std::span<const uint8_t> bytes, Reached* reached = nullptr);
 
 }  // namespace telesplat::test

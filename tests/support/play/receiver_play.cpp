@@ -14,13 +14,13 @@ constexpr size_t kMostMessages = 400;
 constexpr InstanceId kViewer{5}, kHonest{999};
 constexpr int kPlayWidth = 48, kPlayHeight = 32;
 
-// A few tiles as packers publish them.
+// Some tiles as packers publish them.
 struct Tiles {
   struct Tile {
     geometry::Camera camera;
     geometry::Rect rect;
     std::vector<uint8_t> stream;
-    std::vector<uint8_t> bounded, refinement;  // the same with errors, and what makes it exact
+    std::vector<uint8_t> bounded, refinement;  // the image with errors, and the refinement that makes it exact
   };
   std::vector<Tile> all;
   Tiles() {
@@ -130,7 +130,7 @@ class ReceiverPlay {
     }
     send(over_the_wire(p));
   }
-  // Most often of the patch that may be refined, and with what belongs to it.
+  // Refines mostly the patch that may be refined, with the data that belong to it.
   void refine() {
     wire::Refine r{packer_, {sequence()}, epoch(), dice_.chance(80) ? refinable_.first : Sequence{sequence_}, {}};
     const auto& tile = refinable_.second && dice_.chance(80) ? *refinable_.second : dice_.pick(tiles().all);
@@ -147,7 +147,7 @@ class ReceiverPlay {
       viewer_.take_answer(M::kName, *m->body);
   }
 
-  // One packer is there, and publishes from its first event on.
+  // One packer remains, and publishes from its first event on.
   Complaint in_the_end() {
     reached_["points"] += viewer_.figures().points_received;
     reached_["gaps"] += viewer_.figures().gaps;

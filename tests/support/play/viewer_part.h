@@ -1,4 +1,4 @@
-// A viewer's part for points in a play: what reaches it goes through the sockets that it reads from.
+// A viewer's part for points in a play: messages go through the sockets that it reads from.
 #pragma once
 
 #include <memory>
@@ -44,9 +44,9 @@ class ViewerPart {
     free();
   }
   void start() { receiver_.start(); }
-  /// The patience with answers is over.
+  /// Moves the clock past the limit for answers.
   void tick() { receiver_.tick(monotonic_s() + 10); }
-  /// Waits for whole updates from now on, or no longer.
+  /// Starts or ends waiting for whole updates.
   void hold(bool waits) {
     if (waits == holds_) return;
     holds_ = waits;
@@ -55,14 +55,14 @@ class ViewerPart {
     else
       receiver_.release();
   }
-  /// Of the replica; 0: there is none.
+  /// Returns the replica's digest; 0: there is no replica.
   uint64_t digest() const { return cache_.has_replica() ? cache_.digest() : 0; }
   viewer::PointReceiver::Figures figures() const { return receiver_.figures(); }
 
  private:
   void free() {
     cache_.free_dropped();
-    spans_.flush({1});  // they would be many
+    spans_.flush({1});  // spans would add up
   }
 
   Pipes& pipes_;

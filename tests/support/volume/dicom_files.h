@@ -9,21 +9,21 @@
 
 namespace telesplat::data::test {
 
-/// What a frame of a pattern says of itself.
+/// Values that a frame of a pattern states.
 struct EnhancedFrame {
-  int k = 0;  ///< of the pattern
+  int k = 0;  ///< slice of the pattern
   std::string slope = "1", intercept = "0";
   int temporal_position = 0;
 };
 
-/// How frames are written into one file.
+/// Options for writing frames into one file.
 struct Enhanced {
   DicomWriter::Syntax syntax = DicomWriter::Syntax::kExplicit;
-  bool undefined = true;            ///< sequences do not say their lengths
+  bool undefined = true;            ///< sequences have no lengths
   bool groups = true;               ///< frames have functional groups
   std::string offsets = {};         ///< Grid Frame Offset Vector
   std::string syntax_uid = {};      ///< instead of the syntax's
-  std::string claimed_frames = {};  ///< instead of how many there are
+  std::string claimed_frames = {};  ///< instead of the real number
   std::vector<EnhancedFrame> frames = {};
 };
 

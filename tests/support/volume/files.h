@@ -1,5 +1,4 @@
-// Small volume files of every format, written by hand, for tests: what readers make of them must be what was written
-// here.
+// Small volume files of every format, written by hand: tests compare them with the readers' results.
 #pragma once
 
 #include <zlib.h>
@@ -14,7 +13,7 @@
 
 namespace telesplat::data::test {
 
-/// A volume whose voxels all differ: what shall be read.
+/// A volume whose voxels all differ: the expected result of a reader.
 struct Pattern {
   std::array<int, 3> size{5, 4, 3};
   glm::dmat4 index_to_data{1.0};
@@ -37,7 +36,7 @@ struct Pattern {
   }
 };
 
-/// Turned about all axes, with another spacing on each; `mirror`: left-handed.
+/// Turned about all axes, with a different spacing on each; `mirror`: left-handed.
 inline glm::dmat4 turned(bool mirror = false) {
   const double c = std::cos(0.4), s = std::sin(0.4), d = std::cos(0.7), e = std::sin(0.7);
   const glm::dvec3 x(c, s, 0), y(-s * d, c * d, e), z = glm::cross(x, y);
@@ -45,7 +44,7 @@ inline glm::dmat4 turned(bool mirror = false) {
           glm::dvec4(-10, 20, 5, 1)};
 }
 
-/// gzip or, with window_bits 15, zlib.
+/// Packs with gzip or, if window_bits is 15, zlib.
 inline std::string packed(const std::string& content, int window_bits = 31) {
   z_stream stream{};
   EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY), Z_OK);
@@ -87,7 +86,7 @@ inline std::string metaimage_header(const Pattern& p, const std::string& type, c
       p.size[2], type, more);
 }
 
-/// What a NIfTI header says beside the pattern.
+/// Fields of a NIfTI header beside the pattern.
 struct Nifti {
   int version = 1;
   bool big_endian = false, pair = false;
@@ -152,7 +151,7 @@ class DicomWriter {
     out_ += value;
   }
   void put16(uint32_t tag, uint16_t value) { put(tag, "US", raw(value, big())); }
-  /// A sequence of one item of undefined length that holds pixels of its own (an icon): to be skipped.
+  /// Writes a sequence of one item of undefined length with its own pixels (an icon): readers must skip it.
   void put_icon() {
     tag_and_length(0x00880200, "SQ", 0xffffffff);
     out_ += tag(0xfffee000) + raw(uint32_t(0xffffffff), big());
@@ -160,7 +159,7 @@ class DicomWriter {
     put(0x7fe00010, "OW", "\x7f\x7f");
     out_ += tag(0xfffee00d) + raw(uint32_t(0), big()) + tag(0xfffee0dd) + raw(uint32_t(0), big());
   }
-  /// A sequence of items that have their lengths said, or not, as `undefined` is.
+  /// Writes a sequence of items, with their lengths unless `undefined`.
   void put_sequence(uint32_t t, const std::vector<std::string>& items, bool undefined = true) {
     std::string all;
     for (const std::string& item : items) {
@@ -171,7 +170,7 @@ class DicomWriter {
     tag_and_length(t, "SQ", undefined ? 0xffffffff : uint32_t(all.size()));
     out_ += all;
   }
-  /// The elements alone, for an item of a sequence.
+  /// Returns a writer of elements alone, for an item of a sequence.
   static DicomWriter item(Syntax syntax) {
     DicomWriter out(syntax);
     out.out_.clear();
@@ -195,7 +194,7 @@ class DicomWriter {
   std::string out_;
 };
 
-/// How the slices of a pattern are written as DICOM.
+/// Options for writing the slices of a pattern as DICOM.
 struct Dicom {
   DicomWriter::Syntax syntax = DicomWriter::Syntax::kExplicit;
   std::string modality = "MR", series = "1.2.3", slope = "1", intercept = "0", syntax_uid;
@@ -203,7 +202,7 @@ struct Dicom {
   uint16_t bits_stored = 16, representation = 1, components = 1;
   std::string uid, image_type = "ORIGINAL\\PRIMARY\\AXIAL", photometric = "MONOCHROME2";
   bool preamble = true, icon = true;
-  int temporal_position = 0;  ///< 0: not said
+  int temporal_position = 0;  ///< 0: left out
   std::optional<int> padding = {};
   std::optional<glm::dvec3> position = {};  ///< instead of the pattern's
 };
@@ -237,7 +236,7 @@ inline std::string dicom_slice(const Pattern& p, int k, const Dicom& d) {
   w.put(0x00281053, "DS", d.slope);
   if (d.icon) w.put_icon();
   std::string pixels;
-  const uint16_t mask = uint16_t((1u << d.bits_stored) - 1);  // what lies above are another's bits
+  const uint16_t mask = uint16_t((1u << d.bits_stored) - 1);  // readers must ignore the bits above
   for (int j = 0; j < p.size[1]; ++j)
     for (int i = 0; i < p.size[0]; ++i)
       pixels += raw(uint16_t((uint16_t(int16_t(p.value(i, j, k))) & mask) | (0xa5a5 & ~mask)),
@@ -246,7 +245,7 @@ inline std::string dicom_slice(const Pattern& p, int k, const Dicom& d) {
   return d.preamble ? w.content() : w.content().substr(w.content().find("\x08", 132, 1));
 }
 
-/// Reads what lies at `path`, or fails the test.
+/// Reads the volume at `path`, or fails the test.
 inline Volume read_or_fail(const std::string& path, const std::string& raw = "", size_t step = 0) {
   const auto source = find_volume(path, {.raw = raw});
   EXPECT_TRUE(source.ok()) << (source ? "" : source.error().text);
@@ -256,8 +255,7 @@ inline Volume read_or_fail(const std::string& path, const std::string& raw = "",
   return volume ? std::move(*volume) : Volume{};
 }
 
-/// Every voxel of the pattern is found where it lies in data space, whatever order the reader chose; values to
-/// `tolerance`.
+/// Expects every voxel of the pattern at its place in data space, for any order of the reader; values to `tolerance`.
 inline void expect_same(const Volume& volume, const Pattern& p, double scale = 1, double offset = 0,
                         double tolerance = 0) {
   ASSERT_EQ(volume.size, p.size);

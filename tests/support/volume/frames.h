@@ -1,4 +1,4 @@
-// Frames of slice images for tests of the warp: made up, but planned as real ones are.
+// Frames of slice images for tests of the warp: made up, but planned as real frames are.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace telesplat::testing {
 
-/// Not square, not straight: spacing differs by axis, axes are turned.
+/// A grid that is not square and not straight: spacing differs by axis, axes are turned.
 inline volume::Grid turned_grid() {
   volume::Grid g{{60, 50, 40}, glm::dmat4(1)};
   g.index_to_room = glm::translate(glm::dmat4(1), glm::dvec3(-0.3, -0.2, -0.25));
@@ -26,7 +26,7 @@ inline geometry::Camera looking_at(const glm::dvec3& target, const glm::dvec3& f
   return geometry::make_camera({from, glm::quatLookAt(forward, up)}, fov_x_deg, width, height);
 }
 
-/// A camera's whole view of a grid, turned so that points x right, y down.
+/// Position of an eye at distance_m from the grid's centre; angles in radians.
 inline glm::dvec3 orbit(const volume::Grid& grid, double distance_m, double around, double above) {
   return grid.centre_room() + distance_m * glm::dvec3(std::cos(above) * std::sin(around), std::sin(above),
                                                       std::cos(above) * std::cos(around));
@@ -58,14 +58,14 @@ inline volume::VolumeFrame frame_of(const volume::Grid& grid, const volume::Shea
   return volume::make_volume_frame(grid, shear, images, FrameId{1}, EpochId{1}, 0);
 }
 
-/// Of blobs in all layers.
+/// A frame with blobs in all layers.
 inline volume::VolumeFrame blob_frame(const volume::Grid& grid, const geometry::Camera& camera, int layers = 16) {
   volume::PlanOptions options;
   options.layers = layers;
   const auto shear = volume::plan_frame(grid, std::span(&camera, 1), options).value();
   std::vector<volume::SliceImage> images;
   for (int l = 0; l < static_cast<int>(shear.layers.size()); ++l) {
-    // Not the whole raster, so that images have borders within it.
+    // Not the whole raster: images have borders within it.
     const int inset = 3 * (l % 4);
     images.push_back(
         blobs(shear, l, {inset, inset, std::max(shear.width - 2 * inset, 1), std::max(shear.height - 2 * inset, 1)}));
@@ -89,15 +89,15 @@ struct WarpedView {
 
 inline int channel(uint32_t colour, int shift) { return static_cast<int>(colour >> shift & 255); }
 
-/// Largest difference of a colour's channels.
+/// Largest difference of the colours' channels.
 inline int difference(uint32_t a, uint32_t b) {
   int most = 0;
   for (const int shift : {0, 8, 16, 24}) most = std::max(most, std::abs(channel(a, shift) - channel(b, shift)));
   return most;
 }
 
-/// The warp in double precision by its definition, with rays and planes in the room instead of matrices: colour
-/// 0xCCRRGGBB, CC how much is covered, and depth.
+/// Warps in double precision by the definition, with rays and planes in the room instead of matrices: returns colour
+/// 0xCCRRGGBB, CC for coverage, and depth.
 inline std::pair<uint32_t, double> warp_by_rays(const volume::VolumeFrame& frame, const geometry::Camera& camera,
                                                 uint32_t background, int x, int y) {
   const glm::dmat4 to_index = frame.grid.room_to_index();

@@ -1,5 +1,5 @@
-// Shear-splatting as services/sampler/volume/shear/splatter.h defines it, pixel by pixel in double precision: every
-// slice is gathered at every pixel, nothing is skipped.
+// Shear-splatting by the definition in services/sampler/volume/shear/splatter.h, pixel by pixel in double precision:
+// gathers every slice at every pixel, skips nothing.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace telesplat::test {
 
 class SplatOracle {
  public:
-  /// planes: on how many a slice is sampled.
+  /// planes: number of planes that a slice is sampled on.
   SplatOracle(const VolumeScene& scene, const volume::ShearFrame& frame, int planes)
       : grid_(scene.grid), frame_(frame), planes_(planes) {
     const auto& n = grid_.size;
@@ -31,7 +31,7 @@ class SplatOracle {
         }
   }
 
-  /// Premultiplied colour and alpha, 0 to 1, of a layer's pixel.
+  /// Returns a layer's pixel: premultiplied colour and alpha, 0 to 1.
   glm::dvec4 pixel(const volume::Layer& layer, int x, int y) {
     glm::dvec4 sum(0);
     std::vector<double> at;
@@ -55,7 +55,7 @@ class SplatOracle {
     return field_[(size_t(k) * size_t(grid_.size[1]) + size_t(j)) * size_t(grid_.size[0]) + size_t(i)];
   }
 
-  // Extinction times colour, and extinction, of a slice at a pixel.
+  // Returns a slice at a pixel: extinction times colour, and extinction.
   glm::dvec4 slice(double s, int x, int y) {
     const glm::dvec3 p = frame_.unproject(x + 0.5, y + 0.5, s);
     const double t = frame_.t(s), ru = std::max(1.0, frame_.du * t), rv = std::max(1.0, frame_.dv * t);
@@ -69,7 +69,7 @@ class SplatOracle {
         if (a < 0 || b < 0 || a >= grid_.size[size_t(u)] || b >= grid_.size[size_t(v)]) continue;
         std::array<int, 3> index{};
         index[size_t(u)] = a, index[size_t(v)] = b;
-        for (const double side : {std::floor(s), std::ceil(s)}) {  // the same one twice, or half way between
+        for (const double side : {std::floor(s), std::ceil(s)}) {  // the same slice twice, or half way between two
           index[size_t(frame_.axis)] = int(side);
           if (side >= 0 && side < grid_.size[size_t(frame_.axis)]) sum += 0.5 * w * at(index[0], index[1], index[2]);
         }

@@ -1,4 +1,4 @@
-// Small volumes made in memory, and stores of them.
+// Small volumes in memory, and stores of them.
 #pragma once
 
 #include <gtest/gtest.h>

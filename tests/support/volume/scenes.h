@@ -1,5 +1,4 @@
-// Small synthetic volumes for tests, and slice images put together plainly: what a viewer does, without any of its
-// haste.
+// Small synthetic volumes for tests, and slice images put together plainly: like a viewer, without its speed.
 #pragma once
 
 #include <cmath>
@@ -39,7 +38,7 @@ inline volume::Grid make_grid(std::array<int, 3> size, double side_m, glm::dvec3
   return grid;
 }
 
-/// Voxels where `value` of the position in [-1, 1]^3 gives more than level 0; normals of its gradient.
+/// Makes voxels where `value` of the position in [-1, 1]^3 gives more than level 0; normals from its gradient.
 inline VolumeScene make_scene(const volume::Grid& grid, const std::function<double(glm::dvec3)>& value,
                               std::vector<volume::LevelColour> colours, bool lit = true) {
   VolumeScene out{grid, {}, std::move(colours)};
@@ -91,7 +90,7 @@ inline double blobs(glm::dvec3 p) {
   return std::min(sum, 1.0);
 }
 
-/// The voxels of the slices [begin, end) of k.
+/// Returns the voxels of the slices [begin, end) of k.
 inline volume::Voxels part_of(const VolumeScene& scene, int begin, int end) {
   const volume::Voxels& all = scene.voxels;
   volume::Voxels out;
@@ -105,7 +104,7 @@ inline volume::Voxels part_of(const VolumeScene& scene, int begin, int end) {
   return out;
 }
 
-/// Colour (0 to 1, premultiplied) and alpha at a continuous raster position; 0 outside.
+/// Returns colour (0 to 1, premultiplied) and alpha at a continuous raster position; 0 outside.
 inline glm::dvec4 look_up(const volume::SliceImage& image, double x, double y) {
   const double fx = x - 0.5 - image.rect.x, fy = y - 0.5 - image.rect.y;
   const int ix = int(std::floor(fx)), iy = int(std::floor(fy));
@@ -120,9 +119,9 @@ inline glm::dvec4 look_up(const volume::SliceImage& image, double x, double y) {
   return sum;
 }
 
-/// All images (one slab, or slabs in order of their k as `images` has them) as `camera` sees them. Planes front to
-/// back; on one plane the slabs nearer to the eye along k first. Depth: the plane's where more than a quarter is
-/// opaque, so that image::compare knows what is object.
+/// Draws all images (one slab, or slabs in the order of their k in `images`) as `camera` sees them. Planes front to
+/// back; on one plane the slabs nearer to the eye along k first. Depth: 1 where more than a quarter is opaque, so that
+/// image::compare recognises the object.
 inline image::View warp_plainly(const volume::Grid& grid, const volume::ShearFrame& frame,
                                 const std::vector<volume::SliceImage>& images, const geometry::Camera& camera,
                                 uint32_t background) {
@@ -161,7 +160,7 @@ inline image::View warp_plainly(const volume::Grid& grid, const volume::ShearFra
   return out;
 }
 
-/// Peak signal to noise ratio over the pixels where either differs from the background.
+/// Peak signal to noise ratio over the pixels where a or b differs from the background.
 inline double psnr(const image::View& a, const image::View& b, uint32_t background) {
   double sum = 0, count = 0;
   for (size_t n = 0; n < a.colour.size(); ++n) {

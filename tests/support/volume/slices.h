@@ -7,7 +7,7 @@
 
 namespace telesplat::volume {
 
-/// Appends.
+/// Appends the coded slice to `out`.
 inline void encode_slice(const SliceImage& image, std::vector<uint8_t>& out) {
   const std::vector<uint8_t> bytes = encode_slice(image);
   out.insert(out.end(), bytes.begin(), bytes.end());

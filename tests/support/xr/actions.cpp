@@ -1,4 +1,4 @@
-// Controllers, as far as an application that points and chooses asks for them.
+// Controllers, as far as an application needs them for pointing and choosing.
 #include <algorithm>
 #include <string_view>
 
@@ -71,7 +71,7 @@ XrResult DestroyAction(XrAction action) {
   });
 }
 
-// Of the kinds of controllers it knows the simple one alone.
+// Knows only the simple kind of controllers.
 XrResult SuggestInteractionProfileBindings(XrInstance, const XrInteractionProfileSuggestedBinding* info) {
   Runtime& r = runtime();
   return r.call("xrSuggestInteractionProfileBindings", Of::kInstance, [&] {

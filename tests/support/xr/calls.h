@@ -1,4 +1,4 @@
-// The functions of this runtime, as entry.cpp lists them.
+// The functions of this runtime, listed for entry.cpp.
 #pragma once
 
 #include "tests/support/xr/xr.h"
@@ -25,7 +25,7 @@ namespace telesplat::xr_test {
 
 }  // namespace telesplat::xr_test
 
-// Declared by what OpenXR says of each; in the namespace, so that the loader's own functions are not meant.
+// Declared with OpenXR's types; in a namespace, apart from the loader's own functions.
 namespace telesplat::xr_test::calls {
 template <class F>
 struct Signature;

@@ -1,5 +1,5 @@
-// How the loader finds the runtime's functions. The negotiation's structs are not in Debian's headers; they are those
-// of the loader's specification, interface version 1.
+// Gives the loader the runtime's functions. Debian's headers lack the structs of the negotiation; these follow the
+// loader's specification, interface version 1.
 #include <cstring>
 #include <string_view>
 

@@ -1,4 +1,4 @@
-// Frames: when they are due, what is in them.
+// Frames: their times and their content.
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
@@ -64,7 +64,7 @@ std::string complain_about(Runtime& r, const XrCompositionLayerProjection& layer
   return {};
 }
 
-// What OpenGL's textures hold begins with the lowest row.
+// OpenGL's textures begin with the lowest row.
 template <class T>
 std::vector<T> turned(const std::vector<T>& rows, int width, int height) {
   std::vector<T> out(rows.size());
@@ -91,7 +91,7 @@ image::View picture_of(Runtime& r, const XrCompositionLayerProjectionView& view)
       const float d = (v - info->minDepth) / (info->maxDepth - info->minDepth);
       v = d >= 1 ? std::numeric_limits<float>::infinity() : 1 / (near + d * (far - near));
     }
-    // It may have fewer pixels than the picture.
+    // The depth image may have fewer pixels than the picture.
     values = turned(values, depth.width, depth.height);
     out.depth_m.resize(pixels);
     for (int y = 0; y < out.height; ++y)

@@ -1,4 +1,4 @@
-// Instances, the headset, what it wants; texts and times.
+// Instances, the headset and its properties; texts and times.
 #include <fmt/format.h>
 #include <openxr/openxr_reflection.h>
 
@@ -61,7 +61,7 @@ XrResult CreateInstance(const XrInstanceCreateInfo* info, XrInstance* instance) 
   }
   return r.call("xrCreateInstance", Of::kNothing, [&] {
     if (r.exists) return XR_ERROR_LIMIT_REACHED;
-    // Faults happen once, and what was recorded goes on, where an application comes again.
+    // If an application comes again, faults do not, and the record goes on.
     if (!r.recorder) {
       r.config = *config;
       r.recorder = std::make_unique<Recorder>(config->out);

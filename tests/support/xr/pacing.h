@@ -1,9 +1,9 @@
-// When a display without glass refreshes.
+// Refresh times of a display that does not exist.
 #pragma once
 
 namespace telesplat::xr_test {
 
-/// Knows no clock: times come in.
+/// Reads no clock: takes times.
 class Pacing {
  public:
   /// Refreshes at origin_s and every 1 / rate_hz before and after.
@@ -11,13 +11,13 @@ class Pacing {
 
   struct Frame {
     double display_s;  ///< the refresh that shows it
-    double wake_s;     ///< its application begins: a period before, or now if that is past
+    double wake_s;     ///< its application begins: a period before, or now if that time is past
   };
-  /// The next frame of an application that asks at now_s: for a refresh after that of the frame before, at least half a
-  /// period from now.
+  /// Returns the next frame of an application that asks at now_s: for a later refresh than the frame before, at least
+  /// half a period from now.
   Frame next(double now_s);
-  /// The first refresh that can show a frame for display_s that was handed over at submitted_s: that, or the next one
-  /// after the hand-over.
+  /// Returns the first refresh that can show a frame for display_s submitted at submitted_s: that one, or the next one
+  /// after the submission.
   double shown_s(double display_s, double submitted_s) const;
   double period_s() const { return period_s_; }
 

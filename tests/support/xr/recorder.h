@@ -1,4 +1,4 @@
-// What an application did: its calls, its mistakes, its frames with their times, pictures of both eyes.
+// Records an application: its calls, its mistakes, its frames with their times, pictures of both eyes.
 #pragma once
 
 #include <condition_variable>
@@ -18,7 +18,7 @@ namespace telesplat::xr_test {
 
 class Recorder {
  public:
-  /// directory: made if need be; empty: nothing is written.
+  /// directory: made if missing; empty: nothing is written.
   explicit Recorder(const std::string& directory);
   ~Recorder();
   /// Writes calls.json, and waits until all pictures are written.
@@ -31,11 +31,11 @@ class Recorder {
     uint64_t number = 0;
     double display_s = 0, submitted_s = 0, shown_s = 0;  ///< monotonic clock
     bool layers = false, depth = false, discarded = false;
-    geometry::Pose left;  ///< eye, as it was submitted
+    geometry::Pose left;  ///< the eye's, as submitted
   };
   /// A row of frames.csv.
   void frame(const Frame& frame, double period_s);
-  /// A picture; written by a thread. Where more than kMostWaiting wait, it is dropped and counted.
+  /// Queues a picture for the writing thread. If more than kMostWaiting wait, it is dropped and counted.
   void picture(const std::string& name, image::View view, bool exr);
 
   static constexpr size_t kMostWaiting = 16;
@@ -54,7 +54,7 @@ class Recorder {
   std::ofstream frames_;
   uint64_t shown_ = 0, late_ = 0, missed_ = 0, dropped_ = 0;
   double first_s_ = 0, last_shown_s_ = 0;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
   std::deque<Picture> waiting_;
   bool stop_ = false, writing_ = false;

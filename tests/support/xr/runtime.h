@@ -1,5 +1,5 @@
-// The runtime's state: one instance, one session at a time. Every call goes through call(), which counts it, notes what
-// went wrong, and lets faults happen.
+// The runtime's state: one instance, one session at a time. Every call goes through call(), which counts it, notes
+// mistakes, and triggers faults.
 #pragma once
 
 #include <deque>
@@ -21,7 +21,7 @@ namespace telesplat::xr_test {
 struct Space {
   enum class Kind { kStage, kLocal, kView, kHand } kind = Kind::kStage;
   int hand = 0;
-  geometry::Pose offset;  ///< of the space in what it is of
+  geometry::Pose offset;  ///< the space's pose in its reference
 };
 
 struct Swapchain {
@@ -30,7 +30,7 @@ struct Swapchain {
   std::vector<uint32_t> textures;
   uint32_t next = 0;
   enum class Stage { kFree, kAcquired, kWaited } stage = Stage::kFree;
-  std::optional<uint32_t> released;  ///< what a layer shows
+  std::optional<uint32_t> released;  ///< the image that a layer shows
 };
 
 struct Action {
@@ -46,7 +46,7 @@ struct Session {
   std::optional<Pacing> pacing;
   enum class Turn { kWait, kBegin, kEnd } turn = Turn::kWait;
   double display_s = 0;
-  bool told_to_render = true;  // by the last xrWaitFrame
+  bool told_to_render = true;  // result of the last xrWaitFrame
   uint64_t begun = 0;
   std::map<XrSpace, Space> spaces;
   std::map<XrSwapchain, Swapchain> swapchains;
@@ -62,12 +62,12 @@ class Runtime {
   Config config;
   std::unique_ptr<Recorder> recorder;
   std::deque<XrEventDataBuffer> events;
-  std::vector<std::string> paths{"/"};  ///< XrPath is their number
+  std::vector<std::string> paths{"/"};  ///< XrPath is an index
   std::map<XrActionSet, std::string> action_sets;
   std::map<XrAction, Action> actions;
-  std::string profile;  ///< the one whose bindings hold
+  std::string profile;  ///< the profile whose bindings apply
   std::unique_ptr<Session> session;
-  std::optional<double> began_s;  ///< the first session did
+  std::optional<double> began_s;  ///< begin of the first session
 
   XrInstance instance() const { return reinterpret_cast<XrInstance>(uintptr_t{0x7e1e}); }
   XrSession session_handle() const { return reinterpret_cast<XrSession>(uintptr_t{0x5e55}); }
@@ -76,19 +76,19 @@ class Runtime {
     return reinterpret_cast<Handle>(uintptr_t(++handles_));
   }
 
-  /// Seconds since the first session began; negative: none has.
+  /// Seconds since the first session began; negative: no session has begun.
   double since_begin_s() const;
-  /// Lets what is due happen.
+  /// Triggers the events and faults that are due.
   void tick();
   void go_to(XrSessionState state);
   template <class Event>
   void push(const Event& event);
 
-  /// Runs `body` as the call `name`. `of`: what it needs to exist.
+  /// Runs `body` as the call `name`. `of`: the object that must exist for it.
   enum class Of { kNothing, kInstance, kSession };
   template <class Body>
   XrResult call(const char* name, Of of, Body body);
-  /// The caller did wrong: noted, and returned.
+  /// Notes a mistake of the caller, and returns its result.
   XrResult wrong(XrResult result, const std::string& why);
 
  private:
@@ -100,7 +100,7 @@ class Runtime {
        recentre_told_ = false, failed_ = false;
 };
 
-/// The session's context, current for a scope.
+/// Makes the session's context current for a scope.
 class WithContext {
  public:
   explicit WithContext(const Session& session);
@@ -120,7 +120,7 @@ inline double to_s(XrTime t) { return 1e-9 * double(t); }
 XrPosef to_xr(const geometry::Pose& pose);
 geometry::Pose from_xr(const XrPosef& pose);
 geometry::Pose inverse(const geometry::Pose& pose);
-/// First b, then a.
+/// Applies first b, then a.
 geometry::Pose combined(const geometry::Pose& a, const geometry::Pose& b);
 
 template <class Event>
@@ -141,7 +141,7 @@ XrResult Runtime::call(const char* name, Of of, Body body) {
   return body();
 }
 
-/// How OpenXR hands out lists: a count, then what fits.
+/// Returns a list as OpenXR does: a count, then as many elements as fit.
 template <class T, class Source>
 XrResult hand_out(const Source& source, uint32_t capacity, uint32_t* count, T* out) {
   if (!count) return XR_ERROR_VALIDATION_FAILURE;

@@ -1,4 +1,4 @@
-// Spaces, and where the head, its eyes and the hands are in them.
+// Spaces, and the poses of the head, its eyes and the hands in them.
 #include "tests/support/xr/spaces.h"
 
 #include <array>
@@ -26,7 +26,7 @@ geometry::Pose head_at(const Runtime& r, double t_s) {
 geometry::Pose hand_at(const Runtime& r, int hand, double t_s) {
   const geometry::Pose head = head_at(r, t_s);
   const geometry::Pose at = combined(head, {kHandFromHead[hand], {1, 0, 0, 0}});
-  // It points at what is straight before the head, 0.7 m away.
+  // It points at the place straight before the head, 0.7 m away.
   const glm::dvec3 target = head.position_room + head.orientation * glm::dvec3(0, 0, -0.7);
   return geometry::look_at(at.position_room, target);
 }
@@ -53,7 +53,7 @@ namespace {
 using Of = Runtime::Of;
 Runtime& runtime() { return Runtime::get(); }
 
-// In the stage.
+// Returns a space's pose in the stage.
 geometry::Pose pose_of(const Runtime& r, const Space& space, double t_s) {
   switch (space.kind) {
     case Space::Kind::kView:

@@ -1,4 +1,4 @@
-// OpenXR as this runtime offers it.
+// OpenXR's headers with the options of this runtime.
 #pragma once
 
 #include <epoxy/egl.h>

@@ -1,4 +1,4 @@
-// Streams that lie: each refused with a reason, none allocating by what it claims.
+// Streams with false claims: each is refused with a reason, and none allocates the memory that it claims.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -26,7 +26,7 @@ TEST(CodecBadInput, Headers) {
 }
 
 TEST(CodecBadInput, SizesBeyondTheLimit) {
-  // 2^31 x 2^31, 4097 x 4096, and numbers that do not end.
+  // 2^31 x 2^31, 4097 x 4096, and numbers without an end.
   EXPECT_NE(refusal({0xD7, 12, 0, 0x80, 0x80, 0x80, 0x80, 8, 0x80, 0x80, 0x80, 0x80, 8, 0}).find("limit 16777216"),
             std::string::npos);
   EXPECT_NE(refusal({0xD7, 12, 0, 0x81, 0x20, 0x80, 0x20, 0}).find("4097 x 4096"), std::string::npos);
@@ -53,7 +53,7 @@ TEST(CodecBadInput, UnexpectedSizes) {
 }
 
 TEST(CodecBadInput, CoveredPixelsOfDepthZero) {
-  // A full tile of one pixel whose base is 0 and whose residual is 0. With base 1 the same bytes are good.
+  // A full tile of one pixel whose base is 0 and whose residual is 0. With base 1 the same bytes are valid.
   std::vector<uint8_t> bytes = encode([] {
     image::DepthImage image(1, 1);
     image.depth[0] = 1;
@@ -81,19 +81,19 @@ TEST(CodecBadInput, InspectRefusesToo) {
   EXPECT_TRUE(inspect(bytes).ok());
 }
 
-// Kernels read 64 bytes beyond a tile's words: also where nothing follows them.
+// Kernels read 64 bytes beyond a tile's words: also if nothing follows them.
 TEST(CodecBadInput, LongHeadersBeforeNoWordsAreReadWithinTheStream) {
   for (const int width : {64, 5}) {
     image::DepthImage image(width, 1);
     for (size_t i = 0; i < image.pixels(); ++i) image.depth[i] = 1000, image.colour[i] = 0x80, image.normal[i] = 0x7F7F;
     std::vector<uint8_t> bytes = encode(image);
     ASSERT_TRUE(decode(bytes));
-    constexpr size_t kHeaders = 5 + 1 + 8 + 1;  // of the stream, the tile's kind, base, and way of colours
+    constexpr size_t kHeaders = 5 + 1 + 8 + 1;  // stream's header, tile's kind, its base, its way of colours
     const size_t normals = kHeaders + 1 + bytes[kHeaders];
     ASSERT_LT(normals + bytes[normals], bytes.size());
     const std::vector<uint8_t> words(bytes.end() - 4, bytes.end());
     ASSERT_EQ(words, (std::vector<uint8_t>{0, 0, 0, 0})) << "no words, no states";
-    // The header of normals becomes 300 bytes of anything, with what is left behind it.
+    // Replaces the header of normals by 300 bytes of any content; the rest follows.
     std::vector<uint8_t> longer(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(normals));
     longer.push_back(0x80 | (300 & 127)), longer.push_back(300 >> 7);
     longer.insert(longer.end(), 300, 0xFF);

@@ -1,4 +1,4 @@
-// Bounds of error: which there are, the lattices that keep them, and streams that lie about them.
+// Bounds of error: their valid values, the lattices that keep them, and streams with false bounds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ TEST(ErrorBounds, AreCutToWhatMakesSense) {
   EXPECT_FALSE((ErrorBounds{.depth = ErrorBounds::kLeastDepth}).exact());
 }
 
-// Every code lies in one interval, whose middle is as near as is promised; and no interval could be longer.
+// Every code lies in one interval, whose middle is within the bound; and no interval could be longer.
 TEST(ErrorBounds, DepthLatticesReachEveryCode) {
   for (const uint32_t depth : {ErrorBounds::kLeastDepth, uint32_t{100003}, uint32_t{209715}, uint32_t{1} << 22,
                                uint32_t{123456789}, ErrorBounds::kMostDepth}) {
@@ -118,7 +118,7 @@ std::string refusal(const std::vector<uint8_t>& bytes) {
 }
 
 TEST(ErrorBounds, StreamsWithBoundsThatNobodyWrites) {
-  // 1 x 1 pixels, nothing in it. varint depth, u8 normal, u8 colour.
+  // 1 x 1 pixels, none covered. varint depth, u8 normal, u8 colour.
   EXPECT_EQ(refusal({0xD7, 12, 1, 1, 1, 0, 1, 0, 0}), "");
   EXPECT_EQ(refusal({0xD7, 12, 1, 1, 1, 0x80, 0x80, 1, 0, 0, 0}), "") << "2^14";
   for (const auto& bounds : {std::vector<uint8_t>{0, 0, 0},
@@ -175,7 +175,7 @@ TEST(Refinement, OfWhatIsExactTakesAByteATile) {
   EXPECT_TRUE(decode_refinement(bytes, image).value() == image);
 }
 
-// What bounds nothing, too: any image that covers the same pixels.
+// A refinement need not start from a bounded image: any image that covers the same pixels will do.
 TEST(Refinement, OfAnyOtherImage) {
   for (const double density : {0.05, 0.6, 1.0}) {
     const DepthImage exact = test::random_pixels(70, 50, density, 3);

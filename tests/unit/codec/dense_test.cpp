@@ -1,4 +1,4 @@
-// Dense tiles: every way to code a plane is taken by some image, and comes back.
+// Dense tiles: some image uses each way to code a plane, and comes back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ TEST(Dense, SmallTrianglesAreCodedByTheirPlanes) {
   expect_round_trip(test::masked(image, test::random_mask(256, 200, 0.7, 2)));
 }
 
-// Where nothing is covered, rows of planes are left as they were.
+// Rows of planes keep old values where no pixel is covered.
 TEST(Dense, WhatWasCodedBeforeChangesNothing) {
   const DepthImage holes = test::masked(test::render({.width = 256, .height = 200}), test::band_mask(256, 200, 40)),
                    facets = test::masked(test::facets(256, 200, 3, 130), test::random_mask(256, 200, 0.6, 5)),
@@ -49,7 +49,7 @@ TEST(Dense, WhatWasCodedBeforeChangesNothing) {
   for (const ErrorBounds& bounds : {ErrorBounds{}, ErrorBounds{.depth = 1u << 18, .normal = 1, .colour = 1}})
     for (const DepthImage* image : {&holes, &facets}) {
       std::vector<uint8_t> fresh;
-      std::thread([&] { fresh = encode(*image, bounds); }).join();  // a thread's coders have coded nothing
+      std::thread([&] { fresh = encode(*image, bounds); }).join();  // a thread's coders have coded nothing yet
       EXPECT_TRUE(decode(encode(other, bounds)).ok());
       EXPECT_EQ(encode(*image, bounds), fresh);
       DepthImage known;
@@ -60,7 +60,7 @@ TEST(Dense, WhatWasCodedBeforeChangesNothing) {
     }
 }
 
-// What contexts are chosen from is found in every mask that is coded as a dense tile.
+// Every mask that is coded as a dense tile has the values that contexts are chosen by.
 TEST(Dense, ThinMasksHaveContextsToo) {
   constexpr int kSide = 256;
   DepthImage image(kSide, kSide);
@@ -89,13 +89,13 @@ TEST(Dense, ThinMasksHaveContextsToo) {
   EXPECT_LT(keep([](size_t, size_t y) { return y % 11 != 1; }), 1);
 }
 
-// A rough ball in front of a camera that looks along -z, its ray axes, and those of a camera that looks elsewhere.
+// A rough ball in front of a camera that looks along -z, its ray axes, and those of a camera with another direction.
 struct Ball {
   static constexpr int kWidth = 256, kHeight = 200;
   Ball() : image(kWidth, kHeight) {
     const glm::dvec3 centre(0.3, -0.2, -3);
     std::mt19937 random(1);
-    const auto noise = [&] {  // most of it small
+    const auto noise = [&] {  // mostly small
       double sum = -2;
       for (int i = 0; i < 4; ++i) sum += static_cast<double>(random() % 1000) / 1000;
       return 0.03 * sum;
@@ -127,7 +127,7 @@ TEST(Dense, TheCameraIsTakenForNormalsThatFollowIt) {
   EXPECT_EQ(encode(ball.image, {}, nullptr, ball.other), without) << "normals that do not follow what is said";
 }
 
-// Small tiles have too few samples to tell.
+// Small tiles have too few samples to show it.
 TEST(Dense, RoughNormalsWithinBoundsAreNotExactHoweverSmallTheTile) {
   for (const int side : {16, 20, 31, 60}) {
     DepthImage image = test::random_pixels(side, side, 1, 3), bounded;
@@ -143,7 +143,7 @@ TEST(Dense, RoughNormalsWithinBoundsAreNotExactHoweverSmallTheTile) {
   EXPECT_EQ(bounded.normal, smooth.normal) << "they are all that is seen of a smooth surface of one colour";
 }
 
-// The axes of the view that test::render() makes.
+// The axes of test::render()'s view.
 RoomAxes axes_of_render(int width, int height) {
   const double pitch = -50 * std::numbers::pi / 180, c = std::cos(pitch), s = std::sin(pitch);
   const double f = width / 2.0 / std::tan(55 * std::numbers::pi / 360), right = (0.5 - width / 2.0) / f,
@@ -191,7 +191,7 @@ TEST(Dense, NarrowTilesComeBack) {
   }
 }
 
-// A thread's buffers serve both directions.
+// A thread uses the same buffers in both directions.
 TEST(Dense, WhoDecodedANarrowTileEncodesAnyOther) {
   const auto narrow = encode(test::render({.width = 9, .height = 200}));
   const DepthImage image = test::render({.width = 40, .height = 33});

@@ -1,4 +1,4 @@
-// Codes of residuals: any comes back whatever was expected, and no bits take more than is promised.
+// Codes of residuals: any residual comes back with any expectation, and no bits take more than the limit.
 #include "common/codec/golomb.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ TEST(Golomb, AnyResidualComesBackWhateverWasExpected) {
   }
 }
 
-// What is as large as it was expected to be takes as many bits as that, and few more.
+// A residual as large as expected takes as many bits as that, and few more.
 TEST(Golomb, WhatIsExpectedIsShort) {
   for (int size = 1; size <= 24; ++size) {
     detail::BitWriter writer;

@@ -1,5 +1,4 @@
-// What decoders of guided planes make of symbols is what docs/codec.md says, whatever the weights and the masks; and
-// normals are turned as tables say.
+// Decoders of guided planes follow docs/codec.md for any weights and masks; and normals are turned by the tables.
 #include "common/codec/dense/guided.h"
 
 #include <gtest/gtest.h>
@@ -14,8 +13,8 @@ namespace {
 
 constexpr int kWidth = 70, kHeight = 9;
 
-// A plane with weights whose sizes add up to this, a guide and symbols. rough: they go anywhere; else weights cancel
-// each other, the constant is the middle, and no value comes near its bounds.
+// Fills a plane with weights whose sizes add up to `size`, a guide and symbols. rough: they may have any value; else
+// weights cancel each other, the constant is the middle, and no value comes near its bounds.
 void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, int size, bool rough,
           std::mt19937& random) {
   plane.reset(shape, fraction, most);
@@ -46,7 +45,7 @@ void fill(GuidedPlane& plane, const TileShape& shape, int fraction, int most, in
   plane.begin(shape);
 }
 
-// Values as the page has them, "Guided prediction". residual: of the plane before, as it is coded; null: none.
+// Computes values by docs/codec.md, "Guided prediction". residual: the plane before's, as coded; null: first plane.
 std::vector<int> values_of(GuidedPlane& p, const TileShape& shape, const std::vector<int>* residual,
                            std::vector<int>& own_residual) {
   const bool byte = p.bits == GuidedPlane::kByteBits;
@@ -59,14 +58,14 @@ std::vector<int> values_of(GuidedPlane& p, const TileShape& shape, const std::ve
     return out[static_cast<size_t>(y * w + x)];
   };
   for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x)  // also of those to the right: they predict the next row
+    for (int x = 0; x < w; ++x)  // also pixels to the right: they predict the next row
       out[static_cast<size_t>(y * w + x)] = nearest(p.guide.row(y)[x]);
     for (int x = 0; x < w; ++x) {
       if (!shape.at(static_cast<size_t>(x), static_cast<size_t>(y))) continue;
       const auto i = static_cast<size_t>(y * w + x);
       const uint32_t z = p.symbols.z.row(y)[x];
       int off = static_cast<int>(z >> 1) ^ -static_cast<int>(z & 1);
-      if (!byte) off = static_cast<int16_t>(off * (1 << p.bits)) >> p.bits;  // what a plane can hold
+      if (!byte) off = static_cast<int16_t>(off * (1 << p.bits)) >> p.bits;  // the range of a plane
       own_residual[i] = off;
       const int neighbours[4] = {at(x - 1, y), at(x, y - 1), at(x - 1, y - 1), at(x + 1, y - 1)};
       int64_t sum = p.constant + (int64_t{1} << (12 + p.bits));
@@ -99,7 +98,7 @@ TEST(GuidedPlanes, DecodeToWhatThePageSays) {
       const Mask mask = test::random_mask(kWidth, kHeight, seed % 3 == 1 ? 0.6 : 0.98, seed);
       TileShape shape;
       shape.reset(kWidth, kHeight, seed % 3 == 0 ? nullptr : &mask);
-      // Sums that stay far from 2^31, and such as do not; planes are used again.
+      // Some sums stay far from 2^31, some do not; planes are used again.
       const bool rough = (seed >> 3 & 1) != 0;
       const auto size = [&](uint32_t bit) { return (seed >> bit & 1) != 0 ? 119000 : 9000; };
       fill(a, shape, GuidedPlane::kByteBits, 254, size(0), rough, random);
@@ -125,7 +124,7 @@ TEST(Normals, RowsAreTurnedAsSingleCodes) {
     turn_normals(codes.data(), codes.size(), pole, x.data(), y.data());
     for (size_t i = 0; i < codes.size(); ++i)
       ASSERT_EQ(x[i] / 64 | y[i] / 64 << 8, turn_normal(codes[i], pole)) << i << ", pole " << pole;
-    for (size_t i = 0; i < codes.size(); ++i)  // what a stream may hold
+    for (size_t i = 0; i < codes.size(); ++i)  // values that a stream may hold
       x[i] = static_cast<int16_t>((codes[i] & 255) * 64), y[i] = static_cast<int16_t>((codes[i] >> 8) * 64);
     turn_normals_back(x.data(), y.data(), codes.size(), pole, back.data());
     for (size_t i = 0; i < codes.size(); ++i) ASSERT_EQ(back[i], turn_back(codes[i], pole)) << i << ", " << pole;

@@ -1,4 +1,4 @@
-// What the loops over rows make is what docs/codec.md says, whatever the rows hold.
+// The loops over rows follow docs/codec.md, for any content of the rows.
 #include "common/codec/dense/kernels.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ void for_each_width(Check check) {
   }
 }
 
-// Three rows of a plane and what is around them.
+// Three rows of a plane and the values around them.
 template <class T, class Value>
 Plane<T> rows_of(size_t width, Value value) {
   Plane<T> plane;
@@ -58,7 +58,7 @@ TEST(Kernels, ContextsAreThoseOfThePage) {
   });
 }
 
-// A prediction by weights whose sizes add up to what is allowed stays within 32 bits.
+// With weights whose sizes add up to the limit a prediction stays within 32 bits.
 TEST(Kernels, GuidedPredictionIsThatOfThePage) {
   for_each_width([](size_t width, std::mt19937& random) {
     const int bits = random() % 2 != 0 ? 6 : 4, most = bits == 6 ? 255 : 1023;
@@ -95,7 +95,7 @@ TEST(Kernels, GuidedPredictionIsThatOfThePage) {
   });
 }
 
-// The quotients' approximation is as good as the guide needs.
+// The quotients' approximation is exact enough for the guide.
 TEST(Kernels, DirectionsAreThoseOfTheMatrix) {
   for_each_width([](size_t width, std::mt19937& random) {
     const auto depth = rows_of<uint32_t>(width, [&] { return (1u << 23) + random() % (1u << 12); });
@@ -126,7 +126,7 @@ TEST(Kernels, DirectionsAreThoseOfTheMatrix) {
   });
 }
 
-// Depth of facets: most pixels lie in one of eight planes, or up to three codes beside it.
+// Depth of facets: most pixels lie in one of eight planes, or up to three codes off it.
 Plane<uint32_t> facets(size_t width, std::mt19937& random) {
   auto depth = rows_of<uint32_t>(width, [&] { return (1u << 22) + random() % 64; });
   if (random() % 4 == 0) return depth;

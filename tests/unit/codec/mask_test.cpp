@@ -1,5 +1,5 @@
-// Masks of tiles as messages carry them: any mask comes back, patterns that repeat cost little, other words are refused
-// or are some mask.
+// Masks of tiles in messages: any mask comes back, patterns that repeat cost little, other words are refused or give
+// some mask.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -52,7 +52,7 @@ TEST(Masks, PatternsThatRepeatCostATenth) {
   const PixelMask mask = pattern(256, 256, 0, 0), none = test::spread_mask(256, 256, 32, 3);
   EXPECT_LT(4 * encode_mask(mask).size(), 260u);
   EXPECT_GT(4 * encode_mask(none).size(), 1000u);
-  // Within an object: its outline is added.
+  // A pattern within an object: its outline adds to the bytes.
   PixelMask inside(256, 256), elsewhere(256, 256);
   for (int y = 0; y < 256; ++y)
     for (int x = 0; x < 256; ++x) {
@@ -79,7 +79,7 @@ TEST(Masks, OtherWordsAreRefusedOrSomeMask) {
     if (!back) continue;
     ASSERT_EQ(back->width(), width);
     ASSERT_EQ(back->height(), height);
-    for (int y = 0; y < height; ++y)  // nothing beyond the last column
+    for (int y = 0; y < height; ++y)  // no bits beyond the last column
       if (width % 64 != 0) {
         ASSERT_EQ(back->row(y)[back->words_per_row() - 1] >> width % 64, 0u);
       }

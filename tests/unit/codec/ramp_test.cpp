@@ -1,4 +1,4 @@
-// Colours by height of scattered pixels: what they cost, and what a damaged axis does.
+// Colours by height of scattered pixels: their cost, and the effect of a damaged axis.
 #include "common/codec/sparse/ramp.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ RoomAxes axes_of_view() {
   return {{{1 / 200.0, 0, -0.64}, {0, -c / 200, 0.3 * c - s}, {0, -s / 200, 0.3 * s + c}}};
 }
 
-// What lies in the pixel (x, y) of hilly ground, its height, -0.5 to -0.4, and its depth code.
+// Hilly ground in pixel (x, y): its depth code and its height, -0.5 to -0.4.
 struct Ground {
   uint32_t code;
   double height;
@@ -55,7 +55,7 @@ image::DepthImage scattered(Colour colour_of) {
   return image;
 }
 
-// Colours that change with height, up and down, as a terrain's do.
+// Colours that change with height, up and down, like a terrain's.
 uint32_t tint(double height, size_t) {
   const double t = (height + 0.5) / 0.1;
   const auto channel = [](double v) { return static_cast<uint32_t>(std::lround(std::clamp(v, 0.0, 1.0) * 255)); };
@@ -88,7 +88,7 @@ TEST(Ramp, WithinBoundsOfErrorToo) {
   EXPECT_EQ(decode_refinement(encode_refinement(tinted, back), back).value(), tinted);
 }
 
-// Nearly each pixel has a colour of its own, so that colours could be sorted by any heights.
+// Nearly every pixel has its own colour: any heights could be an order for them.
 TEST(Ramp, ColoursThatHaveNothingToDoWithHeightCostNoMore) {
   const image::DepthImage any = scattered([](double, size_t i) { return static_cast<uint32_t>(i * 2654435761u >> 8); });
   EXPECT_EQ(encode(any, {}, nullptr, axes_of_view()), encode(any));
@@ -146,7 +146,7 @@ TEST(Ramp, HeightsAreRoundedDownOnBothSidesOfZero) {
   EXPECT_EQ(axis.height(30000, 0, 1), RampAxis::kMost);
 }
 
-// The axis comes out of floating point, which must be the same everywhere: so these bytes, too.
+// The axis comes from floating point, which must be the same on all machines: so must these bytes.
 TEST(Ramp, TheBytesAreTheSameEverywhere) {
   const auto digest = [](const std::vector<uint8_t>& bytes) {
     uint64_t sum = 0xcbf29ce484222325;  // FNV-1a

@@ -1,4 +1,4 @@
-// Bits by how often they came: any come back, in few bytes where they are alike, and what is added to them is found.
+// Bits coded by their frequency: any bits come back, equal bits take few bytes, and added bytes are detected.
 #include "common/codec/range_coder.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@ namespace telesplat::codec::detail {
 namespace {
 
 std::vector<uint8_t> put(const std::vector<uint32_t>& bits) {
-  std::vector<uint8_t> out{7};  // what stands before stays
+  std::vector<uint8_t> out{7};  // earlier bytes stay
   RangeEncoder coder(out);
   AdaptiveBit models[3];
   for (size_t i = 0; i < bits.size(); ++i) {
@@ -22,7 +22,7 @@ std::vector<uint8_t> put(const std::vector<uint32_t>& bits) {
   return out;
 }
 
-// Whether all came back.
+// True if all numbers came back.
 bool get(std::span<const uint8_t> bytes, const std::vector<uint32_t>& bits) {
   RangeDecoder coder(bytes);
   AdaptiveBit models[3];
@@ -58,7 +58,7 @@ TEST(RangeCoder, WhatIsAlikeTakesNearlyNothing) {
   EXPECT_LT(out.size(), 8u);
 }
 
-// Whatever the bits are, carries included: after the highest probability of the one the other comes.
+// Carries with any bits: after one bit has its highest probability the other one comes.
 TEST(RangeCoder, CarriesGoThroughAsManyBytesAsThereAre) {
   std::mt19937 random(9);
   for (int round = 0; round < 300; ++round) {
@@ -84,7 +84,7 @@ TEST(RangeCoder, AnySignedNumberComesBack) {
   EXPECT_TRUE(decoder.finished());
 }
 
-// Any bytes are some numbers within the range.
+// Any bytes decode to numbers within the range.
 TEST(RangeCoder, AnyBytesAreSignedNumbersWithinTheRange) {
   std::mt19937 random(11);
   for (int round = 0; round < 200; ++round) {

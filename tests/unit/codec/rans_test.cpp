@@ -1,4 +1,4 @@
-// The coder of symbols by itself: what it puts comes back, in as many bits as it should take.
+// The coder of symbols alone: symbols come back, in as many bits as they should take.
 #include "common/codec/dense/rans.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ struct Symbols {
   double entropy_bits = 0;
 };
 
-// Numbers below 2^most_bits, most of them small.
+// Numbers below 2^most_bits, mostly small.
 Symbols make_symbols(size_t n, unsigned most_bits, uint32_t seed) {
   std::mt19937 random(seed);
   Symbols s;
@@ -44,7 +44,7 @@ Symbols make_symbols(size_t n, unsigned most_bits, uint32_t seed) {
   return s;
 }
 
-// Words, and the states behind them.
+// Returns words, and the states behind them.
 std::vector<uint8_t> put(const Symbols& s) {
   std::vector<uint8_t> out(s.z.size() * kMostSymbolBytes + kStateBytes);
   SymbolEncoder coder;
@@ -56,7 +56,7 @@ std::vector<uint8_t> put(const Symbols& s) {
   return out;
 }
 
-// False where words are missing. Takes symbols in parts, as rows have them.
+// False if words are missing. Takes symbols in parts, like rows.
 bool get(const Symbols& s, const std::vector<uint8_t>& bytes, std::vector<uint8_t>& tokens, std::vector<uint32_t>& z,
          bool& rests) {
   const uint8_t *const begin = bytes.data(), *end = begin + bytes.size() - kStateBytes;

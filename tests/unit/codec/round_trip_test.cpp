@@ -1,4 +1,4 @@
-// Small and extreme images through the codec, sizes of streams, and the bytes of the format.
+// Small and extreme images through the codec, sizes of streams, and bytes of the format.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,7 +55,7 @@ TEST(CodecRoundTrip, SinglePixels) {
   }
 }
 
-// Too few for any to be looked at when something is fitted.
+// Too few pixels for a fit to use any.
 TEST(CodecRoundTrip, FewPixels) {
   for (int height = 1; height <= 4; ++height)
     for (int width = 1; width <= 5; ++width) {
@@ -128,7 +128,7 @@ TEST(CodecRoundTrip, PlanesLeaveOnlyRounding) {
   EXPECT_LT(inspect(encode(image)).value().depth_bytes, image.pixels() * 5 / 16) << "2.5 bits a pixel";
 }
 
-// Depths of scattered pixels of a plane are found by its neighbours all around, whatever their distance.
+// The depth of a scattered pixel of a plane is predicted from its neighbours all around, at any distance.
 TEST(CodecRoundTrip, ScatteredPixelsOfAPlaneLeaveOnlyRounding) {
   for (const double density : {0.003, 0.03, 0.1}) {
     DepthImage image = test::plane(256, 256, 301.7, -129.3);
@@ -199,7 +199,7 @@ std::vector<std::vector<uint8_t>> seeds_of(const std::string& fuzzer) {
   return out;
 }
 
-// Of an older version they would all be refused at their second byte.
+// Seeds of an older version would all be refused at their second byte.
 TEST(CodecFormat, SeedsOfTheFuzzersAreOfThisVersion) {
   const auto images = seeds_of("codec"), refinements = seeds_of("refinement"), masks = seeds_of("mask");
   EXPECT_GE(images.size(), 32u);
@@ -207,20 +207,20 @@ TEST(CodecFormat, SeedsOfTheFuzzersAreOfThisVersion) {
   EXPECT_GE(masks.size(), 9u);
   for (const auto& bytes : images) EXPECT_TRUE(decode(bytes).ok());
   const auto known = test::refined_images();
-  for (const auto& bytes : refinements) {  // the first byte says of which image
+  for (const auto& bytes : refinements) {  // the first byte chooses the image
     const auto& of = known[bytes[0] % known.size()];
     const auto exact = decode_refinement(std::span(bytes).subspan(1), of.bounded);
     ASSERT_TRUE(exact.ok()) << exact.error().text;
     EXPECT_EQ(*exact, of.exact);
   }
-  for (const auto& bytes : masks) {  // two bytes say of which size
+  for (const auto& bytes : masks) {  // the first two bytes are the size
     std::vector<uint32_t> words((bytes.size() - 2) / 4);
     if (!words.empty()) std::memcpy(words.data(), bytes.data() + 2, 4 * words.size());
     EXPECT_TRUE(decode_mask(words, bytes[0] + 1, bytes[1] + 1).ok());
   }
 }
 
-// Sparse tiles are predicted in floating point, which must be the same everywhere: these bytes, too.
+// Sparse tiles are predicted in floating point, which must be the same on all machines: so must these bytes.
 TEST(CodecFormat, GoldenBytesOfASparseTile) {
   DepthImage image(9, 8);
   for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {
@@ -238,7 +238,7 @@ TEST(CodecFormat, GoldenBytesOfASparseTile) {
   EXPECT_TRUE(*back == image);
 }
 
-// With normals that are canonical, so that a pole turns them: most of a session's images.
+// With canonical normals, which a pole turns: most of a session's images have them.
 TEST(CodecFormat, GoldenBytesOfASparseTileThatIsTurned) {
   DepthImage image(9, 8);
   for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {

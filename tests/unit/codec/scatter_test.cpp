@@ -1,4 +1,4 @@
-// Sparse tiles: what they cost where it can be said, and that no dense tile is coded as one.
+// Sparse tiles: their size where it can be computed, and no dense tile is coded as a sparse one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,11 +15,11 @@
 namespace telesplat::codec {
 namespace {
 
-// A tile whose pixels `mask` covers, coded as a sparse one.
+// Codes a tile with the pixels of `mask` as a sparse one.
 std::vector<uint8_t> as_sparse(const image::DepthImage& image, const image::PixelMask& mask) {
   const detail::TileRect rect{0, static_cast<size_t>(image.width), image.width, image.height};
   std::vector<uint8_t> out{0xD7, 12, 0, static_cast<uint8_t>(image.width), static_cast<uint8_t>(image.height), 2 | 4};
-  out.resize(out.size() + 8);  // the first prediction: none
+  out.resize(out.size() + 8);  // the first prediction: 0
   out[6] = 1;
   detail::put_mask(out, mask);
   out.push_back(detail::kRaw);
@@ -70,7 +70,7 @@ image::DepthImage scattered(double x, double y, double z, Colour colour_of) {
 }
 constexpr auto kGrey = [](auto&) { return 0x808080u; };
 
-// Level ground lies on the seam of the octahedron's map.
+// Level ground lies on the seam of the octahedral map.
 TEST(Scatter, NormalsAtTheSeamCostNoMoreThanElsewhere) {
   const auto at_pole = encode(scattered(0, 0, 1, kGrey)), at_seam = encode(scattered(0, 0, -1, kGrey)),
              beside = encode(scattered(0, 1, 0, kGrey));
@@ -83,14 +83,14 @@ TEST(Scatter, NormalsThatAreNotCanonicalComeBack) {
   size_t others = 0;
   for (size_t i = 0; i < image.pixels(); ++i)
     if (image.depth[i] != 0 && i % 3 == 0) {
-      image.normal[i] = static_cast<uint16_t>(254 << 8 | i % 255);  // on the map's rim, which is folded upon itself
+      image.normal[i] = static_cast<uint16_t>(254 << 8 | i % 255);  // on the map's rim, which is folded onto itself
       others += image::canonical_normal16(image.normal[i]) != image.normal[i];
     }
   ASSERT_GT(others, 10u);
   EXPECT_EQ(decode(encode(image)).value(), image);
 }
 
-// What a viewer lacks lies all over its view. With its own base, mask, tables and end each tile takes 20 bytes or more.
+// Pixels that a viewer lacks lie all over its view. With its own base, mask, tables and end a tile takes 20 bytes.
 TEST(OneTile, IsWhatScatteredPixelsOfALargeImageAre) {
   image::DepthImage image = test::render({.width = 700, .height = 500, .seed = 4});
   test::keep_random(image, 0.002, 5);
@@ -128,7 +128,7 @@ TEST(OneTile, IsNoImageOfWhichAPartIsDense) {
   EXPECT_EQ(decode(bytes).value(), image);
 }
 
-// A walk tells 65535 pixels apart.
+// A walk distinguishes at most 65535 pixels.
 TEST(OneTile, HasNoMorePixelsThanAWalkTellsApart) {
   for (const double density : {0.0150, 0.0165}) {
     image::DepthImage image = test::random_pixels(2048, 2048, density, 9);
@@ -153,7 +153,7 @@ TEST(OneTile, IsSparseOrRefused) {
   EXPECT_FALSE(decode(sparse).ok()) << "of two tiles";
 }
 
-// A ramp's colours follow from their green, once it was seen.
+// Once a green has been seen, a ramp's other channels follow from it.
 TEST(Scatter, AColourWhoseGreenWasSeenCostsItsGreen) {
   const auto ramp = encode(scattered(0, 0, 1, [](auto& random) {
     const uint32_t g = random() % 64 * 4;

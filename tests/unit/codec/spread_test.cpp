@@ -1,4 +1,4 @@
-// Numbers that are predicted to a 16th: any comes back, and what they cost is what their spread says.
+// Numbers predicted to a 16th: any number comes back, and its cost follows from the spread.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -72,7 +72,7 @@ TEST(Spread, PlacesFollowOneAnother) {
     }
 }
 
-// What lies within a cell is likely as by Student's distribution function with 3 degrees of freedom.
+// Probability of a cell by Student's distribution function with 3 degrees of freedom.
 TEST(Spread, SharesAreStudents) {
   const auto below = [](double x) { return 0.5 + (x / (1 + x * x) + std::atan(x)) / std::numbers::pi; };
   for (const int scale : {0, 20, 41, 56})
@@ -102,7 +102,7 @@ TEST(Spread, AnyNumberComesBackWhateverWasExpected) {
   expect_back({});
 }
 
-// Where scales are wrong, they are corrected.
+// Wrong scales are corrected.
 TEST(Spread, ScalesAreCorrected) {
   std::mt19937 random(5);
   std::student_t_distribution<double> student(3);
@@ -118,7 +118,7 @@ TEST(Spread, ScalesAreCorrected) {
     EXPECT_LT(bits(spread, scale_of(spread * 8)), right + 0.15) << spread;
     EXPECT_LT(bits(spread, scale_of(spread / 8)), right + 0.15) << spread;
     if (spread >= 3) {
-      // The distribution's entropy, and what cells and their shares cost.
+      // The distribution's entropy, and the cost of cells and their shares.
       EXPECT_NEAR(right, std::log2(spread / std::sqrt(3.0)) + 1.7735 / std::numbers::ln2, 0.1) << spread;
     }
   }

@@ -27,11 +27,11 @@ void expect_near(uint32_t got, uint32_t want, int codes, const std::string& what
         << fmt::format("{}: #{:06x} is not near #{:06x}", what, got, want);
 }
 
-// What matplotlib 3.6 (viridis family, turbo), Moreland's table CoolWarmUChar33 and the formulas of the others say.
+// Values of matplotlib 3.6 (viridis family, turbo), Moreland's table CoolWarmUChar33 and the other maps' formulas.
 TEST(ColourMap, BuiltInMapsHaveThePublishedColours) {
   const struct {
     const char* name;
-    uint32_t at_0, at_64, at_128, at_200, at_255;  // of 255
+    uint32_t at_0, at_64, at_128, at_200, at_255;  // positions out of 255
   } published[] = {
       {"viridis", 0x440154, 0x3b528b, 0x21918c, 0x70cf57, 0xfde725},
       {"plasma", 0x0d0887, 0x7e03a8, 0xcc4778, 0xfba139, 0xf0f921},

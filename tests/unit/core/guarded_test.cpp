@@ -1,4 +1,4 @@
-// What happens in a thread stays there.
+// An exception in a thread ends the thread's work, not the process.
 #include "common/core/guarded.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// How many processors a process may use.
+// Number of processors that a process may use.
 #include "common/core/machine.h"
 
 #include <gtest/gtest.h>

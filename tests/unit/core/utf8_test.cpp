@@ -111,7 +111,7 @@ TEST(Printable, LinesKeepTheirFeedsAndNothingThatSteersATerminal) {
   EXPECT_EQ(printable_lines(longer + "\n" + longer), longer + "\n" + longer);
 }
 
-// What peers said is in many lines of logs.
+// Many lines of logs contain texts from peers.
 TEST(Log, ALineIsOneLineWhateverIsInIt) {
   testing::internal::CaptureStderr();
   log::initialise("printable", "info");

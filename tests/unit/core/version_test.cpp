@@ -17,7 +17,7 @@ TEST(Version, NamesVersionAndWhereKnownCommitAndDate) {
       << version();
 }
 
-// What the build's script writes for sources in a folder of their own.
+// Output of the build's script for sources in a folder of their own.
 class VersionScript : public testing::Test {
  protected:
   VersionScript() {

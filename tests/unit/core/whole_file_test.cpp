@@ -1,4 +1,4 @@
-// Files that are read or written as a whole, and that may be anything.
+// Files that are read or written as a whole, with any content.
 #include "common/core/whole_file.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ TEST_F(WholeFile, IsReadUpToItsLimit) {
   EXPECT_TRUE(check_readable(path, 100).ok());
   EXPECT_EQ(refusal(path, 99), "has 100 bytes, limit 99");
   EXPECT_EQ(*read_whole(put("empty", ""), 0), "");
-  // Nobody knows how long these are before they are read.
+  // The length of these files is unknown before they are read.
   EXPECT_TRUE(read_whole("/proc/self/stat", 4096).ok());
   EXPECT_FALSE(read_whole("/proc/self/stat", 10).ok());
 }

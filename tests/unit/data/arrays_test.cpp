@@ -1,4 +1,4 @@
-// Arrays of numbers in mesh files: listed with their ranges, read into chunks, refused where they are not there.
+// Arrays of numbers in mesh files: listed with their ranges, read into chunks, refused if they are missing.
 #include <bit>
 #include <limits>
 #include <set>
@@ -20,8 +20,8 @@ Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path) {
 
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 
-// A square of two triangles with the properties heat (float, one of them NaN) and id (uint8) of vertices, area (double)
-// of faces; positions as ply_of() has them.
+// A square of two triangles with the properties heat (float, one of them NaN) and id (uint8) of vertices, and area
+// (double) of faces; positions like those of ply_of().
 std::string square_ply(const std::string& encoding) {
   const bool ascii = encoding == "ascii", big = encoding == "binary_big_endian";
   std::string file = fmt::format(
@@ -93,8 +93,7 @@ TEST(PlyArray, OfAFaceIsThatOfAllItsTriangles) {
   EXPECT_EQ(mesh->scalars, (std::vector<float>{7, 7, 9}));  // the face of two corners is left out
 }
 
-// A tetrahedron's shape as VTK's formats have it, and arrays: t of points (1 2 3 and not a number), v a vector of
-// points, c of cells.
+// A tetrahedron in VTK's formats, with arrays: t of points (1 2 3 and not a number), v a vector of points, c of cells.
 constexpr const char* kVtp = R"(<?xml version="1.0"?>
 <VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"><PolyData>
 <Piece NumberOfPoints="4" NumberOfVerts="1" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="2">
@@ -264,7 +263,7 @@ TEST(ArrayStore, FacesHaveOneValueAndSmoothNormals) {
   file.replace(file.find("end_header"), 10, "property int number\nend_header");
   size_t faces = file.find("end_header\n") + 11;
   for (size_t v = 0; v < grid.positions.size(); ++v) faces = file.find('\n', faces) + 1;
-  file.resize(faces);  // the faces, again, with a number each
+  file.resize(faces);  // the faces again, each with a number
   for (size_t f = 0; f < grid.indices.size() / 3; ++f)
     file += fmt::format("3 {} {} {} {}\n", grid.indices[3 * f], grid.indices[3 * f + 1], grid.indices[3 * f + 2], f);
   const auto path = folder.write("grid.ply", file);
@@ -280,7 +279,7 @@ TEST(ArrayStore, FacesHaveOneValueAndSmoothNormals) {
   }
   EXPECT_EQ(numbers.size(), 128u);
   EXPECT_EQ(*numbers.rbegin(), 127);
-  // Triangles come in the same order, and their corners have the normals that they share with their neighbours.
+  // Triangles come in the same order, and their corners keep the normals that they share with their neighbours.
   for (size_t i = 0; i < flat.triangles.size(); ++i)
     for (size_t k = 0; k < 3; ++k) {
       EXPECT_EQ(flat.triangles[i][k].position, smooth.triangles[i][k].position);
@@ -301,7 +300,7 @@ TEST(ArrayStore, EachArrayHasAStoreOfItsOwnThatKnowsAllArrays) {
       EXPECT_EQ((*store)->info().array, array);
       EXPECT_EQ((*store)->info().arrays.size(), 4u);
     }
-  options.colouring = {.by = "heat:-1:1", .map = "plasma"};  // map and range are no part of it
+  options.colouring = {.by = "heat:-1:1", .map = "plasma"};  // map and range are not part of the store
   EXPECT_TRUE((*open_mesh(path, options, nullptr))->info().from_cache);
 }
 

@@ -1,4 +1,4 @@
-// Bad files become one clear line that names the file; nothing crashes, hangs or allocates by what a file claims.
+// A bad file gives one clear line that names it; no crash, no hang, no memory by a file's claims.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -18,7 +18,7 @@ long peak_rss_kb() {
   return usage.ru_maxrss;
 }
 
-// Opens a file that must be refused. Returns the error's text, after checking what every such text promises.
+// Opens a file that must be refused. Returns the error's text, after checking the properties of every such text.
 std::string refusal(const std::string& path) {
   const auto store = open_mesh(path, plain_options("auto"), nullptr);
   EXPECT_FALSE(store.ok()) << path << " was accepted";
@@ -187,7 +187,7 @@ TEST(BadOptions, AreRefused) {
   EXPECT_NE(store.error().text.find("'w'"), std::string::npos);
 }
 
-// Any beginning of a good file is refused or read; it never crashes.
+// Any beginning of a good file is refused or read, without a crash.
 TEST(Truncation, AtEveryLengthOfEachTextFormat) {
   const Mesh grid = wavy_grid(2);
   const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n",
@@ -212,7 +212,7 @@ TEST(Truncation, AtEveryLengthOfEachTextFormat) {
   EXPECT_GT(refused, 300u);
 }
 
-// Its buffers may stand in it as texts; everything else takes many times its size of memory.
+// The JSON may contain buffers as texts; any other content takes many times its size of memory.
 TEST(GltfJson, IsNoLargerThanItsLimitBesideTexts) {
   const std::string begin = R"({"asset":{"version":"2.0"},"x":")", end = R"("})";
   const std::string text = begin + std::string(kMostGltfJson, 'A') + R"(\"x)" + end;

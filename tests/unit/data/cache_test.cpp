@@ -1,4 +1,4 @@
-// The folder of chunk stores: what it tells, what goes, what stays.
+// The folder of chunk stores: its list, the stores that are deleted, the stores that stay.
 #include "services/data/mesh/cache.h"
 
 #include <fmt/format.h>
@@ -29,7 +29,7 @@ class CacheFolder : public testing::Test {
   ~CacheFolder() override { fs::remove_all(root_); }
 
   std::string folder() const { return root_ / "cache"; }
-  // A mesh of its own for each name.
+  // Makes a different mesh for each name.
   std::string mesh(const std::string& name) const {
     const std::string path = root_ / (name + ".off");
     std::ofstream(path) << "OFF\n3 1 0\n0 0 0\n1 0 0\n0 " << name.size() << " 0\n3 0 1 2\n";
@@ -43,7 +43,7 @@ class CacheFolder : public testing::Test {
     return store ? *store : nullptr;
   }
   std::vector<CachedStore> stores() const { return *cached_stores(folder()); }
-  // Seconds ago.
+  // s: seconds ago.
   void last_used(const std::string& name, int s) const {
     for (const auto& store : stores())
       if (store.source.ends_with("/" + name + ".off"))

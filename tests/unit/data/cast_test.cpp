@@ -1,5 +1,5 @@
-// What a ray meets in the data themselves, against surfaces, fields and opacities whose formulas are known: the place
-// and the value lie within the bounds that are told.
+// Hits of a ray in the data themselves, for surfaces, fields and opacities with known formulas: place and value lie
+// within the stated bounds.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -176,10 +176,10 @@ TEST(CastVolume, PlacesAndValuesAreWithinTheirBoundsOfTheFormulas) {
   EXPECT_GT(hits, 150);
 }
 
-// A sheet of one voxel whose values are 1000 there and 0 beside it. What lies between is one of all fields that bend no
-// more than the voxels do: trilinear, with the error of linear interpolation V t (1 - t) added or taken away, or smooth
-// (Catmull and Rom's spline). A jump of opacity at half of the value begins where 1 - t is half; what is in front of
-// the place and hides a quarter is an eighth of a voxel (log(0.75) / log(0.1)).
+// A sheet of one voxel whose values are 1000, and 0 beside it. The field between voxels may be any that bends no more
+// than the voxels do: trilinear, with the error of linear interpolation V t (1 - t) added or subtracted, or smooth
+// (Catmull and Rom's spline). A jump of opacity at half of the value begins where 1 - t is half; the part in front of
+// the place that hides a quarter is an eighth of a voxel thick (log(0.75) / log(0.1)).
 TEST(CastVolume, AOneVoxelSheetIsBoundedByTheFieldsItMayBeOf) {
   constexpr int kSheet = 32;
   const auto store = *VolumeStore::make(
@@ -212,7 +212,7 @@ TEST(CastVolume, AOneVoxelSheetIsBoundedByTheFieldsItMayBeOf) {
       EXPECT_LE(std::abs(place - at.z) * voxel_m, *found->error_m) << threshold;
       EXPECT_LE(std::abs(value - *found->value), *found->value_error) << threshold;
     }
-    // It tells no more than these fields need.
+    // The stated error is no larger than these fields need.
     EXPECT_LE(
         *found->error_m,
         voxel_m * (std::max(std::sqrt(1 - threshold) - (1 - threshold), std::sqrt(threshold) - threshold) + 3.0 / 16))
@@ -227,7 +227,7 @@ TEST(CastVolume, WhatHidesTooLittleIsNoPlace) {
   const auto solid = *volume::parse_transfer("0:#ffffff:0.5", {});
   const auto front = store->cast(0, solid, {}, {EpochId{1}, {0, 0, 2}, {0, 0, -1}});
   ASSERT_TRUE(front);
-  // A cut is where the volume begins.
+  // The volume begins at a cut.
   const auto cut = store->cast(0, solid, {{{{0, 0, -1}, 0}}}, {EpochId{1}, {0, 0, 2}, {0, 0, -1}});
   ASSERT_TRUE(cut);
   EXPECT_NEAR(cut->room.z, front->room.z - kRoom / 2, store->session().grid.unit_m());

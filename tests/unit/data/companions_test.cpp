@@ -1,4 +1,4 @@
-// Files that a data set's files name: a server reads those below their folder, and others only where it is told to.
+// Files that a data set's files name: a server reads those below their folder, and others only if an option allows it.
 #include "services/data/kinds.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Named {
-  std::string name, file, begin, end;  // the file's text is begin, the name that it has, end
+  std::string name, file, begin, end;  // the file's text is begin, the name in it, end
 };
 
 const std::string kVoxels(8, '\1');
@@ -99,7 +99,7 @@ TEST_F(Companions, OfASeriesAndOfASurfaceAreLookedAt) {
   EXPECT_FALSE(check_companions(iso));
 }
 
-// A header that lies beside a link to it lies where the link is; one file's own name is no other file's.
+// A header beside a link to it counts where the link is; one file's name does not stand for another file.
 TEST_F(Companions, ALinkToAHeaderCountsWhereItLies) {
   const Named& n = kNaming[0];
   folder.write("secret/a.nhdr", n.begin + "other" + n.end);

@@ -1,4 +1,4 @@
-// Normals that are made: flat faces stay flat, curved parts smooth, whatever the winding; and what copies take along.
+// Computed normals: flat faces stay flat, curved parts smooth, for any winding; and copied vertices keep their data.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -24,7 +24,7 @@ struct Shape {
   }
 };
 
-// 8 vertices, 12 triangles that look outward.
+// 8 vertices, 12 triangles that face outward.
 Shape cube() {
   Shape s;
   for (int i = 0; i < 8; ++i) s.positions.emplace_back(i & 1, i >> 1 & 1, i >> 2 & 1);
@@ -53,7 +53,7 @@ Shape cylinder(uint32_t sides) {
   return s;
 }
 
-// For each corner the normal there, as long as one. Positions of copies are those of what they copy.
+// Returns each corner's normal, of unit length. Copies have the positions of their originals.
 std::vector<glm::vec3> corner_normals(Shape& s, double crease_deg, size_t* copies = nullptr) {
   const SmoothNormals made = smooth_normals(s.positions, crease_deg, s.indices);
   EXPECT_EQ(made.normals.size(), s.positions.size() + made.copies.size());
@@ -73,7 +73,7 @@ TEST(Creases, ACubeHasFlatFaces) {
 }
 
 TEST(Creases, ACylinderIsSmoothAroundAndSharpAtItsCaps) {
-  for (const uint32_t sides : {10u, 64u, 20000u}) {  // 36 degrees between sides; the last has long fans
+  for (const uint32_t sides : {10u, 64u, 20000u}) {  // 36 degrees between sides; the last one has long fans
     Shape s = cylinder(sides);
     size_t copies = 0;
     const auto normals = corner_normals(s, 40, &copies);
@@ -104,7 +104,7 @@ TEST(Creases, TheAngleDecides) {
   }
 }
 
-// Viewers light both sides, so the sign does not matter; that turned triangles took from the sum does.
+// Viewers light both sides, so the sign does not matter; but turned triangles must not cancel others in the sum.
 TEST(Creases, TurnedTrianglesSpoilNoNormal) {
   std::mt19937 random(3);
   for (Shape whole : {cube(), cylinder(40)}) {
@@ -116,14 +116,14 @@ TEST(Creases, TurnedTrianglesSpoilNoNormal) {
     const auto expected = corner_normals(whole, 40, &copies_whole), got = corner_normals(turned, 40, &copies_turned);
     EXPECT_EQ(copies_turned, copies_whole);
     for (size_t c = 0; c < got.size(); ++c) {
-      size_t same = c - c % 3;  // the corner of the same vertex
+      size_t same = c - c % 3;  // a corner of the same vertex
       while (before[same] != corners[c]) ++same;
       EXPECT_GT(std::abs(glm::dot(got[c], expected[same])), 0.9999f) << c;
     }
   }
 }
 
-// A surface with holes, borders, edges of three triangles and vertices in which two parts touch.
+// A surface with holes, borders, edges of three triangles and vertices where two parts touch.
 TEST(Creases, EveryCornerKeepsItsPlaceOnAnyHeapOfTriangles) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> unit(-1, 1);

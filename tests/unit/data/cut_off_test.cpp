@@ -1,4 +1,4 @@
-// A file that others cut off while it is mapped ends its reader in one line that names it.
+// If another process cuts off a mapped file, the reader ends with one line that names it.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -18,7 +18,7 @@ uint64_t sum_of(std::span<const std::byte> bytes) {
   return out;
 }
 
-// In a process of its own.
+// Runs in a process of its own.
 void read_cut_off(const std::string& path, int exit_code) {
   const auto whole = MappedFile::open(path);
   const auto other = MappedFile::open("/proc/self/exe");
@@ -46,7 +46,7 @@ TEST(CutOffDeathTest, OfALongNameTheEndIsTold) {
   EXPECT_EXIT(read_cut_off(path, 2), testing::ExitedWithCode(2), "\\.\\.\\.b.*/a+-end\\.ply: was cut off");
 }
 
-// Whatever else is wrong with memory is no file's fault.
+// A bus error outside mapped files is not blamed on a file.
 TEST(CutOffDeathTest, OtherBusErrorsEndTheProcessAsBefore) {
   EXPECT_EXIT(
       {
@@ -62,7 +62,7 @@ TEST(CutOffDeathTest, OtherBusErrorsEndTheProcessAsBefore) {
       testing::KilledBySignal(SIGBUS), "^$");
 }
 
-// Places are given back: more files than there are places, one after the other, and all at once.
+// Places are reused: maps more files than there are places, one after the other, and all at once.
 TEST(CutOffDeathTest, ManyMappingsHarmNothing) {
   const TempFolder folder;
   const std::string path = folder.write("a.ply", std::string(5000, 'x')),

@@ -25,7 +25,7 @@ TEST(Elevation, StandsEastNorthAndUp) {
   EXPECT_EQ(mesh->indices.size(), 3u * 2 * 2 * 3);
   EXPECT_EQ(mesh->positions[0], glm::dvec3(100, 2000, 0));
   EXPECT_EQ(mesh->positions[7], glm::dvec3(190, 1970, 31));
-  // Every triangle is seen from above.
+  // Every triangle faces up.
   for (size_t i = 0; i < mesh->indices.size(); i += 3) {
     const auto p = [&](size_t k) { return mesh->positions[mesh->indices[i + k]]; };
     EXPECT_GT(glm::cross(p(1) - p(0), p(2) - p(0)).z, 0);
@@ -55,7 +55,7 @@ TEST(Elevation, IsScaledUpwards) {
   const auto three = elevation_mesh(flat, {.z_scale = 3}, "a");
   ASSERT_TRUE(three);
   EXPECT_EQ(three->positions[5].z, 15);
-  // Without a place on earth nobody knows what a pixel is: the relief becomes a seventh of the longer side.
+  // Without a place on earth the size of a pixel is unknown: the relief becomes a seventh of the longer side.
   auto unplaced = flat;
   unplaced.georeferenced = false;
   unplaced.along_row = {1, 0}, unplaced.along_column = {0, -1};

@@ -1,4 +1,4 @@
-// Each format, as its writers write it, comes out as the same mesh.
+// Each format, written as programs write it, gives the same mesh.
 #include "services/data/mesh/reader.h"
 #include "tests/support/files/data_files.h"
 
@@ -188,7 +188,7 @@ TEST(ObjReader, ColoursOfVerticesAndOfMaterials) {
   const Mesh mesh = read(folder.write(
       "m.obj",
       "mtllib colours.mtl\nv 0 0 0\nv 1 0 .5\nv 1 1 0\nv 0 1 .5\nusemtl red\nf 1 2 3\nusemtl grey\nf 1 3 4\n"));
-  ASSERT_EQ(mesh.positions.size(), 6u);  // the corners that two materials share are there twice
+  ASSERT_EQ(mesh.positions.size(), 6u);  // corners between two materials exist twice
   EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0xff0000, 0xff0000, 0xff0000, 0x808080, 0x808080, 0x808080}));
 }
 
@@ -280,7 +280,7 @@ TEST(AsciiGrids, ATextureIsDraped) {
   const auto missing = read_mesh(path, nullptr, {.texture = folder / "nothing.png"});
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().text.find("nothing.png"), std::string::npos);
-  // A picture that names another one is followed nowhere.
+  // A picture that names another one is not followed.
   const auto naming = folder.write(
       "naming.png",
       "<VRTDataset rasterXSize=\"2\" rasterYSize=\"2\"><VRTRasterBand dataType=\"Byte\" band=\"1\"><SimpleSource>"

@@ -1,4 +1,4 @@
-// What `telesplat inspect` finds out of data sets: true units, what a run would choose, values of all steps.
+// Results of `telesplat inspect` for data sets: true units, choices of a run, values of all steps.
 #include "services/data/inspect.h"
 
 #include "tests/support/volume/files.h"
@@ -17,7 +17,7 @@ void expect_rows(const Description& told, std::initializer_list<const char*> par
   for (const char* part : parts) EXPECT_NE(table.find(part), std::string::npos) << part << " is not in\n" << table;
 }
 
-// An SRTM tile: its name says where it lies, its size how fine it is.
+// An SRTM tile: its name gives its place, its size the resolution.
 std::string write_tile(const TempFolder& folder) {
   constexpr int kSide = 1201;
   std::string heights;
@@ -127,8 +127,8 @@ TEST(Inspect, AVolumesUnitIsTheOneItsFileSays) {
 TEST(Inspect, APatientsAxesAreNamed) {
   const TempFolder folder;
   const Pattern p{{5, 4, 3}, glm::dmat4(1.0), 0, 1};
-  const auto facts = inspect_volume(folder.write("a.nii", nifti_header(p, {.sform = true}) + p.bytes<int16_t>()), {}, {},
-                                    nullptr);
+  const auto facts =
+      inspect_volume(folder.write("a.nii", nifti_header(p, {.sform = true}) + p.bytes<int16_t>()), {}, {}, nullptr);
   ASSERT_TRUE(facts) << facts.error().text;
   const Description told = describe(*facts);
   EXPECT_EQ(told.json["space"], "RAS");

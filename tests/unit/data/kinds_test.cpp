@@ -1,4 +1,4 @@
-// What a data set is, which options fit it, and what the session is told of it.
+// The kind of a data set, the options that fit it, and its facts for the session.
 #include "services/data/kinds.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ class Kinds : public testing::Test {
   DataOptions of(const std::string& scene) const {
     DataOptions o;
     o.scene = scene;
-    o.mesh.use_cache = scene == julia::kSceneWord || scene.ends_with(".raw");  // others have none
+    o.mesh.use_cache = scene == julia::kSceneWord || scene.ends_with(".raw");  // others have no cache
     return o;
   }
   // 4 x 4 x 4 voxels, 0 in one half and 200 in the other.
@@ -69,7 +69,7 @@ TEST_F(Kinds, ASurfaceStandsWhereItsVolumeStands) {
   const auto surface = open(o, [](const char*, double) {});
   ASSERT_TRUE(volume.ok() && surface.ok());
   EXPECT_EQ(make_hello(**volume, "data", "").box_room, (geometry::Box{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}));
-  // Half-way up, from the first voxel's centre to the last one's, 0.2 m a voxel; z is up, as of the volume.
+  // Half-way up, from the first voxel's centre to the last one's, 0.2 m a voxel; z is up, as in the volume.
   const geometry::Box box = make_hello(**surface, "data", "").box_room;
   for (int a = 0; a < 3; ++a) {
     EXPECT_NEAR(box.lo[a], a == 1 ? 0 : -0.3, 1e-6);

@@ -1,4 +1,4 @@
-// From data coordinates to room space: precision, turning, degenerate triangles, normals, the guess of what is up.
+// From data coordinates to room space: precision, turning, degenerate triangles, normals, the guess of the up axis.
 #include <glm/gtc/matrix_access.hpp>
 #include <glm/matrix.hpp>
 
@@ -38,7 +38,7 @@ TEST(RotationForUp, APatientStandsInOneWay) {
 
 TEST(PlaceMesh, CentresAndScalesToTheRoomSize) {
   Mesh mesh;
-  mesh.positions = {{100, 5, -3}, {104, 5, -3}, {100, 6, -1}, {1e9, 1e9, 1e9}};  // the last is used by no triangle
+  mesh.positions = {{100, 5, -3}, {104, 5, -3}, {100, 6, -1}, {1e9, 1e9, 1e9}};  // no triangle uses the last one
   mesh.indices = {0, 1, 2};
   const auto placed = place(mesh, "y", 2.0);
   ASSERT_TRUE(placed.ok());
@@ -47,7 +47,7 @@ TEST(PlaceMesh, CentresAndScalesToTheRoomSize) {
   EXPECT_EQ(placed->colours, std::vector<uint32_t>(4, kNeutralAlbedo));
 }
 
-// UTM-like offsets leave a float some 0.5 m of resolution; the mesh here has details of millimetres.
+// UTM-like offsets leave a float a resolution of some 0.5 m; the mesh here has details of millimetres.
 TEST(PlaceMesh, LargeOffsetsLoseNothing) {
   for (const double offset : {0.0, 1e7, 4.6e9}) {
     Mesh near_origin = wavy_grid(10), far = near_origin;
@@ -108,7 +108,7 @@ TEST(PlaceMesh, TinyAndHugeUnitsWork) {
   }
 }
 
-// Vertices where marching cubes over a grid of n^3 voxels would put them for a sphere.
+// Vertices of a sphere as marching cubes over a grid of n^3 voxels would place them.
 Mesh isosurface(int n) {
   Mesh mesh;
   const auto value = [n](glm::dvec3 p) { return glm::length(p - glm::dvec3(0.5 * n + 0.1)) - 0.37 * n; };
@@ -161,7 +161,7 @@ TEST(GuessUp, OthersOnY) {
       for (int z = 0; z < 20; ++z) boxes.positions.emplace_back(x, y, z);
   for (uint32_t i = 2; i < boxes.positions.size(); ++i) boxes.indices.insert(boxes.indices.end(), {i - 2, i - 1, i});
   EXPECT_EQ(guess_up(boxes).axis, "y");
-  Mesh terrain = wavy_grid(30);  // a terrain that stands on y
+  Mesh terrain = wavy_grid(30);  // a terrain with y up
   for (auto& p : terrain.positions) std::swap(p.y, p.z);
   EXPECT_EQ(guess_up(terrain).axis, "y");
 }

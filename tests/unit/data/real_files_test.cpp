@@ -1,4 +1,4 @@
-// Real meshes of every format, where they are present.
+// Real meshes of every format, if this machine has them.
 #include <cstdlib>
 
 #include "tests/support/files/data_files.h"

@@ -1,4 +1,4 @@
-// A mesh's data server between its sockets: orders of arrays are answered, whoever gives them.
+// A mesh's data server between its sockets: it answers orders of arrays from any master.
 #include "services/data/mesh/served_mesh.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ class NoChunks final : public MeshStore {
 
 class ServedMeshTest : public testing::Test {
  protected:
-  // What the master is told after this order of this master.
+  // Returns the answer for `master` after this order.
   std::string answer(uint64_t master, const std::string& order) {
     wire::Welcome session;
     session.master = InstanceId{master};
@@ -84,7 +84,7 @@ TEST(ServedMesh, AChunkIsReadOnlyForAPeerWhoseQueueTakesIt) {
   ASSERT_TRUE(asker.connect("inproc://chunks"));
   constexpr int kAsked = 1000;
   for (int asked = 0; asked < kAsked; ++asked) {
-    net::wait_readable({&asker}, 0);  // it hears what was read of its requests
+    net::wait_readable({&asker}, 0);  // it learns that its requests were read
     ASSERT_TRUE(asker.send(wire::ChunkRequest{EpochId{1}, ChunkId{0}, ""}));
     ASSERT_TRUE(net::wait_readable({&requests}, 20000));
     served->answer(*requests.receive(), {requests, master});
@@ -96,7 +96,7 @@ TEST(ServedMesh, AChunkIsReadOnlyForAPeerWhoseQueueTakesIt) {
   EXPECT_EQ(store->looked_at, got);
 }
 
-// Lists are large, and quickly asked for.
+// Lists are large, and quick to request.
 TEST_F(ServedMeshTest, APeerGetsAFewListsAtOnce) {
   net::Context context;
   net::Socket requests(context, net::Kind::kRouter, "requests", {}), master(context, net::Kind::kRouter, "master", {});

@@ -1,4 +1,4 @@
-// The chunk store: what went in comes out, once made it is found again, a damaged one is made anew.
+// The chunk store: data come back, a store is found again once made, and a damaged one is made anew.
 #include <thread>
 
 #include "services/data/inspect.h"
@@ -15,7 +15,7 @@ MeshOptions cached_in(const std::string& folder) {
   return options;
 }
 
-// A grid and a folder to cache it in.
+// A grid and a folder for its cache.
 class StoreTest : public testing::Test {
  protected:
   TempFolder folder_;
@@ -131,7 +131,7 @@ TEST_F(StoreTest, DamagedStoresAreMadeAnew) {
     fs::resize_file(file, length);
     damage_and_open(fmt::format("cut to {}", length));
   }
-  // Magic, version, number of chunks, size, a count, the checksum's surroundings, the table of contents, a chunk.
+  // Magic, version, number of chunks, size, a count, bytes around the checksum, the table of contents, a chunk.
   for (uint64_t offset : {0, 8, 12, 16, 32, 100, 4096, 4104, 8192 + 4, 8192 + 5000}) {
     {
       std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);

@@ -1,4 +1,4 @@
-// The terrain generator: exact counts, the same land for the same seed, and what a data server makes of it.
+// The terrain generator: exact counts, the same land for the same seed, and its result in a data server.
 #include "tools/make_terrain/terrain.h"
 
 #include <map>
@@ -49,7 +49,7 @@ TEST(Terrain, IsACalderaWithALake) {
   }
   const auto lake = std::max_element(heights.begin(), heights.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
-  EXPECT_FLOAT_EQ(lake->first, 1883.0f);  // its level, and flat
+  EXPECT_FLOAT_EQ(lake->first, 1883.0f);  // the lake's level, and flat
   const double share = static_cast<double>(lake->second) / static_cast<double>(land.positions.size());
   EXPECT_GT(share, 0.05);
   EXPECT_LT(share, 0.35);

@@ -38,7 +38,7 @@ std::string png_of(const TempFolder& folder, const image::View& picture) {
   return content_of(folder / "made.png");
 }
 
-// The colour of the vertex that lies nearest.
+// Returns the colour of the nearest vertex.
 uint32_t colour_near(const Mesh& mesh, glm::dvec3 place) {
   size_t best = 0;
   for (size_t v = 0; v < mesh.positions.size(); ++v)
@@ -47,8 +47,8 @@ uint32_t colour_near(const Mesh& mesh, glm::dvec3 place) {
   return mesh.colours.empty() ? 0 : mesh.colours[best];
 }
 
-// Edges by the positions of their ends: two triangles at each, or one at the rim. A vertex in the middle of a
-// neighbour's edge would make edges that have one triangle inside of the surface.
+// Returns the rim: edges, by the positions of their ends, with one triangle; others have two. A vertex in the middle of
+// a neighbour's edge would make edges with one triangle inside of the surface.
 std::vector<std::pair<glm::dvec3, glm::dvec3>> rim(const Mesh& mesh) {
   const auto less = [](const glm::dvec3& a, const glm::dvec3& b) {
     return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
@@ -231,7 +231,7 @@ TEST(Textures, DamagedPicturesAreRefusedWithTheirName) {
     EXPECT_NE(mesh.error().text.find("bad.png"), std::string::npos) << mesh.error().text;
     EXPECT_EQ(mesh.error().text.find('\n'), std::string::npos) << mesh.error().text;
   }
-  // A header of 60000 x 60000 pixels and nothing behind it.
+  // A header of 60000 x 60000 pixels without data behind it.
   std::string huge = whole.substr(0, 33);
   for (const size_t at : {16, 20}) huge[at] = 0, huge[at + 1] = 0, huge[at + 2] = char(0xea), huge[at + 3] = 0x60;
   folder.write("bad.png", huge);
@@ -272,7 +272,7 @@ TEST(Textures, ThePicturesContentIsPartOfTheStoresName) {
   EXPECT_NE(coarser->variant, after->variant);
 }
 
-// A cube of six faces, all with the same picture; positions shared or not, as the format wants it.
+// A cube of six faces, all with the same picture; positions shared or not, as the format needs them.
 struct Cube {
   std::vector<glm::vec3> positions;
   std::vector<glm::vec2> uv;
@@ -338,7 +338,7 @@ std::string glb(const Cube& c, const std::string& png, const std::string& image,
 
 constexpr const char* kEmbedded = R"({"bufferView":3,"mimeType":"image/png"})";
 
-// Where the squares of the picture lie on the cube's side towards +z (x to the right, y up).
+// Places of the picture's squares on the cube's side towards +z (x to the right, y up).
 void expect_cube_right_way_round(const Mesh& mesh) {
   // axis 2, side 1: u goes along x, v of the formula along y, and the picture's upper rim is at v = 1.
   EXPECT_EQ(colour_near(mesh, {0.25, 0.75, 1}), kRed);
@@ -389,7 +389,7 @@ TEST(Textures, GltfsPictureMayLieBesideItOrInText) {
   const TempFolder folder;
   png_of(folder, four_colours(16));
   expect_cube_right_way_round(read(folder.write("cube.glb", glb(cube(), "", R"({"uri":"made.png"})", "{}"))));
-  // The smallest PNG there is, one red pixel, as text.
+  // The smallest possible PNG, one red pixel, as text.
   const std::string red =
       R"({"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"})";
   for (const uint32_t c : read(folder.write("red.glb", glb(cube(), "", red, "{}"))).colours) EXPECT_EQ(c, kRed);
@@ -429,7 +429,7 @@ TEST(Textures, DetailEndsAtTheLimitAndSaysSo) {
   EXPECT_GT(mesh.indices.size() / 3, 1000u) << "the limit is made use of";
   ASSERT_EQ(mesh.notes.size(), 1u);
   EXPECT_NE(mesh.notes[0].find("--texture-detail 2000"), std::string::npos) << mesh.notes[0];
-  // Vertices that stand for many texels get their mean: the noise is averaged to grey, of the mean of its light.
+  // A vertex that stands for many texels gets their mean: the noise becomes grey, by the mean of its light.
   double off = 0;
   for (const uint32_t c : mesh.colours) off += std::abs(int(c >> 8 & 255) - 0x98);
   EXPECT_LT(off / double(mesh.colours.size()), 30);
@@ -447,7 +447,7 @@ TEST(Textures, AnyMeshStaysWithoutCracks) {
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     std::vector<uint32_t> faces = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
     TextureUse use;
-    Mesh seams;  // every face has vertices of its own, so every edge is a seam
+    Mesh seams;  // every face has its own vertices, so every edge is a seam
     for (const uint32_t i : faces) {
       seams.indices.push_back(uint32_t(seams.positions.size()));
       seams.positions.push_back(mesh.positions[i]);
@@ -484,7 +484,7 @@ TEST(Bake, TexturesOfOneColourAreNotSearched) {
   EXPECT_TRUE(grey->plain());
   EXPECT_FALSE(Texture(four_colours(2), Wrap::kRepeat, Wrap::kRepeat).plain());
   use.textures = {grey};
-  // Each of them repeats it 100 times and more: seconds, if every texel were looked at.
+  // Each of them repeats the texture 100 times and more: reading every texel would take seconds.
   for (uint32_t v = 0; v < 30'000; ++v) {
     mesh.positions.emplace_back(v % 3 == 1, v % 3 == 2, v / 3);
     mesh.indices.push_back(v);

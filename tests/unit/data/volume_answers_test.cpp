@@ -25,7 +25,7 @@ wire::Welcome welcome_of(const VolumeStore& store, uint64_t epoch, const std::st
 
 class Answers : public testing::Test {
  protected:
-  // A column of 200 slices, so that an answer cannot have all.
+  // A column of 200 slices, too many for a single answer.
   std::unique_ptr<VolumeStore> store = open_or_fail(noise(3, {9, 7, 200}));
   VolumeAnswers answers{*store};
 
@@ -39,7 +39,7 @@ class Answers : public testing::Test {
     EXPECT_TRUE(reply->peer.empty());
     return *wire::decode<wire::SliceWeights>(std::as_bytes(std::span(reply->body)));
   }
-  // Its answer; bodies live as long as the fixture.
+  // Returns its answer; bodies live as long as the fixture.
   std::optional<wire::VoxelData> data(std::string* peer = nullptr) {
     auto reply = answers.work(kSelf);
     if (!reply || reply->type != wire::VoxelData::kName) return std::nullopt;
@@ -47,7 +47,7 @@ class Answers : public testing::Test {
     bodies.push_back(std::move(reply->body));
     return *wire::decode<wire::VoxelData>(std::as_bytes(std::span(bodies.back())));
   }
-  // True: queued. False: answered at once, with nothing.
+  // True: queued. False: answered at once with an empty answer.
   bool ask(const wire::VoxelRequest& request, const std::string& peer = "a") {
     const auto reply = answers.ask(peer, request);
     EXPECT_TRUE(reply) << reply.error().text;
@@ -91,7 +91,7 @@ TEST_F(Answers, WeightsOfEveryEpochGoToTheMaster) {
   const auto second = weights();
   ASSERT_TRUE(second);
   EXPECT_LT(second->voxels[0], first->voxels[0]);
-  // Of epochs that came while none was asked for, only the newest's.
+  // Several epochs came without a request: only the newest one's weights are sent.
   follow(3);
   follow(4);
   EXPECT_EQ(weights()->epoch, EpochId{4});
@@ -144,7 +144,7 @@ TEST_F(Answers, OfANewTransferFunctionHaveOnlyWhatLacks) {
   for (const uint16_t l : added.level) ASSERT_TRUE(l >= 80 && l < 100) << l;
   EXPECT_EQ(std::vector(second->have.begin(), second->have.end()),
             std::vector(first->shown.begin(), first->shown.end()));
-  // Together: all of the levels that the answer says are there.
+  // The two answers together have all levels that the second one lists.
   const auto shown =
       *volume::LevelSet::from_bytes({reinterpret_cast<const uint8_t*>(second->shown.data()), second->shown.size()});
   EXPECT_TRUE(shown.contains(shown_levels(*volume::parse_transfer(wider, {}), levels)));
@@ -174,7 +174,7 @@ TEST_F(Answers, UnknownEpochsAreAnsweredAtOnceAndOldOnesForgotten) {
   EXPECT_FALSE(ask(request(1, 0, 5)));
   EXPECT_TRUE(ask(request(2, 0, 5)));
   EXPECT_FALSE(ask(request(99, 0, 5)));
-  // Another master counts from 1 again.
+  // A new master counts from 1 again.
   auto other = welcome_of(*store, 1);
   other.master = InstanceId{4};
   ASSERT_TRUE(answers.follow(other));

@@ -1,5 +1,4 @@
-// Bad volume files become one clear line that names the file; nothing crashes, hangs or allocates by what a file
-// claims.
+// A bad volume file gives one clear line that names it; no crash, no hang, no memory by a file's claims.
 #include <sys/resource.h>
 
 #include "services/data/volume/formats/import_stream.h"
@@ -19,12 +18,12 @@ long peak_rss_kb() {
 }
 
 #ifdef TELESPLAT_SANITIZED
-constexpr long kMostTaken_kb = 256 * 1024;  // with the shadow of the memory, and what is held back when it is freed
+constexpr long kMostTaken_kb = 256 * 1024;  // with the memory's shadow, and freed memory that is held back
 #else
 constexpr long kMostTaken_kb = 64 * 1024;
 #endif
 
-// Reads what must be refused. Returns the error's text, after checking what every such text promises.
+// Reads a file that must be refused. Returns the error's text, after checking the properties of every such text.
 std::string refusal(const std::string& path, const std::string& spec = "", const std::string& named = "") {
   const long before_kb = peak_rss_kb();
   const auto source = find_volume(path, {.raw = spec});
@@ -213,7 +212,7 @@ TEST(BadVolumeFiles, EmptyMissingAndSpecialOnes) {
   EXPECT_FALSE(looks_like_volume(folder / "gone.nrrd"));
 }
 
-// Cut at every length, up to where all voxels are there: a checksum follows compressed ones, of 8 bytes for gzip and 4
+// Cuts at every length, up to where all voxels are there: a checksum follows compressed ones, of 8 bytes for gzip and 4
 // for zlib.
 TEST(BadVolumeFiles, CutAnywhereAreRefused) {
   const TempFolder folder;
@@ -306,7 +305,7 @@ TEST(BadRaw, SizesAndSpecsThatDoNotFit) {
                            "5x4x3:u8:1,-2,1", ":u8", "5x4x3x2:u8", "-5x4x3:u8", "5x4x3:u8:1,2,nan",
                            "99999999999999999999x1x1:u8", "5X4X3:u8", "5x4x3:f16", "5x4x3:u8:1,1,1:2"})
     EXPECT_SAYS(refusal(path, spec), "--raw");
-  // A wrong type is told which there are, all of them.
+  // The error for a wrong type lists all types.
   const std::string types = refusal(path, "5x4x3:uint16");
   EXPECT_SAYS(types, "\"uint16\" is no type");
   for (const char* type : {"u8", "i16", "u32", "f64", "u16be", "little-endian"}) EXPECT_SAYS(types, type);
@@ -349,8 +348,8 @@ TEST(BadSeries, StepsOfOtherSizesAreRefusedWithBothSizes) {
   EXPECT_TRUE(read_volume(*source, 0, nullptr).ok());
 }
 
-// A header that is honest about a bomb: what it unpacks to ends the reading, not its claim, and memory stays what was
-// unpacked.
+// A header that honestly states the size of a bomb: the end of the unpacked bytes ends the reading, not the claim, and
+// memory stays at the unpacked size.
 TEST(Bombs, ThatPackLessThanTheyClaimTakeNoMemory) {
   const TempFolder folder;
   const std::string zeroes = packed(std::string(1 << 20, '\0'));  // a thousand to one, and no more
@@ -359,7 +358,7 @@ TEST(Bombs, ThatPackLessThanTheyClaimTakeNoMemory) {
   EXPECT_SAYS(refusal(path), "ends too early");
 }
 
-// The pipe from the import program: whatever comes, no crash and no memory for claims.
+// The pipe from the import program: any bytes cause no crash and no memory for claims.
 TEST(ImportStream, SurvivesBytesThatAreNoVolume) {
   const auto received = [](const std::string& bytes, uint64_t most) {
     int ends[2];
@@ -392,7 +391,7 @@ TEST(ImportStream, SurvivesBytesThatAreNoVolume) {
   for (size_t at = 0; at < 120 && at < stream.size(); ++at) {
     std::string changed = stream;
     changed[at] = char(changed[at] ^ 0x55);
-    const auto result = received(changed, data.size());  // a voxel's or matrix's change passes; nothing else does harm
+    const auto result = received(changed, data.size());  // a changed voxel or matrix passes; other changes do no harm
     if (result && result->ok()) {
       EXPECT_LE(result->value().bytes.size(), data.size());
     }

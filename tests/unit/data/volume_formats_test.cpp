@@ -59,7 +59,7 @@ TEST(Nrrd, SpacingsAloneAndLeftHandedSpaces) {
   const std::string head = "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 3 2 2\nencoding: raw\n";
   p.index_to_data[0][0] = 0.5, p.index_to_data[2][2] = 4;
   expect_same(read_or_fail(folder.write("a.nrrd", head + "spacings: 0.5 nan 4\r\n\r\n" + p.bytes<uint8_t>())), p);
-  // In left-anterior-superior, x grows to the left, as in no right-handed space with the other two.
+  // In left-anterior-superior, x grows to the left, unlike in a right-handed space with the other two axes.
   p.index_to_data[0][0] = -0.5, p.index_to_data[3][0] = -7;
   expect_same(
       read_or_fail(folder.write("b.nrrd", head +
@@ -206,7 +206,7 @@ TEST(Nifti, QformTurnsAndMayMirror) {
     p.index_to_data[3] = {3, -4, 5, 1};
     Nifti n{.sform = false, .qform = true, .quaternion = {0, s, s}, .qfac = qfac};
     expect_same(read_or_fail(folder.write("a.nii", nifti_header(p, n) + p.bytes<int16_t>())), p);
-    n.sform = true;  // says the same; VTK turns slices round all the same
+    n.sform = true;  // the same placement; VTK turns slices round all the same
     expect_same(read_or_fail(folder.write("b.nii", nifti_header(p, n) + p.bytes<int16_t>())), p);
   }
 }
@@ -244,7 +244,7 @@ TEST(Vti, ReadsExtentsThatBeginElsewhereAndCells) {
   expect_same(read_or_fail(folder.write("cells.vti", file("10 14 -1 2 0 2", "CellData"))), p);
 }
 
-// Plain types are little-endian; "be" turns them round.
+// Plain types are little-endian; "be" swaps their bytes.
 TEST(Raw, HasEveryTypeInEitherByteOrder) {
   const auto check = [&]<class T>(T, const std::string& type) {
     const TempFolder folder;
@@ -293,7 +293,7 @@ TEST_P(DicomFolder, IsSortedByPositionAndPlaced) {
   const TempFolder folder;
   const Pattern p = turned_pattern();
   const Dicom d{.syntax = GetParam(), .modality = "CT", .slope = "2", .intercept = "-1024", .bits_stored = 12};
-  // Names in another order than positions; something else beside them.
+  // Names in another order than positions, and another file beside them.
   const char* names[] = {"b", "c", "a"};
   for (int k = 0; k < 3; ++k) folder.write(names[k], dicom_slice(p, k, d));
   folder.write("README.txt", "slices");
@@ -348,7 +348,7 @@ TEST(DicomSeries, GoesByNumberWithoutPositionsAndRescalesEachSlice) {
   for (int k = 0; k < 3; ++k)
     folder.write(fmt::format("{}.dcm", 9 - k), dicom_slice(p, k, {.slope = "0.5", .positions = false}));
   expect_same(read_or_fail(folder / ""), p, 0.5, 0);
-  // One slice with another slope: values come as f32.
+  // One slice has another slope: values become f32.
   folder.write("9.dcm", dicom_slice(p, 0, {.slope = "0.25", .positions = false}));
   const Volume v = read_or_fail(folder / "");
   EXPECT_EQ(v.type, VoxelType::kF32);

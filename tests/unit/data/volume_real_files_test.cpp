@@ -1,4 +1,4 @@
-// Real volumes of several formats, where they are present.
+// Real volumes of several formats, if this machine has them.
 #include <cmath>
 #include <cstdlib>
 #include <glm/geometric.hpp>
@@ -91,8 +91,8 @@ Volume read_or_fail(const std::string& path, size_t step = 0) {
   return volume ? std::move(*volume) : Volume{};
 }
 
-// The folder holds 40 neighbouring slices of the scan that the single file has whole, turned half round about x: two
-// readers that share nothing must agree.
+// The folder holds 40 neighbouring slices of the scan in the single file, turned half round about x: two readers that
+// share nothing must agree.
 TEST(RealVolumeSlices, OfTheDicomFolderAreThoseOfTheMetaImage) {
   const std::string folder = data_folder() + "/volumes/";
   for (const char* name : {"alderson-dicom", "alderson-ct-512x512x199.mha"})

@@ -1,5 +1,4 @@
-// Real volumes, where they are present: opened, classified by every preset, coded within the bytes that are allowed a
-// voxel.
+// Real volumes, if this machine has them: opened, classified by every preset, coded within the limit of bytes a voxel.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

@@ -71,7 +71,7 @@ TEST(VolumeStatistics, TypicalValuesLeaveTheBackgroundOut) {
   EXPECT_EQ(range.hi, 255);
   EXPECT_NEAR(range.typical_lo, 51, 1);
   EXPECT_NEAR(range.typical_hi, 149, 1);
-  // Nearly all of it within 4 % of the range: the most frequent value alone is background.
+  // Nearly all values are within 4 % of the range: only the most frequent one is background.
   std::vector<uint64_t> narrow(1000);
   narrow[0] = 1000000, narrow[1] = 5000, narrow[2] = 5000, narrow[999] = 1;
   const auto close = describe_values(narrow, {0, 1, 1000}, 0, 999, true);
@@ -204,7 +204,7 @@ TEST(VolumeStore, NormalsOfABallPointOutward) {
         const glm::dvec3 from_centre = glm::dvec3(grid.index_to_room * glm::dvec4(index, 1)) - centre_room;
         if (glm::length(glm::dvec3(index) - glm::dvec3(16, 15, 17)) < 5) continue;  // differences are coarse there
         ASSERT_NE(got.normal[n], volume::kNoNormal);
-        // Differences at the faces are to one side.
+        // Differences at the faces are one-sided.
         const bool face = index.x % 32 == 0 || index.y % 30 == 0 || index.z % 34 == 0;
         ASSERT_GT(glm::dot(glm::dvec3(image::decode_normal16(got.normal[n])), glm::normalize(from_centre)),
                   face ? 0.97 : 0.99)

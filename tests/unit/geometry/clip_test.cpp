@@ -33,7 +33,7 @@ TEST(Clip, KeepsWhatLiesOnTheSideOfItsNormal) {
   EXPECT_TRUE(Clip{}.keeps({1e9, -1e9, 0}));
 }
 
-// The points of a line that are kept are those of its stretch, and no others.
+// The kept points of a line are exactly those of its stretch.
 TEST(Clip, TheStretchOfALineIsWhatIsKeptOfIt) {
   std::mt19937 random(7);
   int kept = 0, cut = 0;
@@ -41,7 +41,7 @@ TEST(Clip, TheStretchOfALineIsWhatIsKeptOfIt) {
     const Clip clip = random_clip(random);
     const glm::dvec3 origin = random_point(random, 1);
     glm::dvec3 direction = random_point(random, 1);
-    if (i % 5 == 0) direction.y = 0;  // beside some of the planes
+    if (i % 5 == 0) direction.y = 0;  // parallel to some of the planes
     const Clip::Stretch stretch = clip.stretch(origin, direction);
     for (double t = -3; t <= 3; t += 0.07) {
       const glm::dvec3 p = origin + t * direction;
@@ -54,7 +54,7 @@ TEST(Clip, TheStretchOfALineIsWhatIsKeptOfIt) {
   EXPECT_GT(cut, 1000);
 }
 
-// All and none are promises about every point; some is not.
+// kAll and kNone are promises about every point; kSome is not.
 TEST(Clip, WhatIsSaidOfABoxHoldsForItsPoints) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> unit(0, 1);

@@ -1,5 +1,4 @@
-// Fitted views: whatever the box's shape and the picture's, all corners are in the picture, with a margin, and not lost
-// in it.
+// Fitted views, for any shape of box and picture: all corners are in the picture, with a margin, and fill it well.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 namespace telesplat::geometry {
 namespace {
 
-// The largest of the corners' coordinates in the picture, whose edges are at 1; infinite if one is behind `near_m`.
+// Returns the corners' largest coordinate in the picture, whose edges are at 1; infinite if one is behind `near_m`.
 double reach(const Box& box, const Pose& pose, Camera camera) {
   camera.pose = pose;
   const auto t = camera.room_to_pixel();
@@ -35,7 +34,7 @@ double nearest_depth(const Box& box, const Pose& pose) {
   return out;
 }
 
-// The lowest and the highest of the corners in the picture, whose edges are at -1 and 1.
+// Returns the lowest and the highest of the corners in the picture, whose edges are at -1 and 1.
 std::pair<double, double> heights(const Box& box, const Pose& pose, Camera camera) {
   camera.pose = pose;
   const auto t = camera.room_to_pixel();
@@ -53,7 +52,7 @@ struct Case {
   Camera camera;
 };
 
-// Towers, plates, beams and blocks of 1 mm to 100 m anywhere near the centre, in pictures of any aspect.
+// Towers, plates, beams and blocks of 1 mm to 100 m, anywhere near the centre, in pictures of any aspect.
 std::vector<Case> cases() {
   std::mt19937 random(11);
   const auto from = [&](double least, double most) {
@@ -78,7 +77,7 @@ TEST(Fit, TheFirstViewShowsTheWholeBoxAndFillsThePicture) {
     const double r = reach(box, pose, camera);
     ASSERT_LE(r, 1 - 0.9 * kFitMargin) << box.size().x << " " << box.size().y << " " << box.size().z << ", aspect "
                                        << double(camera.width) / camera.height;
-    // As near as can be, unless the near plane would cut the box.
+    // As near as possible, unless the near plane would cut the box.
     if (nearest_depth(box, pose) > 1.1 * camera.near_m && r < 1 - 1.1 * kFitMargin)
       ADD_FAILURE() << "fills " << r << " only";
     const auto [low, high] = heights(box, pose, camera);
@@ -98,7 +97,7 @@ TEST(Fit, EveryPoseOfTheOrbitShowsTheWholeBox) {
       low = std::min(low, l), high = std::max(high, h);
     }
     ASSERT_LT(std::abs(low + high), 0.35 * (high - low)) << "about as much room above as below";
-    // As near as can be: the extreme points of its upright cylinder touch the margin somewhere, corners nearly.
+    // As near as possible: the extreme points of its upright cylinder touch the margin somewhere, corners nearly.
     const double distance = glm::distance(orbit.at(0).position_room, glm::dvec3(box.centre()));
     if (distance > 20 * camera.near_m) {
       ASSERT_GT(most, 0.8) << "it is lost in the picture";

@@ -1,4 +1,4 @@
-// Two eyes, the screen before them, and cameras that see what both see.
+// Two eyes, the screen before them, and cameras that cover the view of both.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -10,7 +10,7 @@
 namespace telesplat::geometry {
 namespace {
 
-// Homogeneous pixels of a point.
+// Returns the homogeneous pixel of a point.
 glm::dvec3 project(const Camera& camera, const glm::dvec3& p) {
   const auto t = camera.room_to_pixel();
   const glm::dvec4 h(p, 1);
@@ -34,7 +34,7 @@ TEST(Stereo, EyesStandApartBesideTheHead) {
   EXPECT_NEAR(glm::distance(0.5 * (eyes[0].pose.position_room + eyes[1].pose.position_room), head.pose.position_room),
               0, 1e-12);
   EXPECT_EQ(eyes[0].left, head.left);
-  // What the left eye sees lies farther to the right in its picture.
+  // The left eye sees a point farther to the right in its picture.
   EXPECT_GT(pixel(eyes[0], {0, 0, 0}).x, pixel(eyes[1], {0, 0, 0}).x);
 }
 
@@ -72,7 +72,7 @@ TEST(Stereo, EyesLookThroughTheScreenThatFillsTheHeadsView) {
   EXPECT_NEAR(again.top, head.top, 1e-12);
 }
 
-// A head that is turned and tilted before a screen in the room.
+// A turned and tilted head before a screen in the room.
 std::array<Camera, 2> eyes_before(const Screen& screen, const glm::dvec3& left, const glm::dvec3& right) {
   return {camera_through(screen, left, 640, 400, 0.02), camera_through(screen, right, 640, 400, 0.02)};
 }

@@ -76,7 +76,7 @@ TEST(Trajectory, AnEndlessLineIsRefusedWithoutBeingRead) {
 }
 
 TEST(Trajectory, FindsItsColumnsInAFramesTable) {
-  // Of two viewers, whose rows lie between each other, in another order, with more columns.
+  // Rows of two viewers alternate, columns have another order, and there are more of them.
   const auto t = read(
       "viewer,frame,px,py,pz,begin_s,qx,qy,qz,qw,t_s,detail\n"
       "viewer-10,0,9,9,9,0,0,0,0,1,0.5,1\n"

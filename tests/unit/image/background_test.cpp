@@ -1,4 +1,4 @@
-// Backgrounds, and how much of a pixel is covered.
+// Backgrounds, and coverage of pixels.
 #include <gtest/gtest.h>
 
 #include "common/image/background.h"

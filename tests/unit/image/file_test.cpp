@@ -1,4 +1,4 @@
-// Pictures to files and back.
+// Writes pictures to files and reads them back.
 #include "common/image/file.h"
 
 #include <gtest/gtest.h>
@@ -86,7 +86,7 @@ TEST_F(ImageFile, UnwritablePathsAreNamedAndNothingIsLeft) {
   EXPECT_FALSE(write_exr(path("no/such/folder/a.exr"), all_values()).ok());
   EXPECT_EQ(files(), 0u);
 
-  // A folder stands where the file should go: the rename fails, and the temporary file goes away.
+  // A folder has the file's name: the rename fails, and the temporary file is deleted.
   std::filesystem::create_directories(path("taken.png") + "/inside");
   EXPECT_FALSE(write_png(path("taken.png"), all_values()).ok());
   EXPECT_EQ(files(), 1u);
@@ -101,7 +101,7 @@ TEST_F(ImageFile, UnreadableFilesAreNamed) {
   }
 }
 
-// Not each that there is, which a hostile file could choose from.
+// Not every reader: a hostile file could choose among them.
 TEST_F(ImageFile, TheReaderOfTheNameAloneIsAsked) {
   ASSERT_TRUE(write_exr(path("a.exr"), all_values()).ok());
   std::ifstream in(path("a.exr"), std::ios::binary);
@@ -116,7 +116,7 @@ TEST_F(ImageFile, TheReaderOfTheNameAloneIsAsked) {
   EXPECT_TRUE(read_view(path("a.EXR")).ok());
 }
 
-// In memory the first bytes say what it is; where they do not, the name does.
+// In memory the first bytes give the format; if they do not, the name does.
 TEST_F(ImageFile, PicturesWithWrongNamesAreKnownByTheirBytes) {
   View v = all_values();
   ASSERT_TRUE(write_exr(path("a.exr"), v).ok());
@@ -146,7 +146,7 @@ TEST_F(ImageFile, TruncatedFilesAreRefusedAtEveryLength) {
   }
 }
 
-// The headers of PNG files, which have no pixels.
+// Headers of PNG files without pixels.
 TEST_F(ImageFile, AHeaderThatClaimsTooMuchIsRefused) {
   const std::string before("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16), after("\x08\x02\0\0\0", 5);
   const auto header = [&](const char* name, const std::string& side, const std::string& check) {
@@ -162,7 +162,7 @@ TEST_F(ImageFile, AHeaderThatClaimsTooMuchIsRefused) {
   EXPECT_FALSE(large.ok());
 }
 
-// Colours over black, as those of pictures without alpha.
+// Colours over black, like those of pictures without alpha.
 TEST_F(ImageFile, PngWithAlphaIsReadOverBlack) {
   View v{2, 1, {0xff806040, 0x80403020}, {}};
   ASSERT_TRUE(write_png(path("a.png"), v, Alpha::kCoverage).ok());

@@ -1,4 +1,4 @@
-// FLIP against a second implementation: written after the paper's formulas alone, in double precision, with whole
+// FLIP against a second implementation: written only by the paper's formulas, in double precision, with whole
 // two-dimensional filters and one pixel at a time.
 #include <gtest/gtest.h>
 
@@ -81,7 +81,7 @@ dvec3 hunt(const dvec3& rgb) {
 }
 double hyab(const dvec3& a, const dvec3& b) { return std::abs(a.x - b.x) + std::hypot(a.y - b.y, a.z - b.z); }
 
-// sum over a window of radius r of value(x, y) * weight(dx, dy), borders repeated.
+// Sum over a window of radius r of value(x, y) * weight(dx, dy), with repeated borders.
 double filtered(int x, int y, int w, int h, int r, auto&& value, auto&& weight) {
   double sum = 0;
   for (int dy = -r; dy <= r; ++dy)
@@ -171,8 +171,8 @@ TEST(Flip, IdenticalPicturesDoNotDiffer) {
 }
 
 TEST(Flip, BlackAgainstWhite) {
-  // L* differs by 100: 100^0.7 = 25.12; the largest, green against blue: 203.2^0.7 = 41.26; 0.4 of it becomes 0.95, the
-  // rest 0.05.
+  // L* differs by 100: 100^0.7 = 25.12; the largest difference, green against blue: 203.2^0.7 = 41.26; 0.4 of it
+  // becomes 0.95, the rest 0.05.
   for (const float e : Flip(filled(30, 20, 0)).error_map(filled(30, 20, 0xffffff))) ASSERT_NEAR(e, 0.9674, 5e-4);
   for (const float e : Flip(filled(30, 20, 0x00ff00)).error_map(filled(30, 20, 0x0000ff))) ASSERT_NEAR(e, 1.0, 1e-4);
 }

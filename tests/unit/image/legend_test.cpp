@@ -68,11 +68,11 @@ TEST(LegendPicture, TheBarHasTheMapsColoursLowBelow) {
   const Legend legend = some_legend();
   View picture{1280, 800, std::vector<uint32_t>(1280 * 800, 0x808080), {}};
   draw_legend(picture, legend);
-  // The column of the bar: its ends' colours are there, the low one below the high one.
+  // Finds the bar's column by its ends' colours, the low one below the high one.
   int low = -1, high = -1;
   for (int y = 0; y < 800; ++y)
     for (int x = 640; x < 1280; ++x) {
-      const uint32_t c = picture.colour[size_t(y) * 1280 + x] & 0xffffff;  // above it stands the coverage
+      const uint32_t c = picture.colour[size_t(y) * 1280 + x] & 0xffffff;  // the upper byte has the coverage
       if (c == legend.map.at(0)) low = y;
       if (c == legend.map.at(1) && high < 0) high = y;
     }
@@ -109,7 +109,7 @@ TEST(LegendPicture, GrowsWithTheDisplayAndStaysInside) {
     EXPECT_LE(place.y + place.height, height);
   }
   View tiny{7, 5, std::vector<uint32_t>(35, 0), {}};
-  draw_legend(tiny, some_legend());  // has no room: it is cut off
+  draw_legend(tiny, some_legend());  // it has no room and is cut off
   EXPECT_EQ(tiny.colour.size(), 35u);
 }
 

@@ -1,4 +1,4 @@
-// PSNR, SSIM and hole fraction against their formulae, computed here the slow way.
+// PSNR, SSIM and hole fraction against their formulae, computed here in the slow way.
 #include "common/image/measures/quality.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ View flat(int width, int height, uint32_t colour, float depth_m) {
   return {width, height, std::vector<uint32_t>(n, colour), std::vector<float>(n, depth_m)};
 }
 
-// Smooth patterns with noise and background here and there.
+// Smooth patterns with noise, and background in places.
 View pattern(int width, int height, uint32_t seed, double noise) {
   std::mt19937 random(seed);
   std::normal_distribution<double> gauss(0, 1);
@@ -66,7 +66,7 @@ TEST(Quality, IdenticalViewsAreThe99DecibelCase) {
 }
 
 TEST(Quality, PsnrOfAKnownError) {
-  // All channels off by 10 on the object, by 200 on a background that neither view calls the object.
+  // All channels are off by 10 on the object, by 200 on a background that neither view calls the object.
   View a = flat(20, 10, 0x404040, 1), b = flat(20, 10, 0x4a4a4a, 1);
   for (int i = 0; i < 100; ++i) a.depth_m[i] = b.depth_m[i] = kNothing, a.colour[i] = 0, b.colour[i] = 0xc8c8c8;
   EXPECT_NEAR(compare(a, b).psnr_db, 20 * std::log10(255.0 / 10), 1e-9);

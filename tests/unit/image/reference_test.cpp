@@ -1,4 +1,4 @@
-// Several rays a pixel: which rays, what becomes of them, and how pictures are measured against them.
+// Several rays a pixel: their places, their means, and measures of pictures against them.
 #include "common/image/measures/reference.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ geometry::Camera camera(int width, int height) {
   return c;
 }
 
-// What a ray through (u, v) shows: stripes before a gradient, nothing right of a slanted edge.
+// Colour of a ray through (u, v): stripes before a gradient; background right of a slanted edge.
 uint32_t colour_at(double u, double v) {
   if (u > 0.5 + 0.1 * v) return 0x102030;
   const auto grey = uint32_t(std::lround(127 + 100 * std::sin(40 * u + 25 * v)));
@@ -42,7 +42,7 @@ View draw_rays(const geometry::Camera& c) {
 
 TEST(Supersample, EveryPixelIsTheMeanOfItsRaysThroughEqualParts) {
   for (const int side : {2, 4, 7}) {
-    const auto c = camera(601, 333);  // several pieces of a side of 7
+    const auto c = camera(601, 333);  // several pieces for a side of 7
     const auto made = supersample(c, side * side, [](const geometry::Camera& fine) { return draw_rays(fine); });
     ASSERT_TRUE(made);
     EXPECT_EQ(made->samples, side * side);
@@ -115,7 +115,7 @@ TEST(Supersample, NumbersOfRaysAreSquares) {
   }
 }
 
-// A row of pixels of four rays each, as bits: which of them meet the data, at depth 1 or else 2.
+// A row of pixels with four rays each; bits choose the rays that hit at depth 1, and those at depth 2.
 Reference four_rays(const std::vector<std::pair<int, int>>& near_and_far) {
   const int n = int(near_and_far.size());
   geometry::Camera c = camera(n, 1);
@@ -153,10 +153,10 @@ TEST(QualityAgainstSeveralRays, PixelsThatOneRayOfFourMeetsCount) {
   Reference r = four_rays({{1, 0}, {0, 0}, {4, 0}, {4, 0}});
   View shown = r.view;
   shown.colour[0] = 0x808080 - 0x101010;  // 16 steps off where a quarter of the pixel is data
-  shown.colour[1] = 0;                    // nothing there: does not count
+  shown.colour[1] = 0;                    // background: does not count
   EXPECT_NEAR(compare(r, shown).psnr_db, 10 * std::log10(255.0 * 255.0 * 3 / 256), 1e-9);
   EXPECT_NEAR(mean_error({0.6f, 0.9f, 0, 0}, r, shown), 0.2, 1e-6);
-  shown.depth_m[1] = 1;  // something there that the data have not
+  shown.depth_m[1] = 1;  // the display shows an object that the data do not have
   EXPECT_NEAR(mean_error({0.6f, 0.9f, 0, 0}, r, shown), 0.375, 1e-6);
 }
 

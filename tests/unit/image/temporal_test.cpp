@@ -1,4 +1,4 @@
-// Measures in time: what counts as a change that the data did not make, and what becomes of holes.
+// Measures in time: changes that the data did not make, and the fate of holes.
 #include "common/image/measures/temporal.h"
 
 #include <gtest/gtest.h>
@@ -83,7 +83,7 @@ TEST(Unsteadiness, BlocksAreCutAtTheBorder) {
 TEST(Unsteadiness, WhatShowsNoDataDoesNotCount) {
   View a = flat(16, 8, 0x404040, kNothing), b = flat(16, 8, 0x808080, kNothing);
   EXPECT_EQ(between(a, a, a, b).pixels, 0u);
-  b.depth_m[3] = 1;  // the display shows something where the data are not
+  b.depth_m[3] = 1;  // the display shows an object where the data have none
   const auto seen = between(a, a, a, b);
   EXPECT_EQ(seen.pixels, 1u);
   EXPECT_NEAR(seen.flicker, 64, 1e-12);

@@ -125,7 +125,7 @@ Result<Scene> read_flags(std::vector<std::string> flags) {
   options::Parser parser("Julia sets");
   parser.add(scene_table(o));
   parser.parse_or_exit("test", std::move(flags));
-  // What is handed on to another program says the same.
+  // Flags for another program give the same scene.
   const auto scene = read_scene(o);
   SceneOptions again;
   options::Parser other("Julia sets");
@@ -212,7 +212,7 @@ TEST(JuliaFlags, AnEmptySliceIsFoundWhereverItIsInTheAnimation) {
   scene.parameters.slice_offset = 0.9;
   ASSERT_TRUE(place(scene, 1).ok());
   scene.parameters.slice_offset = 1.75;
-  scene.parameters.c.w = 1.5;  // within the ball of radius() and yet nothing of the set is there
+  scene.parameters.c.w = 1.5;  // within the ball of radius(), and yet outside the set
   ASSERT_TRUE(validate(scene.parameters).ok());
   const auto still = place(scene, 1);
   ASSERT_FALSE(still.ok());

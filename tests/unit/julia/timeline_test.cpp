@@ -16,7 +16,7 @@ TEST(JuliaTimeline, SwingsThereAndBackForEver) {
     EXPECT_NEAR(track.value(time), value, 1e-12) << time;
   EXPECT_NEAR(track.value(0.1), track.value(39.9), 1e-9);
   EXPECT_EQ(track.value(-3), -0.4);
-  // Smooth: it rests at its ends and nowhere leaves them.
+  // Smooth: it rests at its ends and never leaves their range.
   EXPECT_LT(std::abs(track.value(0.01) - track.value(0)), 1e-5);
   for (double s = 0; s < 20; s += 0.05) {
     EXPECT_GE(track.value(s), -0.4 - 1e-12);

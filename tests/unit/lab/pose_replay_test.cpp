@@ -1,4 +1,4 @@
-// When poses of a recorded movement are sent.
+// Times at which poses of a recorded movement are sent.
 #include <gtest/gtest.h>
 
 #include "tools/lab/pose_replay/schedule.h"

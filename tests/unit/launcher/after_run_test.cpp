@@ -1,4 +1,4 @@
-// What a run says of itself at its end: viewers that showed nothing, a machine that was too busy.
+// Messages at a run's end: viewers that showed nothing, a machine that was too busy.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -21,7 +21,7 @@ class Unseen : public ::testing::Test {
   }
   ~Unseen() override { fs::remove_all(options_.out); }
 
-  // Exit code; what it said is in said_.
+  // Returns the exit code; said_ has the messages.
   int code_of(const std::string& by_viewer, bool stopped = false) {
     std::ofstream(options_.out + "/summary.json") << "{\"by_viewer\": " << by_viewer << "}";
     testing::internal::CaptureStderr();
@@ -62,7 +62,7 @@ TEST(ProcessorWait, IsTheShareOfTimeThatTheKernelCounts) {
   EXPECT_GE(wait.share(), 0);
   EXPECT_LT(wait.share(), 1e-3) << "seconds of 12 days";
   ProcessorWait none;
-  none.look(0, 1), none.look(0, 2);  // there is no such process
+  none.look(0, 1), none.look(0, 2);  // this process does not exist
   EXPECT_EQ(none.share(), 0);
 }
 

@@ -1,4 +1,4 @@
-// Children of the launcher: what they say, how they end.
+// Children of the launcher: their output, their ends.
 #include <gtest/gtest.h>
 
 #include <unistd.h>
@@ -53,7 +53,7 @@ TEST_F(Child, LinesAndExitCodesComeBack) {
   EXPECT_EQ(child.name(), "child");
 }
 
-// It goes on writing where the log begins anew, and keeps what was before once.
+// The child goes on writing where the log begins anew; the former content is kept once.
 TEST_F(Child, ALogBeginsAnewBeforeItIsTooLarge) {
   auto child = ChildProcess::start("child", "/bin/sh", {"-c", "echo first >&2; echo there; read go; echo second >&2"},
                                    folder + "/child.log", 0, true);
@@ -73,7 +73,7 @@ TEST_F(Child, ALogBeginsAnewBeforeItIsTooLarge) {
   EXPECT_EQ(text("child.log"), "second\n");
 }
 
-// A file of another's choice is neither emptied nor overwritten.
+// A link's target, which another user may have chosen, is neither emptied nor overwritten.
 TEST_F(Child, ALogThatIsALinkIsLeftAlone) {
   std::ofstream(folder + "/others") << "of another";
   std::filesystem::create_symlink("others", folder + "/child.log");
@@ -109,7 +109,7 @@ TEST_F(Child, SignalsShowInTheExitCode) {
   child.signal(SIGKILL);
   all_lines(child);
   EXPECT_EQ(child.exit_code(), 128 + SIGKILL);
-  child.signal(SIGTERM);  // nobody there: nothing happens
+  child.signal(SIGTERM);  // the process is gone: no effect
 }
 
 TEST_F(Child, FinishWaitsThenAsksThenKills) {
@@ -150,7 +150,7 @@ TEST_F(Child, AProgramThatIsNotThereIsToldInItsLog) {
 
 TEST_F(Child, HasAProcessGroupOfItsOwn) {
   auto child = shell("exec sleep 60");
-  // Made by the child itself before it becomes its program.
+  // The child makes its group itself, before it becomes its program.
   for (const double until = monotonic_s() + 20; getpgid(child.pid()) != child.pid() && monotonic_s() < until;) {
   }
   EXPECT_EQ(getpgid(child.pid()), child.pid());

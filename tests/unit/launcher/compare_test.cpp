@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 // A run folder of two frames, made by hand.
 struct Refusal {
-  std::string name, file, content;  // what is written over one of its files; content "GONE": it is removed
+  std::string name, file, content;  // written over one of its files; content "GONE": the file is removed
   std::string named;                // what the error must name
   std::vector<uint64_t> frames = {};
 };

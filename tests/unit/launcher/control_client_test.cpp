@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kLong_s = 20;
 
-// Answers "status" with {"n": 1} and else with the command itself; what comes while `holds` is answered late: when the
-// next command is there, and before that one's answer.
+// Answers "status" with {"n": 1} and other commands with themselves. While `holds`, it answers a command late: after
+// the next command arrives, and before that one's answer.
 class SlowMaster {
  public:
   SlowMaster() {

@@ -1,4 +1,4 @@
-// What the end of a session's process means for the session.
+// The consequence of a process' end for its session.
 #include <gtest/gtest.h>
 
 #include <string_view>
@@ -36,7 +36,7 @@ TEST(EndedProcess, AViewerThatDiesDoesNotEndTheSessionOfOthers) {
   EXPECT_EQ(consequence_of({.role = "viewer", .code = kRefused, .others = true}), Consequence::kRefuse);
 }
 
-// Its window stays, whatever the data set does to its server; other servers are as before.
+// The session's window stays, even if the data set ends its server; other servers behave as before.
 TEST(EndedProcess, ADataSetThatWasChosenAtAWindowDoesNotEndTheSession) {
   EXPECT_EQ(consequence_of({"data", kRefused, 0, true}), Consequence::kGiveUp);
   EXPECT_EQ(consequence_of({"data", kCrashed, 0, true}), Consequence::kRestart);

@@ -1,4 +1,4 @@
-// The line of figures that `telesplat run` shows: true to what viewers counted, whenever it is asked for.
+// The line of figures of `telesplat run`: true to the viewers' counts at any time of asking.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,10 +12,10 @@ namespace {
 /// A session whose viewer displays frames steadily and reports its counters once a second.
 struct Session {
   double fps = 58, offset_s = 0.3, stops_s = 1e9;
-  bool stamps = true;  // reports tell when they were made
+  bool stamps = true;  // reports have the time of their making
   double displayed(double t_s) const { return std::floor(fps * std::min(t_s, stops_s)); }
 
-  // What the master knows at t_s: the newest report, made at a whole second after offset_s.
+  // Returns the master's knowledge at t_s: the newest report, made at a whole second after offset_s.
   nlohmann::json status(double t_s) const {
     const double made_s = std::floor(t_s - offset_s) + offset_s;
     nlohmann::json viewer{{"role", "viewer"}, {"name", "viewer-1"}, {"pid", 7}, {"alive", true}};
@@ -34,7 +34,7 @@ struct Session {
 
 double fps_of(const std::string& line) { return std::strtod(line.c_str(), nullptr); }
 
-// Asks every `period_s` for 30 s; every line after the first 3 s is of 58 frames a second.
+// Asks every `period_s` for 30 s; every line after the first 3 s shows 58 frames a second.
 void expect_steady(const Session& session, double period_s) {
   SessionFigures figures;
   for (int i = 0; i * period_s < 30; ++i) {

@@ -1,4 +1,4 @@
-// What `telesplat inspect` tells of depth images and run folders, and the depth it writes.
+// Descriptions of depth images and run folders by `telesplat inspect`, and the depth that it writes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,7 +38,7 @@ class InspectFiles : public testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
 
-  // A recorded depth image: row y is y + 1 metres away, the first column holds nothing. near: 0.5 m.
+  // A recorded depth image: row y is y + 1 metres away, the first column is empty. near: 0.5 m.
   std::string record() const {
     geometry::Camera camera = geometry::make_camera({{1, 2, 3}, {1, 0, 0, 0}}, 90, kWidth, kHeight, 0.5);
     image::DepthImage image(kWidth, kHeight);
@@ -54,7 +54,7 @@ class InspectFiles : public testing::Test {
     EXPECT_TRUE(recorder->add({12}, camera, {0, 0, kWidth, kHeight}, 1, image).ok());
     return file("depth/frame-000012.depth");
   }
-  // Row y of what a file of float32 holds.
+  // Checks the rows of a float32 file.
   static void expect_depth(const float* values) {
     for (int y = 0; y < kHeight; ++y) {
       EXPECT_TRUE(std::isinf(values[y * kWidth])) << "nothing is there";

@@ -1,4 +1,4 @@
-// What the person is told who joins a session.
+// Messages for a person who joins a session.
 #include "tools/telesplat/run/joined/joined_session.h"
 
 #include <gtest/gtest.h>

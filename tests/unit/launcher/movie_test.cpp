@@ -1,4 +1,4 @@
-// Movies: what a name asks for, where it is refused, and what an encoder is told.
+// Movies: targets by name, refusals, and the encoder's arguments.
 #include <gtest/gtest.h>
 
 #include <sys/stat.h>
@@ -20,7 +20,7 @@ using Kind = MovieTarget::Kind;
 
 bool never() { return false; }
 
-/// Goes when the object does.
+/// A temporary folder; the destructor deletes it.
 class Folder {
  public:
   Folder() {
@@ -50,7 +50,7 @@ class Movies : public ::testing::Test {
     const auto target = movie_target(name);
     return target ? "" : target.error().text;
   }
-  // A program "ffmpeg" that does what a script says, and nothing else in PATH.
+  // Makes a program "ffmpeg" that runs a script, the only program in PATH.
   void only_ffmpeg(const std::string& script) const {
     fs::create_directories(folder / "bin");
     const std::string program = folder / "bin/ffmpeg";
@@ -142,7 +142,7 @@ TEST_F(Movies, SizesThatAVideoCannotHaveAreRefused) {
   for (const char* size : {"0x0", "x", "640", "99999x10"}) EXPECT_NE(error("a.mp4", size), "") << size;
 }
 
-// What ffmpeg is told: words in lines. The file that the last one names appears.
+// Writes its arguments into the file "words", a line each, and makes the file of the last argument.
 constexpr const char* kTellsItsWords =
     "\nfor a; do out=\"$a\"; echo \"$a\"; done > \"${0%bin/ffmpeg}words\"\necho film > \"${out#file:}\"";
 

@@ -1,4 +1,4 @@
-// --overwrite removes neither what the run is to read nor what another session writes.
+// --overwrite removes neither files that the run will read nor files that another session writes.
 #include "tools/telesplat/run/run_options.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The page of a report: what it holds of whole, broken and strange runs, and that nothing from a run becomes code.
+// The page of a report: its content for complete, broken and strange runs; no text of a run becomes code.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -83,7 +83,7 @@ TEST(ReportRun, WithoutASummaryIsToldFromItsTables) {
     EXPECT_NE(notes.find(told), notes.npos) << told;
 }
 
-// A stranger's run folder may have links to whatever lies on the reader's disk, and pages are passed on.
+// A stranger's run folder may link to any file on the reader's disk, and pages are passed on.
 TEST(ReportRun, NothingIsReadThroughLinks) {
   const TemporaryFolder folder;
   const std::string run = folder / "run", mine = folder / "mine";
@@ -117,7 +117,7 @@ TEST(ReportRun, NothingIsReadThroughLinks) {
     fs::create_symlink(mine + "/" + name, run + "/" + name);
   }
   empty(run_json(run, "r", 1));
-  // A link to the folder itself, such as runs/latest, is as good as its name.
+  // A link to the folder itself, such as runs/latest, works like its name.
   fs::create_directory_symlink(mine, folder / "latest");
   page = run_json(folder / "latest", "r", 1);
   EXPECT_FALSE(page.at("config").is_null());

@@ -1,4 +1,4 @@
-// What a report reads of runs that ended anyhow, and how it makes long measurements short.
+// Reads the tables of runs that ended in any way, and shortens long measurements for a report.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,7 +38,7 @@ TEST(LooseTable, FindsColumnsByNameAndToleratesOthers) {
 }
 
 TEST(LooseTable, LeavesOutWhatIsCutOffOrDamaged) {
-  // The last line may be a number cut in two; a quoted text that does not end is no row either.
+  // The last line may end within a number; a quoted text that does not end is no row either.
   const auto t = table_of("a,b\r\n1,2\r\n3\n4,5,6\n\"7,8\n9,10\n11,1", {"a", "b"});
   ASSERT_TRUE(t.ok());
   EXPECT_EQ(t->numbers("a"), (std::vector<double>{1, 9}));

@@ -11,7 +11,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// As `telesplat run` reads them.
+// Reads them like `telesplat run`.
 Result<std::vector<std::string>> read_scene_file(const std::string& path) {
   RunOptions options;
   return launcher::read_scene_file(path, table(options));
@@ -72,24 +72,11 @@ TEST_F(SceneFile, TheCommandLineComesAfterTheFile) {
 
 // A scene file may be a stranger's.
 TEST_F(SceneFile, KeysThatWouldWriteElsewhereOrLetOthersInAreRefused) {
-  for (const char* key : {"out = \"/tmp/elsewhere\"",
-                          "overwrite = true",
-                          "master = \"tcp://elsewhere:7700\"",
-                          "movie = \"a.mp4\"",
-                          "keys = \"auto\"",
-                          "cache = \"/tmp/elsewhere\"",
-                          "report = true",
-                          "record_every = 1",
-                          "record_points = 9",
-                          "record_depth = true",
-                          "log_level = \"trace\"",
-                          "link = \"10mbit\"",
-                          "metrics_port = 9000",
-                          "max_connections = 4096",
-                          "table_limit_mb = 0",
-                          "trace_limit_mb = 0",
-                          "poses = \"tcp://elsewhere:7800\"",
-                          "overwrite = false"}) {
+  for (const char* key : {"out = \"/tmp/elsewhere\"", "overwrite = true", "master = \"tcp://elsewhere:7700\"",
+                          "movie = \"a.mp4\"", "keys = \"auto\"", "cache = \"/tmp/elsewhere\"", "report = true",
+                          "record_every = 1", "record_points = 9", "record_depth = true", "log_level = \"trace\"",
+                          "link = \"10mbit\"", "metrics_port = 9000", "max_connections = 4096", "table_limit_mb = 0",
+                          "trace_limit_mb = 0", "poses = \"tcp://elsewhere:7800\"", "overwrite = false"}) {
     const std::string name = std::string(key).substr(0, std::string(key).find(' '));
     for (const char* table : {"", "[view]\n"}) {
       const auto flags = read_scene_file(write(std::string("file = \"a.ply\"\n") + table + key + "\n"));
@@ -123,7 +110,7 @@ TEST_F(SceneFile, ErrorsNameFileAndPlace) {
   EXPECT_FALSE(read_scene_file("/nonexistent.toml").ok());
 }
 
-// What the launcher makes of a file's flags.
+// The launcher's scene for a file's flags.
 Result<julia::Scene> scene_of(const std::vector<std::string>& flags) {
   RunOptions run;
   options::Parser parser("run");
@@ -201,7 +188,7 @@ TEST_F(SceneFile, AJuliaSetHasParametersAndKeyFrames) {
   wanted.colour = julia::Colour::kTrap;
   wanted.colour_scale = 2.5;
   wanted.palette = 7;
-  wanted.ambient = 0;  // as animated, at 0 s
+  wanted.ambient = 0;  // the animation's value at 0 s
   wanted.lod = 0.5;
   EXPECT_EQ(scene->parameters, wanted);
   EXPECT_EQ(scene->timeline.tracks.size(), 3u);

@@ -1,4 +1,4 @@
-// What the launcher makes of flags: which scene they name, what processes are told, what session.toml keeps.
+// The launcher's results for flags: the scene, the arguments of processes, the content of session.toml.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ class Scenes : public testing::Test {
   ~Scenes() override { fs::remove_all(folder_); }
   std::string file(const std::string& name) const { return folder_ + "/" + name; }
 
-  // As `telesplat run` reads its command line.
+  // Reads a command line like `telesplat run`.
   static Result<std::shared_ptr<Scene>> settled(RunOptions& options, const std::vector<std::string>& arguments) {
     options::Parser parser("run");
     parser.add(table(options));
@@ -97,7 +97,7 @@ TEST_F(Scenes, WhatSessionTomlKeepsMakesTheSameSceneAgain) {
   EXPECT_FALSE(options.mesh.use_cache);
 }
 
-// A run folder may be a stranger's, and what is made anew is written into the cache.
+// A run folder may be a stranger's, and rebuilt data go into the cache.
 TEST_F(Scenes, TheCacheOfARecordIsNotUsed) {
   std::ofstream(file("session.toml"))
       << "[scene]\nkind = \"mesh\"\nfile = \"a.ply\"\ncache = \"/elsewhere\"\nup = \"z\"\n";
@@ -107,7 +107,7 @@ TEST_F(Scenes, TheCacheOfARecordIsNotUsed) {
   EXPECT_EQ((*scene)->options().mesh.up, "z");
 }
 
-// The master lets nobody tell session.toml what it does not know.
+// The master accepts only known keys for session.toml.
 TEST(ToldKeys, AreAllThatDataServersAndViewersRecord) {
   const auto is_told = [](const std::string& role, const std::string& key) {
     for (const auto& table : master::told_tables(role))
@@ -181,7 +181,7 @@ TEST_F(Scenes, NumbersOfARunHaveLimits) {
   }
 }
 
-// Whatever flag a service has, its process is told of it: the launcher names none of them.
+// Each flag of a service reaches its process, though the launcher names none of them.
 TEST_F(Scenes, EveryFlagOfAServiceReachesItsProcess) {
   RunOptions o;
   ASSERT_TRUE(settled(o, {file("mesh.ply"), "--up=z", "--least-detail=0.5", "--detail-budget=off", "--exr",

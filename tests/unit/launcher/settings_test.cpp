@@ -1,4 +1,4 @@
-// `telesplat ctl` has every setting, and what the launcher is asked is read from a status.
+// `telesplat ctl` has every setting, and the launcher reads its orders from a status.
 #include "common/scene/settings.h"
 
 #include <gtest/gtest.h>

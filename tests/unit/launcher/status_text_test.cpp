@@ -1,4 +1,4 @@
-// What people read of a session: every figure in its place, and nothing breaks where a master tells less or nonsense.
+// A session's status for people: every figure in its place; missing or nonsensical fields break nothing.
 #include "tools/telesplat/control/status_text.h"
 
 #include <gtest/gtest.h>
@@ -151,7 +151,7 @@ TEST(ViewerResults, AreOfTheNamedViewersThoughTheyLeft) {
   EXPECT_TRUE(viewer_results(nlohmann::json::object(), {"viewer-1"}).empty());
 }
 
-// A master of another version, or something that only looks like one.
+// The status of a master of another version, or of a program that only looks like one.
 TEST(StatusText, NonsenseIsPassedOver) {
   EXPECT_EQ(status_text(Json(), 0), "");
   const Json good = volume_status();

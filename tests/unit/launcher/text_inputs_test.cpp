@@ -1,4 +1,4 @@
-// Texts that commands read as a whole: what has no end, and what is larger than such a text may be, is refused at once.
+// Texts that commands read as a whole: files without an end, and files beyond the limit, are refused at once.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -51,7 +51,7 @@ const Input kInputs[] = {
 
 class TextInput : public testing::TestWithParam<Input> {
  protected:
-  // In a new run folder that lacks nothing else.
+  // Returns a path in a new run folder that lacks nothing else.
   std::string path() const {
     const std::string folder = tests::own_folder() + GetParam().name;
     fs::remove_all(folder);

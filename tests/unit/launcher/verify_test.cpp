@@ -1,4 +1,4 @@
-// Verification of displayed frames after a run: which reference, which rows, what summary.json says.
+// Verification of displayed frames after a run: its references, its rows, its part of summary.json.
 #include "tools/telesplat/run/verify.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using data::test::TempFolder;
 constexpr float kNothing = std::numeric_limits<float>::infinity();
 constexpr uint32_t kGrey = 0x808080;
 
-// Grey to the left of u = 0, 2 m away; nothing to the right of it.
+// Grey to the left of u = 0, 2 m away; background to the right of it.
 class HalfAPicture : public DirectScene {
  public:
   explicit HalfAPicture(bool surface = true) : surface_(surface) {}
@@ -52,7 +52,7 @@ class VerifyRun : public ::testing::Test {
   }
   std::string out() const { return folder_ / "run"; }
 
-  // 21 x 10 pixels: of those in the middle column half is grey.
+  // 21 x 10 pixels: half of each pixel in the middle column is grey.
   viewer::SpooledFrame frame(uint64_t number, int samples = 16) {
     const auto camera = geometry::make_camera({}, 90, 21, 10);
     auto drawn = scene_.draw_reference(camera, {}, {1}, samples);

@@ -19,7 +19,7 @@ using viewer::WallLayout;
 
 Result<WallLayout> parse_wall(const std::string& text) { return viewer::parse_wall(text, kMaxViewers); }
 
-// The scene of a run folder, which is a volume's.
+// The scene of a run folder; it is a volume.
 struct RecordedVolume {
   std::unique_ptr<Scene> scene;
   const data::DataOptions* operator->() const { return &scene->options(); }
@@ -74,7 +74,7 @@ class RunFolder : public testing::Test {
 
 TEST_F(RunFolder, TheNewestPicturesOfAllTilesBecomeOne) {
   picture(1, 9, 4, 3, 0xff0000);
-  picture(1, 10, 4, 3, 0x00ff00);  // a later frame than 9, though not by its letters
+  picture(1, 10, 4, 3, 0x00ff00);  // a later frame than 9, though an earlier name
   picture(2, 7, 4, 3, 0x0000ff);
   write("frames.csv", "t_s,viewer,frame\n0.5,viewer-1,9\n1.25,viewer-1,10\n1.5,viewer-2,7\n2,viewer-2,8\n");
   const auto tiles = stitch_wall(path_, {2, 1, 0, {}});

@@ -17,7 +17,7 @@ TEST(Shaper, BytesPassOneAfterTheOtherThenAreDelayed) {
   Shaper s({.rtt_s = 0.02, .rate_bit_s = 8e6}, 0, 1);  // a byte a microsecond
   EXPECT_NEAR(s.pass(0, 1000), 0.011, 1e-9);
   EXPECT_NEAR(s.pass(0, 1000), 0.012, 1e-9);
-  EXPECT_NEAR(s.pass(0.5, 1000), 0.511, 1e-9);  // it had been idle
+  EXPECT_NEAR(s.pass(0.5, 1000), 0.511, 1e-9);  // the link was idle
 }
 
 TEST(Shaper, QueueIsBoundedAndEmptiesAtTheRate) {

@@ -1,4 +1,4 @@
-// Epochs of a Julia set's parameters: who is told what, in which order. The master without sockets and clocks.
+// Epochs of a Julia set's parameters: messages to each peer and their order. Master without sockets and clocks.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -47,8 +47,8 @@ class Animation : public ::testing::Test {
     r.camera.height = 4;
     core.on("v" + std::to_string(viewer), r, now_s);
   }
-  // Everything sent since the last call goes where it belongs: leases into `leases`, the session into `told`; every
-  // lease's epoch must be the newest that its sampler and the packer were told of before.
+  // Sorts all messages since the last call: leases into `leases`, the session into `told`; every lease's epoch must be
+  // the newest that its sampler and the packer know.
   void deliver() {
     for (const auto& out : core.take_outgoing()) {
       const auto body = std::as_bytes(std::span(out.body));
@@ -63,7 +63,7 @@ class Animation : public ::testing::Test {
       }
     }
   }
-  // Samples and packs all there is to sample for s1, and returns the leases.
+  // Samples and packs all open tiles for s1, and returns the leases.
   std::vector<wire::Lease> work(double now_s, const std::string& packer = "p") {
     std::vector<wire::Lease> all;
     for (;;) {
@@ -122,7 +122,7 @@ TEST_F(Animation, SetBeginsAnEpochThatEveryoneIsToldOf) {
   core.on("s1", wire::LeaseRequest{}, 1);
   request(5, 1, 1);
   const auto answer = command("set", {{"c.y", "0.125"}, {"iterations", "17"}}, 2);
-  leases.clear();  // of epoch 1
+  leases.clear();  // those of epoch 1
   EXPECT_TRUE(answer.ok) << answer.text;
   EXPECT_EQ(answer.text, "epoch 2");
   for (const char* peer : {"d", "p", "s1", "s2", "v5", "v6"}) {
@@ -131,7 +131,7 @@ TEST_F(Animation, SetBeginsAnEpochThatEveryoneIsToldOf) {
     EXPECT_EQ(told[peer].parameters.at("iterations"), 17);
     EXPECT_EQ(told[peer].parameters.at("room.x"), 0.25) << "the placement stays";
   }
-  // The view that was begun is sampled anew.
+  // The view in progress is sampled anew.
   const auto all = work(2);
   ASSERT_FALSE(all.empty());
   for (const auto& l : all) EXPECT_EQ(l.epoch.value, 2u);
@@ -203,7 +203,7 @@ TEST_F(Animation, EachViewHasAnEpochOfItsOwnAndItsClockBeginsWithTheFirst) {
     EXPECT_DOUBLE_EQ(parameter("c.y"), timeline.values(now - 100).at("c.y"));
   }
   EXPECT_EQ(core.counters().at("frames_completed"), 20);
-  // Without time passing nothing changes.
+  // Nothing changes while time stands still.
   request(5, 21, 100 + 0.7 * 19);
   EXPECT_EQ(work(100 + 0.7 * 19)[0].epoch.value, last);
   EXPECT_TRUE(command("animate", {{"timeline", "off"}}, 200).ok);
@@ -231,7 +231,7 @@ TEST_F(Animation, AllWhoWaitAreServedFromAnEpochInTurn) {
   for (uint64_t round = 1; round <= 5; ++round) {
     const double now = 10.0 * double(round) + 0.123 * double(round);
     for (const uint64_t v : {5, 6}) request(v, round, now);
-    std::map<uint64_t, uint64_t> epochs;  // of the viewers
+    std::map<uint64_t, uint64_t> epochs;  // by viewer
     for (const auto& l : work(now)) epochs[l.viewer.value] = l.epoch.value;
     ASSERT_EQ(epochs.size(), 2u);
     EXPECT_EQ(epochs[5], epochs[6]);
@@ -255,7 +255,7 @@ TEST_F(Animation, RestartsInTheMiddleDoNotWedgeIt) {
   auto all = work(12);
   ASSERT_FALSE(all.empty());
   for (const auto& l : all) EXPECT_GT(l.epoch.value, before);
-  // So does the data server: what it says again changes nothing, values and animation go on.
+  // So does the data server: its second hello changes nothing, values and animation go on.
   core.undeliverable("d");
   request(5, 3, 13);
   ASSERT_FALSE(work(13).empty());
@@ -269,7 +269,7 @@ TEST_F(Animation, RestartsInTheMiddleDoNotWedgeIt) {
   request(5, 4, 15);
   ASSERT_FALSE(work(15).empty());
   EXPECT_EQ(epoch(), now_epoch + 1);
-  // A sampler that dies in mid-frame neither.
+  // Neither does a sampler that dies in mid-frame.
   request(5, 5, 16);
   core.on("s2", wire::LeaseRequest{}, 16);
   core.undeliverable("s2");

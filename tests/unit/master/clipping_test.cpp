@@ -26,7 +26,7 @@ class ClipOrders : public testing::Test {
     core.on("data", h, 0);
     take();
   }
-  // What was sent since the last call: replies, and the newest welcome.
+  // Takes messages since the last call: replies, and the newest welcome.
   void take() {
     replies.clear(), orders.clear();
     for (const auto& out : core.take_outgoing()) {
@@ -131,7 +131,7 @@ TEST_F(ClipOrders, OrdersGoToTheViewerThatIsMeantAndItsAnswerBack) {
   EXPECT_TRUE(replies.empty()) << "nobody waits for it any more";
   EXPECT_FALSE(control("pick", {{"viewer", "nobody"}}).ok);
 
-  // Without a name the first one; without an answer a refusal.
+  // Without a name the first viewer is asked; without an answer the order is refused.
   control("where", {});
   EXPECT_TRUE(orders.contains("a"));
   core.tick(now_s + 3.5);
@@ -155,7 +155,7 @@ TEST_F(ClipOrders, AProbeIsAnsweredByWhoeverKnows) {
   EXPECT_EQ(replies["ctl"].text, "{\"value\":1}");
 }
 
-// Both were started by hand, without a name of their own.
+// Both were started by hand and have the same name.
 TEST_F(ClipOrders, AProbeGoesToAllPartsWhateverTheyAreCalled) {
   wire::Hello first = hello("data", "data", 7), second = hello("data", "data", 8);
   first.parameters["volume.part"] = 0, second.parameters["volume.part"] = 1;
@@ -171,7 +171,7 @@ TEST_F(ClipOrders, AProbeGoesToAllPartsWhateverTheyAreCalled) {
   EXPECT_TRUE(orders.contains("p") && orders.contains("r"));
 }
 
-// Whatever others say, and however often one says it, those that were asked answer.
+// Only processes that were asked may answer, each once, in spite of other answers.
 TEST_F(ClipOrders, OnlyWhoWasAskedAnswersAndOnce) {
   core.on("p", hello("data", "data-1", 7), 0);
   core.on("q", hello("data", "data-2", 8), 0);
@@ -191,7 +191,7 @@ TEST_F(ClipOrders, OnlyWhoWasAskedAnswersAndOnce) {
   EXPECT_EQ(replies["ctl"].text, "{}");
 }
 
-// A viewer's process died, which nobody knows yet, and was started again; its predecessor's answer counts no more.
+// A viewer's process died unnoticed and was started again; the old process' answer no longer counts.
 TEST_F(ClipOrders, OfOneNameTheNewLifeIsMeant) {
   core.on("z", hello("viewer", "viewer-1", 5), 0);
   take();

@@ -1,4 +1,4 @@
-// The master without sockets and clocks: who is told what.
+// The master without sockets and clocks: its messages to each peer.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ wire::Hello hello(const std::string& role, const std::string& name, uint64_t ins
 
 class Master : public ::testing::Test {
  protected:
-  // The messages of type M sent to `peer` since the last call for anyone.
+  // Returns the messages of type M to `peer` since the last call for any peer.
   template <class M>
   std::vector<M> sent(const std::string& peer) {
     for (auto& out : core.take_outgoing()) outbox.push_back(std::move(out));
@@ -107,7 +107,7 @@ TEST_F(Master, WelcomesEveryoneAndAnnouncesNewEndpoints) {
   EXPECT_EQ(welcomes[1].facts.at("scene"), "hill");
 }
 
-// Whoever reaches the port decides how often these lines would come.
+// Any peer that reaches the port could cause these lines as often as it likes.
 TEST_F(Master, LinesAboutWhoComesAreNotMoreThanAPersonReads) {
   log::initialise("master", "info");
   testing::internal::CaptureStderr();
@@ -131,7 +131,7 @@ TEST_F(Master, AsksStrangersWhoTheyAre) {
   core.on("x", wire::TileDone{}, 0);
   EXPECT_TRUE(core.on("x", wire::MetricRows{}, 0));
   EXPECT_EQ(sent<wire::WhoAreYou>("x").size(), 5u);
-  // One that fell silent is a stranger too.
+  // A silent process becomes unknown, too.
   join_all();
   core.tick(100);
   core.on("v", wire::StatusReport{}, 101);
@@ -222,7 +222,7 @@ TEST_F(Master, RolesAreKeptApart) {
   EXPECT_TRUE(sent<wire::Lease>("v").empty());
   const auto leases = sent<wire::Lease>("s1");
   ASSERT_EQ(leases.size(), 1u);
-  done(leases[0], "s1");  // only the packer knows
+  done(leases[0], "s1");  // only the packer can know
   EXPECT_EQ(core.counters().at("frames_completed"), 0);
   done(leases[0]);
   EXPECT_EQ(core.counters().at("frames_completed"), 1);
@@ -257,12 +257,12 @@ TEST_F(Master, ADeadSamplersLeasesCountAsExpired) {
   // Its next life replaces the one that holds a lease now.
   core.on("new s2", hello("sampler", "sampler-2", 40), 1.1);
   EXPECT_EQ(core.counters().at("leases_expired"), 2);
-  core.undeliverable("s2");  // is known to be gone
+  core.undeliverable("s2");  // its end is known already
   core.undeliverable("never seen");
   EXPECT_EQ(core.counters().at("leases_expired"), 2);
   core.on("new s2", wire::LeaseRequest{}, 1.2);
   ASSERT_EQ(sent<wire::Lease>("new s2").size(), 1u);
-  // One that takes its leave has not failed.
+  // A process that says goodbye has not failed.
   core.on("new s2", wire::Goodbye{}, 1.3);
   EXPECT_EQ(core.counters().at("leases_expired"), 2);
   EXPECT_EQ(core.counters().at("tiles_released"), 3);
@@ -320,7 +320,7 @@ TEST_F(Master, AnEmptyStatusIsASignOfLife) {
   }
 }
 
-// What the others said meanwhile is yet to be read.
+// The other processes' messages of that time are still unread.
 TEST_F(Master, AMasterThatStoodStillTakesNobodyForDead) {
   join_all();
   const auto lease = lease_to("s1", 1, 1);
@@ -353,7 +353,7 @@ TEST_F(Master, ANewPackerStartsWithNewFrames) {
   EXPECT_EQ(core.counters().at("frames_completed"), 0) << "from the packer before";
   done(next, "p2", 1.5);
   EXPECT_EQ(core.counters().at("frames_completed"), 1);
-  // The same packer's second hello drops nothing.
+  // A second hello of the same packer drops nothing.
   const auto kept = lease_to("s1", 3, 1.6);
   core.on("p2", hello("packer", "packer", 20), 1.7);
   done(kept, "p2", 1.8);
@@ -397,7 +397,7 @@ TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
   sent<wire::Welcome>("p");
   core.on("p2", hello("packer", "packer", 20), 1);
   EXPECT_EQ(status()["processes"].size(), 6u);
-  // The one that was taken for the other's old life lives: it is asked who it is, and says so.
+  // The one that was taken for the other's old life is alive: it is asked for its hello and sends it.
   core.on("p", wire::StatusReport{}, 1.5);
   ASSERT_EQ(sent<wire::WhoAreYou>("p").size(), 1u);
   core.on("p", hello("packer", "packer", 2), 1.6);
@@ -412,14 +412,14 @@ TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
     core.tick(now_s);
     for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
   }
-  // The one that packs does so until it leaves.
+  // The packer in use stays until it leaves.
   done(lease_to("s1", 1, 30), "p2", 30.1);
   EXPECT_EQ(core.counters().at("frames_completed"), 1) << "it was there first since the other was taken for dead";
   core.on("p2", wire::Goodbye{{20}}, 31);
   EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "the other one packs now";
 }
 
-// Whatever their names are.
+// The same with two different names.
 TEST_F(Master, ASecondPackerWaitsForTheFirstToLeave) {
   join_all();
   sent<wire::Welcome>("v");
@@ -487,7 +487,7 @@ TEST_F(Master, WhoEndsTheSessionIsToldToAll) {
   join_all();
   core.on("c", wire::Control{"stop", {{"by", "ada of node7"}}}, 1);
   EXPECT_EQ(core.stop_reason(), "the session was ended by ada of node7");
-  // Whoever asks chooses the text.
+  // The sender chooses the text.
   core.on("c", wire::Control{"stop", {{"by", std::string(5000, '\xff')}}}, 1);
   EXPECT_TRUE(valid_utf8(core.stop_reason()));
   EXPECT_LT(core.stop_reason().size(), 500u);
@@ -501,7 +501,7 @@ TEST_F(Master, AViewerThatEndsWithoutAGoodbyeIsKnownToBeLost) {
   };
   core.undeliverable("v");
   EXPECT_EQ(lost(), 1);
-  core.on("v", hello("viewer", "v", 5), 2);  // its link was broken, no more
+  core.on("v", hello("viewer", "v", 5), 2);  // only its link was broken
   EXPECT_EQ(lost(), 0);
   core.on("v", wire::Goodbye{{5}}, 3);
   EXPECT_EQ(lost(), 0);
@@ -563,7 +563,7 @@ TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
   wire::MetricRows rows{{5}, "no_such_table", {"a"}, {1}};
   EXPECT_FALSE(core.on("v", rows, 1));
   for (const char* table : {"frames", "updates", "stages"}) {
-    // Whoever is first would decide which columns there are: all others' rows would be refused.
+    // The first rows decide which columns there are: all other viewers' rows would be refused.
     EXPECT_FALSE(core.on("s1", rows_of(table, {2}), 1)) << "samplers display nothing";
     rows.table = table;
     rows.columns = {"a"}, rows.values = {1};
@@ -629,7 +629,7 @@ TEST_F(Master, AFloodOfOnePeerIsDroppedAndOthersAreHeard) {
   EXPECT_EQ(packers, 100'000) << "it tells of every tile";
   EXPECT_EQ(status()["limits"]["messages_refused"], 100'000 - heard);
   EXPECT_TRUE(core.admit("v", 5)) << "later it is heard again";
-  for (int i = 0; i < 20'000; ++i) core.admit("stranger" + std::to_string(i), 6);  // bounded
+  for (int i = 0; i < 20'000; ++i) core.admit("stranger" + std::to_string(i), 6);  // the list is bounded
   EXPECT_TRUE(core.admit("v", 7));
 }
 
@@ -682,7 +682,7 @@ TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   EXPECT_LE(core.processes().size(), 4096u);
 }
 
-// Each may change what everybody is told.
+// Each hello may change the session that all are sent.
 TEST_F(Master, AFloodOfHellosIsToldOnce) {
   join_all();
   core.tick(1);
@@ -701,7 +701,7 @@ TEST_F(Master, AFloodOfHellosIsToldOnce) {
   auto told = status();
   for (auto& p : told["processes"]) there |= p["name"] == "flood" && p["endpoints"]["tiles"] == "tcp://999";
   EXPECT_TRUE(there);
-  // Many processes, each of which says hello once.
+  // Many processes that say hello once each.
   for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
   for (uint64_t i = 0; i < 1000; ++i)
     core.on("f" + std::to_string(i), hello("packer", "f" + std::to_string(i), 1000 + i), 3 + 0.05 * double(i) / 1000);
@@ -738,7 +738,7 @@ TEST_F(Master, OnlyThePackerTellsWherePatchesAre) {
     m.endpoints = {
         {"patches", "tcp://evil"}, {"state", "tcp://evil"}, {"tiles", "tcp://evil"}, {"chunks", "tcp://evil"}};
     if (m.role == "data") m.box_room = {{-1e9f, -1, -1}, {1, 1, 1}}, m.endpoints.erase("chunks");
-    core.on("a", m, 1);  // before the others in any order of theirs
+    core.on("a", m, 1);  // its name sorts before all others
     core.tick(1.1);
     core.on("v2", hello("viewer", "viewer-2", 6), 1.2);
     const auto welcomes = sent<wire::Welcome>("v2");
@@ -778,14 +778,14 @@ TEST_F(Master, StatusFitsAMessageHoweverManyCameAndLeft) {
     if (out.type == wire::ControlReply::kName) {
       EXPECT_TRUE(wire::decode<wire::ControlReply>(std::as_bytes(std::span(out.body))));
     }
-  // Who left a minute ago is told of in the record alone.
+  // After a minute, processes that left appear only in the record.
   core.tick(100);
   const auto later = status();
   EXPECT_GE(later["departed"].get<int>(), 1000);
   EXPECT_LE(core.processes().size(), 4096u);
 }
 
-// Containers ask every ten seconds, from a connection of their own each time.
+// Containers ask every ten seconds, over a new connection each time.
 TEST_F(Master, TenThousandPastHealthChecksCostNothing) {
   join_all();
   const auto ask = [&](int i, double now_s) {
@@ -864,10 +864,10 @@ TEST_F(Master, StatusCountsInWholeNumbersAndTellsRates) {
   EXPECT_EQ(viewer()["values"]["rss_mb"].dump(), "12.5");
   report(12, 420);
   EXPECT_EQ(viewer()["rates"], (nlohmann::json{{"frames", 60.0}}));
-  // Of the last five reports.
+  // The rate is that of the last five reports.
   for (int i = 1; i <= 4; ++i) report(12 + i, 420 + 10 * i);
   EXPECT_EQ(viewer()["rates"]["frames"], 10.0);
-  report(17, 0);  // it began to count anew
+  report(17, 0);  // it counts from 0 again
   EXPECT_EQ(viewer()["rates"]["frames"], 0.0);
 }
 

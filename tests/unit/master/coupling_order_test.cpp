@@ -1,4 +1,4 @@
-// `telesplat ctl coupling` at the master: who is told what, what is refused, and which requests wait after a change.
+// `telesplat ctl coupling` at the master: messages to viewers, refusals, and the requests that wait after a change.
 #include <gtest/gtest.h>
 
 #include "services/master/master_core.h"
@@ -52,7 +52,7 @@ TEST_F(CouplingOrders, AreToldToTheViewersThatAreHere) {
   ASSERT_EQ(told.size(), 1u);
   EXPECT_EQ(told["viewer-2"].coupling, Mode::kSync);
 
-  // Whatever is announced later says it again, to each its own.
+  // Later announcements repeat it, to each viewer its own.
   core.on("ctl", wire::Control{"epoch", {}}, 2);
   std::map<std::string, Mode> again;
   for (const auto& out : core.take_outgoing())

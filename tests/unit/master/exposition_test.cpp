@@ -1,4 +1,4 @@
-// What programs that watch are told: histograms, and the text format of Prometheus.
+// Figures for monitoring programs: histograms, and the text format of Prometheus.
 #include "services/master/live/exposition.h"
 
 #include <fmt/format.h>
@@ -66,7 +66,7 @@ TEST(LiveFigures, FollowRowsAndTiles) {
   EXPECT_EQ(f.samplers().size(), LiveFigures::kMostNames);
 }
 
-// Samplers come and go all day: those that left make room, those that are here stay.
+// Samplers come and go all day: those that left make room, present ones stay.
 TEST(LiveFigures, WhoLeftLongAgoMakesRoom) {
   LiveFigures f;
   const wire::TileDone tile;

@@ -19,7 +19,7 @@ wire::ViewRequest request(uint64_t viewer, uint64_t id, int width = 256, int hei
 
 const auto kNobody = [](const std::string&) {};
 
-// As the master does: a lease of what is open, else of the next view.
+// Leases an open tile, else one of the next view, as the master does.
 std::optional<wire::Lease> next(FrameSchedule& s, const std::string& sampler, double now_s) {
   do {
     if (auto lease = s.lease(sampler, now_s)) return lease;
@@ -83,7 +83,7 @@ TEST(FrameSchedule, LeasesEveryTileOnceThenCompletes) {
   EXPECT_FALSE(done(s, frame, 1000, 0.2));
 }
 
-// What nobody waits for any more takes no sampler from those who are here.
+// Views of a viewer that left take no sampler from other viewers.
 TEST(FrameSchedule, FramesOfAViewerThatLeftEnd) {
   for (const Cut cut : {Cut{}, Cut{.rows = true}, Cut{.coarse = true}, Cut{.rows = true, .coarse = true}}) {
     FrameSchedule s({.tile_size = 64, .frames_in_flight = 2});
@@ -97,7 +97,7 @@ TEST(FrameSchedule, FramesOfAViewerThatLeftEnd) {
     const auto others = next(s, "b", 0.1);
     ASSERT_TRUE(others);
     EXPECT_EQ(others->viewer.value, 2u);
-    done(s, out->frame, out->tile, 0.2, out->lease);  // what was out may still come
+    done(s, out->frame, out->tile, 0.2, out->lease);  // a tile that was leased may still come
     EXPECT_EQ(s.views_in_flight(), 1u) << "the other's";
     EXPECT_EQ(s.frames_completed(), 0u) << "it was not completed";
   }
@@ -147,9 +147,9 @@ TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
   EXPECT_EQ(second->frame, first->frame);
   EXPECT_EQ(second->tile, first->tile);
   EXPECT_NE(second->lease, first->lease);
-  s.extend(first->lease, "slow", 100);  // of the lease before: unknown now
+  s.extend(first->lease, "slow", 100);  // an earlier lease: unknown now
   EXPECT_EQ(s.expire(17, kNobody), 1);
-  // Whoever's tile comes first counts.
+  // The first tile that comes counts, from either sampler.
   EXPECT_TRUE(done(s, first->frame, first->tile, 17.5));
   EXPECT_FALSE(next(s, "fast", 18));
 }
@@ -167,7 +167,7 @@ TEST(FrameSchedule, LeaseTimesFollowTileTimes) {
   EXPECT_NEAR(s.lease_time_s(), 25 * 0.02, 1e-6);
 }
 
-// It has to fetch what it samples, and to arrange it: that takes longer than a tile of those who have done so.
+// A new sampler has to fetch and arrange its data first: that takes longer than a tile of an experienced one.
 TEST(FrameSchedule, WhoHasFinishedNoTileHasTheLongestTime) {
   FrameSchedule s({.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2});
   double now = 0;

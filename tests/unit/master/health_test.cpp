@@ -1,4 +1,4 @@
-// What health checks are told.
+// Answers to health checks.
 #include <gtest/gtest.h>
 
 #include "services/master/master_core.h"
@@ -17,13 +17,13 @@ wire::Hello hello(const std::string& role, const std::string& name, const std::s
 
 class Health : public ::testing::Test {
  protected:
-  // Empty: well.
+  // Empty: healthy.
   std::string problem(const std::map<std::string, std::string>& about, double now_s = 10) {
     core.on("c", wire::Control{"health", about}, now_s);
     std::string out = "no answer";
     for (const auto& o : core.take_outgoing()) {
       if (o.peer != "c" || o.type != wire::ControlReply::kName) continue;
-      // As it is decoded by who asked, who takes no more than a megabyte.
+      // The client decodes no more than a megabyte.
       const auto reply = wire::decode<wire::ControlReply>(std::as_bytes(std::span(o.body)));
       if (!reply) return "an answer that cannot be read: " + reply.error().text;
       out = reply->ok ? "" : reply->text;
@@ -73,7 +73,7 @@ TEST_F(Health, TellsWhatIsWrong) {
   EXPECT_LT(problem({{"name", std::string(100000, 'x')}}).size(), 200u);
 }
 
-// A soak with kills has had thousands of lives; what is told of each is a kilobyte and more.
+// A soak with kills has thousands of lives, and each takes a kilobyte and more of a status.
 TEST_F(Health, IsAnsweredAfterTenThousandProcesses) {
   core.on("s", hello("sampler", "sampler", "here", 5), 9.9);
   for (uint64_t i = 0; i < 10000; ++i) {
@@ -88,7 +88,7 @@ TEST_F(Health, IsAnsweredAfterTenThousandProcesses) {
   EXPECT_EQ(problem({{"host", "host-x9999"}}), "no healthy process on host-x9999: sampler-x9999 has left the session");
 }
 
-// Whoever asks is no process of the session.
+// The health check itself is no process of the session.
 TEST_F(Health, ThoseWhoAskAreNotRemembered) {
   for (int i = 0; i < 100; ++i) core.on("c" + std::to_string(i), wire::Control{"health", {{"role", "sampler"}}}, 1);
   EXPECT_TRUE(core.processes().empty());

@@ -1,4 +1,4 @@
-// Leases that somebody keeps for ever, or of which nothing comes that the packer can use: frames go on all the same.
+// Some samplers keep leases for ever, or send only tiles that the packer cannot use: frames go on all the same.
 #include <gtest/gtest.h>
 
 #include "services/master/slabs/schedule.h"
@@ -53,7 +53,7 @@ TEST(HeldLeases, OthersGetATileThatOnlyEverIsExtended) {
   FrameSchedule s({.tile_size = 256, .lease_timeout_s = 2});
   wire::TileDone done;
   s.request_view(request(1, 1));
-  const auto first = next(s, "fast", 0);  // so that it is known how long tiles take
+  const auto first = next(s, "fast", 0);  // gives the schedule a typical time of tiles
   done.frame = first->frame, done.tile = first->tile, done.lease = first->lease;
   ASSERT_TRUE(s.tile_done(done, "fast", 0.01));
   s.request_view(request(1, 2));
@@ -149,7 +149,7 @@ TEST(HeldLeases, ARefusalOfAnotherFrameOrATileThatIsDoneChangesNothing) {
   EXPECT_EQ(s.frames_in_flight(), 1u);
 }
 
-// A farm on a clock of milliseconds: each view has eight tiles, and there is always a next view.
+// A farm on a clock of milliseconds: each view has eight tiles, and another view always waits.
 struct Farm {
   enum class Kind { kGood, kSlow, kSilent, kExtends, kBegs };
   struct Sampler {
@@ -182,7 +182,7 @@ struct Farm {
     if (s.kind == Kind::kBegs) schedule.heard_of(name);
     if (auto lease = next(schedule, name, now_s)) s.lease = std::move(lease), s.until_s = now_s + needs_s(s.kind);
   }
-  // Frames a second from now on.
+  // Returns frames a second from now on.
   double rate(double for_s) {
     const uint64_t before = schedule.frames_completed();
     for (const double until_s = now_s + for_s; now_s < until_s;) step();
@@ -202,7 +202,7 @@ std::vector<Farm::Kind> one_good(size_t others, Farm::Kind kind) {
   return out;
 }
 
-// A copy of the good one's tile takes nothing of it, so it goes on as if it were alone.
+// A copy of the good sampler's tile costs it nothing: it goes on as if it were alone.
 TEST(HeldLeases, SamplersThatDeliverNothingTakeLittleOfTheRate) {
   using enum Farm::Kind;
   const double alone = Farm({kGood}).rate(10);
@@ -228,7 +228,7 @@ TEST(HeldLeases, WhoBeginsToDeliverHasItsShareAgain) {
   EXPECT_EQ(farm.told, (std::vector<std::string>{"sampler 1", "sampler 1"}));
 }
 
-// What a slow one delivers comes after a backup's: it is not taken for one that delivers nothing.
+// A slow sampler's tile comes after the backup's: it does not count as delivering nothing.
 TEST(HeldLeases, SlowSamplersAreNotCalledStuck) {
   using enum Farm::Kind;
   const double alone = Farm({kGood}).rate(10);

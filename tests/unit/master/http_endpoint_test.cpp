@@ -1,4 +1,4 @@
-// The metrics' HTTP endpoint against friends and others.
+// The metrics' HTTP endpoint with friendly and hostile clients.
 #include "services/master/live/http_endpoint.h"
 
 #include <arpa/inet.h>
@@ -33,7 +33,7 @@ int free_port() {
   return ntohs(at.sin_port);
 }
 
-/// A connection that says what it is told to.
+/// A connection that sends given texts.
 class Client {
  public:
   explicit Client(int port) : fd_(socket(AF_INET, SOCK_STREAM, 0)) {
@@ -45,7 +45,7 @@ class Client {
     if (fd_ >= 0) close(fd_);
   }
   void say(const std::string& text) { (void)!send(fd_, text.data(), text.size(), MSG_NOSIGNAL); }
-  /// Everything until the other side closes, or the time is over.
+  /// Reads until the other side closes, or the time is over.
   std::string hear(double for_s = 10) {
     std::string out;
     for (const double until = monotonic_s() + for_s; monotonic_s() < until;) {
@@ -111,7 +111,7 @@ TEST_F(Endpoint, RefusesWhatIsNotForIt) {
   EXPECT_TRUE(get("/metrics").ends_with("telesplat_up 1\n")) << "and goes on";
 }
 
-// A page in a browser of this machine may reach it by a name of its own, which points here.
+// A page in a browser of this machine may reach it by a name of its own that points here.
 TEST_F(Endpoint, ThoseWhoCallItByAnotherNameAreRefused) {
   const auto code = [&](const std::string& head) {
     return ask("GET /metrics " + head + "\r\n\r\n").substr(0, sizeof "HTTP/1.1 200" - 1);
@@ -134,7 +134,7 @@ TEST_F(Endpoint, RequestsWithoutAnEndAreNotKept) {
   EXPECT_TRUE(get("/metrics").ends_with("telesplat_up 1\n"));
 }
 
-// Many who say nothing, or a letter now and then, are rid of when their time is over.
+// Many clients that send nothing, or a letter now and then, are closed when their time is over.
 TEST_F(Endpoint, TheSlowAreClosedAndTheOthersServed) {
   std::vector<Client> slow;
   for (size_t i = 0; i < 2 * HttpEndpoint::kMostConnections; ++i) slow.emplace_back(port).say("GET /me");

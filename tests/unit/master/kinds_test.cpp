@@ -1,4 +1,4 @@
-// What changes with the kind of scene, and what data servers may not say. The master without sockets and clocks.
+// Changes of the kind of scene, and hellos of data servers that are refused. The master without sockets and clocks.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -69,7 +69,7 @@ class KindsOfScenes : public ::testing::Test {
     return core.on("data" + std::to_string(instance), w, now);
   }
   void ask() { core.on("sampler1", wire::LeaseRequest{{1}}, now); }
-  // Holds what it is told to hold.
+  // Reports the slabs that it was assigned.
   void slabs_ready() {
     for (const auto& a : sent<wire::SlabAssignment>("sampler1"))
       core.on("sampler1", wire::SlabReady{{1}, a.partition, {1}, 10, 30}, now);
@@ -284,7 +284,7 @@ TEST_F(KindsOfScenes, ARefusedServersEndpointsAreToldNobody) {
   hello(bad);
   EXPECT_FALSE(told().endpoints.contains("chunks"));
   EXPECT_TRUE(told().box_room.empty());
-  // What it says later may be better.
+  // A later hello may be valid.
   hello(data(2, "mesh"));
   hello("viewer", 20);
   EXPECT_TRUE(told().endpoints.contains("chunks"));
@@ -302,7 +302,7 @@ TEST_F(KindsOfScenes, WhatWasNotGivenIsAsTheKindHasIt) {
     EXPECT_EQ(core.progressive(), progressive);
     EXPECT_EQ(core.settings(), s);
   };
-  expect(0.5, false);  // nothing is known yet
+  expect(0.5, false);  // before any data server joins
   hello(data(1, "julia"));
   expect(0.4, true);
   hello(data(2, "mesh"));
@@ -312,7 +312,7 @@ TEST_F(KindsOfScenes, WhatWasNotGivenIsAsTheKindHasIt) {
   EXPECT_EQ(told().settings.layers, 16u);
 }
 
-// Volumes have no rays that a plan could choose; pictures and models that keep everything need all.
+// Volumes have no rays that a plan could choose; pictures, and models that keep everything, need all rays.
 TEST(Settings, RaysArePlannedForPointsUnlessAllAreNeeded) {
   for (const auto kind : scene::kKinds) EXPECT_EQ(settings({}, kind).steering, kind != scene::Kind::kVolume);
   EXPECT_FALSE(settings({.settings = {.keep_redundant = true}}, scene::Kind::kMesh).steering);

@@ -17,7 +17,7 @@ TEST(LinkGate, IsOpenToWhomItKnowsNothingOf) {
   EXPECT_TRUE(gate.open(kFar, 1));
   EXPECT_TRUE(gate.idle(1));
   EXPECT_EQ(gate.update_rays(kFar), 0u);
-  // Of one whose rate is not known yet, some must be under way to learn it.
+  // A link of unknown rate must have some bytes under way to learn the rate.
   gate.report(link(kFar, 0, 100'000), 1);
   EXPECT_TRUE(gate.open(kFar, 1));
   EXPECT_FALSE(gate.idle(1));
@@ -52,7 +52,7 @@ TEST(LinkGate, AViewerThatDoesNotReadIsSentNothingAndHoldsUpNobody) {
   gate.report(link(kFar, 0, 1000, 0.02, 3), 1);
   EXPECT_FALSE(gate.open(kFar, 1));
   EXPECT_TRUE(gate.idle(1));
-  // Or says nothing at all.
+  // A viewer may also stay silent.
   gate.report(link(kFar, 2.5e6, 10'000, 0.02, 0.1), 2);
   EXPECT_TRUE(gate.open(kFar, 2));
   EXPECT_FALSE(gate.open(kFar, 2 + LinkGate::kSilent_s));

@@ -1,4 +1,4 @@
-// What a mesh is coloured by: chosen by the data server, then by commands; another array is fetched before its epoch.
+// Colours of a mesh: chosen by the data server, then by commands; another array is fetched before its epoch.
 #include "services/master/tiles/mesh_colours.h"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ TEST_F(MeshColoursTest, RangeAndMapBeginAnEpochAtOnce) {
   ASSERT_TRUE(colours.obey(colour({{"array", "heat"}, {"map", "own=0:#000000,1:#ffffff"}})).ok());
   EXPECT_EQ(now().hi, 10);
   EXPECT_EQ(now().map.name, "own");
-  EXPECT_FALSE(adopt(data(heat())));  // the data server was restarted: what was chosen stays
+  EXPECT_FALSE(adopt(data(heat())));  // the data server was restarted: the choice stays
   EXPECT_EQ(now().map.name, "own");
 }
 
@@ -104,7 +104,7 @@ TEST_F(MeshColoursTest, TheLastOrderCounts) {
   EXPECT_EQ(colours.text(), "");
   EXPECT_TRUE(adopt(data("", "2")));
   EXPECT_EQ(now().array, "heat");
-  EXPECT_EQ(now().map.name, "plasma");  // as the data server began
+  EXPECT_EQ(now().map.name, "plasma");  // the data server's first map
 }
 
 TEST_F(MeshColoursTest, MapsOfAnArrayThatIsOnItsWayAreTaken) {

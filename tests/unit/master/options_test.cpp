@@ -1,4 +1,4 @@
-// The master's flags, and its socket's patience with messages.
+// The master's flags, and its socket's limits of messages.
 #include "services/master/master_options.h"
 
 #include <gtest/gtest.h>

@@ -56,7 +56,7 @@ TEST_F(Paced, TilesFollowAtThePaceOfTheLink) {
   ASSERT_TRUE(begins(kFar, 1));
   const auto first = schedule.lease("a", now);
   ASSERT_TRUE(first);
-  EXPECT_TRUE(done(*first, 80'000));  // 70 ms of the link are 70,000
+  EXPECT_TRUE(done(*first, 80'000));  // 70 ms of the link are 70,000 bytes
   EXPECT_FALSE(schedule.lease("a", now));
   link(kFar, 80'000);
   EXPECT_FALSE(schedule.lease("a", now));
@@ -87,7 +87,7 @@ TEST_F(Paced, ALinkThatTakesNothingDoesNotKeepOthersFromBeginning) {
   EXPECT_TRUE(schedule.begin_view({1}, false, now));
 }
 
-// A view of four tiles, the first of which filled the link.
+// A view of four tiles; the first one filled the link.
 class Overtaken : public Paced {
  protected:
   void begin(uint64_t buffers = 0) {

@@ -31,7 +31,7 @@ wire::TileDone done(const wire::Lease& l, double took_s = 0) {
 
 const auto kNobody = [](const std::string&) {};
 
-// To "a", or, what only an idle sampler gets, to "b".
+// Leases to "a", or, if only an idle sampler gets a lease, to "b".
 std::optional<wire::Lease> lease_any(FrameSchedule& s) {
   const auto l = s.lease("a", 0);
   return l ? l : s.lease("b", 0);
@@ -101,7 +101,7 @@ TEST(SamplingCosts, AreEachSamplersOwnOnceItHasSome) {
 
 TEST(Rows, LeasesFollowEachSamplersMeasuredSpeed) {
   auto s = by_rows({.frames_in_flight = 1});
-  // A row takes "fast" 0.4 ms and "slow" 4 ms.
+  // "fast" takes 0.4 ms for a row, "slow" 4 ms.
   std::map<std::string, double> row_s{{"fast", 0.0004}, {"slow", 0.004}};
   std::map<std::string, int> most;
   double now = 0;
@@ -251,7 +251,7 @@ TEST(Coarse, IsDroppedOnceTheFineOneIsThere) {
   EXPECT_FALSE(s.tile_done(done(*stuck), "slow", 1));
 }
 
-// A schedule that knows tiles take `typical_s`, with one frame of two rows begun.
+// A schedule with a typical time of tiles, `typical_s`, and one frame of two rows begun.
 FrameSchedule experienced(double typical_s, bool rows) {
   FrameSchedule s({.tile_size = 64, .frames_in_flight = 1, .lease_timeout_s = 100});
   s.set_cut({rows, false});
@@ -284,7 +284,7 @@ TEST(Backups, GoToAnotherSamplerOnceATileIsLongOut) {
       EXPECT_EQ(s.backups(), 1u);
       EXPECT_FALSE(s.lease("d", 10 + after + 0.0002)) << "one backup at most, the other tile is not due";
       EXPECT_EQ(s.lease("a", 20)->tile, b->tile);
-      // Either closes the tile, the other comes too late.
+      // Either one completes the tile; the other's comes too late.
       EXPECT_TRUE(s.tile_done(done(*backup), "c", 20));
       EXPECT_FALSE(s.tile_done(done(*a), "a", 20.1));
       EXPECT_TRUE(s.tile_done(done(*b), "b", 20.1));

@@ -1,4 +1,4 @@
-// Assignment sheets: who sends what to whom in which round.
+// Assignment sheets: sender, receiver and round of each transfer.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 const std::vector<Transfer> kFigure{{0, 0, 1}, {0, 1, 1}, {1, 0, 1}, {1, 1, 1}, {1, 2, 1},
                                     {2, 0, 1}, {2, 1, 1}, {2, 2, 1}, {3, 1, 1}, {3, 2, 1}};
 
-// Pairs of transfers that share a node and a round.
+// Counts pairs of transfers that share a node and a round.
 int conflicts(const AssignmentSheet& sheet, const std::vector<Transfer>& transfers) {
   int out = 0;
   for (size_t i = 0; i < transfers.size(); ++i)
@@ -32,7 +32,7 @@ TEST(Scatter, FigureWithoutConflictsTakesAsManyRoundsAsB2HasTransfers) {
 }
 
 TEST(Scatter, FigureInThreeRoundsIsAsGoodAsTheThesissBetterSheet) {
-  // Sheets (c) and (d), rounds from 0. In (c) the text has A4 -> B1 for what its table has as A4 -> B2.
+  // Sheets (c) and (d), rounds from 0. In (c) the text says A4 -> B1 where its table has A4 -> B2.
   const AssignmentSheet c{{0, 1, 0, 1, 2, 0, 1, 2, 0, 1}, 3};
   const AssignmentSheet d{{2, 0, 0, 1, 2, 1, 2, 0, 0, 1}, 3};
   const auto ours = schedule_scatter(kFigure, 3);
@@ -69,8 +69,7 @@ TEST(Scatter, LargeTransfersShareRounds) {
   // Two senders, two receivers: large along one diagonal, small along the other.
   const std::vector<Transfer> t{{0, 0, 100}, {0, 1, 1}, {1, 0, 1}, {1, 1, 100}};
   EXPECT_EQ(schedule_scatter(t)->makespan(t), 101u);
-  // What was coloured badly is put right by swaps: three rounds that each have a large transfer in order of their
-  // bytes.
+  // Swaps repair a bad colouring: three rounds, each with one large transfer, by order of bytes.
   const std::vector<Transfer> u{{0, 0, 9}, {0, 1, 8}, {1, 1, 7}, {1, 2, 9}, {2, 2, 8}, {2, 0, 1}};
   EXPECT_LE(schedule_scatter(u)->makespan(u), schedule_scatter(u, 0, false)->makespan(u));
 }
@@ -129,7 +128,7 @@ TEST_P(RandomScatter, TakesLessTimeThanAnArbitraryColouring) {
     const auto t = transfers();
     ours += double(schedule_scatter(t)->makespan(t));
     arbitrary += double(schedule_scatter(t, 0, false)->makespan(t));
-    // No node can be through sooner than with all its own.
+    // No node can finish sooner than all of its own transfers take.
     std::map<std::pair<int, uint32_t>, uint64_t> load;
     for (const auto& x : t) load[{0, x.sender}] += x.bytes, load[{1, x.receiver}] += x.bytes;
     uint64_t most = 0;
@@ -151,7 +150,7 @@ TEST(Scatter, LargestSheetsAreBounded) {
   ASSERT_TRUE(sheet);
   EXPECT_EQ(sheet->rounds, 256u);
   EXPECT_TRUE(validate(*sheet, many));
-  // One pair has them all.
+  // One pair has all transfers.
   many.assign(kMaxTransfers, {kMaxScatterNodes - 1, 0, 1});
   sheet = schedule_scatter(many);
   ASSERT_TRUE(sheet);

@@ -1,4 +1,4 @@
-// Who may speak in whose name.
+// Which connection may send messages in a process' name.
 #include "services/master/gate/gate.h"
 
 #include <gtest/gtest.h>
@@ -70,7 +70,7 @@ TEST(Senders, EveryoneSpeaksForThemselves) {
   for (const Status& s : all("a", 2)) EXPECT_FALSE(s.ok());
   for (const Status& s : all("a", 77)) EXPECT_FALSE(s.ok()) << "of somebody who never said hello";
   for (const Status& s : all("c", 1)) EXPECT_TRUE(s.ok()) << "the core asks who it is";
-  // What names somebody else's process.
+  // Messages may name another process.
   wire::TileDone done;
   done.sampler = {1};
   EXPECT_TRUE(senders.admit(from("b"), done).ok());

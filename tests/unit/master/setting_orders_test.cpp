@@ -1,4 +1,4 @@
-// Orders that change a setting which a viewer or the launcher keeps: who is asked, and how the answer comes back.
+// Orders that change a setting of a viewer or the launcher: the process that is asked, and the way of its answer.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -21,12 +21,12 @@ class SettingOrders : public testing::Test {
     }
     core.take_outgoing();
   }
-  // What comes of an order: replies, and orders to viewers.
+  // Sends an order and takes the results: replies, and orders to viewers.
   void order(const std::string& command, const std::map<std::string, std::string>& arguments, double now_s = 1) {
     core.on("ctl", wire::Control{command, arguments}, now_s);
     take();
   }
-  // Whether a pick that comes over this connection with this key is passed on to a viewer.
+  // True if a pick over this connection with this key is passed on to a viewer.
   bool picks(const std::string& peer, const std::string& key) {
     core.on(peer, wire::Control{"pick", {{"at", "1,1"}}}, 1, key);
     take();
@@ -111,7 +111,7 @@ TEST_F(SettingOrders, AnAnswerThatIsNoneIsRefusedAndALauncherThatIsSilentIsTold)
   EXPECT_EQ(replies[0].second.text, "no answer within 3 s");
 }
 
-// A viewer keeps 64 orders and drops the oldest: a person alone must not be able to fill its list.
+// A viewer keeps 64 orders and drops the oldest: one person alone must not be able to fill its list.
 TEST_F(SettingOrders, NobodyFillsTheListOfOrdersAlone) {
   size_t passed_on = 0;
   for (size_t i = 0; i < Errands::kMost; ++i) passed_on += picks("eve's " + std::to_string(i), "eve");

@@ -36,7 +36,7 @@ wire::ViewRequest request(uint64_t viewer, uint64_t id, uint64_t buffers = 0, gl
   return r;
 }
 
-// The same one whenever it is asked for.
+// Returns the same partition for the same number.
 std::shared_ptr<Partition> halves(uint64_t number = 1) {
   static std::map<uint64_t, std::shared_ptr<Partition>> all;
   auto& p = all[number];
@@ -77,12 +77,12 @@ TEST(Plan, ViewsThatSeeNothingHaveAnEmptyFrameThatIsValid) {
                                  {0, -1e12, 0},
                                  {0.025, 0, 0},
                                  {1e300, 0, 0}}) {
-      // Looks along -z from behind, from within and from far off: not at the volume, or it is in view, and planned.
+      // Looks along -z from behind, from within and from far off: away from the volume, or at it, which is planned.
       const auto frame = plan(grid, {request(1, 1, 0, eye)}, 16);
       const auto valid = volume::validate(frame, grid);
       ASSERT_TRUE(valid) << valid.error().text;
       if (frame.width > 1 || frame.height > 1) continue;
-      // Its pixel lies beyond the volume on every slice that it has.
+      // Its pixel lies beyond the volume on each of its slices.
       ASSERT_EQ(frame.layers.size(), 1u);
       for (const double x : {0.0, 1.0}) {
         const glm::dvec3 p = frame.unproject(x, x, frame.layers[0].plane);
@@ -322,7 +322,7 @@ TEST(VolumeScene, IsKnownOnceAllPartsAre) {
   EXPECT_EQ(scene.servers()[1].end, 24);
   EXPECT_EQ(scene.facts().at("scene"), "hill.nrrd");
   EXPECT_EQ(scene.values().at("volume.part"), 0);
-  // Weights come from those who hold the slices.
+  // Weights count only from servers that hold the slices.
   EXPECT_FALSE(scene.weighed());
   EXPECT_FALSE(scene.weigh(weights_of(session(0, 2), 9, {1}))) << "nobody known";
   EXPECT_FALSE(scene.weigh(weights_of(session(0, 2), 2, {1}))) << "others' slices";
@@ -375,7 +375,7 @@ TEST(VolumeScene, AServerThatReturnsKeepsWhatWasSet) {
   EXPECT_TRUE(change->servers);
   EXPECT_EQ(scene.session().transfer.points.size(), 2u);
   EXPECT_EQ(scene.session().transfer.points[1].opacity, 0.25f);
-  // One that says something else is believed.
+  // A later server with other values is believed.
   scene.leave({2});
   auto other = session();
   other.transfer.points[1].opacity = 0.75f;
@@ -647,7 +647,7 @@ TEST_F(VolumeMaster, WaitsForAllPartsAndTellsThemOfANewEpoch) {
   const auto l = leased(1);
   ASSERT_TRUE(l);
   EXPECT_EQ(l->views[0].request.value, 1u);
-  // A stranger's volume is refused.
+  // Another volume is refused.
   auto other = session(0, 1);
   other.grid.size = {4, 4, 4};
   core->on("stranger", data_hello(other, "stranger", 999), now);
@@ -669,7 +669,7 @@ TEST_F(VolumeMaster, AnotherTransferFunctionIsAnotherEpoch) {
   const auto welcome = sent<wire::Welcome>("packer10").back();
   EXPECT_EQ(welcome.epoch.value, 2u);
   EXPECT_NE(welcome.facts.at("transfer").find("#00ff00"), std::string::npos) << welcome.facts.at("transfer");
-  finish(*old, 1);  // in vain
+  finish(*old, 1);  // without effect
   ask(1);
   const auto l = leased(1);
   ASSERT_TRUE(l) << "the view waits again";
@@ -803,7 +803,7 @@ TEST_F(VolumeMaster, ASilentSamplersSlabMovesUntilItAsksAgain) {
   EXPECT_EQ(assigned[2].slabs, 2u) << "it was slow, not dead";
 }
 
-// As while nothing gets from the packer to the master.
+// No message of the packer reaches the master.
 TEST_F(VolumeMaster, SamplersThatAskAgainKeepTheirSlabsThoughThePackerIsSilent) {
   begin();
   join_all();
@@ -845,7 +845,7 @@ TEST_F(VolumeMaster, ASamplerThatNeverDeliversHasItsSlabMoreAndMoreSeldom) {
     if (lease) finish(*lease, 1), ask(1);
     ++(lease ? delivered : stood_still);
   }
-  // It lets leases of 2 s run out, after 0, 2, 4, ... 32 s and not again.
+  // It lets leases of 2 s run out, after 0, 2, 4, ... 32 s, and not again.
   EXPECT_NEAR(stood_still * 0.05, 7 * 2, 3);
   EXPECT_GT(delivered, 0);
 }
@@ -863,7 +863,7 @@ TEST_F(VolumeMaster, RestartedPeersFindTheirPlace) {
   hello("packer", 11);
   ask(1);
   EXPECT_EQ(leased(1)->views[0].request.value, 1u);
-  // The data server: the session stays; samplers are told the new address.
+  // The data server: the session stays; samplers get the new address.
   ASSERT_TRUE(control("tf", {{"transfer", "0:#000000:0, 200:#0000ff:1"}}).ok);
   const auto epoch = sent<wire::Welcome>("viewer20").back().epoch;
   core->undeliverable("data0");
@@ -875,7 +875,7 @@ TEST_F(VolumeMaster, RestartedPeersFindTheirPlace) {
   const auto a = sent<wire::SlabAssignment>("sampler1");
   ASSERT_EQ(a.size(), 1u);
   EXPECT_EQ(a[0].sheet[0].endpoint, "tcp://elsewhere");
-  // A sampler under its old name in a new life has nothing.
+  // A restarted sampler with its old name has no slab.
   wire::Hello h;
   h.role = "sampler";
   h.name = "sampler2";

@@ -1,4 +1,4 @@
-// How a volume is cut into slabs, and what partition is in use when.
+// Cuts a volume into slabs, and decides which partition is in use.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -13,7 +13,7 @@ uint64_t weight_of(const std::vector<uint32_t>& weights, SlabRange r) {
   return std::accumulate(weights.begin() + r.begin, weights.begin() + r.end, uint64_t{0});
 }
 
-// The lightest heaviest range of all ways to cut, by dynamic programming.
+// Returns the least possible heaviest range, by dynamic programming over all cuts.
 uint64_t best_heaviest(const std::vector<uint32_t>& weights, int parts) {
   const size_t n = weights.size();
   std::vector<uint64_t> best(n + 1, ~uint64_t{0});
@@ -76,7 +76,7 @@ TEST(CutSlabs, HeaviestIsAsLightAsCanBe) {
 class Partitions : public ::testing::Test {
  protected:
   Partitions() { p.set_slices(12); }
-  // Everyone of the newest partition says it is ready.
+  // All samplers of the newest partition report that they are ready.
   void all_ready() {
     const auto newest = p.newest();
     for (const auto& s : newest->slabs) p.ready(s.sampler, newest->number, 1, 1);
@@ -142,12 +142,12 @@ TEST_F(Partitions, OneThatLostASamplerIsNotUsedAnyMore) {
   ASSERT_TRUE(p.update(1));
   EXPECT_EQ(p.newest()->slabs.size(), 2u);
   EXPECT_FALSE(p.in_use());
-  // Nothing can be shown meanwhile: it is not waited for longer than the patience lasts.
+  // No picture is possible meanwhile: the wait ends after kReadyPatience_s.
   p.update(1 + kReadyPatience_s - 0.01);
   EXPECT_FALSE(p.in_use());
   p.update(1 + kReadyPatience_s);
   EXPECT_TRUE(p.in_use());
-  // Again, before one was ready: nobody waits anew.
+  // Again before one was ready: there is no new wait.
   p.leave("a");
   EXPECT_FALSE(p.in_use());
   p.update(1 + kReadyPatience_s);

@@ -1,5 +1,4 @@
-// Plans: views wait for them, become masked tiles, and when nothing is left to do more is cast. Without sockets and
-// clocks.
+// Plans: views wait for them, become masked tiles, and an idle time is used for extra rays. Without sockets and clocks.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -39,7 +38,7 @@ wire::Plan plan_of(const wire::PlanRequest& asked, const std::vector<Tile>& tile
   }
   return out;
 }
-// A tile of which only the first pixels are cast.
+// A tile whose mask has only the first `rays` pixels.
 Tile masked(const geometry::Rect& rect, uint32_t rays) {
   image::PixelMask mask(rect.width, rect.height);
   for (int i = 0; i < int(rays); ++i) mask.set(i % rect.width, i / rect.width);
@@ -50,7 +49,7 @@ const std::vector<Tile> kTwoTiles{masked({64, 0, 64, 64}, 30), {{0, 64, 32, 32},
 class Steered : public testing::Test {
  protected:
   void SetUp() override { schedule.set_cut({.steered = true}); }
-  // What is asked of the packer now; there must be one question.
+  // Returns the open question to the packer; there must be one.
   wire::PlanRequest asked() {
     const auto questions = schedule.take_questions();
     EXPECT_EQ(questions.size(), 1u);
@@ -85,7 +84,7 @@ class Steered : public testing::Test {
     m.moments.sample_end_s = m.moments.encode_end_s = l.moments.leased_s + took_s;
     return schedule.tile_done(m, "a", now);
   }
-  // A view from beginning to end; nothing has to be cast for it.
+  // A view from beginning to end that needs no ray.
   wire::PlanRequest look(uint64_t viewer, uint64_t id, double x = 0) {
     const auto question = ask(viewer, id, x);
     answer(question, {});
@@ -149,7 +148,7 @@ TEST_F(Steered, AHeadThatRestsDoesNotWaitForRaysThatRefine) {
   const auto still = ask(5, 2);
   ASSERT_TRUE(still.still);
   EXPECT_EQ(still.most_rays, kStillViews * moving.most_rays);
-  // How long it takes does not count.
+  // Its time does not count.
   wire::Plan plan = plan_of(still, kTwoTiles);
   plan.figures["rays.sparse"] = double(still.most_rays);
   EXPECT_TRUE(schedule.take_plan(plan, now));
@@ -273,7 +272,7 @@ TEST_F(Steered, AViewWhosePlanIsLateIsSampledWhole) {
   schedule.give_up_plans(now);
   EXPECT_EQ(leases().size(), 8u);
   EXPECT_EQ(schedule.take_plan_rows().at(0).outcome, Outcome::kLate);
-  answer(question, kTwoTiles);  // nobody waits for it any more
+  answer(question, kTwoTiles);  // too late: the view no longer waits for it
   EXPECT_TRUE(leases().empty());
   EXPECT_EQ(schedule.views_in_flight(), 1u);
   EXPECT_TRUE(schedule.take_plan_rows().empty());
@@ -290,7 +289,7 @@ TEST_F(Steered, APackerThatDoesNotAnswerIsNotAskedForAWhile) {
   EXPECT_TRUE(schedule.steered(now)) << "once may be chance";
   wait_in_vain(2);
   EXPECT_FALSE(schedule.steered(now));
-  // Views go on as without plans, and may overlap.
+  // Views go on without plans, and may overlap.
   for (uint64_t id = 3; id <= 4; ++id) {
     schedule.request_view(request(5, id));
     EXPECT_TRUE(schedule.begin_view({1}, false, now));
@@ -303,7 +302,7 @@ TEST_F(Steered, APackerThatDoesNotAnswerIsNotAskedForAWhile) {
   EXPECT_TRUE(schedule.steered(now));
   wait_in_vain(5);
   EXPECT_FALSE(schedule.steered(now + 1.5 * kFirstRest_s)) << "longer this time";
-  schedule.trust_packer();  // another one
+  schedule.trust_packer();  // another packer
   look(5, 6);
   EXPECT_TRUE(schedule.steered(now));
 }
@@ -393,7 +392,7 @@ TEST_F(Steered, OldExtraTilesAreDroppedWhenAnotherViewBegins) {
   EXPECT_EQ(schedule.frames_in_flight(), 0u);
 }
 
-// A view that stays is asked for every second, and more is cast for it in between.
+// A resting view is requested every second, and extra rays are cast for it in between.
 TEST_F(Steered, ExtraTilesOfAViewThatStaysAreKept) {
   look(5, 1);
   answer(ask_extra(), kTwoTiles);
@@ -432,7 +431,7 @@ TEST_F(Steered, LostLeasesOfADroppedExtraFrameEndIt) {
   EXPECT_TRUE(asks_extra());
 }
 
-// The packer looks for what is beyond a view when it has time.
+// The packer searches beyond a view only when it has time.
 TEST_F(Steered, ExtraRaysAreWaitedForLongerThanViews) {
   look(5, 1);
   const auto question = ask_extra();
@@ -449,7 +448,7 @@ TEST_F(Steered, ExtraRaysAreWaitedForLongerThanViews) {
   EXPECT_TRUE(schedule.steered(now));
 }
 
-// A viewer that moves asks for the next view while one is sampled: there never is nothing to do.
+// A moving viewer requests the next view while one is sampled: there is never an idle time.
 TEST_F(Steered, EverySecondViewOfAMovingHeadIsFollowedByAnExtraFrame) {
   int extras = 0;
   for (uint64_t id = 1; id <= 10; ++id) {
@@ -586,7 +585,7 @@ TEST_F(Steered, APlanWhoseMasksAreNoneIsRefusedAndTheViewSampledWhole) {
     EXPECT_EQ(schedule.frames_completed(), id);
     EXPECT_EQ(schedule.take_plan_rows().back().outcome, Outcome::kFull);
   }
-  // Extra rays that nobody can cast are not asked for again.
+  // Extra rays that cannot be cast are not asked for again.
   const Status s = schedule.take_plan(plan_of(ask_extra(), {miscounted}), now);
   ASSERT_FALSE(s);
   EXPECT_NE(s.error().text.find("41 rays, its mask has 40"), std::string::npos) << s.error().text;
@@ -603,7 +602,7 @@ TEST_F(Steered, APlanWhoseMasksAreNoneIsRefusedAndTheViewSampledWhole) {
       << refused.error().text;
 }
 
-// A sampler that cannot read a mask casts all of its tile, and says so.
+// A sampler that cannot read a mask casts all of its tile, and reports that.
 TEST_F(Steered, ATileThatWasSampledWholeCostsAllItsPixels) {
   answer(ask(5, 1), {kTwoTiles[0]});
   auto l = leases().at(0);
@@ -612,7 +611,7 @@ TEST_F(Steered, ATileThatWasSampledWholeCostsAllItsPixels) {
   EXPECT_NEAR(schedule.costs().pixel_s("a"), 1e-6, 1e-12);
   answer(ask(5, 2, 0.1), {kTwoTiles[0]});
   l = leases().at(0);
-  l.rays = ~uint64_t{0};  // more than there are
+  l.rays = ~uint64_t{0};  // more than the tile has
   EXPECT_TRUE(done(l, 1e-6 * 64 * 64));
   EXPECT_NEAR(schedule.costs().pixel_s("a"), 1e-6, 1e-12);
 }
@@ -743,7 +742,7 @@ TEST_F(SteeredMaster, WithoutSamplersOrPackerNothingIsAsked) {
   EXPECT_EQ(sent<wire::PlanRequest>("other").size(), 1u);
 }
 
-// Viewers come and go, under new names and over old connections, while other scenes are shown, in mid-plan.
+// Viewers come and go, under new names and over old connections, while other scenes are shown, in the middle of plans.
 TEST_F(SteeredMaster, NothingIsRememberedOfViewersThatLeft) {
   volume::Session other;  // a scene of another kind
   other.grid.size = {16, 16, 24};
@@ -764,7 +763,7 @@ TEST_F(SteeredMaster, NothingIsRememberedOfViewersThatLeft) {
       if (instance % 3 == 0) continue;
       EXPECT_TRUE(core.on("packer", plan_of(question, {}), now));
     }
-    now += 2 * kLeastPatience_s;  // the others are given up
+    now += 2 * kLeastPatience_s;  // the other plans are given up
     core.tick(now);
     remembered += core.figures().viewers == 1;
     EXPECT_LE(core.figures().viewers, 1u);
@@ -772,7 +771,7 @@ TEST_F(SteeredMaster, NothingIsRememberedOfViewersThatLeft) {
   for (int i = 0; i < 200; ++i) {
     const std::string peer = "v" + std::to_string(i);
     look(peer);
-    if (i % 4 == 0) look(peer);  // in a new life
+    if (i % 4 == 0) look(peer);  // after a restart
     switch (i % 3) {
       case 0:
         core.on(peer, wire::Goodbye{{instance}}, now);

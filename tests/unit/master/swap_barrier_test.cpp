@@ -1,4 +1,4 @@
-// Viewers of a wall swap together; one that is late, slow, lost or dead holds nobody for longer than a frame.
+// Viewers of a wall swap together; one that is late, slow, lost or dead delays the others by a frame at most.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -29,13 +29,13 @@ class Swaps : public ::testing::Test {
   void say(uint64_t viewer, uint64_t frame, double now_s) {
     barrier.on("peer-" + std::to_string(viewer), ready(viewer, frame), now_s);
   }
-  // Those that were told to present `frame` since the last call, and when.
+  // Returns the swaps sent since the last call, by viewer.
   std::map<std::string, wire::Swap> told() {
     std::map<std::string, wire::Swap> out;
     for (const auto& o : barrier.take_outgoing()) out[o.peer] = o.swap;
     return out;
   }
-  // All four are there; frame 0 is told at 1 s.
+  // All four are there; frame 0 is announced at 1 s.
   void begin() {
     for (uint64_t v = 0; v < 4; ++v) say(v, 0, 1);
     ASSERT_EQ(told().size(), 4u);
@@ -101,10 +101,10 @@ TEST_F(Swaps, ALateOneHoldsTheOthersForAFrameOnce) {
   EXPECT_EQ(swaps.size(), 4u) << "the late one hears of it, too";
   EXPECT_EQ(swaps.begin()->second.viewers, 3u);
   EXPECT_EQ(barrier.figures().incomplete, 1u);
-  // From now on nobody waits for it.
+  // From now on the others do not wait for it.
   for (uint64_t v = 0; v < 3; ++v) say(v, 2, due_s + 0.005);
   EXPECT_EQ(told().size(), 4u);
-  // It comes back to the frame of the others, and is waited for after some in time.
+  // It comes back at the others' frame, and they wait for it after it was in time a few times.
   say(3, 1, due_s + 0.006);
   double now_s = due_s + 0.02;
   for (uint64_t frame = 3; frame < 3 + SwapBarrier::kInTime; ++frame, now_s += 0.02) {
@@ -129,7 +129,7 @@ TEST_F(Swaps, OneThatComesNowAndThenIsNotWaitedFor) {
   }
 }
 
-// A hostile viewer tells of frames that nobody has shown: what the others tell still counts.
+// A hostile viewer reports frames that were never shown: the others' reports still count.
 TEST_F(Swaps, FramesThatNobodyWasToldToPresentDoNotCount) {
   begin();
   for (uint64_t frame = 1; frame < 20; ++frame) {
@@ -212,7 +212,7 @@ TEST_F(Swaps, OneViewersNumberLeadsNoWallToTheLastFrame) {
   EXPECT_EQ(swaps.begin()->second.frame, 500u);
 }
 
-// The first viewer's head is everyone's; without it the next one's.
+// All use the first viewer's head; if that viewer is late, the next one's.
 TEST_F(Swaps, TheHeadOfTheNextOneServesWhereTheFirstIsLate) {
   begin();
   for (uint64_t v = 1; v < 4; ++v) say(v, 1, 1.005);
@@ -240,7 +240,7 @@ TEST_F(Swaps, NumbersOfAModelNeverFallAndWaitOnlySoLongForOne) {
   EXPECT_EQ(frame(7, 1.75, 110, 120), 110u) << "for three frames it had what was shown";
 }
 
-// Another packer: its numbers begin anew, and it is shown once all have something of it.
+// A new packer: its numbers begin anew, and it is shown once all have received data from it.
 TEST_F(Swaps, AnotherSourceIsShownWhenAllReceiveFromIt) {
   begin();
   const auto frame = [&](uint64_t number, double now_s, uint64_t of_last) {
@@ -257,7 +257,7 @@ TEST_F(Swaps, AnotherSourceIsShownWhenAllReceiveFromIt) {
   EXPECT_EQ(state.newest, 3u);
 }
 
-// A viewer that was started again, or whose link to the packer is cut, has nothing to show: the others go on.
+// A viewer that was restarted, or whose link to the packer is cut, has no picture: the others go on.
 TEST_F(Swaps, AFirstViewerThatHasReceivedNothingFreezesNobody) {
   begin();
   auto again = ready(0, 0);
@@ -293,7 +293,7 @@ TEST_F(Swaps, WhereSourcesDifferForLongThatOfMostIsShown) {
   EXPECT_EQ(frame(4, 2.08).newest, 41u);
 }
 
-// Of frames of slice images each may lack others than its neighbours.
+// Each viewer may lack other frames of slice images than its neighbours.
 TEST_F(Swaps, TheNewestFrameThatAllHaveIsShown) {
   begin();
   const auto frame = [&](uint64_t number, double now_s, const std::vector<std::set<uint64_t>>& held) {
@@ -326,7 +326,7 @@ TEST_F(Swaps, WhoIsNotWaitedForDoesNotHoldBackWhatTheOthersShow) {
   EXPECT_EQ(told().begin()->second.state.newest, 40u);
 }
 
-// When the first viewer says that views are to be asked for, all ask for views of the head that it says.
+// If the first viewer says that views are due, all request views for the head that it sends.
 TEST_F(Swaps, AllAskForViewsOfOneHead) {
   begin();
   const auto frame = [&](uint64_t number, bool asks) {

@@ -1,4 +1,4 @@
-// What others tell session.toml of themselves.
+// Facts of data servers and viewers in session.toml.
 #include "services/master/master_record.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,7 @@ TEST(ToldTables, NobodyTellsWhatIsNotTheirs) {
   EXPECT_TRUE(out("data", "[scene]\nfile = \"a\"\nfile = \"b\"\n").first.starts_with("refused: line 3: "));
 }
 
-// The file is read again by other programs: it stays readable, and says of each what that one said.
+// Other programs read the file: it stays readable, and has each process' own facts.
 TEST(SessionText, StaysReadableWhateverPeersTell) {
   metrics::Process data =
       teller("data", "[scene]\nfile = \"a.ply\"\n[[process]]\nrole = \"viewer\"\nname = \"false\"\n");

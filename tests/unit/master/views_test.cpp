@@ -1,4 +1,4 @@
-// Requests that wait: of asynchronous viewers the newest, of the others all in order (T6.3-6.5).
+// Requests that wait: for asynchronous viewers only the newest, for the others all in order (T6.3-6.5).
 #include <gtest/gtest.h>
 
 #include "services/master/tiles/frame_schedule.h"
@@ -109,7 +109,7 @@ TEST(FrameSchedule, BufferedViewsAreBegunInOrderSeveralAtOnce) {
   };
   lease_all();
   ASSERT_EQ(leases.size(), 3u) << "no more than three views are in flight for a viewer's buffers";
-  s.request_view(request(1, 2, 4));  // asked again: it is on its way
+  s.request_view(request(1, 2, 4));  // asked again: it is in flight
   wire::TileDone done;
   done.frame = leases[1].frame;
   done.lease = leases[1].lease;
@@ -118,7 +118,7 @@ TEST(FrameSchedule, BufferedViewsAreBegunInOrderSeveralAtOnce) {
   ASSERT_EQ(leases.size(), 4u);
   for (uint64_t id = 1; id <= 4; ++id) EXPECT_EQ(leases[id - 1].request.value, id);
   EXPECT_FALSE(s.view_waiting());
-  // A new epoch: what is in flight is sampled anew, in order.
+  // A new epoch: frames in flight are sampled anew, in order.
   s.drop_frames();
   leases.clear();
   lease_all();
@@ -156,7 +156,7 @@ struct Session {
   };
   explicit Session(std::vector<Viewer> all) : viewers(std::move(all)) {}
 
-  // Views a second of the first viewer.
+  // Returns views a second of the first viewer.
   double rate(double for_s) {
     const double begin_s = now_s;
     uint64_t views = 0;

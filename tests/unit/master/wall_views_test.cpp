@@ -1,4 +1,4 @@
-// Views of a wall's viewers are sampled as one frame; who is late, new or gone holds up nobody for long.
+// Views of a wall's viewers are sampled as one frame; a late, new or departed viewer delays the others only briefly.
 #include "services/master/slabs/schedule.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ wire::ViewRequest view(uint64_t viewer, uint64_t ask, double now_s) {
   wire::ViewRequest r;
   r.viewer = {100 + viewer};
   r.request = {ask + 1};
-  // Heads that are not together: the ask says what belongs together.
+  // Heads that are apart: the ask's number says which views belong together.
   r.camera = geometry::make_camera({.position_room = {0.4 + 0.1 * double(viewer), 0.4, 3}}, 60, 64, 48);
   r.moments.received_s = now_s;
   r.wall = "lab";
@@ -35,7 +35,7 @@ class WallFrames : public ::testing::Test {
   void ask(std::initializer_list<uint64_t> viewers, uint64_t number, double now_s) {
     for (const uint64_t v : viewers) schedule.request_view(view(v, number, now_s));
   }
-  // The views of the frame that begins now; it is sampled at once.
+  // Begins the next frame, samples it at once, and returns its views.
   std::set<uint64_t> begin(double now_s) {
     if (!schedule.begin_frame({1}, partition, false, now_s)) return {};
     const auto lease = schedule.lease("a", now_s);
@@ -47,7 +47,7 @@ class WallFrames : public ::testing::Test {
     EXPECT_TRUE(schedule.tile_done(done, now_s));
     return out;
   }
-  // All four have had a frame of the first ask.
+  // Lets all four have a frame of the first ask.
   void begin_wall() {
     ask({0, 1, 2, 3}, 1, 1);
     ASSERT_EQ(begin(1), all);

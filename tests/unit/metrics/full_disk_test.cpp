@@ -1,4 +1,4 @@
-// A record whose disk is full, that grows for hours, and whose names are hostile.
+// A record on a full disk, a record that grows for hours, and hostile names.
 #include <malloc.h>
 #include <sys/resource.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-/// No file of this process grows beyond `bytes`, as on a disk that is full.
+/// No file of this process can grow beyond `bytes`, as on a full disk.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) {

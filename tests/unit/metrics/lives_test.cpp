@@ -1,4 +1,4 @@
-// A record that a master goes on with after another was killed.
+// A record that a new master continues after the old one was killed.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -43,7 +43,7 @@ class Lives : public Record {
     r.add_epoch({1}, begin_s, {{"c.x", 0.5}}, {{"transfer", "a,b"}});
     ASSERT_TRUE(r.add_rows(viewer, {{5}, "spans", {"sample"}, {0, begin_s, begin_s + 1, 0, 7, -1, -1}}));
   }
-  /// A master that is killed: nothing that it holds is written any more.
+  /// A master that is killed: rows that it still holds are lost.
   void live_and_be_killed(double begin_s) {
     const pid_t pid = fork();
     if (pid == 0) {
@@ -119,7 +119,7 @@ TEST_F(Lives, ThereMayBeManyAndTheFirstMayHaveMeasuredNothing) {
   EXPECT_TRUE(json::accept(text("trace.json")));
 }
 
-// A line without an end must not fill the memory of who goes on with the record.
+// A line without an end must not fill the memory of the next master.
 TEST_F(Lives, RowsThatAreTooLongAreLeftOut) {
   live_and_be_killed(101);
   const std::string rows = text("frames.csv");

@@ -22,7 +22,7 @@ std::vector<nlohmann::json> of_phase(const nlohmann::json& trace, const std::str
 }
 
 TEST_F(Record, TablesBecomeCsv) {
-  // Times have the digits of nanoseconds, everything else those that it has.
+  // Times have digits down to nanoseconds, other numbers all of their digits.
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s", "px"}, {0, 0.25, 0, 1, 1e-7, 1e-7}}));
   viewer.name = "viewer-2";
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s", "px"}, {0, 123456.789, 1.0 / 3}}));
@@ -46,7 +46,7 @@ TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
   ASSERT_TRUE(record->add_rows(
       viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 7, 3, 9, 1, 2, 2.25, 3, -1, -1, -1}}));
   ASSERT_TRUE(record->add_rows(
-      viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, 0, 0, 0, -1, 1, 2, 0, 0, 0, 0}}));  // names that are not there
+      viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, 0, 0, 0, -1, 1, 2, 0, 0, 0, 0}}));  // no such names
   record.reset();
   const auto trace = nlohmann::json::parse(text("trace.json"), nullptr, false);
   ASSERT_TRUE(trace.is_array());
@@ -66,7 +66,7 @@ TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
   EXPECT_EQ(names["thread_name3"], "epochs");
 }
 
-// What may overlap in one lane is told apart by its id.
+// Spans of a lane that may overlap are distinguished by their ids.
 TEST_F(Record, TheTraceHasLeasesPlansAndViewUpdates) {
   wire::TileDone done = tile(4, 2, 10);
   done.lease = {77};
@@ -102,7 +102,7 @@ TEST_F(Record, TheTraceHasLeasesPlansAndViewUpdates) {
   EXPECT_EQ(begins[3]["args"]["request"], 6);
 }
 
-// However long the machine runs: twelve days of uptime are 10^6 seconds.
+// After any uptime: twelve days are 10^6 seconds.
 TEST_F(Record, TimesCountFromTheRunsBeginning) {
   record = std::move(RunRecord::open(folder + "/run", {1'000'000, 1})).value();
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "begin_s"}, {0.5, 1'000'002.000000001}}));
@@ -172,7 +172,7 @@ TEST_F(Record, AFolderThatCannotBeMadeIsNamed) {
   EXPECT_NE(bad.error().text.find("/file/run"), std::string::npos);
 }
 
-// Nothing of this comes in through messages, which are UTF-8. Names of files and flags might.
+// Messages are UTF-8, but names of files and flags may be anything.
 TEST_F(Record, FilesAreUtf8WhateverNamesAre) {
   viewer.name = "viewer \xff";
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"caf\xe9"}, {0, 1, 1.5, 0, -1, -1, -1}}));

@@ -1,4 +1,4 @@
-// Distributions, and what processes measure before it is sent.
+// Distributions, and measurements of processes before they are sent.
 #include "common/metrics/recorder.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Whose files a run folder holds: those of the record in it may be removed, those of others may not.
+// Ownership of a run folder's files: those of its record may be removed, other files may not.
 #include "common/metrics/run_folder.h"
 
 #include <sys/stat.h>
@@ -58,7 +58,7 @@ TEST_F(RunFolder, ARecordWithinItIsAnotherRuns) {
     EXPECT_TRUE(has(other + std::string("/frames.csv")) && has(other + std::string("/run.id"))) << other;
 }
 
-// Command lines, paths and hosts stand in it.
+// The record contains command lines, paths and hosts.
 TEST_F(RunFolder, ARecordIsForItsUserAlone) {
   const auto mode = [&](const std::string& name) { return fs::status(folder + "/" + name).permissions(); };
   const auto before = umask(0);

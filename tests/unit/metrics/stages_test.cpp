@@ -50,7 +50,7 @@ TEST(Stages, EachEndsWhereTheNextBegins) {
   EXPECT_NEAR(sum_ms(ms, ""), 140, 1e-6);
 }
 
-// A plan that needs no ray: nothing is leased or sampled.
+// A plan that needs no ray: no lease, no sampling.
 TEST(Stages, WhatIsNotOnTheWayTakesNoTime) {
   const wire::Moments part{
       .requested_s = 100, .received_s = 100.001, .begun_s = 100.001, .planned_s = 100.020, .published_s = 100.021};
@@ -72,7 +72,7 @@ TEST(Stages, FetchingIsNoLongerThanTheSamplerHadTheLease) {
   EXPECT_NEAR(by.at("sampler_queue_ms"), 0, 1e-6);
 }
 
-// What a peer says may be nonsense; the sum stays that of the viewer's own moments.
+// A peer's moments may be nonsense; the sum still is that of the viewer's own moments.
 TEST(Stages, AddUpWhateverPeersSay) {
   wire::Moments part;
   double v = 1e6;

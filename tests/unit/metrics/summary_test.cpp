@@ -12,7 +12,7 @@ TEST_F(Record, RowsThatNeverCameAreCountedByTheNumbersOfFrames) {
   const std::vector<std::string> columns{"frame", "t_s"};
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 1, 0.1, 2, 0.2, 6, 0.6}}));
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {7, 0.7, 10, 1.0}}));
-  // It was started again.
+  // The viewer was restarted.
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 1, 0.1, 3, 0.3}}));
   const auto s = record->summary({}, {});
   EXPECT_EQ(s["errors"]["record_lost"]["frames.csv"], 3 + 2 + 1);
@@ -20,7 +20,7 @@ TEST_F(Record, RowsThatNeverCameAreCountedByTheNumbersOfFrames) {
   EXPECT_EQ(s["by_viewer"][viewer.name]["frames"], 11 + 4);
 }
 
-// Updates have no numbers without holes: viewers tell how many rows they have sent.
+// Updates have no consecutive numbers: viewers report how many rows they have sent.
 TEST_F(Record, RowsOfUpdatesThatNeverCameAreCountedByWhatViewersTell) {
   const auto tells = [&](double updates, double stages) {
     viewer.values = {{kUpdateRows, updates}, {kStageRows, stages}};
@@ -30,7 +30,7 @@ TEST_F(Record, RowsOfUpdatesThatNeverCameAreCountedByWhatViewersTell) {
     ASSERT_TRUE(record->add_rows(viewer, {{5}, table, {"latency_ms"}, std::vector<double>(rows, 9)}));
   };
   const auto lost = [&] { return record->summary({}, {})["errors"]["record_lost"]; };
-  tells(100, 90);  // for the record before
+  tells(100, 90);  // rows of the record before
   came("updates", 4), came("stages", 4);
   tells(104, 94);
   EXPECT_TRUE(lost().is_null());
@@ -41,7 +41,7 @@ TEST_F(Record, RowsOfUpdatesThatNeverCameAreCountedByWhatViewersTell) {
   came("updates", 2), came("stages", 1);
   tells(114, 99);
   EXPECT_EQ(lost(), nlohmann::json({{"stages.csv", 4}, {"updates.csv", 7}}));
-  viewer.pid = 6;  // it was started again
+  viewer.pid = 6;  // the viewer was restarted
   tells(0, 0);
   came("updates", 2);
   tells(3, 0);
@@ -241,7 +241,7 @@ TEST_F(Record, PlansSpareRays) {
   EXPECT_NE(plans.find(",5,1,1,0,0,tiles,"), std::string::npos) << plans;
 }
 
-// Six frames, of which the third and fourth stand. Figures by hand (Python's statistics module for the deviation).
+// Six frames; the third and fourth stand still. Figures by hand (Python's statistics module for the deviation).
 TEST_F(Record, FramesOfAPictureThatStandsAreToldApart) {
   const std::vector<std::string> columns{
       "t_s", "inter_frame_ms", "construction_ms", "motion_to_photon_ms", "missed", "refresh_ms", "still"};
@@ -295,7 +295,7 @@ TEST_F(Record, SaysHowEvenlySamplersWereBusy) {
 TEST_F(Record, ViewersAreCountedEachByItself) {
   Process second = viewer;
   second.name = "viewer-2";
-  // The first shows 5 frames in 1 s. The second begins later and is started again: 3 frames in 0.25 s, twice.
+  // The first shows 5 frames in 1 s. The second begins later and is restarted: 3 frames in 0.25 s, twice.
   const std::vector<std::string> columns{"t_s", "inter_frame_ms"};
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 0.25, 250, 0.5, 250, 0.75, 250, 1, 250}}));
   ASSERT_TRUE(record->add_rows(second, {{6}, "frames", columns, {0, 0, 0.125, 125, 0.25, 125}}));
@@ -428,7 +428,7 @@ TEST_F(Record, CouplingsAreCountedForEachViewer) {
   const std::vector<std::string> columns{"t_s", "inter_frame_ms", "coupling", "buffers"};
   Process other = viewer;
   other.name = "viewer-2";
-  // The first goes to sync and to loose; the second, whose rows come in between, stays asynchronous.
+  // The first goes to sync and to loose; the second, with rows in between, stays asynchronous.
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 0, 0, 1, 9, 0, 0}}));
   ASSERT_TRUE(record->add_rows(other, {{6}, "frames", columns, {0, 0, 0, 0}}));
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {2, 9, 1, 1, 3, 9, 2, 3, 4, 9, 2, 4}}));
@@ -502,7 +502,7 @@ TEST_F(Record, TheSummarySaysWhatWasDone) {
   EXPECT_EQ(s["asked"]["duration_s"], 2.5);
   EXPECT_EQ(s["asked"]["verify_every"], 30);
   EXPECT_EQ(s["settings"]["packing.epsilon"], 0.004);
-  // Started by hand: everyone's own command line.
+  // Started by hand: each process has its own command line.
   EXPECT_EQ(record->summary({sampler}, {})["command"], nlohmann::ordered_json({{"sampler-1", "s 'x y'"}}));
 }
 
@@ -512,7 +512,7 @@ TEST_F(Record, TheSummaryIsUtf8WhateverNamesAre) {
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s"}, {0, 1}}));
   record->add_tile("sampler \xff", tile(1, 0, 1.0));
   ASSERT_TRUE(record->finish({data, viewer}, {}));
-  const auto s = nlohmann::json::parse(text("summary.json"));  // refuses what is not UTF-8
+  const auto s = nlohmann::json::parse(text("summary.json"));  // refuses invalid UTF-8
   EXPECT_EQ(s["scene"], "caf\xef\xbf\xbd.ply");
   EXPECT_EQ(s["by_viewer"]["viewer \xef\xbf\xbd"]["frames"], 2);
   EXPECT_TRUE(s["samplers_busy"]["busy_s"].contains("sampler \xef\xbf\xbd"));

@@ -1,4 +1,4 @@
-// What exchanges of messages tell of another clock.
+// Estimates another machine's clock from exchanges of messages.
 #include "common/net/master_link.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ TEST(ClockEstimate, EqualWaysTellTheOffsetExactly) {
   EXPECT_NEAR(e.round_trip_s(), 0.04, 1e-9);
 }
 
-// Queues make single ways long, at random and by far; the shortest round trip is near the truth all the same.
+// Queues lengthen single ways, at random and by far; the shortest round trip is near the truth all the same.
 TEST(ClockEstimate, TheErrorIsNeverBeyondWhatItSays) {
   std::mt19937 random(7);
   std::exponential_distribution<double> queue(1 / 0.01);
@@ -69,8 +69,8 @@ TEST(ClockEstimate, IgnoresWhatCannotBe) {
   ClockEstimate e;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   e.add({1, 5, 5, 0.5});  // answered before it was asked
-  e.add({1, 5, 7, 1.5});  // the other one worked longer than the whole took
-  e.add({1, 7, 5, 1.5});  // answered before it came
+  e.add({1, 5, 7, 1.5});  // the work took longer than the whole exchange
+  e.add({1, 7, 5, 1.5});  // answered before it arrived
   e.add({1, nan, 5, 1.5});
   EXPECT_FALSE(e.known());
   e.add({1, 5, 5, 1.5});

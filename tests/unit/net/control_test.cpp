@@ -1,4 +1,4 @@
-// Asking a master: what it answers, that it refuses, and that nobody is there.
+// Asks a master: it answers, it refuses, or no master is there.
 #include "common/net/control.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What one peer may have of a socket: messages a second, and bytes that wait for it.
+// A peer's share of a socket: messages a second, and bytes that wait for it.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -89,7 +89,7 @@ TEST(QueuedBytes, ManyPeersTogetherHaveHardlyMoreThanTwo) {
   EXPECT_EQ(queued.of_all(), 0u);
 }
 
-// A message may outlast the peer, and the socket that sent it.
+// A message may outlive the peer, and the socket that sent it.
 TEST(QueuedBytes, TicketsOutlastTheirPeers) {
   auto queued = std::make_unique<QueuedBytes>(100);
   auto ticket = std::make_unique<QueuedBytes::Ticket>(queued->add("a", 80));

@@ -16,13 +16,13 @@ namespace {
 
 constexpr double kDeadline_s = test::patient(20);
 
-// A socket made of queues: `given` are the messages that come, `taken` those that were sent.
+// A socket made of queues: `given` are messages to receive, `taken` those that were sent.
 struct FakeSocket {
   std::mutex mutex;
   std::deque<Message> given;
   std::vector<std::string> taken;
   std::atomic<bool> refuses{false};
-  std::atomic<int> looks{0};  // of the thread, for something to send or that is due
+  std::atomic<int> looks{0};  // the thread's looks for messages to send, or that are due
 
   ReadAhead::Ends ends() {
     return {.receive = [this]() -> std::optional<Message> {

@@ -1,5 +1,5 @@
-// Names and addresses that processes give themselves: they must be good for others, on other machines and in other
-// containers.
+// Names and addresses that processes give themselves: other processes must be able to use them, on other machines and
+// in other containers.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
-// Sessions are found by the files that their masters leave: what a master wrote is read, what is stale is removed, what
-// is strange is passed over.
+// Masters leave files so that their sessions are found: they are read back, stale ones are removed, strange ones are
+// skipped.
 #include "common/net/session_file.h"
 
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ class SessionFiles : public testing::Test {
     unsetenv("TELESPLAT_RUNTIME");
     fs::remove_all(fs::path(folder_).parent_path());
   }
-  // The one file that is there.
+  // Returns the only file.
   fs::path file() const { return fs::directory_iterator(folder_)->path(); }
   size_t files() const { return size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator())); }
   nlohmann::json content() const { return nlohmann::json::parse(std::ifstream(file())); }
@@ -59,7 +59,7 @@ TEST_F(SessionFiles, AreReadAsTheyWereWrittenAndGoWithTheSession) {
     RunningSession more = session();
     more.scene =
         "\xff\x1b[31m\xc2\x9b"
-        "2J.ply";  // not UTF-8, and what would steer a terminal
+        "2J.ply";  // invalid UTF-8, and bytes that steer a terminal
     ASSERT_TRUE(file->update(more).ok());
     ASSERT_EQ(running_sessions().size(), 1u);
     EXPECT_EQ(running_sessions().front().scene, "\xef\xbf\xbd?[31m?2J.ply");
@@ -83,10 +83,10 @@ TEST_F(SessionFiles, OfTheDeadAreRemoved) {
       s.pid = uint64_t(getpid());
       return s;
     }());
-    _exit(file.ok() ? 0 : 1);  // without removing it, as if killed
+    _exit(file.ok() ? 0 : 1);  // without removing the file, as if killed
   }
   int status = 0;
-  // Dead, and its parent has not looked yet.
+  // The process is dead, and its parent has not noticed.
   siginfo_t info;
   ASSERT_EQ(waitid(P_PID, id_t(child), &info, WEXITED | WNOWAIT), 0);
   ASSERT_EQ(files(), 1u);
@@ -118,7 +118,7 @@ TEST_F(SessionFiles, OfTheMachineBeforeItStartedAnewAreRemoved) {
   EXPECT_EQ(files(), 0u);
 }
 
-// Where folders are shared, a process number of theirs says nothing here.
+// In a shared folder, process numbers of other machines mean nothing here.
 TEST_F(SessionFiles, OfOtherMachinesAndContainersStay) {
   const auto file = SessionFile::publish(session());
   ASSERT_TRUE(file.ok());
@@ -160,7 +160,7 @@ TEST_F(SessionFiles, ThatAreStrangeArePassedOver) {
   fs::create_symlink(this->folder_ + "/something.else", folder_ + "/session-9.json");
   ASSERT_EQ(mkfifo((folder_ + "/session-10.json").c_str(), 0600), 0);
   const size_t before = files();
-  // One that looks like ours, but for a time when it began that is no time at all.
+  // A file like ours, except that its time of beginning is not a time.
   EXPECT_EQ(running_sessions().size(), 2u) << "the good one, and that which began before 1970";
   EXPECT_EQ(files(), before);
 }

@@ -1,4 +1,4 @@
-// What is waited for comes as a line once, then once a minute.
+// A wait gives a line once, then once a minute.
 #include "common/net/connections/waiting.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Books of notes: what is kept comes back; hostile and broken files are refused and left as they are.
+// Books of notes: notes come back; hostile and broken files are refused and left as they are.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <grp.h>
@@ -88,7 +88,7 @@ TEST_F(Notes, LieBesideTheData) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder + "/data"), {}), 2) << "no temporary file stays";
 }
 
-// A book that lies where nobody may write is read, and goes on in the cache.
+// A book in a folder that cannot be written is read, and new notes go into the cache.
 TEST_F(Notes, LieInTheCacheWhereNobodyMayWrite) {
   if (geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
   ASSERT_TRUE(add_note(shelf, "one"));
@@ -108,7 +108,7 @@ TEST_F(Notes, LieInTheCacheWhereTheFolderIsNoFolderOfOurs) {
   EXPECT_EQ(path, elsewhere.in_cache);
 }
 
-// The book's name would be longer than a file system takes, and the data's is not.
+// The book's name would be longer than a file system takes, though the data's is not.
 TEST_F(Notes, LieInTheCacheWhereTheirNameIsTooLong) {
   const std::string data = folder + "/data/" + std::string(250, 'a');
   write(data, "data");
@@ -120,7 +120,7 @@ TEST_F(Notes, LieInTheCacheWhereTheirNameIsTooLong) {
     EXPECT_EQ(path, longest.in_cache);
   }
   EXPECT_EQ(read_book(longest)->notes.size(), 2u);
-  // One that is just short enough, so that nothing may be appended for a while.
+  // A name just short enough: even a temporary suffix would not fit.
   const std::string fits = folder + "/data/" + std::string(244, 'b');
   ASSERT_TRUE(add_note(shelf_of(fits, "", folder + "/cache"), "one", &path));
   EXPECT_EQ(path, fits + ".notes.json");
@@ -143,12 +143,12 @@ TEST_F(Notes, WhatOtherProgramsKeepStays) {
   EXPECT_EQ(book->find("a")->pose.position_room.x, 1);
   EXPECT_EQ(book->find("b")->others, "");
   EXPECT_EQ(*book_from_json(to_json(*book)), *book);
-  // Reading what lies deep in itself, or writing it, would end the program.
+  // Deeply nested JSON would end the program on reading or writing.
   const std::string deep(200000, '[');
   EXPECT_FALSE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + std::string(deep.size(), ']') + "}"));
 }
 
-// Reading takes time as the file is long, and not as that squared, whatever other programs keep in it.
+// Reading takes linear, not quadratic, time, for any content of other programs.
 TEST_F(Notes, LongListsOfOthersAreReadAtOnce) {
   std::string list = "{}";
   for (int i = 0; i < 200'000; ++i) list += ",{\"a\":1}";
@@ -203,13 +203,13 @@ TEST_F(Notes, WhoseTheyAreStays) {
   EXPECT_EQ(now.st_mode & 0777, 0600u);
 }
 
-// Bob writes into what Alice shares with him, and takes nothing from her.
+// Bob writes into a folder that Alice shares with him, and Alice loses no access.
 TEST_F(Notes, WhoWritesForAGroupTakesThemFromNobody) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
   fs::permissions(folder, fs::perms(0755));
   fs::create_directories(folder + "/cache");
   ASSERT_EQ(chown((folder + "/cache").c_str(), kBob, kBob), 0);
-  // Exit code of Bob, of these groups: 0: beside the data, 1: in the cache, 2: nowhere.
+  // Returns Bob's exit code, with these groups: 0: beside the data, 1: in the cache, 2: nowhere.
   const auto add_as_bob = [&](const std::vector<gid_t>& groups) {
     const pid_t child = fork();
     if (child == 0) {
@@ -270,7 +270,7 @@ TEST_F(Notes, OfScenesWithoutAFileLieInTheCache) {
   EXPECT_FALSE(add_note(shelf_of("", "julia", ""), "one"));
 }
 
-// Whatever is wrong with a file, it is told, and the file stays as it is.
+// Any fault of a file is reported, and the file stays as it is.
 TEST_F(Notes, ABadFileIsRefusedAndStays) {
   const std::string good = to_json(full_book());
   std::vector<std::string> bad{"",
@@ -304,7 +304,7 @@ TEST_F(Notes, ABadFileIsRefusedAndStays) {
   }
 }
 
-// Cut off anywhere, or with any byte changed: refused or read, and never changed by a refusal.
+// Cut off anywhere, or with any byte changed: refused or read, and a refusal never changes the file.
 TEST_F(Notes, DamagedFilesNeverHurt) {
   const std::string good = to_json(full_book());
   for (size_t n = 0; n + 2 < good.size(); ++n) EXPECT_FALSE(book_from_json(good.substr(0, n))) << n;

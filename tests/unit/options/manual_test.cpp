@@ -1,4 +1,4 @@
-// What is made from tables beside the command line: shell completion, manual pages.
+// Shell completion and manual pages, made from the tables of the command line.
 #include "common/options/manual.h"
 
 #include <fmt/format.h>
@@ -79,7 +79,7 @@ using Words = std::set<std::string>;
 
 class Completion : public Manuals {
  protected:
-  // What is offered for the last of these words.
+  // Returns the candidates for the last of these words.
   Words offered(const std::vector<std::string>& words) {
     std::istringstream lines(candidates(manual(settings_), words));
     Words out;

@@ -1,4 +1,4 @@
-// Rows become blocks, whatever order they come in and whatever else comes.
+// Rows become blocks, in any order and among any other messages.
 #include "services/packer/points/block_gatherer.h"
 
 #include <gtest/gtest.h>
@@ -75,7 +75,7 @@ TEST(BlockGatherer, RowsThatAreThereAreNotTakenAgain) {
     EXPECT_FALSE(again->has_value());
   }
   EXPECT_EQ(gatherer.statistics().tiles_duplicate, 2u);
-  // All rows of the block at once: those that are new.
+  // All rows of the block at once: only the new ones count.
   const auto rest = gatherer.add(block_of(1), block_of(1).rect, stream_of(block_of(1).rect));
   ASSERT_TRUE(rest.ok() && rest->has_value() && (*rest)->block);
   EXPECT_FALSE((*rest)->is_block);
@@ -131,7 +131,7 @@ TEST(BlockGatherer, ContradictionsAreRefusedWithAReason) {
     r = {0, 0, 16384, 1};
   });
   EXPECT_EQ(gatherer.open_blocks(), 1u);
-  // Nothing of it was taken.
+  // The gatherer took nothing of it.
   const auto rest = gatherer.add(block_of(0), block_of(0).rect, stream_of(block_of(0).rect));
   ASSERT_TRUE(rest.ok() && rest->has_value() && (*rest)->block);
   EXPECT_EQ((*rest)->block->image, test::sample_scene(kCamera, block_of(0).rect));
@@ -146,7 +146,7 @@ TEST(BlockGatherer, UnfinishedBlocksDoNotPileUp) {
   EXPECT_EQ(gatherer.statistics().blocks_dropped, 3u);
   gatherer.clear();
   EXPECT_EQ(gatherer.open_blocks(), 0u);
-  // The largest blocks of one frame: the memory they may have in all is given to no more of them.
+  // The largest blocks of one frame: beyond the memory limit for all, no more are taken.
   SampledTile block = block_of(0);
   block.camera.width = 16384, block.camera.height = 16384, block.tiles_in_frame = 100;
   const auto wide = codec::encode(image::DepthImage(16384, 1));
@@ -156,7 +156,7 @@ TEST(BlockGatherer, UnfinishedBlocksDoNotPileUp) {
     taken += gatherer.add(block, {0, block.rect.y, 16384, 1}, wide).ok();
   }
   EXPECT_EQ(taken, kMaxGatheredPixels / kMaxBlockPixels);
-  // Another frame takes their place.
+  // A newer frame takes their place.
   EXPECT_TRUE(gatherer.add(block_of(0, {9}), rows(0, 1), stream).ok());
   EXPECT_EQ(gatherer.open_blocks(), 1u);
 }

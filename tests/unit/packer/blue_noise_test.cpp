@@ -1,4 +1,4 @@
-// Picks of pixels: every one in turn, each set spread evenly.
+// Picks of pixels: each comes in turn, and each set is spread evenly.
 #include "services/packer/points/plan/validation.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ Pixels picked(const BlueNoise& noise, uint64_t round) {
   return out;
 }
 
-// Of each pixel to the nearest other one, on the torus; the mean and the least.
+// Distances of each pixel to the nearest other one, on the torus: their mean and their least.
 std::pair<double, double> spacing(const Pixels& pixels) {
   double sum = 0, least = kSide;
   for (const auto& a : pixels) {

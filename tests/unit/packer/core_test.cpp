@@ -1,4 +1,4 @@
-// The packer's core: what goes in, what comes out, what is remembered.
+// The packer's core: tiles in, events out, and the state that it keeps.
 #include "services/packer/points/packer_core.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ geometry::Camera camera(double turn = 0) {
   return test::scene_camera({0.7 * std::cos(turn), 0.4, 0.7 * std::sin(turn)}, 320, 200);
 }
 
-// Submits every tile of a frame, each of which must be taken.
+// Submits every tile of a frame; each must be taken.
 std::vector<Event> submit_all(PackerCore& core, std::vector<SampledTile> tiles, double now_s = 0) {
   std::vector<Event> out;
   for (SampledTile& tile : tiles) {
@@ -80,7 +80,7 @@ TEST(PackerCore, AFrameBecomesEventsOfEveryTile) {
   EXPECT_EQ(core.statistics().tiles_untold, tiles.size() - told);
 }
 
-// All points, wherever they are.
+// All points of the model.
 std::multiset<std::tuple<points::ClusterKey, uint16_t, uint16_t, uint16_t, uint16_t, uint32_t>> points_of(
     const points::PointModel& model) {
   std::multiset<std::tuple<points::ClusterKey, uint16_t, uint16_t, uint16_t, uint16_t, uint32_t>> out;
@@ -157,7 +157,7 @@ TEST(PackerCore, DuplicateTilesAreDroppedAndCounted) {
   EXPECT_FALSE(again->has_value());
   EXPECT_EQ(core.statistics().tiles_duplicate, 1u);
   EXPECT_EQ(core.model().digest(), digest);
-  // Also after the frame was finished.
+  // The same after the frame was finished.
   for (size_t i = 1; i < tiles.size(); ++i) ASSERT_TRUE(core.submit(tiles[i], 0).ok());
   const Sequence before = core.sequence();
   for (const auto& tile : tiles) EXPECT_FALSE(core.submit(tile, 0)->has_value());
@@ -189,7 +189,7 @@ TEST(PackerCore, AFrameThatEndsEarlySaysWhatItLeavesOut) {
   EXPECT_FALSE(core.end_frame(label, 0)->has_value()) << "once";
   EXPECT_FALSE(core.submit(tiles[3], 0)->has_value()) << "what comes late is dropped";
 
-  // A view of which nothing came, one that is complete, and one of another epoch.
+  // A view without any tile, one that is complete, and one of another epoch.
   tiles = sampled_frame({2}, camera(), 64);
   const auto none = core.end_frame(
       [&] {
@@ -316,7 +316,7 @@ TEST(PackerCore, WhatWasForgottenIsSampledAgain) {
   auto tiles = sampled_frame({1}, camera(), 64);
   const auto again = sampled_frame({2}, camera(), 64);
   const uint64_t samples = submit_all(core, tiles, 0).back().frame_kept;
-  // Half of the next frame comes, then all is forgotten in mid-frame; its second half must not be taken for redundant.
+  // Half of the next frame comes, then all is forgotten in mid-frame; its second half must not count as redundant.
   for (size_t i = 0; i < again.size() / 2; ++i) ASSERT_TRUE(core.submit(again[i], 1)->has_value());
   EXPECT_FALSE(core.tick(10).empty());
   EXPECT_EQ(core.model().points(), 0u);
@@ -349,7 +349,7 @@ TEST(PackerCore, ClustersNobodyDrawsBecomeObsolete) {
   const std::vector<points::ClusterKey> drawn(all.begin(), all.begin() + static_cast<ptrdiff_t>(all.size() / 3));
   core.accessed(drawn, 103);
   core.accessed(std::vector<points::ClusterKey>{0x3fffffff}, 103);  // no such cluster
-  core.accessed({}, 105.5);  // a viewer reports
+  core.accessed({}, 105.5);                                         // a viewer reports
   const std::vector<Event> events = core.tick(105.5);
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].kind, Event::Kind::kForget);
@@ -427,7 +427,7 @@ TEST(PackerCore, LateJoinersGetOnlyWhatStillMatters) {
   test::Replica present(config.model);
   submit_all(core, sampled_frame({1}, camera(0), 64), 0);
   present.catch_up(core);
-  // Three clusters which the second frame does not see are drawn once more.
+  // Three clusters that the second frame does not see are drawn again.
   PackerCore other(packer_config(), kEpoch);
   submit_all(other, sampled_frame({2}, camera(2), 64), 0);
   std::vector<points::ClusterKey> drawn;
@@ -438,7 +438,7 @@ TEST(PackerCore, LateJoinersGetOnlyWhatStillMatters) {
   EXPECT_EQ(core.tick(6).size(), 1u);  // most of it goes; a few patches keep points
   const auto second = submit_all(core, sampled_frame({2}, camera(2), 64), 6);
   core.accessed({}, 9.5);
-  EXPECT_EQ(core.tick(9.5).at(0).clusters, drawn);  // and now these
+  EXPECT_EQ(core.tick(9.5).at(0).clusters, drawn);  // now these go, too
 
   test::Replica late(config.model);
   const std::vector<Event> events = core.events_since({0});
@@ -483,7 +483,7 @@ TEST(PackerCore, UnfinishedFramesDoNotPileUp) {
   SampledTile newest = tile, oldest = tile;
   newest.frame = {80};
   EXPECT_FALSE(core.submit(newest, 0)->has_value());
-  // The oldest frame's tiles are not remembered; one that comes again is packed again, to nothing.
+  // The oldest frame's tiles are forgotten; a tile that comes again is packed again, with hardly any new point.
   const auto again = core.submit(oldest, 0);
   ASSERT_TRUE(again->has_value());
   EXPECT_LT((*again)->kept * 100, (*again)->samples);

@@ -39,7 +39,7 @@ TEST(DepthRecorder, ComposesTilesInAnyOrderAndKeepsAsManyFramesAsAsked) {
   const auto decoded = codec::decode(bytes);
   ASSERT_TRUE(decoded.ok()) << decoded.error().text;
   EXPECT_TRUE(*decoded == whole);
-  // Where it was seen from, with all digits.
+  // The camera, with all digits.
   std::ifstream cameras(directory + "/cameras.csv");
   std::string columns, row, more;
   std::getline(cameras, columns), std::getline(cameras, row);

@@ -1,4 +1,4 @@
-// Which space was seen: what a view carves, what it leaves, what becomes unseen again.
+// Seen space: cells that a view carves, cells that it leaves, cells that become unseen again.
 #include "services/packer/points/plan/known_empty.h"
 
 #include <gtest/gtest.h>
@@ -75,7 +75,7 @@ TEST(KnownEmpty, AViewSeesTheSpaceBeforeItsSurfacesAndAllOfItWhereItMissed) {
   for (const double far : {5.0, -5.0, 1e300, -1e300}) EXPECT_FALSE(space.unseen_at({0, far, 0})) << "outside the cube";
   EXPECT_TRUE(space.unseen(cell_at(space, {-0.3, -0.15, 0})));     // in its shadow
   EXPECT_FALSE(space.unseen(cell_at(space, {-0.3, 0.15, 0.35})));  // beside it, against the sky
-  // Nothing is left before what was just seen, but for some pixels along steps of depth.
+  // Hardly any pixel has unseen space before the surface just seen, except along steps of depth.
   EXPECT_LT(view.unseen_before_surfaces(space), 320u * 200 / 100);
 }
 
@@ -107,7 +107,7 @@ TEST(KnownEmpty, AHeadWithinTheDataHasNotSeenWhatLiesBesideItsImage) {
   EXPECT_GT(mask.count(), 320u * 200 * 86 / 100) << "begins where the other view ends, but for a block";
 }
 
-// A surface close behind another one was not seen with it: samples 0.4 mm apart, blocks of 6 mm.
+// A view of a surface does not see another one close behind it: samples 0.4 mm apart, blocks of 6 mm.
 TEST(KnownEmpty, PointsSeenFromNearHideNothingBehindThem) {
   KnownEmpty space(kModel);
   const View view(test::scene_camera({0.35, 0, 0}, 320, 200));
@@ -127,16 +127,16 @@ TEST(KnownEmpty, AWalkAroundTheSceneLeavesNearlyNothingToBeSeen) {
     if (i >= 63) pixels += view.unseen_before_surfaces(space);
     view.see(space);
   }
-  // The second half looks at what the first has seen from the other side.
+  // The second half looks from the other side at surfaces that the first half has seen.
   EXPECT_LT(static_cast<double>(pixels) / (63 * 160 * 100), 0.01);
 }
 
-// Today's samples of a wall do not tell that nobody stands before it where no ray has been.
+// Samples of a wall do not prove that the space before it is empty where no ray has been.
 TEST(KnownEmpty, AnUnseenThingBeforeAKnownSurfaceMayBeThere) {
   KnownEmpty space(kModel);
   const geometry::Camera c = camera(0);
   const View view(c);
-  // The left half was not cast.
+  // No rays were cast in the left half.
   std::vector<float> half = view.depth_m;
   for (size_t i = 0; i < half.size(); ++i)
     if (i % 320 < 160) half[i] = 0;
@@ -218,7 +218,7 @@ TEST(KnownEmpty, AnEpochBeginsWithEverythingUnseen) {
 }
 
 TEST(KnownEmpty, ASparseModelsSurfacesHaveNoHoles) {
-  // Samples lie several blocks apart; what lies between them is seen nevertheless.
+  // Samples lie several blocks apart; the surface between them counts as seen all the same.
   KnownEmpty space(kModel);
   const View coarse(camera(0, 64, 40));
   coarse.see(space);

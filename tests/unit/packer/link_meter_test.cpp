@@ -10,7 +10,7 @@ namespace {
 
 constexpr InstanceId kViewer{7};
 
-// A link between meter and viewer, events of one size: carries bytes one after the other, receipts come back.
+// A link between meter and viewer with events of one size: carries bytes one after the other; receipts come back.
 class SimulatedLink {
  public:
   SimulatedLink(double rate_bytes_s, double rtt_s) : rate_(rate_bytes_s), rtt_s_(rtt_s) {}
@@ -20,7 +20,7 @@ class SimulatedLink {
     free_s_ = std::max(free_s_, now_s) + double(bytes) / rate_;
     under_way_.push_back({sequence_, free_s_ + rtt_s_ / 2});
   }
-  // The viewer says every 30 ms what it has.
+  // The viewer sends a receipt every 30 ms.
   void run_until(double until_s) {
     for (; next_receipt_s_ <= until_s; next_receipt_s_ += 0.03) {
       while (!under_way_.empty() && under_way_.front().second <= next_receipt_s_) {
@@ -111,11 +111,11 @@ TEST(LinkMeter, AViewerThatDoesNotReadShowsByTheAgeOfWhatWaits) {
   EXPECT_FALSE(meter.figures(kViewer, 71));
 }
 
-// A late joiner, or one with a gap: what it has rises by all that was ever published, however little it was sent.
+// A viewer that joins late or had a gap: its receipts count all that was ever published; little was sent to it.
 TEST(LinkMeter, LearnsNothingFromAReplay) {
   LinkMeter meter;
   for (uint64_t i = 1; i <= 100; ++i) meter.published(Sequence{i}, 1'000'000, double(i));
-  for (uint64_t v = 100; v < 100 + 2 * LinkMeter::kMostViewers; ++v) meter.replayed({v});  // of whom no receipt comes
+  for (uint64_t v = 100; v < 100 + 2 * LinkMeter::kMostViewers; ++v) meter.replayed({v});  // they send no receipt
   meter.replayed(kViewer);
   meter.received(kViewer, {}, 0, 100.00);
   meter.received(kViewer, Sequence{60}, 0.03, 100.03);
@@ -140,7 +140,7 @@ TEST(LinkMeter, AViewerThatHasNothingYetWaitsForAll) {
   EXPECT_EQ(meter.figures(kViewer, 2)->rtt_s, 0);
 }
 
-// Who is not told so goes on waiting for what was on its way of the model before.
+// Without clear() a viewer would go on waiting for events of the old model.
 TEST(LinkMeter, OfANewModelNothingIsUnderWay) {
   LinkMeter meter;
   for (uint64_t i = 1; i < 5; ++i) meter.published(Sequence{i}, 1000, 1);
@@ -155,7 +155,7 @@ TEST(LinkMeter, OfANewModelNothingIsUnderWay) {
 
 TEST(LinkMeter, LatenessIsNotTakenForASlowLink) {
   LinkMeter meter;
-  // Small events, each of which the viewer looks at 60 ms late.
+  // Small events; the viewer looks at each 60 ms late.
   for (uint64_t i = 1; i < 200; ++i) {
     meter.published(Sequence{i}, 1000, 0.1 * double(i));
     meter.received(kViewer, Sequence{i - 1}, 0.1 * double(i) + 0.03, 0.1 * double(i) + 0.04);
@@ -171,7 +171,7 @@ TEST(LinkMeter, NonsenseTellsNothing) {
   meter.published(Sequence{1}, 100, 1);
   meter.published(Sequence{2}, 100, 1);
   meter.received(kViewer, Sequence{2}, 1, 2);
-  meter.received(kViewer, Sequence{1}, 9, 3);  // older than what it had
+  meter.received(kViewer, Sequence{1}, 9, 3);  // older than its last receipt
   meter.received(kViewer, Sequence{99}, 1.0 / 0.0, 4);
   EXPECT_EQ(meter.figures(kViewer, 5)->backlog_bytes, 0u);
   for (uint64_t v = 100; v < 100 + 2 * LinkMeter::kMostViewers; ++v) meter.received({v}, Sequence{2}, 1, 2);

@@ -1,4 +1,4 @@
-// What a packer is told: limits, what fits which scene, what another process is handed.
+// Options of a packer: limits, flags that fit a scene, arguments for another process.
 #include <gtest/gtest.h>
 
 #include "services/packer/packer_options.h"

@@ -1,5 +1,4 @@
-// Which patches go first where packing keeps redundant ones: scores, limits, ties, order; and what of it reaches late
-// replicas.
+// Order in which redundant patches go: scores, limits, ties; and the state of replicas that join late.
 #include "services/packer/points/obsolescence.h"
 
 #include <gtest/gtest.h>
@@ -221,7 +220,7 @@ TEST(EliminateMode, WhatARestingHeadWasShownGoesWhenItHasMovedOn) {
   EXPECT_GT(core.model().points(), 3 * of_view);
   EXPECT_EQ(replica.model().digest(), core.model().digest());
 
-  // The first view from elsewhere, and what of it is there already, are the same with and without a rest before.
+  // The first view from elsewhere keeps the same points with and without a rest before.
   std::vector<Event> moved = submit_all(core, test::sampled_frame({20}, camera(0.02), 48), 1);
   const std::vector<Event> expected = submit_all(plain, test::sampled_frame({20}, camera(0.02), 48), 1);
   ASSERT_EQ(moved.size(), expected.size());
@@ -238,11 +237,11 @@ TEST(EliminateMode, WhatARestingHeadWasShownGoesWhenItHasMovedOn) {
   EXPECT_EQ(late.model().digest(), core.model().digest());
   EXPECT_EQ(core.log_bytes() < 2 * plain.log_bytes(), true) << "and its patches go with them";
 
-  // Another rest has another number; a head that rests elsewhere at once leaves the old one behind, too.
+  // Another rest has another number; a head that rests elsewhere at once also ends the old one.
   for (const Event& e : submit_all(core, fine(30, camera(0.02)), 2)) EXPECT_EQ(e.rest, 2u);
   for (const Event& e : submit_all(core, fine(31, camera(0.04)), 2)) EXPECT_EQ(e.rest, 3u);
   EXPECT_EQ(core.forget_superseded().size(), 1u);
-  // Tiles of the old one that come only now do not end the new one.
+  // Late tiles of the old rest do not end the new one.
   const uint64_t before = core.model().points();
   auto tiles = fine(32, camera(0.02));
   for (auto& t : tiles) t.request = {1030};
@@ -295,7 +294,7 @@ TEST(KeepMode, WhatIsDrawnStays) {
   PackerCore core(config, test::kEpoch);
   submit_all(core, test::sampled_frame({1}, camera(0), 32), 0);
   submit_all(core, test::sampled_frame({2}, camera(0.5), 32), 0);
-  // One patch of each cluster is drawn; of every third cluster it is not said which.
+  // One patch of each cluster is drawn; for every third cluster the report does not say which.
   std::vector<points::ClusterKey> drawn, some;
   std::vector<uint32_t> frames;
   for (const auto& [key, cluster] : core.model().clusters()) {
@@ -341,7 +340,7 @@ TEST(KeepMode, TheLogIsBounded) {
   EXPECT_EQ(late.model().digest(), core.model().digest());
 }
 
-// A replica that stopped too long ago is told so; no other is.
+// A replica that stopped too long ago must begin anew; no other must.
 TEST(EventLogOfPatches, KnowsHowFarItRemembers) {
   const points::ModelConfig config = keep_config().model;
   points::PointModel model(config);
@@ -383,11 +382,11 @@ TEST(EventLogOfPatches, KnowsHowFarItRemembers) {
     EXPECT_EQ(log.remembers({forgets[i].sequence.value - 1}), remembers) << "forget " << i;
   }
   EXPECT_FALSE(remembers);
-  // From nothing it is whole.
+  // From the beginning the answer is complete.
   test::Replica late(config);
   for (const Event& event : log.since({0})) late.apply(event);
   EXPECT_EQ(late.model().digest(), model.digest());
-  // After an epoch began, everybody can follow.
+  // After a new epoch every replica can follow.
   Event epoch;
   epoch.kind = Event::Kind::kEpoch, epoch.sequence = {++sequence};
   log.add_epoch(epoch);

@@ -1,4 +1,4 @@
-// What the model shows in a view, and what it lacks: planes, holes, steps; tiles and masks.
+// Content of the model in a view, and its gaps: planes, holes, steps; tiles and masks.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -21,7 +21,7 @@ geometry::Camera front(int width = kWidth, int height = kHeight) {
   return geometry::make_camera({{0, 0, 1}, {1, 0, 0, 0}}, 30, width, height);
 }
 
-// A plane z = const as `camera` samples it; only where keep(x, y) says so, in metres.
+// A plane z = const sampled by `camera`, only where keep(x, y) is true; metres.
 template <class Keep>
 image::DepthImage plane(const geometry::Camera& camera, double z, uint32_t colour, Keep keep) {
   image::DepthImage out(camera.width, camera.height);
@@ -50,7 +50,7 @@ class ViewMapTest : public testing::Test {
     render_view_map(model, camera, {0.005f, nearest}, true, keys, map);
     return map;
   }
-  // Without the outermost pixels: what lies outside the view that sampled the plane is nobody's concern.
+  // Counts without the outermost pixels, which the view that sampled the plane may not have seen.
   size_t inner(const image::PixelMask& mask, int border = 4) const {
     return cropped(mask, {border, border, mask.width() - 2 * border, mask.height() - 2 * border}).count();
   }
@@ -176,7 +176,7 @@ TEST_F(ViewMapTest, FarSamplesAreGoodEnoughWhereLessIsAskedFor) {
   EXPECT_LT(inner(map.lacking), kInner / 100);
 }
 
-// One thread and several, whole and tile by tile: the same.
+// One thread and several, whole and tile by tile give the same.
 TEST_F(ViewMapTest, TilesAreJudgedAloneAsInTheWhole) {
   const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 300, 200);
   add(camera, test::sample_scene(camera, {0, 0, 300, 200}));
@@ -232,7 +232,7 @@ TEST(RayTiles, HoldEveryRayOnce) {
   }
 }
 
-// A view of few rays is one tile, whatever its size; more are shared out evenly, so that there are few tiles.
+// A view of few rays is one tile of any size; more rays are shared out evenly, so that there are few tiles.
 TEST(RayTiles, AreFewAndHaveAboutAsManyRaysEach) {
   const image::PixelMask few = random_mask(1312, 816, 0.003, 5);
   EXPECT_EQ(cut_tiles(few, {0, 0, 1312, 816}, {2048, few.count()}).size(), 1u);

@@ -1,4 +1,4 @@
-// Plans, and what they lead to: an analytic scene is sampled by what is planned alone.
+// Plans and their results: an analytic scene is sampled only by plans.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -18,7 +18,7 @@ PlanConfig plan_config() {
   return c;
 }
 
-// A packer with its planner, and a sampler that casts what is planned.
+// A packer with its planner, and a sampler that casts the planned rays.
 struct Session {
   explicit Session(const PlanConfig& config = plan_config()) : planner(config) { core.watch(&planner); }
 
@@ -100,7 +100,7 @@ TEST(Plan, AStillViewNeedsNothingAfterAFewRounds) {
   }
 }
 
-// Where finer rays met nothing no point says so; their patches do.
+// If finer rays meet nothing, no point shows it; their patches do.
 TEST(Plan, PatchesOfFinerRaysTellWhichOfThemMetNothing) {
   PlanConfig config = plan_config();
   config.validation = 0, config.view_cell_m = 0;
@@ -135,7 +135,7 @@ TEST(Plan, PatchesOfFinerRaysTellWhichOfThemMetNothing) {
   EXPECT_GT(frames, 1u);
   EXPECT_GT(missed, 100u) << "beside the ball";
 
-  // Rays of a view, and of no plan, tell nothing.
+  // Rays of a view, and rays without a plan, report no misses.
   const wire::PlanRequest r = s.request(test::scene_camera({0.6, 0.3, 0.25}, 160, 120));
   for (test::PlannedTile& planned : test::planned_tiles(r, s.ask(r)))
     EXPECT_EQ(s.planner.missed(planned.tile).width(), 0);
@@ -146,7 +146,7 @@ TEST(Plan, PatchesOfFinerRaysTellWhichOfThemMetNothing) {
   EXPECT_FALSE(s.core.submit(std::move(wrong), 1).ok());
 }
 
-// What a view shows once its rays are in, sampled whole or by plans.
+// Returns a view after its rays are in, sampled whole or by plans.
 ViewMap shown(const PackerCore& core, const geometry::Camera& camera) {
   splat::ViewKeys keys(1);
   ViewMap map;
@@ -213,14 +213,14 @@ TEST(Plan, StrangeRequestsAreAnswered) {
       for (size_t i = 0; i < plan.tiles.size(); i += wire::kPlanNumbers) EXPECT_GE(plan.tiles[i + 4], 1u);
     }
   }
-  // Away from everything; inside of it; very large and very small.
+  // Away from everything; inside the scene; very large and very small.
   ask([](auto& r) { r.camera.pose.position_room = {1e6, 0, 0}; });
   ask([](auto& r) { r.camera.pose.position_room = {0, 0, 0}; });
   ask([](auto& r) { r.camera.width = r.camera.height = 1; });
   ask([](auto& r) { r.camera.width = geometry::kMaxImageSide, r.camera.height = 1, r.extra = true; });
 }
 
-// Where nothing is left to be found the packer is not away for long: views are planned in between.
+// When nothing is left to find, the search beyond a view is short: other views are planned in between.
 TEST(Plan, WhatIsBeyondAViewIsLookedForInPieces) {
   PlanConfig config = plan_config();
   config.validation = 0;
@@ -244,7 +244,7 @@ TEST(Plan, WhatIsBeyondAViewIsLookedForInPieces) {
   EXPECT_TRUE(s.ask(r).tiles.empty()) << "at once";
 }
 
-// Packer and viewers pay for each tile, and a head that rests waits for each question.
+// Each tile costs the packer and viewers time, and a head that rests waits for each question.
 TEST(Plan, FinerRaysOfAStillViewComeInFewPlansOfFewTiles) {
   PlanConfig config = plan_config();
   config.validation = 0;
@@ -266,7 +266,7 @@ TEST(Plan, FinerRaysOfAStillViewComeInFewPlansOfFewTiles) {
   }
 }
 
-// Splats cannot show everything: one ray that always sees something else must not make a still view cast the pixels
+// Splats cannot show everything: a ray that always meets another surface must not make a still view cast the pixels
 // around it again and again.
 TEST(Plan, AStillViewGetsOverARayThatAlwaysContradicts) {
   PlanConfig config = plan_config();
@@ -357,7 +357,7 @@ TEST(Plan, TilesThatCameWholeAreThoseOfThePlan) {
   EXPECT_EQ(s.forgets, 0u);
 }
 
-// The master gave them up for a newer view; a sampler had begun them.
+// The master gave them up for a newer view, but a sampler had begun them.
 TEST(Plan, TilesOfAnExtraFrameThatComeLateAreTakenAllTheSame) {
   Session s;
   const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 320, 240);
@@ -376,7 +376,7 @@ TEST(Plan, TilesOfAnExtraFrameThatComeLateAreTakenAllTheSame) {
   EXPECT_FALSE(s.last.full);
 }
 
-// Near a surface a step aside shows another world: there is no end to what could be cast.
+// Near a surface a step aside uncovers much: the rays to cast would have no end.
 TEST(Plan, FromBesideAHeadMovesNoFartherThanTheNearestSurface) {
   Session s;
   s.view(test::scene_camera({0.7, 0.1, 0}, 160, 120));

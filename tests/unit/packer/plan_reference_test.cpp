@@ -1,4 +1,4 @@
-// What a plan has seen of the model serves the tiles that come back: they are compared with it as with the model.
+// The planner's view of the model serves returning tiles: they are compared with it as with the model.
 #include <gtest/gtest.h>
 
 #include "services/packer/points/plan/planned_frame.h"
@@ -14,7 +14,7 @@ const geometry::Camera kBeside = test::scene_camera({0.69, 0.41, 0.03}, 208, 138
 const geometry::Camera kFartherBeside = test::scene_camera({0.68, 0.42, 0.06}, 240, 160);
 const geometry::Camera kOther = test::scene_camera({0.6, 0.5, 0.3}, 192, 128);
 
-// Two packers of the same tiles: one knows what was planned.
+// Two packers of the same tiles: only one knows the plan.
 class PlannedTiles : public testing::Test {
  protected:
   PlannedTiles() {
@@ -53,7 +53,7 @@ TEST_F(PlannedTiles, AreComparedWithWhatThePlanHasSeen) {
   ASSERT_GT(tiles.size(), 2u);
   uint64_t kept = 0, samples = 0;
   for (size_t i = 0; i < tiles.size(); ++i) {
-    // Another view's points come in between: what they show is not kept once more.
+    // Another view's points come in between: surfaces that they show are not kept again.
     if (i == tiles.size() / 2) submit_frame(kOther, {3});
     planner.take(tiles[i], false, 1);
     const auto reference = planner.reference(tiles[i]);
@@ -97,7 +97,7 @@ TEST_F(PlannedTiles, AreComparedWithTheModelWhereThePlanDoesNotKnow) {
   EXPECT_FALSE(planner.reference(tiles[0])) << "the model shows less now";
 }
 
-// The master gave them up for a newer view, and their masks went with the next question.
+// The master gave them up for a newer view, and the next question dropped their masks.
 TEST_F(PlannedTiles, ThatComeAfterTheyWereGivenUpAreComparedWithTheModel) {
   wire::PlanRequest beside = request({2});
   beside.extra = true;

@@ -109,7 +109,7 @@ class PointPackingTest : public testing::Test {
   std::vector<wire::TileRefused> refused;
   std::deque<Sent> sent;
   metrics::SpanRecorder spans;
-  int takes = 1 << 30;  // messages to one viewer, then no more
+  int takes = 1 << 30;  // messages that a viewer's connection takes
   PointPacking packing;
 };
 
@@ -260,7 +260,7 @@ TEST_F(PointPackingTest, ATileKeepsItsLabelFromLeaseToPatch) {
   EXPECT_EQ(status("tiles_duplicate"), 1);
 }
 
-// Stages of an update are those of the part that completes it: nobody reads the moments of others.
+// Stages of an update use the moments of the part that completes it: other parts have none.
 TEST_F(PointPackingTest, MomentsAreOfThePatchThatCompletesAnUpdate) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   for (const int half : {0, 1}) {
@@ -328,7 +328,7 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   EXPECT_EQ(sent.size(), 2u);
 }
 
-// Each beginning looks at all events: who asks for everything again and again is no other's business.
+// Each beginning goes through all events: a viewer that begins again and again must not slow others down.
 TEST_F(PointPackingTest, AnswersThatBeginAnewAreFewASecond) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   for (const int half : {0, 1}) sample(tile(1, half), 1);
@@ -384,7 +384,7 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
   EXPECT_EQ(decoded<wire::StateMark>(sent.back()).digest, 0u) << "an answer has no time for it";
 }
 
-// Else it would wait until it asked for the view again.
+// Otherwise the viewer would wait until it requests the view again.
 TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
   wire::Welcome session = welcome();
   session.settings.validation = 0;
@@ -415,13 +415,13 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
       requests.push_back(patch.request.value);
     }
     EXPECT_TRUE(decoded<wire::StateMark>(sent.back()).answer);
-    receipt({8}, packer, 5);  // else what it asks for again is under way
+    receipt({8}, packer, 5);  // otherwise a repeated request counts as under way
     return requests;
   };
   EXPECT_EQ(told_after({}), (std::vector<uint64_t>{5, 6, 7, 8}));
   EXPECT_EQ(told_after({2}), (std::vector<uint64_t>{7, 8}));
   EXPECT_EQ(told_after({4}), std::vector<uint64_t>{});
-  // Of another epoch none is complete.
+  // No view of another epoch is complete.
   session.epoch = test::kEpoch.next();
   ASSERT_TRUE(packing.follow(session, 6));
   sent.clear();
@@ -466,7 +466,7 @@ TEST_F(PointPackingTest, WhatCameOfAViewThatEndsEarlyIsKnown) {
 TEST_F(PointPackingTest, TilesOfAMasterThatIsGoneAreDropped) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   ASSERT_TRUE(packing.follow(welcome(test::kEpoch, {2}), 1));
-  // The earlier master's frame 1 was seen from elsewhere, and in one tile of two.
+  // The earlier master's frame 1 had another camera, and this is one of its two tiles.
   wire::DepthTile late = tile(1, 0);
   late.lease.camera = test::scene_camera({0.1, 0.1, 0}, 96, 64);
   sample(late, 1, {1});
@@ -489,7 +489,7 @@ TEST_F(PointPackingTest, TilesOfAMasterThatIsNotKnownYetWaitForIt) {
   EXPECT_EQ(told.size(), 2u);
 }
 
-// Until their master is known their seals say nothing.
+// Their seals cannot be checked until their master is known.
 TEST_F(PointPackingTest, OneKeysEarlyTilesDoNotPushOutAnothers) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   const auto deliver_by = [&](const std::string& user, wire::DepthTile m, std::span<const uint8_t> stream) {
@@ -570,7 +570,7 @@ class StateAnswersTest : public PointPackingTest {
       sample(m, 1);
     }
   }
-  // What went to this viewer since the last call: sequences of patches; 0: the mark at the end.
+  // Sequences of patches sent to this viewer since the last call; 0: the mark at the end.
   std::vector<uint64_t> to(const std::string& peer) {
     std::vector<uint64_t> out;
     bytes = 0;
@@ -596,7 +596,7 @@ class StateAnswersTest : public PointPackingTest {
   static constexpr uint64_t kFrames = 60;
   InstanceId packer;
   uint64_t total_bytes = 0, bytes = 0;
-  std::vector<uint64_t> begins;  // after which events answers began
+  std::vector<uint64_t> begins;  // answers' `after`, in order
 };
 
 TEST_F(StateAnswersTest, AnAnswerGoesOutAsFastAsItIsReceived) {
@@ -635,19 +635,19 @@ TEST_F(StateAnswersTest, RequestsOfOneViewerAreOneAnswer) {
   ask({first.back()}, packer, 5);
   packing.tick(5.1);
   EXPECT_EQ(to("peer").front(), first.back() + 1) << "it goes on where it was";
-  // Over another connection nothing is under way; what was left of the old one is not sent.
+  // Over a new connection nothing is under way; the rest of the old answer is not sent.
   ask({}, {}, 6, "again");
   EXPECT_EQ(to("again").front(), 1u);
   packing.tick(6.1);
   EXPECT_TRUE(to("peer").empty());
-  // It lost what it had.
+  // The viewer lost its points.
   receipt({3}, packer, 7, "again");
   to("again");
   ask({}, packer, 7, "again");
   EXPECT_EQ(to("again").front(), 1u);
 }
 
-// It had received the answer, and told of none of it yet.
+// It had received the answer, but sent no receipt yet.
 TEST_F(StateAnswersTest, WhoThrewItAwayGetsItAgainOverTheSameConnection) {
   ask({}, {}, 2);
   EXPECT_EQ(to("peer").front(), 1u);
@@ -658,7 +658,7 @@ TEST_F(StateAnswersTest, WhoThrewItAwayGetsItAgainOverTheSameConnection) {
   EXPECT_EQ(begins, (std::vector<uint64_t>{0, 0, 9}));
 }
 
-// An answer to everything would not be taken by a replica that stands elsewhere.
+// A replica that stands elsewhere would not take an answer to everything.
 TEST_F(StateAnswersTest, WhoStandsWhereNobodyCanStandStartsFromNothing) {
   ask({kFrames + 1}, packer, 2);
   ASSERT_EQ(sent.size(), 1u);
@@ -686,7 +686,7 @@ TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
   for (int n = 0; n < 8; ++n) EXPECT_GT(newest["peer" + std::to_string(n)], 10u) << "each has its turn";
 }
 
-// They ask anew, say that they have received all, or ask in the name of other viewers: what waits for them is counted.
+// They ask anew, claim to have received all, or ask in the name of other viewers: bytes that wait for them are counted.
 TEST_F(StateAnswersTest, WhoReadsNothingIsSentNoMoreThanItsPart) {
   constexpr int kConnections = 40;
   const auto ask_as = [&](const std::string& user, const std::string& peer, uint64_t viewer, double now_s) {
@@ -709,7 +709,7 @@ TEST_F(StateAnswersTest, WhoReadsNothingIsSentNoMoreThanItsPart) {
     largest = std::max<uint64_t>(largest, s.body.size());
   }
   EXPECT_LE(waiting, kAll + kConnections * (largest + 4096));
-  // Another person has a part of their own.
+  // Another person has a share of their own.
   ask_as("anna", "anna", 99, now_s);
   for (int turn = 0; turn < 20; ++turn) packing.tick(now_s += 0.02);
   to("anna");
@@ -751,7 +751,7 @@ TEST(Completions, AreBounded) {
   for (uint64_t viewer = 2; viewer <= Completions::kMostViewers + 1; ++viewer) add(viewer);
   EXPECT_EQ(count(1), 0u) << "who waited longest for a view made room";
   EXPECT_EQ(count(2), 1u);
-  for (const bool extra : {false, true}) {  // of a coarse pass, of rays beyond the view
+  for (const bool extra : {false, true}) {  // parts of a coarse pass, and extra rays
     event.step = extra ? 1 : 4, event.extra = extra;
     add(2);
   }
@@ -785,7 +785,7 @@ TEST_F(PointPackingTest, SessionsOfAnotherPipelineAreNotFollowed) {
   auto julia = welcome();
   julia.facts["kind"] = "julia";
   EXPECT_TRUE(packing.follow(julia, 0));
-  // What is for the other pipeline is refused.
+  // Messages for the other pipeline are refused.
   packing.take_state(socket, message(wire::SliceAck{{77}, {0}, 2, false}), 1);
   EXPECT_EQ(socket.rejected(), 1u);
   slices.take_state(socket, message(wire::StateRequest{{77}, {}, {}}), 1);

@@ -1,4 +1,4 @@
-// Frames of a volume on links of all sorts: the link is kept busy, and no frame waits long before it.
+// Frames of a volume on links of all kinds: the link stays busy, and no frame waits long before it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,12 +14,12 @@ struct Link {
   double bytes_s, rtt_s;
 };
 struct Outcome {
-  double busy = 0;            // share of the time in which the link carried something
-  double longest_wait_s = 0;  // of a frame before the link
+  double busy = 0;            // share of the time in which the link carried bytes
+  double longest_wait_s = 0;  // longest wait of a frame before the link
   uint64_t frames = 0;
 };
 
-// A viewer with two buffers on a link; a new frame every period_s, the newest of which goes out when it may.
+// A viewer with two buffers on a link; a new frame every period_s; the newest goes out when the pace allows.
 Outcome play(SlicePace& pace, const Link& link, double period_s, uint64_t bytes, double from_s, double until_s) {
   struct Ack {
     FrameId frame;
@@ -39,7 +39,7 @@ Outcome play(SlicePace& pace, const Link& link, double period_s, uint64_t bytes,
     next = next.next();
     pace.sent(frame, bytes, now_s);
     const double begin_s = std::max(now_s, free_s), takes_s = static_cast<double>(bytes) / link.bytes_s;
-    // The first ones tell the rate.
+    // The first frames measure the rate.
     if (now_s > from_s + 2) out.longest_wait_s = std::max(out.longest_wait_s, begin_s - now_s);
     free_s = begin_s + takes_s;
     carried_s += takes_s;
@@ -57,7 +57,7 @@ TEST(SlicePace, ASlowLinkIsBusyAndNothingWaitsBeforeIt) {
       const uint64_t bytes = 500'000;
       const double takes_s = static_cast<double>(bytes) / bytes_s;
       const Outcome out = play(pace, {bytes_s, rtt_s}, 0.02, bytes, 0, 30);
-      // Two frames under way are all that there may be: a link that is much longer than they are cannot be filled.
+      // At most two frames are under way: a much longer link cannot be filled.
       const double most = std::min(1.0, 2 * takes_s / (takes_s + rtt_s));
       EXPECT_GT(out.busy, (rtt_s > 0.1 ? 0.75 : 0.85) * most) << bytes_s << " bytes/s, " << rtt_s << " s";
       EXPECT_LT(out.longest_wait_s, 0.3 * takes_s) << bytes_s << " bytes/s, " << rtt_s << " s";
@@ -110,7 +110,7 @@ TEST(SlicePace, WhatWasSentTwiceOrAcknowledgedTogetherTellsNothing) {
   pace.sent({1}, 500'000, 0);
   pace.acknowledged({1}, 0.5);
   pace.sent({2}, 500'000, 1);
-  pace.lost();  // it was late, and comes after all
+  pace.lost();  // it was late, and arrives after all
   pace.sent({2}, 500'000, 3);
   pace.acknowledged({2}, 3.01);
   EXPECT_DOUBLE_EQ(pace.rate_bytes_s(), 1e6);

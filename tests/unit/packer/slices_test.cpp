@@ -1,4 +1,4 @@
-// Slabs become frames, frames go to viewers: to each what it may see, in order, never more than it has room for.
+// Slabs become frames, frames go to viewers: to each in order, as its coupling asks, and within its buffers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ wire::SliceView view(uint64_t viewer, uint64_t request, uint64_t buffers = 0, co
   return {{viewer}, {request}, c, buffers};
 }
 
-// Slab n of `slabs` even ones.
+// Slab n of `slabs` equal ones.
 wire::SliceLease lease(uint64_t frame, uint64_t slab, uint64_t slabs, std::vector<wire::SliceView> views) {
   wire::SliceLease l{.lease = {frame * 100 + slab}, .frame = {frame}, .epoch = kEpoch, .partition = 1};
   l.slab = slab, l.slabs = slabs;
@@ -44,7 +44,7 @@ wire::SliceLease lease(uint64_t frame, uint64_t slab, uint64_t slabs, std::vecto
   return l;
 }
 
-// Every pixel of every layer, in a colour of its own slab's.
+// Every pixel of every layer, in a different colour for each slab.
 SliceGatherer::Slab slab(const wire::SliceLease& l, uint64_t voxels = 100) {
   auto bytes = std::make_shared<std::vector<uint8_t>>();
   for (int layer = 0; layer < int(l.shear.layers.size()); ++layer) {
@@ -101,7 +101,7 @@ TEST(SliceGatherer, AFrameGoesOutWhenAllOfItsSlabsAreThere) {
   EXPECT_EQ(g.open_frames(), 0u);
 }
 
-// Its blocks lie where they should, and one cannot be decoded.
+// A slab whose blocks have valid places, but one cannot be decoded.
 SliceGatherer::Slab damaged(const SliceGatherer::Slab& whole) {
   const auto& shear = whole.images.lease.shear;
   for (size_t at = whole.images.data.size(); at-- > 0;) {
@@ -238,7 +238,7 @@ TEST(SliceGatherer, ContradictionsAreRefusedWithAReason) {
   refuse("raster", [](M& m) { m.lease.shear.width = 0; });
   refuse("an image of slices 20 to 40", [](M& m) { m.lease.begin = 21; });
   refuse("", [](M& m) { m.data = m.data.first(m.data.size() - 1); });
-  // Nothing of it was taken.
+  // The gatherer took nothing of it.
   EXPECT_TRUE(g.add(slab(lease(1, 1, 2, views)), 1)->frame_complete);
 }
 
@@ -268,10 +268,10 @@ TEST(SliceGatherer, ALateViewerGetsTheNewestFrameAtOnce) {
     EXPECT_EQ(out->frame.request.value, 0u) << "nothing that it asked for";
   }
   EXPECT_EQ(to.size(), 2u);
-  // One that wants its frames in order does not want others'.
+  // A viewer with buffers does not want other viewers' frames.
   ASSERT_TRUE(g.acknowledged("ordered", ack(3, 0, 3, true), 2));
   EXPECT_FALSE(g.take_outgoing(2));
-  // Of another epoch there is none yet.
+  // No frame of the new epoch exists yet.
   g.set_scene(grid(), kEpoch.next());
   ASSERT_TRUE(g.acknowledged("later", ack(4, 0), 3));
   EXPECT_FALSE(g.take_outgoing(3));
@@ -328,7 +328,7 @@ TEST(SliceGatherer, WhatWasUnderWayToABrokenConnectionComesAgain) {
   EXPECT_EQ(g.take_outgoing(2)->frame.frame.value, 3u);
 }
 
-// On a link that needs longer for a frame than a viewer is silent, copies would pile up.
+// If a link takes longer for a frame than the viewer's time of silence, copies would pile up.
 TEST(SliceGatherer, ASignOfLifeOverTheSameConnectionSendsNothingAgain) {
   auto g = gatherer();
   const auto sent = [&](double now_s) {
@@ -356,7 +356,7 @@ TEST(SliceGatherer, ASignOfLifeOverTheSameConnectionSendsNothingAgain) {
   EXPECT_TRUE(sent(63).empty()) << "it has the newest";
   ASSERT_TRUE(g.acknowledged("again", ack(1, 0), 64));
   EXPECT_EQ(sent(64), std::vector<uint64_t>{1}) << "what it had on another connection may be lost";
-  // Frames in order may lie in their buffers for long.
+  // Frames in order may wait in the viewer's buffers for long.
   ASSERT_TRUE(g.acknowledged("ordered", ack(2, 0, 2, true), 0));
   ASSERT_TRUE(g.add(slab(lease(2, 0, 1, {view(2, 1, 2)})), 65).ok());
   EXPECT_EQ(sent(65), std::vector<uint64_t>{2});
@@ -402,7 +402,7 @@ TEST(SliceGatherer, AnotherMasterCountsAnew) {
 // takes only the newest never gets an older one than there is; never more under way than it has buffers.
 TEST(SliceGatherer, RandomFramesReachViewersInOrderAndWithinTheirBuffers) {
   uint64_t delivered = 0, skipped = 0;
-  const auto nothing = std::make_shared<int>();  // images without anything in them are images, too
+  const auto nothing = std::make_shared<int>();  // images without content are images, too
   for (uint64_t seed = 0; seed < 30; ++seed) {
     std::mt19937_64 random(seed);
     auto g = gatherer();

@@ -29,7 +29,7 @@ DicomOrder order(std::vector<DicomSlice> slices, bool same = false) {
   return order_slices(std::move(slices), [=](auto&, auto&) { return same; });
 }
 
-// What layers are made of: slices' heights, mixed.
+// Heights of the layers: mixed from their slices'.
 std::vector<double> heights_of(const DicomOrder& o, size_t step = 0) {
   std::vector<double> out;
   for (const DicomLayer& l : o.steps[step])
@@ -75,7 +75,7 @@ TEST(DicomOrder, EvensSmallStepsAsideAndResamplesLargeOnes) {
   const DicomOrder resampled = order(at({0, 2, 4, 7, 10, 13, 20}));
   expect_even(resampled, 0, 2, 11);
   EXPECT_EQ(resampled.remark, "slices are 2 to 7 mm apart; resampled to 2 mm");
-  // Layers stay few where two slices nearly touch.
+  // Two slices that nearly touch do not cause many layers.
   EXPECT_LE(order(at({0, 0.01, 1000, 2000})).steps[0].size(), 81u);
 }
 

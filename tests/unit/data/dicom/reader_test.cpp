@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using namespace test;
 using gdcm::TransferSyntax;
 
-// A file whose pixels GDCM has packed. make: a plain file that claims a transfer syntax ("": its own).
+// Returns a file whose pixels GDCM has packed. make: makes a plain file that claims a transfer syntax ("": its own).
 std::string compressed(const std::function<std::string(const std::string&)>& make, TransferSyntax::TSType syntax) {
   gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();
   std::istringstream in(make(""));
@@ -85,7 +85,7 @@ TEST_P(CompressedDicom, CutAnywhereNeitherCrashesNorGivesVoxels) {
     const std::string path = folder.write("a.dcm", content.substr(0, cut));
     const auto source = find_volume(path);
     const auto volume = source ? read_volume(*source, 0, nullptr) : source.error();
-    if (volume.ok()) continue;  // a codec may give what it has
+    if (volume.ok()) continue;  // a codec may return partial data
     EXPECT_EQ(volume.error().text.find(fs::path(path).parent_path().string()), 0u) << volume.error().text;
   }
 }

@@ -1,4 +1,4 @@
-// glTF files, put together in memory.
+// glTF files made in memory.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ constexpr int kComponent = std::is_same_v<T, int8_t>     ? 5120
                            : std::is_same_v<T, uint32_t> ? 5125
                                                          : 5126;
 
-/// Companions that lie in memory.
+/// Companions in memory.
 class Folder : public Companions {
  public:
   std::map<std::string, std::string> files;
@@ -42,7 +42,7 @@ class Folder : public Companions {
   }
 };
 
-/// A GLB to which views, accessors and the rest are added.
+/// A GLB file; tests add views, accessors and the rest.
 class MadeGltf {
  public:
   Json json = {{"asset", {{"version", "2.0"}}}};
@@ -68,7 +68,7 @@ class MadeGltf {
     more.update({{"componentType", component}, {"count", count}, {"type", type}});
     return add("accessors", std::move(more));
   }
-  /// A mesh of one primitive in a node of its own; returns the node.
+  /// Adds a mesh of one primitive in a node of its own; returns the node.
   size_t show(Json primitive, Json node = Json::object()) {
     node["mesh"] = add("meshes", {{"primitives", {std::move(primitive)}}});
     return add("nodes", std::move(node));
@@ -112,7 +112,7 @@ inline void expect_box(const Mesh& mesh, size_t triangles, glm::dvec3 lower, glm
   EXPECT_LT(glm::distance(high, upper), within) << high.x << " " << high.y << " " << high.z;
 }
 
-/// Six times the volume under the triangles: positive where they turn outwards.
+/// Returns six times the volume under the triangles: positive if they face outwards.
 inline double volume(const Mesh& mesh) {
   double sum = 0;
   const auto at = [&](size_t i) { return mesh.positions[mesh.indices[i]]; };

@@ -1,4 +1,4 @@
-// What meshoptimizer and Draco have packed into glTF files.
+// glTF files with data packed by meshoptimizer and Draco.
 #include <draco/compression/encode.h>
 #include <draco/mesh/triangle_soup_mesh_builder.h>
 #include <meshoptimizer.h>
@@ -32,7 +32,7 @@ struct Packing {
   const char* filter = "NONE";
 };
 
-// A view of what was packed, as gltfpack writes it: what it unpacks to claims a place in a buffer that is not there.
+// A view of packed data, as gltfpack writes it: its unpacked form claims a place in a buffer that does not exist.
 size_t packed_view(MadeGltf& made, const std::string& packed, const Packing& p) {
   const size_t lies = made.view(packed);
   Json extension = made.json["bufferViews"][lies];
@@ -69,8 +69,8 @@ std::string from_base64(const std::string& text) {
   }
   return out;
 }
-// The positions and colours (x / 4, y / 3, 1/2, 1), the latter with the filter COLOR, as meshoptimizer 1.2 packs them
-// in version 1 of its attribute codec.
+// The positions and colours (x / 4, y / 3, 1/2, 1), the latter with the filter COLOR, packed by meshoptimizer 1.2 in
+// version 1 of its attribute codec.
 const std::string kPositions1 = from_base64(
     "oRymAQCAAQB9h42D9H2HjYP0fYeNg/R9h42DAQEQRBEEAAEBIIR9h40CAAAAExdCYugPAAMFDwUAAAAAAAAAAAAAAAAAAAAAAAAAAAAAUgI=");
 const std::string kColours1 = from_base64(

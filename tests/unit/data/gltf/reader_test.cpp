@@ -14,7 +14,7 @@ class GltfNumbers : public testing::Test {};
 using Integers = testing::Types<int8_t, uint8_t, int16_t, uint16_t>;
 TYPED_TEST_SUITE(GltfNumbers, Integers);
 
-// KHR_mesh_quantization: the node undoes what the integers stand for.
+// KHR_mesh_quantization: the node's transform scales the integers back.
 TYPED_TEST(GltfNumbers, PositionsAreAsTheyAreStored) {
   std::vector<TypeParam> corners(kTetrahedron.begin(), kTetrahedron.end());
   for (auto& c : corners) c = TypeParam(c * 100);
@@ -90,7 +90,7 @@ TEST(Gltf, StripsFansAndListsWithoutIndicesTurnAlike) {
   EXPECT_EQ(mesh.notes, std::vector<std::string>{"a.glb: parts of points or lines are left out: 1"});
 }
 
-// A strip's corner that stands twice joins two strips.
+// A corner that stands twice in a strip joins two strips.
 TEST(Gltf, StripsMayBeJoined) {
   MadeGltf made;
   const size_t p = made.accessor<float>({0, 0, 0, 0, 1, 0, 1, 0, 0, 5, 0, 0, 5, 1, 0, 6, 0, 0}, 3);
@@ -147,7 +147,7 @@ TEST(Gltf, WhatIsTransparentIsLeftOutOrTold) {
   EXPECT_EQ(with(gone).indices.size(), 12u);
 }
 
-// A quad whose four colours are asked for by a transform of its coordinates: offset, scale, turn, and another set.
+// A quad reads four colours through a transform of its coordinates: offset, scale, turn, and another set.
 TEST(Gltf, TextureTransformsAreApplied) {
   const TempFolder folder;
   image::View four{16, 16, {}, {}};
@@ -181,7 +181,7 @@ TEST(Gltf, TextureTransformsAreApplied) {
   EXPECT_EQ(colour(0.2, 0.2, {{"offset", {0.0, 0.5}}}), 0x0000ffu);
   EXPECT_EQ(colour(0.2, 0.2, {{"texCoord", 1}}), 0x00ff00u);
   EXPECT_EQ(colour(0.4, 0.4, {{"scale", {0.0017, 0.0017}}}), 0xffff00u);
-  // A quarter turn against the clock: (u, v) becomes (v, -u), which repeats at (v, 1 - u).
+  // A quarter turn anticlockwise: (u, v) becomes (v, -u), which repeats at (v, 1 - u).
   EXPECT_EQ(colour(0.2, 0.2, {{"rotation", M_PI / 2}}), 0x0000ffu);
   EXPECT_EQ(colour(0.7, 0.2, {{"rotation", M_PI / 2}}), 0xff0000u);
 }
@@ -210,7 +210,7 @@ TEST(Gltf, HarmlessExtensionsMayBeRequiredAndOthersAreNamed) {
   EXPECT_NE(refusal(made.glb()).find("extension ACME_shapes"), std::string::npos);
 }
 
-// Content decides, not the name.
+// The content decides, not the name.
 TEST(Gltf, IsToldByContent) {
   EXPECT_TRUE(looks_like_gltf(MadeGltf().glb()));
   EXPECT_TRUE(looks_like_gltf("\xef\xbb\xbf \r\n{\"scenes\": [], \"asset\": {}}"));
@@ -238,7 +238,7 @@ TEST(Gltf, NamesOfFilesArePercentEncoded) {
   EXPECT_EQ(uri_file("%zz%4"), "%zz%4");
 }
 
-// Any beginning of a file, and any single byte of it changed, is refused or read.
+// Any beginning of a file, and any change of a single byte, is refused or read.
 TEST(Gltf, DamageIsRefusedOrRead) {
   const std::string whole = coloured(std::vector<uint8_t>{9, 9, 9, 8, 8, 8, 7, 7, 7}, 3).glb();
   Folder nothing;

@@ -1,4 +1,4 @@
-// Where meshes of glTF files stand: nodes, scenes, instances, skins and morphs.
+// Places of meshes in glTF files: nodes, scenes, instances, skins and morphs.
 #include "tests/unit/data/gltf/made.h"
 
 namespace telesplat::data::test {
@@ -58,7 +58,7 @@ TEST(GltfScene, InstancesAreShownWhetherRequiredOrNot) {
   }
 }
 
-// Two joints, of which the upper one is turned by a quarter; the node of the mesh itself does not count.
+// Two joints; the upper one is turned by a quarter. The mesh's own node does not count.
 TEST(GltfScene, SkinsAndMorphsStandAtRest) {
   MadeGltf made;
   Json primitive = tetrahedron(made);

@@ -1,4 +1,4 @@
-// What a process may still do that reads other people's files.
+// Rights of the process that reads other people's files.
 #include "services/data/import/confine.h"
 
 #include <fcntl.h>
@@ -21,7 +21,7 @@ namespace {
 
 constexpr uint64_t kMemory = uint64_t{4} << 30;
 
-// What `call` returns in a confined process of its own: 0..100; or 128 and the signal that ended it.
+// Runs `call` in a confined process of its own and returns its result, 0..100; or 128 and the signal that ended it.
 int in_confinement(const std::function<int()>& call) {
   const pid_t child = fork();
   if (child == 0) {

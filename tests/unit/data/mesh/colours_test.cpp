@@ -13,7 +13,7 @@ Mesh read(const std::string& path) {
   return mesh ? std::move(*mesh) : Mesh();
 }
 
-// A triangle whose corners have one colour.
+// Returns the colour of a triangle, whose corners must have the same one.
 uint32_t colour_of(const Mesh& mesh, size_t triangle) {
   if (mesh.colours.empty()) return kNoColour;
   const uint32_t colour = mesh.colours[mesh.indices.at(3 * triangle)];
@@ -88,7 +88,7 @@ TEST(FaceColours, OfStlAreThoseOfVisCamMaterialiseOrMeshLab) {
   const Mesh magics = read(folder.write("magics.stl", stl(header, {magics_red, 24 << 5, 0x8000 | 31})));
   EXPECT_EQ(colour_of(magics, 0), 0xde2121u);
   EXPECT_EQ(colour_of(magics, 1), 0x00c500u);
-  EXPECT_EQ(colour_of(magics, 2), 0x010203u);  // bit 15 is set: the colour of all
+  EXPECT_EQ(colour_of(magics, 2), 0x010203u);  // bit 15 is set: the colour of the whole file
   EXPECT_EQ(colour_of(read(folder.write("all.stl", stl(header, {0, 0}))), 1), 0x010203u);
   const std::string meshlab = "COLOR=\x7f\x7f\x7f MATERIAL=\x7f\x7f\x7f \x7f\x7f\x7f \x7f\x7f\x7f ";
   EXPECT_EQ(colour_of(read(folder.write("meshlab.stl", stl(meshlab, {0x8c7b}))), 0), 0xde1919u);

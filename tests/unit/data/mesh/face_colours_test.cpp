@@ -1,4 +1,4 @@
-// Triangles with colours of their own: vertices between different ones are doubled.
+// Triangles with different colours: vertices between them are doubled.
 #include <gtest/gtest.h>
 
 #include <chrono>

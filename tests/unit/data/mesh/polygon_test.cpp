@@ -15,7 +15,7 @@ namespace {
 
 using Corners = std::vector<glm::dvec2>;
 
-// The polygon lies in a plane that is parallel to no axis.
+// Puts the polygon into a plane that is parallel to no axis.
 glm::dvec3 placed(glm::dvec2 p) {
   return glm::dvec3(5, -3, 100) + p.x * glm::dvec3(0.6, 0.8, 0) + p.y * glm::dvec3(0.48, -0.36, 0.8);
 }
@@ -37,8 +37,8 @@ std::vector<uint32_t> cut(const Corners& corners) {
   return indices;
 }
 
-// The sum of the triangles' areas, each without its sign, is the polygon's area only if none lies outside and none
-// lies on another.
+// The sum of the triangles' areas, each without its sign, is the polygon's area only if no triangle lies outside or
+// over another one.
 void expect_covered_once(const Corners& corners) {
   const std::vector<uint32_t> indices = cut(corners);
   ASSERT_EQ(indices.size(), 3 * (corners.size() - 2));

@@ -1,4 +1,4 @@
-// Shapes of mesh files as other programs write them: concave faces, vertices that are no numbers, unusual text.
+// Shapes of mesh files from other programs: concave faces, vertices that are no numbers, unusual text.
 #include <glm/geometric.hpp>
 
 #include "services/data/mesh/reader.h"

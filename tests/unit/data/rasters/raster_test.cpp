@@ -1,4 +1,4 @@
-// Rasters as surveys give them: their units, turned grids, mosaics, and what lies beside a file.
+// Rasters as surveys give them: their units, turned grids, mosaics, and files beside them.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -16,7 +16,7 @@ const std::string kGrid =
     "ncols 3\nnrows 2\nxllcorner 500000\nyllcorner 4000000\ncellsize 10\nNODATA_value -9999\n"
     "100 200 300\n-9999 150 250\n";
 
-// A VRT over kGrid, which says what its arguments say.
+// A VRT file over kGrid with these parts.
 std::string vrt(const std::string& transform, const std::string& system = "", const std::string& of_band = "",
                 const std::string& source = "grid.asc") {
   return "<!-- made by hand --><VRTDataset rasterXSize=\"3\" rasterYSize=\"2\">" +
@@ -57,9 +57,9 @@ TEST_F(Rasters, HeightsInFeetAreLengthsInMetres) {
     const auto mesh = read("a.vrt", vrt(utm, "EPSG:32632", fmt::format("<UnitType>{}</UnitType>", unit)));
     ASSERT_TRUE(mesh) << mesh.error().text;
     EXPECT_NEAR(mesh->positions[0].z, 100 * metres, 1e-4) << unit;
-    EXPECT_NEAR(mesh->positions[0].z / mesh->coordinates.shown.z, 100, 1e-4) << unit;  // told as the file has it
+    EXPECT_NEAR(mesh->positions[0].z / mesh->coordinates.shown.z, 100, 1e-4) << unit;  // shown in the file's unit
   }
-  // A vertical reference system in feet, and a plan in feet beside which nothing is said of heights.
+  // A vertical reference system in feet, and a plan in feet without a unit of heights.
   const auto compound = read("b.vrt", vrt(utm, "EPSG:32618+6360"));
   ASSERT_TRUE(compound) << compound.error().text;
   EXPECT_NEAR(compound->positions[0].z, 100 * 1200.0 / 3937, 1e-4);
@@ -97,7 +97,7 @@ TEST_F(Rasters, CoordinatesWithoutASystemAreLengths) {
   ASSERT_TRUE(mesh) << mesh.error().text;
   EXPECT_EQ(mesh->positions[0], glm::dvec3(500005, 4000015, 100));
   expect_note(*mesh, "they and the heights are taken for metres");
-  // A file of a system beside it says more.
+  // A file beside it with a reference system adds to that.
   folder.write("grid.prj",
                "PROJCS[\"WGS_1984_UTM_Zone_32N\",GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\","
                "6378137,298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],"
@@ -110,7 +110,7 @@ TEST_F(Rasters, CoordinatesWithoutASystemAreLengths) {
   EXPECT_NE(placed->coordinates.reference.find("UTM"), std::string::npos) << placed->coordinates.reference;
 }
 
-// A PNG of 16 bits of grey, stored without compression, by zlib's rules.
+// A PNG of 16 bits of grey, stored without compression in zlib's format.
 std::string png(const std::vector<uint16_t>& grey, uint32_t width, uint32_t height) {
   const auto chunk = [](const std::string& type, const std::string& data) {
     const std::string body = type + data;
@@ -160,7 +160,7 @@ TEST_F(Rasters, AnXyzFileIsAGrid) {
   EXPECT_EQ(mesh->positions[3], glm::dvec3(500015, 4000005, 4));
 }
 
-// GDAL opens no file itself: what was not sent to it is not there.
+// GDAL opens no file itself: it sees only files that were sent to it.
 TEST_F(Rasters, AMosaicReadsWhatItNamesAndNothingElse) {
   const auto absent = read("a.vrt", vrt("", "", "", "missing.asc"));
   ASSERT_FALSE(absent);

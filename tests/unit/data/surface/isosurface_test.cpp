@@ -15,7 +15,7 @@
 namespace telesplat::data {
 namespace {
 
-// A ball of radius 8 around (12, 11, 10), value 100 at its surface and 10 more or less a voxel; in a placement that may
+// A ball of radius 8 around (12, 11, 10), value 100 at its surface and 10 more or less a voxel; the placement may
 // mirror.
 template <class T>
 Volume ball(VoxelType type, const glm::dmat4& index_to_data, double scale = 1, double offset = 0) {
@@ -96,7 +96,7 @@ TEST(Isosurface, RefusesValuesWithoutASurface) {
   EXPECT_FALSE(isosurface(flat, 100, "flat"));
 }
 
-// Noise has every case of marching cubes: no edge of a triangle but at the volume's border is left open.
+// Noise has every case of marching cubes: only triangles at the volume's border have open edges.
 TEST(Isosurface, OfNoiseIsClosedWithinTheVolume) {
   Volume v;
   v.size = {37, 21, 40};
@@ -133,7 +133,7 @@ TEST(Isosurface, TakesValuesThatAreNotFiniteForTheLowest) {
   check_ball(v);
 }
 
-// Where larger stored values mean lower ones, inside and outside change places.
+// If larger stored values mean lower ones, inside and outside change places.
 TEST(Isosurface, OfANegativeScaleFacesLowerValues) { check_ball(ball<float>(VoxelType::kF32, placement(1), -2, 500)); }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Volumes whose voxels lie in several files or behind other data, and values that 32-bit numbers do not tell apart.
+// Volumes with voxels in several files or behind other data, and values that differ only beyond 32-bit precision.
 #include "services/data/kinds.h"
 #include "tests/support/volume/files.h"
 
@@ -13,7 +13,7 @@ Result<Volume> read_step(const std::string& path, const std::string& spec = "") 
 
 class Parts : public testing::Test {
  protected:
-  // Each slice in a file of its own, behind `before`.
+  // Writes each slice into a file of its own, behind `before`.
   void write_slices(const std::string& pattern, int first, const std::string& before = "", bool zipped = false) {
     const std::string all = p.bytes<int16_t>();
     const size_t bytes = all.size() / 3;

@@ -16,7 +16,7 @@ struct TiffPage {
   bool placed = false;
 };
 
-// A TIFF file without compression, a strip a page. big: Motorola's order of bytes; large: BigTIFF.
+// A TIFF file without compression, a strip a page. big: Motorola's byte order; large: BigTIFF.
 std::string tiff(const std::vector<TiffPage>& pages, bool big = false, bool large = false) {
   const auto offset = [&](uint64_t value) { return large ? raw(value, big) : raw(uint32_t(value), big); };
   std::string out = big ? "MM" : "II";
@@ -98,7 +98,7 @@ TEST_F(Stack, ReducedCopiesAndMasksAreNone) {
   auto all = pages<uint16_t>(16, 1);
   all.insert(all.begin() + 1, {.pixels = std::string(16, 'x'), .width = 4, .height = 2, .subfile = 1});
   expect_same(read_or_fail(folder.write("a.tif", tiff(all))), p);
-  // A picture with its overviews is no stack, nor is a raster of several pages.
+  // A picture with its overviews is no stack, and neither is a raster of several pages.
   EXPECT_FALSE(looks_like_volume(folder.write("one.tif", tiff({all[0], all[1]}))));
   for (TiffPage& page : all) page.placed = true;
   EXPECT_FALSE(looks_like_volume(folder.write("placed.tif", tiff(all))));
@@ -114,7 +114,7 @@ TEST_F(Stack, ImageJWritesOneDirectoryForAllSlices) {
     spaced.index_to_data[2][2] = 2.5;
     expect_same(v, spaced);
     EXPECT_EQ(v.unit, "micron");
-    page.pixels.resize(page.pixels.size() - 1);  // and the directory behind it is no pixel
+    page.pixels.resize(page.pixels.size() - 1);  // the directory behind it is no pixel
     const auto pages = tiff_pages(tiff({page}, big).substr(0, 8 + page.pixels.size()));
     EXPECT_FALSE(pages) << "its directory is gone";
   }
@@ -125,7 +125,7 @@ TEST_F(Stack, ImageJsOtherFilesAreStacksTooUnlessTheyHaveMoreAxes) {
   auto all = pages<uint16_t>(16, 1);
   all[0].description = "ImageJ=1.11a\nimages=3\nslices=3\n";
   expect_same(read_or_fail(folder.write("a.tif", tiff(all))), p);
-  // What a writer that was told of no axes calls channels.
+  // A writer that does not know the axes calls them channels.
   TiffPage page = pages<uint16_t>(16, 1)[0];
   page.pixels = p.bytes<uint16_t>();
   page.description = "ImageJ=1.11a\nimages=3\nchannels=3\nmode=grayscale\n";

@@ -1,4 +1,4 @@
-// A VTK file's active scalars are what a mesh is coloured by where nobody says otherwise.
+// A VTK file's active scalars colour a mesh by default.
 #include "services/data/mesh/reader.h"
 
 #include <limits>

@@ -25,7 +25,7 @@ TEST(VtkComposite, FacesBetweenPiecesAreGone) {
   EXPECT_NE(cut.error().text.find("p1.vtu"), std::string::npos) << cut.error().text;
 }
 
-// As VTK writes data that it cannot cut: each piece has all of them, and nothing says so.
+// VTK writes data that it cannot cut like this: each piece has all cells, without a mark.
 TEST(VtkComposite, ACellThatSeveralPiecesHaveIsOne) {
   const TempFolder folder;
   for (const char* name : {"p0.vtu", "p1.vtu", "p2.vtu"}) folder.write(name, vtu(bricks(2)));

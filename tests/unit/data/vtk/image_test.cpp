@@ -17,7 +17,7 @@ Volume volume_or_fail(const std::string& path, const std::string& array = {}) {
   return volume ? std::move(*volume) : Volume();
 }
 
-// Points from (first, 0, 0) to (last, 1, 1); the value of each is 100 times its x, and y and z behind that.
+// Points from (first, 0, 0) to (last, 1, 1); each value is 100 times its x, plus y and z.
 std::string piece(int first, int last, VtkWriter& writer, const std::string& more = "") {
   std::vector<int16_t> values;
   for (int k = 0; k < 2; ++k)

@@ -6,7 +6,7 @@
 namespace telesplat::data::test {
 namespace {
 
-// Numbers as text, or big-endian bytes.
+// Writes numbers as text, or as big-endian bytes.
 class Legacy {
  public:
   explicit Legacy(bool binary, const char* version = "3.0")
@@ -68,7 +68,7 @@ TEST(VtkLegacy, StructuredAndRectilinearGrids) {
   }
 }
 
-// Everything that may stand among the data.
+// A file with everything that may stand among the data.
 std::string with_all_kinds(bool binary) {
   Legacy out(binary);
   const std::vector<float> four{1, 2, 3, 4}, twelve{1, 0, 0, 0, 2, 0, 0, 0, 2, 3, 4, 0};

@@ -1,4 +1,4 @@
-// Files of VTK as tests need them, in all encodings.
+// Files of VTK for tests, in all encodings.
 #pragma once
 
 #include <lz4.h>
@@ -18,8 +18,8 @@ struct VtkEncoding {
   enum class Mode { kAscii, kBase64, kAppendedRaw, kAppendedBase64 } mode = Mode::kAscii;
   std::string packing;  ///< "ZLib", "LZ4", "LZMA"
   bool wide_header = false, big_endian = false;
-  bool joined = false;  ///< base64 of header and data in one, as some writers do
-  size_t block = 64;    ///< bytes that are packed at once: several blocks, the last one smaller
+  bool joined = false;  ///< header and data in one base64 text, as some writers do
+  size_t block = 64;    ///< bytes packed at once: several blocks, the last one smaller
 };
 
 inline std::string base64(const std::string& bytes) {
@@ -49,7 +49,7 @@ inline std::string packed_by(const std::string& packing, const std::string& byte
   return out.substr(0, size);
 }
 
-/// Writes arrays as one encoding has them; collects what is appended.
+/// Writes arrays in one encoding; collects appended data.
 class VtkWriter {
  public:
   explicit VtkWriter(VtkEncoding encoding = {}) : encoding_(std::move(encoding)) {}
@@ -69,7 +69,7 @@ class VtkWriter {
     return fmt::format("{}format=\"appended\" offset=\"{}\"/>\n", tag, at);
   }
 
-  /// A file around what stands in the root.
+  /// Wraps the root's content into a file.
   std::string file(const std::string& type, const std::string& content) const {
     std::string out = fmt::format(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"{}\" version=\"1.0\" byte_order=\"{}\" header_type=\"{}\"{}>\n{}",
@@ -149,11 +149,11 @@ inline Grid bricks(int n, double x0 = 0) {
   return out;
 }
 
-/// What tells whether a surface is right.
+/// Measures of a surface.
 struct Shape {
   size_t triangles = 0;
-  double area = 0, volume = 0;  ///< the volume is right where the surface is closed and looks outward
-  bool closed = true;           ///< by positions
+  double area = 0, volume = 0;  ///< right only if the surface is closed and faces outward
+  bool closed = true;           ///< judged by positions
 };
 inline Shape shape_of(const Mesh& mesh) {
   Shape out{mesh.indices.size() / 3, 0, 0, true};

@@ -79,7 +79,7 @@ TEST(VtkXml, VolumeCellsFaceOutwardHoweverTheyAreTurned) {
     }
 }
 
-// Ten nodes; the middles stand off the edges' middles by a tenth.
+// Ten nodes; the middle nodes are a tenth off the edges' middles.
 TEST(VtkXml, QuadraticCellsAreDividedAtTheirMiddles) {
   const TempFolder folder;
   Grid grid{{0,   0,   0, 1,   0,  0,   0,   1,   0,  0,   0, 1,   .5, -.1, -.1,
@@ -102,7 +102,7 @@ TEST(VtkXml, QuadraticCellsAreDividedAtTheirMiddles) {
   EXPECT_NEAR(quad.area, 1.1, 1e-12);
 }
 
-// Two polyhedra; faces of either sense.
+// Two polyhedra; faces have either orientation.
 TEST(VtkXml, PolyhedraOfBothLayouts) {
   const TempFolder folder;
   Grid grid = bricks(2);
@@ -199,7 +199,7 @@ TEST(VtkXml, UnitsStandInAnArraysInformation) {
   EXPECT_EQ(mesh_or_fail(folder.write("a.vtu", vtu(bricks(2), {}, array))).arrays.back().unit, "kPa");
 }
 
-// Damaged files: a reason that names the file, or a mesh; no crash, no memory for claims.
+// Damaged files give a reason that names the file, or a mesh; no crash, no memory for claims.
 TEST(VtkXml, SurvivesCutAndChangedFiles) {
   const TempFolder folder;
   std::mt19937 random(7);
@@ -249,7 +249,7 @@ TEST(VtkXml, RefusesWhatDoesNotFit) {
   EXPECT_NE(says(packed).find("claims 1 blocks of 4294967295 bytes"), std::string::npos) << says(packed);
 }
 
-// VTK's own blocks have 32768 bytes; what is packed is shorter than one, and its beginning packs to little.
+// VTK's own blocks have 32768 bytes; the packed array is shorter than one, and its beginning packs well.
 TEST(VtkXml, ABlockThatIsNotFullIsPackedAlone) {
   for (const char* packing : {"ZLib", "LZ4", "LZMA"}) {
     const TempFolder folder;

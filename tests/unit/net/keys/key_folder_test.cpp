@@ -1,4 +1,4 @@
-// Folders of keys: made once, never overwritten, refused where others could read or change them.
+// Folders of keys: made once, never overwritten, refused if others could read or change them.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -92,7 +92,7 @@ TEST(KeyFolders, WhatIsMissingIsMadeAnew) {
   EXPECT_EQ(*keys.maker().make_missing(), std::vector<std::string>{"sampler"});
   EXPECT_NE(read_named_key(keys.path(), "sampler")->pair.open, before);
   EXPECT_EQ(read_allow_list(keys.path())->of_key(before), nullptr);
-  // The power went between the key and the list.
+  // The power failed between the key and the list.
   ASSERT_TRUE(fs::remove(keys.path() + "/allowed.toml"));
   ASSERT_TRUE(fs::remove(keys.path() + "/server.pub"));
   EXPECT_EQ(keys.maker().make_missing()->size(), 0u);

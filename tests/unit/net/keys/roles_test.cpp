@@ -1,4 +1,4 @@
-// The table of roles: complete, and no wider than it must be.
+// The table of roles: complete, and no wider than necessary.
 #include "common/net/keys/roles.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST(Roles, HaveNamesThatAreFoundAgain) {
   for (const char* other : {"", "ctl", "Viewer", "viewer ", "root"}) EXPECT_FALSE(role_named(other)) << other;
 }
 
-// What each type of message may come from, written down once more, by what the protocol says of it.
+// Senders of each type of message, written down a second time, from the protocol's text.
 TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
   const std::set<Role> members{kData, kPacker, kSampler, kViewer, kOperator}, watchers{kViewer, kOperator};
   const std::map<std::pair<std::string, std::string_view>, std::set<Role>> allowed{
@@ -58,7 +58,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       {{"state", wire::AccessReport::kName}, watchers},
       {{"state", wire::Receipt::kName}, watchers},
       {{"state", wire::SliceAck::kName}, watchers}};
-  // Answers, and what servers say of themselves: nobody sends them to a socket that binds.
+  // Answers and announcements of servers: no process sends them to a socket that binds.
   const std::set<std::string_view> answers{
       wire::Welcome::kName,     wire::WhoAreYou::kName,  wire::ClockReply::kName,     wire::Lease::kName,
       wire::SliceLease::kName,  wire::Order::kName,      wire::ControlReply::kName,   wire::Shutdown::kName,
