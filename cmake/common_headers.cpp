@@ -1,1 +1,1 @@
-// Nothing: a library needs a source for its precompiled header to be compiled with.
+// Empty: a library needs a source to compile its precompiled header with.

@@ -1,5 +1,5 @@
-// Headers that half of all sources include, compiled once (a precompiled header). Sources still include what they use:
-// they must build without this (cmake -DTELESPLAT_PCH=OFF).
+// Headers that half of all sources include, compiled once (a precompiled header). Sources still include all that they
+// use: they must build without this (cmake -DTELESPLAT_PCH=OFF).
 #pragma once
 
 #include <fmt/format.h>

@@ -33,11 +33,11 @@ if(TELESPLAT_DISPLAYS)
   pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
   pkg_check_modules(openxr REQUIRED IMPORTED_TARGET openxr)
 endif()
-# Charts of the page that telesplat report makes: put into the program when it is built.
+# Charts of the page that telesplat report makes: embedded into the program.
 find_path(TELESPLAT_DYGRAPHS dygraph.min.js PATHS /usr/share/javascript/dygraphs REQUIRED NO_DEFAULT_PATH
   DOC "folder of dygraph.min.js and dygraph.min.css (Debian's libjs-dygraphs)")
 if(TELESPLAT_TESTS)
   find_package(GTest REQUIRED)
   find_package(benchmark REQUIRED)
-  pkg_check_modules(x11 REQUIRED IMPORTED_TARGET x11 xtst)  # hands on windows under test
+  pkg_check_modules(x11 REQUIRED IMPORTED_TARGET x11 xtst)  # the windows' tests use it to send input
 endif()

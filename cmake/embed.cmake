@@ -1,4 +1,4 @@
-# Writes a C++ source that holds files as texts, so that a program needs none of them when it runs.
+# Writes a C++ source that holds files as texts, so that a program does not need the files when it runs.
 #   cmake -D OUT=page_files.cpp -D HEADER=tools/x/page_files.h -D NAMESPACE=telesplat::x -D "FILES=name=path|name=path"
 #     -P embed.cmake
 # The header declares for each name: extern const std::string_view name;
@@ -15,7 +15,7 @@ foreach(entry IN LISTS files)
   if(NOT at EQUAL -1)
     message(FATAL_ERROR "${CMAKE_MATCH_2}: holds the mark that ends texts")
   endif()
-  # Parts, because compilers promise no more than 64 KiB a literal.
+  # In parts, because compilers guarantee only 64 KiB a literal.
   file(APPEND "${OUT}.part" "\nconst std::string_view ${name} =")
   string(LENGTH "${text}" left)
   set(begin 0)

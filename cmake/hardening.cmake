@@ -1,4 +1,4 @@
-# What finds mistakes and what makes them harmless: sanitizers, the standard library's assertions, hardened binaries.
+# Finds mistakes, and makes them harmless: sanitizers, the standard library's assertions, hardened binaries.
 if(TELESPLAT_ASSERTIONS)
   add_compile_definitions(_GLIBCXX_ASSERTIONS)
 endif()
@@ -7,28 +7,28 @@ if(TELESPLAT_SANITIZE)
   add_compile_options(-fsanitize=${TELESPLAT_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${TELESPLAT_SANITIZE})
   if(TELESPLAT_SANITIZE MATCHES undefined)
-    # What is found ends the program. Left out: what AddressSanitizer tells as well, and costs most to compile.
+    # A finding ends the program. Left out: checks that AddressSanitizer makes as well, and that cost most to compile.
     add_compile_options(-fno-sanitize-recover=all -fno-sanitize=null,object-size,vptr)
   endif()
   if(TELESPLAT_SANITIZE MATCHES address AND CMAKE_CXX_COMPILER_ID MATCHES Clang)
-    # Functions of very many accesses check them by calls, so that none takes minutes to compile.
+    # Functions with very many memory accesses check them by calls, which compile faster: some took minutes.
     add_compile_options("SHELL:-mllvm -asan-instrumentation-with-call-threshold=300")
   endif()
-  # One instruction set: the others are the same source, and take most of the time of the kernels' sources.
-  # Sources that must know: a sanitizer maps terabytes of shadow, and is slow.
+  # Uses one instruction set: the others are the same source, and take most of its compile time.
+  # For sources that need to know: a sanitizer maps terabytes of shadow memory, and is slow.
   add_compile_definitions(HWY_COMPILE_ONLY_STATIC TELESPLAT_SANITIZED)
 elseif(TELESPLAT_HARDEN)
-  # Fortified copies need an optimised build; sanitizers check the same, and better.
+  # Fortified copies need an optimised build; sanitizers make the same checks, and better.
   add_compile_options($<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE> $<$<NOT:$<CONFIG:Debug>>:-D_FORTIFY_SOURCE=3>
     -fstack-protector-strong)
   add_link_options(-Wl,-z,relro,-z,now)
-  # All code alike, so that it can share precompiled headers. Shared libraries say -fPIC themselves.
+  # All code in the same way, so that it can share precompiled headers. Shared libraries set -fPIC themselves.
   add_compile_options($<$<NOT:$<STREQUAL:$<TARGET_PROPERTY:TYPE>,SHARED_LIBRARY>>:-fPIE>)
   add_link_options($<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-pie>)
 endif()
 
-# The instruction sets of vector kernels. all: each machine uses the newest that it has. one: AVX2 where this machine
-# has it, and the oldest, which compile in a third of the time.
+# Instruction sets of vector kernels. all: each machine uses the newest that it has. one: only AVX2, if this machine has
+# it, and the oldest, which compile in a third of the time.
 set(TELESPLAT_SIMD all CACHE STRING "Instruction sets of vector kernels: all or one")
 set_property(CACHE TELESPLAT_SIMD PROPERTY STRINGS all one)
 if(TELESPLAT_SIMD STREQUAL "one" AND EXISTS /proc/cpuinfo)
@@ -38,9 +38,9 @@ if(TELESPLAT_SIMD STREQUAL "one" AND EXISTS /proc/cpuinfo)
   endif()
 endif()
 
-# telesplat_kernels(sources...)   gives those of these sources that are vector kernels their instruction sets
-#   In sanitized builds, SSE4.2 alone: compiled for the oldest x86 alone, Highway emulates vectors by loops, and a
-#   kernel took 200 s to compile, now 5 s.
+# telesplat_kernels(sources...)   sets the instruction sets of those sources that are vector kernels
+#   Sanitized builds use SSE4.2: for the oldest x86 Highway would emulate vectors by loops, and a kernel took 200 s to
+#   compile, now 5 s.
 function(telesplat_kernels)
   foreach(source ${ARGN})
     cmake_path(ABSOLUTE_PATH source OUTPUT_VARIABLE path)
@@ -52,7 +52,7 @@ function(telesplat_kernels)
           set_property(SOURCE ${source} APPEND PROPERTY COMPILE_DEFINITIONS "${TELESPLAT_SIMD_LEFT_OUT}")
         endif()
         if(TELESPLAT_SANITIZE AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-          # A precompiled header is of another instruction set.
+          # The precompiled header has another instruction set.
           set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS -msse4.2 -maes -mpclmul)
           set_property(SOURCE ${source} PROPERTY SKIP_PRECOMPILE_HEADERS ON)
         endif()
@@ -61,8 +61,8 @@ function(telesplat_kernels)
   endforeach()
 endfunction()
 
-# telesplat_margins(TARGET)   its rows have pixels before the first: row[x - 1] where x, which has no sign, is 0
-#   The sum is right, as numbers of the machine wrap around; AddressSanitizer sees where it leads.
+# telesplat_margins(TARGET)   allows row[x - 1] with an unsigned x = 0, in rows with pixels before the first
+#   The address is right, since unsigned sums wrap around; AddressSanitizer still checks it.
 function(telesplat_margins target)
   if(TELESPLAT_SANITIZE MATCHES undefined)
     target_compile_options(${target} PRIVATE -fno-sanitize=pointer-overflow)

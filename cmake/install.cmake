@@ -1,4 +1,4 @@
-# cmake --install: the programs, and what they tell of themselves: manual pages and shell completion.
+# cmake --install: the programs, and the manual pages and shell completion that they print.
 include(GNUInstallDirs)
 
 foreach(program telesplat telesplat-data telesplat-display telesplat-health telesplat-import telesplat-master

@@ -1,5 +1,5 @@
 // JSON for precompiled headers: sources spend seconds each on it, so its functions are compiled once
-// (json_headers.cpp). Sources still include what they use.
+// (json_headers.cpp). Sources still include all that they use.
 #pragma once
 
 #include <nlohmann/json.hpp>

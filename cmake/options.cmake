@@ -8,7 +8,7 @@ if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release)
 endif()
 
-# A first picture needs none of these (the preset first).
+# A first picture needs none of these options (the preset first).
 option(TELESPLAT_IMPORT "Build telesplat-import, which reads what GDAL, GDCM and packers of glTF read" ON)
 option(TELESPLAT_DISPLAYS "Build telesplat-display: windows and headsets" ON)
 option(TELESPLAT_LAB "Build telesplat-lab" ON)
@@ -20,9 +20,9 @@ set(TELESPLAT_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=")
 option(TELESPLAT_ASSERTIONS "Check what the standard library can check at little cost: indices, empty containers" ON)
 option(TELESPLAT_HARDEN "What compiler and linker can do against what is exploited: checked copies, guarded stacks" ON)
 
-# -ffp-contract=off: packer and viewers must compute identical points, whatever instruction set they dispatch to.
-# GCC 12 warns of std::string's own code in these ways (GCC bugs 105329, 105651, 105562), and of names of one source
-# where several are compiled together; clang checks the same.
+# -ffp-contract=off: packer and viewers must compute identical points with any instruction set. GCC 12 warns wrongly
+# about std::string's own code (GCC bugs 105329, 105651, 105562), and about equal names in sources that are compiled
+# together; clang makes the same checks.
 add_compile_options(-Wall -Wextra -Wno-missing-field-initializers
   "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-maybe-uninitialized>"
   "$<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread;-Wno-subobject-linkage>"
@@ -32,26 +32,26 @@ if(TELESPLAT_FUZZ AND NOT CMAKE_CXX_COMPILER_ID MATCHES Clang)
   message(FATAL_ERROR "TELESPLAT_FUZZ needs clang: tools/setup --developer")
 endif()
 
-# Cases are run once: optimising them takes longer than it saves. What they test is optimised. GoogleTest's macros have
-# an else of their own.
+# Test cases run once: optimising them takes longer than it saves. The code under test is optimised. GoogleTest's macros
+# have an else of their own.
 set(TELESPLAT_TEST_FLAGS -O1 -Wno-dangling-else)
 if(TELESPLAT_SANITIZE)
-  set(TELESPLAT_TEST_FLAGS -O0 -Wno-dangling-else)  # what tests call is optimised, they themselves need not be
+  set(TELESPLAT_TEST_FLAGS -O0 -Wno-dangling-else)  # code under test is optimised, test cases need not be
 endif()
 
-# Several sources are compiled at once (the preset release): a clean build takes half of the time.
+# Compiles several sources at once (the preset release): a clean build takes half of the time.
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 10)
 
 find_program(CCACHE ccache)
 if(CCACHE)
-  # With precompiled headers ccache must be told that macros and times in them do not matter.
+  # With precompiled headers ccache must ignore macros and times in them.
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
   add_compile_options($<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fpch-preprocess>)
-  # clang writes the headers' times into a precompiled header, so that no two are equal.
+  # clang writes the headers' times into a precompiled header, which would make each one different.
   add_compile_options("$<$<COMPILE_LANG_AND_ID:CXX,Clang>:SHELL:-Xclang -fno-pch-timestamp>")
 endif()
 
-# A faster linker, where it is installed.
+# Uses a faster linker, if it is installed.
 find_program(MOLD mold)
 if(MOLD)
   add_link_options(-fuse-ld=mold)

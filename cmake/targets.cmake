@@ -1,8 +1,8 @@
-# Precompiled headers, each compiled once: what half of all sources include, and the same with GoogleTest.
-# All code is position-independent in one way, so that libraries and programs share them.
+# Precompiled headers, each compiled once: headers that half of all sources include, and the same with GoogleTest. All
+# code is position-independent in one way, so that libraries and programs share them.
 set(headers ${PROJECT_SOURCE_DIR}/cmake)
 add_library(telesplat_common_headers STATIC ${headers}/common_headers.cpp)
-# The former, with JSON, for code whose speed no session feels: optimising it takes longer than it saves.
+# The first, with JSON, for code whose speed no session feels: optimising it takes longer than it saves.
 set(TELESPLAT_COLD_FLAGS -O1)
 if(TELESPLAT_SANITIZE)
   set(TELESPLAT_COLD_FLAGS -O0)
@@ -36,9 +36,9 @@ if(TELESPLAT_TESTS)
   endif()
 endif()
 
-# telesplat_headers(TARGET common|cold|test)   compiles TARGET with a precompiled header; all but tests for libFuzzer
-#   cold: what it does takes no time, so it is hardly optimised, which takes half of a compiler's time
-#   What cold, and in sanitized builds test, have of JSON is compiled once.
+# telesplat_headers(TARGET common|cold|test)   compiles TARGET with a precompiled header; unless test, for libFuzzer
+#   cold: the code runs for no noticeable time, so it is hardly optimised, which halves its compile time
+#   JSON's functions for cold, and in sanitized builds for test, are compiled once.
 function(telesplat_headers target which)
   target_link_libraries(${target} PRIVATE spdlog::spdlog fmt::fmt glm::glm)
   if(which STREQUAL cold)
@@ -98,7 +98,7 @@ endfunction()
 # telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds] [SERIAL] [APART])
 #   one GoogleTest executable, each of its cases a CTest test with LABEL. Its working directory is the repository's
 #   root. SERIAL: its cases measure time or need the whole machine, so no other test runs beside them.
-#   APART: its sources have helpers of the same names, so each is compiled by itself.
+#   APART: its sources have helpers with the same names, so each is compiled by itself.
 function(telesplat_test label name)
   cmake_parse_arguments(ARG "APART;SERIAL" "TIMEOUT" "DEPS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -123,9 +123,9 @@ function(telesplat_test label name)
     PROPERTIES LABELS ${label} TIMEOUT ${ARG_TIMEOUT} ${serial})
 endfunction()
 
-# telesplat_fuzz(NAME CORPUS folder [DEPS targets...])   of NAME_fuzz.cpp and corpus/folder
-#   with TELESPLAT_FUZZ a libFuzzer program; always a CTest test (label unit) that replays the corpus, and what becomes
-#   of its files when they are damaged.
+# telesplat_fuzz(NAME CORPUS folder [DEPS targets...])   from NAME_fuzz.cpp and corpus/folder
+#   with TELESPLAT_FUZZ a libFuzzer program; always a CTest test (label unit) that replays the corpus, and damaged
+#   copies of its files.
 function(telesplat_fuzz stem)
   cmake_parse_arguments(ARG "" "CORPUS" "DEPS" ${ARGN})
   set(name ${stem}_fuzz)

@@ -1,4 +1,4 @@
-// The same for tests, with GoogleTest.
+// The common headers, and GoogleTest, for tests.
 #pragma once
 
 #include "cmake/common_headers.h"

@@ -1,7 +1,7 @@
-# Writes version.cpp, each time something is built: the commit changes without CMake being run again.
+# Writes version.cpp at each build: the commit changes without a new run of CMake.
 #   cmake -D SOURCE=root -D VERSION=0.2.0 -D COMMIT=5ad84a7,2026-11-22 -D OUT=version.cpp -P version.cmake
-# The commit is, of these the first that tells one: COMMIT (a container is built without history), git, commit.txt (an
-# archive that git made). A version is "-dev" unless its commit bears its tag, v0.2.0.
+# The commit is the first one known from: COMMIT (a container is built without history), git, commit.txt (an archive
+# that git made). A version is "-dev" unless its commit has its tag, v0.2.0.
 cmake_minimum_required(VERSION 3.24)
 
 set(told "${COMMIT}")
@@ -46,6 +46,6 @@ set(there "")
 if(EXISTS "${OUT}")
   file(READ "${OUT}" there)
 endif()
-if(NOT source STREQUAL there)  # else what is linked with it stays as it is
+if(NOT source STREQUAL there)  # if equal, programs that use it are not linked again
   file(WRITE "${OUT}" "${source}")
 endif()

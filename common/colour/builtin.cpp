@@ -1,5 +1,5 @@
-// The built-in colour maps. Of the tables of 256 colours that were published, a few stops are kept, so that no colour
-// differs in more than one code of 255 (tests/unit/colour compares).
+// The built-in colour maps. Published tables of 256 colours are reduced to a few stops, so that no channel differs by
+// more than 1 in 255 (tests/unit/colour compares).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace telesplat::colour {
 namespace {
 
 struct Entry {
-  int at;  // of 255
+  int at;  // place, 0 to 255
   uint32_t rgb;
 };
 
@@ -54,7 +54,7 @@ constexpr Entry kTurbo[] = {{0, 0x30123b},   {6, 0x372466},   {10, 0x3b2f80},  {
                             {177, 0xfea933}, {183, 0xfe992c}, {195, 0xf9751d}, {202, 0xf26014}, {208, 0xeb500e},
                             {215, 0xe14109}, {226, 0xcc2b04}, {237, 0xb21a01}, {242, 0xa41301}, {255, 0x7a0403}};
 
-// What follows is plain formulas.
+// These maps follow plain formulas.
 constexpr Entry kGrey[] = {{0, 0x000000}, {255, 0xffffff}};
 constexpr Entry kBlackBody[] = {{0, 0x000000}, {102, 0xe60000}, {204, 0xe6e600}, {255, 0xffffff}};  // ParaView's
 constexpr int kEighths = 8;
@@ -73,7 +73,7 @@ constexpr auto kNames = [] {
   return names;
 }();
 
-// Other words for them, as people write them: lower case, no hyphens.
+// Other names of maps, as people write them: lower case, no hyphens.
 constexpr std::pair<std::string_view, std::string_view> kAliases[] = {
     {"gray", "grey"}, {"greys", "grey"}, {"grays", "grey"}, {"jet", "rainbow"}, {"cooltowarm", "cool-warm"}};
 

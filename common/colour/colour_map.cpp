@@ -12,7 +12,7 @@
 namespace telesplat::colour {
 namespace {
 
-// The number that `text` begins with; takes it off.
+// Takes a number off the front of `text`.
 template <class T, class... Base>
 std::optional<T> take_number(std::string_view& text, Base... base) {
   T value{};

@@ -16,11 +16,11 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kMaxFileBytes = 4u << 20;
-constexpr size_t kMaxPoints = 1u << 14;  // in a file; what travels is shortened afterwards
+constexpr size_t kMaxPoints = 1u << 14;  // in a file; maps are shortened before they are sent
 constexpr int kMaxDepth = 16;
-constexpr int kPieces = 16;  // straight pieces between two points of a space that is not RGB
+constexpr int kPieces = 16;  // straight pieces between two points, for spaces other than RGB
 
-// The numbers of an array of them; nothing if it is none.
+// The numbers of an array; nothing if it is no array of numbers.
 std::optional<std::vector<double>> numbers(const Json& array) {
   if (!array.is_array()) return std::nullopt;
   std::vector<double> out;
@@ -88,11 +88,11 @@ Result<Space> read_space(const Json& map, const std::string& path) {
   return *space;
 }
 
-// As straight pieces in RGB.
+// Converts points to straight pieces in RGB.
 std::vector<ParaviewMap::Colour> straightened(const std::vector<ParaviewMap::Colour>& points, Space space) {
   if (space == Space::kRgb) return points;
   std::vector<ParaviewMap::Colour> out;
-  const int pieces = points.size() > kMaxPoints / kPieces ? 1 : kPieces;  // so many lie close enough
+  const int pieces = points.size() > kMaxPoints / kPieces ? 1 : kPieces;  // that many points lie close enough
   for (size_t n = 0; n < points.size(); ++n) {
     out.push_back(points[n]);
     if (n + 1 == points.size()) break;
@@ -107,7 +107,7 @@ std::vector<ParaviewMap::Colour> straightened(const std::vector<ParaviewMap::Col
   return out;
 }
 
-// The stops that matter most: ends first, then always the one that is farthest from the line between those kept.
+// The most important stops: the ends first, then always the one farthest from the line between those kept.
 std::vector<ColourMap::Stop> most_important(const std::vector<ColourMap::Stop>& stops) {
   if (stops.size() <= kMaxStops) return stops;
   struct Piece {
@@ -205,7 +205,7 @@ Result<ColourMap> parse_colour_map(std::string_view content, const std::string& 
   const double lo = map->colours.front().value, hi = map->colours.back().value;
   for (const auto& c : map->colours)
     out.stops.push_back({hi > lo ? std::clamp((c.value - lo) / (hi - lo), 0.0, 1.0) : 0.0, code(c)});
-  // Short texts: a thousandth of a thousandth is finer than any picture's row of colours.
+  // Keeps texts short: a millionth is finer than a pixel in any picture's colour bar.
   for (auto& stop : out.stops) stop.x = std::round(stop.x * 1e6) / 1e6;
   out.stops = most_important(out.stops);
   if (map->missing) out.missing = *map->missing;

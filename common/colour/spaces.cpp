@@ -40,7 +40,7 @@ Rgb rgb_of_lab(const Rgb& lab) {
   Rgb c = {3.2406 * xyz[0] - 1.5372 * xyz[1] - 0.4986 * xyz[2], -0.9689 * xyz[0] + 1.8758 * xyz[1] + 0.0415 * xyz[2],
            0.0557 * xyz[0] - 0.2040 * xyz[1] + 1.0570 * xyz[2]};
   for (double& v : c) v = v > 0.0031308 ? 1.055 * std::pow(v, 1 / 2.4) - 0.055 : 12.92 * v;
-  const double most = std::max({c[0], c[1], c[2], 1.0});  // as VTK does: too bright colours keep their hue
+  const double most = std::max({c[0], c[1], c[2], 1.0});  // as in VTK: too bright colours keep their hue
   for (double& v : c) v = std::max(0.0, v / most);
   return c;
 }
@@ -84,7 +84,7 @@ Msh msh_of(const Rgb& rgb) {
   return out;
 }
 
-// The hue of the unsaturated end that makes the way from a saturated colour look straight.
+// Hue at the unsaturated end that makes the path from a saturated colour look straight.
 double hue_for(const Msh& saturated, double unsaturated_m) {
   if (saturated.m >= unsaturated_m - 0.1) return saturated.h;
   const double m = saturated.m;

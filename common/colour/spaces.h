@@ -1,4 +1,4 @@
-// Inside common/colour: spaces in which ParaView interpolates colours.
+// Colour spaces in which ParaView interpolates. Private to common/colour.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ using Rgb = std::array<double, 3>;  ///< sRGB, 0 to 1
 
 enum class Space { kRgb, kHsv, kHsvNoWrap, kLab, kDiverging, kStep };
 
-/// ParaView's word for it; nothing if we know none of that name. "Lab/CIEDE2000" is taken as Lab.
+/// Finds the space that ParaView calls `word`; nothing if it is unknown. "Lab/CIEDE2000" counts as Lab.
 std::optional<Space> space_of(std::string_view word);
 
 /// The colour at t, 0 to 1, from a to b.

@@ -29,7 +29,7 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
-/// Whether `inner` has at least one pixel and lies in `outer`. Any numbers may come from outside: nothing overflows.
+/// True if `inner` has at least one pixel and lies in `outer`. Safe for any numbers from outside: nothing overflows.
 constexpr bool contains(const Rect& outer, const Rect& inner) {
   return inner.width >= 1 && inner.height >= 1 && inner.width <= outer.width && inner.height <= outer.height &&
          inner.x >= outer.x && inner.y >= outer.y && int64_t{inner.x} + inner.width <= int64_t{outer.x} + outer.width &&
@@ -43,7 +43,7 @@ constexpr bool contains(const Rect& outer, const Rect& inner) {
 struct Camera {
   Pose pose;
   double left = -1, right = 1, bottom = -0.625, top = 0.625;
-  double near_m = 0.02;  ///< nearest depth seen; with 24-bit reciprocal depth the step at depth z is z^2 / (near 2^24)
+  double near_m = 0.02;  ///< nearest visible depth; 24-bit reciprocal depth has steps of z^2 / (near 2^24) at depth z
   int width = 1280, height = 800;
 
   bool operator==(const Camera&) const = default;
@@ -70,7 +70,7 @@ struct Camera {
 Camera make_camera(const Pose& pose, double fov_x_deg, int width, int height, double near_m = 0.02);
 
 /// Refuses NaN, infinities, empty or inverted frusta, sizes outside [1, kMaxImageSide], near outside [1e-6, 1e6],
-/// quaternions that are not of unit length to 1 %. For cameras that arrive from outside.
+/// quaternions whose length differs from 1 by more than 1 %. For cameras that arrive from outside.
 Status validate(const Camera& camera);
 
 /// The five planes (left, right, bottom, top, near) of a camera's frustum, pointing inwards, in room space.
@@ -90,18 +90,18 @@ class Frustum {
 /// The frustum of a part of the image, as a camera of its own (same pose, off-axis, rect.width x rect.height pixels).
 Camera crop(const Camera& camera, const Rect& rect);
 
-/// The camera whose pixel (i, j) looks where pixel (step * i + step / 2, step * j + step / 2) of `camera` does:
-/// ceil(width / step) x ceil(height / step) pixels, so the last ones may lie outside camera's image. Precondition: step
-/// >= 1.
+/// The camera whose pixel (i, j) looks in the direction of pixel (step * i + step / 2, step * j + step / 2) of
+/// `camera`: ceil(width / step) x ceil(height / step) pixels, so the last ones may lie outside camera's image.
+/// Precondition: step >= 1.
 Camera subsample(const Camera& camera, int step);
 
 /// The camera whose pixel (i, j) covers the pixels (2 i, 2 j) to (2 i + 1, 2 j + 1) of `camera`: half its size, rounded
 /// up, so the last ones may lie partly outside camera's image.
 Camera half_size(const Camera& camera);
 
-/// Where the pixels of the part `rect` of a camera's image look in the room, as the depth-image codec wants it
-/// (codec::RoomAxes): row i . (x, y, 1) times a pixel's depth in metres is coordinate i, of room space, of what its
-/// centre shows, from the eye; x and y are its column and row in the part.
+/// Directions in the room of the pixels in the part `rect` of a camera's image, in the form of the depth-image codec
+/// (codec::RoomAxes): row i . (x, y, 1) times a pixel's depth in metres is coordinate i, in room space, of the point at
+/// its centre, relative to the eye; x and y are its column and row in the part.
 std::array<std::array<double, 3>, 3> ray_axes(const Camera& camera, const Rect& rect);
 
 }  // namespace telesplat::geometry

@@ -12,10 +12,10 @@ namespace telesplat::geometry {
 namespace {
 
 constexpr double kLargest = 1e9;
-// A line that is less inclined to a plane runs beside it.
+// A line less inclined to a plane counts as parallel.
 constexpr double kParallel = 1e-12;
 
-// The next number of a text, without the blanks before it; NaN: there is none.
+// Takes the next number off a text, with the blanks before it; NaN: no number follows.
 double take_number(std::string_view& text) {
   while (text.starts_with(' ')) text.remove_prefix(1);
   double value = 0;

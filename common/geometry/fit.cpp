@@ -12,7 +12,7 @@ constexpr double kFarthest_m = 2e5;  // from the box's centre: cameras farther t
 
 struct Shape {
   glm::dvec3 centre, half;  // metres
-  double radius;            // of the upright cylinder around it
+  double radius;            // radius of the upright cylinder around it
 };
 
 Shape shape_of(const Box& box) {
@@ -20,13 +20,13 @@ Shape shape_of(const Box& box) {
   return {(lo + hi) * 0.5, half, std::hypot(half.x, half.z)};
 }
 
-// Tangents of the picture's half sides, less the margin.
+// Tangents of the picture's half sides, minus the margin.
 glm::dvec2 half_tangents(const Camera& c) {
   return glm::max(glm::dvec2(std::min(-c.left, c.right), std::min(-c.bottom, c.top)), 1e-4) * (1 - kFitMargin);
 }
 
-// What the corners ask of an eye that looks along a given direction: `distance` from the centre against that direction,
-// and `aside`, upwards in the picture. A corner p (right, up, towards the eye) is in the picture if
+// Finds an eye, looking along a given direction, that sees all corners: at `distance` from the centre against that
+// direction, and `aside`, upwards in the picture. A corner p (right, up, towards the eye) is in the picture if
 //   |p.x| <= tangent.x (distance - p.z)  and  |p.y - aside| <= tangent.y (distance - p.z).
 class Demands {
  public:
@@ -41,7 +41,7 @@ class Demands {
   }
   void at_least(double distance) { least_ = std::max(least_, distance); }
 
-  // As much room above as below, from the distance below. The higher the eye, the lower lies all in the picture.
+  // Finds the height with equal room above and below, by bisection: a higher eye moves all corners down.
   double aside() const {
     double low = tangents_.y * (above_ - distance()), high = tangents_.y * (distance() - below_);
     for (int i = 0; i < 60; ++i) {
@@ -63,7 +63,7 @@ class Demands {
   double near_m_, above_ = 0, below_ = 0, least_ = 0;
 };
 
-// The eye that fulfils them, as a point to look at, on the box's vertical axis, and the distance from there.
+// The eye that meets the demands: its target, on the box's vertical axis, and its distance from there.
 struct Stand {
   glm::dvec3 target;
   double distance;
@@ -78,9 +78,9 @@ struct Axes {
         up(glm::cross(back, right)) {}
 };
 
-// The corners of a box as a view sees them. Moving its eye aside, so that the target of depth d is seen at the tangent
-// m, makes x + m d of each x; the condition |x + m d - m (d - z)| <= tangent (d - z) is that of a corner at x + m z,
-// where z counts from the target. target_z: of the target, from the box's centre towards the eye.
+// Calls use() for the corners of a box in a view's axes. Moving the eye aside, so that the target of depth d is seen at
+// the tangent m, makes x + m d of each x; the condition |x + m d - m (d - z)| <= tangent (d - z) is that for a corner
+// at x + m z, where z counts from the target. target_z: of the target, from the box's centre towards the eye.
 template <class F>
 void for_corners(const Shape& s, const Axes& axes, double middle_x, double target_z, F use) {
   for (int corner = 0; corner < 8; ++corner) {
@@ -90,7 +90,7 @@ void for_corners(const Shape& s, const Axes& axes, double middle_x, double targe
   }
 }
 
-// From `distance` before the target, which is seen at the tangent middle_x.
+// Pose at `distance` before the target, which is seen at the tangent middle_x.
 Pose pose_before(const glm::dvec3& target, double distance, const Axes& axes, double middle_x) {
   glm::dmat3 turned(axes.right, axes.up, axes.back);
   return {target + axes.back * distance - axes.right * (middle_x * distance), glm::normalize(glm::quat_cast(turned))};
@@ -114,7 +114,7 @@ Pose fitted_view(const Box& box, const Camera& frustum, double middle_x) {
   const Shape s = shape_of(box);
   const double tilt = suitable_tilt_rad(box);
   const Axes axes({0, std::sin(tilt), std::cos(tilt)});
-  // Where the target is decides how far the eye is moved aside, and so where the target is: it settles soon.
+  // The target decides how far the eye is moved aside, and that moves the target: the loop settles soon.
   Stand stand{s.centre, 0};
   for (int i = 0; i < (middle_x == 0 ? 1 : kSettle); ++i) {
     Demands demands(half_tangents(frustum), frustum.near_m);
@@ -141,8 +141,8 @@ Trajectory fitted_orbit(const Box& box, const Camera& frustum, double period_s) 
   const Shape s = shape_of(box);
   const double tilt = suitable_tilt_rad(box), sine = std::sin(tilt), cosine = std::cos(tilt);
   const glm::dvec2 tangents = half_tangents(frustum);
-  // All corners pass along the two rims of the upright cylinder around the box. Upwards a rim's demand is linear in
-  // cos a, so its nearest and its farthest point decide; sideways the largest over a of
+  // All corners pass along the two rims of the upright cylinder around the box. For `aside`, a rim's demand is linear
+  // in cos a, so its nearest and its farthest point decide; for the width, the largest over a of
   //   y sin + r (cos a cos + |sin a| / tangent)  is  y sin + r sqrt(cos^2 + 1 / tangent^2).
   Demands demands(tangents, frustum.near_m);
   for (const double y : {-s.half.y, s.half.y})

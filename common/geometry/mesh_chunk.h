@@ -1,4 +1,4 @@
-// Mesh chunks: the blocks that a data server stores and serves and a sampler traces.
+// Mesh chunks: the blocks that a data server stores and serves, and a sampler traces.
 //
 // One chunk is one contiguous block of bytes, the same in the chunk store's file, on the wire and in a sampler's
 // memory, so that it is memory-mapped, sent and handed to Embree without a copy. Little-endian. All positions are in
@@ -8,8 +8,8 @@
 //   0                               ChunkHeader     64 bytes
 //   64                              float[3][V]     positions, metres
 //   64 + 12 V                       uint32[V]       normals, octahedral, 2 x 16 bits (image/normal.h: encode_normal32)
-//   64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo; or, where the header says so,
-//                                                   float[V] scalars (NaN: none), which a colouring makes colours of
+// 64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo; or, with ChunkHeader::scalars,
+// float[V] scalars (NaN: none), which a colouring makes colours of
 //   64 + 20 V                       uint32[3][T]    vertex indices, each < V
 //   64 + 20 V + 12 T                zero bytes      to a multiple of 64, at least 16 (Embree reads beyond the end)
 #pragma once
@@ -41,12 +41,12 @@ struct ChunkHeader {
 };
 static_assert(sizeof(ChunkHeader) == 64);
 
-/// Bytes of a chunk of V vertices and T triangles, padding included.
+/// Bytes of a chunk with V vertices and T triangles, padding included.
 constexpr size_t chunk_bytes(size_t vertices, size_t triangles) {
   return (64 + 20 * vertices + 12 * triangles + 16 + 63) / 64 * 64;
 }
 
-/// A validated chunk: spans into bytes that somebody else keeps alive (4-byte aligned).
+/// A validated chunk: spans into bytes (4-byte aligned) that must outlive it.
 struct MeshChunkView {
   Box box_room;
   std::span<const float> positions_room;  ///< 3 V
@@ -58,11 +58,11 @@ struct MeshChunkView {
   size_t triangles() const { return indices.size() / 3; }
 
   /// Checks magic, counts against the limits and against bytes.size(), every index < V, every position finite.
-  /// Nothing is allocated. Precondition: none on the content; bytes.data() must be 4-byte aligned.
+  /// Allocates nothing. Precondition: bytes.data() is 4-byte aligned; the content may be anything.
   static Result<MeshChunkView> validate(std::span<const std::byte> bytes);
 };
 
-/// What a data server says of a chunk before anyone fetches it.
+/// Description of a chunk that a data server sends before its bytes.
 struct ChunkInfo {
   ChunkId id;
   Box box_room;
@@ -71,14 +71,13 @@ struct ChunkInfo {
   bool operator==(const ChunkInfo&) const = default;
 };
 
-/// Lays out one chunk. normals and colours have one entry a vertex, as in the table above; scalars: what the colours
-/// are.
-/// Preconditions: counts within the limits, indices < vertices.
+/// Lays out one chunk. normals and colours have one entry a vertex, as in the table above; scalars: the colours are
+/// scalars. Preconditions: counts within the limits, indices < vertices.
 std::vector<std::byte> build_chunk(std::span<const float> positions_room, std::span<const uint32_t> normals,
                                    std::span<const uint32_t> colours, std::span<const uint32_t> indices,
                                    bool scalars = false);
 
-/// Bytes of a chunk with whatever keeps them alive (a mapped file, a received message, a vector).
+/// Bytes of a chunk, and an owner that keeps them alive (a mapped file, a received message, a vector).
 struct ChunkBytes {
   std::span<const std::byte> bytes;
   std::shared_ptr<const void> owner;

@@ -1,4 +1,4 @@
-// Numbers in texts that travel.
+// Numbers in texts for messages.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace telesplat {
 
-/// The whole of a text as a finite number.
+/// Reads the whole of a text as a finite number.
 template <class T>
 std::optional<T> number_from(std::string_view text) {
   T value{};
@@ -18,7 +18,7 @@ std::optional<T> number_from(std::string_view text) {
   return value;
 }
 
-/// What a text has up to `end`; takes it, and `end`, off the text.
+/// Takes the text up to `end` off its front, and `end` too; returns it.
 inline std::string_view take_until(std::string_view& text, char end) {
   const size_t at = std::min(text.find(end), text.size());
   const std::string_view out = text.substr(0, at);

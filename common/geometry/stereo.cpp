@@ -6,12 +6,12 @@
 namespace telesplat::geometry {
 namespace {
 
-// One axis across the line of sight: where the eyes are on it, and the tangents of their frusta's two edges.
+// One axis across the line of sight: the eyes' places on it, and the tangents of their frusta's two edges.
 struct Axis {
   std::array<double, 2> place, low, high;
 };
 
-// How far back both edges meet that hold the eyes' edges, and where on the axis.
+// The point behind the eyes from which one frustum holds both: its distance back, and its place on the axis.
 struct Apex {
   double least_low, most_high;  // tangents of the edges
   double low_m, high_m;         // where these edges cross the plane of the first eye
@@ -19,7 +19,7 @@ struct Apex {
   double place(double back) const { return 0.5 * (low_m - least_low * back + high_m - most_high * back); }
 };
 
-// depth: how far each eye lies behind the first one.
+// behind: distance of each eye behind the first one.
 Apex apex_of(const Axis& axis, const std::array<double, 2>& behind) {
   Apex out{std::min(axis.low[0], axis.low[1]), std::max(axis.high[0], axis.high[1]), 0, 0};
   const auto low = [&](size_t i) { return axis.place[i] + out.least_low * behind[i]; };
@@ -58,7 +58,7 @@ Camera camera_through(const Screen& screen, const glm::dvec3& eye_room, int widt
 Camera enclosing_camera(const std::array<Camera, 2>& eyes) {
   const Camera &a = eyes[0], &b = eyes[1];
   const glm::dvec3 to_b =
-      glm::conjugate(a.pose.orientation) * (b.pose.position_room - a.pose.position_room);  // as the first eye sees it
+      glm::conjugate(a.pose.orientation) * (b.pose.position_room - a.pose.position_room);  // in the first eye's axes
   const std::array<double, 2> behind{0, to_b.z};
   const Apex x = apex_of({{0, to_b.x}, {a.left, b.left}, {a.right, b.right}}, behind);
   const Apex y = apex_of({{0, to_b.y}, {a.bottom, b.bottom}, {a.top, b.top}}, behind);

@@ -39,7 +39,7 @@ std::vector<std::string_view> split(std::string_view line) {
   }
 }
 
-// viewer-2 comes before viewer-10.
+// Natural order of names: viewer-2 before viewer-10.
 bool comes_before(std::string_view a, std::string_view b) { return a.size() != b.size() ? a.size() < b.size() : a < b; }
 
 class Reader {
@@ -59,7 +59,7 @@ class Reader {
  private:
   Error wrong(const std::string& what) const { return Error{fmt::format("{}:{}: {}", path_, number_, what)}; }
 
-  // A line without end does not fill the memory.
+  // Reads a line of limited length, so that an endless one does not fill the memory.
   bool next_line() {
     line_.clear();
     for (char c = 0; in_.get(c);) {
@@ -127,7 +127,7 @@ class Reader {
     return ok_status();
   }
 
-  // One viewer's rows count, the first one's by name, wherever its first row is.
+  // Only the rows of one viewer count: of the first by name, even if its rows begin later.
   bool is_of_viewer(std::string_view name) {
     if (viewer_ && comes_before(*viewer_, name)) return false;
     if (!viewer_ || name != *viewer_) {
@@ -210,7 +210,7 @@ Status write_trajectory(const std::string& path, const std::vector<Trajectory::S
   if (out) return ok_status();
   Error error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};
   std::error_code ignored;
-  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);  // half of one is none
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);  // removes half a file
   return error;
 }
 

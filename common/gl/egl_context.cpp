@@ -27,7 +27,7 @@ EglContext::Current::~Current() {
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
 }
 
-// The display is shared by everyone in this process who asked for the same device, so it is not terminated.
+// Does not terminate the display: all users of the same device in this process share it.
 EglContext::~EglContext() { eglDestroyContext(display_, context_); }
 
 bool is_software(std::string_view renderer) {

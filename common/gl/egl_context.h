@@ -11,14 +11,14 @@
 
 namespace telesplat::gl {
 
-/// True of a GL_RENDERER that runs on the processor (llvmpipe, softpipe, SwiftShader).
+/// True if a GL_RENDERER runs on the processor (llvmpipe, softpipe, SwiftShader).
 bool is_software(std::string_view renderer);
 
-/// OpenGL 4.3 core on the first that works: every EGL device, then Mesa's surfaceless platform.
-/// Bound to no thread until a Current is made.
+/// OpenGL 4.3 core on the first device that works: every EGL device, then Mesa's surfaceless platform. Not current in
+/// any thread until a Current is made.
 class EglContext {
  public:
-  /// Fails saying what was tried and why each attempt failed. Leaves nothing current.
+  /// Error: lists each attempt and why it failed. Leaves no context current.
   static Result<std::unique_ptr<EglContext>> make();
   ~EglContext();
   EglContext(const EglContext&) = delete;
@@ -32,7 +32,7 @@ class EglContext {
   EGLConfig config() const { return config_; }
   EGLContext context() const { return context_; }
 
-  /// Makes the context current in this thread for a scope, and then what was current before.
+  /// Makes the context current in this thread for a scope; restores the previous one afterwards.
   class Current {
    public:
     explicit Current(const EglContext& context);

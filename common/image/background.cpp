@@ -39,7 +39,7 @@ void find_coverage(const View& over_white, View& over_black) {
   CHECK(over_white.colour.size() == over_black.colour.size());
   for (size_t i = 0; i < over_black.colour.size(); ++i) {
     uint32_t& black = over_black.colour[i];
-    // The channel that tells most: one that is full over black tells nothing.
+    // Takes the channel with the smallest difference, which gives the largest coverage.
     uint32_t through = 255;
     for (const int shift : {0, 8, 16}) {
       const uint32_t white = channel(over_white.colour[i], shift), dark = channel(black, shift);

@@ -1,4 +1,4 @@
-// What lies behind the data in pictures: a colour, or nothing.
+// The background of pictures: a colour, or transparent.
 #pragma once
 
 #include <cstdint>
@@ -10,19 +10,19 @@
 namespace telesplat::image {
 
 struct Background {
-  uint32_t colour = 0x00141820;  ///< 0x00RRGGBB; black where it is transparent
+  uint32_t colour = 0x00141820;  ///< 0x00RRGGBB; black if transparent
   bool transparent = false;
   bool operator==(const Background&) const = default;
 };
 
-/// "#rrggbb", a name (white, black, grey, ...), or "transparent". Error: lists what there is.
+/// Reads "#rrggbb", a name (white, black, grey, ...), or "transparent". Error: lists the valid ones.
 Result<Background> parse_background(const std::string& text);
 
-/// Sets the upper byte of each colour of `over_black` to how much of the pixel the data cover, 0..255, from the same
-/// picture over a white background: a background shines through by what both differ. Precondition: equal sizes.
+/// Sets the upper byte of each colour of `over_black` to the data's coverage of the pixel, 0..255, from the same
+/// picture over a white background: both differ by the light of the background. Precondition: equal sizes.
 void find_coverage(const View& over_white, View& over_black);
 
-/// A colour over black and its coverage in the upper byte, as a colour by itself: 0xAARRGGBB, not premultiplied.
+/// Converts a colour over black, with its coverage in the upper byte, to 0xAARRGGBB, not premultiplied.
 uint32_t straight_colour(uint32_t over_black);
 
 }  // namespace telesplat::image

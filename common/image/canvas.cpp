@@ -100,7 +100,7 @@ View magnify(const View& picture, const geometry::Rect& part, int factor) {
 geometry::Rect worst_square(const std::vector<float>& errors, int width, int height, int side) {
   CHECK(errors.size() == size_t(width) * height && width > 0 && height > 0 && side > 0);
   const int w = std::min(side, width), h = std::min(side, height);
-  // Sums of columns over the h rows above, then a window of w columns slides along them.
+  // Sums columns over the h rows above, then slides a window of w columns along them.
   std::vector<double> columns(width, 0.0);
   geometry::Rect best{0, 0, w, h};
   double most = -1;

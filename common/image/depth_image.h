@@ -1,4 +1,4 @@
-// Depth images: the G-buffer of one sampling view or of one tile of it (T4.2.1).
+// Depth images: the G-buffer of one sampling view or of one tile in it (T4.2.1).
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@ inline constexpr uint32_t kMaxDepthCode = (1u << 24) - 1;
 inline constexpr int kRawBytesPerPixel = 8;
 
 /// Planes of width x height pixels, row-major from the upper left, no padding.
-/// Canonical form, which every producer keeps and the codec relies on: depth 0 means nothing there, and colour and
-/// normal are 0 too in such a pixel. "Coverage" is depth != 0.
+/// Canonical form, which every producer keeps and the codec relies on: depth 0 means an empty pixel, whose colour and
+/// normal are 0, too. "Coverage" is depth != 0.
 struct DepthImage {
   int width = 0, height = 0;
-  std::vector<uint32_t> depth;   ///< 24-bit reciprocal depth code, 1..kMaxDepthCode, larger is nearer; 0 = nothing
+  std::vector<uint32_t> depth;   ///< 24-bit reciprocal depth code, 1..kMaxDepthCode, larger is nearer; 0: empty
   std::vector<uint32_t> colour;  ///< 0x00RRGGBB, unlit albedo
   std::vector<uint16_t> normal;  ///< octahedral, see image/normal.h: encode_normal16; room space, facing the camera
 

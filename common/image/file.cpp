@@ -21,10 +21,10 @@ namespace {
 
 uint32_t byte_of(float v) { return v > 0 ? static_cast<uint32_t>(std::min(v, 1.0f) * 255.0f + 0.5f) : 0; }
 
-// OpenImageIO may tell of several errors, one a line.
+// OpenImageIO may report several errors, one a line.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// Which channels of a file are red, green, blue and depth; -1 = none.
+// Indices of a file's red, green, blue and depth channels; -1: the file lacks it.
 struct Channels {
   int r = -1, g = -1, b = -1, z = -1;
 };
@@ -35,11 +35,11 @@ Channels find_channels(const OIIO::ImageSpec& spec) {
   return c;
 }
 
-// Of OpenImageIO's many readers those that are asked: what is hostile would choose among all of them.
+// The only readers of OpenImageIO that are used: a hostile file could choose any of its many others.
 constexpr const char* kEndings[] = {"png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif",
                                     "tga", "exr", "hdr",  "ppm",  "pgm", "pbm",  "pnm"};
 
-// OpenImageIO chooses a reader by the ending of a name, but pictures in other files have none, and some a wrong one.
+// OpenImageIO chooses a reader by a name's ending, but pictures inside files have none, and some a wrong one.
 std::string name_for_reader(std::span<const std::byte> bytes, const std::string& name) {
   using namespace std::literals;
   constexpr std::pair<std::string_view, const char*> kBeginnings[] = {
@@ -53,10 +53,10 @@ std::string name_for_reader(std::span<const std::byte> bytes, const std::string&
   return name;
 }
 
-// told: the name to be read; name: for the error text.
+// told: the name that OpenImageIO gets; name: for the error text.
 Status check_reader(const std::string& told, const std::string& name) {
-  // Else OpenImageIO asks all its readers, HEIF's and that of movies too, about a file that is not what its name says.
-  // One takes minutes and all memory for a few letters (libheif 1.15, under ThreadSanitizer).
+  // Else OpenImageIO asks all its readers, HEIF's and those of movies too, about a file whose name does not fit. One
+  // takes minutes and all memory for a few letters (libheif 1.15, under ThreadSanitizer).
   static const bool asks_one = OIIO::attribute("try_all_readers", 0);
   CHECK(asks_one);
   std::string ending = told.substr(std::min(told.rfind('.'), told.size() - 1) + 1);
@@ -82,7 +82,7 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
   const bool linear = spec.format == OIIO::TypeDesc::HALF || spec.format == OIIO::TypeDesc::FLOAT;
   const auto code = [linear](float v) { return linear ? srgb_of_linear(v) : byte_of(v); };
   View view{spec.width, 0, {}, {}};
-  // A few rows at a time: what is allocated follows what the file really holds, not what its header claims.
+  // Reads a few rows at a time: memory follows the file's real content, not its header's claim.
   const int step = spec.tile_width > 0 ? std::max(1, std::min(spec.tile_height, 1024)) : 16;
   std::vector<float> rows(size_t(step) * spec.width * spec.nchannels);
   for (int y = 0; y < spec.height; y += step) {
@@ -111,9 +111,9 @@ Result<View> read_picture(std::span<const std::byte> bytes, const std::string& n
   if (const auto known = check_reader(told, name); !known) return known.error();
   OIIO::ImageSpec wishes;
   wishes.attribute("oiio:UnassociatedAlpha", 1);
-  OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes.data()), bytes.size());  // which only reads
+  OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes.data()), bytes.size());  // it only reads
   OIIO::Filesystem::IOProxy* const proxy = &memory;
-  wishes.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);  // wishes take the place of what open() is given
+  wishes.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);  // these settings replace the proxy that open() gets
   const auto input = OIIO::ImageInput::open(told, &wishes, &memory);
   if (!input) return Error{fmt::format("cannot read picture {}: {}", name, first_line(OIIO::geterror()))};
   return read_pixels(*input, name, most_pixels);

@@ -110,7 +110,7 @@ struct Sign {
   Glyph glyph;
 };
 // clang-format off
-constexpr Sign kSigns[] = {  // of units
+constexpr Sign kSigns[] = {  // signs of units
     {U'\u00b0', {0b01100, 0b10010, 0b10010, 0b01100, 0b00000, 0b00000, 0b00000}},  // degree
     {U'\u00b1', {0b00100, 0b00100, 0b11111, 0b00100, 0b00100, 0b00000, 0b11111}},  // plus-minus
     {U'\u00b2', {0b01100, 0b10010, 0b00100, 0b11110, 0b00000, 0b00000, 0b00000}},  // squared

@@ -9,10 +9,10 @@ namespace telesplat::image {
 
 using Glyph = std::array<uint8_t, 7>;
 
-/// The letter for a character; a hollow box for what is neither printable ASCII nor a common sign of units.
+/// The letter for a character; a hollow box if it is neither printable ASCII nor a common sign of units.
 const Glyph& glyph_of(char32_t c);
 
-/// The first character of UTF-8 text, which it takes off; U+FFFD for what is none. Precondition: text is not empty.
+/// Takes the first character off UTF-8 text; U+FFFD: it is not valid. Precondition: text is not empty.
 char32_t take_character(std::string_view& text);
 
 }  // namespace telesplat::image

@@ -40,7 +40,7 @@ std::vector<std::byte> encode_jpeg(std::span<const uint32_t> colour, int width, 
 }
 
 Status decode_jpeg(std::span<const std::byte> jpeg, int width, int height, uint32_t* to, int stride) {
-  const Codec codec(tjInitDecompress());  // one that met an error keeps what it had read
+  const Codec codec(tjInitDecompress());  // a new one each time: after an error it would keep the bytes it had read
   CHECK(codec);
   int w = 0, h = 0, chroma = 0, space = 0;
   if (tjDecompressHeader3(codec.get(), bytes_of(jpeg), jpeg.size(), &w, &h, &chroma, &space))

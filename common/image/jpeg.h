@@ -1,4 +1,4 @@
-// JPEG, as remote desktops send pictures (libjpeg-turbo).
+// JPEG pictures, as in remote desktops (libjpeg-turbo).
 #pragma once
 
 #include <cstddef>
@@ -10,15 +10,15 @@
 
 namespace telesplat::image {
 
-/// Quality of pictures whose colours keep all pixels (4:4:4); at lower ones colours have every second pixel of every
-/// second row (4:2:0), which the eye hardly sees at these qualities.
+/// Least quality at which colours keep all pixels (4:4:4); below, they keep every second pixel of every second row
+/// (4:2:0), which is hardly visible at these qualities.
 inline constexpr int kFullChromaFrom = 95;
 
-/// colour: 0x00RRGGBB, rows follow each other. Preconditions: width x height colours, at least one; quality 1 to 100.
+/// colour: 0x00RRGGBB, row after row. Preconditions: width x height colours, at least one; quality 1 to 100.
 std::vector<std::byte> encode_jpeg(std::span<const uint32_t> colour, int width, int height, int quality);
 
-/// Decodes a picture of this size to `to`, whose rows begin `stride` colours apart; the upper byte of each is void.
-/// Error: it is not a JPEG picture of this size; colours may have been written then. Bytes may come from outside.
+/// Decodes a picture of this size to `to`, whose rows begin `stride` colours apart; the upper byte of each colour is
+/// undefined. Error: not a JPEG picture of this size; colours may have been written then. Bytes may come from outside.
 Status decode_jpeg(std::span<const std::byte> jpeg, int width, int height, uint32_t* to, int stride);
 
 }  // namespace telesplat::image

@@ -13,12 +13,12 @@ namespace telesplat::image {
 namespace {
 
 constexpr uint32_t kInk = 0xfff4f4f4, kRim = 0xd0101418, kEmpty = 0x90101418;
-// Behind all of it: small white letters do not read on a white ground by their rims alone.
+// Plate behind the legend: on a white ground, rims alone do not make small white letters readable.
 constexpr uint32_t kPlate = 0xa0101418;
 constexpr int kLeastTicks = 2, kMostTicks = 7;
 constexpr size_t kMostTitleLines = 4;
 
-// Digits behind the point that a multiple of `step` needs.
+// Number of digits behind the point that a multiple of `step` needs.
 int decimals_of(double step) {
   for (int n = 0; n < 17; ++n) {
     const double scaled = step * std::pow(10.0, n);
@@ -27,15 +27,15 @@ int decimals_of(double step) {
   return 17;
 }
 
-// What all labels are to be multiplied with, as a power of ten: so that they have neither many digits nor many zeros.
+// Power of ten that all labels are divided by, so that they have neither many digits nor many zeros.
 int common_exponent(double lo, double hi) {
   const double largest = std::max(std::abs(lo), std::abs(hi));
   if (largest == 0 || (largest >= 1e-3 && largest < 1e6)) return 0;
-  if (largest >= 1e6 && largest < 1e10 && hi - lo < 1e-3 * largest) return 0;  // dates: people know them whole
+  if (largest >= 1e6 && largest < 1e10 && hi - lo < 1e-3 * largest) return 0;  // dates: people read them whole
   return int(std::floor(std::log10(largest)));
 }
 
-// Times a power of ten, exactly where both are exact; beyond 10^308 in two steps.
+// Multiplies by a power of ten, exactly if both are exact; beyond 10^300 in steps.
 double times_power(double value, int exponent) {
   for (; exponent > 300; exponent -= 300) value *= 1e300;
   for (; exponent < -300; exponent += 300) value /= 1e300;
@@ -45,11 +45,11 @@ double times_power(double value, int exponent) {
 std::string number_text(double value, int decimals) {
   std::string out = fmt::format("{:.{}f}", value, decimals);
   if (std::none_of(out.begin(), out.end(), [](char c) { return c >= '1' && c <= '9'; }) && out[0] == '-')
-    out.erase(0, 1);  // minus zero
+    out.erase(0, 1);  // no minus zero
   return out;
 }
 
-// Multiples of `step`; nothing where numbers have no digits left to tell them apart.
+// Multiples of `step`; empty if numbers lack the digits to tell them apart.
 std::vector<Tick> multiples(double lo, double hi, double step) {
   std::vector<Tick> out;
   const double slack = (hi - lo) * 1e-9;
@@ -113,7 +113,7 @@ Layout layout_of(const Legend& legend, int display_width, int display_height) {
   return l;
 }
 
-// Letters with a rim of one dot.
+// Writes letters with a rim of one dot.
 void write(Canvas& canvas, int x, int y, const std::string& text, int dot) {
   for (int dy = -dot; dy <= dot; dy += dot)
     for (int dx = -dot; dx <= dot; dx += dot) canvas.text(x + dx, y + dy, text, kRim, dot);
@@ -122,7 +122,7 @@ void write(Canvas& canvas, int x, int y, const std::string& text, int dot) {
 
 View plain(int width, int height, uint32_t colour) { return Canvas(width, height, colour).view(); }
 
-// The bar's pixels; with opacities a curve of them over the values, filled with the values' colours.
+// The bar's pixels; with opacities, a curve of them over the values, filled with the values' colours.
 View bar_of(const Legend& legend, int width, int height) {
   View out = plain(width, height, kEmpty);
   for (int y = 0; y < height; ++y) {
@@ -144,7 +144,7 @@ View bar_of(const Legend& legend, int width, int height) {
 
 double place_on_bar(const Legend& legend, double value) {
   if (!(legend.hi > legend.lo)) return 0.5;
-  // In halves, because the difference of large numbers may be infinite.
+  // Divides by 2 first, because the difference of large numbers may be infinite.
   return std::clamp((value / 2 - legend.lo / 2) / (legend.hi / 2 - legend.lo / 2), 0.0, 1.0);
 }
 
@@ -186,7 +186,7 @@ Ticks nice_ticks(double lo, double hi, int most) {
   out.exponent = common_exponent(lo, hi);
   const double a = times_power(lo, -out.exponent), b = times_power(hi, -out.exponent);
   if (a < b) {
-    // From the finest step on that may leave few enough, to the first that does.
+    // Tries steps from the finest that may do, and takes the first with few enough ticks.
     const int power = int(std::floor(std::log10((b - a) / most)));
     for (int n = 0; n < 12; ++n) {
       constexpr double kFactors[] = {1, 2, 2.5, 5};

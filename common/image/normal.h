@@ -36,8 +36,8 @@ inline uint32_t quantise(float v, uint32_t levels) {  // [-1, 1] -> 0..levels
 
 }  // namespace detail
 
-/// The one of several codes of a direction that encoders write. On the map's border two codes mean the same direction,
-/// and its four corners one: of these the one with larger coordinates. Coordinates of 255 mean 254.
+/// The code of a direction that encoders write. On the map's border two codes mean the same direction, and the four
+/// corners all mean one: the canonical code has the larger coordinates. Coordinates of 255 mean 254.
 inline uint16_t canonical_normal16(uint16_t code) {
   const int x = std::min(code & 255, 254), y = std::min(code >> 8, 254);
   const bool side = x == 0 || x == 254, end = y == 0 || y == 254;
@@ -57,7 +57,7 @@ inline glm::vec3 decode_normal16(uint16_t code) {
 }
 
 /// A vector along decode_normal16(code), not normalised and free of rounding: its components are integers in [-127,
-/// 127]. For tests that need a direction's side only.
+/// 127]. For tests that need only a direction's side.
 inline glm::vec3 octahedral16(uint16_t code) {
   const int x = std::min(code & 255, 254) - 127, y = std::min(code >> 8, 254) - 127;
   const int z = 127 - std::abs(x) - std::abs(y), fold = std::max(-z, 0);

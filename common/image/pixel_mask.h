@@ -1,4 +1,4 @@
-// Some of the pixels of a rectangle: which are covered, which rays are to be cast.
+// A set of pixels in a rectangle: those that are covered, or those whose rays are cast.
 #pragma once
 
 #include <bit>
@@ -8,8 +8,8 @@
 
 namespace telesplat::image {
 
-/// How many bits are set: std::popcount(), which is a call where a processor's own instruction may not be taken for
-/// granted.
+/// Number of set bits. std::popcount() would be a library call if the build may not assume the processor's own
+/// instruction.
 inline uint32_t set_bits(uint64_t word) {
   word -= word >> 1 & 0x5555555555555555;
   word = (word & 0x3333333333333333) + (word >> 2 & 0x3333333333333333);
@@ -21,7 +21,7 @@ class PixelMask {
  public:
   PixelMask() = default;
   PixelMask(int width, int height) { reset(width, height); }
-  /// All zero.
+  /// Sets the size; all bits become zero.
   void reset(int width, int height) {
     width_ = width, height_ = height, words_per_row_ = (static_cast<size_t>(width) + 63) / 64;
     words_.assign(words_per_row_ * static_cast<size_t>(height), 0);

@@ -1,4 +1,4 @@
-// Pictures that Telesplat writes, read again through libpng and OpenEXR themselves, as in write.cpp.
+// Reads pictures that Telesplat wrote, through libpng and OpenEXR themselves, as in write.cpp.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -18,7 +18,7 @@
 namespace telesplat::image {
 namespace {
 
-// Rows of an EXR file that are read at once: memory follows what a file holds, not what its header claims.
+// Rows of an EXR file that are read at once: memory follows the file's content, not its header's claim.
 constexpr int kRowsAtOnce = 16;
 
 std::string size_error(int64_t width, int64_t height) {
@@ -27,7 +27,7 @@ std::string size_error(int64_t width, int64_t height) {
               : fmt::format("it has {}x{} pixels, limits are 1..{} a side", width, height, geometry::kMaxImageSide);
 }
 
-// A channel over black.
+// A channel of a transparent pixel, over black.
 uint32_t covered(uint8_t channel, uint8_t alpha) { return (uint32_t(channel) * alpha + 127) / 255; }
 
 std::string read_png(const std::string& path, View& view) {
@@ -38,7 +38,7 @@ std::string read_png(const std::string& path, View& view) {
   if (std::string wrong = size_error(picture.width, picture.height); !wrong.empty()) return wrong;
   picture.format = PNG_FORMAT_RGBA;
   const size_t count = size_t(picture.width) * picture.height;
-  const std::unique_ptr<uint8_t[]> rows(new uint8_t[4 * count]);  // pages come with what is read
+  const std::unique_ptr<uint8_t[]> rows(new uint8_t[4 * count]);  // uninitialised: pages are touched when read
   if (!png_image_finish_read(&picture, nullptr, rows.get(), 0, nullptr)) return picture.message;
   view.colour.resize(count);
   for (size_t i = 0; i < count; ++i) {

@@ -24,7 +24,7 @@ std::optional<ShadingParameters> shading_named(std::string_view name) {
   ShadingParameters p;
   if (name == "lit") return p;
   if (name == "head") {
-    p.head += p.key;  // as bright where a surface faces the viewer
+    p.head += p.key;  // keeps the brightness of surfaces that face the viewer
     p.key = 0;
     return p;
   }

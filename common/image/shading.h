@@ -1,7 +1,7 @@
 // Shading, the same for splatted points, direct rendering and verification: intensity from the normal, times albedo.
 //   I(n) = ambient + head * |n . h| + key * max(0, n . k)
-// h: the camera's backward axis (a head light at infinity), k: a fixed direction in room space. Both sides are lit by
-// the head.
+// h: the camera's backward axis (a head light at infinity), k: a fixed direction in room space. The head light lights
+// both sides.
 #pragma once
 
 #include <array>
@@ -19,11 +19,11 @@ struct ShadingParameters {
   float ambient = 0.15f, head = 0.6f, key = 0.25f;
   glm::vec3 key_direction_room{-0.4082f, 0.8165f, 0.4082f};  ///< towards the light, unit length
   uint32_t background = 0x00141820;                          ///< 0x00RRGGBB
-  bool lit = true;                                           ///< false: albedo as it is
+  bool lit = true;                                           ///< false: albedo unchanged
 };
 
-/// Named ways of shading, as --shading has them: "lit" (both lights and ambient), "head" (the head light alone, so that
-/// light follows the viewer), "unlit" (albedo as it is).
+/// Names of kinds of shading, for --shading: "lit" (both lights and ambient), "head" (the head light alone, so that
+/// light follows the viewer), "unlit" (albedo unchanged).
 inline constexpr std::array kShadingNames{"lit", "head", "unlit"};
 std::optional<ShadingParameters> shading_named(std::string_view name);
 

@@ -1,5 +1,5 @@
-// Pictures to files. Through libpng and OpenEXR themselves: OpenImageIO brings 200 libraries along, and those who only
-// write pictures start without them.
+// Writes pictures to files, through libpng and OpenEXR themselves: OpenImageIO loads 200 libraries, which programs that
+// only write pictures do not need.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -19,9 +19,8 @@
 namespace telesplat::image {
 namespace {
 
-// Writes under a temporary name beside `path`, then renames: no reader ever sees half a file, and nothing is written
-// through a link.
-// write: writes all of the file; what is wrong, if something is.
+// Writes under a temporary name beside `path`, then renames: readers never see half a file, and links are not followed.
+// write: writes the whole file; returns an error text, or an empty one.
 Status write_picture(const std::string& path, const std::function<std::string(const std::string& part)>& write) {
   const auto part = new_part(path);
   if (!part) return part.error();
@@ -43,7 +42,7 @@ std::string write_png_file(const std::string& path, const View& view, int channe
   return png_image_write_to_file(&picture, path.c_str(), 0, bytes, 0, nullptr) ? "" : picture.message;
 }
 
-// Channels of an EXR file: half floats, `names.size()` a pixel beside each other, and Z.
+// Writes an EXR file with `names.size()` interleaved half-float channels, and Z.
 Status write_exr_file(const std::string& path, const View& view, const std::vector<const char*>& names,
                       const std::vector<Imath::half>& values) {
   return write_picture(path, [&](const std::string& part) -> std::string {

@@ -48,7 +48,7 @@ Status validate(const Parameters& start, const Timeline& timeline) {
     Parameters alone;
     const auto infos = parameter_infos();
     const auto info = std::find_if(infos.begin(), infos.end(), [&](const auto& i) { return i.name == track.name; });
-    if (info == infos.end()) return set(alone, track.name, 0).error();  // names those there are
+    if (info == infos.end()) return set(alone, track.name, 0).error();  // lists the valid names
     if (!info->animates || info->whole) {
       std::string names;
       for (const auto& i : infos)

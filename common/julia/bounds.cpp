@@ -10,16 +10,15 @@ namespace {
 
 constexpr int kDepth = 9;  // finest cells are a 512th of the first cube
 
-/// held[n]: only what has |q| <= held[n] can still have |q| <= bailout after n more iterations, because |q^2 + c| <= b
-/// only where
-/// |q| <= sqrt(b + |c|). Falls towards radius(c).
+/// held[n]: only points with |q| <= held[n] can still have |q| <= bailout after n more iterations, because |q^2 + c| <=
+/// b needs |q| <= sqrt(b + |c|). Falls towards radius(c).
 std::vector<double> held_radii(const Parameters& p) {
   std::vector<double> held{p.bailout};
   for (int n = 0; n < p.iterations; ++n) held.push_back(std::sqrt(held.back() + glm::length(p.c)));
   return held;
 }
 
-// The box of all finest cells that may hold a point of the set.
+// Finds the box of all finest cells that may hold a point of the set.
 class BoxSearch {
  public:
   BoxSearch(const Parameters& parameters, const std::vector<double>& held, double half_side, bool any)
@@ -29,8 +28,8 @@ class BoxSearch {
   const geometry::DBox& box() const { return box_; }
 
  private:
-  // Whether all orbits that begin in a ball of the slice escape. The iterates of a ball about q of radius r lie in one
-  // of radius 2 |q| r + r^2 about q^2 + c. Unlike the distance estimate this needs no connected set.
+  // True if all orbits that begin in a ball of the slice escape. The iterates of a ball about q of radius r lie in
+  // one of radius 2 |q| r + r^2 about q^2 + c. Unlike the distance estimate this needs no connected set.
   bool all_escape(const glm::dvec3& centre, double r) const {
     glm::dvec4 q = slice_.origin + centre.x * slice_.e[0] + centre.y * slice_.e[1] + centre.z * slice_.e[2];
     for (int n = 0;; ++n) {
@@ -44,7 +43,7 @@ class BoxSearch {
 
   void visit(const glm::dvec3& centre, double half, int depth) {
     const glm::dvec3 lo = centre - half, hi = centre + half;
-    const auto known = [&] {  // nothing in here can change the result
+    const auto known = [&] {  // true if this cell cannot change the result
       if (any_) return !box_.empty();
       return glm::all(glm::greaterThanEqual(lo, box_.lo)) && glm::all(glm::lessThanEqual(hi, box_.hi));
     };

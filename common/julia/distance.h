@@ -1,4 +1,4 @@
-// How far a point is from a quaternion Julia set, plainly and in double precision: what faster ways are measured
+// Distance of a point from a quaternion Julia set, in plain double precision: the reference for faster methods.
 // against.
 #pragma once
 
@@ -12,9 +12,9 @@ inline glm::dvec4 iterate(const glm::dvec4& q, const glm::dvec4& c) {
 }
 
 /// Distance estimate at p in set space: 0.5 |q| log|q| / |q'| at the first |q| > bailout of q0 = p, q <- q^2 + c, with
-/// |q'| <- 2 |q| |q'| from 1; 0 where no |q| of the first 1 + iterations ones exceeds it. Near the set a lower bound of
-/// the distance (Hart, Sandin, Kauffman: Ray tracing deterministic 3-D fractals, 1989); far from it, where |p| is above
-/// about 4, and between the parts of sets that are not connected it may be none.
+/// |q'| <- 2 |q| |q'| from 1; 0 if no |q| of the first 1 + iterations ones exceeds it. Near the set a lower bound of
+/// the distance (Hart, Sandin, Kauffman: Ray tracing deterministic 3-D fractals, 1989). Not always a bound far from the
+/// set, where |p| is above about 4, and between the parts of sets that are not connected.
 double distance_estimate(const Parameters& parameters, const Slice& slice, const glm::dvec3& p);
 
 }  // namespace telesplat::julia

@@ -16,7 +16,7 @@ std::string joined(const Names& names) {
   return out;
 }
 
-// Takes "nan" and "inf" as well, so that the parameter's own limits answer.
+// Also reads "nan" and "inf", so that the parameter's own limits refuse them.
 Result<double> read_number(std::string_view name, const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
@@ -40,7 +40,7 @@ Status read_constant(const std::string& text, Parameters& p) {
   return ok_status();
 }
 
-// Which parameter is to blame for an empty slice: one without which there would be points, else the constant. at: when.
+// Names the parameter that makes a slice empty: one without which it has points, else the constant. at: when.
 std::string why_empty(const Parameters& p, const std::string& at) {
   Parameters other = p;
   other.bound = 0;
@@ -56,7 +56,7 @@ std::string why_empty(const Parameters& p, const std::string& at) {
       p.c.x, p.c.y, p.c.z, p.c.w, at, glm::length(p.c));
 }
 
-// What a parameter is, its limits, and its value in the first preset.
+// Help text: the parameter, its limits, and its value in the first preset.
 std::string help_of(const ParameterInfo& info) {
   const Parameters& defaults = presets().front().parameters;
   std::string limits = fmt::format("{}..{}", info.least, info.most),

@@ -60,14 +60,14 @@ constexpr Access kAccess[] = {
 };
 static_assert(std::size(kInfos) == std::size(kAccess));
 
-// std::size(kInfos) if there is none.
+// Index of the name; std::size(kInfos) if it is unknown.
 size_t index_of(std::string_view name) {
   return size_t(std::find_if(std::begin(kInfos), std::end(kInfos), [&](const auto& i) { return i.name == name; }) -
                 std::begin(kInfos));
 }
 
 Status check_value(const ParameterInfo& info, double value) {
-  if (!(value >= info.least && value <= info.most))  // false for what is not a number, too
+  if (!(value >= info.least && value <= info.most))  // false for NaN, too
     return Error{fmt::format("{} is {}, limits are {}..{}", info.name, value, info.least, info.most)};
   if (info.whole && value != std::floor(value))
     return Error{fmt::format("{} is {}, but takes whole numbers {}..{}", info.name, value, info.least, info.most)};
@@ -129,8 +129,8 @@ Status validate(const Parameters& parameters) {
 }
 
 Slice slice(const Parameters& parameters) {
-  // Untilted: X is the real axis, Y is i, Z is j, and k is the normal. A turn in the plane (a, k) takes a towards k and
-  // k towards -a.
+  // Without turns X is the real axis, Y is i, Z is j, and k is the normal. A turn in the plane (a, k) takes a towards k
+  // and k towards -a.
   const auto turned = [&](glm::dvec4 v) {
     const int axes[] = {3, 0, 1};
     for (int turn = 0; turn < 3; ++turn) {

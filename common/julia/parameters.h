@@ -1,4 +1,4 @@
-// A quaternion Julia set as a scene (T4.2.2, T7.3): what defines it, its names, its limits. No ray is traced here.
+// A quaternion Julia set as a scene (T4.2.2, T7.3): its parameters, their names and limits. Traces no rays.
 //
 // The filled-in set of f(q) = q^2 + c is cut by a three-dimensional hyperplane of the quaternions. Set space is that
 // hyperplane's own coordinates (X, Y, Z), with X to the right, Y up and Z towards the viewer, as in room space.
@@ -17,7 +17,7 @@
 
 namespace telesplat::julia {
 
-/// What a point's colour is made from; the number is the parameter's value.
+/// Source of a point's colour; the number is the parameter's value.
 enum class Colour {
   kDistance = 0,   ///< distance from the set's centre, the quaternion 0 (T4.2.2)
   kTrap = 1,       ///< least distance of the orbit from the real axis
@@ -30,32 +30,32 @@ struct Parameters {
   double slice_offset = 0;           ///< distance of the slice from 0 along its normal (k, turned), in [-4, 4]
   glm::dvec3 slice_turn_deg{
       0.0};  ///< turns of the slice, one after the other, in the planes (1, k), (i, k), (j, k); in [-360, 360]
-  int iterations = 64;  ///< of f at most, 1..4096; an orbit that has not escaped by then is inside
+  int iterations = 64;  ///< most iterations of f, 1..4096; an orbit that has not escaped by then is inside
   double bailout = 16;  ///< |q| beyond which an orbit has escaped, 2..1e6
-  double lod = 0.5;     ///< the surface is where the distance estimate is this many pixel footprints, 0.05..16
-  double bound = 0;     ///< half side of the cube, about 0 in set space, that is shown; 0: the set's own box; at most 8
+  double lod = 0.5;     ///< the surface lies at this distance estimate, in pixel footprints, 0.05..16
+  double bound = 0;     ///< half side of the visible cube about 0 in set space, at most 8; 0: the set's own box
   Colour colour = Colour::kDistance;
   int palette = 0;          ///< index into palette_names()
-  double colour_scale = 1;  ///< palettes run through this often from 0 to the set's radius, 0.01..100
-  double colour_shift = 0;  ///< where in the palette 0 lies, in [-100, 100]; whole numbers change nothing
+  double colour_scale = 1;  ///< number of times that palettes repeat from 0 to the set's radius, 0.01..100
+  double colour_shift = 0;  ///< place of 0 in the palette, in [-100, 100]; whole numbers change nothing
   double ambient = 0.6;     ///< strength of the ambient occlusion that darkens colours, 0 (off)..1
   double shadow = 0;        ///< strength of the soft shadow of a light at the upper left in front, 0 (off)..1
   bool operator==(const Parameters&) const = default;
 };
 
-/// A parameter by its name, as on the command line, in scene files, in messages and for animation: "c.x", "c.y", "c.z",
-/// "c.w", "slice.offset", "slice.turn-x", "slice.turn-y", "slice.turn-z", "iterations", "bailout", "lod", "bound",
-/// "colour", "palette", "colour.scale", "colour.shift", "ambient", "shadow".
+/// Description of a parameter. Its name is used on the command line, in scene files, in messages and for animation:
+/// "c.x", "c.y", "c.z", "c.w", "slice.offset", "slice.turn-x", "slice.turn-y", "slice.turn-z", "iterations", "bailout",
+/// "lod", "bound", "colour", "palette", "colour.scale", "colour.shift", "ambient", "shadow".
 struct ParameterInfo {
   std::string_view name;
   double least, most;
   bool whole;             ///< takes whole numbers only
-  bool animates;          ///< may change from one epoch to the next; those that are not whole can be animated
+  bool animates;          ///< may change from one epoch to the next; if also not whole, it can be animated
   std::string_view text;  ///< for --help
 };
 std::span<const ParameterInfo> parameter_infos();
 
-/// Error: no such name (names the ones there are), not finite, out of [least, most], not whole. Says name, value and
+/// Error: no such name (lists the valid ones), not finite, out of [least, most], not whole. States name, value and
 /// limits.
 Status set(Parameters& parameters, std::string_view name, double value);
 /// Precondition: a name of parameter_infos().
@@ -63,12 +63,11 @@ double get(const Parameters& parameters, std::string_view name);
 
 /// All parameters by name, for messages.
 std::map<std::string, double> to_map(const Parameters& parameters);
-/// Names that are none of ours are ignored (messages hold others too); missing ones keep their default; the rest as
-/// set() does.
+/// Ignores other names (messages hold others too); missing parameters keep their default; the rest as set() does.
 Result<Parameters> from_map(const std::map<std::string, double>& values);
 
-/// Each value within its limits, the slice not so far from 0 that it must be empty, and the bailout beyond the ball
-/// that holds the set. Error texts name parameter, value and limit.
+/// Checks that each value is within its limits, that the slice is near enough to 0 to meet the set, and that the
+/// bailout is beyond the ball that holds the set. Error texts name parameter, value and limit.
 Status validate(const Parameters& parameters);
 
 struct Preset {
@@ -77,7 +76,7 @@ struct Preset {
 };
 /// Sets that look good; the first is the default.
 std::span<const Preset> presets();
-/// Error: no such preset; names those there are.
+/// Error: no such preset; lists the valid names.
 Result<Parameters> preset_named(std::string_view name);
 
 std::span<const std::string_view> palette_names();
@@ -93,21 +92,20 @@ Slice slice(const Parameters& parameters);
 /// Radius of a ball about 0 that holds the filled-in set: (1 + sqrt(1 + 4 |c|)) / 2.
 double radius(const glm::dvec4& c);
 
-/// Where the set lies in set space: cells of a grid refined where not all orbits can be shown to escape, and a cell
-/// more on each side, so the box is never too small. `bound` > 0: that cube instead. Empty where the slice (in that
-/// cube) misses the set. About 10 ms. Precondition: validate(parameters).
+/// Box of the set in set space: refines cells of a grid unless all their orbits provably escape, and adds a cell on
+/// each side, so the box is never too small. `bound` > 0: that cube instead. Empty if the slice (in that cube) misses
+/// the set. About 10 ms. Precondition: validate(parameters).
 geometry::DBox bounds(const Parameters& parameters);
 
-/// Set space in room space: room = (set - centre) * scale. Fixed for a session, so that an animated set does not jump
-/// about.
+/// Set space in room space: room = (set - centre) * scale. Fixed for a session, so that an animated set does not jump.
 struct Placement {
   glm::dvec3 centre{0.0};
   double scale = 1;        ///< metres a unit of set space
-  geometry::Box box_room;  ///< what is shown; rays are clipped to it
+  geometry::Box box_room;  ///< the visible part; rays are clipped to it
 };
-/// The box centred in the room, its largest extent room_size_m. Precondition: !box.empty().
+/// Centres the box in the room and scales its largest extent to room_size_m. Precondition: !box.empty().
 Placement place(const geometry::DBox& box, double room_size_m);
-/// "room.x", "room.y", "room.z", "room.scale", for messages, and back: errors name the value that is missing or no
+/// "room.x", "room.y", "room.z", "room.scale", for messages, and back. Errors name the value that is missing or not a
 /// finite number.
 std::map<std::string, double> to_map(const Placement& placement);
 Result<Placement> placement_from_map(const std::map<std::string, double>& values, const geometry::Box& box_room);

@@ -9,7 +9,7 @@ namespace {
 
 enum Palette { kEmber, kOcean, kForest, kSpectrum, kIvory, kDusk, kCopper, kIce };
 
-// c as the literature writes it: real part first.
+// c in the order of the literature: real part first.
 Parameters set_of(double real, double i, double j, double k, Colour colour, Palette palette, double scale,
                   double shift) {
   Parameters p;

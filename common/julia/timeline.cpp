@@ -17,7 +17,7 @@ Error unreadable(std::string_view part, const std::string& why) {
   return Error{fmt::format("animation \"{}\": {}", part.substr(0, 80), why)};
 }
 
-// The pieces between separators, empty ones included.
+// Splits a text at separators; keeps empty pieces.
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> out;
   for (size_t begin = 0;;) {
@@ -43,7 +43,7 @@ Result<double> number(std::string_view part, std::string_view text) {
   return value;
 }
 
-// "10s" or "10".
+// Reads "10s" or "10".
 Result<double> seconds(std::string_view part, std::string_view text) {
   auto digits = text;
   if (digits.ends_with('s')) digits.remove_suffix(1);
@@ -54,7 +54,7 @@ Result<double> seconds(std::string_view part, std::string_view text) {
   return *value;
 }
 
-// "-0.4:0.4:10s"
+// Reads "-0.4:0.4:10s".
 Status read_swing(std::string_view part, std::string_view text, Track& track) {
   const auto fields = split(text, ':');
   if (fields.size() != 3) return unreadable(part, "is not NAME=FROM:TO:SECONDS, such as c.y=-0.4:0.4:10s");
@@ -68,7 +68,7 @@ Status read_swing(std::string_view part, std::string_view text, Track& track) {
   return ok_status();
 }
 
-// "@0s:-0.4@5s:0.4"
+// Reads "@0s:-0.4@5s:0.4".
 Status read_keys(std::string_view part, std::string_view text, Track& track) {
   const auto frames = split(text.substr(1), '@');
   if (frames.size() > kMaxKeys)
@@ -92,7 +92,7 @@ Status read_keys(std::string_view part, std::string_view text, Track& track) {
 }
 
 // (1 - cos(pi x)) / 2 = sin(pi x / 2)^2 for x from 0 to 1, by the sine's Taylor polynomial: cos() has other last bits
-// on processors without FMA, and everybody must have the same scene.
+// on processors without FMA, and all processes must compute the same scene.
 double smooth(double x) {
   const double angle = 0.5 * glm::pi<double>() * std::min(x, 1 - x), square = angle * angle;
   double sine = 1;

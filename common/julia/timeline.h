@@ -1,5 +1,5 @@
-// How parameters of a scene change with time: key frames, read from the command line or a scene file. Knows names and
-// numbers only.
+// Change of a scene's parameters in time: key frames, read from the command line or a scene file. Uses only names and
+// numbers.
 #pragma once
 
 #include <map>
@@ -11,7 +11,7 @@
 
 namespace telesplat::julia {
 
-/// One parameter's key frames. Between two the value runs smoothly (cosine), so that it rests at each.
+/// One parameter's key frames. Between two the value changes smoothly (cosine), so that it rests at each.
 struct Track {
   struct Key {
     double t_s, value;
@@ -26,7 +26,7 @@ struct Timeline {
   bool empty() const { return tracks.empty(); }
   /// Values at t_s seconds after the animation began.
   std::map<std::string, double> values(double t_s) const;
-  /// As --animate takes it.
+  /// The text that --animate takes.
   std::string text() const;
 };
 

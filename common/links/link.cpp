@@ -21,7 +21,7 @@ constexpr double kLeastBetweenStalls_s = 0.01, kMostStalled = 0.99;
 constexpr double kLongest_s = 10, kMostBetweenStalls_s = 3600, kLeastRate = 1e4, kMostRate = 1e11;
 constexpr double kShortestQueue_s = 0.1;
 
-// A number and one of these units; nothing if it is neither.
+// Reads a number with one of these units; nothing: the text has another form.
 std::optional<double> measure(std::string_view text, const std::array<Unit, 3>& units) {
   double number = 0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -54,7 +54,7 @@ Result<double> rate_of(std::string_view key, std::string_view value) {
   return *rate;
 }
 
-// "2s/30s"
+// Reads "2s/30s".
 Status read_stall(Link& link, std::string_view value) {
   const size_t slash = value.find('/');
   const auto part = [&](size_t from, size_t n) { return measure(value.substr(from, n), kTimes); };
@@ -82,7 +82,7 @@ Status read_part(Link& link, std::string_view key, std::string_view value) {
   return ok_status();
 }
 
-// "20mbit", "50ms", "50ms:100mbit"
+// Reads "20mbit", "50ms", "50ms:100mbit".
 Result<Link> parse_short(std::string_view text) {
   Link out;
   const size_t colon = text.find(':');

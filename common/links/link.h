@@ -1,4 +1,4 @@
-// A link of a network as people name it, "rtt=40ms,rate=100mbit,jitter=5ms,stall=2s/30s": what a simulated one does.
+// A link of a network in the text form of users, "rtt=40ms,rate=100mbit,jitter=5ms,stall=2s/30s", for simulated links.
 #pragma once
 
 #include <cstdint>
@@ -9,20 +9,20 @@
 
 namespace telesplat::links {
 
-/// What a link does to bytes, the same both ways.
+/// Effect of a link on bytes, the same both ways.
 struct Link {
-  double rtt_s = 0;          ///< there and back without waiting, half of it each way; 0..10
+  double rtt_s = 0;          ///< both ways together, without waiting; half of it each way; 0..10
   double rate_bit_s = 0;     ///< each way; 10^4..10^11; 0: no limit
-  double jitter_s = 0;       ///< more delay each way, between nothing and this; 0..10
-  double stall_s = 0;        ///< nothing passes for so long; 0: never
+  double jitter_s = 0;       ///< random extra delay each way, from 0 to this; 0..10
+  double stall_s = 0;        ///< nothing passes for this time; 0: no stalls
   double stall_every_s = 0;  ///< from the begin of one stall to that of the next, above stall_s; at most 3600
 
-  /// Whether it does nothing to bytes.
+  /// True if it changes nothing.
   bool is_local() const { return rtt_s == 0 && rate_bit_s == 0 && jitter_s == 0 && stall_s == 0; }
   bool operator==(const Link&) const = default;
 };
 
-/// Where in the pipeline a link lies.
+/// Place of a link in the pipeline.
 enum class Place {
   kViewer,   ///< between each viewer and everything else
   kSampler,  ///< between each sampler and everything else
@@ -35,18 +35,18 @@ struct PlacedLink {
   Link link;
 };
 
-/// "local"; RATE ("20mbit"), RTT ("50ms") or RTT:RATE ("50ms:100mbit"); or some of rtt=, rate=, jitter= and
+/// Reads "local"; RATE ("20mbit"), RTT ("50ms") or RTT:RATE ("50ms:100mbit"); or some of rtt=, rate=, jitter= and
 /// stall=FOR/EVERY, separated by commas. Times are numbers with us, ms or s, rates with kbit, mbit or gbit (powers of
-/// 1000, bits a second). Error: which part, its value and the limit.
+/// 1000, bits a second). Error: names the part, its value and the limit.
 Result<Link> parse(std::string_view text);
-/// The same after a place and a colon, "viewer:", "sampler:" or "data:"; without one it is the viewer's.
+/// The same after a place and a colon, "viewer:", "sampler:" or "data:"; without a place, the link is the viewer's.
 Result<PlacedLink> parse_placed(std::string_view text);
 
-/// As parse() takes it: "rtt=40ms,rate=100mbit", or "local".
+/// Writes text for parse(): "rtt=40ms,rate=100mbit", or "local".
 std::string text_of(const Link& link);
 
 /// Bytes that wait before a link's bottleneck, each way: as many as it carries in a round trip, or in 100 ms if that is
-/// longer. 0: without a rate nothing waits.
+/// longer. 0: without a rate no bytes wait.
 uint64_t queue_bytes(const Link& link);
 
 }  // namespace telesplat::links

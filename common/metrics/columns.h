@@ -1,4 +1,4 @@
-// A table of measurements, one row of code a column: its name, and how its value comes out of a record.
+// A table of measurements, one row of code a column: its name, and the function that takes its value from a record.
 #pragma once
 
 #include <cstddef>
@@ -8,14 +8,14 @@
 
 namespace telesplat::metrics {
 
-/// Value: double where rows travel as numbers, std::string where a file says how each number is written.
+/// Value: double if rows are sent as numbers, std::string if a file prescribes the format of each number.
 template <class Row, class Value = double>
 struct Column {
   const char* name;
   Value (*get)(const Row&);
 };
 
-/// In the order of the columns.
+/// Names in the order of the columns.
 template <class Row, class Value>
 std::vector<std::string> names(std::span<const Column<Row, Value>> columns) {
   std::vector<std::string> out;
@@ -24,7 +24,7 @@ std::vector<std::string> names(std::span<const Column<Row, Value>> columns) {
   return out;
 }
 
-/// What the columns make of one record, in their order.
+/// Values of all columns for one record, in their order.
 template <class Row, class Value>
 std::vector<Value> values(std::span<const Column<Row, Value>> columns, const Row& row) {
   std::vector<Value> out;

@@ -1,4 +1,4 @@
-// A process as the record of a run knows it.
+// A process in the record of a run.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,13 @@
 
 namespace telesplat::metrics {
 
-/// Status value by which a process tells how many files of the record it could not write to their end.
+/// Status value with which a process reports the number of record files that it could not write completely.
 inline constexpr const char* kRecordFailed = "record_failed";
 
-/// Status values by which a viewer tells how many rows of updates.csv and stages.csv it has sent.
+/// Status values with which a viewer reports the number of rows of updates.csv and stages.csv that it has sent.
 inline constexpr const char *kUpdateRows = "update_rows", *kStageRows = "stage_rows";
 
-/// Facts by which processes tell the record what the figures do not: tables of session.toml, "\n[table]\nkey = ...\n".
+/// Fact with which a process adds text to the record: tables of session.toml, " [table] key = ... ".
 inline constexpr const char* kRecordFact = "record";
 
 struct Process {
@@ -21,7 +21,7 @@ struct Process {
   uint64_t pid = 0;
   std::map<std::string, std::string> facts;
   std::map<std::string, double> values;  ///< newest status report
-  bool replaced = false;                 ///< it died and another of its name took its place
+  bool replaced = false;                 ///< it died, and another process of its name took its place
   bool lost = false;                     ///< it ended without a goodbye
 };
 

@@ -6,7 +6,7 @@
 
 namespace telesplat::metrics {
 namespace {
-constexpr size_t kMaxBuffered = 1u << 20;  // values kept if the master is away; newer ones are dropped then
+constexpr size_t kMaxBuffered = 1u << 20;  // values kept while the master is away; newer ones are dropped
 }
 
 void TableRecorder::add(std::span<const double> row) {

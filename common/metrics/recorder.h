@@ -1,4 +1,4 @@
-// What a process measures before it is sent to the master: rows of a table, and spans for the trace. Thread-safe.
+// Buffers measurements of a process for the master: rows of a table, and spans for the trace. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -23,7 +23,7 @@ class TableRecorder {
   void add(std::initializer_list<double> row) { add(std::span(row.begin(), row.size())); }
   /// The rows since the last call, if any.
   std::optional<wire::MetricRows> flush(InstanceId instance);
-  /// Rows that flush() has returned so far, or for which there was no room.
+  /// Number of rows that flush() has returned so far, or that were dropped for lack of room.
   uint64_t gone() const { return gone_; }
 
  private:
@@ -37,15 +37,15 @@ class TableRecorder {
 /// Values of a row of "spans".
 inline constexpr size_t kSpanWidth = 7;
 
-/// What a span is about; -1: that is not known, or it is about several.
+/// Subject of a span; -1: unknown, or several.
 struct SpanOf {
   double frame = -1, tile = -1, request = -1;
 };
-/// Spans of this lane may overlap: they are told apart by what they are about.
+/// Lane of spans that may overlap: their subjects tell them apart.
 inline constexpr int kOverlapping = -1;
 
-/// Spans "name, from, to, lane, frame, tile, request" in seconds of the master's clock; lane tells a process's threads
-/// apart.
+/// Spans "name, from, to, lane, frame, tile, request" in seconds of the master's clock; lane: number of the process'
+/// thread.
 class SpanRecorder {
  public:
   void add(const char* name, double begin_s, double end_s, int lane = 0, const SpanOf& of = {});

@@ -22,8 +22,8 @@ constexpr uint64_t kMostIdBytes = 4096;
 constexpr const char* kLatest = "latest";
 constexpr const char* kReplaced = ".replaced";
 
-/// Files that we write, a pattern of names in a folder of a record. What a person may have put there (screenshots,
-/// notes) is not ours.
+/// Files that we write: patterns of names in a folder of a record. Other files, such as a person's screenshots or
+/// notes, are not ours.
 struct Ours {
   const char* folder;
   std::vector<const char*> names;
@@ -55,12 +55,12 @@ bool is_ours(const Ours& of, const std::string& name) {
                      [&](const char* pattern) { return fnmatch(pattern, name.c_str(), FNM_PERIOD) == 0; });
 }
 
-/// What lies in a record's folder under names of ours.
+/// Files, folders and links with names of ours in a record's folder.
 struct Found {
   std::vector<std::string> files, folders, links;  ///< relative to the folder; folders: inner ones first
 };
 
-// prefix: of what is found, "" or "viewer-2/".
+// prefix: for the found names, "" or "viewer-2/".
 void look(const fs::path& directory, const std::string& prefix, const Ours& of, Found& out) {
   const std::string inner = *of.folder ? prefix + of.folder + "/" : prefix;
   const fs::path folder = directory / inner;
@@ -85,7 +85,7 @@ void look_everywhere(const fs::path& directory, const std::string& prefix, Logs 
   if (logs == Logs::kOurs) look(directory, prefix, kLogFiles, out);
 }
 
-// Further viewers have a folder of their own in it, viewer-NAME. One with an id is another run's record.
+// Further viewers have a folder of their own in it, viewer-NAME. A folder with an id is another run's record.
 Found look_into(const std::string& directory, Logs logs) {
   Found out;
   look_everywhere(directory, "", logs, out);
@@ -104,7 +104,7 @@ Found look_into(const std::string& directory, Logs logs) {
   return out;
 }
 
-// "summary.json, frames.csv and 12 more"
+// Writes "summary.json, frames.csv and 12 more".
 std::string list_of(const std::vector<std::string>& files) {
   constexpr size_t kNamed = 3;
   std::string out;
@@ -112,7 +112,7 @@ std::string list_of(const std::vector<std::string>& files) {
   return files.size() > kNamed ? out + fmt::format(" and {} more", files.size() - kNamed) : out;
 }
 
-// A folder that earlier versions left has no id, but what a master begins with.
+// A folder of an earlier version has no id, but has the first files of a master.
 bool is_record(const std::string& directory, const Found& found) {
   const auto has = [&](const char* name) {
     return std::find(found.files.begin(), found.files.end(), name) != found.files.end();
@@ -142,7 +142,7 @@ Status move_record(const std::string& from, const std::string& to, const Found& 
   return ok_status();
 }
 
-// Sets the record aside, in place of what a run that was killed may have left there.
+// Sets the record aside, and replaces the one that a killed run may have left there.
 Status set_aside(const std::string& directory, const Found& found) {
   const std::string aside = directory + "/" + kReplaced;
   std::error_code error;
@@ -155,9 +155,7 @@ Status set_aside(const std::string& directory, const Found& found) {
   return ok_status();
 }
 
-std::string new_id() {
-  return fmt::format("{:016x}", random_bits());
-}
+std::string new_id() { return fmt::format("{:016x}", random_bits()); }
 
 }  // namespace
 
@@ -183,7 +181,7 @@ bool may_go_on(const std::string& directory) {
 Result<std::string> go_on_in_folder(const std::string& directory) {
   if (const Status s = refuse_links(directory, Logs::kOthers); !s) return s.error();
   std::error_code error;
-  fs::remove(directory + "/summary.json", error);  // it is not all of the record any more
+  fs::remove(directory + "/summary.json", error);  // it no longer describes the whole record
   return folder_id(directory);
 }
 

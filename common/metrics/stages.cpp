@@ -5,7 +5,7 @@
 namespace telesplat::metrics {
 
 StagesMs stages_ms(const wire::Moments& part, const UpdateMoments& update) {
-  // When each stage ended. What the sampler fetched ends where sampling begins.
+  // End of each stage. Fetching ends where sampling begins.
   const double fetched_s = part.sample_begin_s;
   const double fetch_begin_s = part.fetch_s > 0 ? std::max(fetched_s - part.fetch_s, part.lease_arrived_s) : fetched_s;
   const double ends_s[kStageCount] = {

@@ -1,4 +1,4 @@
-// The stages of a view update, from its request to the display: what each took (docs/metrics.md, stages.csv; the
+// The stages of a view update, from its request to the display, and the time of each (docs/metrics.md, stages.csv; the
 // latencies of T6.2 broken down).
 #pragma once
 
@@ -12,10 +12,10 @@
 namespace telesplat::metrics {
 
 inline constexpr size_t kStageCount = 17;
-/// Milliseconds of each stage, in the order in which they happen.
+/// Milliseconds of each stage, in order.
 using StagesMs = std::array<double, kStageCount>;
 
-/// Names that end in "network_ms" are the network, in "queue_ms" waiting for someone who is busy; the rest is work.
+/// Names that end in "network_ms" are time on the network, in "queue_ms" waiting for a busy process; the rest is work.
 inline constexpr Column<StagesMs> kStageColumns[] = {
     {"request_network_ms", [](const StagesMs& s) { return s[0]; }},
     {"view_queue_ms", [](const StagesMs& s) { return s[1]; }},
@@ -37,20 +37,20 @@ inline constexpr Column<StagesMs> kStageColumns[] = {
 };
 static_assert(std::size(kStageColumns) == kStageCount);
 
-/// What the viewer adds to the moments of the part that made an update complete; seconds of the master's clock.
+/// The viewer's moments, beside those of the part that completed an update; seconds of the master's clock.
 struct UpdateMoments {
-  double requested_s = 0;     ///< the update was asked for
+  double requested_s = 0;     ///< the viewer asked for the update
   double arrived_s = 0;       ///< the part reached the viewer's machine
-  double decode_begin_s = 0;  ///< it was taken from its queue
+  double decode_begin_s = 0;  ///< it was taken from the viewer's queue
   double decoded_s = 0;
   double complete_s = 0;  ///< it was in the replica, or in the buffer of the display
 };
 
-/// Their sum is complete_s - requested_s: each begins when the one before it ends. A stage whose end is 0 was not on
-/// the way and took no time.
+/// Each stage begins when the one before ends, so their sum is complete_s - requested_s. A stage whose end is 0 was not
+/// on the way and took no time.
 StagesMs stages_ms(const wire::Moments& part, const UpdateMoments& update);
 
-/// The stages whose names end so, together: "queue_ms", "network_ms".
+/// Sum of the stages whose names have this ending: "queue_ms", "network_ms".
 double sum_ms(const StagesMs& stages, std::string_view ending);
 
 }  // namespace telesplat::metrics

@@ -9,7 +9,7 @@ namespace {
 
 std::string last_word(const std::string& name) { return name.substr(name.rfind(' ') + 1); }
 
-// Words that may follow, each with what it means.
+// Collects words that may follow, each with its meaning.
 class Offer {
  public:
   Offer(std::string before, std::string typed) : before_(std::move(before)), typed_(std::move(typed)) {}
@@ -36,7 +36,7 @@ _{0}() {{
 }}
 complete -o bashdefault -o default -F _{0} {0}
 )";
-// Of a folder of functions the file itself is the function, when it is first called.
+// In a folder of functions, zsh takes the file itself as the function when it is first called.
 constexpr const char* kZsh = R"(#compdef {0}
 # zsh completion of {0}, printed by `{0} completion zsh`
 _{0}() {{
@@ -65,9 +65,9 @@ complete -c {0} -a '(__{0}_words)'
 std::string candidates(const Manual& program, std::vector<std::string> words) {
   if (words.empty()) words.emplace_back();
   const Manual* m = &program;
-  const Row* awaits = nullptr;  // the flag whose value comes
+  const Row* awaits = nullptr;  // flag whose value comes next
   for (size_t i = 0; i + 1 < words.size(); ++i) {
-    if (words[i] == "=") continue;  // bash makes three words of --flag=value
+    if (words[i] == "=") continue;  // bash splits --flag=value into three words
     const Row* row = find(m->table, words[i]);
     awaits = !awaits && row && takes_value(*row) ? row : nullptr;
     for (const Manual& c : m->commands)

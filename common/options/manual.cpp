@@ -8,7 +8,7 @@
 namespace telesplat::options {
 namespace {
 
-// A text as roff has it: nothing in it is a command.
+// Escapes a text for roff, so that none of it is a command.
 std::string roff(const std::string& text) {
   std::string out;
   bool begins = true;
@@ -33,7 +33,7 @@ std::string roff(const std::string& text) {
   return out;
 }
 
-// "telesplat-run": the page's name.
+// Name of a page: "telesplat-run".
 std::string page_of(std::string name) {
   std::replace(name.begin(), name.end(), ' ', '-');
   return name;
@@ -49,7 +49,7 @@ std::string type_word(const Row& row) {
   return row.is_file ? "file" : "text";
 }
 
-// Its help, what it may be, and what it is anyway.
+// Help of a row, with its limits and default.
 std::string described(const Row& row) {
   std::string text = row.help;
   if (const std::string values = values_text(row); !values.empty()) text += fmt::format(" ({})", values);
@@ -66,7 +66,7 @@ std::string entry(const Row& row) {
   return fmt::format(".TP\n{}\n{}\n", head, roff(described(row)));
 }
 
-// A line of --help: what a person types, and beside it, in as many lines as it takes, what it does.
+// Makes a line of --help: the typed words, and beside them the text, in several lines if needed.
 std::string line(const std::string& typed, const std::string& text) {
   constexpr size_t kIndent = 28, kWidth = 100;
   std::string out = "  " + typed;
@@ -117,7 +117,7 @@ std::string synopsis(const Manual& m) {
 
 std::string paragraphs(const std::string& text) { return text.empty() ? "" : fmt::format(".PP\n.nf\n{}\n.fi\n", text); }
 
-// The commands of a page that has them, one after the other.
+// Writes the commands of a page, one after the other.
 std::string sections(const Manual& m) {
   std::string out;
   for (const Manual& command : m.commands) {

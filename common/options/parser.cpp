@@ -17,7 +17,7 @@ namespace {
 
 using Words = std::span<const std::string>;
 
-// A negative number is no flag.
+// True for a negative number, which is not a flag.
 bool is_number(const std::string& word) {
   return word.find_first_not_of("-+.,:0123456789eE%") == word.npos && word.find_first_of("0123456789") != word.npos;
 }
@@ -36,7 +36,7 @@ struct Parser::Impl {
   bool chosen = false;
   Given given;
 
-  // What is to be printed instead of going on.
+  // Text to print, instead of running the program.
   struct Told {
     std::string text;
   };
@@ -96,7 +96,7 @@ Status Parser::Impl::unknown_command(const std::string& called, const std::strin
                            meant.empty() ? fmt::format(", which has {}", all) : meant)};
 }
 
-// An argument by its place, of which there were `places`.
+// Takes an argument by its position; `places` arguments came before it.
 Status Parser::Impl::take(const std::string& called, const std::string& word, size_t places,
                           std::vector<Value>& values) const {
   for (const Row& row : table) {
@@ -108,7 +108,7 @@ Status Parser::Impl::take(const std::string& called, const std::string& word, si
   return Error{fmt::format("{}: {} takes no more arguments", shown(word), called)};
 }
 
-// at: of the flag, and then of the last word that belongs to it.
+// at: index of the flag; becomes the index of the last word that belongs to it.
 Status Parser::Impl::take_flag(const std::string& called, Words words, size_t& at, std::vector<Value>& values) const {
   const std::string& word = words[at];
   size_t end = word.find('=');
@@ -126,7 +126,7 @@ Status Parser::Impl::take_flag(const std::string& called, Words words, size_t& a
   return ok_status();
 }
 
-// The last value of each counts: flags of a scene file come before those of the command line.
+// The last value of each flag counts: flags of a scene file come before those of the command line.
 Status Parser::Impl::set_all(const std::string& called, std::vector<Value> values) {
   for (const Row& row : table) {
     const auto is_its = [&](const Value& v) { return v.row == &row; };
@@ -151,7 +151,7 @@ Status Parser::Impl::read(const std::string& called, Words words, Told& told) {
   std::vector<Value> values;
   size_t places = 0;
   bool flags = true;
-  Status extra = ok_status();  // told if nothing else is wrong
+  Status extra = ok_status();  // reported if there is no other error
   for (size_t i = 0; i < words.size(); ++i) {
     const std::string& word = words[i];
     if (flags && (word == "-h" || word == "--help")) {

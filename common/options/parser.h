@@ -1,4 +1,4 @@
-// Tables of flags as a command line.
+// Parses command lines by tables of flags.
 #pragma once
 
 #include <memory>
@@ -8,32 +8,32 @@
 
 namespace telesplat::options {
 
-/// A command line, or one of its sub-commands. Flags that are given twice take the last value.
+/// A command line, or one of its sub-commands. If a flag is given twice, the last value counts.
 class Parser {
  public:
   explicit Parser(const std::string& about);
   ~Parser();
   Parser(Parser&&) noexcept;
 
-  /// Adds flags. What the rows point to must outlive parse().
+  /// Adds flags. The variables that the rows point to must outlive parse().
   void add(const Table& table);
-  /// A sub-command; one of them is then required. The reference lives as long as this.
+  /// Adds a sub-command; the command line must name one of them. The reference lives as long as this parser.
   Parser& command(const std::string& name, const std::string& about);
   /// Text at the end of --help.
   void footer(const std::string& text);
-  /// What --version tells behind the program's name, and --man, alone, in the foot of the manual page that it prints.
-  /// Without it there are no such flags.
+  /// Text that --version prints behind the program's name, and that --man prints in the foot of the manual page.
+  /// Without it these flags do not exist.
   void version(const std::string& text);
 
-  /// --help prints and exits 0 (--help all: what few need, too), bad usage prints "PROGRAM: what is wrong" in one line
-  /// and exits 2. program: its name, which may have a path in front. arguments: without it.
+  /// --help prints and exits 0 (--help all: also what few users need); bad usage prints "PROGRAM: PROBLEM" in one line
+  /// and exits 2. program: its name, perhaps with a path in front. arguments: without the name.
   void parse_or_exit(const std::string& program, std::vector<std::string> arguments);
 
-  /// The same for words that a program was given for later: nothing is printed, and the program goes on. called: what a
-  /// person would type in front of them. Error: what is wrong, or that they ask for help.
+  /// The same for words that came later: prints nothing and does not exit. called: text that a person would type before
+  /// them. Error: the problem, or that they ask for help.
   Status parse(const std::string& called, std::vector<std::string> arguments);
 
-  /// After parsing: whether this sub-command was chosen; the flags and arguments that were given here.
+  /// After parsing: true if this sub-command was chosen; the flags and arguments that were given here.
   bool chosen() const;
   Given given() const;
 

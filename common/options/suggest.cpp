@@ -10,7 +10,7 @@
 namespace telesplat::options {
 namespace {
 
-// Shorter words are like too much.
+// Shorter words resemble too many others.
 constexpr size_t kLeastLetters = 3;
 
 size_t letters(std::string_view word) { return word.size() - std::min(word.find_first_not_of('-'), word.size()); }

@@ -1,4 +1,4 @@
-// "Did you mean": what a person may have wanted to type.
+// "Did you mean": suggests the word that a person may have wanted to type.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace telesplat::options {
 
-/// "; did you mean --duration?" where a candidate is like `word`, or the only one that `word` begins; else empty.
+/// "; did you mean --duration?" if a candidate resembles `word`, or is the only one that begins with it; else empty.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace telesplat::options

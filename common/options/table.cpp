@@ -106,7 +106,7 @@ bool is_number(const Row& row) {
          std::holds_alternative<std::optional<int>*>(row.value);
 }
 
-// "only volumes have --tf"
+// Text before a flag's name, as in "only volumes have --tf".
 std::string owners(const Row& row) {
   if (row.fits == scene::Kinds{scene::Kind::kVolume}) return "only volumes have";
   if (row.fits == scene::Kinds{scene::Kind::kJulia}) return "only Julia sets have";
@@ -170,7 +170,7 @@ Status set(const Row& row, const std::string& text) {
   const auto wrong = [&](const std::string& why) {
     return Error{fmt::format("{} {}: {}", name_of(row), text.empty() ? "\"\"" : text.substr(0, 200), why)};
   };
-  // What is no number is told so, before its range is looked at.
+  // A text that is not a number is reported as such, before its range is checked.
   if (const std::string why = is_number(row) ? std::string() : complain(row.limits, text); !why.empty())
     return wrong(why);
   if (is_number(row)) {
@@ -183,7 +183,7 @@ Status set(const Row& row, const std::string& text) {
 
 namespace {
 
-// A row of the same type, whose value goes nowhere.
+// Checks with a row of the same type, whose value is discarded.
 template <class T>
 Status check_as(Row row, const std::string& text) {
   T scratch{};

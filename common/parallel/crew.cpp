@@ -27,7 +27,7 @@ Crew::~Crew() {
   for (std::thread& helper : helpers_) helper.join();
 }
 
-// Helpers that are not awake before the loop is over are not waited for.
+// Does not wait for helpers that wake up after the loop is over.
 void Crew::run(size_t count, const std::function<void(size_t, int)>& turn) {
   Loop loop{count, turn};
   {

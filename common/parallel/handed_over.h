@@ -1,5 +1,5 @@
-// Tells ThreadSanitizer what it cannot see: that ZeroMQ and TBB, which are built without it, hand memory from thread to
-// thread, and order what they do with it. Nothing without ThreadSanitizer.
+// Reports to ThreadSanitizer that ZeroMQ and TBB, which are built without it, pass memory from thread to thread in
+// order. Does nothing without ThreadSanitizer.
 #pragma once
 
 #ifdef __has_feature
@@ -11,7 +11,7 @@
 
 namespace telesplat {
 
-/// What this thread did until now comes before what others do after was_handed_over(memory).
+/// Orders this thread's work so far before other threads' work after was_handed_over(memory).
 inline void hand_over([[maybe_unused]] void* memory) {
 #ifdef TELESPLAT_THREAD_SANITIZER
   __tsan_release(memory);

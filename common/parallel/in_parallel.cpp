@@ -31,8 +31,8 @@ void run_turns(size_t count, const std::function<void(size_t)>& turn) {
   }
   std::atomic<size_t> next{0};
   std::exception_ptr thrown;
-  std::mutex mutex;           // of what was thrown
-  std::latch begun(threads);  // else short loops would be over before another thread takes a turn
+  std::mutex mutex;           // guards `thrown`
+  std::latch begun(threads);  // else a short loop would end before another thread takes a turn
   const auto work = [&](int thread) {
     t_thread = thread, t_in_loop = true;
     begun.arrive_and_wait();

@@ -1,6 +1,6 @@
-// Loops whose turns run on several threads, those of TBB. All go through here, so that ThreadSanitizer can watch them:
-// it does not see how TBB's threads wait for each other, since Debian's library is built without it. Where it watches,
-// each loop has threads of its own.
+// Loops on several threads of TBB. All go through here, so that ThreadSanitizer can watch them: it does not see how
+// TBB's threads wait for each other, since Debian's library is built without it. Under ThreadSanitizer each loop has
+// threads of its own.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -19,12 +19,12 @@ namespace telesplat {
 
 #ifdef TELESPLAT_THREAD_SANITIZER
 namespace detail {
-/// turn(n) for each n below `count`, on as many threads as the arena has that the caller is in, four at most; on the
-/// caller's alone within such a loop. What a turn throws ends the loop and is thrown.
+/// Calls turn(n) for each n below `count`, on as many threads as the caller's arena has, at most four; inside such a
+/// loop only on the caller's. An exception of a turn ends the loop and is thrown again.
 void run_turns(size_t count, const std::function<void(size_t)>& turn);
 int thread_in_run();
 
-/// Parts of a range in their order, at most 2^halvings.
+/// Parts of a range in order, at most 2^halvings.
 template <class Range>
 std::vector<Range> parts_of(Range range, int halvings) {
   if (range.empty()) return {};
@@ -38,7 +38,7 @@ std::vector<Range> parts_of(Range range, int halvings) {
 }  // namespace detail
 #endif
 
-/// turn(part) for parts of a range (tbb::blocked_range), whose sizes a partitioner of TBB's chooses.
+/// Calls turn(part) for parts of a range (tbb::blocked_range); a partitioner of TBB chooses their sizes.
 template <class Range, class Turn, class... Partitioner>
 requires std::is_class_v<Range>
 void in_parallel(const Range& range, const Turn& turn, const Partitioner&... partitioner) {
@@ -51,7 +51,7 @@ void in_parallel(const Range& range, const Turn& turn, const Partitioner&... par
 #endif
 }
 
-/// turn(i) for each i from `first` to `last`, the last one left out.
+/// Calls turn(i) for each i in [first, last).
 template <class Index, class Turn>
 requires std::is_integral_v<Index>
 void in_parallel(Index first, Index last, const Turn& turn) {
@@ -69,14 +69,14 @@ void both_in_parallel(const A& a, const B& b) {
 #endif
 }
 
-/// Sums of turn(part, sum so far), from `none` on, joined in the same way for any number of threads.
+/// Sums of turn(part, sum so far), starting from `none`, joined in the same order for any number of threads.
 template <class Range, class Sum, class Turn, class Join>
 Sum sum_in_parallel(const Range& range, const Sum& none, const Turn& turn, const Join& join) {
 #ifdef TELESPLAT_THREAD_SANITIZER
-  const auto parts = detail::parts_of(range, 64);  // as small as they become otherwise, so that sums are the same
+  const auto parts = detail::parts_of(range, 64);  // as small as TBB's parts, so that sums are the same
   std::vector<Sum> sums(parts.size(), none);
   detail::run_turns(parts.size(), [&](size_t n) { sums[n] = turn(parts[n], none); });
-  // As halves of halves, which is how ranges are divided.
+  // Joins halves of halves, as ranges are divided.
   const auto joined = [&](const auto& self, size_t begin, size_t end) -> Sum {
     if (end - begin == 1) return sums[begin];
     const size_t middle = begin + (end - begin) / 2;
@@ -88,7 +88,7 @@ Sum sum_in_parallel(const Range& range, const Sum& none, const Turn& turn, const
 #endif
 }
 
-/// Within a loop: which of the threads this is that run it at the same time, below the concurrency of the arena.
+/// Inside a loop: index of this thread among those that run it at the same time, below the arena's concurrency.
 inline int thread_in_loop() {
 #ifdef TELESPLAT_THREAD_SANITIZER
   return detail::thread_in_run();

@@ -16,8 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kNamesTold = 20;     // in an error
-constexpr size_t kMostSpanText = 52;  // bytes: two numbers of all digits
+constexpr size_t kNamesTold = 20;     // names listed in an error
+constexpr size_t kMostSpanText = 52;  // bytes: two numbers with all digits
 
 std::string names_of(std::span<const ArrayInfo> arrays) {
   std::string out;
@@ -27,7 +27,7 @@ std::string names_of(std::span<const ArrayInfo> arrays) {
   return out;
 }
 
-// A component's number behind the array's name, and how long what says so is: ".x", "[12]".
+// The number of a component, from the suffix of an array's name, and the suffix's length: ".x", "[12]".
 struct Suffix {
   int component;
   size_t bytes;
@@ -46,7 +46,7 @@ std::optional<Suffix> suffix_of(std::string_view text) {
   return Suffix{component, text.size() - open};
 }
 
-// UTF-8 without characters that would steer a terminal.
+// Returns UTF-8 without characters that would steer a terminal.
 std::string plain(const std::string& text) {
   std::string out = to_utf8(text);
   for (size_t i = 0; i < out.size(); ++i) {
@@ -57,7 +57,7 @@ std::string plain(const std::string& text) {
   return out;
 }
 
-// Cuts between characters.
+// Cuts a text between characters.
 std::string shortened(const std::string& text, size_t bytes) {
   if (text.size() <= bytes) return text;
   while (bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xc0) == 0x80) --bytes;
@@ -160,7 +160,7 @@ void make_tellable(std::vector<ArrayInfo>& arrays) {
     for (int n = 2; taken.contains(a.name); ++n) a.name = fmt::format("{} ({})", name, n);
     taken.insert(a.name);
   }
-  // Spans may be found later: there is room for them.
+  // Leaves room for spans that are found later.
   const auto most_bytes = [](const ArrayInfo& a) { return text_of(a).size() + 1 + a.spans.size() * kMostSpanText; };
   size_t bytes = 2, told = 0;
   while (told < arrays.size() && (bytes += most_bytes(arrays[told])) <= kMaxArraysText) ++told;

@@ -38,7 +38,7 @@ std::optional<Number> scalar_or_percent(std::string_view text) {
   return out;
 }
 
-// `count` of them, separated by commas.
+// Reads `count` numbers, separated by commas.
 std::optional<std::vector<Number>> numbers(std::string_view text, size_t count) {
   std::vector<Number> out;
   for (;;) {
@@ -58,7 +58,7 @@ glm::dvec3 along(int axis, double sign) {
   return out;
 }
 
-// What of an axis is kept: from the number on, or up to it.
+// Keeps the part of an axis from the number on, or up to it.
 ClipOrder::Plane on_axis(int axis, bool from, const Number& n) {
   return {along(axis, from ? 1 : -1), from ? n.value : -n.value, n.percent};
 }
@@ -97,7 +97,7 @@ Result<bool> read_box(std::string_view text, ClipOrder& out) {
   return true;
 }
 
-// Shares of the box become numbers.
+// Converts shares of the box to numbers.
 Result<double> value_of(const ClipOrder::Plane& plane, const Placement& placement) {
   if (!plane.percent) return plane.value;
   if (placement.box_data.empty())
@@ -134,7 +134,7 @@ Result<ClipOrder> parse_clip(std::string_view text) {
   return out;
 }
 
-// A point p of the data is kept if n . p >= d. With p = A^-1 (r - t) of a point r in the room: (A^-T n) . r >= d +
+// A point p of the data is kept if n . p >= d. With p = A^-1 (r - t) for a point r in the room: (A^-T n) . r >= d +
 // (A^-T n) . t.
 Result<geometry::Clip> place_clip(const ClipOrder& order, const Placement& placement) {
   geometry::Clip out;

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The whole of `text` as a number.
+// Reads the whole of `text` as a number.
 std::optional<double> number(std::string_view text) {
   double value = 0;
   if (text.starts_with('+')) text.remove_prefix(1);
@@ -106,7 +106,7 @@ Result<Colouring> make_colouring(std::span<const ArrayInfo> arrays, const Colour
 double scalar_origin(const ValueSpan& span) {
   if (span.empty()) return 0;
   const double farthest = std::max(std::abs(span.lo), std::abs(span.hi));
-  // Floats have 24 bits: within a thousandth of their size they still tell 16,000 values apart.
+  // Floats have 24 bits: if the span is at least a thousandth of the size, they resolve 16,000 values.
   return farthest > 1000 * (span.hi - span.lo) ? span.lo : 0;
 }
 

@@ -1,4 +1,4 @@
-// What the data of a session are, and how they travel: the two questions every process asks. One row a kind (kind.cpp).
+// The kind of a session's data, and the pipeline that draws it: every process asks for both. One row a kind (kind.cpp).
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace telesplat::scene {
 
-/// What the data are.
+/// Kind of the data.
 enum class Kind { kMesh, kJulia, kVolume };
 inline constexpr Kind kKinds[] = {Kind::kMesh, Kind::kJulia, Kind::kVolume};
 
-/// How they travel and are drawn: depth images that become points, or slice images; or, in sessions that show what the
-/// servers draw, as pictures. No kind is of pictures by itself: SessionView::pipeline().
+/// Form in which data are sent and drawn: depth images that become points; slice images; or pictures that the servers
+/// draw. No kind uses pictures by itself: SessionView::pipeline().
 enum class Pipeline { kPoints, kSlices, kPictures };
 
 /// A set of kinds.
@@ -44,8 +44,8 @@ std::string_view described(Kind kind);
 
 Pipeline pipeline_of(Kind kind);
 
-/// What a session does with a kind of scene unless told otherwise. The master tells everyone, so that sessions in
-/// containers and those of `telesplat run` agree.
+/// Defaults of a session with a kind of scene. The master sends them to all processes, so that sessions in containers
+/// and those of `telesplat run` agree.
 struct Policy {
   bool progressive;       ///< a view arrives with every 4th pixel of every 4th row first
   double least_sampling;  ///< sampled pixels a displayed pixel, on each axis, at least

@@ -5,7 +5,7 @@
 namespace telesplat::scene {
 namespace {
 
-constexpr int kSamples = 128;  // of a transfer function; few enough for a colour map's stops
+constexpr int kSamples = 128;  // samples of a transfer function; few enough for a colour map's stops
 
 uint32_t code(const volume::TransferFunction::Point& p) {
   uint32_t rgb = 0;

@@ -1,4 +1,4 @@
-// What the legend of an epoch tells: the array that colours a mesh, or a volume's transfer function.
+// Makes the legend of an epoch: of the array that colours a mesh, or of a volume's transfer function.
 #pragma once
 
 #include <map>
@@ -12,11 +12,11 @@
 namespace telesplat::scene {
 
 image::Legend legend_of(const Colouring& colouring);
-/// Colour over value, opacity as its height; over the values that the function and the data have in common.
+/// Colour over value, opacity as its height; over the range that the function and the data have in common.
 image::Legend legend_of(const volume::Session& session);
 
-/// Of an epoch's facts and parameters, as a welcome or the record has them; nothing where there is nothing to tell, or
-/// they cannot be read.
+/// From an epoch's facts and parameters, as a welcome or the record has them; nothing if they describe no legend, or
+/// cannot be read.
 std::optional<image::Legend> legend_of(const std::map<std::string, std::string>& facts,
                                        const std::map<std::string, double>& parameters);
 

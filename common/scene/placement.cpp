@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 constexpr size_t kMaxText = 4000;
 constexpr double kLargest = 1e300;
 
-// `count` finite numbers.
+// Reads `count` finite numbers.
 Result<std::vector<double>> read_numbers(const Json& json, const char* key, size_t count) {
   const auto found = json.find(key);
   if (found == json.end() || !found->is_array() || found->size() != count)
@@ -76,7 +76,7 @@ Result<Coordinates> coordinates_from(const Json& json) {
   return out;
 }
 
-// Digits after the point, so that the last one is a millionth of the data's size.
+// Number of digits after the point, so that the last one is a millionth of the data's size.
 int digits_of(const Placement& p, int axis) {
   const double size = p.box_data.empty() ? 1 : p.box_data.size()[axis];
   const int digits = size > 0 ? std::clamp(6 - int(std::ceil(std::log10(size))), 0, 12) : 6;
@@ -97,14 +97,14 @@ glm::dvec3 Placement::to_data(const glm::dvec3& room) const {
   return glm::inverse(glm::dmat3(data_to_room)) * (room - glm::dvec3(data_to_room[3]));
 }
 
-// Normals are turned by the transpose of what turns points from the data to the room; told they are in lengths.
+// Normals are turned by the transpose of the matrix that turns points to the room, and scaled to lengths.
 glm::dvec3 Placement::direction_to_data(const glm::dvec3& room) const {
   const glm::dvec3 out = glm::transpose(glm::dmat3(data_to_room)) * room / coordinates.lengths;
   const double length = glm::length(out);
   return length > 0 ? out / length : room;
 }
 
-// With the radii of curvature along the meridian and across it, at the latitude in the middle.
+// Uses the radii of curvature along the meridian and across it, at the latitude in the middle.
 glm::dvec3 Placement::way(const glm::dvec3& from_data, const glm::dvec3& to_data) const {
   const glm::dvec3 along = to_data - from_data;
   if (coordinates.space != Space::kGeographic) return along * coordinates.lengths;

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kFarthest_m = 1e9;
 
-// Numbers that commas separate.
+// Reads `count` numbers separated by commas.
 bool read_numbers(std::string_view text, double* out, int count) {
   if (std::count(text.begin(), text.end(), ',') != count - 1) return false;
   for (int i = 0; i < count; ++i) {

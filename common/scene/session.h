@@ -1,4 +1,4 @@
-// A session as its master tells it, read without fear: what is missing or strange has a fallback.
+// Reads a session as its master sends it: missing or invalid values have fallbacks.
 #pragma once
 
 #include <string>
@@ -15,13 +15,12 @@ V value_or(const std::map<std::string, V>& map, const std::string& key, V fallba
   return found == map.end() ? fallback : found->second;
 }
 
-/// Looks into a welcome; holds a reference to it.
+/// Reads a welcome; holds a reference to it.
 class SessionView {
  public:
   explicit SessionView(const wire::Welcome& session) : session_(session) {}
 
-  /// What the data are; none while no data server has said hello, or if it is of a kind that this program does not
-  /// know.
+  /// Kind of the data; nothing while no data server has said hello, or if this program does not know the kind.
   std::optional<Kind> kind() const { return kind_named(fact("kind")); }
   std::optional<Pipeline> pipeline() const {
     const auto k = kind();
@@ -30,7 +29,7 @@ class SessionView {
     return usual == Pipeline::kPoints && session_.settings.pictures ? Pipeline::kPictures : usual;
   }
   std::string fact(const std::string& name) const { return value_or(session_.facts, name, std::string()); }
-  /// Empty if nobody serves it.
+  /// Empty: no process serves it.
   std::string endpoint(const std::string& name) const { return value_or(session_.endpoints, name, std::string()); }
   const wire::SessionSettings& settings() const { return session_.settings; }
   double parameter(const std::string& name, double fallback) const {

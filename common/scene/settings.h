@@ -1,5 +1,5 @@
-// What people can change while a session runs: one row a setting. `telesplat ctl`, the panel of a window, their helps
-// and the table of docs/window.md are made of these rows or compared with them.
+// The settings that users can change while a session runs: one row a setting. `telesplat ctl`, the panel of a window,
+// their helps and the table of docs/window.md are made from these rows or compared with them.
 #pragma once
 
 #include <span>
@@ -10,33 +10,33 @@
 
 namespace telesplat::scene {
 
-/// Who carries a change out.
+/// Process that carries a change out.
 enum class Keeper {
-  kSession,   ///< the master, and so it is everybody's
-  kViewer,    ///< one viewer, or all that are here
+  kSession,   ///< the master, for the whole session
+  kViewer,    ///< one viewer, or all that are connected
   kLauncher,  ///< `telesplat run` or `view` that started the session: it starts and ends processes
-  kNotes      ///< whoever asks, in the file beside the data set
+  kNotes      ///< the process that asks, in the file beside the data set
 };
 
 struct Setting {
-  std::string_view name;     ///< unique; as the panel calls it
-  std::string_view section;  ///< of the panel
+  std::string_view name;     ///< unique; the name in the panel
+  std::string_view section;  ///< section of the panel
   std::string_view order;    ///< the order of `telesplat ctl` that changes it, and the command on the wire
-  std::string_view flag;     ///< that it begins with; empty: there is none
+  std::string_view flag;     ///< flag for its first value; empty: it has none
   Kinds kinds;
   Keeper keeper;
   std::string_view what;  ///< one sentence, without a full stop
-  /// What changes it in the panel where that is not called `name`: a widget of `section`, or with "/" its whole name.
+  /// Widget in the panel that changes it, if not called `name`: a widget of `section`, or with "/" its whole name.
   std::string_view widget = {};
 };
 
 /// Sections of the panel and their rows, from the top.
 std::span<const Setting> settings();
-/// Null: there is none of this name.
+/// Finds a setting by its name. Null: no such name.
 const Setting* find_setting(std::string_view name);
-/// Whether this order of `telesplat ctl` has a setting; the first one of it. Null: none has.
+/// Finds the first setting of an order of `telesplat ctl`. Null: the order has none.
 const Setting* setting_of_order(std::string_view order);
-/// What an order changes: the sentence of its setting, or of several "name: sentence; name: sentence".
+/// Help text of an order: the sentence of its setting, or of several "name: sentence; name: sentence".
 std::string help_of_order(std::string_view order);
 /// "mesh, volume"; "all".
 std::string text_of(Kinds kinds);

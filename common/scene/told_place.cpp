@@ -36,7 +36,7 @@ std::optional<glm::dvec3> vector(const Json& json, const char* key) {
   return out;
 }
 
-// With one digit more than the bound's first. The bound has two digits, and no exponent as long as it is short.
+// Writes a value with one digit more than its bound's first, and the bound with two digits, without exponent if short.
 std::string bounded(double value, double error) {
   if (!(error > 0)) return fmt::format("{:.9g}", value);
   const int digits = std::clamp(1 - int(std::floor(std::log10(error))), 0, 12);
@@ -52,7 +52,7 @@ void refine(ToldPlace& place, const Probed& probed, const Placement& placement) 
   place.error.reset();
   if (const double room_m = glm::length(probed.normal_room); room_m > 0)
     place.normal_data = placement.direction_to_data(probed.normal_room);
-  // Along the axis of the room on which the data are largest, so that the bound holds in all directions.
+  // Uses the axis of the room along which the data are largest, so that the bound holds in all directions.
   if (probed.error_m) {
     double most = 0;
     for (int a = 0; a < 3; ++a) {

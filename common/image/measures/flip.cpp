@@ -85,10 +85,10 @@ float hyab(const Colour& a, const Colour& b) {
   return std::abs(a.x - b.x) + std::sqrt((a.y - b.y) * (a.y - b.y) + (a.z - b.z) * (a.z - b.z));
 }
 
-// A filter's taps from -radius to radius along one axis.
+// Weights of a filter from -radius to radius along one axis.
 using Taps = std::vector<float>;
 
-// Gaussians of the CSFs are separable: a channel is a sum of `terms` separable filters. Normalised over the square
+// Gaussians of the CSFs are separable: a channel is a sum of `terms` separable filters, normalised over the square
 // window.
 std::vector<Taps> sensitivity_filters(const Sensitivity& s, int radius, double pixels_per_degree) {
   const auto axis = [&](double b) {
@@ -112,14 +112,14 @@ std::vector<Taps> sensitivity_filters(const Sensitivity& s, int radius, double p
   std::vector<Taps> out;
   for (const auto& [weight, t] : terms) {
     Taps taps;
-    for (double v : t) taps.push_back(static_cast<float>(v * std::sqrt(weight / sum)));  // applied along both axes
+    for (double v : t) taps.push_back(static_cast<float>(v * std::sqrt(weight / sum)));  // used along both axes
     out.push_back(std::move(taps));
   }
   return out;
 }
 
 struct FeatureFilters {
-  Taps smooth, edge, point;  // Gaussian, and its derivatives with positive and negative parts of sum 1 each
+  Taps smooth, edge, point;  // Gaussian, and its derivatives; their positive and negative parts each sum to 1
 };
 
 FeatureFilters feature_filters(double pixels_per_degree) {
@@ -151,7 +151,7 @@ void for_rows(int height, const auto& body) {
   });
 }
 
-/// Separable filtering with the border's pixels repeated.
+/// Separable filtering that repeats the border's pixels.
 class Filter {
  public:
   Filter(int width, int height) : width_(width), height_(height) {}
@@ -190,7 +190,7 @@ class Filter {
   int width_, height_;
 };
 
-// What the comparison needs of one picture.
+// A picture in the form that the comparison needs.
 struct Perceived {
   std::vector<Colour> lab;  // filtered, Hunt-adjusted
   Plane edges, points;      // magnitudes

@@ -14,7 +14,7 @@ namespace telesplat::image {
 /// The paper's viewing conditions: a 3840 pixel wide monitor of 0.7 m, seen from 0.7 m.
 inline constexpr double kFlipPixelsPerDegree = 67.02;
 
-/// Compares pictures with one reference; what depends on the reference alone is computed once.
+/// Compares pictures with one reference; computes its part of the work once.
 ///
 /// Per pixel, with colours as sRGB codes (file.h):
 ///   colour: linear RGB -> YyCxCz; each channel filtered with its contrast sensitivity function (sums of Gaussians
@@ -26,7 +26,7 @@ inline constexpr double kFlipPixelsPerDegree = 67.02;
 ///     (Yy + 16) / 116;
 ///     dE_f = sqrt(max(|difference of edge magnitudes|, |difference of point magnitudes|) / sqrt 2), in [0, 1];
 ///   FLIP = dE_c ^ (1 - dE_f).
-/// At borders the nearest pixel is repeated. The map does not depend on how many threads compute it.
+/// At borders the nearest pixel is repeated. The map does not depend on the number of threads.
 class Flip {
  public:
   /// pixels_per_degree in [1, 1000]. Precondition: the view is not empty.
@@ -34,7 +34,7 @@ class Flip {
   ~Flip();
   Flip(Flip&&) noexcept;
 
-  /// Width x height values in 0..1, 0 where nothing differs. Precondition: `test` has the reference's size.
+  /// Width x height values in 0..1, 0 for equal pixels. Precondition: `test` has the reference's size.
   std::vector<float> error_map(const View& test) const;
 
  private:

@@ -14,7 +14,7 @@ namespace {
 constexpr int kRadius = 5;  // 11 x 11 window
 constexpr double kSigma = 1.5;
 constexpr float kC1 = 0.01f * 255 * 0.01f * 255, kC2 = 0.03f * 255 * 0.03f * 255;
-// Luma is stored less 128: variances do not change, and single precision keeps two more bits of them.
+// Luma is stored minus 128: variances do not change, and single precision keeps two more bits of them.
 constexpr float kLumaOffset = 128;
 
 bool shows(float depth_m) { return depth_m < std::numeric_limits<float>::infinity(); }
@@ -47,8 +47,7 @@ std::array<float, 2 * kRadius + 1> gaussian() {
   return w;
 }
 
-// 1 / (sum of the weights that fall inside [0, size)): windows are cut at the image's edges and normalised to what is
-// left.
+// 1 / (sum of the weights that fall inside [0, size)): windows are cut at the image's edges and normalised to the rest.
 std::vector<float> window_scales(int size, const std::array<float, 2 * kRadius + 1>& w) {
   std::vector<float> scales(size);
   for (int i = 0; i < size; ++i) {
@@ -115,7 +114,7 @@ class RowMoments {
   std::array<std::vector<float>, 4> vertical_, means_;
 };
 
-// hits: how many rays of each pixel of the reference met the data; null: its depth tells.
+// hits: number of rays in each pixel of the reference that met the data; null: its depth tells.
 Quality compare_counted(const View& reference, const uint16_t* hits, const View& reconstruction) {
   const int width = reference.width, height = reference.height;
   const size_t pixels = size_t(width) * height;

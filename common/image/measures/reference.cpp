@@ -12,7 +12,7 @@ namespace telesplat::image {
 namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::infinity();
-constexpr int kPieceSide = 2048;  // of a piece as it is drawn
+constexpr int kPieceSide = 2048;  // side of a piece as it is drawn
 
 int side_of(int samples) { return static_cast<int>(std::lround(std::sqrt(samples))); }
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kBlock = 8;            // pixels a side
 constexpr double kPopping = 0.999;   // quantile over blocks
-constexpr double kSamePlace = 0.01;  // of the depth
+constexpr double kSamePlace = 0.01;  // largest difference, as a share of the depth
 
 // Sum over the channels of |(d1 - d0) - (r1 - r0)|.
 int change_error(uint32_t d0, uint32_t d1, uint32_t r0, uint32_t r1) {

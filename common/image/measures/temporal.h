@@ -1,4 +1,4 @@
-// Measures in time: what changes from one displayed frame to the next that the data do not change (docs/quality.md).
+// Measures in time: changes from one displayed frame to the next that the data do not cause (docs/quality.md).
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace telesplat::image {
 
-/// A displayed frame beside its reference, of equal size and both with depth. What is pointed to outlives it.
+/// A displayed frame beside its reference, of equal size and both with depth. The referenced objects outlive it.
 struct VerifiedFrame {
   const geometry::Camera& camera;
   const Reference& reference;
@@ -21,21 +21,21 @@ struct Unsteadiness {
   /// The 99.9th percentile (nearest rank) over blocks of 8 x 8 pixels in which any counts; a block has the mean over
   /// its pixels.
   double popping = 0;
-  size_t pixels = 0;  ///< that count; nothing is defined if 0
+  size_t pixels = 0;  ///< pixels that count; if 0, all figures are undefined
 };
 
-/// Of two frames that were displayed one after the other. Precondition: equal sizes.
+/// Compares two frames that were displayed one after the other. Precondition: equal sizes.
 Unsteadiness unsteadiness(const VerifiedFrame& before, const VerifiedFrame& after);
 
-/// What became of the holes of a frame in the next one.
+/// Fate of the holes of a frame in the next one.
 struct HoleFates {
   size_t followed = 0;  ///< holes of the first frame whose place is in sight in the second
-  size_t closed = 0;    ///< those of them that are no holes any more
+  size_t closed = 0;    ///< those that are closed there
 };
 
-/// A hole's place is the point of the reference's surface there. It is in sight where it lies in the second frame's
-/// picture and the reference's depth there is the same to 1 %; it is closed where neither the pixel it falls into nor
-/// one of the eight around it is a hole. Precondition: surfaces, whose depth is metres.
+/// A hole's place is the point of the reference's surface there. It is in sight if it lies in the second frame's
+/// picture and the reference's depth there is the same to 1 %; it is closed if neither its pixel nor one of the eight
+/// around it is a hole. Precondition: surfaces, whose depth is metres.
 HoleFates follow_holes(const VerifiedFrame& before, const VerifiedFrame& after);
 
 }  // namespace telesplat::image
