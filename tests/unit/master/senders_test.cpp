@@ -1,4 +1,4 @@
-// Which connection may send messages in a process' name.
+// Connections that may send messages in a process' name.
 #include "services/master/gate/gate.h"
 
 #include <gtest/gtest.h>

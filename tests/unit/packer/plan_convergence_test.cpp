@@ -322,7 +322,7 @@ TEST(Plan, TilesOfUnknownFramesAndWrongRectanglesChangeNothing) {
   const wire::Plan plan = s.ask(r);
   SampledTile tile;
   tile.frame = {r.frame.value}, tile.camera = camera, tile.rect = {1, 1, 5, 5}, tile.image = image::DepthImage(5, 5);
-  s.planner.take(tile, false, 1);  // of the frame, but no tile of its plan
+  s.planner.take(tile, false, 1);  // the plan's frame, but no tile of the plan
   tile.camera.width = 80;
   s.planner.take(tile, false, 1);
   tile.frame = {12345};

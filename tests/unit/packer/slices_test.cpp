@@ -435,7 +435,7 @@ TEST(SliceGatherer, RandomFramesReachViewersInOrderAndWithinTheirBuffers) {
         ++next;
       }
       if (pending.empty()) continue;
-      // Frames come about in order, now and then not.
+      // Mostly the oldest slab is added first, sometimes any other one.
       const size_t which = random() % 6 ? 0 : random() % pending.size();
       const auto s = pending[which];
       pending.erase(pending.begin() + long(which));
@@ -463,7 +463,7 @@ TEST(SliceGatherer, RandomFramesReachViewersInOrderAndWithinTheirBuffers) {
           ASSERT_TRUE(g.acknowledged(std::to_string(id), ack(id, frame, v.buffers, v.in_order), step));
         }
     }
-    // In the end everyone gets what is left.
+    // In the end every viewer gets the frames that are left.
     for (bool more = true; more;) {
       more = false;
       for (auto& [id, v] : viewers)
@@ -512,7 +512,7 @@ class SlicePackingTest : public testing::Test {
   std::vector<wire::TileRefused> refused;
   std::vector<std::pair<wire::SliceFrame, std::string>> sent;
   std::set<std::string> gone;
-  std::deque<std::string> bodies;  // which `sent` points into
+  std::deque<std::string> bodies;  // `sent` points into these
   metrics::SpanRecorder spans;
   SlicePacking packing{{.tell = [this](const wire::TileDone& m) { told.push_back(m); },
                         .refuse = [this](const wire::TileRefused& m) { refused.push_back(m); },
@@ -591,7 +591,7 @@ TEST_F(SlicePackingTest, OthersFramesAreTakenForOthersAfterAMastersRestart) {
   ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2, {2}));
   ASSERT_EQ(sent.size(), 2u);
   EXPECT_NE(sent[0].first.packer, sent[1].first.packer);
-  // A viewer that is gone does not keep others waiting.
+  // A viewer that is gone does not keep the others waiting.
   gone.insert("peer");
   ASSERT_TRUE(packing.acknowledged("other", ack(8, 0, 1), 2));
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 1, 1), 2));

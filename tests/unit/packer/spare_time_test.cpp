@@ -1,4 +1,4 @@
-// When the packer does what can wait.
+// Times at which the packer does work that can wait.
 #include "services/packer/packer_service.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What rays say about what is shown.
+// Validation: rays confirm or disprove the points that viewers show.
 #include "services/packer/points/plan/validation.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kWidth = 128, kHeight = 96;
 
-// A grey wall across the view, 0.7 m away; a model shows it.
+// A grey wall across the view, 0.7 m away, and a model that shows it.
 struct Wall {
   points::ModelConfig model = test::scene_config(5);
   geometry::Camera camera = test::scene_camera({0.0, 0.0, 0.7}, kWidth, kHeight);
@@ -68,7 +68,7 @@ TEST(Validation, RaysAreJudgedByDepthColourAndNormal) {
 
 TEST(Validation, WhatLiesBetweenThePixelsAroundAgrees) {
   Wall wall;
-  // A checkerboard of black and white, and a ramp: a sample beside a pixel's centre sees what is between.
+  // A black and white checkerboard, and a ramp: a sample beside a pixel's centre sees a colour between two pixels'.
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const size_t i = static_cast<size_t>(y) * kWidth + static_cast<size_t>(x);
@@ -137,7 +137,7 @@ TEST(Validation, AContradictionMakesItsSurroundingsStaleUntilTheyAreSampled) {
   v.mark_stale(wall.camera, 10.1, stale);
   EXPECT_TRUE(stale.at(60, 40));
   EXPECT_EQ(stale.count(), 16u * 16);
-  v.resampled(9);  // of another plan
+  v.resampled(9);  // the time of another plan
   EXPECT_EQ(v.marks(), 1u);
   v.resampled(10.1);
   EXPECT_EQ(v.marks(), 0u);
@@ -154,7 +154,7 @@ TEST(Validation, MarksFollowTheirPlaceAndRunOut) {
   v.mark_stale(beside, 10.5, stale);
   EXPECT_GT(stale.count(), 0u);
   EXPECT_TRUE(stale.at(60 - static_cast<int>(std::lround(0.05 / 0.6 * beside.focal_x())), 40));
-  beside.pose.position_room.z = -3;  // it is behind the eye
+  beside.pose.position_room.z = -3;  // the marked place is behind the eye
   stale.reset(kWidth, kHeight);
   v.mark_stale(beside, 10.5, stale);
   EXPECT_EQ(stale.count(), 0u);
@@ -174,7 +174,7 @@ TEST(Validation, ManyRaysThroughAClusterDisproveItAndFewDoNot) {
   wall.check(v, 0.1);
   const auto keys = v.disproved();
   ASSERT_FALSE(keys.empty());
-  // They are where the rays went through.
+  // The disproved clusters lie where the rays went through the wall.
   for (const points::ClusterKey key : keys) {
     const geometry::Box leaf = points::leaf_box(wall.model, key);
     EXPECT_LE(leaf.lo.z, 0.001f);
@@ -204,7 +204,7 @@ TEST(Validation, SomethingNearerDisprovesNothingBehindIt) {
   EXPECT_TRUE(v.disproved().empty());
 }
 
-// A cluster that looks wrong again and again, because splats cannot show it, is forgotten less and less often.
+// A cluster that keeps looking wrong because splats cannot show it is forgotten less and less often.
 TEST(Validation, EachTimeMoreProofIsAskedFor) {
   Wall wall;
   Validation v(wall.model);

@@ -1,5 +1,5 @@
-// What the planner remembers of viewers and of frames under way is bounded, whoever comes and goes, and is void only
-// for those who may see what was forgotten.
+// The planner's memory of viewers and of frames under way: it is bounded, however many come and go, and becomes void
+// only for viewers that may see the forgotten leaves.
 #include "services/packer/points/plan/planned_frame.h"
 
 #include <gtest/gtest.h>
@@ -79,7 +79,7 @@ TEST(ViewerViews, OnlyViewsThatMaySeeWhatWasForgottenLoseTheirCasts) {
   EXPECT_EQ(forget({behind_front, behind_side}), std::pair(true, true));
   EXPECT_EQ(forget({behind_front}, 0.2), std::pair(true, true)) << "rays from beside go farther";
   EXPECT_EQ(forget({}), std::pair(false, false));
-  // A splat stands out of its leaf: the border of the view is 1 cm away.
+  // Splats reach beyond their leaf: the border of the view is 1 cm away.
   EXPECT_EQ(forget({leaf_at(model, {0.2, 0, 0})}).first, true);
 }
 
@@ -96,7 +96,7 @@ TEST(FrameShelf, WhatIsUnderWayIsBoundedByWhatItTakes) {
       case 0:
         frame.whole = true, frame.whole_m.resize(2048 * 2048);
         break;
-      case 1:  // many rays, no map
+      case 1:  // many rays, no map of depths
         for (int y = 0; y < 2048; y += 256)
           frame.tiles.push_back({{0, y, 2048, 256}, image::PixelMask(2048, 256), 2048u * 256u});
         break;

@@ -1,4 +1,4 @@
-// A crew's loops: each turn comes once, threads have numbers of their own, and loops follow each other at once.
+// A crew's loops: each turn runs once, threads have numbers of their own, and loops follow each other at once.
 #include "common/parallel/crew.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ TEST(Crew, EachTurnComesOnceAndThreadsHaveNumbersOfTheirOwn) {
   }
 }
 
-// What a loop's turns read is gone when it is over.
+// The data that a loop's turns read is freed right after the loop.
 TEST(Crew, ThousandsOfShortLoopsLeaveNoThreadBehind) {
   Crew crew(4);
   std::atomic<size_t> turns{0};
@@ -44,7 +44,7 @@ TEST(Crew, ThousandsOfShortLoopsLeaveNoThreadBehind) {
 TEST(Crew, SeveralThreadsTakeTurns) {
   Crew crew(3);
   std::atomic<int> arrived{0};
-  crew.run(3, [&](size_t, int) {  // none ends before all three have begun
+  crew.run(3, [&](size_t, int) {  // no turn ends before all three have begun
     ++arrived;
     while (arrived < 3) std::this_thread::yield();
   });

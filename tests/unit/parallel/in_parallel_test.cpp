@@ -1,4 +1,4 @@
-// Loops on several threads: each turn comes once, what is thrown comes out, sums are the same for any number of them.
+// Loops on several threads: each turn runs once, exceptions reach the caller, sums do not depend on the threads.
 #include "common/parallel/in_parallel.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ TEST(InParallel, WhatATurnThrowsComesOut) {
                            }),
                std::runtime_error);
   EXPECT_THROW(both_in_parallel([] {}, [] { throw std::runtime_error("b"); }), std::runtime_error);
-  int a = 0, b = 0;  // and the next one runs
+  int a = 0, b = 0;  // the next pair runs all the same
   both_in_parallel([&] { a = 1; }, [&] { b = 2; });
   EXPECT_EQ(a + b, 3);
 }
@@ -61,7 +61,7 @@ TEST(InParallel, ThreadsOfALoopHaveNumbersBelowTheArenasConcurrency) {
   }
 }
 
-// Rounding included, of which there is much.
+// The sums are equal to the bit: rounding depends on the order of additions.
 TEST(InParallel, SumsAreTheSameForAnyNumberOfThreads) {
   for (const int count : {0, 1, 31, 33, 2049, 5000}) {
     const auto sum = [&] {

@@ -1,4 +1,4 @@
-// JPEG pictures: what comes back, and what is none.
+// JPEG pictures: round trips, and bytes that are refused.
 #include "common/image/jpeg.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace telesplat::image {
 namespace {
 
-// Soft colours, so that little is lost.
+// Soft colours: JPEG changes them little.
 std::vector<uint32_t> ramp(int width, int height) {
   std::vector<uint32_t> out;
   for (int y = 0; y < height; ++y)

@@ -1,4 +1,4 @@
-// How many pictures are asked for ahead, against servers and links of known speed.
+// Number of pictures that a viewer asks for ahead, against servers and links of known speed.
 #include "client/viewer/coupling/coupling.h"
 
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 namespace telesplat::viewer {
 namespace {
 
-// Views go through stages one after the other; each stage has one view at a time, but for the way there and back.
+// Stages that each have one view at a time; only the round trip takes any number of views at once.
 struct Way {
   double draw_s = 0.03, send_s = 0.01, round_trip_s = 0;
-  double drawn_s = 0, sent_s = 0;  // when these are free
+  double drawn_s = 0, sent_s = 0;  // times at which the two stages are free
   struct Arrival {
     double s = 0;
     PipelineDepth::View view;
@@ -34,7 +34,7 @@ struct Outcome {
   int depth = 0;
 };
 
-// Asks as credits allow, `period_s` apart at least; figures of the last `last` views.
+// Asks as credits allow, at least `period_s` apart. Returns figures of the last `last` views.
 Outcome run(PipelineDepth& depth, Way& way, int views, double period_s = 1.0 / 60, int last = 100) {
   std::deque<Way::Arrival> open;
   double now_s = way.sent_s, due_s = now_s, first_s = 0, sum_s = 0;
@@ -63,7 +63,7 @@ TEST(PipelineDepth, ASamplerOnThisMachineIsKeptBusyByTwo) {
   EXPECT_LT(o.latency_s, 0.09);
 }
 
-// The first view waits for the data: none has ever had all for itself, and views differ in weight from then on.
+// The first view waits for the data, so it does not show how long a view takes by itself; later views differ in weight.
 TEST(PipelineDepth, AFirstViewThatWaitsForTheDataDeepensNothing) {
   PipelineDepth depth;
   Way way{.draw_s = 0.03, .send_s = 0.001, .drawn_s = 5};

@@ -1,4 +1,4 @@
-// The servers' part where views come as pictures: how a view is cut, drawn and passed on.
+// The servers' part of views that come as pictures: cutting a view into tiles, drawing them, passing them on.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -75,7 +75,7 @@ TEST(PictureSettings, AreToldWhereViewsComeAsPicturesAndNothingIsSteered) {
 
 // ---- sampler -------------------------------------------------------------------------------------------------------
 
-// A red square that faces the head, on the left of the picture.
+// A red square in the left half of the picture, facing the head.
 image::DepthImage sampled(int side) {
   image::DepthImage out(64 * side, 48 * side);
   const uint16_t towards = image::encode_normal16({0, 0, 1});

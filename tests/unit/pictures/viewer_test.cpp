@@ -1,4 +1,4 @@
-// The viewer's part where views come as pictures: which are asked for, how tiles become pictures, which is displayed.
+// The viewer's part of views that come as pictures: it asks for them, puts tiles together and displays the pictures.
 #include <gtest/gtest.h>
 
 #include "client/viewer/coupling/coupling.h"

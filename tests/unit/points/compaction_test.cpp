@@ -1,4 +1,4 @@
-// Merging the mosaics of a cluster: nothing is lost, little is left lying about, and any prefix covers the cluster.
+// Merging the mosaics of a cluster: no point is lost, few mosaics are left, and any prefix covers the cluster.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ ModelConfig compact_config() {
   return config;
 }
 
-// A view of the scene of which a share of the pixels is left, as elimination leaves them.
+// A view of the scene with the share `fraction` of its pixels, as elimination leaves them.
 PreparedPatch view(uint64_t sequence, double fraction, int width = 320, double distance = 1, FrameId frame = {}) {
   std::mt19937_64 random(sequence);
   const geometry::Rect tile{0, 0, width, width * 5 / 8};
@@ -85,7 +85,7 @@ TEST(Compaction, ProvisionalMosaicsStayAsTheyCame) {
 TEST(Compaction, PointsOfARestAreMergedAmongThemselves) {
   PointModel model(compact_config()), without(compact_config()), alone(compact_config());
   for (uint64_t s = 1; s <= 60; ++s) {
-    const uint64_t rest = s % 3;  // none, and two of them
+    const uint64_t rest = s % 3;  // no rest, then two rests
     model.insert(view(s, 0.4, 320, 1, tagged({s}, 1, rest)));
     if (rest == 0) without.insert(view(s, 0.4, 320, 1, tagged({s}, 1)));
     if (rest == 1) alone.insert(view(s, 0.4, 320, 1, tagged({s}, 1, rest)));
@@ -124,7 +124,7 @@ TEST(Compaction, MosaicsGrowWithTheLogarithmOfPoints) {
     for (const Mosaic& m : cluster->mosaics) sizes[density_class(m.pixel_range())].push_back(m.count(0));
     for (auto& [density, of_class] : sizes) {
       std::sort(of_class.begin(), of_class.end());
-      // The two smallest may be waiting for the next one.
+      // The two smallest may be waiting for the next mosaic.
       for (size_t i = 2; i < of_class.size(); ++i) EXPECT_GT(of_class[i], of_class[i - 1]) << "class " << density;
     }
   }
@@ -144,7 +144,7 @@ TEST(Compaction, InTwoStepsLeavesTheModelAloneInTheFirst) {
   }
 }
 
-// n points at random on a plane across the leaf, sampled `density` of them along its edge.
+// n random points on a plane across the leaf, with a pixel range of `density` (samples along the leaf's edge).
 Mosaic plane(uint32_t n, float density, uint64_t seed, uint16_t normal = image::encode_normal16({0, 0, 1}),
              uint16_t z = 32768) {
   std::mt19937_64 random(seed);
@@ -166,7 +166,7 @@ TEST(Compaction, EveryPrefixCoversTheClusterEvenly) {
   const Mosaic::Level l = merged.level(0);
   for (const uint32_t n : {merged.count(2), (merged.count(2) + merged.count(1)) / 2, merged.count(1),
                            (merged.count(1) + merged.count(0)) / 2}) {
-    // In how many of about n / 4 squares of the plane is none of the first n points?
+    // Counts the squares of the plane, about n / 4 of them, that have one of the first n points.
     const auto side = static_cast<uint32_t>(std::max(2.0, std::sqrt(n / 4.0)));
     std::set<uint32_t> seen;
     for (uint32_t i = 0; i < n; ++i) seen.insert((l.x[i] * side >> 16) * side + (l.y[i] * side >> 16));
@@ -187,7 +187,7 @@ TEST(Compaction, CoarseColoursAreMeans) {
     for (uint32_t i = 0; i < l.count; ++i) sum += std::pow((l.colour[i] & 255) - mean(merged.level(0)), 2);
     return std::sqrt(sum / l.count);
   };
-  // Blue is random in 0..255: means of many spread less.
+  // Blue is random in 0..255: the more points a mean is of, the less the means spread.
   EXPECT_NEAR(mean(merged.level(2)), mean(merged.level(0)), 4);
   EXPECT_LT(spread(merged.level(1)), 0.5 * spread(merged.level(0)));
   EXPECT_LT(spread(merged.level(2)), 0.5 * spread(merged.level(1)));
@@ -208,7 +208,7 @@ TEST(Compaction, BothSidesOfASheetStayAtEveryLevel) {
 TEST(Compaction, FinerPointsTakeInTheCoarseOnesTheySurround) {
   std::vector<Mosaic> cluster;
   cluster.push_back(plane(100, 10, 1));
-  // Twice as fine, over all of the leaf.
+  // Twice as fine, all over the leaf.
   Merge merge = plan_merge(cluster, plane(800, 20, 2));
   ASSERT_FALSE(merge.replaced.empty());
   uint32_t points = 0, fine = 0;
@@ -220,13 +220,13 @@ TEST(Compaction, FinerPointsTakeInTheCoarseOnesTheySurround) {
   EXPECT_GT(fine, 880u) << "nearly all are surrounded";
   EXPECT_NEAR(merge.added.back().pixel_range(), 20, 0.01);
 
-  // Of another side of the surface: they surround nothing.
+  // On the other side of the surface: these points do not surround the coarse ones.
   Merge apart = plan_merge(cluster, plane(800, 20, 3, image::encode_normal16({0, 0, -1})));
   EXPECT_TRUE(apart.replaced.empty());
 }
 
-// Clumps of finer samples, as refinement adds them: where there are none, samples stay as far apart as they are, and
-// so are drawn as large.
+// Finer samples come in clumps, as refinement adds them. Outside the clumps, samples keep their range, and so their
+// size on the display.
 TEST(Compaction, SamplesBesideFinerOnesKeepTheirSize) {
   const ModelConfig config = compact_config();
   PointModel model(config);
@@ -250,7 +250,7 @@ TEST(Compaction, SamplesBesideFinerOnesKeepTheirSize) {
           image.depth[i] = image.colour[i] = image.normal[i] = 0;
     return prepare_patch(config, {sequence}, fine, all, image, FrameId{sequence});
   };
-  // Samples with nothing finer beside them, and the range at which they were sampled.
+  // Samples without a finer one beside them, and the range at which they were sampled.
   std::map<Point, float> alone;
   const auto apart = patch(1, 1, [&](int x, int y) {
     for (int j = -1; j <= 1; ++j)
@@ -298,7 +298,7 @@ TEST(Summary, HasAPointForEachCellOfTheBlock) {
     EXPECT_LE(m.pixel_range(), kMostSummaryRange);
     EXPECT_EQ(summary->cluster.leaf_room, brick->box_room);
     EXPECT_LT(m.count(0), points);
-    // Each point of the model has a representative no farther than two cells.
+    // Each point of the model has a representative within two cells.
     const geometry::Box& box = brick->box_room;
     const float cell = (box.hi.x - box.lo.x) / m.pixel_range();
     std::vector<glm::vec3> representatives;

@@ -1,4 +1,4 @@
-// The point model: events, accounting, digests.
+// The point model: events, counts of points and bytes, digests.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -94,7 +94,7 @@ TEST(PointModel, ClustersTakenOutStayDrawable) {
 
 TEST(PointModel, ForgetDropsSinglePatches) {
   PointModel model(test::scene_config()), expected(test::scene_config());
-  // Two blocks of frame 1, with one of frame 2 between them.
+  // Two blocks of frame 1, with a block of frame 2 between them.
   const geometry::Camera camera = test::scene_camera({0.6, 0.4, 0.3}, kTile.width, kTile.height);
   const auto add = [&](PointModel& m, uint64_t sequence, uint64_t frame) {
     m.insert(prepare_patch(m.config(), {sequence}, camera, kTile, test::sample_scene(camera, kTile), {frame}));
@@ -105,7 +105,7 @@ TEST(PointModel, ForgetDropsSinglePatches) {
   const Mosaic::Level kept = model.clusters().begin()->second->mosaics.at(1).level(0);
   const Mosaic::Level gone = model.clusters().begin()->second->mosaics.at(2).level(0);
   const Cluster* first = model.clusters().begin()->second.get();
-  std::vector<ClusterKey> keys{0xfffffff0u, first->key};  // unknown; a frame it does not have
+  std::vector<ClusterKey> keys{0xfffffff0u, first->key};  // an unknown cluster; a frame that the cluster does not have
   std::vector<uint32_t> frames{1, 7};
   for (const auto& [key, cluster] : model.clusters())
     for (int twice = 0; twice < 2; ++twice) keys.push_back(key), frames.push_back(1);
@@ -131,7 +131,7 @@ TEST(PointModel, ForgetDropsSinglePatches) {
   EXPECT_EQ(points_dropped, points - points / 3);
   EXPECT_TRUE(found) << "nor does what was dropped";
 
-  // The last patch of a cluster takes the cluster along, as it lies in memory.
+  // When its last patch goes, the cluster itself is handed over, at the same place in memory.
   const ClusterKey key = first->key;
   const auto last = model.take_out(std::vector<ClusterKey>{key}, std::vector<uint32_t>{2});
   ASSERT_EQ(last.size(), 1u);
@@ -157,7 +157,7 @@ TEST(PointModel, ForgettingEverythingIsAnEmptyModel) {
 
 TEST(PointModel, DigestTellsModelsApartAndNotTheOrderOfTheirClusters) {
   PointModel a(test::scene_config()), b(test::scene_config()), c(test::scene_config());
-  // b meets the clusters in another order, by way of forgetting and inserting other ones first.
+  // b gets the clusters in another order: it inserts and forgets others first.
   a.insert(patch(1));
   b.insert(patch(9));
   b.clear();
@@ -180,7 +180,7 @@ TEST(PointModel, BytesAreWhatTheAllocatorGaveOut) {
   {
     std::vector<PreparedPatch> warm;
     warm.push_back(patch(1));
-  }  // tables that are built once
+  }  // builds the tables that are built once
   if (in_use() == 0) GTEST_SKIP() << "this allocator does not count (sanitizers)";
   for (const double fraction : {1.0, 0.02}) {
     const size_t before = in_use();
@@ -196,12 +196,12 @@ TEST(PointModel, BytesAreWhatTheAllocatorGaveOut) {
   }
 }
 
-// As patches came, their headers count.
+// Uncompacted patches: their headers add to the bytes of a point.
 class BytesAPoint : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Compact, BytesAPoint, testing::Bool());
 TEST_P(BytesAPoint, AreFewEvenInSmallPatches) {
   for (const double fraction : {1.0, 0.3, 0.05, 0.02}) {
-    // Frames of 1280x800 over leaves of 1/64: as many points a leaf as in a session, then what elimination leaves.
+    // Frames of 1280x800 over leaves of 1/64: as many points in a leaf as in a session; then fewer, after elimination.
     ModelConfig config = test::scene_config();
     config.compact = GetParam();
     PointModel model(config);

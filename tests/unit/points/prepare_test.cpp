@@ -1,4 +1,4 @@
-// A tile becomes mosaics: what prepare_patch promises, checked against the samples themselves.
+// prepare_patch makes mosaics of a tile: its promises, checked against the samples themselves.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -18,7 +18,7 @@ glm::dvec3 position(const OctreeGrid& grid, ClusterKey key, const Mosaic::Level&
   return grid.lo + (cell + (q + 0.5) / 65536.0) * grid.leaf_size;
 }
 
-// The pixel of the tile's frame on which a point lies.
+// Pixel of the tile's frame that shows a point.
 glm::ivec2 pixel_of(const geometry::Camera& c, const glm::dvec3& p) {
   const auto t = c.room_to_pixel();
   const glm::dvec4 h(p, 1);
@@ -26,7 +26,7 @@ glm::ivec2 pixel_of(const geometry::Camera& c, const glm::dvec3& p) {
           static_cast<int>(std::floor(glm::dot(t.y, h) / glm::dot(t.w, h)))};
 }
 
-// An image of one tile with a single sample at depth z.
+// A patch of an image of one tile with a single sample at depth z.
 PreparedPatch prepare_one(const ModelConfig& config, const geometry::Camera& c, int x, int y, double z) {
   image::DepthImage image(1, 1);
   image.depth[0] = image::encode_depth(z, c.near_m);
@@ -100,7 +100,7 @@ TEST(PreparePatch, KeysAscendAndLeavesHoldTheirPoints) {
   }
 }
 
-// Walks a sample across the plane between two leaves in steps of a hundredth of a quantum.
+// Moves a sample across the plane between two leaves in steps of a hundredth of a quantum.
 TEST(PreparePatch, LeafBoundaryBelongsToTheUpperLeaf) {
   const ModelConfig config = {{glm::vec3(-0.5f), glm::vec3(0.5f)}, 1};
   geometry::Camera c;  // looks along -z; the cube's middle planes are x = 0, y = 0, z = 0
@@ -157,7 +157,7 @@ TEST(PreparePatch, EveryCoveredBlockHasAPointAtItsLevel) {
               << "level " << l << " at " << x << "," << y;
         }
       }
-      // Not many more points than blocks: only where leaves or surfaces meet.
+      // Hardly more points than blocks: a block has several points only where leaves or surfaces meet.
       EXPECT_LT(static_cast<double>(points), 1.6 * static_cast<double>(blocks.size())) << "level " << l;
     }
   }
@@ -221,7 +221,7 @@ TEST(PreparePatch, PixelRangeStaysFiniteAroundTheEye) {
 }
 
 TEST(PreparePatch, CoarseColoursAreMeansAndStayOnTheirSideOfAnEdge) {
-  // Left half near and red, right half far and blue, edge in the middle of 2x2 blocks.
+  // The left half is near and red, the right half far and blue; the edge runs through the middle of 2x2 blocks.
   image::DepthImage image(8, 8);
   const geometry::Camera c = camera();
   for (int i = 0; i < 64; ++i) {
@@ -245,7 +245,7 @@ TEST(PreparePatch, CoarseColoursAreMeansAndStayOnTheirSideOfAnEdge) {
 }
 
 TEST(PreparePatch, TilesOfAFrameMayBePreparedInAnyCutAndGiveTheSamePoints) {
-  // Cut at multiples of 4 pixels, every level is the same set of points as of the whole.
+  // Cut at multiples of 4 pixels, the tiles have at every level the same points as the whole frame.
   const ModelConfig config = test::scene_config();
   const auto points_of = [&](const std::vector<geometry::Rect>& cut, int l) {
     std::multiset<std::array<uint64_t, 2>> out;

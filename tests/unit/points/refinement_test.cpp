@@ -1,4 +1,4 @@
-// Points with bounded errors become exact, wherever merging took them.
+// Points with bounded errors become exact, also after merging has moved them.
 #include "common/points/refinement.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ ModelConfig config(bool compact) {
   return out;
 }
 
-// A view, and the same with errors.
+// A view: exact, and with errors.
 struct View {
   geometry::Camera camera;
   geometry::Rect tile{0, 0, 96, 64};
@@ -60,7 +60,7 @@ std::multiset<Point> points_of(const PointModel& model) {
   return out;
 }
 
-// Those of a that b lacks.
+// Points of a that b lacks.
 std::vector<Point> differences(const std::multiset<Point>& a, const std::multiset<Point>& b) {
   std::vector<Point> only;
   std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(only));
@@ -130,7 +130,7 @@ TEST_P(Refinement, KeepsTheMemoryThatTheModelCounts) {
   for (const auto& [key, cluster] : model.clusters()) keys.push_back(key);
   model.forget(keys);
   EXPECT_EQ(model.points(), 0u);
-  // What is left is tables that were allocated; what mosaics took is gone to the byte.
+  // The tables keep their allocations; the bytes of mosaics are all freed.
   EXPECT_LT(model.bytes(), again.bytes() + 64 * keys.size() + 4096);
 }
 

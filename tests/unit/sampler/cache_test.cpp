@@ -1,4 +1,4 @@
-// Which chunks a sampler holds and which it lets go.
+// Chunks that a sampler keeps and those that it drops.
 #include <gtest/gtest.h>
 
 #include "common/geometry/trajectory.h"
@@ -7,7 +7,7 @@
 namespace telesplat::sampler {
 namespace {
 
-// Ten boxes in a row along x, 100 bytes each; ids given in any order.
+// Ten boxes in a row along x, 100 bytes each; ids in descending order.
 std::vector<geometry::ChunkInfo> row() {
   std::vector<geometry::ChunkInfo> out;
   for (int i = 9; i >= 0; --i) {
@@ -52,8 +52,8 @@ TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
       for (const ChunkId old : cache.insert(id, 100)) removed.push_back(old.value);
     return removed;
   };
-  EXPECT_TRUE(view(8).empty());                                                                     // 8, 9
-  EXPECT_TRUE(view(9).empty());                                                                     // uses 9 again
+  EXPECT_TRUE(view(8).empty());                                                                     // needs 8, 9
+  EXPECT_TRUE(view(9).empty());                                                                     // needs 9 again
   cache.missing(geometry::make_camera(geometry::look_at({-4.5, 0, 5}, {-4.5, 0, 0}), 10, 64, 64));  // sees chunk 0
   EXPECT_TRUE(cache.insert({0}, 100).empty());
   cache.missing(geometry::make_camera(geometry::look_at({-3.5, 0, 5}, {-3.5, 0, 0}), 10, 64, 64));  // sees chunk 1
@@ -68,7 +68,7 @@ TEST(ChunkCache, NeverLetsGoOfWhatTheViewNeeds) {
   for (const ChunkId id : cache.missing(looking_right(4))) EXPECT_TRUE(cache.insert(id, 100).empty());
   EXPECT_EQ(cache.bytes(), 600u) << "over the budget, but all of it is in view";
   EXPECT_TRUE(cache.missing(looking_right(4)).empty());
-  // The next view needs few: the rest goes.
+  // The next view needs one chunk: the others are dropped.
   cache.missing(looking_right(9));
   EXPECT_EQ(cache.insert({9}, 100).size(), 4u);
   EXPECT_LE(cache.bytes(), 250u);
@@ -96,7 +96,7 @@ TEST(ChunkCache, SurvivesAnIdThatIsNotInTheList) {
   EXPECT_EQ(cache.bytes(), 100u);
 }
 
-// A list may claim that its chunks are empty: memory is what came.
+// A list may claim that its chunks are empty: the cache counts the bytes that came.
 TEST(ChunkCache, CountsWhatCame) {
   ChunkCache cache(300);
   auto claimed = row();

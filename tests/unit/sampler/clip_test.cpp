@@ -1,4 +1,4 @@
-// What samplers show of a scene from which part was cut away: nothing of what was cut, and all that lay behind.
+// Samplers of a clipped scene show no part that was cut away, and all that lay behind it.
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
@@ -31,7 +31,7 @@ glm::dvec3 random_direction(std::mt19937& random) {
   return glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
 }
 
-// Planes that leave something of what lies about the origin.
+// Planes that leave some of the space about the origin.
 Clip random_clip(std::mt19937& random, double reach) {
   std::uniform_real_distribution<double> any(-reach, 0.3 * reach);
   Clip out;
@@ -51,10 +51,10 @@ glm::dvec3 position(const Camera& c, const DepthImage& image, int x, int y) {
 
 struct Seen {
   int covered = 0, same = 0, behind = 0, opened = 0;
-  int odd = 0;  // edges of triangles, of which a rasteriser that clips decides a few otherwise
+  int odd = 0;  // pixels at edges of triangles, which a rasteriser that clips may decide in another way
 };
-// Of a clipped image: no pixel lies on the far side; where the whole scene's surface is kept it is the same one; where
-// it was cut away only what lay behind it is seen.
+// Checks a clipped image: no pixel lies on the far side; where the whole scene's surface is kept, the image shows it;
+// where it was cut away, the image shows only surfaces behind it.
 Seen compare(const Camera& c, const Clip& clip, const DepthImage& all, const DepthImage& clipped, double tolerance_m) {
   Seen out;
   for (int y = 0; y < c.height; ++y)
@@ -64,7 +64,7 @@ Seen compare(const Camera& c, const Clip& clip, const DepthImage& all, const Dep
       if (is) {
         ++out.covered;
         EXPECT_TRUE(clip.keeps(position(c, clipped, x, y), tolerance_m)) << x << "," << y;
-        out.odd += !was;  // a clip adds nothing
+        out.odd += !was;  // a clip adds no surface
       }
       if (!was) continue;
       const glm::dvec3 p = position(c, all, x, y);
@@ -95,7 +95,7 @@ TEST_P(OfMeshes, AClipShowsWhatLayBehindIt) {
   Seen sum;
   for (int i = 0; i < 12; ++i) {
     glm::dvec3 eye = random_direction(random) * 0.75;
-    eye.y = 0.1 + std::abs(eye.y) * 0.3;  // hills hide each other
+    eye.y = 0.1 + std::abs(eye.y) * 0.3;  // low enough that hills hide each other
     const Camera c = camera_from(eye);
     const Clip clip = random_clip(random, 0.25);
     sampler->set_clip({});
@@ -113,7 +113,7 @@ TEST_P(OfMeshes, AClipShowsWhatLayBehindIt) {
   EXPECT_LE(sum.odd, std::string(GetParam()) == "ray" ? 0 : sum.same / 500);
 }
 
-// The closed surface of a cube, cut in the middle: one sees its inside.
+// The closed surface of a cube, cut in the middle, shows its inside.
 TEST_P(OfMeshes, ACutSolidIsSeenFromInside) {
   auto made = make_sampler(GetParam(), 1);
   ASSERT_TRUE(made);
@@ -134,14 +134,14 @@ TEST_P(OfMeshes, ACutSolidIsSeenFromInside) {
   }
   ASSERT_TRUE((*made)->add_chunk({0}, test::chunk_of(v, t)));
   const Camera c = camera_from({0, 0, 1}, 64, 64);
-  (*made)->set_clip({{{{0, 0, -1}, 0}}});  // z <= 0 is kept
+  (*made)->set_clip({{{{0, 0, -1}, 0}}});  // keeps z <= 0
   const DepthImage image = (*made)->sample(c, whole(c));
   const size_t middle = 32 * 64 + 32;
   ASSERT_NE(image.depth[middle], 0u);
   EXPECT_NEAR(image::decode_depth(image.depth[middle], c.near_m), 1.2, 1e-4) << "the back wall";
   EXPECT_EQ(image.colour[middle], 0xff0000u);
   EXPECT_GT(image::decode_normal16(image.normal[middle]).z, 0.9f) << "its side towards the eye";
-  // An empty region shows nothing.
+  // An empty region shows no pixels.
   (*made)->set_clip({{{{0, 0, -1}, 0}, {{0, 0, 1}, 0.01}}});
   const DepthImage none = (*made)->sample(c, whole(c));
   EXPECT_EQ(none, DepthImage(64, 64));
@@ -178,8 +178,8 @@ TEST(ClipOfJuliaSets, NothingLiesBeyondAndTheKernelsAgree) {
   EXPECT_GT(cut, 1000);
 }
 
-// Where a plane cuts the set, the cut itself is seen: flat, facing the eye, neither shadowed nor darkened by what is
-// gone.
+// Where a plane cuts the set, the sampler shows the cut itself: flat, facing the eye, neither shadowed nor darkened by
+// the part that is gone.
 TEST(ClipOfJuliaSets, ACutIsAFlatFaceInFullLight) {
   julia::Parameters ball;  // c = 0: the unit ball
   ball.ambient = 1, ball.shadow = 1;
@@ -198,7 +198,7 @@ TEST(ClipOfJuliaSets, ACutIsAFlatFaceInFullLight) {
   EXPECT_EQ(image.colour[middle], bright.colour[middle]);
 }
 
-// The splatter with a clip draws what it draws of the voxels that are left.
+// The splatter with a clip draws the same as without one from the voxels that the clip leaves.
 TEST(ClipOfVolumes, IsAsIfTheVoxelsWereNotThere) {
   const auto grid = test::make_grid({33, 29, 31}, 0.5, {1, 1.1, 1.3}, 25, glm::normalize(glm::dvec3(1, 2, 0.5)));
   const test::VolumeScene scene = test::make_scene(grid, test::blobs, test::ramp(0.5));

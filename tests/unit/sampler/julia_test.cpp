@@ -1,4 +1,4 @@
-// What the Julia sampler promises: canonical images, pixels that do not depend on the rectangle, normals, colours, and
+// Promises of the Julia sampler: canonical images, pixels that do not depend on the rectangle, normals, colours, and
 // odd cameras and sets.
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ size_t covered(const image::DepthImage& image) {
   return static_cast<size_t>(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; }));
 }
 
-// c = 0: the filled-in set is the unit ball, cut by the slice into a ball.
+// c = 0: the filled-in set is the unit ball, and its slice is a ball, too.
 julia::Parameters ball(double offset = 0) {
   julia::Parameters p;
   p.slice_offset = offset;
@@ -45,8 +45,8 @@ TEST(JuliaSampler, SampledBallIsABall) {
   const geometry::Camera c = camera();
   const image::DepthImage image = whole(s.scene, c);
   ASSERT_GT(covered(image), image.pixels() / 20);
-  // Of q^2 the estimate is 0.5 |q| log|q|, near |q| = 1 half of |q| - 1: half a footprint is reached where |q| is one
-  // more than 1, which in the slice, where the ball's radius is 0.8, takes 1 / 0.8 of a footprint.
+  // For q^2 the distance estimate is 0.5 |q| log|q|, near |q| = 1 about (|q| - 1) / 2. It reaches half a footprint at
+  // |q| = 1 + a footprint; in the slice, where the ball's radius is 0.8, that is 1 / 0.8 of a footprint outside.
   const double footprint = 1 / c.focal_x(), radius = 0.8 * s.placement.scale;
   for (int y = 0; y < c.height; ++y)
     for (int x = 0; x < c.width; ++x) {
@@ -99,13 +99,13 @@ TEST(JuliaSampler, ImagesAreCanonicalAndNormalsFaceTheViewer) {
           continue;
         }
         const glm::dvec3 ray = glm::normalize(c.unproject(x + 0.5, y + 0.5, 1) - c.pose.position_room);
-        ASSERT_LT(glm::dot(glm::dvec3(image::decode_normal16(image.normal[at])), ray), 0.02);  // quantised
+        ASSERT_LT(glm::dot(glm::dvec3(image::decode_normal16(image.normal[at])), ray), 0.02);  // normals are quantised
       }
   }
 }
 
 TEST(JuliaSampler, NormalsFollowTheSurface) {
-  // Cross products of neighbours' positions, where the surface is smooth enough for them to mean something.
+  // Compares with cross products of neighbours' positions, where the surface is smooth enough.
   const Scene s(julia::presets()[0].parameters);
   const geometry::Camera c = camera(640, 400);
   const image::DepthImage image = whole(s.scene, c);
@@ -127,11 +127,11 @@ TEST(JuliaSampler, NormalsFollowTheSurface) {
                         glm::dvec3(image::decode_normal16(image.normal[at(x, y)]))) > 0.95;
     }
   ASSERT_GT(compared, 5000u);
-  EXPECT_GT(double(alike), 0.93 * double(compared));  // creases are not smooth
+  EXPECT_GT(double(alike), 0.93 * double(compared));  // the surface has creases
 }
 
 TEST(JuliaSampler, StepKeepsTheFootprintOfTheFullCamera) {
-  // A camera of every fourth pixel of every fourth row sees what the full one sees there.
+  // A camera of every fourth pixel of every fourth row sees the same there as the full one.
   const Scene s(julia::presets()[0].parameters);
   const geometry::Camera full = camera(320, 200);
   geometry::Camera coarse = full;
@@ -155,7 +155,7 @@ TEST(JuliaSampler, StepKeepsTheFootprintOfTheFullCamera) {
   EXPECT_LE(one, 3u);
 }
 
-// Four by four rays for each pixel of `c`, of the pixel's own surface.
+// Casts four by four rays for each pixel of `c`, each ray with the footprint of the whole pixel.
 image::Reference sixteen_rays(const JuliaScene& scene, const geometry::Camera& c, const image::Shading& shading) {
   return *image::supersample(c, 16, [&](const geometry::Camera& part) {
     return Result<image::View>(render_julia_directly(scene, part, shading, 1, 4));
@@ -163,7 +163,7 @@ image::Reference sixteen_rays(const JuliaScene& scene, const geometry::Camera& c
 }
 
 TEST(JuliaSampler, FinerCamerasSeeTheSurfaceOfTheView) {
-  // Rays at the middles of a view's pixels, cast by a camera of 3 x 3 rays a pixel.
+  // A camera of 3 x 3 rays a pixel casts, among others, the rays at the middles of the view's pixels.
   const Scene s(julia::presets()[0].parameters);
   const geometry::Camera view = camera(320, 200);
   geometry::Camera fine = view;
@@ -185,7 +185,7 @@ TEST(JuliaSampler, FinerCamerasSeeTheSurfaceOfTheView) {
     return out;
   };
   EXPECT_LT(differ(3), covered(own) / 500);  // single rays that graze the surface
-  EXPECT_GT(differ(1), covered(own) / 20);   // a pixel of its own is a third as large, so its surface lies deeper
+  EXPECT_GT(differ(1), covered(own) / 20);   // with a footprint of a third of a pixel the surface lies deeper
 }
 
 TEST(JuliaSampler, RimsAreNotDottedWithDarkPixels) {
@@ -203,7 +203,7 @@ TEST(JuliaSampler, RimsAreNotDottedWithDarkPixels) {
     dark += red(one.colour[i]) + 30 < red(truth.view.colour[i]);
   }
   ASSERT_GT(shown, 50000u);
-  EXPECT_LT(dark, 55u);  // 29; 102 if each normal is that of its point
+  EXPECT_LT(dark, 55u);  // measured 29; 102 if each normal is that of its point alone
 }
 
 TEST(JuliaSampler, BoxThatCutsTheSetShowsItsFaces) {

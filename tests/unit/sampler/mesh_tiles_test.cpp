@@ -1,4 +1,4 @@
-// A mesh's chunks between data server and sampler: each is asked for until it is there, and no more often.
+// A mesh's chunks between data server and sampler: the sampler asks for each until it comes, and no more often.
 #include "services/sampler/mesh/tiles.h"
 
 #include <gtest/gtest.h>
@@ -11,9 +11,9 @@ namespace telesplat::sampler {
 namespace {
 
 constexpr double kDeadline_s = test::patient(20);
-constexpr std::byte kBad{0xff};  // the first byte of what is no chunk
+constexpr std::byte kBad{0xff};  // first byte of an invalid chunk
 
-// Takes chunks of any bytes but some.
+// Takes chunks of any bytes, except those that begin with kBad.
 class Taker final : public Sampler {
  public:
   explicit Taker(std::map<ChunkId, int>& taken) : taken_(taken) {}
@@ -56,7 +56,7 @@ class MeshTilesTest : public testing::Test {
     w.facts["content_hash"] = "1";
     tiles.on_welcome(w);
   }
-  // Lets messages travel until `done`. Times are those of `now`, which stands still.
+  // Passes messages on until `done`. The clock is `now`, which stands still.
   bool until(const auto& done) {
     for (const double deadline = monotonic_s() + kDeadline_s; monotonic_s() < deadline;) {
       tiles.fetch(nullptr, now);
@@ -131,7 +131,7 @@ TEST_F(MeshTilesTest, AChunkThatIsNoneInTheEndIsAHole) {
   EXPECT_EQ(asked.size(), 4u) << "no more than that";
 }
 
-// What is asked for twice comes twice, and a slow link becomes slower.
+// A chunk that is asked for twice comes twice and makes a slow link slower.
 TEST_F(MeshTilesTest, SlowChunksAreAskedForOnceAndFewAtATime) {
   give_list(40, 3 << 20);
   ASSERT_TRUE(until([&] { return asked.size() >= 2; }));
@@ -142,7 +142,7 @@ TEST_F(MeshTilesTest, SlowChunksAreAskedForOnceAndFewAtATime) {
   net::wait_readable({&data}, 100);
   ASSERT_TRUE(until([&] { return true; }));
   EXPECT_EQ(asked, (std::vector<uint64_t>{0, 1})) << "8 MB of chunks of 3 MB";
-  // Silence is no slow link.
+  // A link without answers is not a slow link: after kFirst_s the sampler asks again.
   now += RetryClock::kFirst_s;
   ASSERT_TRUE(until([&] { return asked.size() >= 4; }));
   EXPECT_EQ(asked[2], 0u);
@@ -156,7 +156,7 @@ class MeshLeases : public MeshTilesTest {
     held.received_s = now;
     held.lease.lease = {7};
   }
-  // How often more time was asked for in `seconds`.
+  // Returns how many times the sampler asked for more time within `seconds`.
   int extended(double seconds) {
     for (const double end = now + seconds; now < end; now += 0.05) tiles.fetch(&held, now);
     int times = 0;
@@ -169,7 +169,7 @@ class MeshLeases : public MeshTilesTest {
   HeldLease held;
 };
 
-// Others would get its tiles while it waits for a list that an array makes late, and the master would think it dead.
+// An array makes its list late. Without more time the master would think the sampler dead and give its tiles to others.
 TEST_F(MeshLeases, TheListIsWaitedForLikeChunks) { EXPECT_GE(extended(2), 10); }
 
 TEST_F(MeshLeases, WhereNothingComesNoMoreTimeIsAskedFor) {

@@ -1,4 +1,4 @@
-// What a sampler is told: limits, what fits which scene, what another process is handed.
+// A sampler's options: limits, which sampler fits which scene, arguments for a child process.
 #include <gtest/gtest.h>
 
 #include "services/sampler/sampler_options.h"
@@ -9,7 +9,7 @@ namespace {
 TEST(SamplerOptions, AChildIsToldWhatDiffers) {
   SamplerOptions options, defaults;
   EXPECT_TRUE(options::arguments(table(options), table(defaults)).empty());
-  options.service.name = "sampler-1";  // the one who starts it says so itself
+  options.service.name = "sampler-1";  // the starter passes the name itself
   options.kind = "ray";
   options.threads = 3;
   EXPECT_EQ(options::arguments(table(options), table(defaults)),

@@ -19,7 +19,7 @@ const glm::vec3 kUp{0, 0, 1};  // towards the cameras below, which look along -z
 Rect whole(const Camera& c) { return {0, 0, c.width, c.height}; }
 Camera camera_8x8() { return geometry::make_camera({}, 90, 8, 8, 0.1); }
 
-// A square of 2 x 2 m at z = -depth, in two triangles.
+// A square of 2 half x 2 half metres at z = -depth, in two triangles.
 geometry::ChunkBytes square(float depth, uint32_t colour, glm::vec3 normal = kUp, float half = 1.0f) {
   const auto v = [&](float x, float y) { return Vertex{{x, y, -depth}, normal, colour}; };
   return test::chunk_of({v(-half, -half), v(half, -half), v(half, half), v(-half, half)}, {0, 1, 2, 0, 2, 3});
@@ -70,7 +70,7 @@ TEST(RaySampler, NormalsAreTurnedToTheSideThatIsSeen) {
     const glm::vec3 expected = n.z > 0 ? n : -n;
     EXPECT_EQ(image.normal[centre], image::encode_normal16(expected));
   }
-  // From behind (camera at z = -2 looking along +z) the same square shows its other side.
+  // From behind (the camera at z = -2 looks along +z) the same square shows its other side.
   Camera behind = camera;
   behind.pose = geometry::Pose{{0, 0, -2}, glm::dquat(0, 0, 1, 0)};
   const glm::vec3 n(0.3f, -0.2f, 0.9f);
@@ -80,7 +80,7 @@ TEST(RaySampler, NormalsAreTurnedToTheSideThatIsSeen) {
 TEST(RaySampler, OppositeCornerNormalsFallBackToThePlane) {
   const glm::vec3 a(1, 0, 0);
   const Camera camera = geometry::make_camera({}, 90, 1, 1, 0.1);
-  // The one ray meets the middle of the lower edge, where +x and -x weigh the same.
+  // The only ray meets the middle of the lower edge, where the normals a and -a weigh the same.
   auto cancelled = sampler_with(test::triangle({{-3, 0, -1}, a, 0}, {{3, 0, -1}, -a, 0}, {{0, 6, -1}, a, 0}));
   const image::DepthImage image = cancelled->sample(camera, {0, 0, 1, 1});
   ASSERT_NE(image.depth[0], 0u);
@@ -111,7 +111,7 @@ TEST(RaySampler, NearestSurfaceWinsAndTheNearPlaneCuts) {
   const Camera camera = camera_8x8();
   const image::DepthImage image = s->sample(camera, whole(camera));
   for (uint32_t c : image.colour) EXPECT_EQ(c, 0x00ff00u);
-  // Whatever is seen at the near plane has the largest code and no larger one.
+  // A surface at the near plane has the largest depth code.
   auto at_near = sampler_with(square(0.1f + 1e-7f, 0xffffff));
   for (uint32_t code : at_near->sample(camera, whole(camera)).depth) EXPECT_NEAR(code, image::kMaxDepthCode, 32);
 }

@@ -1,4 +1,4 @@
-// What is waited for over a slow link is not asked for twice.
+// A chunk that is still coming over a slow link is not asked for again.
 #include "services/sampler/retry_clock.h"
 
 #include <gtest/gtest.h>
@@ -14,12 +14,12 @@ TEST(RetryClock, WaitsAsLongAsTheLinkNeeds) {
   EXPECT_TRUE(clock.overdue(10 + 1.01 * RetryClock::kFirst_s, false));
   EXPECT_TRUE(clock.overdue(12.1, true)) << "what was on a broken connection is lost";
   EXPECT_FALSE(clock.overdue(11.9, true));
-  // A megabit a second.
+  // 1 Mbit/s.
   clock.answered(3'000'000, 3'000'000, 34);
   EXPECT_FALSE(clock.overdue(1e9, false));
   clock.asked(3'000'000, 34);
   EXPECT_GE(clock.patience_s(), 2 * 24);
-  // A gigabit a second.
+  // 1 Gbit/s.
   for (int i = 0; i < 50; ++i) {
     clock.answered(3'000'000, 3'000'000, 34 + 0.024 * (i + 1) + 30);
     clock.asked(3'000'000, 34 + 0.024 * (i + 1) + 30);

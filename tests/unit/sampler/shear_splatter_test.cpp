@@ -14,14 +14,14 @@ namespace {
 
 using test::VolumeScene;
 
-// Seen along `axis`, from its lower end or its upper one, a little aside.
+// A camera that looks along `axis`, from its lower end or its upper one, a little aside.
 geometry::Camera from_axis(int axis, int sign, double distance_m, int side) {
   glm::dvec3 eye(0.21, 0.13, -0.17);
   eye[axis] = sign;
   return geometry::make_camera(geometry::look_at(glm::normalize(eye) * distance_m, glm::dvec3(0)), 45, side, side);
 }
 
-// The largest difference of any channel of any layer from the oracle, in 1/255, where nothing is hidden.
+// Largest difference from the oracle in any channel of any layer, in 1/255, where no voxel is hidden.
 double worst_difference(const VolumeScene& scene, const volume::ShearFrame& frame,
                         const std::vector<volume::SliceImage>& images, int planes = 1) {
   test::SplatOracle oracle(scene, frame, planes);
@@ -44,7 +44,7 @@ TEST(ShearSplatter, EqualsTheOracleAlongAllAxes) {
   const auto grid = test::make_grid({23, 31, 19}, 0.5, {1, 1.2, 1.7}, 20, glm::normalize(glm::dvec3(1, 2, 0.5)));
   int twice = 0;
   for (const bool lit : {false, true}) {
-    // Where levels are opaque, planes between slices count, too; here nothing is so opaque that it hides anything.
+    // Where levels are opaque, planes between slices count too; these levels are so transparent that they hide nothing.
     const VolumeScene scene = test::make_scene(grid, test::blobs, test::ramp(lit ? 0.5 : 0.15), lit);
     const SlabVolume volume(grid, scene.voxels);
     for (int axis = 0; axis < 3; ++axis)
@@ -72,7 +72,7 @@ TEST(ShearSplatter, EqualsTheOracleAtAnySizeOfPixels) {
   auto frame = volume::plan_frame(grid, std::span(&camera, 1));
   ASSERT_TRUE(frame);
   const double width = frame->width * frame->du, height = frame->height * frame->dv;
-  // Voxels of 4 pixels to pixels of 12 voxels, not the same across and down; wider than a tile, too.
+  // From 4 pixels a voxel to 12 voxels a pixel, different across and down; also wider than a tile.
   for (const auto& [w, h] : {std::pair{160, 40}, {41, 130}, {23, 9}, {9, 11}, {1, 1}, {700, 10}}) {
     frame->width = w, frame->height = h;
     frame->du = width / w, frame->dv = height / h;
@@ -102,7 +102,7 @@ TEST(ShearSplatter, CropsImagesAndLeavesOutEmptyOnes) {
     EXPECT_TRUE(any(0, 0, 0, 1) && any(image.rect.width - 1, 0, 0, 1));
   }
   EXPECT_EQ(stats.voxels + stats.skipped, scene.voxels.size());
-  EXPECT_EQ(stats.voxels, scene.voxels.size());  // all in view, none behind what is opaque
+  EXPECT_EQ(stats.voxels, scene.voxels.size());  // all in view, none behind opaque voxels
   EXPECT_GT(stats.pixels, stats.voxels);
 
   const std::vector<volume::LevelColour> nothing(256);
@@ -114,8 +114,8 @@ TEST(ShearSplatter, CropsImagesAndLeavesOutEmptyOnes) {
   EXPECT_TRUE(ShearSplatter(1).splat(SlabVolume(grid, none), scene.colours, *frame, 0, 32, &stats).empty());
 }
 
-// A solid block, most of which is skipped. Neither the sampled pose nor one 5 degrees beside it may tell: layers
-// splatted one by one, which know of nothing in front of them, look the same.
+// A solid block whose inside is skipped. It looks the same as layers splatted one by one, which are hidden by no other
+// layer, from the sampled pose and from 5 degrees beside it.
 TEST(ShearSplatter, SkipsOnlyWhatNobodySees) {
   const auto grid = test::make_grid({48, 48, 48}, 0.5);
   auto colours = test::ramp(0.9);
@@ -200,11 +200,11 @@ TEST(Lighting, HeadLightShinesFromTheEyeOnTheCentre) {
   EXPECT_GT(of({0, 0, 1}), of({1, 0, 0}) + 0.4f);
   EXPECT_NEAR(of({0, 0, 1}), light[volume::kNoNormal], 0.01);
   for (const float l : light) ASSERT_TRUE(l >= 0 && l <= 1);
-  // From the centre itself there is no direction; there is light all the same.
+  // From the centre itself there is no direction; the light shines all the same.
   EXPECT_GT(volume::normal_intensities(grid, grid.centre_room())[volume::kNoNormal], 0.1f);
 }
 
-// Through the middle of a uniform block, along an axis: its n voxels, of which the outermost fall to nothing over one
+// A ray through the middle of a uniform block, along an axis, meets n voxels; the outermost ones fall to zero over one
 // more voxel.
 TEST(VolumeRaycaster, IntegratesAUniformBlock) {
   const auto grid = test::make_grid({17, 17, 17}, 0.17);  // a voxel is a centimetre

@@ -1,5 +1,5 @@
-// What a sampler does for leases of a volume: voxels from data servers that answer as they like, slabs that change,
-// epochs, memory.
+// A sampler's work for leases of a volume: voxels from data servers that answer late, in part or twice, slabs that
+// change, epochs, memory.
 #include <gtest/gtest.h>
 
 #include <deque>
@@ -72,7 +72,7 @@ wire::Welcome welcome(EpochId epoch, const volume::Session& s, InstanceId master
   return w;
 }
 
-// A data server that answers when told to.
+// A data server that answers on the test's order.
 struct FakeData {
   explicit FakeData(net::Context& context) : socket(context, net::Kind::kRouter, "data") {
     const auto bound = socket.bind("tcp://127.0.0.1:*");
@@ -162,7 +162,7 @@ class VolumeWorkTest : public testing::Test {
     l.views = {{{9}, {3}, camera, 0}};
     return l;
   }
-  // Lets messages travel until `done`.
+  // Passes messages on until `done`.
   bool until(VolumeWork& work, const auto& done) {
     for (const double deadline = monotonic_s() + kDeadline_s; monotonic_s() < deadline;) {
       work.fetch(now);
@@ -184,7 +184,7 @@ class VolumeWorkTest : public testing::Test {
     data.requests.pop_front();
     return r;
   }
-  // Answers whatever is asked until the sampler is ready.
+  // Answers every request until the sampler is ready.
   bool serve(VolumeWork& work, const LevelSet& show) {
     const size_t before = ready.size();
     return until(work, [&] {
@@ -228,7 +228,7 @@ TEST_F(VolumeWorkTest, FetchesTheSlabAndASliceMoreByTheSheetOneRequestAtATime) {
   EXPECT_EQ(r.begin, 5u);
   EXPECT_EQ(r.end, 7u);
   EXPECT_EQ(r.round, 1u);
-  other.answer(r, 5, 6, shown(s));  // not all of it: the rest is asked for
+  other.answer(r, 5, 6, shown(s));  // only a part: the sampler asks for the rest
   other.requests.clear();
   ASSERT_TRUE(until(work, [&] { return !other.requests.empty(); }));
   EXPECT_EQ(other.requests.front().begin, 6u);
@@ -276,7 +276,7 @@ TEST_F(VolumeWorkTest, AsksAgainAfterSilenceAndAfterServersThatDoNotKnow) {
   EXPECT_EQ(made.at(0)->voxels, voxels(0, 0, 12, shown(s)));
 }
 
-// What is asked for twice comes twice, and a slow link becomes slower.
+// Voxels that are asked for twice come twice and make a slow link slower.
 TEST_F(VolumeWorkTest, ASlowAnswerIsAskedForOnce) {
   auto work = make();
   const auto s = session(kHigh);
@@ -311,7 +311,7 @@ TEST_F(VolumeWorkTest, ANewTransferFunctionBringsOnlyWhatIsMissing) {
   ASSERT_TRUE(serve(work, shown(more)));
   EXPECT_EQ(ready.back().epoch.value, 2u);
   EXPECT_EQ(made.back()->voxels, voxels(0, 1, 11, shown(more)));
-  // Nothing new: nothing is asked for, nor arranged.
+  // An epoch that changes nothing: the sampler neither asks for voxels nor arranges any.
   const size_t arranged = made.size();
   work.on_welcome(welcome({3}, high));
   ASSERT_TRUE(until(work, [&] { return ready.back().epoch.value == 3; }));
@@ -424,7 +424,7 @@ TEST_F(VolumeWorkTest, TheOldPartitionIsServedUntilTheNewOneIsInUse) {
   ASSERT_EQ(work.look_at_next(now).state, State::kReady);
   work.sample_next();
   EXPECT_EQ(made.size(), 1u);
-  // Even in a new epoch, whose voxels come by the old sheet.
+  // The same in a new epoch, whose voxels come by the old sheet.
   const auto more = session(kMore);
   work.on_welcome(welcome({2}, more));
   tell(work, lease(3, {2}, 0, 8, more));
@@ -443,7 +443,7 @@ TEST_F(VolumeWorkTest, TheOldPartitionIsServedUntilTheNewOneIsInUse) {
   tell(work, lease(4, {2}, 6, 12, more));
   ASSERT_EQ(work.look_at_next(now).state, State::kReady);
   work.sample_next();
-  // The new one is in use: what was arranged of the old one is gone, its voxels are not.
+  // The new slab is in use: the arranged voxels of the old one are freed, its voxels are kept.
   tell(work, lease(5, {2}, 0, 8, more));
   ASSERT_EQ(work.look_at_next(now).state, State::kReady);
   const size_t arranged = made.size();
@@ -489,7 +489,7 @@ TEST_F(VolumeWorkTest, LaterStepsAreFetchedAheadAsFarAsMemoryGoes) {
       EXPECT_EQ(*steps.rbegin(), wanted);
     }
     if (fit < 3) continue;
-    // The next step is here already.
+    // The next step's voxels are already here.
     work.on_welcome(welcome({2}, at(1)));
     work.fetch(now);
     EXPECT_EQ(ready.back().epoch.value, 2u);
@@ -537,7 +537,7 @@ TEST_F(VolumeWorkTest, AnswersThatAreNoneDoNoHarm) {
     refuse([&] { data.send(r, 0, 12, shown(high), {good.begin(), good.begin() + long(random() % good.size())}); });
   data.answer(r, 0, 12, shown(high));
   ASSERT_TRUE(until(work, [&] { return ready.size() == 1; }));
-  // What was there already, again.
+  // Sends the voxels that the sampler already has.
   work.on_welcome(welcome({2}, more));
   ASSERT_TRUE(asked(work));
   r = take_request();
@@ -558,7 +558,7 @@ TEST_F(VolumeWorkTest, AnotherVolumeOrMasterBeginsAnew) {
   work.on_welcome(welcome({1}, s));
   tell(work, slab(1, 0, 12));
   ASSERT_TRUE(serve(work, shown(s)));
-  // Another master of the same volume: what is held is good for it.
+  // Another master of the same volume: the voxels held are good for it.
   work.on_welcome(welcome({1}, s, {8}));
   tell(work, slab(1, 0, 12));
   work.fetch(now);

@@ -1,4 +1,4 @@
-// What samplers do for their leases: Julia sets by epoch, replays, masks.
+// Samplers' work for their leases: Julia sets by epoch, replays, masks.
 #include <gtest/gtest.h>
 
 #include <unistd.h>
@@ -101,7 +101,7 @@ TEST(JuliaTiles, DropsLeasesOfBadParametersAndForgetsAnotherMastersEpochs) {
   work.on_welcome(incomplete);
   EXPECT_EQ(work.readiness(lease(1, {2}, {0, 0, 48, 8}, 0), 0).state, State::kHopeless);
   work.on_welcome(welcome({3}, 0));
-  work.on_welcome(welcome({1}, 0, {8}));  // a master in a new life counts anew
+  work.on_welcome(welcome({1}, 0, {8}));  // a restarted master counts epochs anew
   EXPECT_EQ(work.readiness(lease(1, {1}, {0, 0, 48, 8}, 0), 0).state, State::kReady);
   EXPECT_EQ(work.readiness(lease(1, {3}, {0, 0, 48, 8}, 0), 0).state, State::kWaits);
 }
@@ -163,7 +163,7 @@ class Masks : public testing::Test {
     const auto body = std::make_shared<std::string>(wire::encode(lease));
     work_.take(control_, {"", "lease", std::as_bytes(std::span(*body)), body}, true, 0);
   }
-  // What comes of the first lease.
+  // Samples the first lease; returns the lease and the image of the tile that results.
   std::pair<wire::Lease, image::DepthImage> deliver() {
     EXPECT_EQ(work_.look_at_next(0).state, State::kReady);
     const Delivery made = work_.sample_next();
@@ -205,7 +205,7 @@ TEST_F(Masks, OfALeaseSaysWhatIsSampledAndStaysWithTheSampler) {
   EXPECT_NE(image, image::DepthImage(40, 24));
 }
 
-// Dropped, the lease would come again and again.
+// Dropped, the lease would be sent again and again.
 TEST_F(Masks, WhereTheyAreNoneAllPixelsAreSampled) {
   wire::Lease lease = plain();
   take(lease);

@@ -19,7 +19,7 @@ geometry::Clip placed(const char* text) {
   return clip ? *clip : geometry::Clip{};
 }
 
-// What an order says of the data holds for the points of the room, wherever the data stand there.
+// An order in the data's coordinates cuts the right points of the room, wherever the data stand there.
 TEST(ClipOrder, IsMeantInTheDatasOwnCoordinates) {
   struct Case {
     const char* text;

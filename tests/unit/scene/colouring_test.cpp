@@ -179,7 +179,7 @@ TEST(Colouring, TheTableHasTheMapsColours) {
   EXPECT_EQ(table.at(1e30f), 0xffffffu);
   EXPECT_NEAR(table.at(15) & 255, 127.5, 1);
   EXPECT_EQ(table.at(float(kNan)), 0x123456u);
-  c.hi = 10;  // one value: the middle of the map
+  c.hi = 10;  // a range of one value: the middle of the map
   EXPECT_NEAR(make_table(c).at(10) & 255, 127.5, 1);
   c = {"dates", "", 1.6e9, 1.6e9 + 100, 1.6e9, two_colours()};
   EXPECT_NEAR(make_table(c).at(stored_scalar(1.6e9 + 50, c.origin)) & 255, 127.5, 1);

@@ -10,7 +10,7 @@
 namespace telesplat::scene {
 namespace {
 
-// z up becomes y up; a box of a kilometre far from the origin becomes 0.8 m.
+// z up becomes y up; a box of a kilometre far from the origin becomes 0.8 m wide.
 Placement map_sheet() {
   const glm::dmat3 z_up(glm::dvec3(1, 0, 0), glm::dvec3(0, 0, -1), glm::dvec3(0, 1, 0));
   return placement_of(z_up, {{500000, 4000000, 1200}, {501000, 4000500, 1300}},

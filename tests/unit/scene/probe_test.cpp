@@ -1,4 +1,4 @@
-// The question to a data server, its answer, and what people are told of both.
+// The question to a data server, its answer, and the texts that people read of both.
 #include "common/scene/probe.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The table of what can be changed while a session runs, and the page that shows it.
+// The table of settings that may change while a session runs, and the page that lists them.
 #include "common/scene/settings.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Contours of single splats whose answer is known without any formula.
+// Contours of single splats whose shape is known without any formula.
 #include <gtest/gtest.h>
 
 #include "common/geometry/trajectory.h"
@@ -29,7 +29,7 @@ TEST(SurfelContour, FacingDiscIsACircle) {
 }
 
 TEST(SurfelContour, FacingDiscOffAxisStaysACircle) {
-  // Parallel to the screen: perspective keeps its shape wherever it is.
+  // A disc parallel to the screen keeps its shape in perspective at any place.
   const auto c = contour({1.5f, -0.8f, -2}, {0, 0, 127}, {0, 0, 1}, 0.1f);
   EXPECT_NEAR(c.xx, 25.0f, 2e-3f);
   EXPECT_NEAR(c.yy, 25.0f, 2e-3f);
@@ -38,7 +38,7 @@ TEST(SurfelContour, FacingDiscOffAxisStaysACircle) {
 }
 
 TEST(SurfelContour, SlopeSeenFromWhereItWasSampledIsTheSamplesCircle) {
-  // What the slope stretches at sampling, displaying shortens again.
+  // Displaying shortens the slope by as much as sampling stretched it.
   const auto c = contour({0, 0, -2}, {100, 0, 100}, {0, 0, 1}, 0.01f);
   EXPECT_NEAR(c.xx, 0.25f, 1e-3f);
   EXPECT_NEAR(c.yy, 0.25f, 1e-3f);
@@ -48,7 +48,7 @@ TEST(SurfelContour, SlopeSampledFromItsFrontIsShortened) {
   const auto c = contour({0, 0, -2}, {100, 0, 100}, glm::normalize(glm::vec3(1, 0, 1)), 0.01f);
   EXPECT_NEAR(c.xx, 0.125f, 1e-3f);
   EXPECT_NEAR(c.yy, 0.25f, 1e-3f);
-  // Its plane: x + z = -2, so that z on the ray through (u, v) is 2 / (1 - u): nearer to the right.
+  // The splat's plane: x + z = -2. On the ray through (u, v) its depth is 2 / (1 - u): farther to the right.
   EXPECT_NEAR(c.slope_x, -0.01f, 1e-6f);
   EXPECT_NEAR(c.slope_y, 0.0f, 1e-6f);
 }

@@ -43,7 +43,7 @@ TEST(KernelTraits, ARowHasWhatItsKindOfSplatNeeds) {
     EXPECT_EQ(t.surfel, t.flat_contour_r2 == 0) << t.name;
     EXPECT_EQ(t.surfel, t.reach.growth > 0) << t.name;
     EXPECT_TRUE(t.surfel || t.passes == splat::Passes::kKeys) << t.name;
-    // Sums carry no ring, so no bias could be taken off them again.
+    // Sums carry no ring, so a bias could not be taken off them again.
     EXPECT_TRUE(t.passes == splat::Passes::kKeys || !t.surfel_bias) << t.name;
   }
 }

@@ -1,4 +1,4 @@
-// Transitions between levels: how many points are drawn, which, how large, as the head moves.
+// Transitions between levels: number, choice and size of the points drawn as the head moves.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -17,7 +17,7 @@ using splat::SelectionOptions;
 
 constexpr int kSide = 128;
 
-// A wall through the origin, seen from 1 m; colours tell the pixel. In one leaf (depth 0), or in many.
+// A wall through the origin, seen from 1 m, in one leaf (depth 0) or many. A point's colour is its pixel's number.
 points::PointModel wall(int depth, int phases = 1) {
   points::PointModel model({{{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}, depth});
   const geometry::Camera camera = geometry::make_camera(geometry::look_at({0, 0, 1}, {0, 0, 0}), 60, kSide, kSide);
@@ -43,7 +43,7 @@ geometry::Camera from(double distance) {
   return geometry::make_camera(geometry::look_at({0, 0, distance}, {0, 0, 0}), 60, kSide, kSide);
 }
 
-// The largest change of the number of points drawn from one step to the next, as a share of all there are.
+// Largest change of the number of points drawn from one step to the next, as a share of all points.
 double largest_jump(const points::PointModel& model, const SelectionOptions& options, double* least = nullptr) {
   double jump = 0, last = -1;
   const auto all = static_cast<double>(model.points());
@@ -131,8 +131,8 @@ TEST(LevelTransitions, MeetTheLevelsAtBothEnds) {
   }
 }
 
-// What widest_spacing promises, on the points themselves: no sample is farther from a point drawn than the corner of a
-// square cell of that side is from its middle, and a little.
+// widest_spacing holds for the points themselves: no sample is farther from a drawn point than half the diagonal of a
+// square cell of that side, plus 0.42 pixels.
 TEST(LevelTransitions, SplatsOfTheWidestSpacingBridgeTheGaps) {
   const points::PointModel model = wall(0);
   const points::Mosaic& m = only_mosaic(model);
@@ -169,7 +169,7 @@ TEST(LevelTransitions, EveryPrefixIsSpreadEvenly) {
       EXPECT_EQ(*least, *most) << n << " points, windows of " << side;
     }
   }
-  // Half of the points: every pixel is drawn or beside one that is.
+  // Half of the points: every pixel is drawn or beside a drawn one.
   std::vector<bool> half(kSide * kSide);
   for (uint32_t i = 0; i < level.count / 2; ++i) half[level.colour[i]] = true;
   for (uint32_t i = 0; i + 1 < kSide * kSide; ++i) {
@@ -179,14 +179,14 @@ TEST(LevelTransitions, EveryPrefixIsSpreadEvenly) {
   }
 }
 
-// What an item says about the arrays that it is a part of, so that a renderer's copies last.
+// An item names the arrays that it is a part of; they stay the same, so that a renderer can keep its copies.
 TEST(LevelTransitions, ItemsArePartsOfLevelsThatStayTheSame) {
   const points::PointModel model = wall(2);
   size_t partial = 0, pairs = 0;
   for (double distance = 0.9; distance < 5; distance *= 1.1) {
     splat::DrawList list;
     splat::select_view(model, from(distance), {}, list);
-    std::map<const uint16_t*, uint32_t> drawn_to;  // of each mosaic
+    std::map<const uint16_t*, uint32_t> drawn_to;  // for each mosaic
     for (size_t i = 0; i < list.items.size(); ++i) {
       const splat::DrawItem& item = list.items[i];
       const points::Mosaic::Level whole = item.arrays();
@@ -240,7 +240,7 @@ TEST(LevelTransitions, LessDetailDropsPointsOfMagnifiedMosaicsToo) {
   EXPECT_NEAR(less.items[0].radius_m, full.items[0].radius_m * 2, 0.01f * full.items[0].radius_m);
 }
 
-// A low-rate mosaic beside a high-rate one: its revised size (T4.4.3) moves with the distance, it does not jump.
+// A low-rate mosaic beside a high-rate one: its revised size (T4.4.3) changes with the distance without a jump.
 TEST(LevelTransitions, RevisedSizesAreContinuousToo) {
   points::PointModel model({{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, 0});
   uint64_t sequence = 0;

@@ -1,4 +1,4 @@
-// Redundant patches: which of a cluster's are drawn (T4.4.3.3).
+// Redundant patches: the choice of a cluster's patches to draw (T4.4.3.3).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,14 +20,14 @@ geometry::Camera camera_from(const glm::dvec3& eye) {
   return geometry::make_camera(geometry::look_at(eye, {0, 0, 0}), kFov_deg, kSide, kSide);
 }
 
-// One cluster around the origin, a square of 0.5 m in z = 0 in it, sampled from several eyes.
+// A square of 0.5 m in the plane z = 0, in one cluster around the origin, sampled from several eyes.
 class Square {
  public:
-  // Where there are several leaves, the square lies on no leaf's face.
+  // At depth > 0 the square lies on no leaf's face.
   explicit Square(int depth = 0)
       : model_({{{-0.4f, -0.4f, depth ? -0.3687f : -0.4f}, {0.4f, 0.4f, depth ? 0.4313f : 0.4f}}, depth}) {}
 
-  /// Samples the part of the square with x in [x0, x1); in `tiles` tiles side by side, of one frame; every step-th
+  /// Samples the part of the square with x in [x0, x1) as one frame of `tiles` tiles side by side: every step-th
   /// pixel of every step-th row.
   void add(const glm::dvec3& eye, double x0 = -0.25, double x1 = 0.25, int tiles = 1, int step = 1) {
     ++frame_;
@@ -55,7 +55,7 @@ class Square {
   const points::PointModel& model() const { return model_; }
   const points::Cluster& cluster() const { return *model_.clusters().begin()->second; }
 
-  /// Frames of which something is drawn.
+  /// Frames that have points in the draw list.
   std::set<uint32_t> drawn(const glm::dvec3& eye) const {
     splat::SelectionOptions options;
     options.best_patch_only = true;
@@ -172,7 +172,7 @@ TEST(PatchChoice, CoarsePatchesLoseToFineOnesOfNearlyTheSameView) {
         splat::select_view(square.model(), camera_from(eye * nearer), options, list);
         size_t inside = 0, coarse = 0, fine = 0;
         for (size_t i = 0; i < list.frames_seen.size(); ++i) {
-          // In leaves at the square's border, which runs along the rows, coarse samples may well reach farther.
+          // In leaves at the square's border, which runs along the rows, coarse samples may reach farther.
           const geometry::Box& leaf = square.model().find(list.clusters_seen[i])->leaf_room;
           const bool is_inside =
               std::max({std::abs(leaf.lo.x), std::abs(leaf.hi.x), std::abs(leaf.lo.y), std::abs(leaf.hi.y)}) < 0.25f;
@@ -181,7 +181,7 @@ TEST(PatchChoice, CoarsePatchesLoseToFineOnesOfNearlyTheSameView) {
           coarse += is_inside && list.frames_seen[i] != 2;
         }
         EXPECT_GT(fine, 10u);
-        // Where a leaf has less than two coarse samples a side, a few still pass for more.
+        // Where a leaf has less than two coarse samples a side, a few coarse patches still win.
         EXPECT_LE(coarse, depth < 5 ? 0 : inside / 30)
             << "of " << inside << ", depth " << depth << " from " << eye.x << " " << nearer;
       }
@@ -192,7 +192,7 @@ TEST(PatchChoice, CoarsePatchesLoseToFineOnesOfNearlyTheSameView) {
 TEST(PatchChoice, AFinePatchFromTheSideDoesNotReplaceABetterOne) {
   for (const int depth : {0, 3}) {
     Square square(depth);
-    square.add({0, 0, 1.4});      // not as fine, but straight on
+    square.add({0, 0, 1.4});      // not as fine, but seen straight on
     square.add({0.62, 0, 0.12});  // near, at a low angle
     const Frames drawn = square.drawn({0, 0, 0.7});
     EXPECT_TRUE(drawn.contains(1)) << depth;
@@ -200,8 +200,8 @@ TEST(PatchChoice, AFinePatchFromTheSideDoesNotReplaceABetterOne) {
   }
 }
 
-// While a frame is half there, an older one is drawn where the new one has nothing yet: no leaf loses much of what it
-// showed.
+// While half of a frame is there, an older frame is drawn where the new one has no points yet: no leaf loses much of
+// the area that it showed.
 TEST(PatchChoice, WhatAFrameHasNotBroughtYetIsShownByOlderOnes) {
   for (const int step : {1, 4}) {
     const glm::dvec3 eye(0.1, 0, 0.8);
@@ -217,7 +217,7 @@ TEST(PatchChoice, WhatAFrameHasNotBroughtYetIsShownByOlderOnes) {
         std::set<Sequence> drawn;
         for (const auto& item : list.items)
           if (item.cluster == cluster.get()) drawn.insert(item.sequence);
-        // In steps of a sixteenth of the leaf along x: which parts have points, which of them are drawn.
+        // Steps of a sixteenth of the leaf along x: `has` where there are points, `shown` where points are drawn.
         std::array<bool, 16> has{}, shown{};
         for (const auto& m : cluster->mosaics)
           for (uint32_t i = 0; i < m.count(0); ++i) {

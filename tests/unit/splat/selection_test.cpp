@@ -1,4 +1,4 @@
-// What is selected for a view, against a search through everything.
+// Selection for a view, against a search through all mosaics.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -203,7 +203,7 @@ TEST(ViewSelection, LessDetailMeansFewerAndLargerPoints) {
   EXPECT_GT(mean_px(half), mean_px(full) * 1.2);
 }
 
-// What stands far away is drawn by bricks, and as completely as by clusters.
+// Surfaces far away are drawn by bricks, and as completely as by clusters.
 TEST(ViewSelection, WhatIsFarAwayCostsItsBlocks) {
   points::PointModel model({{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, 5, true});
   for (int i = 0; i < 9; ++i) {
@@ -238,7 +238,7 @@ TEST(ViewSelection, WhatIsFarAwayCostsItsBlocks) {
   EXPECT_GT(covered, 300);
   EXPECT_NEAR(double(draw(with)), double(covered), 0.1 * double(covered));
 
-  // What came since is drawn beside the summary; what was forgotten makes it useless.
+  // Points that came since are drawn beside the summary; forgotten points make it useless.
   const geometry::Camera near = view(2.0, 1.0);
   model.insert(points::prepare_patch(model.config(), Sequence{10}, near, {0, 0, 320, 240}, sphere_image(near, 0, 1)));
   DrawList later;
@@ -251,7 +251,7 @@ TEST(ViewSelection, WhatIsFarAwayCostsItsBlocks) {
               later.summaries_wanted.end());
   for (const auto& item : later.items) EXPECT_NE(item.cluster->key, brick | points::kSummaryKey);
 
-  // Nor is a brick that was gone taken for the one that was summarised.
+  // A brick that was gone and came back is not taken for the one that was summarised.
   model.forget(plain.clusters_seen);
   model.insert(points::prepare_patch(model.config(), Sequence{11}, near, {0, 0, 320, 240}, sphere_image(near, 0, 8)));
   splat::select_view(model, far, {}, later, &summaries);
@@ -288,7 +288,7 @@ TEST(ViewSelection, PointsThatFaceAwayAreNotDrawn) {
     EXPECT_GT(all, 0.99);
     EXPECT_LT(facing, 0.8);
     EXPECT_GT(facing, 0.4);
-    // They were hidden, but where pin-holes of the front let the back shine through.
+    // The points left out were hidden, except where pin-holes of the front let the back shine through.
     size_t covered = 0, differs = 0;
     for (size_t i = 0; i < plain.size(); ++i) {
       covered += plain[i] != plain[0];
@@ -299,7 +299,7 @@ TEST(ViewSelection, PointsThatFaceAwayAreNotDrawn) {
   }
 }
 
-// One list for both eyes: each sees what it would see of a list of its own, also where a mosaic faces it alone.
+// Points of a rest, as finer rays add them, are drawn only if the options ask for rests.
 TEST(Selection, PointsOfARestAreChosenOnlyWhereTheyAreAskedFor) {
   points::PointModel model = sphere_model();
   const geometry::Camera camera = view(0.3, 0.8);

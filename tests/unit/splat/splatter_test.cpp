@@ -1,4 +1,4 @@
-// What single points look like: where, how large, which wins.
+// Pictures of single points: place, size, and which of two wins.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -99,7 +99,7 @@ TEST(CpuSplatter, TilesAreFinishedAsTheWholeImageWouldBe) {
   const int reach = splat::finish_reach({true, true, true});  // near the image's edges the plain loops see less
   for (const Kernel kernel : {Kernel::kSquare, Kernel::kDisc}) {
     splat::CpuSplatter splatter(2);
-    // Stages come and go, and with them the tiles' layout.
+    // Switching stages on and off changes the tiles' layout.
     for (const int stages : {7, 1, 0, 2, 4, 3, 7}) {
       const splat::Finish finish{(stages & 1) != 0, (stages & 2) != 0, (stages & 4) != 0};
       const Frame expected = testing::splat_plainly(list, camera, kernel, shading, finish);
@@ -155,8 +155,8 @@ TEST(CpuSplatter, NearestPointWins) {
 }
 
 TEST(CpuSplatter, OverlapOfASlantedSurfaceGoesToTheNearestCentre) {
-  // Two samples a pixel apart on a receding surface: the pixel at the farther one's centre, which the nearer one's
-  // splat covers too, shows the farther one. A focal length of 300 pixels resolves 18 degrees at size 3, one of 1280 54
+  // Two samples a pixel apart on a receding surface: the pixel at the farther centre, which the nearer splat covers
+  // too, shows the farther sample. A focal length of 300 pixels resolves 18 degrees at size 3, one of 1280 pixels 54
   // degrees.
   const double slope = std::tan(15 * 3.14159265 / 180) / testing::front_camera(kWidth, kHeight).focal_x();
   HandMadeItem a(kLeaf), b(kLeaf);
@@ -168,7 +168,7 @@ TEST(CpuSplatter, OverlapOfASlantedSurfaceGoesToTheNearestCentre) {
 }
 
 TEST(CpuSplatter, HalfResolutionSamplesFillTheirBlocks) {
-  // Samples at the pixel centres of a half-size frame, seen at the same pose: each fills just its 2 x 2 block.
+  // Samples at the pixel centres of a half-size frame, seen at the same pose: each fills its 2 x 2 block.
   const geometry::Camera half = testing::front_camera(kWidth / 2, kHeight / 2);
   HandMadeItem item(kLeaf);
   for (int y = 90; y < 110; ++y)
@@ -313,7 +313,7 @@ TEST(SplatTable, SizesRoundAsStated) {
   EXPECT_EQ(splat::disc_diameter(0.1f), 1.0f);
 }
 
-// Bilinear between the centres of the pixels drawn, for odd sizes and parts of pictures, too.
+// Linear between the centres of the pixels drawn, also for odd sizes and parts of pictures.
 TEST(CpuSplatter, HalvedFramesAreInterpolated) {
   for (const auto& [width, height] : {std::pair{600, 400}, {601, 399}}) {
     const geometry::Camera camera = testing::front_camera(width, height), small = geometry::half_size(camera);

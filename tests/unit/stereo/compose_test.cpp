@@ -1,4 +1,4 @@
-// Two pictures on one display, by place and by colour.
+// Two pictures on one display, side by side in place or mixed by colour.
 #include <gtest/gtest.h>
 
 #include "client/stereo/compose.h"
@@ -7,7 +7,7 @@
 namespace telesplat::stereo {
 namespace {
 
-// Every pixel tells its eye, column and row.
+// Every pixel encodes its eye, column and row.
 image::View picture(uint32_t eye, int width, int height) {
   image::View v{width, height, {}, {}};
   for (int y = 0; y < height; ++y)
@@ -41,7 +41,7 @@ TEST(StereoModes, SizesFitTheDisplay) {
   for (const auto& name : mode_names()) {
     const Mode mode = *mode_named(name);
     const Size eye = eye_size(mode, display);
-    if (mode == Mode::kQuadBuffer) {  // a buffer for each
+    if (mode == Mode::kQuadBuffer) {  // a buffer for each eye
       EXPECT_EQ(eye, display);
       EXPECT_EQ(composed_size(mode, eye), (Size{2 * display.width, display.height}));
       continue;
@@ -118,7 +118,7 @@ TEST(StereoAnaglyph, GreyIsLumaAndColoursAreChannels) {
   }
 }
 
-// Greys stay as they are: rows of both matrices together add up to 1.
+// Greys stay the same: the rows of both matrices together add up to 1.
 TEST(StereoAnaglyph, GreysKeepTheirLight) {
   for (uint32_t g = 0; g < 256; ++g) {
     const uint32_t grey = g * 0x010101, out = through_glasses(Mode::kAnaglyphDubois, grey, grey);
@@ -127,7 +127,7 @@ TEST(StereoAnaglyph, GreysKeepTheirLight) {
   }
 }
 
-// The red filter passes what the left eye is to see, the cyan one next to nothing of it.
+// The red filter passes the left eye's picture, the cyan one next to none of it.
 TEST(StereoAnaglyph, DuboisPartsTheEyes) {
   const uint32_t left_alone = through_glasses(Mode::kAnaglyphDubois, 0xffffff, 0),
                  right_alone = through_glasses(Mode::kAnaglyphDubois, 0, 0xffffff);

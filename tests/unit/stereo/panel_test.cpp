@@ -71,7 +71,7 @@ TEST(PanelFile, TheExamplesSuitTheirDistance) {
   }
 }
 
-// A panel of other geometry shows eyes that are too far away more of each other's picture.
+// On a panel of other geometry, eyes that are too far away see more of each other's picture.
 TEST(Panel, CrosstalkGrowsAwayFromTheBestDistance) {
   Panel p = small_panel();
   p.lines.guard = 0;
@@ -125,7 +125,7 @@ TEST(Interleaver, PicturesAreStretchedLinearly) {
   Interleaver interleaver(p);
   image::View small{2, 1, {0x000000, 0xffffff}, {}}, out;
   interleaver.compose(eyes, small, small, out);
-  // From the middle of the one to the middle of the other the colour rises evenly; beyond, nothing changes.
+  // From the middle of one to the middle of the other the colour rises evenly; outside it stays the same.
   for (const int x : {0, 79, 120, 160, 200, 240, 319}) {
     const double share = std::clamp((x + 0.5) / 160 - 0.5, 0.0, 1.0);
     for (const int shift : {0, 8, 16}) EXPECT_NEAR(double(out.colour[size_t(x)] >> shift & 255), 255 * share, 1.5) << x;

@@ -1,4 +1,4 @@
-// Configurations against the first one.
+// Configurations compared with the first one.
 #include "tools/telesplat/sweep/tables.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// Three configurations; what varies in the figures is the inter-frame delay.
+// Three configurations that differ in one figure, the inter-frame delay.
 SweepRecord record_of(const std::vector<std::vector<double>>& delays) {
   SweepRecord out;
   out.grid.scene = "julia";

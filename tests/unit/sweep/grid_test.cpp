@@ -1,4 +1,4 @@
-// The grid of a sweep: what --vary means, which cells there are, what they are called, in which order they run.
+// The grid of a sweep: the meaning of --vary, the cells, their names and the order in which they run.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -12,7 +12,7 @@ namespace {
 
 class SweepGrid : public ::testing::Test {
  protected:
-  // The axes of these --vary; what is wrong instead, if something is.
+  // Adds the axes of these --vary. Returns the first error, or "".
   std::string vary(const std::vector<std::string>& texts) {
     for (const auto& text : texts)
       if (const Status s = add_axis(text, flags, grid.axes); !s) return s.error().text;

@@ -1,4 +1,4 @@
-// What a sweep remembers: it goes on where it was, grows, and does not mix with another.
+// A sweep's manifest: the sweep resumes where it stopped, grows, and does not mix with another.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -75,7 +75,7 @@ TEST_F(SweepManifest, IsNotThereOrSaysWhatIsWrong) {
     std::ofstream(folder + "/sweep.json") << text;
     EXPECT_FALSE(read_manifest(folder)) << text;
   }
-  // A name by which a run would be written elsewhere.
+  // A name that would put a run's files elsewhere.
   Manifest m = begin_manifest(small(), "1.0", "/here");
   m.configurations[0].name = "../elsewhere";
   ASSERT_TRUE(write_manifest(m, folder));
@@ -120,9 +120,9 @@ TEST_F(SweepManifest, WhatIsNotDoneIsToDo) {
   Manifest m = begin_manifest(small(), "1.0", "/here");
   EXPECT_EQ(list(Sweep(m, folder, "", 0).to_do()), "0/1 1/1 2/1 3/1 0/2 1/2 2/2 3/2 ");
   for (const auto& c : {0, 1, 2}) m.outcomes[{m.configurations[size_t(c)].name, 1}] = done_in(3);
-  m.outcomes[{m.configurations[2].name, 1}].done = false;  // it failed: again
+  m.outcomes[{m.configurations[2].name, 1}].done = false;  // failed: it runs again
   complete(m, 0, 1);
-  complete(m, 2, 1);  // and 1's record is gone
+  complete(m, 2, 1);  // the record of configuration 1 is gone
   EXPECT_EQ(list(Sweep(m, folder, "", 0).to_do()), "1/1 2/1 3/1 0/2 1/2 2/2 3/2 ");
 }
 

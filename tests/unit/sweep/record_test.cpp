@@ -1,4 +1,4 @@
-// What a sweep found: figures, noise, tables.
+// A sweep's results: figures, noise, tables.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 namespace telesplat::launcher {
 namespace {
 
-// Two configurations of `delays.size()` runs; the first one's inter-frame delays.
+// Two configurations of `delays.size()` runs each, with the first one's inter-frame delays.
 SweepRecord record_of(const std::vector<double>& delays) {
   SweepRecord out;
   out.grid.scene = "julia";
@@ -85,7 +85,7 @@ TEST(SweepNoise, LatencyCountsAndOtherFiguresDoNot) {
   EXPECT_STREQ(found[0].figure->name, "view_update_latency_ms.median");
 }
 
-// The table, read as others read it.
+// The table as other programs read it.
 tools::CsvTable read_csv(const SweepRecord& record) {
   const std::string path = (std::filesystem::temp_directory_path() / "telesplat-sweep-test.csv").string();
   std::ofstream(path) << to_csv(record);

@@ -1,4 +1,4 @@
-// Tables of comma-separated values: what is taken, and up to which limits.
+// Tables of comma-separated values: accepted texts, and limits.
 #include "tools/common/csv_table.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ Result<CsvTable> read(const std::string& text, const CsvTable::Limits& limits = 
   return CsvTable::read(file.path(), limits);
 }
 
-// A text that is so short lies in its string, and moves with it. runs_fuzz found it.
+// A short text lies within its std::string, and moves with it. runs_fuzz found the error.
 TEST(CsvTable, MovesWithItsText) {
   auto table = read("a,b\n1,2\n3,x\n");
   ASSERT_TRUE(table) << table.error().text;

@@ -1,4 +1,4 @@
-// JSON files that may be anything by now.
+// JSON files with any content.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Tables for people line up, whatever stands in them.
+// Tables for people line up, with any texts in their cells.
 #include "tools/common/text_table.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What the relay understands: its flags, and clients that say where they want to go.
+// The relay's input: its flags, and clients that name their destination.
 #include <gtest/gtest.h>
 
 #include "tools/wan_relay/options.h"

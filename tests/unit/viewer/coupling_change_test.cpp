@@ -1,5 +1,4 @@
-// Couplings that change while a viewer runs: credits, the gate, what is held back, and what happens when no update
-// comes.
+// Couplings that change while a viewer runs: credits, the gate, updates held back, and requests that get no update.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -65,7 +64,7 @@ TEST(ChangedCoupling, AsynchronouslyNothingIsWaitedForAnyMore) {
   EXPECT_TRUE(c.completed({2}, 1).empty()) << "what was asked for before counts no more";
 }
 
-// Whatever is ordered when: credits are never exceeded, no update is displayed twice, and nothing hangs.
+// In any order of events: the credits are never exceeded, no update is displayed twice, and nothing hangs.
 TEST(ChangedCoupling, NeverHangsAndNeverRepeats) {
   for (uint32_t seed = 1; seed <= 100; ++seed) {
     std::mt19937 random(seed);
@@ -108,7 +107,7 @@ TEST(ChangedCoupling, NeverHangsAndNeverRepeats) {
 }
 
 TEST(ChangedCoupling, ADisplayThatWaitsIsWokenAtOnce) {
-  // The change comes before the display waits or, most often, after.
+  // The change comes before the display waits or, most often, afterwards.
   for (int i = 0; i < 100; ++i) {
     CouplingGate gate(kSync);
     const double begin_s = monotonic_s();
@@ -141,13 +140,13 @@ TEST(ChangedRequests, ArePacedByCreditsOrByTheirRate) {
   const auto later = requester.next(2);
   ASSERT_TRUE(later);
   EXPECT_EQ(later->buffers, 0u);
-  // What was asked for in order is answered all the same.
+  // Requests made in order are answered all the same.
   EXPECT_TRUE(requester.on_part({.viewer = {5}, .request = second->request, .complete = true}, 2.05));
   EXPECT_TRUE(requester.on_part({.viewer = {5}, .request = third->request, .complete = true}, 2.1));
   EXPECT_TRUE(requester.on_part({.viewer = {5}, .request = later->request, .complete = true}, 2.2));
 }
 
-// Credits may ask more often than the rate allows; that is no debt.
+// Requests by credits may have come more often than the new rate allows; that makes no debt.
 TEST(ChangedRequests, TheRateBeginsAnew) {
   ViewRequester requester{{.sampling_width = 640, .sampling_height = 400, .max_rate_hz = 10, .buffers = 2}, {5}};
   requester.on_pose(0, geometry::make_camera({}, 90, 1280, 800));

@@ -1,4 +1,4 @@
-// Credits of synchronous and loose coupling: what may be asked for, what is displayed next, what happens without
+// Credits of synchronous and loose coupling: requests that may be made, the update to display next, requests without
 // answers.
 #include <gtest/gtest.h>
 
@@ -133,8 +133,8 @@ TEST(Coupling, GivesUpWhatALaterUpdateWaitsFor) {
   EXPECT_EQ(c.open(), Requests{{3}});
 }
 
-// Whatever is lost, reordered or repeated: credits are never exceeded, updates are displayed in order and once, and
-// nothing hangs.
+// With updates lost, reordered or repeated: the credits are never exceeded, updates are displayed in order and once,
+// and nothing hangs.
 TEST(Coupling, NeverExceedsItsBuffersAndNeverHangs) {
   for (uint32_t seed = 1; seed <= 200; ++seed) {
     std::mt19937 random(seed);
@@ -145,7 +145,7 @@ TEST(Coupling, NeverExceedsItsBuffersAndNeverHangs) {
     uint64_t next = 1, last_displayed = 0, frames = 0;
     double now_s = 0, last_frame_s = 0;
     const auto ask = [&](RequestId id) {
-      if (random() % 10 != 0) at_master.insert(id.value);  // else it is lost
+      if (random() % 10 != 0) at_master.insert(id.value);  // otherwise it is lost
     };
     for (int step = 0; step < 3000; ++step) {
       now_s += 0.02;
@@ -156,7 +156,7 @@ TEST(Coupling, NeverExceedsItsBuffersAndNeverHangs) {
       ASSERT_LE(c.open().size() + size_t(c.filled()), size_t(buffers));
       Requests released;
       for (const RequestId id : c.overdue(now_s, released)) ask(id);
-      if (random() % 200 == 0) at_master.clear();  // another master
+      if (random() % 200 == 0) at_master.clear();  // another master, which has no requests
       if (!at_master.empty() && random() % 3 == 0) {
         auto answered = at_master.begin();
         if (!in_order && random() % 4 == 0) answered = std::prev(at_master.end());
@@ -173,7 +173,7 @@ TEST(Coupling, NeverExceedsItsBuffersAndNeverHangs) {
         last_frame_s = now_s;
         c.displayed();
       }
-      // Lost one after the other, each request costs the patience.
+      // If they are lost one after the other, each request costs the patience.
       ASSERT_LT(now_s - last_frame_s, Coupling::kPatience_s * 10) << "seed " << seed;
     }
     EXPECT_GT(frames, 20u);
@@ -220,7 +220,7 @@ TEST(BufferedRequests, ArePacedByCreditsAndKeepTheirIdsWhenAskedAgain) {
   EXPECT_EQ(again[0].request, first->request);
   EXPECT_EQ(again[1].request, second->request);
   EXPECT_EQ(again[0].camera.pose.position_room, glm::dvec3(1, 2, 3)) << "for the view that is wanted now";
-  // Answers out of order are answers too.
+  // Answers out of order count too.
   ViewPart part{.viewer = {5}, .request = second->request, .complete = true};
   EXPECT_TRUE(requester.on_part(part, 13));
   part.request = first->request;

@@ -92,7 +92,7 @@ TEST_F(Requester, AMovingHeadGetsAWiderViewWithinTheLimit) {
 TEST_F(Requester, AnUpdateIsMeasuredFromRequestToItsLastPart) {
   requester.on_pose(0, display);
   const RequestId first = requester.next(0)->request, second = requester.next(1)->request;
-  EXPECT_FALSE(requester.on_part(part_of(part(second, 1, 3, kOther)), 1.1).has_value());  // somebody else's
+  EXPECT_FALSE(requester.on_part(part_of(part(second, 1, 3, kOther)), 1.1).has_value());  // another viewer's part
   EXPECT_FALSE(requester.on_part(part_of(part(second, 0, 2)), 1.2).has_value());
   const auto update = requester.on_part(part_of(part(second, 1, 2)), 1.5);
   ASSERT_TRUE(update.has_value());
@@ -136,7 +136,7 @@ TEST_F(Requester, AHeadThatTremblesAsksForTheSameViewAgain) {
   requester.on_pose(0, display);
   const geometry::Camera first = requester.next(0)->camera;
   const double quarter_rad = ViewRequester::kDeadBand_px / display.focal_x();
-  // Slow, so that it counts as resting; half of the dead band to one side, then to the other.
+  // Slow, so that the head counts as resting; half of the dead band to one side, then to the other.
   double now_s = 0;
   for (const double turn : {0.5, -0.5, 0.9, 0.0}) {
     display.pose = turned(turn * quarter_rad, {0, 0, 0});
@@ -150,20 +150,20 @@ TEST_F(Requester, AHeadThatTremblesAsksForTheSameViewAgain) {
     return screen_movement(asked.pose, display.pose, ViewRequester::kNearest_m, display.focal_x());
   };
   EXPECT_LT(apart_px(next), 5e-3) << "what is displayed, but for what is short";
-  // It drifts, in steps that are small each: the dead band is about what was asked for, not about the step before.
+  // The head drifts in small steps: the dead band is measured from the last camera requested, not from the last step.
   display.pose = turned(1.9 * quarter_rad, {0, 0, 0});
   for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
   EXPECT_TRUE(requester.next(now_s)->camera == next);
   display.pose = turned(2.6 * quarter_rad, {0, 0, 0});
   for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
   EXPECT_FALSE(requester.next(now_s)->camera == next);
-  // Metres count as well.
+  // Metres count as well as angles.
   display.pose.position_room.x += ViewRequester::kNearest_m * 1.1 * quarter_rad;
   for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
   EXPECT_LT(apart_px(requester.next(now_s)->camera), 5e-3);
 }
 
-// Every update says its camera.
+// A short camera takes few bytes, and every update contains its camera.
 TEST_F(Requester, AsksForCamerasThatAreShort) {
   display.pose = turned(0.123456789, {1.0 / 3, 1.0 / 7, -1.0 / 9});
   requester.on_pose(0, display);
@@ -172,7 +172,7 @@ TEST_F(Requester, AsksForCamerasThatAreShort) {
 
 TEST_F(Requester, KeepsItsRateWhoeverLooksLate) {
   int count = 0;
-  // 10 a second, looked at every 0.013 s: a period that began with the last request would lose 4 % of them.
+  // 10 requests a second, polled every 0.013 s: a period that began with the last request would lose 4 % of them.
   for (int i = 0; i < 1540; ++i) {
     const double now_s = 100 + 0.013 * i;
     requester.on_pose(now_s, display);
@@ -181,7 +181,7 @@ TEST_F(Requester, KeepsItsRateWhoeverLooksLate) {
   }
   EXPECT_GE(count, 200);
   EXPECT_LE(count, 202);
-  // After a pause there are no more at once than one.
+  // A pause saves up no requests: at most one goes out at once.
   requester.on_pose(200, display);
   EXPECT_TRUE(requester.next(200).has_value());
   EXPECT_FALSE(requester.next(200.05).has_value());
@@ -190,7 +190,7 @@ TEST_F(Requester, KeepsItsRateWhoeverLooksLate) {
 class SteeredRequester : public Requester {
  protected:
   SteeredRequester() { requester.set_steered(true); }
-  // Requests within `for_s` of a head that moves by so many metres a second; each is answered after 50 ms.
+  // Returns the number of requests within `for_s` of a head that moves at speed_m_s; each is answered after 50 ms.
   int requests(double for_s, uint64_t kept, double speed_m_s = 0, uint64_t left_out = 0) {
     int count = 0;
     for (const double end_s = now_s + for_s; now_s < end_s; now_s += 0.01) {
@@ -247,7 +247,7 @@ TEST_F(SteeredRequester, TheNextViewIsAskedForWhenTheLastOneIsComplete) {
   }
   ASSERT_GT(asked_s.size(), 9u);
   for (size_t i = 1; i < asked_s.size(); ++i) EXPECT_EQ(asked_s[i], answered_s[i - 1]);
-  // One that is lost does not stop it for good.
+  // A lost request does not stop the requester for good.
   int count = 0;
   for (const double end_s = now_s + 2; now_s < end_s; now_s += 0.01) {
     display.pose.position_room.x += 0.005;
@@ -379,7 +379,7 @@ TEST_F(AdaptiveRequester, SamplesAsFinelyAsTheLatencyAllows) {
   for (int i = 0; i < 30; ++i) c = cycle(1e9, true);
   EXPECT_NEAR(density(c), 1.0, 0.01);  // no finer than the display
   for (int i = 0; i < 30; ++i) c = cycle(1e5, true);
-  EXPECT_NEAR(density(c), 0.5, 0.01);  // no coarser than half of it
+  EXPECT_NEAR(density(c), 0.5, 0.01);  // no coarser than half of the display
 }
 
 TEST_F(AdaptiveRequester, SteeredSamplingGoesByOctavesAndOnlyWhereUpdatesAgree) {
@@ -407,7 +407,7 @@ TEST_F(AdaptiveRequester, OneSteeredViewThatWasSampledWholeAndTookFarTooLongIsEn
   EXPECT_NEAR(density(cycle(1e7, true, true)), 0.5, 0.01) << "0.41 s";
 }
 
-// Unseen surfaces that come into sight take longer than the views of known ones did.
+// Unseen surfaces that come into sight take longer than the views of known ones took.
 TEST_F(AdaptiveRequester, ASteeredViewOfATurningHeadIsWideHoweverFastTheLastOnesCame) {
   for (const bool steered : {false, true}) {
     requester.set_steered(steered);

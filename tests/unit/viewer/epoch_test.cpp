@@ -1,4 +1,4 @@
-// Which replica is displayed, what its draw lists say, and what is reported of them.
+// The replica on display, its draw lists, and the reports about the clusters that they drew.
 #include <gtest/gtest.h>
 
 #include "client/viewer/points/epoch_switch.h"
@@ -191,7 +191,7 @@ TEST_F(Cache, WhatAFrameDrawsLivesUntilItsEnd) {
   insert(kThree);
   cache.show_newest();
   cache.free_dropped();
-  EXPECT_EQ(sum(), before);  // the address sanitizer sees what was freed
+  EXPECT_EQ(sum(), before);  // the address sanitizer finds clusters that were freed too early
   cache.end_frame();
   EXPECT_EQ(select().epoch, kThree);
   cache.end_frame();

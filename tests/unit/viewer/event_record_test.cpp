@@ -1,5 +1,5 @@
-// The record of point-model events: what a viewer applied comes back as it was, and nothing that a file may hold does
-// harm.
+// The record of point-model events: the replay gives back the events that a viewer applied, and a file of any content
+// does no harm.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -56,7 +56,7 @@ ModelEvent as_received(const packer::Event& e) {
           e.blob};
 }
 
-// What a packer published: three views, some clusters forgotten, a new epoch, another view.
+// A packer's events: three views, some clusters forgotten, a new epoch, another view.
 std::vector<packer::Event> published(int width, int tile) {
   packer::Config config = test::packer_config();
   config.obsolete_after_s = 5;
@@ -155,7 +155,7 @@ class EventRecord : public testing::Test {
     std::memcpy(body.data() + 8, &brick, 4);
     return part("summary", body);
   }
-  // The error of replaying it all; empty: none.
+  // Replays the whole file; returns the error or "".
   std::string error_of(const std::string& content) const {
     write(content);
     auto replay = EventReplay::open(path_, true);
@@ -224,7 +224,7 @@ TEST_F(EventRecord, EventsAreSkippedToButNeverPassed) {
     ASSERT_TRUE((*replay)->advance(events[to].sequence).ok());
     EXPECT_EQ((*replay)->applied(), events[to].sequence);
     EXPECT_EQ((*replay)->model()->digest(), expected[to]);
-    ASSERT_TRUE((*replay)->advance(events[to / 2].sequence).ok());  // behind it: nothing changes
+    ASSERT_TRUE((*replay)->advance(events[to / 2].sequence).ok());  // before its position: nothing changes
     EXPECT_EQ((*replay)->applied(), events[to].sequence);
   }
 }
@@ -236,7 +236,7 @@ TEST_F(EventRecord, AnotherPackerBeginsAnotherReplica) {
     auto recorder = EventRecorder::open(path_, 1u << 30);
     for (int replica = 0; replica < 2; ++replica) {
       (*recorder)->begin_replica(test::scene_config());
-      (*recorder)->begin_replica(test::scene_config());  // one that held nothing
+      (*recorder)->begin_replica(test::scene_config());  // the replica before held nothing
       for (const auto& e : events) (*recorder)->add(as_received(e));
     }
     (*recorder)->flush();
@@ -254,7 +254,7 @@ TEST_F(EventRecord, AnotherPackerBeginsAnotherReplica) {
   ASSERT_FALSE(none.ok());
   EXPECT_NE(none.error().text.find(path_), std::string::npos);
 
-  // Straight to the second one, before anything was applied.
+  // Straight to the second replica, before any event was applied.
   auto second = EventReplay::open(path_);
   ASSERT_TRUE((*second)->next_replica().ok());
   ASSERT_TRUE((*second)->advance(events[0].sequence).ok());
@@ -284,7 +284,7 @@ TEST_F(EventRecord, CutAtEveryLengthItEndsBeforeTheCut) {
   const auto expected = digests(events);
   record(events);
   const std::string whole = bytes();
-  std::vector<size_t> ends;  // of each event
+  std::vector<size_t> ends;  // end of each event
   size_t end = 8 + part("replica", std::string(32, '\0')).size();
   for (const auto& e : events) ends.push_back(end += event(e).size());
   ASSERT_EQ(ends.back(), whole.size());
@@ -307,7 +307,7 @@ TEST_F(EventRecord, CutAtEveryLengthItEndsBeforeTheCut) {
   }
 }
 
-// What a frame of three events and one summary displayed, as it was then: later summaries are not made yet.
+// A replayed frame has the draw list that it had on display, though summaries were made between the frames.
 TEST_F(EventRecord, SummariesAreMadeAgainAtTheirPlace) {
   const auto events = published(120, 60);
   ASSERT_GT(events.size(), 8u);
@@ -436,7 +436,7 @@ TEST_F(EventRecord, ASparseFileAllocatesNothing) {
   const uint64_t claimed = uint64_t{1} << 40;
   std::memcpy(content.data() + content.size() - 16, &claimed, 8);
   std::ofstream(path_, std::ios::binary) << content;
-  fs::resize_file(path_, uint64_t{1} << 41);  // a hole: the claim is within the file
+  fs::resize_file(path_, uint64_t{1} << 41);  // a hole: the size claimed lies within the file
   auto replay = EventReplay::open(path_);
   ASSERT_TRUE(replay.ok());
   EXPECT_TRUE((*replay)->advance(Sequence{100}).ok());

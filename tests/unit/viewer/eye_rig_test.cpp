@@ -1,4 +1,4 @@
-// Where the eyes of a display's head are, what is sampled for them, and what is made of their pictures.
+// Eyes of a display's head: their places, the views sampled for them, and the pictures composed of theirs.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -65,14 +65,14 @@ TEST(EyeRig, APanelIsAWindowIntoAScaledRoom) {
   const double fov_deg = 2 * std::atan(0.32 / 0.8) * 180 / 3.14159265358979323846;
   const geometry::Camera head = geometry::make_camera(geometry::look_at({0, 0, 1}, {0, 0, 0}), fov_deg, 64, 64);
   EyeRig rig(o);
-  // The screen is twice as far away in the room: all is twice as large there.
+  // The screen is twice as far away in the room: all lengths there are twice as large.
   const EyePair pair = rig.eyes(head, 0, kScene);
   EXPECT_NEAR(glm::distance(pair.eyes[0].pose.position_room, pair.eyes[1].pose.position_room), 0.128, 1e-9);
   EXPECT_NEAR((pair.head.top - pair.head.bottom) / (pair.head.right - pair.head.left), 200.0 / 320, 1e-9);
   const auto before = stereo::eyes_of(panel, pair.eyes);
   EXPECT_LT(glm::distance(before[0], glm::dvec3(-0.032, 0, 0.8)), 1e-9);
   EXPECT_LT(glm::distance(before[1], glm::dvec3(0.032, 0, 0.8)), 1e-9);
-  // A head that is tracked: the eyes are where it is, and where its turn puts them.
+  // A tracked head: the eyes follow its place and its turn.
   o.tracked_head = geometry::Trajectory::still({{0.1, -0.05, 0.7}, glm::angleAxis(0.5, glm::dvec3(0, 0, 1))});
   EyeRig tracking(o);
   const auto tracked = stereo::eyes_of(panel, tracking.eyes(head, 0, kScene).eyes);
@@ -92,7 +92,7 @@ TEST(EyeRig, AWallsScreenIsWhereItIsAndEyesLieBesideEachOtherAsTheHeadTurns) {
   EXPECT_NEAR(pair.screen_m, distance_m, 1e-9);
   const glm::dvec3 apart = pair.eyes[1].pose.position_room - pair.eyes[0].pose.position_room;
   EXPECT_LT(glm::distance(apart, turned * glm::dvec3(0.07, 0, 0)), 1e-9);
-  // Both see the screen's corners at the edges of their pictures.
+  // Both eyes see the screen's corners at the edges of their pictures.
   const geometry::Screen screen = geometry::screen_before(camera, distance_m);
   EXPECT_NEAR(screen.width_m, width_m, 1e-9);
   for (const auto& eye : pair.eyes) {
@@ -111,7 +111,7 @@ TEST(EyeRig, SwappedEyesSwapTheirPlaces) {
   EXPECT_EQ(out.colour, (std::vector<uint32_t>{2, 2, 1, 1}));
 }
 
-// Whatever the mode, the middle of the display, or of its left half, is the middle of a picture.
+// In every mode, the middle of the display, or of its left half, is the middle of a picture.
 TEST(EyePictures, APlaceOfTheDisplayIsOneOfItsPicture) {
   struct Case {
     stereo::Mode mode;
@@ -133,7 +133,7 @@ TEST(EyePictures, APlaceOfTheDisplayIsOneOfItsPicture) {
   }
 }
 
-// While the display waits the head moves on, and what is asked about is the frame that is to be seen.
+// While the display waits the head moves on; a place asked for belongs to the frame on display.
 TEST(EyePictures, APlaceIsThatOfTheFrameOnDisplay) {
   EyePictures eyes({.mode = stereo::Mode::kSideBySide, .screen_m = 1});
   eyes.begin(0, head_at(1), head_at(1).pose.orientation, 0, kScene);

@@ -1,4 +1,4 @@
-// What finer rays of a view have met: kept for its eye alone, looked up for any picture of it.
+// Results of a view's finer rays: kept for that view's eye alone, and looked up for any picture from there.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ geometry::Camera finer(int times) {
   return c;
 }
 
-// A tile in which some rays met nothing, and some something two metres away.
+// A tile with rays that met no surface and rays that met one two metres away.
 struct Sampled {
   Sampled(int times, const geometry::Rect& r) : camera(finer(times)), rect(r), missed(r.width, r.height) {
     image = image::DepthImage(r.width, r.height);
@@ -45,7 +45,7 @@ float at(const FineRays& rays, const geometry::Camera& camera, int x, int y, Epo
   return met_m[size_t(y) * size_t(camera.width) + size_t(x)];
 }
 
-// Rays that met nothing, left of a surface 2 m away.
+// Rays that met no surface, left of a surface 2 m away.
 void add_surface(FineRays& rays) {
   Sampled fine(4, {600, 300, 80, 40});
   for (int y = 300; y < 340; ++y)
@@ -65,7 +65,7 @@ TEST(FineRays, TellWhatEachRayMet) {
   const geometry::Camera part = geometry::crop(finer(4), {590, 290, 40, 20});
   EXPECT_EQ(at(rays, part, 10, 10), kInf);
   EXPECT_NEAR(at(rays, part, 11, 10), 2, 1e-3);
-  // A picture with other pixels shows the ray nearest to each.
+  // A picture with other pixels shows the ray nearest to each pixel.
   geometry::Camera other = finer(4);
   other.width = 1000, other.height = 625;
   EXPECT_EQ(at(rays, other, 469, 234), kInf) << "at 600.96, 300.16 of the rays";
@@ -80,7 +80,7 @@ TEST(FineRays, TheFinestOnesCount) {
   rays.add(Sampled(4, {600, 300, 40, 40}).hit(600, 300).tile());
   rays.add(Sampled(2, {310, 160, 20, 20}).miss(310, 160).tile());
   EXPECT_NEAR(at(rays, finer(4), 600, 300), 2, 1e-3);
-  // There is no third size.
+  // Rays of a third size are not kept.
   FineRays three;
   add_surface(three);
   for (const int times : {2, 3}) three.add(Sampled(times, {0, 0, 4, 4}).miss(0, 0).tile());
@@ -93,7 +93,7 @@ TEST(FineRays, AreOfOneEye) {
   FineRays rays;
   rays.add(Sampled(4, {600, 300, 40, 40}).miss(600, 300).hit(640 - 1, 300).tile());
   geometry::Camera beside = finer(4);
-  beside.pose.position_room.x += 4e-4;  // moves what is 0.3 m away by 0.9 rays: something may be as near
+  beside.pose.position_room.x += 4e-4;  // moves a surface 0.3 m away by 0.9 rays: there may be one as near
   EXPECT_EQ(at(rays, beside, 600, 300), kInf);
   beside.pose.position_room.x += 2e-4;
   EXPECT_EQ(at(rays, beside, 600, 300), 0);
@@ -102,7 +102,7 @@ TEST(FineRays, AreOfOneEye) {
   EXPECT_EQ(at(nothing_met, finer(4), 600, 300), kInf);
   EXPECT_EQ(at(nothing_met, beside, 600, 300), 0) << "it is not known how near things are";
 
-  // The same eye looks elsewhere: what lies in another direction has another depth.
+  // The same eye looks elsewhere: the depth of a point depends on the direction of the look.
   geometry::Camera turned =
       geometry::make_camera({{0, 0, 0}, glm::angleAxis(0.3, glm::dvec3(0, 1, 0))}, 100, 1280, 800);
   std::vector<float> met_m;
@@ -128,13 +128,13 @@ TEST(FineRays, AreOfOneEye) {
   moved.follow(elsewhere);
   EXPECT_EQ(at(moved, finer(4), 620, 320), 0);
 
-  // A view from elsewhere begins anew.
+  // A view from another place begins anew.
   Sampled next(4, {0, 0, 8, 8});
   next.camera.pose.position_room.z += 0.5;
   rays.add(next.miss(1, 1).tile());
   EXPECT_EQ(at(rays, finer(4), 600, 300), 0);
   EXPECT_EQ(at(rays, next.camera, 1, 1), kInf);
-  // So does an epoch.
+  // So does a new epoch.
   Sampled later(4, {0, 0, 8, 8});
   later.camera = next.camera;
   rays.add(later.miss(2, 2).tile({9}));
@@ -146,7 +146,7 @@ TEST(FineRays, WhatOthersMeetWhereTheyMetNothingIsForgotten) {
   FineRays rays;
   add_surface(rays);
   Sampled view(1, {140, 70, 40, 40});
-  view.hit(155, 80, 2);  // 620 to 623, 320 to 323 of the finest
+  view.hit(155, 80, 2);  // 620 to 623, 320 to 323 of the finest rays
   rays.revise(view.camera, view.rect, view.image);
   for (const auto& [x, y] : {std::pair{620, 320}, {623, 323}, {620, 323}, {622, 322}})
     EXPECT_EQ(at(rays, finer(4), x, y), 0) << x << ", " << y;
@@ -217,7 +217,7 @@ TEST(FineRays, TellWhereSomethingChanged) {
   changes.clear();
   rays.take_changes(kView, changes);
   EXPECT_TRUE(changes.empty());
-  // Nobody takes them for long: then they are one.
+  // If the changes are not taken for long, they become one.
   for (int i = 0; i < 10'000; ++i) rays.add(Sampled(4, {i % 100, 300, 4, 4}).tile());
   rays.take_changes(kView, changes);
   EXPECT_LT(changes.size(), 5000u);

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kBudget_ms = 14;
 
-// Share of all points drawn at this detail. Mosaics' ratios are spread evenly over an octave, or all are 1; each thins
-// out as between_levels does.
+// Share of all points drawn at this detail. Mosaics' ratios are spread evenly over an octave, or all are 1; each mosaic
+// thins out as in between_levels.
 double points_drawn(double detail, int ratios) {
   const auto passed = [](double wanted) {
     const double t = (wanted - splat::kTransitionBegin) / (splat::kTransitionEnd - splat::kTransitionBegin);
@@ -31,7 +31,7 @@ double points_drawn(double detail, int ratios) {
   return sum / ratios;
 }
 
-// Time of a frame in budgets: `load` at full detail, of which `fixed` is a part that does not depend on points.
+// Time of a frame in budgets: `load` at full detail; the share `fixed` of it does not depend on points.
 double levels_time(double detail, double load, double fixed, int ratios) {
   return load * (fixed + (1 - fixed) * points_drawn(detail, ratios) / points_drawn(1, ratios));
 }
@@ -43,7 +43,7 @@ struct Course {
     for (size_t i = load.size() - last; i < load.size(); ++i) n += load[i] > limit;
     return n / double(last);
   }
-  // Largest over least detail of the last frames.
+  // Largest over least detail among the last frames.
   double late_swing(size_t last) const {
     const auto [least, most] = std::minmax_element(detail.end() - std::ptrdiff_t(last), detail.end());
     return *most / *least;
@@ -99,7 +99,7 @@ TEST(FrameBudget, NoiseIsNotSeen) {
   }
 }
 
-// What a machine does whose frames of full size take `load` budgets, and `saved` times less at half their size.
+// Simulates frames that take `load` budgets, and load / saved at half size. Returns on() of each frame.
 std::vector<bool> halves(HalfSize& size, int frames, const std::function<double(int frame)>& load, double saved,
                          bool least = true) {
   std::vector<bool> out;
@@ -240,7 +240,7 @@ TEST(SpeedDetail, FallsWithSpeedAndIsFullSoonAfterStandingStill) {
     for (int i = 0; i < 60; ++i, t += 1 / 60.0, angle += speed_rad_s / 60) d.frame(t, turned(angle), 1);
     angle -= speed_rad_s / 60;  // stands still from here on
     EXPECT_LT(d.detail(), last);
-    // Slow movements cost nothing.
+    // Slow movements keep full detail.
     EXPECT_NEAR(d.detail(), std::clamp(SpeedDetail::kFreePixels / (640 * speed_rad_s / 60), kLeastDetail, 1.0), 0.01);
     last = d.detail();
     double previous = d.detail();

@@ -59,7 +59,7 @@ TEST_F(Spool, FramesComeBackAsTheyWere) {
   EXPECT_EQ(back->view.depth_m, expected.view.depth_m);
 }
 
-// An exception in the thread that writes: there is no memory for what it writes.
+// An exception in the thread that writes: it gets no memory for a frame.
 TEST_F(Spool, AFrameThatCannotBeMadeIsCountedAndOthersFollow) {
 #ifdef TELESPLAT_SANITIZED
   GTEST_SKIP() << "sanitizers need the memory that is taken away here";
@@ -92,7 +92,7 @@ TEST_F(Spool, AFullDiskIsSaidOnce) {
   auto spool = FrameSpool::open(directory_);
   ASSERT_TRUE(spool.ok());
   testing::internal::CaptureStdout();
-  const rlimit small{1000, before.rlim_max};  // no frame fits
+  const rlimit small{1000, before.rlim_max};  // smaller than a frame
   setrlimit(RLIMIT_FSIZE, &small);
   for (uint64_t i = 0; i < 20; ++i) {
     EXPECT_EQ((*spool)->exchange(frame(i, kPicture)).colour.size(), 200u) << "the display goes on";
@@ -144,7 +144,7 @@ TEST_F(Spool, TransparentPicturesHaveAlpha) {
   }
 }
 
-// Frames are compared with references, and people look at pictures.
+// Frames are compared with references, so legends go only onto the pictures that people look at.
 TEST_F(Spool, LegendsAreDrawnOntoPicturesAndLeaveFramesToVerifyAlone) {
   const auto large = [](uint64_t number, uint32_t use) {
     SpooledFrame f = frame(number, use);

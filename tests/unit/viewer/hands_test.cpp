@@ -1,4 +1,4 @@
-// Picking, measuring and clipping what the viewer holds, without any window, session or picture.
+// Picking, measuring and clipping the points that a viewer holds, without a window, a session or a picture.
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
@@ -16,7 +16,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// Two spheres, one before the other, of known depth: the front one red, the back one blue.
+// Two spheres of known depth, one before the other: the front one red, the back one blue.
 struct Balls {
   struct Ball {
     glm::dvec3 centre;
@@ -25,7 +25,7 @@ struct Balls {
   };
   std::vector<Ball> balls{{{0, 0, 0.15}, 0.1, 0xff0000}, {{0.05, 0.02, -0.15}, 0.2, 0x0000ff}};
 
-  // Depth along the axis, and what is there; nothing: no ball.
+  // Nearest ball on the ray through a pixel: its depth along the axis, place, normal and colour; nullopt: no ball.
   struct Hit {
     double depth;
     glm::dvec3 position, normal;
@@ -108,7 +108,7 @@ TEST(Picking, FindsTheSurfaceUnderEachPixel) {
 
 TEST(Picking, OfNothingFindsNothing) { EXPECT_FALSE(pick_point({}, display(), 10, 10)); }
 
-// Nothing that a plane cuts away is drawn; everything else is.
+// No point that a plane cuts away is drawn; all others are.
 TEST(ClipList, KeepsThePointsInsideAndNoOthers) {
   const auto model = Balls().model();
   const geometry::Camera c = display();
@@ -177,7 +177,7 @@ TEST(Picking, OfAVolumeGoesToWhereItHidesEnough) {
   const auto plain = [](int layer, uint32_t pixel) {
     return volume::SliceImage{layer, 0, 16, {0, 0, 80, 60}, std::vector<uint32_t>(80 * 60, pixel)};
   };
-  // A tenth hidden in front, nothing between, all behind.
+  // The front layer hides a tenth, the middle one nothing, the back one everything.
   const std::vector<volume::SliceImage> images{plain(0, 0x1a1a0000), plain(2, 0xff0000ff)};
   const auto frame = volume::make_volume_frame(grid, shear, images, {1}, {1}, 0);
 
@@ -196,7 +196,7 @@ TEST(Picking, OfAVolumeGoesToWhereItHidesEnough) {
   const std::vector<volume::SliceImage> thin{plain(0, 0x1a1a0000)};
   EXPECT_FALSE(pick_volume(volume::make_volume_frame(grid, shear, thin, {1}, {1}, 0), c, 40, 30, 0.5));
 
-  // Rays that run along the layers meet their planes as far away as numbers go.
+  // Rays that run along the layers meet their planes at the largest finite distances.
   const double half = std::sqrt(0.5);
   for (const double lean : {1e-5, 1e-9, 1e-12, 1e-15, -1e-12}) {
     geometry::Camera along = geometry::make_camera({{-60, 14.5, 9.5}, {half, 0, -half + lean, 0}}, 50, 80, 60);
@@ -213,7 +213,7 @@ scene::Colouring temperature() {
           .map = *colour::find_colour_map("viridis")};
 }
 
-// The colour map is undone: the value lies in the range that is told, and that is narrow.
+// The colour map is inverted: the value lies within a narrow range that the pick states.
 TEST(Values, AreFoundByTheirColours) {
   const scene::Colouring colouring = temperature();
   const auto table = scene::make_table(colouring);
@@ -285,7 +285,7 @@ TEST_F(Errands, APickIsToldInTheDatasTerms) {
   EXPECT_EQ(pick["colour"], "#102030");
   EXPECT_EQ(json["epoch"], 3);
   EXPECT_EQ(opacity, kPickOpacity);
-  // It is the viewer's own, so it tells no bound, but the question to the data server.
+  // The viewer's own pick states no error bound, but it has the question to the data server.
   EXPECT_FALSE(pick.contains("error"));
   EXPECT_TRUE(pick.contains("estimate"));
   const auto probe = scene::probe_from(pick["probe"].get<std::map<std::string, std::string>>());
@@ -298,7 +298,7 @@ TEST_F(Errands, APickIsToldInTheDatasTerms) {
   const auto both = nlohmann::json::parse(*two);
   EXPECT_NEAR(both["picks"][1]["data"][0].get<double>() - both["picks"][0]["data"][0].get<double>(), 16, 1e-3);
   EXPECT_EQ(opacity, 0.9);
-  // Where nothing is.
+  // A place without points.
   EXPECT_TRUE(nlohmann::json::parse(*order("pick", {{"at", "10,10"}}))["picks"][0].is_null());
 }
 

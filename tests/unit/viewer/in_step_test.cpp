@@ -1,4 +1,4 @@
-// What a display of a wall holds back until all of the wall's displays have it.
+// A wall's displays hold back models and frames until all of them have these.
 #include <gtest/gtest.h>
 
 #include "client/viewer/points/update_batches.h"
@@ -83,7 +83,7 @@ TEST_F(InStep, AnEpochWithoutAWholeViewIsShownAfterAWhile) {
   EXPECT_EQ(batches.newest(now_s + UpdateBatches::kReplicaPatience_s + 1).replica, 3u);
 }
 
-// Else an animation whose epochs follow each other fast would never be seen.
+// Otherwise an animation whose epochs follow each other fast would never be seen.
 TEST_F(InStep, AnEpochThatIsToBeShownIsNotPassedOver) {
   begin(0, 1);
   patch(1, 1);

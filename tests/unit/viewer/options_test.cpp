@@ -114,7 +114,7 @@ TEST(ViewerFlags, AreSettledOrRefused) {
   EXPECT_EQ(s.error().text, "--wall-tile 6: --wall 3x2 has the tiles 0..5");
 }
 
-// Written into a folder of the test's.
+// Writes a wall's description into the test's own folder; returns its path.
 std::string description(const std::string& anchor) {
   const std::string path = tests::own_folder() + anchor + ".toml";
   std::ofstream(path) << "[wall]\nanchor = \"" << anchor
@@ -240,7 +240,7 @@ TEST(LeastSampling, IsWhatTheSessionTellsWithinItsLimits) {
     requester.set_min_scale(told);
     geometry::Camera display = geometry::make_camera({}, 90, 2000, 2000);
     int width = 0;
-    // The head turns and every update takes far too long: sampling becomes as coarse as it may.
+    // The head turns and every update takes far too long: sampling becomes as coarse as allowed.
     for (int i = 0; i < 60; ++i) {
       const double now_s = i * 2.0;
       for (int k = 0; k < 5; ++k) {

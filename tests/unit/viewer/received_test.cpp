@@ -1,5 +1,5 @@
-// What a viewer receives: sessions that cannot be shown are refused, and one that changes its kind is followed picture
-// by picture.
+// A viewer's reception: it refuses sessions that it cannot show, and follows a session that changes its kind picture by
+// picture.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -87,8 +87,8 @@ TEST_F(Receiving, FeedsAreConnectedAnewWhereASessionIsElsewhere) {
   EXPECT_TRUE(feeds.connected()) << "nobody serves it now: what is open stays";
 }
 
-// A packer begins another model as soon as it hears of another box. Its first event comes over another connection than
-// the viewer's welcome.
+// A packer begins another model as soon as it gets another box. Its first event comes over another connection than the
+// viewer's welcome.
 TEST_F(Receiving, ABoxThatComesAfterItsPackersFirstEventCounts) {
   net::Socket patches(context, net::Kind::kPub, "patches"), state(context, net::Kind::kRouter, "state");
   ASSERT_TRUE(patches.bind("inproc://patches") && state.bind("inproc://state"));
@@ -102,7 +102,7 @@ TEST_F(Receiving, ABoxThatComesAfterItsPackersFirstEventCounts) {
     received->on_connected();
     return true;
   };
-  // Answers requests by what this packer has published, until the viewer knows of it.
+  // Answers requests with the events that this packer has published, until `until` is true.
   const auto serve = [&](InstanceId packer, const auto& until) {
     for (const double deadline = monotonic_s() + test::patient(20); !until() && monotonic_s() < deadline;) {
       while (const auto message = state.receive())

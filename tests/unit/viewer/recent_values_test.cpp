@@ -1,4 +1,4 @@
-// What was measured in the last seconds.
+// Values measured in the last seconds.
 #include "client/viewer/record/recent_values.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Which of two renderers a session keeps.
+// The trial of two renderers: a session keeps the quicker one.
 #include "client/viewer/render/renderer_trial.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@ namespace {
 
 constexpr size_t kPixels = 1280 * 800;
 
-// Draws frames at 50 a second until the trial ends; renderer 0 takes ms[0]. Returns how many it took, at most 500.
+// Draws frames at 50 a second until the trial ends; renderer i takes ms[i]. Returns the number of frames, at most 500.
 size_t frames_of_trial(RendererTrial& trial, std::array<double, 2> ms) {
   size_t frames = 0;
   for (; !trial.quicker() && frames < 500; ++frames) trial.add(kPixels, ms[trial.next()], 10 + 0.02 * double(frames));
@@ -65,7 +65,7 @@ TEST(RendererTrial, LeavesTheFirstFramesOut) {
 }
 
 TEST(RendererTrial, CountsFramesOfTheLargestSizeAlone) {
-  // A window grows, and there the other renderer is quicker. Parts of frames are drawn between.
+  // A window grows, and there the other renderer is quicker. Between its frames, parts of frames are drawn.
   RendererTrial grown;
   for (int i = 0; i < 8; ++i) grown.add(kPixels / 4, grown.next() == 0 ? 5 : 6, 10 + 0.01 * i);
   double now_s = 11;
@@ -79,7 +79,7 @@ TEST(RendererTrial, CountsFramesOfTheLargestSizeAlone) {
   EXPECT_EQ(grown.median_ms(1), 8);
 }
 
-// A frame takes ms of the test's clock.
+// Each frame takes ms on the test's clock.
 class SlowRenderer final : public Renderer {
  public:
   struct Test {
@@ -115,7 +115,7 @@ TEST(TriedRenderer, DrawsWithTheOneThatIsKeptAndDropsTheOther) {
   const image::Shading shading({}, camera);
   const splat::FrameTarget target{64, 48, nullptr, nullptr};
   const auto draw = [&] { tried->render(list, camera, splat::RenderOptions{}, shading, target); };
-  for (int i = 0; i < 20; ++i) draw();  // shows nothing, so does not count
+  for (int i = 0; i < 20; ++i) draw();  // an empty picture does not count
   EXPECT_EQ(choice->get().kept, "");
   list.points = 1;
   for (size_t i = 0; i < 2 * (RendererTrial::kWarmUp + RendererTrial::kFew); ++i) draw();

@@ -1,4 +1,4 @@
-// Digests of replica and packer: what differs is made anew, but not for ever.
+// Digests of replica and packer: a replica that differs is requested anew, but not without end.
 #include "client/viewer/points/replica_check.h"
 
 #include <gtest/gtest.h>
@@ -30,12 +30,12 @@ TEST(ReplicaCheck, ADifferentOneIsMadeAnewAtOnceThenLessOftenAndThenNoMore) {
   EXPECT_EQ(anew_s, (std::vector<double>{0, 20, 60}));
   EXPECT_EQ(given_up_s, std::vector<double>{140}) << "told once";
   EXPECT_EQ(check.different(), 18000u);
-  // Once it was equal, the next difference is another one.
+  // Once the digests were equal, the next difference is a new one.
   EXPECT_EQ(check.compare(kPacker, 3, 3, 1e6), Verdict::kGoOn);
   EXPECT_EQ(check.compare(kPacker, 3, 4, 1e6 + 2), Verdict::kAskAnew);
   EXPECT_EQ(check.compare(kPacker, 3, 4, 1e6 + 2 + ReplicaCheck::kPatience_s / 2), Verdict::kGoOn);
   EXPECT_EQ(check.compare(kPacker, 3, 4, 1e6 + 2 + ReplicaCheck::kPatience_s), Verdict::kAskAnew);
-  // So it is with another packer.
+  // The same holds for another packer.
   EXPECT_EQ(check.compare({6}, 3, 4, 1e6 + 24), Verdict::kAskAnew);
 }
 

@@ -1,4 +1,4 @@
-// Where a viewer records is what a master tells: it is believed only as far as the folder on this machine bears it out.
+// A viewer records into the folder that the master names only if the folder on this machine has the run's id.
 #include "client/viewer/session_record.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ class JoinedRecord : public testing::Test {
                       {"run_id", *metrics::begin_folder(folder_ + "/run", false, metrics::Logs::kOthers)}};
   }
   ~JoinedRecord() override { fs::remove_all(folder_); }
-  // Where in the session's folder a viewer records.
+  // Folder, within the session's, where a viewer records.
   std::string joined() const {
     const auto record = SessionRecord::open({.out = {}, .join = true, .name = "guest", .received_mb = 1});
     (*record)->follow(session_);
@@ -49,7 +49,7 @@ TEST_F(JoinedRecord, ItIsForItsUserAlone) {
     EXPECT_EQ(fs::status(folder_ + name).permissions(), fs::perms::owner_all) << name;
 }
 
-// Else it would write into the files of the first, make pictures of its frames, and take its spool away.
+// Otherwise the second viewer would write into the first one's files, draw its frames and take its spool away.
 TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
   const auto first = SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "first", .received_mb = 1});
   ASSERT_TRUE(first) << first.error().text;
@@ -58,7 +58,7 @@ TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
   EXPECT_EQ((*first)->records_in(), ".");
 }
 
-// Else the second would write over the files of the first.
+// Otherwise the second viewer would write over the first one's files.
 TEST_F(JoinedRecord, TwoViewersThatAreToldOneFolderDoNotShareIt) {
   for (const char* folder : {"/own", "/run"}) {
     const SessionRecord::Options told{.out = folder_ + folder, .join = true, .name = "guest", .received_mb = 0};
@@ -100,7 +100,7 @@ TEST_F(JoinedRecord, WhatCannotBeWrittenIsCounted) {
   fs::create_directories(folder_ + "/own");
   const auto record = SessionRecord::open({.out = folder_ + "/own", .join = true, .name = "guest", .received_mb = 1});
   ASSERT_TRUE(record) << record.error().text;
-  // As on a disk that is full.
+  // Every write fails, as on a full disk.
   signal(SIGXFSZ, SIG_IGN);
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);

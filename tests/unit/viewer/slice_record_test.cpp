@@ -1,5 +1,5 @@
-// The record of slice images: what a viewer could display comes back as it was, and nothing that a file may hold does
-// harm.
+// The record of slice images: the replay gives back the frames that a viewer could display, and a file of any content
+// does no harm.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -19,11 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Sent {
-  std::string bytes;  // slice images, which message.data points into
+  std::string bytes;  // slice images; message.data points into it
   wire::SliceFrame message;
 };
 
-// A frame seen from an angle of its own.
+// A frame seen from an angle that depends on its number.
 std::unique_ptr<Sent> sent(uint64_t number, const volume::Grid& grid) {
   auto out = std::make_unique<Sent>();
   wire::SliceFrame& f = out->message;
@@ -70,7 +70,7 @@ class SliceRecord : public ::testing::Test {
     std::memcpy(out.data() + 4, &body_bytes, 8);
     return out.append(type).append(body);
   }
-  // What comes of looking for frame 1 in such a file: an error, or "found", or "ends".
+  // Looks for frame 1 in such a file. Returns the error, "found" or "ends".
   std::string outcome(const std::string& content) const {
     write(content);
     auto replay = SliceReplay::open(path_);
@@ -208,7 +208,7 @@ TEST_F(SliceRecord, DamagedBytesNeverEndTheProgram) {
   int refused = 0;
   for (int round = 0; round < 300; ++round) {
     std::string content = whole;
-    // Mostly in the head, where lengths and numbers are.
+    // Mostly at the beginning, where lengths and numbers are.
     const size_t most = round % 2 ? content.size() - 8 : 900;
     for (int n = 1 + round % 5; n > 0; --n) content[8 + random() % most] = char(random());
     const std::string result = outcome(content);

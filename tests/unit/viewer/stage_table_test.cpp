@@ -10,7 +10,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// An update that took from t to t + 0.1 s.
+// Completes an update that took from t_s to t_s + 0.1 s.
 void complete(StageTable& table, uint64_t request, double t_s) {
   const ViewRequester::Update update{.request = {request}, .requested_s = t_s, .complete_s = t_s + 0.1, .tiles = 3};
   const ViewPart last{.frame = {7}, .tile = 2, .moments = {.received_s = t_s + 0.001}, .arrived_s = t_s + 0.09};

@@ -1,4 +1,4 @@
-// The picture of a camera that rests: which tiles are drawn when, and what the display does with them.
+// The picture of a camera that rests: the order in which its tiles are drawn, and their display.
 #include <gtest/gtest.h>
 
 #include <thread>
@@ -58,7 +58,7 @@ TEST(StillPicture, BeginsInTheCentreAndCoversEveryPixelOnce) {
   EXPECT_EQ(std::count(met.begin(), met.end(), 1), std::ptrdiff_t(met.size()));
 }
 
-// A box of 2 cm that is seen in one tile only.
+// A box of 2 cm that only one tile sees.
 geometry::Box box_at(const geometry::Camera& camera, double x, double y) {
   const glm::vec3 centre(camera.unproject(x, y, 1));
   return {centre - 0.01f, centre + 0.01f};
@@ -116,7 +116,7 @@ TEST(StillPicture, ChangesBesideTheViewAreNone) {
                      {{-1, -1, 3}, {1, 1, 4}},  // behind the eye
                      {{nan, 0, -1}, {nan, 0, -1}}}});
   EXPECT_FALSE(still.next(100));
-  // Around the eye: anywhere. Infinite ones, too, crash nothing.
+  // A box around the eye may be seen anywhere. Infinite ones crash nothing.
   still.on_changes({true, false, {{{-1, -1, -1}, {1, 1, 1}}, {{-inf, -inf, -inf}, {inf, inf, inf}}}});
   int wanted = 0;
   for (; const auto tile = still.next(100); ++wanted) still.done(*tile, true, 100);
@@ -186,7 +186,7 @@ TEST(ModelCacheChanges, DoNotGrowWithoutEndWhereNobodyTakesThem) {
   EXPECT_TRUE(changes.boxes.empty());
 }
 
-// Draws, and counts how often.
+// Counts the frames that it draws.
 class CountingRenderer final : public Renderer {
  public:
   explicit CountingRenderer(int& frames) : frames_(frames), renderer_(make_cpu_renderer(2)) {}
@@ -237,7 +237,7 @@ class StillSource : public testing::Test {
     view_.depth_m.resize(view_.colour.size());
     return source_->draw({.begin_s = monotonic_s(), .camera = camera_, .look = look_, .intact = intact}, view_);
   }
-  // Until nothing changes any more; the last frame.
+  // Draws until no frame changes any more; returns the last one.
   DrawnFrame settle() {
     DrawnFrame f = frame();
     int unchanged = 0;
@@ -285,7 +285,7 @@ TEST_F(StillSource, ConvergesToSixteenRaysAPixelAndThenDrawsNothing) {
   EXPECT_FALSE(stands.changed);
   EXPECT_TRUE(stands.still);
   EXPECT_EQ(renders_, before);
-  // A view that went elsewhere is filled again, without drawing.
+  // A view whose pixels were overwritten is filled again, without drawing.
   std::fill(view_.colour.begin(), view_.colour.end(), 7u);
   const DrawnFrame filled = frame(false);
   EXPECT_TRUE(filled.changed);
@@ -315,7 +315,7 @@ TEST_F(StillSource, NewPointsAreShown) {
   insert(4);
   settle();
   EXPECT_NE(view_.colour, before);
-  // All points go: what is left is the background.
+  // All points are forgotten: only the background is left.
   std::vector<points::ClusterKey> keys;
   for (uint32_t x = 0; x < 64; ++x)
     for (uint32_t y = 0; y < 64; ++y)
@@ -339,7 +339,7 @@ TEST_F(StillSource, AFrameNeverShowsTwoEpochs) {
   for (const uint32_t c : view_.colour) ASSERT_EQ(c & 0xffffff, options_.shading.background);
 }
 
-// However long the epoch that is cut as the session is takes to come, and whatever is shown meanwhile.
+// However long the epoch with the session's clip takes, and with any epoch on display in the meantime.
 TEST_F(StillSource, FramesBetweenTwoClipsAreToldUntilTheirEpochIsShown) {
   EXPECT_FALSE(frame().between_clips);
   const auto show = [&](uint64_t epoch) {
@@ -360,9 +360,9 @@ TEST_F(StillSource, FramesBetweenTwoClipsAreToldUntilTheirEpochIsShown) {
   EXPECT_TRUE(frame().between_clips);
   show(3);
   EXPECT_FALSE(frame().between_clips);
-  clip(4, "1 0 0 0");  // the epoch is another one, and what it cuts the same
+  clip(4, "1 0 0 0");  // another epoch, with the same clip
   EXPECT_FALSE(frame().between_clips);
-  // Points may come before the word for them.
+  // The epoch's points may come before its welcome.
   show(5);
   clip(5, "");
   EXPECT_FALSE(frame().between_clips);

@@ -1,4 +1,4 @@
-// Histograms as text, which comes from outside, and transfer functions as ParaView's JSON.
+// Histograms as text, which other programs send, and transfer functions as ParaView's JSON.
 #include "common/volume/histogram.h"
 
 #include <gtest/gtest.h>

@@ -103,8 +103,7 @@ TEST(VolumeLayerImage, FilledSaysWhereThereMayBeAnything) {
   EXPECT_GT(empty, 500);
 }
 
-// The point of merging: however a layer's slices are shared out among slabs, what is shown is what one slab alone would
-// have shown.
+// The reason for merging: however a layer's slices are divided among slabs, the picture is the one of a single slab.
 TEST(VolumeLayerImage, SlabsOfAnOpaqueBlockMeetWithoutASeam) {
   const Grid grid = turned_grid();
   int shared_out = 0;
@@ -114,7 +113,7 @@ TEST(VolumeLayerImage, SlabsOfAnOpaqueBlockMeetWithoutASeam) {
     options.layers = 4;
     const ShearFrame shear = plan_frame(grid, std::span(&camera, 1), options).value();
     if (shear.axis == 2) continue;  // slabs are ranges of slices then, and share no slice
-    // Every slice is opaque wherever the slab owns it: what samplers make of a solid block.
+    // Every slice is opaque in the pixels that the slab owns, as samplers draw a solid block.
     const auto frame_of_slabs = [&](const std::vector<std::pair<int, int>>& slabs) {
       std::vector<SliceImage> images;
       for (int l = 0; l < static_cast<int>(shear.layers.size()); ++l)

@@ -34,8 +34,8 @@ std::vector<glm::dvec3> eyes() {
   return out;
 }
 
-// Every principal axis in both directions: what a display pixel of the sampled camera sees is, in every layer, where
-// the shear puts it.
+// For every principal axis in both directions: a display pixel of the sampled camera sees the same pixel of the frame
+// in every layer.
 TEST(VolumeShear, WarpOfTheSampledViewIsTheSamePixelInEveryLayer) {
   const Grid grid = a_grid();
   int seen[3][2] = {};
@@ -155,7 +155,7 @@ TEST(VolumeShear, EyeInsideSeesOnlyWhatIsInFront) {
   EXPECT_FALSE(plan_frame(grid, std::span(&away, 1)));
 }
 
-// Just above the top slice, looking along it: slices across the look are the ones to splat.
+// An eye just above the top slice that looks along it: the slices across the look are the ones to splat.
 TEST(VolumeShear, EyeThatSkimsAFaceSamplesAlongItsLook) {
   const Grid grid = a_grid();
   const glm::dvec3 eye = grid.index_to_room * glm::dvec4(-3, 25, 40.5, 1);

@@ -1,4 +1,4 @@
-// Slice images come back as they were, and nothing that comes instead of them does harm.
+// Slice images survive a round trip, and any other bytes do no harm.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 using Random = std::mt19937_64;
 
-// Soft blobs with hard edges, premultiplied; kNoise bits of noise in the colours.
+// Soft blobs with hard edges, premultiplied; `noise` bits of noise in the colours.
 SliceImage blobs(const geometry::Rect& rect, Random& random, int noise = 0) {
   SliceImage out{3, 10, 20, rect, std::vector<uint32_t>(size_t(rect.width) * size_t(rect.height))};
   std::uniform_real_distribution<double> u(0, 1);
@@ -131,7 +131,7 @@ TEST(SliceCodec, EveryTruncationIsRefused) {
   const size_t first = encode_slice(*decode_slice(whole->front(), 128, 128)).size();
   for (size_t n = 1; n < bytes.size(); ++n)
     EXPECT_EQ(parse_slices(std::span(bytes).first(n), 128, 128, 4).ok(), n == first) << n;
-  // A block that ends early, with a head that says so.
+  // A block that ends early, with a length that says so.
   for (const auto& b : whole->front().blocks)
     for (size_t n = 0; n < b.bytes.size(); ++n) {
       EncodedSlice cut = whole->front();
@@ -164,7 +164,7 @@ TEST(SliceCodec, RefusalsSayWhy) {
   refused(0, 3, "in a raster of 64 x 128", 64);
 }
 
-// A volume's slice: soft, and without anything that repeats.
+// A volume's slice: soft, and without repetitions.
 SliceImage soft(Random& random) {
   SliceImage image{0, 0, 1, {0, 0, 256, 192}, std::vector<uint32_t>(256 * 192)};
   for (int y = 0; y < 192; ++y)
@@ -233,8 +233,7 @@ Grid a_grid() {
   return g;
 }
 
-// A block any pixel of which the warp puts into the (widened) picture may be seen; of those that it does not, most are
-// left out.
+// A block may be seen if the warp puts any of its pixels into the widened picture; most other blocks are left out.
 TEST(SliceView, IsConservativeAndUseful) {
   const Grid grid = a_grid();
   Random random(9);
@@ -251,7 +250,7 @@ TEST(SliceView, IsConservativeAndUseful) {
     const auto wide = look(from, 80, grid.centre_room());
     const auto frame = plan_frame(grid, std::span(&wide, 1));
     ASSERT_TRUE(frame);
-    // Another one, near by, that sees a part of it.
+    // Another camera near by that sees a part of the frame.
     const auto camera = look(from + 0.05 * glm::dvec3(u(random), u(random), u(random)), 25,
                              grid.centre_room() + 0.2 * glm::dvec3(u(random), u(random), u(random)));
     const SliceView view(grid, *frame, camera, margin);

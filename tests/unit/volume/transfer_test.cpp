@@ -1,4 +1,4 @@
-// Transfer functions: their text, ParaView's files, presets, and what they make of levels.
+// Transfer functions: their text, ParaView's files, presets, and colours of levels.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -111,7 +111,7 @@ TEST(VolumeTransfer, PresetsAreValidFitTheDataAndTravel) {
       EXPECT_EQ(*parse_transfer(to_text(*f), range), *f) << preset.name;
       EXPECT_LT(to_text(*f).size(), kMaxTransferText);
       EXPECT_FALSE(preset.text.empty());
-      // What is below where the data begin is background.
+      // Values below the data's typical range are background.
       EXPECT_TRUE(!(range == kBytes) || f->at(range.typical_lo).opacity == 0) << preset.name;
     }
   // Air, flesh and bone of a CT.

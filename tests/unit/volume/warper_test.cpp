@@ -22,7 +22,7 @@ WarpedView warped(const VolumeFrame* frame, const geometry::Camera& camera, int 
   return out;
 }
 
-// A grid of unit voxels seen along -z, with a raster whose pixels are the display's, upside down.
+// A grid of unit voxels seen along -z; the frame's pixels are the display's, upside down.
 struct Straight {
   Grid grid{{40, 30, 16}, glm::dmat4(1)};
   geometry::Camera camera;
@@ -108,7 +108,7 @@ TEST(VolumeWarper, AgreesWithRaysThroughPlanesFromEverywhere) {
       }
     EXPECT_LT(sum / (view.width * view.height), 0.3) << n;
     EXPECT_GT(shown, 500) << n;
-    EXPECT_LT(depths_off, 1 + shown / 50) << n;  // where opacity is kSolid but for rounding
+    EXPECT_LT(depths_off, 1 + shown / 50) << n;  // where rounding decides whether the opacity reaches kSolid
   }
 }
 
@@ -129,7 +129,7 @@ TEST(VolumeWarper, WorksWithEyesAmongTheLayersAndPlanesSeenEdgeOn) {
         edge_on += std::isfinite(depth);
         off += difference(colour, view.colour[view.at(x, y)]) > 8;
       }
-    // Near a plane's horizon a pixel holds many texels, and which of them it shows is chance.
+    // Near a plane's horizon a pixel holds many texels, and chance decides which of them it shows.
     EXPECT_LT(off, 150 * 110 / 50) << n;
   }
   EXPECT_GT(edge_on, 1000);
@@ -181,7 +181,7 @@ TEST(VolumeWarper, NothingIsBackground) {
     WarpStats stats;
     const WarpedView view = warped(frame, camera, 1, &stats);
     EXPECT_EQ(stats.samples, 0u);
-    for (const uint32_t colour : view.colour) ASSERT_EQ(colour, kBackground);  // covered by nothing
+    for (const uint32_t colour : view.colour) ASSERT_EQ(colour, kBackground);  // covered by no layer
     for (const float depth : view.depth_m) ASSERT_EQ(depth, std::numeric_limits<float>::infinity());
   }
 }
@@ -190,7 +190,7 @@ TEST(VolumeWarper, ImagesFadeWithinAPixelOfTheirBorder) {
   Straight s(1);
   SliceImage image{0, 0, 16, {20, 20, 20, 20}, std::vector<uint32_t>(400, 0xffffffffu)};
   const VolumeFrame frame = frame_of(s.grid, s.shear, {image});
-  geometry::Camera half = s.camera;  // by half a pixel to the right
+  geometry::Camera half = s.camera;  // moved right by half a pixel
   half.left += 0.5 * s.shear.du, half.right += 0.5 * s.shear.du;
   const WarpedView view = warped(&frame, half);
   const auto grey = [&](int x) { return channel(view.colour[view.at(x, 30)], 0); };
@@ -202,7 +202,7 @@ TEST(VolumeWarper, ImagesFadeWithinAPixelOfTheirBorder) {
   EXPECT_EQ(grey(40), 0x40);
 }
 
-// What is skipped because it is empty or hidden has no effect; nor have threads.
+// Skipping empty and hidden pixels changes no pixel; nor does the number of threads.
 TEST(VolumeWarper, ThreadsDrawTheSamePixels) {
   const Grid grid = turned_grid();
   const auto sampled = looking_at(grid.centre_room(), orbit(grid, 0.9, 0.4, 0.2), 400, 300);

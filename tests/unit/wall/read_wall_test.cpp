@@ -1,4 +1,4 @@
-// Descriptions of walls: what they come to, and what each mistake in them is told.
+// Descriptions of walls: the screens that they describe, and the message for each mistake.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -32,7 +32,7 @@ TEST(ReadWall, GridsStandByRowsFromTheUpperLeft) {
   EXPECT_EQ(wall->screens_of(1), (std::vector<int>{2, 3}));
   const auto& first = wall->screens[0].pose.position_room;
   const auto& last = wall->screens[5].pose.position_room;
-  // Middles lie 0.4 + 0.01 + 0.02 apart, and beside the grid's middle by half of what the bezels differ.
+  // Middles lie 0.4 + 0.01 + 0.02 apart, beside the grid's middle by half of the difference of the bezels.
   EXPECT_NEAR(first.x, -0.43 - 0.005, 1e-12);
   EXPECT_NEAR(first.y, 0.185 - 0.005, 1e-12);
   EXPECT_NEAR(last.x, 0.43 - 0.005, 1e-12);

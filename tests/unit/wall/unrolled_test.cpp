@@ -1,4 +1,4 @@
-// A wall laid flat: where pictures lie in the picture of all.
+// A wall laid flat: places of its pictures in the picture of all.
 #include <gtest/gtest.h>
 
 #include "client/wall/screen_camera.h"

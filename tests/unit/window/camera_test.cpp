@@ -1,4 +1,4 @@
-// What a hand does to the camera beside orbit and flight: sides of the data, tilt, centre, and what a panel covers.
+// Other moves of the camera than orbit and flight: sides of the data, tilt, centre, and the part that a panel covers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ double apart(const Pose& a, const Pose& b) {
   return std::max(glm::distance(a.position_room, b.position_room), turn_between(a, b));
 }
 
-// Where a place of the room is seen, as tangents from the view's axis, +y up.
+// Direction in which a place of the room is seen, as tangents from the view's axis, +y up.
 glm::dvec2 seen_at(const Pose& pose, const glm::dvec3& place) {
   const glm::dvec3 p = glm::conjugate(pose.orientation) * (place - pose.position_room);
   EXPECT_LT(p.z, 0) << "it lies behind the eye";
@@ -42,7 +42,7 @@ const geometry::Camera kWindow = window_camera({}, 60, 1280, 800, 0.02);
 
 // ---- fitted views ----
 
-// The part of the window that nothing covers, and where its middle lies.
+// The part of the window that no panel covers, and the place of its middle.
 struct FreePart {
   geometry::Camera frustum = kWindow;
   double middle_x = 0;
@@ -57,7 +57,7 @@ FreePart free_part(double left, double right) {
 
 void expect_inside(const Pose& pose, const geometry::Box& box, const FreePart& part, const char* what) {
   const auto& f = part.frustum;
-  double nearest = 1e9;  // how far from a side, over the half width or height
+  double nearest = 1e9;  // distance from a side, over the half width or height
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 p(corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
                        corner & 4 ? box.hi.z : box.lo.z);
@@ -103,13 +103,13 @@ TEST(CameraControls, OrbitsAboutTheMiddleOfThePartThatIsFree) {
     EXPECT_NEAR(at.x, part.middle_x, 1e-6);
     EXPECT_NEAR(at.y, 0, 1e-6);
   }
-  // The panel goes: who has moved stays where they are, and home is another.
+  // The panel goes: a moved camera stays, and home is another pose.
   const Pose moved = c.pose(), whole = geometry::fitted_view(box, kWindow);
   c.set_scene(box, whole, 0);
   EXPECT_LT(apart(settle(c), moved), 1e-6);
   c.reset();
   EXPECT_LT(apart(settle(c), whole), 1e-5);
-  // And back at home, it follows the panel again, without a jump.
+  // Back at home, the camera follows the panel again, without a jump.
   c.set_scene(box, home, part.middle_x);
   EXPECT_LT(apart(c.pose(), whole), 1e-5);
   EXPECT_LT(apart(settle(c), home), 1e-5);
@@ -142,7 +142,7 @@ TEST(CameraControls, ATiltedHeadStaysTiltedAndDragsFollowThePointer) {
   c.roll(0.5);  // a quarter turn
   const Pose tilted = settle(c);
   EXPECT_NEAR(turn_between(tilted, geometry::default_pose()), kPi / 2, 1e-6);
-  // What is seen at the right of the middle moves to the right with a drag to the right, however the head is tilted.
+  // With a tilted head, too, a drag to the right moves the near side of the data to the right.
   const glm::dvec3 near_side = glm::normalize(tilted.position_room) * 0.4;
   const double before = seen_at(tilted, near_side).x;
   c.orbit(0.1, 0);

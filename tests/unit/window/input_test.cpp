@@ -1,4 +1,4 @@
-// Camera controls, keys, title line, screenshots: the window without a window.
+// Camera controls, keys, title line, screenshots: a window's logic without a window.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -132,7 +132,7 @@ TEST(CameraControls, FlyingBeginsAndEndsWithoutMovingTheView) {
   EXPECT_GT(glm::distance(flown.position_room, before.position_room), 0.05);
   c.set_flying(false);
   expect_same_pose(c.pose(), flown, 1e-9);
-  // And then it orbits about what is ahead.
+  // From there it orbits about the place ahead.
   c.fly({});
   const Pose at = settle(c);
   c.orbit(0.2, 0);
@@ -201,7 +201,7 @@ TEST(CameraControls, TheFirstViewFollowsTheSceneUntilThePersonMoves) {
   const Pose moved = c.pose();
   EXPECT_NEAR(glm::distance(moved.position_room, glm::dvec3(3, 0, 0)),
               glm::distance(aside.position_room, glm::dvec3(3, 0, 0)), 1e-6);  // around the box's centre
-  c.set_scene(box_of(1), far);                                                 // who has moved stays
+  c.set_scene(box_of(1), far);                                                 // a moved camera stays
   expect_same_pose(c.pose(), moved, 1e-9);
   c.reset();
   expect_same_pose(settle(c), far, 1e-5);
@@ -215,7 +215,7 @@ TEST(CameraControls, AFirstViewFromFarAwayOrPastTheDataStays) {
     c.set_scene(box_of(0.4), home);
     expect_same_pose(settle(c), home, 1e-5);
     c.set_flying(true);
-    expect_same_pose(settle(c), home, 0.05);  // who looks straight up bends a degree
+    expect_same_pose(settle(c), home, 0.05);  // a look straight up bends by a degree
   }
 }
 
@@ -370,7 +370,7 @@ TEST_F(InteractionTest, ARecordedPathIsWhatTPlays) {
   ASSERT_GE(path.size(), 60u);
   EXPECT_TRUE(i.take_path().empty());
   expect_same_pose(path.back().pose, end);
-  i.set_recorded(recorded());  // what the person recorded stays
+  i.set_recorded(recorded());  // the person's own recording stays
   tap(i, Key::kR);
   wait(i);
   tap(i, Key::kT);
@@ -411,7 +411,7 @@ TEST_F(InteractionTest, FlightUsesTheKeysAndEscapeEndsItFirst) {
   const Pose sunk = wait(i, 0.2);
   EXPECT_FALSE(i.wants_to_quit());
   EXPECT_LT(sunk.position_room.y, home.position_room.y - 0.01);
-  i.focus_lost();  // the key's release goes elsewhere
+  i.focus_lost();  // the key's release goes to another window
   const Pose a = wait(i), b = wait(i);
   expect_same_pose(a, b);
   tap(i, Key::kEscape);
@@ -434,7 +434,7 @@ TEST_F(InteractionTest, EscapeClosesWhatIsOpenAndNeverTheProgram) {
   for (int n = 0; n < 5; ++n) tap(i, Key::kEscape);
   EXPECT_FALSE(i.wants_to_quit());
   EXPECT_EQ(i.take_notes().back(), "Ctrl+Q quits");
-  // A dialog that is all that there is to look at stays.
+  // Where the dialog is all that there is to see, it stays.
   i.set_dialog(true, false);
   i.show_dialog(true);
   tap(i, Key::kEscape);
@@ -464,10 +464,10 @@ TEST_F(InteractionTest, NoLetterIsACommandWhileTheDialogIsOpen) {
   EXPECT_TRUE(i.take_notes().empty());
   tap(i, Key::kF11);
   EXPECT_TRUE(i.take(Wish::kFullscreen));
-  // What a button of the panel stands for is done all the same.
+  // A button of the panel acts all the same.
   i.press(Key::kP);
   EXPECT_TRUE(i.take(Wish::kScreenshot));
-  // Where nothing can be opened the key says so and opens nothing.
+  // Where no file can be opened, the key sends the wish and opens no dialog.
   Interaction guest(std::nullopt, look_);
   tap(guest, Key::kO);
   EXPECT_FALSE(guest.shows_dialog());
@@ -554,14 +554,14 @@ TEST_F(InteractionTest, PlaysTheRecordedMovementUntilTheCameraIsTaken) {
   i.button(MouseButton::kLeft, true);
   i.move(0.6, 0.5);
   EXPECT_FALSE(i.playing());
-  // Without one T says why nothing happens.
+  // Without a recording, T shows a note.
   Interaction none(std::nullopt, look_);
   tap(none, Key::kT);
   EXPECT_FALSE(none.playing());
   EXPECT_EQ(none.take_notes().size(), 1u);
 }
 
-// Its first view comes with its scene, which is told in the same frame and after the session.
+// The first view comes with its scene, in the same frame and after the session.
 TEST_F(InteractionTest, AnotherDataSetIsSeenFromItsOwnFirstView) {
   Interaction i(std::nullopt, look_);
   const Pose first = geometry::look_at({0, 1, 3}, {0, 0, 0}), other = geometry::look_at({0, 4, 12}, {0, 0, 0});
@@ -577,10 +577,10 @@ TEST_F(InteractionTest, AnotherDataSetIsSeenFromItsOwnFirstView) {
   drag();
   wait(i);
   i.back_to_first_view();
-  drag();  // whose hand is on the mouse at that moment
+  drag();  // the person drags at that moment
   i.set_scene(scene::Pipeline::kPoints, box_of(4), other);
   expect_same_pose(wait(i, 3), other, 1e-5);
-  // And then the camera is the person's again.
+  // Afterwards the camera is the person's again.
   drag();
   const Pose moved = wait(i, 3);
   EXPECT_GT(glm::distance(moved.position_room, other.position_room), 0.1);

@@ -1,4 +1,4 @@
-// What a person measures in a window: rows of places, what is told of them, their marks in the picture.
+// A person's measurements in a window: rows of places, their texts, their marks in the picture.
 #include "client/viewer/hands/measurements.h"
 #include "client/displays/window/hands/hand_overlays.h"
 
@@ -97,7 +97,7 @@ TEST_F(Measuring, ThereAreNotTooMany) {
   EXPECT_FALSE(all.add(pick, terms, EpochId{2}, 0.25));
 }
 
-// Where the picture of the marks has a colour.
+// True if the picture of the marks has a colour there.
 bool marked(const MarksPicture& marks, double x, double y) {
   const int column = int(x) - marks.x, row = int(y) - marks.y;
   if (column < 0 || row < 0 || column >= marks.view.width || row >= marks.view.height) return false;
@@ -124,7 +124,7 @@ TEST_F(Measuring, MarksLieOverTheirPlaces) {
   all.clear();
   add({0, 0, 0}), add({0.2, 0.1, 0});
   EXPECT_LT(marks.view.width * marks.view.height, 640 * 480 / 4) << "only the part that has marks";
-  // Behind the eye there is nothing to mark, and lines end at the window's edge.
+  // A place behind the eye gets no mark, and lines end at the window's edge.
   auto away = camera;
   away.pose.orientation = {0, 0, 1, 0};
   EXPECT_EQ(draw_marks(all, away, 1).view.width, 0);

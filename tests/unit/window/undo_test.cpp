@@ -1,4 +1,4 @@
-// Undo: of the camera, of the look, and of what the panel ordered of the session.
+// Undo of the camera, of the look, and of the panel's orders to the session.
 #include <gtest/gtest.h>
 
 #include "client/displays/window/input/interaction.h"
@@ -29,11 +29,11 @@ TEST(UndoStack, TakesBackAndDoesAgainInOrder) {
   EXPECT_FALSE(stack.can_undo());
   EXPECT_EQ(stack.redo(), "done again: value");
   EXPECT_EQ(value, 1);
-  change(10, 7);  // what was taken back is gone
+  change(10, 7);  // the undone change is gone
   EXPECT_EQ(stack.redo(), "there is nothing to do again");
   stack.undo();
   EXPECT_EQ(value, 1);
-  // A slider that is dragged is one deed; after a rest it is another one.
+  // Dragging a slider is one change; after a rest it is another one.
   for (int i = 0; i < 50; ++i) change(20 + 0.1 * i, 100 + i, "slider");
   change(40, 200, "slider");
   stack.undo();
@@ -113,7 +113,7 @@ TEST_F(UndoTest, LooksAreTakenBack) {
   tap(Key::k1);
   tap(Key::k8);
   Look look = i_.look();
-  look.background = 0xffffff;  // by somebody else's order, which is not the person's to take back
+  look.background = 0xffffff;  // another person's order, which this person cannot undo
   i_.set_look(look);
   i_.control('Z');
   EXPECT_TRUE(i_.look().lit);
@@ -174,7 +174,7 @@ TEST(OrderUndo, WhatWasRefusedOrUndoesIsNoDeed) {
   EXPECT_EQ(undo.answered({skin, false, "no such preset"}), std::nullopt);
   undo.given(skin, true);
   EXPECT_EQ(undo.answered(obeyed(skin)), std::nullopt);
-  // Of two that wait the second takes the place of the first, which is never answered.
+  // The second of two orders that wait replaces the first, which never gets an answer.
   undo.given(skin);
   told->facts["transfer"] = "1:#000000:0,2:#ffffff:1";
   undo.given(bone);

@@ -1,4 +1,4 @@
-// Poses that other programs tell.
+// Poses that other programs send.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,7 @@ TEST(HeadPose, ComesBackAsItWas) {
   }
 }
 
-// As other programs write it: integers, floats of 32 bits, other fields, any order.
+// Other programs write integers, floats of 32 bits, other fields, and any order.
 TEST(HeadPose, TakesWhatOthersWrite) {
   // The literal holds zeros: its length is counted.
   const std::string bytes(

@@ -1,4 +1,4 @@
-// What decoding refuses: fields beyond their limits, and fields that do not go together.
+// Limits of decoding: fields beyond their limits, and fields that do not go together.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -13,7 +13,7 @@ namespace {
 
 using namespace telesplat::test;
 
-// Refused, with the message and `named` in the text.
+// Success if decoding fails with an error that names the message and `named`.
 template <class M>
 ::testing::AssertionResult refused(const std::string& body, const std::string& named = "") {
   const auto result = decode<M>(bytes_of(body));
@@ -54,7 +54,7 @@ TEST(Limits, OfStringsListsAndMaps) {
   EXPECT_TRUE(decode<ControlReply>(bytes_of(encode(reply))));
 }
 
-// Numbers of a wall's frames stay far from where they would begin anew.
+// Numbers of a wall's frames stay far below the value at which they would wrap.
 TEST(Limits, OfFramesOfAWall) {
   for (uint64_t SwapReady::*number : {&SwapReady::frame, &SwapReady::presented}) {
     SwapReady ready = sample_message<SwapReady>();
@@ -65,9 +65,9 @@ TEST(Limits, OfFramesOfAWall) {
   }
 }
 
-// Texts go into JSON, CSV and logs: nothing but UTF-8 comes in.
+// Texts go into JSON, CSV and logs: only valid UTF-8 is accepted.
 TEST(Limits, OfTexts) {
-  // What no sender of ours sends: `good` in the encoded message becomes `bad`, which is as long.
+  // Bytes that our senders never send: in the encoded message `good` becomes `bad`, which is as long.
   const auto with = [](auto message, auto change, const std::string& good = {}, const std::string& bad = {}) {
     change(message);
     std::string body = encode(message);
@@ -122,7 +122,7 @@ TEST(Limits, OfTexts) {
                               "field sheet : field endpoint is not UTF-8"));
 }
 
-// A file, a folder or a name of this machine may be any bytes: nobody is refused for it.
+// A file, a folder or a machine's name may be any bytes: no process is refused for it.
 TEST(Texts, AreUtf8HoweverTheyWereGiven) {
   Hello hello = sample_message<Hello>();
   hello.name = "caf\xe9";
@@ -145,7 +145,7 @@ TEST(Texts, AreUtf8HoweverTheyWereGiven) {
   Control control{"clip", {{"\xe9", "\xff"}}};
   EXPECT_TRUE(decode<Control>(bytes_of(encode(control))));
 
-  // U+FFFD takes three bytes: a text that was within its limit stays there, and is cut between characters.
+  // U+FFFD takes three bytes: a text within its limit stays there, and is cut between characters.
   for (const size_t size : {kMaxString, kMaxString - 1, kMaxString - 2}) {
     hello.name = std::string(size - 1, 'n') + "\xff";
     const auto cut = decode<Hello>(bytes_of(encode(hello)));
@@ -157,7 +157,7 @@ TEST(Texts, AreUtf8HoweverTheyWereGiven) {
   EXPECT_TRUE(decode<Hello>(bytes_of(encode(hello))));
 }
 
-// An element takes a byte in a message and 24 of memory, also in fields that nobody knows.
+// An element takes a byte in a message and 24 of memory, also in unknown fields.
 TEST(Limits, OfElementsInAll) {
   const auto with = [](const std::string& value) {
     std::string body = encode(sample_message<Control>());
@@ -231,7 +231,7 @@ TEST(Limits, OfFootprints) {
   }
 }
 
-// What tells which part of a frame it is: a lease's block, a patch's tile.
+// Number of the part of a frame: a lease's block, a patch's tile.
 uint64_t& part(Lease& m) { return m.block; }
 uint64_t& part(Patch& m) { return m.tile; }
 uint64_t& parts(Lease& m) { return m.blocks_in_frame; }
@@ -291,7 +291,7 @@ TEST(Limits, OfTiles) {
 
 TEST(Limits, OfMasks) {
   Lease lease = sample_message<Lease>();
-  lease.rays = 5000;  // of 100 x 50 pixels
+  lease.rays = 5000;  // in 100 x 50 pixels
   EXPECT_TRUE(decode<Lease>(bytes_of(encode(lease))));
   lease.rays = 5001;
   EXPECT_TRUE(refused<Lease>(encode(lease), "5001 rays of 100x50 pixels"));
@@ -328,7 +328,7 @@ TEST(Limits, OfPlans) {
   EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 3, 2}, 1), "1 words of masks, its tiles have 2"));
   EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 3, 2}, 3), "3 words of masks, its tiles have 2"));
   EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 3, kMaxMaskWords + 1}, kMaxMaskWords + 1), "words of mask"));
-  // The same pixels again and again would be more work than the frame.
+  // Repeated pixels would be more work than the frame.
   EXPECT_TRUE(refused<Plan>(plan({0, 0, 320, 200, 64000, 0, 0, 0, 1, 1, 1, 0}, 0), "64001 pixels, the frame 64000"));
   EXPECT_TRUE(refused<Plan>(plan({}, kMaxPlanWords + 1), "masks"));
   EXPECT_TRUE(refused<Plan>(plan(std::vector<uint32_t>(kPlanNumbers * kMaxTiles + 1), 0), "tiles"));
@@ -354,7 +354,7 @@ TEST(Limits, OfChunkLists) {
   };
   const geometry::Box box{{0, 0, 0}, {1, 1, 1}};
   EXPECT_TRUE(decode<ChunkList>(bytes_of(with({ChunkId{5}, box, 10, 400}))));
-  // 3.45e38 is a number, and no float.
+  // 3.45e38 is a double, but beyond float's range.
   std::string list = "\x91\x99\x05\x0a\x64";
   for (const double x : {0.0, 0.0, 0.0, 1.0, 3.45e38, 1.0}) {
     list += '\xcb';

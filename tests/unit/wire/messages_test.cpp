@@ -1,4 +1,4 @@
-// Every message: round trips, refusals of everything that is not one, bytes that must not change unnoticed.
+// Every message: round trips, refusals of all other bytes, bytes that must not change unnoticed.
 #include <cxxabi.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -18,12 +18,12 @@ namespace {
 
 using namespace telesplat::test;
 
-// Those that may be larger than kMaxControlBytes.
+// Messages that may be larger than kMaxControlBytes.
 constexpr std::string_view kBulkMessages[] = {
     "metric_rows", "chunk_list",   "chunk",       "depth_tile", "patch",  "forget",       "access_report",
     "voxel_data",  "slice_images", "slice_frame", "plan",       "refine", "picture_tile", "picture"};
 
-// Those whose fields may be missing.
+// True for messages whose fields may be missing.
 bool is_brief(const MessageSample& sample) { return sample.name == "patch"; }
 
 size_t body_limit(const MessageSample& sample) {
@@ -31,7 +31,7 @@ size_t body_limit(const MessageSample& sample) {
   return bulk ? kMaxBulkBytes + kMaxControlBytes : kMaxControlBytes;
 }
 
-// Refused, with the message and `named` in the text.
+// Success if decoding fails with an error that names the message and `named`.
 ::testing::AssertionResult refused(const MessageSample& sample, const std::string& body,
                                    const std::string& named = "") {
   const auto result = sample.round_trip(bytes_of(body));
@@ -114,7 +114,7 @@ constexpr Property kProperties[] = {
     {"IsRefusedWithTextThatIsNotUtf8",
      [](const MessageSample& sample) {
        value_end(sample.body, 0, [&](std::string_view text) {
-         // A brief message has no text but "v".
+         // The only text of a brief message is "v".
          if (text.empty() || is_brief(sample)) return;
          std::string body = sample.body;
          body[size_t(text.data() - sample.body.data()) + text.size() - 1] = '\xff';
@@ -131,7 +131,7 @@ constexpr Property kProperties[] = {
     {"IsRefusedBeyondItsSize",
      [](const MessageSample& sample) {
        const size_t limit = body_limit(sample);
-       // The size is looked at before the bytes are, so that these need not be there.
+       // The size is checked before the bytes, so the bytes need not be there.
        const auto result = sample.round_trip(Bytes(kBulk.data(), limit + 1));
        ASSERT_FALSE(result);
        EXPECT_NE(result.error().text.find(std::to_string(limit)), std::string::npos) << result.error().text;
@@ -178,7 +178,7 @@ std::string hex(const std::string& bytes) {
   for (unsigned char c : bytes) out += fmt::format("{:02x}", c);
   return out;
 }
-// Of an older version they would all be refused at their first field. A seed's first byte says which message it is.
+// Seeds of an older version would all be refused at their first field. A seed's first byte is its message's number.
 TEST(WireFuzzer, HasASeedOfThisVersionForEachMessage) {
   for (size_t i = 0; i < message_samples().size(); ++i) {
     const MessageSample& sample = message_samples()[i];
@@ -236,7 +236,7 @@ TEST(BriefMessages, AreWithoutWhatANewOneHolds) {
   EXPECT_EQ(back->missed_rect, fresh.missed_rect);
   EXPECT_EQ(back->tiles_in_frame, 1u);
 
-  // What a session sends with an image of a few hundred bytes.
+  // A patch as sessions send it, with an image of a few hundred bytes.
   Patch patch{.packer = InstanceId{0x1fffffffffffff},
               .sequence = Sequence{100000},
               .epoch = EpochId{1},
@@ -280,7 +280,7 @@ TEST(Numbers, OfMomentsAreMicroseconds) {
   FrameEnd m = sample_message<FrameEnd>();
   m.moments = {};
   m.moments.requested_s = 86400.1234567;
-  m.moments.received_s = 86400.1;  // clocks differ: before
+  m.moments.received_s = 86400.1;  // earlier than requested_s: clocks differ
   m.moments.fetch_s = 0.25;
   m.moments.published_s = 86401;
   const auto back = decode<FrameEnd>(bytes_of(encode(m)));
@@ -291,7 +291,7 @@ TEST(Numbers, OfMomentsAreMicroseconds) {
   EXPECT_NEAR(back->moments.published_s, 86401, 0.51e-6);
   EXPECT_EQ(back->moments.leased_s, 0);
 
-  // What is beyond any clock is not known; what a stranger claims so far is refused.
+  // Encoding drops moments beyond any clock; decoding refuses them.
   for (const double bad : {1e300, -1e300, double(NAN), HUGE_VAL}) {
     m.moments.requested_s = bad;
     const auto without = decode<FrameEnd>(bytes_of(encode(m)));

@@ -1,4 +1,4 @@
-// Processes of another version are told so in a message that they can read.
+// Processes of another version get an explanation in a message that they can read.
 #include <gtest/gtest.h>
 
 #include "common/wire/serial.h"
@@ -8,7 +8,7 @@ namespace {
 
 Bytes bytes_of(const std::string& body) { return std::as_bytes(std::span(body)); }
 
-// {"role": "viewer", "v": VERSION}; version: as msgpack has it.
+// {"role": "viewer", "v": VERSION}; version: its msgpack bytes.
 std::string body_of_version(const std::string& version) { return "\x82\xa4role\xa6viewer\xa1v" + version; }
 
 TEST(OtherVersion, IsFoundInAnyMapThatHasOne) {
@@ -22,7 +22,7 @@ TEST(OtherVersion, IsFoundInAnyMapThatHasOne) {
     EXPECT_FALSE(other_version(bytes_of(bad)));
 }
 
-// Byte for byte what this version writes, but for the number.
+// The same bytes as this version writes, except the version number.
 TEST(OtherVersion, AnswersAreWrittenAsThatVersionWritesThem) {
   const Shutdown shutdown{about_versions(13)};
   std::string as_ours = encode(shutdown), theirs = encode_for(13, shutdown);

@@ -1,4 +1,4 @@
-// Short cameras: what is said of one is what is read, whatever bytes are not one are refused.
+// Short cameras: round trips are exact, and all other bytes are refused.
 #include "common/wire/short_camera.h"
 
 #include <gtest/gtest.h>
@@ -77,7 +77,7 @@ TEST(ShortCamera, OfAUsualViewTakes29Bytes) {
   EXPECT_EQ(bytes->size(), 29u);
 }
 
-// Two components are alike, or one is all: each may be the one that is left out.
+// Two components are equal in size, or one is 1: each component may be the one left out.
 TEST(ShortCamera, OfQuarterTurnsIsShortened) {
   const double half = std::sqrt(0.5);
   for (const glm::dquat q : {glm::dquat(half, 0, half, 0), glm::dquat(half, half, 0, 0), glm::dquat(0, half, 0, -half),
@@ -139,7 +139,7 @@ TEST(ShortCamera, StandsInBriefMessagesAlone) {
   const auto back = decode<Patch>(bytes_of(body));
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->camera, c);
-  // Others have fourteen numbers.
+  // Other messages have all fourteen numbers.
   ViewRequest request = sample_message<ViewRequest>();
   request.camera = c;
   const auto asked = decode<ViewRequest>(bytes_of(encode(request)));

@@ -1,4 +1,4 @@
-// Rows of pictures as a headset's textures have them.
+// Rows of pictures in the layout of a headset's textures.
 #include "client/displays/xr/picture_chain.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ TEST(TextureRows, TheNearestOfFourDepthsIsKept) {
   const DepthRange range{0.1, 50};
   for (const size_t pixels : {1u, 9u, 32u, 37u}) {
     std::vector<float> above(2 * pixels, kNothing), below(2 * pixels, kNothing), out(pixels);
-    // One of the four is near; of each fifth none is.
+    // In each block of four one pixel is near; in every fifth block all are infinitely far.
     for (size_t i = 0; i < pixels; ++i)
       if (i % 5 != 4) ((i & 1) ? above : below)[2 * i + (i >> 1 & 1)] = 0.1f + 0.3f * float(i);
     to_half_depth(above.data(), below.data(), range, pixels, out.data());
@@ -41,7 +41,7 @@ TEST(TextureRows, TheNearestOfFourDepthsIsKept) {
         EXPECT_EQ(out[i], 1);
         continue;
       }
-      // As a projection has it, undone.
+      // Undoes the projection of the depth.
       const double metres = 1 / (1 / range.near_m + out[i] * (1 / range.far_m - 1 / range.near_m));
       EXPECT_NEAR(metres, 0.1 + 0.3 * double(i), 2e-4 * metres * metres + 1e-6) << i;
     }

@@ -30,7 +30,7 @@ TEST(XrSpace, AnEyeBecomesACamera) {
   EXPECT_TRUE(geometry::validate(camera));
 }
 
-// Whatever an eye sees, the camera of both sees: for random points, whatever the eyes' distance and cant.
+// The camera of both eyes sees every random point that one eye sees, for several cants of the eyes.
 TEST(XrSpace, BothEyesSeeNothingThatTheirCameraDoesNot) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0, 1);
@@ -46,7 +46,7 @@ TEST(XrSpace, BothEyesSeeNothingThatTheirCameraDoesNot) {
       const glm::vec3 lo(p - 1e-6), hi(p + 1e-6);
       EXPECT_TRUE(frustum.may_contain({lo, hi})) << cant_deg;
     }
-    // It lies behind the eyes, not far, and its pixels are as fine.
+    // The camera lies behind the eyes, not far, and its pixels are as fine.
     const double behind = both.pose.position_room.z;
     EXPECT_GT(behind, 0);
     EXPECT_LT(behind, 0.05);
@@ -54,7 +54,7 @@ TEST(XrSpace, BothEyesSeeNothingThatTheirCameraDoesNot) {
   }
 }
 
-// Sizes of splats are chosen for it: as far from what is seen as the eyes are.
+// The camera between the eyes decides the sizes of splats: it is as far from surfaces as the eyes are.
 TEST(XrSpace, WhatStandsBetweenTheEyesIsAsNearAsThey) {
   const std::array eyes{eye_camera(eye(-0.032, -50, 42, 0), {}, 800, 820, 0.02),
                         eye_camera(eye(0.032, -42, 50, 0), {}, 800, 820, 0.02)};
@@ -65,7 +65,7 @@ TEST(XrSpace, WhatStandsBetweenTheEyesIsAsNearAsThey) {
   EXPECT_GT(both_eyes(eyes).pose.position_room.z, middle.pose.position_room.z);
 }
 
-// Neighbouring codes of 16 bits at a metre, as the depth is coded that a runtime is handed.
+// Neighbouring codes of 16 bits at a metre, in the coding of the depth that the runtime gets.
 TEST(XrSpace, StepsOfDepthAreThoseOfSixteenBits) {
   for (const double near_m : {0.002, 0.02, 0.5}) {
     const double far_m = 100;

@@ -1,4 +1,4 @@
-// --trajectory, --eye, --look-at, --loop, --duration and --background: what they come to, and what is refused.
+// --trajectory, --eye, --look-at, --loop, --duration and --background: their effect, and values that are refused.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 const geometry::Box kBox{{-0.1f, -0.4f, -0.1f}, {0.1f, 0.4f, 0.1f}};
 
-// A trajectory of three seconds.
+// The file of a trajectory of three seconds.
 class File {
  public:
   File() : path_((std::filesystem::temp_directory_path() / "telesplat-head-movement-test.csv").string()) {

@@ -1,4 +1,4 @@
-// How far predictions were off, and other programs' clocks.
+// Errors of predictions, and other programs' clocks.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ TEST(PredictionMeter, ComparesWithWhereTheHeadWasThen) {
   meter.actual(0, at_x(0));
   meter.predicted(0, at_x(0), 0.05, at_x(0.04));
   EXPECT_EQ(meter.figures().count, 0u);
-  meter.actual(0.1, at_x(0.1));  // so it was at 0.05 then
+  meter.actual(0.1, at_x(0.1));  // so the head was at 0.05 then
   const auto f = meter.figures();
   EXPECT_EQ(f.count, 1u);
   EXPECT_NEAR(f.horizon_s, 0.05, 1e-12);
@@ -27,9 +27,9 @@ TEST(PredictionMeter, ComparesWithWhereTheHeadWasThen) {
 TEST(PredictionMeter, DoesNotJudgeWhatNobodyKnows) {
   PredictionMeter meter;
   meter.predicted(0, at_x(0), 0.05, at_x(0));
-  meter.actual(0.1, at_x(1));  // nothing is known of before
+  meter.actual(0.1, at_x(1));  // no earlier pose is known
   meter.predicted(0.1, at_x(1), 0.2, at_x(1));
-  meter.actual(5, at_x(2));  // nothing of the time between
+  meter.actual(5, at_x(2));  // no pose between is known
   EXPECT_EQ(meter.figures().count, 0u);
 }
 
@@ -43,7 +43,7 @@ TEST(PredictionMeter, KeepsNoMoreThanItMay) {
 
 TEST(PoseClock, TakesTheLeastDelay) {
   PoseClock clock;
-  // Their clock is 100 s behind; messages take 5 ms and up to 20 ms more.
+  // Their clock is 100 s behind; messages take 5 to 25 ms.
   double worst = 0;
   for (int i = 0; i < 500; ++i) {
     const double t_s = i * 0.01, arrived_s = t_s + 100.005 + 0.02 * std::abs(std::sin(i * 1.7));
@@ -57,7 +57,7 @@ TEST(PoseClock, TakesTheLeastDelay) {
 TEST(PoseClock, FollowsAClockThatIsSetAnew) {
   PoseClock clock;
   for (int i = 0; i < 100; ++i) clock.local_s(i * 0.01, 100 + i * 0.01);
-  // Back by 50 s: what came before holds no longer than two windows.
+  // Their clock goes back by 50 s: the old offset is forgotten within two windows.
   double local_s = 0, arrived_s = 0;
   for (int i = 0; i < 500; ++i) {
     arrived_s = 101 + i * 0.01;

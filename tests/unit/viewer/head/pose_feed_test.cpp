@@ -1,4 +1,4 @@
-// Poses over sockets, good and bad.
+// Poses over sockets, valid and invalid.
 #include "client/viewer/input/pose_feed.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ void send(net::PlainPublisher& to, double x) {
   to.send(wire::encode_head_pose({std::nullopt, {{x, 0, 0}, {1, 0, 0, 0}}}));
 }
 
-// Until `there` says so, or patience is over.
+// Waits until `there` is true; returns false after kPatience_s.
 bool wait_for(const std::function<bool()>& there) {
   for (const double until_s = monotonic_s() + kPatience_s; monotonic_s() < until_s;) {
     if (there()) return true;
@@ -52,7 +52,7 @@ TEST(PoseFeed, OutlivesWhatIsNoPose) {
        {std::string(), std::string("hello"), std::string(3000, '\x93'), std::string(1 << 20, 'x')})
     hostile->send(bytes);
   ASSERT_TRUE(wait_for([&] { return (*feed)->figures().refused >= 3; }));
-  // The last one was too large for anybody; its connection ended, and another one was made.
+  // The last message was over the socket's size limit; the connection ended, and the feed connected again.
   ASSERT_TRUE(wait_for([&] {
     hostile->heard();
     send(*hostile, 5);
@@ -73,7 +73,7 @@ TEST(PoseFeed, AFloodIsBoundedAndTold) {
     if (const auto news = (*feed)->take_news(monotonic_s())) told += *news;
     return told.find("messages a second") != std::string::npos || sent > 5'000'000;
   }));
-  // A machine that cannot send so many tells nothing.
+  // On a machine too slow for such a flood there is no news.
   const double most = PoseFeed::kMost_s * (1.2 * (monotonic_s() - begin_s) + 0.02);  // turns of 0.01 s are whole
   EXPECT_LE(double((*feed)->figures().poses), most);
 }

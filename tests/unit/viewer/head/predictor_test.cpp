@@ -1,4 +1,4 @@
-// Where a head will be.
+// Predictions of a head's pose.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 geometry::Pose turned(double yaw_rad, const glm::dvec3& p) { return {p, glm::angleAxis(yaw_rad, glm::dvec3(0, 1, 0))}; }
 
-// A head that sways: 0.1 m and 0.3 rad, once in two seconds.
+// A head that sways by 0.1 m and 0.3 rad with a period of two seconds.
 geometry::Pose swaying(double t_s) {
   const double phase = std::sin(3.14159265 * t_s);
   return turned(0.3 * phase, {0.1 * phase, 1.5, 0});
@@ -22,7 +22,7 @@ struct Errors {
   double m = 0, rad = 0;
 };
 
-// Mean errors at a horizon of 60 ms, poses come rate_hz times a second with that noise.
+// Mean errors at a horizon of 60 ms; poses come rate_hz times a second with that noise.
 Errors errors(Prediction method, double rate_hz, double noise_m = 0, double noise_rad = 0) {
   PosePredictor predictor(method);
   std::mt19937 random(7);
@@ -60,7 +60,7 @@ TEST(PosePredictor, TheFilterFindsAConstantVelocity) {
   for (int i = 0; i <= 200; ++i) predictor.add(i * 0.01, turned(0.5 * i * 0.01, {0.4 * i * 0.01, 0, 0}));
   EXPECT_NEAR(predictor.speed_m_s(), 0.4, 0.04);
   EXPECT_NEAR(predictor.turn_rad_s(), 0.5, 0.1);
-  // Heads that turn come to rest: it expects a little less than a straight line would have.
+  // Heads that turn come to rest: the predictor expects a little less than a straight line would give.
   const geometry::Pose p = predictor.predict(2.05);
   EXPECT_NEAR(p.position_room.x, 0.4 * 2.05, 0.003);
   EXPECT_NEAR(glm::angle(p.orientation), 0.5 * 2.05, 0.01);

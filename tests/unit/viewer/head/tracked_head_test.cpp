@@ -1,4 +1,4 @@
-// A head whose poses another program tells.
+// A head whose poses another program sends.
 #include "client/viewer/input/tracked_head.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ TEST(TrackedHead, StandsNowhereBeforeItsFirstPose) {
 
 TEST(TrackedHead, FollowsPosesInTheirOwnClock) {
   TrackedHead head(tracking::Prediction::kVelocity);
-  // It moves with 1 m/s; its clock is 1000 s ahead; every second message is 4 ms late.
+  // It moves at 1 m/s; its clock is 1000 s ahead; every second message is 4 ms late.
   for (int i = 0; i < 100; ++i) head.told(at_x(1000 + i * 0.01, i * 0.01), i * 0.01 + (i % 2 ? 0.004 : 0.0));
   const auto pose = head.at(0.995, 0.02);
   ASSERT_TRUE(pose);

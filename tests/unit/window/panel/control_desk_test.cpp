@@ -1,4 +1,4 @@
-// Orders of the panel and a master that answers, answers late, or is not there.
+// Orders of the panel to a master that answers, answers late, or is not there.
 #include "client/displays/window/panel/control_desk.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ class ControlDeskTest : public testing::Test {
     ASSERT_TRUE(bound) << bound.error().text;
     endpoint_ = *bound;
   }
-  // The next command that reached the master.
+  // Returns the next command that reached the master.
   std::optional<wire::Control> next() {
     std::optional<wire::Control> out;
     wait_for([&] {
@@ -81,9 +81,9 @@ TEST_F(ControlDeskTest, OfOrdersOfOneSubjectTheNewestWaits) {
   EXPECT_EQ(seen, (std::vector<std::string>{"100", "5", "epoch", "epoch"}));
 }
 
-// What came too late for one order is no answer to the next one.
+// An answer that comes too late for one order is not taken for the next order's.
 TEST_F(ControlDeskTest, ALateAnswerIsNotTakenForTheNextOnes) {
-  ControlDesk desk(endpoint_, {}, 1.5);  // in which a busy machine answers the second order, too
+  ControlDesk desk(endpoint_, {}, 1.5);  // 1.5 s are enough for a busy machine to answer the second order
   const auto answered = [&] {
     std::vector<OrderAnswer> answers;
     EXPECT_TRUE(wait_for([&] { return !(answers = desk.take_answers()).empty(); }));

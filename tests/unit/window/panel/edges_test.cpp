@@ -1,5 +1,5 @@
-// The panel and the dialog with what nobody expects: windows of a pixel, names that are no names, texts that look like
-// formats. Dear ImGui ends the program at what it does not expect.
+// The panel and the dialog with unusual input: windows of a pixel, invalid names, texts that look like formats. Dear
+// ImGui ends the program at input that it does not expect.
 #include <gtest/gtest.h>
 #include <imgui.h>
 #include <unistd.h>

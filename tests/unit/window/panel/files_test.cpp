@@ -1,4 +1,4 @@
-// Folders as the dialog lists them, data sets that were opened of late, lines of the launcher.
+// Folders as the dialog lists them, recently opened data sets, lines of the launcher.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// The legend over a window, as it is drawn, without a window: where it lies, how it is moved, how its range changes.
+// The legend over a window, drawn without a window: its place, moving it, changing its range.
 #include "client/displays/window/panel/gui/legend_view.h"
 
 #include <gtest/gtest.h>
@@ -79,7 +79,7 @@ TEST_F(LegendView, LiesInTheLowerRightCornerOfAnyWindow) {
 
 TEST_F(LegendView, IsDraggedElsewhereAndKeepsItsDistanceFromTheCorner) {
   const double before = left();
-  // By its title.
+  // Drags it by its title.
   drag({float(left() + 20), float(part_.top * 800 + 12)}, {-900, -300});
   EXPECT_NEAR(left(), before - 900, 2);
   const double at = left();

@@ -1,4 +1,4 @@
-// The panel without its window: plots, what is chosen and what comes of it.
+// The panel without its window: plots, choices and their effects.
 #include "client/displays/window/panel/panel.h"
 
 #include <gtest/gtest.h>

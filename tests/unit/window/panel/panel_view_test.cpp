@@ -1,4 +1,4 @@
-// The panel as it is drawn, without a window: a hand that clicks, drags and types everywhere orders nothing wrong.
+// The panel drawn without a window: clicks, drags and typing everywhere never give an invalid order.
 #include "client/displays/window/panel/gui/panel_view.h"
 
 #include <gtest/gtest.h>
@@ -91,7 +91,7 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
         EXPECT_TRUE(value == "on" || value == "off") << name << " " << value;
         overlays_[name] = value;
       } else if (const Status s = change(settings_, name, value); !s) {
-        // These two need what the window began with.
+        // These two values need devices that the window was started with.
         EXPECT_TRUE(name == "stereo" && (value == "autostereo" || value == "quad-buffer")) << s.error().text;
       }
     }
@@ -105,7 +105,7 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
     panel_.take_pressed();
   }
 
-  // As the master would read it. A slice that misses the set is its to refuse.
+  // Checks an order as the master reads it, except for slices that miss the set, which the master refuses.
   void check(const Order& order) {
     orders_.insert(order.command);
     if (order.command == "tf") {
@@ -161,7 +161,7 @@ TEST_P(PanelView, AHandThatClicksEverywhereOrdersNothingWrong) {
   ImGuiIO& io = ImGui::GetIO();
   frame();
   for (int i = 0; i < 2500; ++i) {
-    // A list that a click opened lies below it.
+    // A list that a click opened lies below the pointer.
     if (number(2) == 0)
       io.MousePos = {float(number(380)), float(number(1400))};
     else
@@ -186,7 +186,7 @@ TEST_P(PanelView, AHandThatClicksEverywhereOrdersNothingWrong) {
   if (GetParam() == scene::Kind::kJulia) EXPECT_TRUE(orders_.contains("set"));
 }
 
-// All sections are opened; what needs an isosurface or loose coupling gets it.
+// All sections are opened; settings for isosurfaces and for loose coupling get these.
 TEST_P(PanelView, HasEverySettingOfItsKind) {
   WidgetLog log("widgets-of-no-folder/list");
   ImGuiIO& io = ImGui::GetIO();
@@ -255,7 +255,7 @@ TEST_P(PanelView, TheLogHasItsWidgetsWhereTheyAreAndCountsTheirUse) {
   EXPECT_EQ(LoggedBuild::log(), nullptr);
 }
 
-// A function may end within the data, or lie beside them; bars of the histogram then lie beside the plot.
+// A function may end within the data's range or lie beside it; bars of the histogram then lie beside the plot.
 TEST_P(PanelView, DrawsAnyTransferFunctionOverAnyHistogram) {
   if (GetParam() != scene::Kind::kVolume) GTEST_SKIP() << "other data have no transfer function";
   std::vector<std::string> functions;

@@ -1,4 +1,4 @@
-// What a person changes of a scene: transfer functions, steps, parameters, timelines, and the orders that come of it.
+// A person's changes of a scene: transfer functions, steps, parameters, timelines, and the orders that they give.
 #include "client/displays/window/panel/scene_controls.h"
 
 #include <gtest/gtest.h>
@@ -90,7 +90,7 @@ TEST_F(VolumeControlsTest, AFunctionHasNoMorePointsThanItsTextHolds) {
 TEST_F(VolumeControlsTest, WhatIsWantedIsShownUntilTheSessionHasIt) {
   controls_.edit([](TransferEditor& e) { return e.move(10, 1, 120, 0.7); });
   const auto wanted = controls_.transfer().transfer();
-  controls_.on_session(10.5, welcome_of(session_));  // an older one
+  controls_.on_session(10.5, welcome_of(session_));  // an older session
   EXPECT_EQ(controls_.transfer().transfer(), wanted);
   controls_.on_session(20, welcome_of(session_));
   EXPECT_EQ(controls_.transfer().transfer(), session_.transfer) << "somebody else had it another way";
