@@ -1,4 +1,4 @@
-// Masks in messages: the rays of a tile to cast.
+// Masks in messages: they mark the rays of a tile to cast.
 #pragma once
 
 #include <cstdint>

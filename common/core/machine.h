@@ -1,4 +1,4 @@
-// The machine that a process runs on and the command line that started it, for records of what was done.
+// The machine that a process runs on, and the command line that started it, for records.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Reads or writes files as a whole: descriptions, settings, tables. The content may have changed to anything since, or
-// be written by a stranger.
+// Reads or writes files as a whole: descriptions, settings, tables. Any content must be expected: files change, and may
+// come from strangers.
 #pragma once
 
 #include <cstdint>

@@ -35,7 +35,7 @@ struct Clip {
   bool keeps(const glm::dvec3& room, double tolerance_m = 0) const;
 
   enum class Part { kAll, kSome, kNone };
-  /// Tells which part of a box is kept. Near an edge of the planes it may say kSome for a box that is wholly cut away.
+  /// Returns the kept part of a box. Near an edge of the planes it may return kSome for a box that is wholly cut away.
   Part part_of(const Box& box_room) const;
 
   /// The kept stretch of a line, in units of its direction; empty if begin > end.

@@ -1,4 +1,4 @@
-// Tells endpoints on this machine from those on others.
+// Finds endpoints that stay on this machine.
 #pragma once
 
 #include <arpa/inet.h>

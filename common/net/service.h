@@ -25,8 +25,8 @@ struct ServiceOptions {
   std::string log_level = "info";
   double give_up_after_s = 0;       ///< limit of a wait for the master or others of the session; 0: none
   uint64_t max_connections = 1024;  ///< at a time, of each socket that binds
-  double queue_limit_mb = 256;      ///< bytes that wait for one peer, in 10^6
-  double max_messages = 20000;      ///< requests of one peer, a second
+  double queue_limit_mb = 256;      ///< limit of bytes that wait for one peer, 10^6 bytes
+  double max_messages = 20000;      ///< limit of requests of one peer, a second
   uint64_t queue_limit_bytes() const { return uint64_t(queue_limit_mb * 1e6); }
 };
 

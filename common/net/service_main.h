@@ -1,4 +1,4 @@
-// The main() of every service program: parse the configuration, serve until told to stop.
+// The main() of every service program: parses the configuration, serves until a stop is requested.
 #pragma once
 
 #include "common/core/version.h"

@@ -41,8 +41,8 @@ SessionPlace this_place() {
   return out;
 }
 
-// Start of a process, in clock ticks since the machine started: tells apart processes with the same number. nullopt: no
-// such process runs.
+// Start of a process, in clock ticks since the machine started: it differs between processes with the same number.
+// nullopt: no such process runs.
 std::optional<uint64_t> process_start(uint64_t pid) {
   std::ifstream in(fmt::format("/proc/{}/stat", pid));
   std::string line;

@@ -252,7 +252,7 @@ class FinerPoints {
 
  private:
   static constexpr uint32_t kOctants = 24, kMostCounted = (1u << kOctants) - 1;  // a word: octants above, count below
-  // A surface crosses at least four octants. Fewer mean a clump of many samples with nothing beside it.
+  // A surface crosses four octants or more. Fewer than this mean a clump of many samples with nothing beside it.
   static constexpr int kLeastOctants = 3;
   Grid grid_, halves_;
   uint32_t enough_;

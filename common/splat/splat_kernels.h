@@ -82,8 +82,8 @@ struct TileTarget {
 void resolve_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, std::vector<uint64_t>& scratch);
 
 /// Writes colours (0xff000000 | 0x00RRGGBB) and, if target.depth_m is not null, depths in metres without the bias
-/// (+infinity where empty). Then turns the tile and its reach into empty keys again; the rest of the rows stays as the
-/// stages left it.
+/// (+infinity for empty pixels). Then turns the tile and its reach into empty keys again; leaves the rest of the rows
+/// as the stages left it.
 void write_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, const TileTarget& target);
 
 /// resolve_tile and write_tile in one pass, for tiles without reach.

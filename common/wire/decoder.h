@@ -24,7 +24,7 @@ class Decoder {
   /// value, without an error.
   void be_brief() { brief_ = true; }
 
-  /// Names the field and what is wrong with it.
+  /// The first error: names the field and the problem.
   const std::optional<Error>& error() const { return error_; }
 
   /// True if the map has a field of this name.

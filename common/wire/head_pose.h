@@ -23,7 +23,7 @@ inline constexpr double kFarthestHead_m = 1e4;  ///< from the room's centre, alo
 std::string encode_head_pose(const HeadPose& pose);
 /// Refuses, naming field, value and limit: bodies over kMaxHeadPoseBytes, bytes that are not one msgpack map, fields
 /// that are missing ("t" may be) or of another type, numbers that are not finite, positions beyond kFarthestHead_m,
-/// quaternions whose length is not 1 to 5 %. Ignores other fields. The quaternion is made of unit length.
+/// quaternions whose length differs from 1 by more than 5 %. Ignores other fields. Normalises the quaternion.
 Result<HeadPose> decode_head_pose(Bytes body);
 
 }  // namespace telesplat::wire

@@ -1,4 +1,4 @@
-// Messages about the links of viewers: how much of what was published has arrived.
+// Messages about the links of viewers: the part of the published events that has arrived.
 #pragma once
 
 #include <string_view>

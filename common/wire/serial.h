@@ -1,4 +1,4 @@
-// Encoding and decoding of messages: msgpack maps, validated before anything is allocated.
+// Encodes and decodes messages: msgpack maps, validated before memory is allocated.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,4 @@
-// Messages of a session, between every process (DEALER) and the master (ROUTER): who takes part, what is shown,
-// what was measured, when it ends.
+// Messages of a session, between every process (DEALER) and the master (ROUTER): members, scene, measurements, end.
 #pragma once
 
 #include <map>

@@ -67,7 +67,7 @@ struct Lease {
   bool extra = false;         ///< rays beyond those that the view asked for: the tile completes no update
   uint64_t rays = 0;          ///< rays to cast: one for each pixel of mask; without a mask, of rect
   std::vector<uint32_t> mask; ///< codec::encode_mask, of rect's size; empty: all pixels. Samplers do not send it back
-  double footprint = 0;       ///< as ViewRequest::footprint; 0: width of one of camera's pixels, over step
+  double footprint = 0;       ///< as ViewRequest::footprint; 0: the width of one of camera's pixels, divided by step
   Moments moments;            ///< up to the lease; a sampler sends it back with its own
   InstanceId master;          ///< master that numbers leases and frames
   std::vector<uint32_t> seal; ///< kSealWords numbers, of this master and for this sampler (lease_seal.h)

@@ -34,7 +34,7 @@ struct GuidedSamples {
 /// Weights found by least squares.
 struct GuidedFit {
   bool better_than_median =
-      false;  ///< false: weights are 0: on facets, whose pixels all have one normal, the median wins
+      false;  ///< if false, weights are 0: on facets, whose pixels all have one normal, the median wins
   int16_t weights[kGuidedTerms] = {};
   int32_t constant = 0;
   double left_over = 0;  ///< mean token of the prediction errors; infinite if no fit was possible

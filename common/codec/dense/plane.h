@@ -7,8 +7,8 @@
 
 namespace telesplat::codec::detail {
 
-/// width x height elements, with two more rows above and below each, kLead more elements to the left and kTail to the
-/// right of each row. Kernels may read and write whole vectors beyond a row's end.
+/// A plane of width x height elements with a border: two rows above and two below, and in each row kLead elements to
+/// the left and kTail to the right. Kernels may read and write whole vectors beyond a row's end.
 template <class T>
 class Plane {
  public:

@@ -16,7 +16,7 @@ constexpr uint32_t weight_of(unsigned level) { return level < 2 ? 0 : kSteps[(le
 
 // Returns the level whose weight is nearest, by ratio.
 unsigned level_of(uint32_t weight) {
-  // Looks up the seven bits after the highest one: number of geometric means of steps that lie below.
+  // Nearest step by the seven bits after the highest one: counts the geometric means of neighbouring steps below it.
   static constexpr auto kNearest = [] {
     std::array<uint8_t, 128> out{};
     for (uint32_t i = 0; i < out.size(); ++i) {

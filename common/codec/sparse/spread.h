@@ -47,7 +47,7 @@ class SpreadShares {
     const uint32_t given = 2 * static_cast<uint32_t>(places());
     return (below(place - reach_ - 1, scale_) * (kAll - given) >> kAllBits) + 2 * static_cast<uint32_t>(place);
   }
-  /// Tells if a wider spread makes a cell likelier: 256: much likelier; -256: much less.
+  /// Returns 256 if a wider spread makes a cell much likelier, down to -256 if much less likely.
   int wider(int place) const;
 
   static constexpr unsigned kAllBits = 16;

@@ -114,7 +114,7 @@ class RowMoments {
   std::array<std::vector<float>, 4> vertical_, means_;
 };
 
-// hits: number of rays in each pixel of the reference that met the data; null: its depth tells.
+// hits: number of rays in each pixel of the reference that met the data; null: one ray, whose depth shows it.
 Quality compare_counted(const View& reference, const uint16_t* hits, const View& reconstruction) {
   const int width = reference.width, height = reference.height;
   const size_t pixels = size_t(width) * height;

@@ -17,7 +17,7 @@ inline constexpr int kMostSamples = 64;
 /// The data as seen with several rays a pixel.
 ///   view.colour   mean of the rays' colours, background included: a box filter on displayed colours
 ///   view.depth_m  the farthest depth at which a ray meets the data; +infinity unless all of them do
-///   hits          number of rays in each pixel that met the data; empty for one ray a pixel, whose depth tells
+///   hits          number of rays in each pixel that met the data; empty for one ray a pixel, whose depth shows it
 struct Reference {
   int samples = 1;
   View view;

@@ -42,7 +42,7 @@ inline const std::string* payer(const Message& message) {
 class WorkShares {
  public:
   static constexpr double kShare = 0.2;    ///< share of the time
-  static constexpr double kBurst_s = 0.5;  ///< seconds at once after a quiet time
+  static constexpr double kBurst_s = 0.5;  ///< seconds of work at once after a quiet time
 
   /// True if one more message of this payer may be handled; false: counts it as refused.
   bool admit(const std::string& payer, double now_s);

@@ -169,7 +169,7 @@ class EwaRecord {
 // First pass: the least depth of opaque ellipses. Leaves a record for the second.
 class EwaVisibility {
  public:
-  // The reach of the second pass, whose splats reach farther.
+  // Uses the reach of the second pass, whose splats reach farther.
   static constexpr SurfelReach kReach = kEwaReach;
 
   EwaVisibility(const TileInput& input, const EwaBuffer& buffer, EwaRecord& record)

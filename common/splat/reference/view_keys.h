@@ -13,7 +13,7 @@
 namespace telesplat::splat {
 
 /// Sizes of splats as multiples of the distance of their samples. A square grid's splats meet at its diagonals from
-/// sqrt 2 on: then a surface hides what is behind it however thinly it is sampled (up to kMaxSplatSide pixels).
+/// sqrt 2 on: then a surface hides all that is behind it, even if thinly sampled (up to kMaxSplatSide pixels).
 inline constexpr float kClosedScale = 1.45f;
 
 class ViewKeys {

@@ -147,8 +147,7 @@ HWY_INLINE Conics ConicOf(const Surfels& s, VF grow, float add, const geometry::
   const auto inverse = hn::Div(Const(1.0f), c.determinant);
   c.xx = hn::Mul(yy, inverse), c.xy = hn::Mul(hn::Mul(xy, Const(-2.0f)), inverse), c.yy = hn::Mul(xx, inverse);
   const auto bounds = [&](VF centre, VF variance, int low, int size, VI& pixel, VI& first, VI& last) HWY_ATTR {
-    const auto reach =
-        hn::Min(hn::Sqrt(variance), Const(64.0f));  // far beyond the cut; no number is too large to convert
+    const auto reach = hn::Min(hn::Sqrt(variance), Const(64.0f));  // far beyond the cut, and small enough to convert
     const auto from = hn::Sub(centre, Const(0.5f));
     pixel = hn::ConvertTo(di, hn::Floor(centre));
     first = hn::ConvertTo(di, hn::Ceil(hn::Sub(from, reach)));
