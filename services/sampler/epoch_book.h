@@ -1,5 +1,4 @@
-// What a sampler remembers of a session's epochs: leases name the epoch that they are of, and may come before its
-// welcome.
+// A sampler's memory of a session's epochs: each lease names its epoch, and may come before the epoch's welcome.
 #pragma once
 
 #include <map>
@@ -9,14 +8,14 @@
 
 namespace telesplat::sampler {
 
-inline constexpr size_t kEpochs = 8;          ///< remembered, the newest ones
+inline constexpr size_t kEpochs = 8;          ///< epochs that are remembered, the newest ones
 inline constexpr double kUnknownEpoch_s = 1;  ///< a lease waits this long for its epoch's welcome
 
 template <class T>
 class EpochBook {
  public:
-  /// Says whose epochs come now. With another master the same number is another epoch: then all are forgotten. Returns
-  /// whether it is another one.
+  /// Sets the master whose epochs come now. With another master the same number is another epoch: then all are
+  /// forgotten. True: it is another master.
   bool follow(InstanceId master) {
     const bool another = master != master_;
     if (another) epochs_.clear();
@@ -24,7 +23,7 @@ class EpochBook {
     return another;
   }
 
-  /// Null: not known, or forgotten. Valid until put() or follow().
+  /// Null: the epoch is not known, or forgotten. Valid until put() or follow().
   const T* find(EpochId epoch) const {
     const auto found = epochs_.find(epoch);
     return found == epochs_.end() ? nullptr : &found->second;
@@ -39,7 +38,7 @@ class EpochBook {
   EpochId newest_id() const { return epochs_.rbegin()->first; }
   const T& newest() const { return epochs_.rbegin()->second; }
 
-  /// For a lease whose epoch is not known: it waits, then it is hopeless.
+  /// For a lease whose epoch is not known: it waits for kUnknownEpoch_s, then it is hopeless.
   static Readiness wait_for_welcome(EpochId epoch, double received_s, double now_s) {
     const double until_s = received_s + kUnknownEpoch_s;
     if (now_s < until_s) return {Readiness::State::kWaits, until_s};

@@ -1,5 +1,5 @@
-// How long to wait for what a data server was asked for before it is asked again: as long as the link needs, by what
-// came over it so far. What is asked for twice comes twice, and makes a slow link slower. No sockets, no clocks.
+// Says when to repeat a request to a data server: after the time that the link needs, judged by the answers so far.
+// Data that is asked for twice comes twice, and makes a slow link slower. No sockets, no clocks.
 #pragma once
 
 #include <algorithm>
@@ -11,16 +11,16 @@ namespace telesplat::sampler {
 class RetryClock {
  public:
   static constexpr double kLeast_s = 2, kMost_s = 60;
-  static constexpr double kFirst_s = 15;   ///< while nothing is known of the link
-  static constexpr double kTimes = 3;      ///< what the link should need
-  static constexpr double kWindow_s = 10;  ///< that its rate is a mean of, about
+  static constexpr double kFirst_s = 15;   ///< patience while nothing has come over the link
+  static constexpr double kTimes = 3;      ///< multiple of the time that the link should need
+  static constexpr double kWindow_s = 10;  ///< the link's rate is a mean over about this time
 
-  /// About so many bytes are asked for.
+  /// About `bytes` bytes are asked for.
   void asked(uint64_t bytes, double now_s) {
     if (open_ == 0) since_s_ = now_s;
     open_ += std::max<uint64_t>(bytes, 1);
   }
-  /// `bytes` came, of a request for `expected`. What comes at one moment came one after the other.
+  /// `bytes` came in answer to a request for `expected`. Answers at one moment count as one after the other.
   void answered(uint64_t expected, uint64_t bytes, double now_s) {
     const double took_s = std::max(0.0, now_s - since_s_), fades = std::exp(-took_s / kWindow_s);
     bytes_ = bytes_ * fades + double(bytes);
@@ -28,25 +28,25 @@ class RetryClock {
     open_ -= std::min(open_, std::max<uint64_t>(expected, 1));
     since_s_ = now_s;
   }
-  /// Nothing is waited for any more.
+  /// Drops all requests.
   void forget() { open_ = 0; }
 
-  /// Something has come.
+  /// True if an answer has come.
   bool known() const { return bytes_ > 0; }
-  /// Since the last answer, or since it was asked.
+  /// Seconds to wait after the last answer, or after the first open request.
   double patience_s() const {
     if (bytes_ == 0) return kFirst_s;
     return std::clamp(kLeast_s + kTimes * double(open_) * busy_s_ / bytes_, kLeast_s, kMost_s);
   }
-  /// broken: the connection broke since it was asked, so that requests and answers may be lost.
+  /// True if requests should be repeated. broken: the connection broke after them, so that they may be lost.
   bool overdue(double now_s, bool broken) const {
     return open_ > 0 && now_s - since_s_ > (broken ? kLeast_s : patience_s());
   }
 
  private:
-  uint64_t open_ = 0;  // asked for and not answered
+  uint64_t open_ = 0;  // bytes asked for and not answered
   double since_s_ = 0;
-  double bytes_ = 0, busy_s_ = 0;  // decaying
+  double bytes_ = 0, busy_s_ = 0;  // sums that decay with kWindow_s
 };
 
 }  // namespace telesplat::sampler

@@ -1,4 +1,4 @@
-// What a sampler can be told on its command line.
+// The flags of telesplat-sampler.
 #pragma once
 
 #include "common/net/service.h"
@@ -7,14 +7,14 @@ namespace telesplat::sampler {
 
 struct SamplerOptions {
   net::ServiceOptions service{.name = net::unique_name("sampler")};
-  std::string kind = "auto";     ///< of meshes: "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
+  std::string kind = "auto";     ///< for meshes: "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
   int threads = 0;               ///< 0: all cores
-  double chunk_cache_mb = 8192;  ///< of chunks or voxels held, unless one view needs more
-  std::string replay;            ///< file of rows sampled before (tiles/replay.h); empty: samples itself
-  double cost_scale = 1;         ///< a replayed lease takes this times what its rows took
+  double chunk_cache_mb = 8192;  ///< memory for chunks or voxels, unless one view needs more
+  std::string replay;            ///< file of rows that were sampled before (tiles/replay.h); empty: it samples
+  double cost_scale = 1;         ///< a replayed lease takes this many times as long as its rows took
 };
 
-/// A row a flag; they point into `options`.
+/// Rows of all flags; they point into `options`.
 options::Table table(SamplerOptions& options);
 
 }  // namespace telesplat::sampler

@@ -25,24 +25,23 @@
 namespace telesplat::sampler {
 namespace {
 
-constexpr int kLeases = 2;                           // held and asked for: one being sampled, one to go on with at once
-constexpr double kIdle_s = 0.1;                      // the longest wait: then status reports and hellos are due
-constexpr double kSpanFlush_s = 1;                   // between two deliveries of spans
-constexpr double kSendAgain_s = 0.025;               // between two tries to send
-constexpr double kSendFor_s = 1;                     // to a packer that is slow or being restarted
-constexpr std::chrono::duration<double> kLook{0.2};  // how late a stop is noticed
+constexpr int kLeases = 2;              // held and asked for: one that is sampled, and one to go on with at once
+constexpr double kIdle_s = 0.1;         // the longest wait: then status reports and hellos are due
+constexpr double kSpanFlush_s = 1;      // between two messages of spans
+constexpr double kSendAgain_s = 0.025;  // between two tries to send
+constexpr double kSendFor_s = 1;        // tries go on for this long: the packer may be slow, or restarted
+constexpr std::chrono::duration<double> kLook{0.2};  // a stop is noticed this late at most
 
-// A sampler begins no lease later than this after it was told to stop.
+// A sampler begins no lease later than this after a signal to stop.
 constexpr double kDrain_s = 0.8;
-// This long after it was told to stop it ends, in the middle of anything: its manager may kill it after two seconds.
+// This long after the signal it ends, even in the middle of a lease: its manager may kill it after two seconds.
 constexpr double kStop_s = 1.3;
 
-// Makes a sampler that is told to stop end in time, even in the middle of a lease that never ends.
+// Makes a sampler end in time after a signal to stop, even in the middle of a lease that never ends.
 class DrainGuard {
  public:
-  // From then on watches net::stop_requested(). If the process still runs kStop_s after it was told to stop, says
-  // goodbye to the master in the name of `instance`, so that its leases go to others at once, and ends the process
-  // with code 0.
+  // Watches net::stop_requested() from now on. If the process still runs kStop_s after the signal, says goodbye to the
+  // master in the name of `instance`, so that its leases go to others at once, and ends the process with code 0.
   DrainGuard(const std::string& master, InstanceId instance, net::Access access = {});
   ~DrainGuard();
 
@@ -85,7 +84,7 @@ void DrainGuard::watch(const std::string& master, InstanceId instance, const net
 
 class SamplerTurns final : public SamplerService {
  public:
-  /// mesh_sampler: made beforehand, or null. replay: samples scenes of every kind, or null.
+  /// mesh_sampler: made beforehand, or null. replay: delivers tiles instead of sampling scenes of any kind, or null.
   SamplerTurns(const SamplerOptions& o, InstanceId instance, std::unique_ptr<Sampler> mesh_sampler,
                std::unique_ptr<TileSource> replay, net::Context& context)
       : options_(o),
@@ -99,7 +98,7 @@ class SamplerTurns final : public SamplerService {
   std::optional<net::Wait> turn() override {
     receive_control(!give_up_s_);
     if (work_) work_->receive(monotonic_s());
-    // What came meanwhile may have changed what is known of the lease's epoch.
+    // Messages that came meanwhile may have changed the lease's epoch.
     if (std::exchange(ready_, false) && look_at_next(monotonic_s()).state == Readiness::State::kReady && held() > 0)
       sample_next();
     const double now = monotonic_s();
@@ -155,8 +154,8 @@ class SamplerTurns final : public SamplerService {
     if (const auto rows = spans_.flush(link_.instance())) link_.socket().send(*rows);
   }
 
-  // Told to stop, it works off what it holds. What cannot be sampled soon is left to the master: it goes to others with
-  // our goodbye.
+  // True if it may leave after a signal to stop: it finishes the leases that it can sample soon. The master gives the
+  // others to other samplers after our goodbye.
   bool drained(bool ready, const Readiness& next, double now_s) const {
     if (!give_up_s_) return false;
     const bool waits = unsent_ || (held() > 0 && next.again_s < *give_up_s_);
@@ -191,7 +190,7 @@ class SamplerTurns final : public SamplerService {
     if (const Status s = tiles_->connect(endpoint); !s) log::error("{}", s.error().text);
   }
 
-  // Another kind of scene takes other work.
+  // Makes another work if the kind of scene is another one.
   void follow_kind(const std::string& name) {
     if (name.empty() || name == kind_) return;
     kind_ = name;
@@ -247,7 +246,7 @@ class SamplerTurns final : public SamplerService {
     send_out(monotonic_s());
   }
 
-  // If the packer is slow or being restarted, what was sampled is held for kSendFor_s. Then its lease may expire.
+  // If the packer is slow or being restarted, holds the message for kSendFor_s. Then its lease may expire.
   void send_out(double now_s) {
     if (!unsent_) return;
     if ((tiles_ && tiles_->send_frames({}, unsent_->type, unsent_->body)) || now_s > unsent_->encoded_s + kSendFor_s)
@@ -260,15 +259,15 @@ class SamplerTurns final : public SamplerService {
   const bool replays_;
   metrics::SpanRecorder spans_;
   net::MasterLink link_;
-  std::unique_ptr<Work> work_;  // none before the session's kind is known
+  std::unique_ptr<Work> work_;  // null: the session's kind is not known yet
   std::optional<net::Socket> tiles_;
   std::string tiles_endpoint_, kind_;
   InstanceId master_;
   std::optional<Delivery> unsent_;
-  std::optional<double> give_up_s_;  // set once told to stop
+  std::optional<double> give_up_s_;  // set after a signal to stop
   int leases_asked_ = 0;
   bool failed_ = false;
-  bool ready_ = false;  // the first lease may be sampled once what is here is received
+  bool ready_ = false;  // the first lease may be sampled once waiting messages are taken
   uint64_t tiles_sampled_ = 0;
   double busy_s_ = 0;  // sampling and encoding
   double last_flush_s_ = 0;
@@ -293,7 +292,7 @@ Result<int> run(const SamplerOptions& given) {
     auto file = read_replay(o.replay);
     if (!file) return file.error();
     replay = std::make_unique<ReplayTiles>(std::move(*file), o.cost_scale);
-  } else if (o.kind != "auto") {  // one that cannot be made should not wait for a session to say so
+  } else if (o.kind != "auto") {  // if it cannot be made, report it now, not when a session comes
     auto made = make_sampler(o.kind, o.threads);
     if (!made) return complain(made.error(), 1);
     sampler = std::move(*made);

@@ -1,5 +1,5 @@
-// The sampler process (T5.2.2): takes leases, samples what they ask for, encodes, pushes. What sampling is depends on
-// the session's kind of scene (works.h).
+// The sampler process (T5.2.2): takes leases, samples what they ask for, encodes, pushes. The way of sampling depends
+// on the session's kind of scene (works.h).
 #pragma once
 
 #include <memory>
@@ -19,9 +19,9 @@ class SamplerService : public net::Turns {
   virtual int exit_code() const = 0;
 };
 
-/// Serves until told to finish. Told by SIGINT or SIGTERM it finishes what it holds, asks for no more, and is gone
-/// within 2 s; told by the master it ends at once. Exit code: 0; 1 if the sampler asked for cannot be made; 2 if the
-/// replay file cannot be read.
+/// Serves until a signal or the master's Shutdown. After SIGINT or SIGTERM it finishes the leases that it holds, asks
+/// for no more, and ends within 2 s; after a Shutdown it ends at once. Exit code: 0; 1 if the sampler asked for cannot
+/// be made; 2 if the replay file cannot be read.
 Result<int> run(const SamplerOptions& options);
 
 }  // namespace telesplat::sampler

@@ -1,4 +1,4 @@
-// The one place that knows which work a kind of scene takes: a row a kind (works.cpp).
+// Makes the work for a kind of scene. Only works.cpp knows which: it has a row for each kind.
 #pragma once
 
 #include <memory>
@@ -13,13 +13,13 @@ namespace telesplat::sampler {
 
 class Sampler;
 
-/// What works are made with; all of it outlives them.
+/// Parts that works are made with; all of them outlive the works.
 struct WorkTools {
   const SamplerOptions& options;
   net::Context& context;
   net::MasterLink& link;
   metrics::SpanRecorder& spans;
-  std::unique_ptr<Sampler>& mesh_sampler;  ///< made beforehand, to be taken; null: it is made when a mesh comes
+  std::unique_ptr<Sampler>& mesh_sampler;  ///< made beforehand, to be moved from; null: made when a mesh comes
 };
 
 /// Error: this kind cannot be sampled here (no OpenGL, for instance).

@@ -59,8 +59,8 @@ HWY_INLINE VF log_of(VF x) {
   return hn::Add(hn::Mul(e, set(kLog2)), hn::Mul(hn::Add(s, s), hn::Add(set(1), series)));
 }
 
-// Estimates at kWays vectors of points at once: one alone would wait for its own results. What has escaped goes on
-// unmasked, towards infinity, and on to what is not a number, but never comes back below the limit.
+// Estimates at kWays vectors of points at once: one alone would wait for its own results. Points that have escaped go
+// on unmasked, towards infinity and then NaN, but never come back below the limit.
 template <int kWays>
 HWY_INLINE void Estimate(const Constants& k, const Vec4 (&q)[kWays], VF (&out)[kWays]) {
   const VF limit = set(k.limit), half = set(0.5f), c_w = set(k.c_w), c_p = set(k.c_p);

@@ -36,7 +36,7 @@ void KeepHits(Queue& queue) {
     for (int i = 0; i < kMarchWays * static_cast<int>(kMaxLanes); ++i) copy(0, kept + i);
 }
 
-// The rays of all parts stand in one queue: lanes that are done find others even where parts have few rays.
+// Traces the rays of all parts in one queue: lanes that are done find new rays even if parts have few.
 void TraceParts(const Constants& k, const JuliaRays& rays, std::span<const JuliaPart> parts, JuliaPoints& out) {
   static_assert(JuliaPoints::kPadded - JuliaPoints::kMost >= kMarchWays * static_cast<int>(kMaxLanes));
   float start[JuliaPart::kBlocks + kMaxLanes];

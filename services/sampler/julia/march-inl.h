@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::sampler::HWY_NAMESPACE {
 
-// Rays that are left after clipping, in the order of their blocks, then, in the same places, what became of them.
+// Rays that are left after clipping, in the order of their blocks, and their brackets in the same places.
 struct Queue {
   static constexpr size_t kSize = JuliaPoints::kPadded;
   HWY_ALIGN float d[4][kSize], inverse[kSize], t0[kSize], t1[kSize];
@@ -59,7 +59,7 @@ HWY_INLINE Interval Clip(const Constants& k, const JuliaRays& rays, const VF* d,
   return out;
 }
 
-// Depths up to which the blocks' rays are free, for whole vectors of blocks; those without rays are free all the way.
+// Writes to `start` the depth up to which each block's rays are free; kNothing for blocks without rays. Whole vectors.
 HWY_NOINLINE void MarchCones(const Constants& k, const JuliaRays& rays, const JuliaPart& part,
                              float* HWY_RESTRICT start) {
   const VF growth = set(rays.spread + kConeMargin * k.lod * rays.footprint);
@@ -93,13 +93,13 @@ HWY_NOINLINE void MarchCones(const Constants& k, const JuliaRays& rays, const Ju
   }
 }
 
-// Appends the rays of a part that have something left to march.
+// Appends the rays of a part whose interval is not empty after clipping.
 HWY_NOINLINE void ClipRays(const Constants& k, const JuliaRays& rays, const JuliaPart& part,
                            const float* HWY_RESTRICT start, Queue& queue) {
   HWY_ALIGN float d_of[4][kMaxLanes], inverse[kMaxLanes], t0[kMaxLanes], t1[kMaxLanes];
   const int lanes = static_cast<int>(hn::Lanes(f));
   const int first = part.block_begin * kJuliaBlock, count = (part.block_end - part.block_begin) * kJuliaBlock;
-  // Blocks in order, rows in a block, so that neighbours in the queue do alike.
+  // Go through blocks, then rows in a block, so that neighbours in the queue behave alike.
   for (int x8 = 0; x8 < count; x8 += std::max(lanes, kJuliaBlock))
     for (int row = 0; row < kJuliaBlock; ++row)
       for (int x0 = x8; x0 < x8 + kJuliaBlock; x0 += lanes) {
@@ -143,7 +143,7 @@ HWY_INLINE uint64_t BitsOf(MF mask) {
   return bits;
 }
 
-// Rays under way, one a lane.
+// Rays under way, one in each lane.
 template <int kWays>
 struct Lanes {
   static constexpr size_t kMost = kWays * kMaxLanes;
@@ -170,7 +170,7 @@ struct Lanes {
     t1[i] = queue.t1[next];
   }
 
-  // One vector a way.
+  // Loads one vector for each way.
   HWY_INLINE void load(int lanes, Vec4 (&d_of)[kWays], VF (&inverse_of)[kWays], VF (&t_of)[kWays], VF (&t1_of)[kWays],
                        VF (&last_t_of)[kWays], VF (&last_r_of)[kWays], VF (&steps_of)[kWays]) const {
     for (int j = 0; j < kWays; ++j) {
@@ -183,7 +183,7 @@ struct Lanes {
     }
   }
 
-  // What a march changes.
+  // Stores the values that a march changes.
   HWY_INLINE void store(int lanes, const VF (&t_of)[kWays], const VF (&last_t_of)[kWays], const VF (&last_r_of)[kWays],
                         const VF (&steps_of)[kWays], const VF (&g_of)[kWays]) {
     for (int j = 0; j < kWays; ++j) {

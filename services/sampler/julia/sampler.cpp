@@ -18,7 +18,7 @@ namespace telesplat::sampler {
 
 namespace {
 
-// Bits x .. x + 7 of a row of bits, of which those outside of it are 0. x: more than -8.
+// Returns bits x .. x + 7 of a row of bits; bits outside of the row are 0. x: more than -8.
 uint8_t eight_bits(const uint64_t* words, size_t count, int x) {
   if (x < 0) return static_cast<uint8_t>(words[0] << -x);
   const size_t word = static_cast<size_t>(x) / 64, shift = static_cast<size_t>(x) % 64;
@@ -26,13 +26,13 @@ uint8_t eight_bits(const uint64_t* words, size_t count, int x) {
   const uint64_t rest = shift > 56 && word + 1 < count ? words[word + 1] << (64 - shift) : 0;
   return static_cast<uint8_t>(words[word] >> shift | rest);
 }
-// Those of x .. x + 7 that lie in [0, width).
+// Returns a bit for each of x .. x + 7 that lies in [0, width).
 uint8_t eight_inside(int x, int width) {
   const int left = std::max(-x, 0), right = std::min(width - x, 8);
   return left >= right ? 0 : static_cast<uint8_t>((255u << left) & (255u >> (8 - right)));
 }
 
-// The rays wanted of blocks [block_begin, block_end) of a row of blocks.
+// Returns the wanted rays of blocks [block_begin, block_end) of a row of blocks.
 JuliaPart make_part(const JuliaRays& rays, const geometry::Rect& rect, const image::PixelMask* mask, int block_row,
                     int block_begin, int block_end) {
   static_assert(kJuliaBlock == 8);
@@ -52,11 +52,11 @@ JuliaPart make_part(const JuliaRays& rays, const geometry::Rect& rect, const ima
 // Parts of a rectangle that are traced together, one behind the other in a list.
 struct Batches {
   std::vector<JuliaPart> parts;
-  std::vector<size_t> begin{0};  // of each batch, and the end of the last
+  std::vector<size_t> begin{0};  // first part of each batch, and the end of the last batch
 };
 
-// A row of blocks is one part or several, so that even a single row of pixels keeps all threads busy. With a mask,
-// parts have few rays or none; then some of them make a batch.
+// Cuts each row of blocks into one or several parts, so that even a single row of pixels keeps all threads busy. With a
+// mask, parts have few rays or none; then several parts make a batch.
 Batches make_batches(const JuliaRays& rays, const geometry::Rect& rect, const image::PixelMask* mask) {
   constexpr int kMaskedBatch = 256;  // rays: enough for lanes to be full most of the time
   Batches out;
@@ -177,7 +177,7 @@ JuliaPalette::JuliaPalette(const uint32_t* stops, size_t count) {
 }
 
 const glm::vec3& JuliaPalette::at(float tone) const {
-  const float part = tone - std::floor(tone);  // not a number where tone is infinite
+  const float part = tone - std::floor(tone);  // NaN if tone is infinite
   return entries_[part >= 0 && part < 1 ? static_cast<int>(part * kEntries) : 0];
 }
 

@@ -10,7 +10,7 @@
 namespace telesplat::sampler {
 namespace {
 
-// An orthonormal basis of the vectors (i, j, k) that begins with the direction of `v`.
+// Returns an orthonormal basis of the vectors (i, j, k) that begins with the direction of `v`.
 glm::dmat3 basis_along(const glm::dvec3& v) {
   const double length = glm::length(v);
   const glm::dvec3 a = length > 0 ? v / length : glm::dvec3(1, 0, 0);
@@ -86,7 +86,7 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
     return Seven{orbit.x, orbit.y, orbit.z, orbit.w, room.x, room.y, room.z};
   };
   const Seven right = axis({1, 0, 0}), up = axis({0, 1, 0}), ahead = axis({0, 0, -1});
-  // The first of `count` pixels or blocks at `first`, in pixels, the others `step` apart.
+  // Fill directions of `count` pixels or blocks, the first at `first`, the others `step` apart, in pixels.
   const auto fill_columns = [&](std::array<std::vector<float>, 7>& to, double first, double step, int count) {
     for (int i = 0; i < 7; ++i) {
       to[i].resize(static_cast<size_t>(count));
@@ -112,10 +112,10 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
   for (int i = 0; i < 3; ++i) origin[4 + i] = static_cast<float>(camera.pose.position_room[i]);
   footprint = static_cast<float>(pixel_x * footprint_px * scene.units_per_metre());
 
-  // The farthest pixel centre of a block from its middle; a little more, for rounding. What is in the ball lies no
-  // deeper than `deepest`.
+  // The farthest pixel centre of a block from its middle; a little more, for rounding. No point of the ball
+  // lies deeper than `deepest`.
   const double reach = (kJuliaBlock - 1) * 0.5 * std::sqrt(pixel_x * pixel_x + pixel_y * pixel_y) * 1.001;
-  const double radius = scene.constants().radius * 1.01;  // so that estimates at its edge are safe from rounding
+  const double radius = scene.constants().radius * 1.01;  // larger, to make estimates at its edge safe from rounding
   const double deepest = (glm::length(orbit) / 2 + radius) / scene.units_per_metre();
   ball = static_cast<float>(2 * radius);
   spread = static_cast<float>(reach * scene.units_per_metre());

@@ -1,4 +1,4 @@
-// A quaternion Julia set made ready for tracing rays: constants in single precision, and the rays of a camera in the
+// A quaternion Julia set, prepared for tracing rays: constants in single precision, and the rays of a camera in the
 // set's own coordinates.
 //
 // The orbit of q under f(q) = q^2 + c never leaves the three-dimensional space that 1, the vector part of c and the
@@ -27,16 +27,16 @@ class JuliaScene {
  public:
   /// The palette index must be one of julia::palette_names(). An orbit counts as escaped no sooner than it must escape:
   /// the bailout used is the larger of the one given and 1.01 julia::radius(c),
-  /// so that what has escaped never comes back, rounded as it is.
-  /// clip: what is cut away; where it cuts the set, the cut is shown.
+  /// so that an escaped orbit never comes back, even with rounding.
+  /// clip: cuts parts away; the cut through the set is shown.
   JuliaScene(const julia::Parameters& parameters, const julia::Placement& placement, const geometry::Clip& clip = {});
 
-  /// What the kernels read. Lengths in set units, room space in metres.
+  /// Constants for the kernels. Lengths in set units, room space in metres.
   struct Constants {
     float c_w, c_p;                ///< 2 Re c, 2 |v(c)|
     float limit;                   ///< 4 bailout^2
     int iterations;                ///< at most
-    float radius;                  ///< of the ball about 0 that holds the set
+    float radius;                  ///< radius of the ball about 0 that holds the set
     float lod;                     ///< the surface is where the estimate is this many footprints
     float box_lo[3], box_hi[3];    ///< room space
     float axes[3][4];              ///< orbit coordinates gained along X, Y, Z
@@ -45,7 +45,7 @@ class JuliaScene {
     float tone_scale, tone_shift;  ///< tone = length / (2 radius) tone_scale + tone_shift, lengths doubled
     float ambient, shadow;
     float light[3];  ///< towards the light, unit length
-    int planes;      ///< of the clip
+    int planes;      ///< number of the clip's planes
     float plane_normal[geometry::Clip::kMostPlanes][3], plane_offset[geometry::Clip::kMostPlanes];  ///< room space
     float units_per_metre;                                                                          ///< set units
   };
@@ -68,28 +68,28 @@ class JuliaScene {
   int palette_;
 };
 
-/// Pixels of a side of the square blocks that cones are marched for. The blocks lie on a grid fixed to the whole image,
+/// Side of the square blocks for which cones are marched, pixels. The blocks lie on a grid fixed to the whole image,
 /// so that a pixel's result does not depend on the rectangle it was asked for with.
 inline constexpr int kJuliaBlock = 8;
 
-/// The rays of a camera through a scene. footprint_px: pixels of this camera that a footprint is. A ray's parameter t
-/// is depth in metres; the direction of pixel (x, y) is column[x] + row[y], in orbit coordinates (index 0 to 3) and in
-/// room space (4 to 6). Only what `rect` needs is filled, in whole blocks.
+/// The rays of a camera through a scene. footprint_px: size of a footprint in pixels of this camera. A ray's parameter
+/// t is depth in metres; the direction of pixel (x, y) is column[x] + row[y], in orbit coordinates (index 0 to 3) and
+/// in room space (4 to 6). Only the blocks that `rect` touches are filled.
 struct JuliaRays {
   JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect, double footprint_px);
 
   int x0, y0;  ///< upper left pixel of the blocks that hold the rectangle
   int columns_of_blocks, rows_of_blocks;
-  float origin[7];  ///< of all rays: orbit coordinates, room space
+  float origin[7];  ///< origin of all rays: orbit coordinates, room space
   float near_m;
   float footprint;     ///< footprint_px pixels, in set units a metre of depth
   float ball;          ///< radius in orbit coordinates of the ball about 0 that rays are clipped to
-  float spread;        ///< of a block: distance of its farthest ray from the middle one, in set units a metre of depth
+  float spread;        ///< distance of a block's farthest ray from its middle one, in set units a metre of depth
   float block_ball;    ///< as `ball`, for a block's middle ray to stand for all its rays
   float block_margin;  ///< metres that the box grows by, likewise
-  std::array<std::vector<float>, 7> column, row;              ///< of pixels, from (x0, y0)
-  static constexpr int kPadding = 16;                         ///< more to the right, for whole vectors
-  std::array<std::vector<float>, 7> block_column, block_row;  ///< of the blocks' middles
+  std::array<std::vector<float>, 7> column, row;              ///< for pixels, from (x0, y0)
+  static constexpr int kPadding = 16;                         ///< additional columns at the right, for whole vectors
+  std::array<std::vector<float>, 7> block_column, block_row;  ///< for the blocks' middles
 };
 
 }  // namespace telesplat::sampler

@@ -1,5 +1,5 @@
-// From brackets to surface points: depths refined, normals, colours, occlusion, shadow. Included once a target, by
-// kernels.cpp.
+// From brackets to surface points: refines depths, finds normals, colours, occlusion, shadow. Included once for each
+// target, by kernels.cpp.
 #if defined(TELESPLAT_JULIA_SURFACE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_JULIA_SURFACE_INL_H_
 #undef TELESPLAT_JULIA_SURFACE_INL_H_
@@ -22,7 +22,7 @@ HWY_INLINE Vec3 choose(MF mask, const Vec3& yes, const Vec3& no) {
            hn::IfThenElse(mask, yes.v[2], no.v[2])}};
 }
 
-// To unit length. Returns where there is one.
+// Scales vectors to unit length. Returns the mask of lanes in which that is possible.
 HWY_INLINE MF normalise(Vec3& n) {
   const VF x = hn::Abs(n.v[0]), y = hn::Abs(n.v[1]), z = hn::Abs(n.v[2]), most = hn::Max(hn::Max(x, y), z);
   const VF nothing = set(kNothing);
@@ -47,7 +47,7 @@ HWY_INLINE Vec4 load_direction(const Queue& hits, int at) {
            hn::LoadU(f, hits.d[3] + at)}};
 }
 
-// Regula falsi for all hits; depths come to hits.t0.
+// Refines all hits by regula falsi; writes depths to hits.t0.
 HWY_NOINLINE void Refine(const Constants& k, const JuliaRays& rays, Queue& hits) {
   constexpr int kWays = kMarchWays;
   const int lanes = static_cast<int>(hn::Lanes(f));
@@ -128,7 +128,7 @@ HWY_INLINE Orbit Follow(const Constants& k, const Vec4& q) {
   return out;
 }
 
-// Steep normals, widened.
+// Widens steep normals: each becomes the mean of two (steps.h).
 HWY_INLINE Vec3 Widen(const Constants& k, const Vec4& q, VF reach, const Vec3& back, const Vec3& n) {
   const VF lean = dot(n, back), in = hn::Mul(set(kInward), reach);
   const MF steep = hn::Lt(lean, set(kSteep));
@@ -180,7 +180,7 @@ HWY_INLINE Vec3 NormalAt(const Constants& k, const Vec4& q, const Vec3& gradient
   return Widen(k, q, reach, back, n);
 }
 
-// Set units to where a line leaves what the clip keeps.
+// Returns the distance at which a line leaves the part that the clip keeps, in set units.
 HWY_INLINE VF ExitOf(const Constants& k, const Vec3& room, const Vec3& towards) {
   VF out = set(kNothing);
   for (int i = 0; i < k.planes; ++i) {
@@ -224,7 +224,7 @@ HWY_INLINE VF LitAt(const Constants& k, const Vec4& q, VF exit) {
   return lit;
 }
 
-// What is known of the hits, appended to `out`. Depths are in hits.t0.
+// Appends the hits as surface points to `out`. Depths are in hits.t0.
 HWY_NOINLINE void Shade(const Constants& k, const JuliaRays& rays, const Queue& hits, JuliaPoints& out) {
   const int lanes = static_cast<int>(hn::Lanes(f));
   for (int first = 0; first < hits.count; first += lanes) {
@@ -242,7 +242,7 @@ HWY_NOINLINE void Shade(const Constants& k, const JuliaRays& rays, const Queue& 
     Vec3 n = NormalAt(k, q, orbit.gradient, hn::Mul(set(rays.footprint), t), ray);
     for (int a = 0; a < 3; ++a) hn::StoreU(n.v[a], f, out.normal[a] + at);
 
-    // Where the box cuts the set.
+    // Hits where the box cuts the set.
     const MF cut = hn::Eq(hn::LoadU(f, hits.bracket_t0 + first), hn::LoadU(f, hits.bracket_t1 + first));
     if (!hn::AllFalse(f, cut)) {
       for (int i = 0; i < lanes; ++i) {

@@ -20,7 +20,7 @@ Result<JuliaScene> make_scene(const wire::Welcome& session) {
   return JuliaScene(*parameters, *placement, *clip);
 }
 
-// Pixels of the lease's camera that are one of the view's; within limits, whatever a lease says.
+// Returns the size of a pixel of the view in pixels of the lease's camera, within limits for any lease.
 double footprint_px(const wire::Lease& lease) {
   if (lease.footprint <= 0) return 1.0 / double(lease.step);
   return std::clamp(lease.footprint * lease.camera.focal_x(), 1.0 / 64, 64.0);

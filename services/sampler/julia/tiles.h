@@ -1,4 +1,4 @@
-// Tiles of a Julia set: all there is to know of the scene comes with the master's welcomes.
+// Tiles of a Julia set. The master's welcomes describe the whole scene.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@ class JuliaTiles final : public TileSource {
   explicit JuliaTiles(int threads) : sampler_(threads) {}
 
   const char* name() const override { return "julia"; }
-  /// Remembers the epoch's parameters. Bad ones are told once, and that epoch's leases are hopeless.
+  /// Remembers the epoch's parameters. Logs bad ones once; that epoch's leases are hopeless.
   void on_welcome(const wire::Welcome& session) override;
   bool takes_leases() const override { return !epochs_.empty(); }
   Readiness readiness(const HeldLease& lease, double now_s) override;
@@ -26,8 +26,8 @@ class JuliaTiles final : public TileSource {
   struct Epoch {
     std::map<std::string, double> parameters;
     geometry::Box box_room;
-    std::string clip;                 // the fact
-    std::optional<JuliaScene> scene;  // none: the parameters are bad
+    std::string clip;                 // the fact "clip"
+    std::optional<JuliaScene> scene;  // nullopt: the parameters are bad
   };
   JuliaSampler sampler_;
   EpochBook<Epoch> epochs_;

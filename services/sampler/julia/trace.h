@@ -1,8 +1,8 @@
-// Tracing a part of an image: from rays to surface points with normals and colours, by a SIMD kernel that is chosen for
+// Traces a part of an image: from rays to surface points with normals and colours, by a SIMD kernel that is chosen for
 // the processor at run time. Its scalar oracle, with equal results, is meant to be read: tests/support/julia/plain.h.
 //
-//   cones    for each block of 8 x 8 pixels the depth up to which none of its rays meets the surface, or that none does
-//   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left
+//   cones    for each block of 8 x 8 pixels the depth up to which no ray of it meets the surface, or that no ray does
+//   clipping of every ray to the box, to the ball that holds the set, and to the depths behind its block's cone
 //   marching until the estimate is below the threshold lod * footprint(t): a bracket of the surface's depth
 //   surface  the depth refined within its bracket; normal, colour, occlusion, shadow
 #pragma once
@@ -18,7 +18,7 @@ namespace telesplat::sampler {
 
 /// Some of the pixels of a row of blocks, counted from rays.x0, rays.y0.
 struct JuliaPart {
-  static constexpr int kBlocks = 16;   ///< at most
+  static constexpr int kBlocks = 16;   ///< blocks, at most
   static constexpr int kPadding = 16;  ///< blocks: kernels read whole vectors
   int block_row, block_begin, block_end;
   /// The pixels to be traced: bit i of wanted[y][b] is pixel i of row y of block block_begin + b.
@@ -43,7 +43,7 @@ struct JuliaPoints {
   int32_t x[kPadded], y[kPadded];  ///< pixel, from rays.x0, rays.y0
   float depth_m[kPadded];
   float normal[3][kPadded];  ///< room space, unit length, facing the viewer
-  float tone[kPadded];       ///< where in the palette; the whole part means nothing
+  float tone[kPadded];       ///< place in the palette; the whole part is ignored
   float light[kPadded];      ///< 0..1, multiplies the colour
 };
 
@@ -52,8 +52,8 @@ struct JuliaPoints {
 using JuliaTrace = void (*)(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
                             JuliaPoints& points);
 
-/// For a ray that meets the surface where it begins, at depth t: the normal of the face through which it enters the box
-/// there; false where it enters none, which is where the camera is inside the set. direction: room space.
+/// For a ray that meets the surface where it begins, at depth t: writes the normal of the face through which it enters
+/// the box there. False: it enters through no face, as the camera is inside the set. direction: room space.
 bool face_normal(const JuliaScene::Constants& scene, const JuliaRays& rays, const float* direction, float t,
                  float* normal);
 

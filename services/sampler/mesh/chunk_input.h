@@ -1,4 +1,4 @@
-// What every sampler does with a chunk that arrives: check it before anything reads it.
+// Checks a chunk that arrives, before a sampler reads it.
 #pragma once
 
 #include "common/core/ids.h"
@@ -6,13 +6,13 @@
 
 namespace telesplat::sampler {
 
-/// A chunk that was found to be valid, with what keeps its bytes alive.
+/// A valid chunk, and the owner that keeps its bytes alive.
 struct HeldChunk {
   geometry::MeshChunkView view;
   std::shared_ptr<const void> owner;
 };
 
-/// Validates. Bytes that are not aligned to 4 are copied first; others are used where they are. Errors name the chunk.
+/// Validates a chunk. Copies bytes that are not aligned to 4 first; uses others in place. Errors name the chunk.
 Result<HeldChunk> hold(ChunkId id, geometry::ChunkBytes chunk);
 
 /// Gathers the refusals of a batch into one status: "2 of 9 chunks refused; first: ...".

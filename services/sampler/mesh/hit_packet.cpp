@@ -67,7 +67,7 @@ HWY_INLINE VU encode16(const V3& n) {
                 hn::ShiftLeft<8>(hn::IfThenElse(at_border(qx), upper(qy), qy)));
 }
 
-// The scalars' colours; scalars that are not a number have the last one.
+// Returns the scalars' colours; scalars that are not a number have the last one.
 HWY_INLINE VU look_up(VF scalar, const scene::ColourTable& table) {
   const VF entry = hn::MulAdd(hn::Sub(scalar, hn::Set(f, table.lo)), hn::Set(f, table.scale), hn::Set(f, table.offset));
   const VF last = hn::Set(f, float(scene::ColourTable::kEntries - 1));
@@ -90,7 +90,7 @@ void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* H
     const V3 d{hn::Load(f, hits.direction[0] + lane), hn::Load(f, hits.direction[1] + lane),
                hn::Load(f, hits.direction[2] + lane)};
     const VF behind = dot(d, g), minus = hn::Set(f, -0.0f);
-    const auto seen = [&](const V3& n) HWY_ATTR {  // the signs of n . g and d . g are equal where n points away
+    const auto seen = [&](const V3& n) HWY_ATTR {  // n points away if the signs of n . g and d . g are equal
       const VF sign = hn::And(hn::Xor(hn::Xor(dot(n, g), behind), minus), minus);
       return V3{hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
     };

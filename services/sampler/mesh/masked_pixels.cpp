@@ -9,11 +9,11 @@ namespace {
 constexpr int kSquare = 32, kCell = 8;  // pixels a side
 constexpr int kCellsAcross = kSquare / kCell;
 
-// The i-th place along the Z curve through a square of cells: even bits of i are x, odd ones y.
+// Column and row of place i along the Z curve through a square of cells: even bits of i are x, odd ones y.
 constexpr int column_of(int i) { return (i & 1) | (i >> 1 & 2); }
 constexpr int row_of(int i) { return column_of(i >> 1); }
 
-// Eight pixels of a row; those beyond the mask are not covered. x: a multiple of 8.
+// Returns eight pixels of a row as bits; pixels beyond the mask are not covered. x: a multiple of 8.
 uint32_t bits(const image::PixelMask& mask, int x, int y) {
   if (x >= mask.width() || y >= mask.height()) return 0;
   return static_cast<uint32_t>(mask.row(y)[x >> 6] >> (x & 63)) & 255u;

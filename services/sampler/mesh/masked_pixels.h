@@ -13,7 +13,7 @@ struct MaskedPixel {
 };
 
 /// All covered pixels of a mask, successive ones close together: the mask is walked in squares of 32 x 32 pixels, each
-/// along a Z curve (G. Morton, 1966) down to blocks of 4 x 2, which are the packets of a mask that is full.
+/// along a Z curve (G. Morton, 1966) down to blocks of 4 x 2, which are the packets of a full mask.
 /// Precondition: sides of at most 32767 pixels.
 std::vector<MaskedPixel> gather(const image::PixelMask& mask);
 

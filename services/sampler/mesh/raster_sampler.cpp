@@ -33,7 +33,7 @@ class RasterSampler final : public Sampler {
                            const image::PixelMask* mask = nullptr) override;
 
  private:
-  // What OpenGL holds of a chunk: its bytes as they are, in one buffer. The caller's bytes are not needed any more.
+  // A chunk in OpenGL: its bytes as they are, in one buffer. The caller's bytes are not needed any more.
   struct Drawable {
     GLuint buffer = 0, vertex_array = 0;
     GLuint vertices = 0;
@@ -57,8 +57,8 @@ class RasterSampler final : public Sampler {
   GLuint targets_[4] = {};  // depth in metres, colour, normal, the rasteriser's depth buffer
   int target_width_ = 0, target_height_ = 0, largest_part_ = kLargestPart;
   GLint64 largest_chunk_bytes_ = 0;
-  GLuint colour_buffer_ = 0;                           // of colours_
-  std::shared_ptr<const scene::ColourTable> colours_;  // null: none was told yet
+  GLuint colour_buffer_ = 0;                           // holds colours_
+  std::shared_ptr<const scene::ColourTable> colours_;  // null: no colours were set yet
   std::unordered_map<ChunkId, Drawable> chunks_;
   geometry::Clip clip_;
 };
@@ -210,7 +210,7 @@ void RasterSampler::reserve_targets(int width, int height) {
   glDrawBuffers(3, kPlaces);
 }
 
-// What lies outside of the clip's planes is cut off by the rasteriser.
+// Sets the clip's planes: the rasteriser cuts off all that lies outside.
 void RasterSampler::set_planes(const glm::dvec3& eye_room) const {
   static_assert(geometry::Clip::kMostPlanes == 8, "as the shader has it");
   glm::vec4 planes[geometry::Clip::kMostPlanes]{};
@@ -222,7 +222,7 @@ void RasterSampler::set_planes(const glm::dvec3& eye_room) const {
   glUniform4fv(uniform("clip"), GLsizei(geometry::Clip::kMostPlanes), glm::value_ptr(planes[0]));
 }
 
-// Draws `part` of the camera's image; the rest of it is left as it was.
+// Draws `part` of the camera's image and leaves the rest as it was.
 void RasterSampler::draw(const geometry::Camera& camera, const geometry::Rect& part) {
   glViewport(0, 0, camera.width, camera.height);
   glEnable(GL_SCISSOR_TEST);
@@ -269,7 +269,7 @@ void RasterSampler::draw(const geometry::Camera& camera, const geometry::Rect& p
   glBindVertexArray(0);
 }
 
-// Copies `from` of what was drawn to the pixels of the image that begin at `to`.
+// Copies the part `from` of the targets to the pixels of the image that begin at `to`.
 void RasterSampler::read(const geometry::Rect& from, size_t to, std::vector<float>& depth_m,
                          image::DepthImage& out) const {
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
@@ -283,8 +283,8 @@ void RasterSampler::read(const geometry::Rect& from, size_t to, std::vector<floa
   read_plane(GL_COLOR_ATTACHMENT2, GL_RED_INTEGER, GL_UNSIGNED_SHORT, out.normal.data() + to);
 }
 
-// A mask spares what lies outside of the smallest rectangle that holds it: fragments are shaded many at a time, so that
-// to discard single ones would save little.
+// With a mask, draws only the smallest rectangle that holds it: fragments are shaded many at a time, so that to discard
+// single ones would save little.
 image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const geometry::Rect& tile,
                                         const image::PixelMask* mask) {
   image::DepthImage out(tile.width, tile.height);

@@ -25,7 +25,7 @@ static_assert(kPacketWidth * kPacketHeight == kPacket);
 // It is the sum of a term per column and a term per row, both held in double precision for the range that is traced.
 class PixelRays {
  public:
-  // Rays for pixels [x0, x1) x [y0, y1), which may lie outside the image; what lies outside of `clip` they do not see.
+  // Rays for pixels [x0, x1) x [y0, y1), which may lie outside the image; they see only what `clip` keeps.
   PixelRays(const geometry::Camera& camera, const geometry::Clip& clip, int x0, int y0, int x1, int y1)
       : x0_(x0),
         y0_(y0),
@@ -38,7 +38,7 @@ class PixelRays {
     for (int y = y0; y < y1; ++y) rows_.push_back(r * glm::dvec3(0, camera.top - (y + 0.5) / camera.focal_y(), -1));
   }
 
-  // What stays the same from packet to packet.
+  // Sets the fields that are the same in all packets.
   void begin(RTCRayHit8& packet) const {
     std::fill_n(packet.ray.org_x, kPacket, origin_.x);
     std::fill_n(packet.ray.org_y, kPacket, origin_.y);
@@ -50,13 +50,13 @@ class PixelRays {
     std::fill_n(packet.ray.flags, kPacket, 0u);
   }
 
-  // Rays of the packet whose upper left pixel is (x, y).
+  // Sets the rays of the packet whose upper left pixel is (x, y).
   void aim(int x, int y, RTCRayHit8& packet) const {
     for (int k = 0; k < kPacket; ++k)
       aim(k, columns_[x - x0_ + k % kPacketWidth] + rows_[y - y0_ + k / kPacketWidth], packet);
   }
 
-  // Rays of up to kPacket pixels, counted from (x, y); other lanes keep what they have, but hit nothing.
+  // Sets the rays of up to kPacket pixels, counted from (x, y); other lanes keep their rays, but hit nothing.
   void aim(std::span<const MaskedPixel> pixels, int x, int y, RTCRayHit8& packet) const {
     for (size_t k = 0; k < pixels.size(); ++k)
       aim(static_cast<int>(k), columns_[x - x0_ + pixels[k].x] + rows_[y - y0_ + pixels[k].y], packet);
@@ -73,7 +73,7 @@ class PixelRays {
       const auto [begin, end] = clip_.stretch(eye_, d);
       const bool any = begin <= end && end > near_;
       packet.ray.tnear[k] = any ? std::max(near_, static_cast<float>(begin)) : 1.0f;
-      packet.ray.tfar[k] = any ? static_cast<float>(end) : 0.0f;  // before it begins: it meets nothing
+      packet.ray.tfar[k] = any ? static_cast<float>(end) : 0.0f;  // an end before the begin: it meets nothing
     }
     packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
@@ -87,7 +87,7 @@ class PixelRays {
   std::vector<glm::dvec3> columns_, rows_;
 };
 
-// Whether a traced packet hit anything.
+// True if a ray of a traced packet hit something.
 bool any_hit(const RTCRayHit8& packet) {
   bool any = false;
   for (int k = 0; k < kPacket; ++k) any |= packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
@@ -131,7 +131,7 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
   });
 }
 
-// The same without a state per task: consume(packet, x, y).
+// Likewise, without a state per task: consume(packet, x, y).
 template <class Consume>
 void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile, const Consume& consume) {
   trace_tile(
@@ -140,7 +140,7 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
 }
 
 // Traces the pixels of `tile` that `mask`, of its size, covers; consume(task, packet, pixels) as in trace_tile(), the
-// packet's pixels being counted from the tile's corner. Packets hold what of the mask lies close together.
+// packet's pixels being counted from the tile's corner. A packet holds pixels of the mask that lie close together.
 template <class Begin, class Consume, class End>
 void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile,
                   const image::PixelMask& mask, const Begin& begin, const Consume& consume, const End& end) {
@@ -171,9 +171,9 @@ void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometr
   scene.arena().execute([&] { in_parallel(tbb::blocked_range<size_t>(0, packets, kTask / kPacket), trace); });
 }
 
-// Hits of one task, waiting for their attributes. Indices and vertices of neighbouring hits lie far apart in memory, so
-// that fetching them one hit after the other would wait for each: instead the hits are collected, what they need is
-// prefetched step by step, and eight at a time are shaded when it has arrived.
+// Hits of one task that wait for their attributes. Indices and vertices of neighbouring hits lie far apart in memory,
+// so that fetching them hit by hit would wait each time: instead the hits are collected, their indices and vertices are
+// prefetched step by step, and eight at a time are shaded when these have arrived.
 class PendingHits {
  public:
   PendingHits(const RayScene& scene, const scene::ColourTable& colours, double near_m, image::DepthImage& out)
@@ -206,7 +206,7 @@ class PendingHits {
     }
   }
 
-  /// Shades what is there and writes it to the image.
+  /// Shades the collected hits and writes them to the image.
   void flush() {
     for (int i = 0; i < count_; ++i)
       for (int c = 0; c < 3; ++c) {
@@ -221,7 +221,7 @@ class PendingHits {
         for (int c = 0; c < 3; ++c) {
           const uint32_t vertex = corners_[first + k][c];
           hits.corner_normal[c][k] = chunks_[first + k]->normals[vertex];
-          // Chunks of both kinds meet only while they change: then those of the other are neutral.
+          // Chunks with scalars and with colours meet only while they are replaced: then the other kind is neutral.
           const bool fits = chunks_[first + k]->scalars == scalars;
           hits.corner_colour[c][k] = fits ? chunks_[first + k]->colours[vertex] : scalars ? kNotANumber : kNeutral;
         }
@@ -238,8 +238,8 @@ class PendingHits {
   }
 
  private:
-  static constexpr int kCapacity =
-      64;  // eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet
+  // Eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet.
+  static constexpr int kCapacity = 64;
 
   static constexpr uint32_t kNotANumber = 0x7fc00000, kNeutral = 0xc8c8c8;
 

@@ -1,5 +1,4 @@
-// The mesh as Embree sees it: one bounding volume hierarchy a chunk, instanced into one small hierarchy over all
-// chunks.
+// The mesh in Embree: one bounding volume hierarchy for each chunk, instanced into one small hierarchy over all chunks.
 //
 // Chunks are built when they arrive, in parallel and independently, so that adding or replacing one never rebuilds
 // another; Embree reads positions and indices where they lie. Measured with 5.76M triangles in 98 chunks on two cores
@@ -24,7 +23,7 @@ namespace telesplat::sampler {
 
 class RayScene {
  public:
-  /// threads: how many oneTBB threads build and trace, 0 = all cores.
+  /// threads: number of oneTBB threads that build and trace, 0 = all cores.
   explicit RayScene(int threads);
 
   /// As Sampler::add_chunks.
@@ -36,12 +35,12 @@ class RayScene {
   void commit();
 
   RTCScene scene() const { return top_.get(); }
-  /// What rays are cut to.
+  /// Sets the clip to which rays are cut.
   void set_clip(const geometry::Clip& clip) { clip_ = clip; }
   const geometry::Clip& clip() const { return clip_; }
-  /// The chunk behind a hit's instID.
+  /// Returns the chunk of a hit's instID.
   const geometry::MeshChunkView& chunk(unsigned slot) const { return slots_[slot].held.view; }
-  /// Everything parallel runs in here.
+  /// All parallel work runs in here.
   tbb::task_arena& arena() { return arena_; }
 
  private:

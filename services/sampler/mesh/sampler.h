@@ -1,4 +1,4 @@
-// The one interface of all mesh samplers: chunks in, depth images of tiles out. No sockets, no clocks.
+// The interface of all mesh samplers: chunks in, depth images of tiles out. No sockets, no clocks.
 #pragma once
 
 #include <memory>
@@ -23,40 +23,40 @@ class Sampler {
   /// "ray" or "raster".
   virtual const char* name() const = 0;
 
-  /// Adds a chunk, building what it needs (a BVH, GL buffers); the sampler keeps chunk.owner alive as long as it reads
-  /// its bytes (the raster sampler only until they are uploaded). Replaces a chunk of the same id. Bytes that do not
-  /// validate are refused and nothing changes.
+  /// Adds a chunk and builds its BVH or GL buffers; the sampler keeps chunk.owner alive as long as it reads
+  /// its bytes (the raster sampler only until they are uploaded). Replaces a chunk of the same id. Refuses bytes that
+  /// are not valid; then nothing changes.
   virtual Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) = 0;
-  /// Adds several chunks at once, in parallel where that helps; refuses as add_chunk does, keeping those that were
-  /// good.
+  /// Adds several chunks at once, in parallel where that helps; refuses bad ones as add_chunk does, and keeps the good
+  /// ones.
   virtual Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) = 0;
   virtual void remove_chunk(ChunkId id) = 0;
 
-  /// What chunks that hold scalars are coloured with from now on; null: neutral. Others keep their colours.
+  /// Sets the colours of chunks that hold scalars, from now on; null: neutral. Other chunks keep their colours.
   virtual void set_colours(std::shared_ptr<const scene::ColourTable> colours) = 0;
 
-  /// What is cut away from now on: rays begin and end at its planes, so that what lay behind is sampled.
+  /// Sets the clip from now on: rays begin and end at its planes, so that the surface behind a cut is sampled.
   virtual void set_clip(const geometry::Clip& clip) = 0;
 
   /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
   /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped
-  /// to the side on which the camera sees the triangle, and turned to the eye (hit_packet.h). Returns a canonical image
-  /// of tile.width x tile.height.
-  /// mask, of the tile's size: only its pixels are sampled, and are what they are without a mask (where two triangles
-  /// are equally near, the other one may be seen); the others are empty. null: all.
-  /// Precondition: tile lies in the camera's image.
+  /// to the side on which the camera sees the triangle, and turned to the eye (hit_packet.h). Returns a canonical
+  /// image of tile.width x tile.height.
+  /// mask, of the tile's size: only its pixels are sampled, with the same result as without a mask (if two triangles
+  /// are equally near, the other one may be seen); the others are empty. null: all pixels are sampled. Precondition:
+  /// tile lies in the camera's image.
   virtual image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
                                    const image::PixelMask* mask = nullptr) = 0;
 };
 
-/// Of scalars that nobody told the colours of.
+/// Returns the colours of scalars before set_colours(): all the same grey.
 std::shared_ptr<const scene::ColourTable> neutral_colours();
 
 /// Embree 3 ray packets on `threads` oneTBB threads (0 = all cores).
 std::unique_ptr<Sampler> make_ray_sampler(int threads);
-/// EGL off-screen G-buffer. Fails where no OpenGL 4.3 context can be made, saying what was tried.
+/// EGL off-screen G-buffer. Error: no OpenGL 4.3 context can be made; says what was tried.
 Result<std::unique_ptr<Sampler>> make_raster_sampler();
-/// kind: "ray", "raster", or "auto": raster where OpenGL runs on a GPU, else ray.
+/// kind: "ray", "raster", or "auto": raster if OpenGL runs on a GPU, else ray.
 Result<std::unique_ptr<Sampler>> make_sampler(const std::string& kind, int threads);
 
 /// Direct rendering for verification: every pixel of `camera` traced from the data, shaded with unquantised normals.

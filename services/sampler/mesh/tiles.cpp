@@ -12,10 +12,10 @@ namespace telesplat::sampler {
 namespace {
 
 constexpr size_t kChunksInFlight = 8;         // requests to the data server not yet answered
-constexpr uint64_t kBytesInFlight = 8 << 20;  // of these chunks, or one chunk
+constexpr uint64_t kBytesInFlight = 8 << 20;  // size of these chunks, unless it is one chunk
 constexpr double kMostListPatience_s = 16;    // an array that is being read may take long
 constexpr double kExtend_s = 0.1;             // between two requests for more time
-constexpr double kPatience_s = 6.0;           // nothing came for so long, or longer than the link needs: no more time
+constexpr double kPatience_s = 6.0;  // if nothing comes for this time, and for what the link needs: no more time
 
 // Chunk bytes must be 4-byte aligned to be used in place; a received field may lie anywhere.
 geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
@@ -95,7 +95,7 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
   begin_anew();
 }
 
-// Nothing that was asked for is waited for.
+// Forgets all open requests.
 void MeshTiles::begin_anew() {
   cache_.forget_waiting();
   retry_.forget();
@@ -104,7 +104,7 @@ void MeshTiles::begin_anew() {
   broken_ = false;
 }
 
-// It is small, or its array is being read: each time it is waited for twice as long.
+// Asks for the list of chunks. It is small, unless its array is still being read: waits twice as long each time.
 void MeshTiles::fetch_list(double now_s) {
   if (now_s - list_asked_s_ <= (broken_ ? RetryClock::kLeast_s : list_patience_s_)) return;
   if (list_asked_s_ > 0) list_patience_s_ = std::min(2 * list_patience_s_, kMostListPatience_s);
@@ -128,7 +128,7 @@ Sampled MeshTiles::sample(const HeldLease& held) {
   return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect, held.pixels()); });
 }
 
-// Of a lease whose chunks are not here, unless nothing has come for long.
+// Asks for more time for a lease whose chunks are not here, unless nothing has come for long.
 void MeshTiles::extend(const HeldLease& next, double now_s) {
   const bool patient = now_s - std::max(progress_s_, next.received_s) < std::max(kPatience_s, retry_.patience_s());
   if (!patient || now_s - last_extend_s_ <= kExtend_s) return;
@@ -136,7 +136,7 @@ void MeshTiles::extend(const HeldLease& next, double now_s) {
   last_extend_s_ = now_s;
 }
 
-// Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.
+// Asks for the list of chunks, then for chunks of the next tile, then for the rest as far as the budget goes.
 void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
   const uint64_t failed = blocks_->failed_connections();
@@ -204,7 +204,7 @@ void MeshTiles::receive() {
   const bool all_good = sampler_->add_chunks(batch).ok();
   for (auto& [id, bytes] : batch) {
     const uint64_t size = bytes.bytes.size();
-    if (!all_good)  // which one is not?
+    if (!all_good)  // find the bad one
       if (const Status s = sampler_->add_chunk(id, std::move(bytes)); !s) {
         refuse(id, s.error().text);
         continue;
@@ -228,7 +228,7 @@ void MeshTiles::add_status(net::MasterLink::Values& values) const {
   values["messages_rejected"] = blocks_ ? double(blocks_->rejected()) : 0.0;
 }
 
-// ---- chunks that are held ------------------------------------------------------------------------------------------
+// ---- the cache of chunks -------------------------------------------------------------------------------------------
 
 void ChunkCache::reset(std::vector<geometry::ChunkInfo> chunks) {
   std::sort(chunks.begin(), chunks.end(), [](const auto& a, const auto& b) { return a.id < b.id; });

@@ -1,4 +1,4 @@
-// Tiles of a mesh: chunks are fetched from the data server, nearest first, and held as far as memory goes.
+// Tiles of a mesh: fetches chunks from the data server, nearest first, and holds as many as memory allows.
 #pragma once
 
 #include <map>
@@ -15,20 +15,20 @@
 
 namespace telesplat::sampler {
 
-/// Which chunks a sampler holds, which it waits for, which it lets go: the least recently used ones first when over its
-/// budget. No sockets, no clocks.
+/// Keeps the chunks that a sampler holds and waits for; over its budget, it drops the least recently used ones first.
+/// No sockets, no clocks.
 class ChunkCache {
  public:
   explicit ChunkCache(uint64_t budget_bytes) : budget_bytes_(budget_bytes) {}
 
-  /// The data set's chunks; forgets everything held before.
+  /// Sets the data set's chunks and forgets everything held before.
   void reset(std::vector<geometry::ChunkInfo> chunks);
   bool known() const { return !chunks_.empty(); }
 
-  /// Chunks the view needs and that are not held, nearest first; marks the held ones as used. Waiting ones are
-  /// included.
+  /// Returns the chunks that the view needs and that are not held, nearest first, waiting ones included; marks the held
+  /// ones as used.
   std::vector<ChunkId> missing(const geometry::Camera& camera);
-  /// Chunks worth fetching before any view asks, as far as the budget goes: in order of id.
+  /// Returns chunks to fetch before a view asks for them, as far as the budget goes, in order of id.
   std::vector<ChunkId> prefetch() const;
 
   bool held(ChunkId id) const { return held_.contains(id); }
@@ -36,17 +36,17 @@ class ChunkCache {
   size_t waiting_count() const { return waiting_.size(); }
   void mark_waiting(ChunkId id) { waiting_.insert(id); }
   void forget_waiting() { waiting_.clear(); }
-  /// As the list says.
+  /// Size of a chunk according to the list.
   uint64_t bytes_of(ChunkId id) const;
   uint64_t waiting_bytes() const;
-  /// Takes note of a chunk of this size that came. Returns those to remove to stay within the budget; never one the
-  /// last view needs.
+  /// Notes a chunk of this size that came. Returns the chunks to remove to stay within the budget; none that the last
+  /// view needs.
   std::vector<ChunkId> insert(ChunkId id, uint64_t bytes);
-  /// What came is no chunk. It is missing still, until it was refused kTries times: then views do without it. Returns
-  /// whether it was the last time.
+  /// An answer was not a valid chunk. The chunk stays missing until it was refused kTries times: then views do without
+  /// it. True: this was the last time.
   static constexpr int kTries = 3;
   bool refuse(ChunkId id);
-  /// Those that views do without.
+  /// Number of chunks that views do without.
   size_t holes() const { return holes_; }
 
   uint64_t bytes() const { return bytes_; }
@@ -56,10 +56,10 @@ class ChunkCache {
   uint64_t budget_bytes_;
   std::vector<geometry::ChunkInfo> chunks_;  // index = id
   struct Held {
-    uint64_t use;  // the last
+    uint64_t use;  // number of the last view that needed it
     uint64_t bytes;
   };
-  std::map<ChunkId, Held> held_;  // holes, too: nothing
+  std::map<ChunkId, Held> held_;  // with holes, of 0 bytes
   std::map<ChunkId, int> refused_;
   std::set<ChunkId> waiting_;
   size_t holes_ = 0;
@@ -74,8 +74,8 @@ class MeshTiles final : public TileSource {
 
   const char* name() const override { return sampler_->name(); }
   void on_welcome(const wire::Welcome& session) override;
-  /// A lease may have to wait for its chunks, but then they come first: the earliest tiles need not wait for the whole
-  /// mesh.
+  /// True once the list is known: a lease may wait for its chunks, but these come first, so that the earliest tiles
+  /// need not wait for the whole mesh.
   bool takes_leases() const override { return cache_.known(); }
   Readiness readiness(const HeldLease& lease, double now_s) override;
   Sampled sample(const HeldLease& lease) override;
@@ -85,10 +85,10 @@ class MeshTiles final : public TileSource {
   void add_status(net::MasterLink::Values& values) const override;
 
  private:
-  // How an epoch looks.
+  // The look of an epoch.
   struct Look {
     std::string text;   // the fact "colouring"
-    std::string array;  // that chunks hold; empty: colours
+    std::string array;  // array whose values chunks hold; empty: they hold colours
     std::shared_ptr<const scene::ColourTable> colours;
     bool known = true;      // the texts could be read
     std::string clip_text;  // the fact "clip"
@@ -109,17 +109,17 @@ class MeshTiles final : public TileSource {
   metrics::SpanRecorder& spans_;
   std::optional<net::Socket> blocks_;
   std::string endpoint_, content_hash_;
-  std::string array_;  // that the chunks held have
-  EpochId epoch_;      // the newest
+  std::string array_;  // array of the chunks held
+  EpochId epoch_;      // newest epoch
   EpochBook<Look> looks_;
   bool prefetched_ = false;
   uint64_t chunks_refused_ = 0;
-  RetryClock retry_;  // of chunks
+  RetryClock retry_;  // for chunks
   double list_asked_s_ = -1e9, list_patience_s_ = RetryClock::kLeast_s;
   uint64_t failed_before_ = 0;
-  bool broken_ = false;  // the connection, since something was asked for
+  bool broken_ = false;  // the connection broke after a request
   double last_extend_s_ = -1e9;
-  double progress_s_ = -1e9;  // when something came of the data server
+  double progress_s_ = -1e9;  // when the data server last sent something useful
 };
 
 }  // namespace telesplat::sampler

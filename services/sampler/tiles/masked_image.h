@@ -1,4 +1,4 @@
-// Depth images of which only some pixels were wanted.
+// Depth images with a mask: only some of their pixels are wanted.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ inline void keep_only(const image::PixelMask& mask, image::DepthImage& image) {
     }
 }
 
-/// The smallest rectangle that holds all covered pixels; empty where there are none.
+/// Returns the smallest rectangle that holds all covered pixels; empty: the mask covers no pixel.
 inline geometry::Rect bounds(const image::PixelMask& mask) {
   int left = mask.width(), right = -1, top = mask.height(), bottom = -1;
   for (int y = 0; y < mask.height(); ++y)

@@ -8,12 +8,12 @@
 namespace telesplat::sampler {
 namespace {
 
-constexpr size_t kMostSeen = 256;  // viewers
+constexpr size_t kMostSeen = 256;  // viewers that are remembered
 
-// 1, 2 or 4: rays a pixel on each axis. Limits, whatever a master says.
+// Returns rays a pixel on each axis: 1, 2 or 4, for any number that a master may send.
 int side_of(int samples) { return samples >= 16 ? 4 : samples >= 4 ? 2 : 1; }
 
-// Mean colours of side x side pixels each.
+// Returns the mean colour of each side x side pixels.
 std::vector<uint32_t> averaged(const std::vector<uint32_t>& fine, int width, int height, int side) {
   std::vector<uint32_t> out(size_t(width) * size_t(height));
   const auto count = uint32_t(side * side);
@@ -41,7 +41,8 @@ void PictureMaker::follow(const wire::Welcome& session) {
   shading_.reset();
 }
 
-// All tiles of a frame are alike, also where the one before was not drawn here.
+// True if the viewer asks for the same view as in the frame before. All tiles of a frame get the same answer, even if
+// the frame before was not drawn here.
 bool PictureMaker::is_still(const wire::Lease& lease) {
   if (seen_.size() >= kMostSeen && !seen_.contains(lease.viewer)) seen_.clear();
   Seen& seen = seen_[lease.viewer];

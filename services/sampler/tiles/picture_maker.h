@@ -1,5 +1,5 @@
-// Pictures of sampled tiles, where a session shows what its servers draw: shaded like what viewers draw of points, over
-// the background, as JPEG. A view that its viewer asks for again has not changed since: it is drawn finer.
+// Pictures of sampled tiles, for sessions that show pictures: shaded like viewers shade points, over the background, as
+// JPEG. A view that its viewer asks for again has not changed since: it is drawn finer.
 #pragma once
 
 #include <map>
@@ -14,21 +14,21 @@ namespace telesplat::sampler {
 
 class PictureMaker {
  public:
-  static constexpr int kStillQuality = 95, kStillSamples = 4;  ///< of a still view, at least
+  static constexpr int kStillQuality = 95, kStillSamples = 4;  ///< least for a still view
 
-  /// What the session wants of pictures: its settings "picture.*".
+  /// Takes the session's settings for pictures, "picture.*".
   void follow(const wire::Welcome& session);
   bool on() const { return quality_ > 0; }
 
-  /// What is to be sampled for a tile of a view.
+  /// Rays that are to be sampled for a tile of a view.
   struct Rays {
     int side = 1;                      ///< rays a pixel, on each axis
-    int quality = 0;                   ///< of JPEG
-    std::optional<wire::Lease> lease;  ///< the tile with these rays as its pixels; none: of one ray a pixel, as leased
+    int quality = 0;                   ///< JPEG quality
+    std::optional<wire::Lease> lease;  ///< the tile with these rays as its pixels; nullopt: one ray a pixel, as leased
   };
-  /// Precondition: on().
+  /// Returns the rays for a leased tile. Precondition: on().
   Rays rays(const wire::Lease& lease);
-  /// JPEG of the tile. sampled: what rays() asked for.
+  /// Returns the tile as JPEG. sampled: the image of `rays`.
   std::vector<std::byte> picture(const wire::Lease& lease, const Rays& rays, const image::DepthImage& sampled);
 
  private:
@@ -42,7 +42,7 @@ class PictureMaker {
 
   int quality_ = 0, samples_ = 1;
   image::ShadingParameters parameters_;
-  std::optional<image::Shading> shading_;  // of shaded_
+  std::optional<image::Shading> shading_;  // shading for the camera shaded_
   geometry::Camera shaded_;
   std::map<InstanceId, Seen> seen_;  // the newest frame of each viewer
 };

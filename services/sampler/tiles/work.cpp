@@ -15,7 +15,7 @@ void TileWork::take(net::Socket& from, const net::Message& message, bool takes_l
   });
 }
 
-// The mask is decoded once, and does not go on to the packer.
+// Adds a lease. Decodes its mask once and takes it out: it does not go on to the packer.
 void TileWork::hold(const wire::Lease& lease, double arrived_s, double now_s) {
   HeldLease held{.lease = lease, .received_s = now_s};
   held.lease.moments.lease_arrived_s = link_.to_master_s(arrived_s);
@@ -54,7 +54,7 @@ Delivery TileWork::sample_next() {
   return out;
 }
 
-// What cannot be sampled finer is not.
+// Samples a tile and makes a picture of it. If the source cannot sample it finer, it has one ray a pixel.
 Delivery TileWork::picture(const HeldLease& held) {
   PictureMaker::Rays rays = pictures_.rays(held.lease);
   HeldLease fine{rays.lease.value_or(held.lease), held.received_s};
@@ -67,7 +67,7 @@ Delivery TileWork::picture(const HeldLease& held) {
   return out;
 }
 
-// Of what has just been encoded.
+// Returns a delivery whose encoding ends now, without its body.
 Delivery TileWork::deliver(std::string_view type, const HeldLease& held, const Sampled& sampled) {
   const wire::Lease& lease = held.lease;
   return {type,

@@ -1,5 +1,5 @@
-// The adapter between leases of tiles and what samples them: it holds the leases and makes depth tiles of the samples,
-// or pictures where the session shows these.
+// The adapter between leases of tiles and the source that samples them: it holds the leases and encodes the samples as
+// depth tiles, or as pictures if the session shows pictures.
 #pragma once
 
 #include <deque>
@@ -12,7 +12,7 @@ namespace telesplat::sampler {
 
 class TileWork final : public Work {
  public:
-  /// Keeps a reference to the link: who we are, and the master's clock.
+  /// Keeps a reference to the link, for this sampler's instance and the master's clock.
   TileWork(std::unique_ptr<TileSource> source, net::MasterLink& link) : source_(std::move(source)), link_(link) {}
 
   const char* name() const override { return source_->name(); }
@@ -21,8 +21,8 @@ class TileWork final : public Work {
     pictures_.follow(session);
   }
   bool takes_leases() const override { return source_->takes_leases(); }
-  /// All pixels of a lease whose mask is none are sampled, with a line: dropped, it would come again when it has run
-  /// out, as would the view that waits for it.
+  /// If a lease's mask cannot be decoded, all its pixels are sampled, and the log says so: dropped, it would come again
+  /// when it has run out, and its view would wait for it.
   void take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) override;
   size_t leases() const override { return leases_.size(); }
   void drop_leases() override { leases_.clear(); }

@@ -20,11 +20,11 @@ namespace telesplat::sampler {
 namespace {
 
 constexpr int kBrick = 8;             // cells a side; a cell lies between eight voxels
-constexpr int kCorners = kBrick + 1;  // voxels a side, so that a brick has all it interpolates
+constexpr int kCorners = kBrick + 1;  // voxels a side: a brick has all voxels that it interpolates
 constexpr uint32_t kAbsent = 0xffffffff;
-constexpr double kEnough = 1e-6;  // of light that is left when a ray ends
+constexpr double kEnough = 1e-6;  // a ray ends when less than this share of light is left
 
-// Level in the low half, normal in the high one.
+// Each voxel has its level in the low half, its normal in the high half.
 using Brick = std::array<uint32_t, kCorners * kCorners * kCorners>;
 
 int corner(int x, int y, int z) { return (z * kCorners + y) * kCorners + x; }
@@ -37,7 +37,7 @@ struct VolumeRaycaster::Impl {
   bool lit = false;
   // Cells have the index of their lower corner, -1 to n - 1; brick (0, 0, 0) begins with cell (-1, -1, -1).
   std::array<int, 3> across{};
-  std::vector<int32_t> index;  // -1: nothing in it
+  std::vector<int32_t> index;  // index into bricks; -1: an empty brick
   std::vector<Brick> bricks;
   mutable tbb::task_arena arena;
 
@@ -54,7 +54,7 @@ struct VolumeRaycaster::Impl {
   void march(const Light& light, const Ray& ray, glm::dvec3& colour, double& left, double& solid) const;
 };
 
-// A voxel is a corner of the cells on both sides of it, so of up to eight bricks.
+// Stores a voxel. It is a corner of the cells on both sides of it, so it goes into up to eight bricks.
 void VolumeRaycaster::Impl::put(int i, int j, int k, uint32_t value) {
   const std::array<int, 3> p{i + 1, j + 1, k + 1};
   for (int which = 0; which < 8; ++which) {
@@ -77,7 +77,7 @@ void VolumeRaycaster::Impl::put(int i, int j, int k, uint32_t value) {
   }
 }
 
-// What a voxel emits and absorbs, seen from one eye.
+// Emission and absorption of voxels, seen from one eye.
 struct VolumeRaycaster::Impl::Light {
   std::vector<glm::dvec4> level;  // r, g, b times extinction; extinction
   std::vector<float> intensity;   // by normal; empty: all 1
@@ -99,7 +99,7 @@ struct VolumeRaycaster::Impl::Ray {
   double from, step;  // metres
 };
 
-// The part of the ray that lies in the grid and a voxel around it. None: it misses.
+// Returns the part of the ray, [enter, leave] in metres, within the grid and one voxel around it. nullopt: it misses.
 std::optional<std::pair<double, double>> VolumeRaycaster::Impl::span_of(const Ray& ray) const {
   double enter = ray.from, leave = std::numeric_limits<double>::infinity();
   for (int a = 0; a < 3; ++a) {
@@ -115,7 +115,7 @@ std::optional<std::pair<double, double>> VolumeRaycaster::Impl::span_of(const Ra
   return std::pair(enter, leave);
 }
 
-// Where the ray leaves the brick, at the latest at `leave`.
+// Returns t where the ray leaves the brick, `leave` at most.
 double VolumeRaycaster::Impl::end_of(const std::array<int, 3>& brick, const Ray& ray, double leave) {
   double out = leave;
   for (int a = 0; a < 3; ++a) {
@@ -131,7 +131,7 @@ void VolumeRaycaster::Impl::march(const Light& light, const Ray& ray, glm::dvec3
   const auto span = span_of(ray);
   if (!span) return;
   const auto [enter, leave] = *span;
-  const double unit = grid.unit_m(), length = ray.step / unit;  // of a step, as extinctions count it
+  const double unit = grid.unit_m(), length = ray.step / unit;  // length: of a step, in the unit of extinctions
   std::array<int, 3> cell{-9, -9, -9};
   std::array<glm::dvec4, 8> corners;
   bool empty = true;
@@ -150,7 +150,7 @@ void VolumeRaycaster::Impl::march(const Light& light, const Ray& ray, glm::dvec3
     if (c != cell) {
       const int32_t slot = index[at(brick[0], brick[1], brick[2])];
       if (slot < 0) {
-        // On to the first step in another brick.
+        // Go on to the first step in another brick.
         n = std::max(n, int64_t(std::floor((end_of(brick, ray, leave) - enter) / ray.step - 0.5)));
         cell = {-9, -9, -9};
         continue;
@@ -197,7 +197,7 @@ VolumeRaycaster::VolumeRaycaster(const volume::Grid& grid, const volume::Voxels&
       for (uint32_t n = voxels.rows[row]; n < voxels.rows[row + 1]; ++n) {
         const uint16_t level = voxels.level[n];
         if (level >= impl.colours.size() || !(impl.colours[level].extinction > 0)) continue;
-        // As the splatter has it: rounding does not decide about voxels that lie in a plane.
+        // As in the splatter: the margin keeps voxels that lie in a plane, however they are rounded.
         const glm::dvec3 room(grid.index_to_room * glm::dvec4(voxels.i[n], j, k, 1));
         if (!clip.empty() && !clip.keeps(room, 1e-6 * grid.unit_m())) continue;
         impl.put(voxels.i[n], j, k, level | uint32_t(impl.lit ? voxels.normal[n] : volume::kNoNormal) << 16);

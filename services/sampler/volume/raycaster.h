@@ -1,4 +1,4 @@
-// The reference: rays through the same field, in double precision.
+// The reference for the splatter: rays through the same field, in double precision.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,16 @@ namespace telesplat::sampler {
 
 /// Integrates emission and absorption along every pixel's ray: extinction and extinction times colour are interpolated
 /// trilinearly between voxels (0 outside [-1, n]), steps of `step` voxels (the smallest side of one), in double
-/// precision, without early termination before 1e-6 of light is left. Classified before interpolation, as voxels
-/// travel. Lit by volume/lighting.h for the camera's eye.
+/// precision, without early termination before 1e-6 of light is left. Classified before interpolation, since voxels
+/// travel classified. Lit by volume/lighting.h for the camera's eye.
 class VolumeRaycaster {
  public:
-  /// voxels: of all slices; those whose centres the clip cuts away are not there.
+  /// voxels: of all slices; voxels whose centres the clip cuts away are left out.
   VolumeRaycaster(const volume::Grid& grid, const volume::Voxels& voxels, std::vector<volume::LevelColour> colours,
                   int threads, const geometry::Clip& clip = {});
   ~VolumeRaycaster();
-  /// Colours over background, in the upper byte how much of the pixel the volume covers; depth as volume::WarpTarget
-  /// has it.
+  /// Returns colours over the background, with the volume's coverage of the pixel in the upper byte; depth as in
+  /// volume::WarpTarget.
   image::View draw(const geometry::Camera& camera, uint32_t background, double step = 0.25) const;
 
  private:

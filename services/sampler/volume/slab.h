@@ -1,5 +1,5 @@
-// A sampler's part of a volume, ready to be splatted: what stands between the work for leases and the splatter, so that
-// each can be tested alone.
+// A sampler's part of a volume, ready to be splatted: the interface between the work for leases and the splatter, so
+// that each can be tested alone.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ class Slab {
  public:
   virtual ~Slab() = default;
   virtual size_t bytes() const = 0;
-  /// As ShearSplatter::splat(); voxels: how many were splatted.
+  /// As ShearSplatter::splat(); voxels: set to the number splatted.
   virtual std::vector<volume::SliceImage> splat(const std::vector<volume::LevelColour>& colours,
                                                 const volume::ShearFrame& frame, int k_begin, int k_end,
                                                 const geometry::Clip& clip, uint64_t& voxels) const = 0;

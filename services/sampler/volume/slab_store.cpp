@@ -12,7 +12,7 @@ using volume::Voxels;
 
 uint64_t bytes_of(const Voxels& v) { return 4 * v.rows.size() + 6 * v.size() + 1024; }
 
-// One slice of several.
+// Returns slice k of several slices.
 Voxels cut(const Voxels& from, int k, int size_y) {
   const auto row = size_t(k - from.k_begin) * size_t(size_y);
   const uint32_t first = from.rows[row], last = from.rows[row + size_t(size_y)];
@@ -48,7 +48,7 @@ LevelSet both(const LevelSet& a, const LevelSet& b) {
   return *LevelSet::from_bytes(bits);
 }
 
-// Without the voxels of other levels.
+// Returns the voxels of these levels only.
 Voxels only(const Voxels& from, const LevelSet& levels) {
   Voxels out;
   out.k_begin = from.k_begin, out.k_end = from.k_end;
@@ -92,7 +92,7 @@ Status SlabStore::assign(const wire::SlabAssignment& a) {
   assignment_ = a;
   auto sheet = a.sheet;
   std::stable_sort(sheet.begin(), sheet.end(), [](const auto& x, const auto& y) { return x.round < y.round; });
-  // Slices that are still leased by the old partition come by the old sheet.
+  // Leases of the old partition still need slices of the old sheet.
   for (const auto& e : sheet_)
     if (sheet.size() < 2 * wire::kMaxSlabs && std::find(sheet.begin(), sheet.end(), e) == sheet.end())
       sheet.push_back(e);
@@ -108,7 +108,7 @@ void SlabStore::use(int begin, int end) {
   used_ = {begin, end};
   const bool newest = begin == int(assignment_.begin) && end == int(assignment_.end);
   if (newest && sheet_.size() > assignment_.sheet.size()) sheet_.resize(assignment_.sheet.size());
-  // Arranged, slabs of earlier partitions are of no use, and take as much memory as their voxels.
+  // Drop arranged slabs of earlier partitions: they are of no use, and take as much memory as their voxels.
   std::erase_if(arranged_, [&](const Arranged& a) {
     const bool assigned = a.begin == int(assignment_.begin) && a.end == int(assignment_.end);
     return !assigned && (a.begin != begin || a.end != end);
@@ -180,7 +180,7 @@ Result<bool> SlabStore::take(const VoxelAsk& ask, const wire::VoxelData& data, c
   auto voxels = volume::decode_voxels({reinterpret_cast<const uint8_t*>(data.data.data()), data.data.size()}, size[0],
                                       size[1], int(data.begin), int(data.end), scene_->levels.count);
   if (!voxels) return voxels.error();
-  // The decoder takes any part of the slices; what is cut below must be all of them.
+  // The decoder accepts any part of the slices; the loop below cuts all of them.
   if (voxels->k_begin != int(data.begin) || voxels->k_end != int(data.end))
     return Error{fmt::format("{} sent voxels of slices {} to {} in an answer of slices {} to {}", ask.endpoint,
                              voxels->k_begin, voxels->k_end, data.begin, data.end)};
@@ -196,7 +196,7 @@ Result<bool> SlabStore::take(const VoxelAsk& ask, const wire::VoxelData& data, c
       slice.voxels = volume::merge(old->second.voxels, slice.voxels);
       if (!in_order(slice.voxels)) return Error{fmt::format("slice {} brings voxels that were there", k)};
     } else if (!ask.have.empty()) {
-      return false;  // it was let go meanwhile
+      return false;  // the slice was dropped meanwhile
     }
     slice.have = ask.have;
     slice.have.add(*has);

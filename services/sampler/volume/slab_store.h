@@ -1,5 +1,5 @@
-// The voxels a sampler holds of a volume: what it lacks for a slab, who has it, what it lets go when memory runs short.
-// No sockets, no clocks.
+// The voxels of a volume that a sampler holds: finds the ones that a slab lacks and the server that has them, and drops
+// some when memory runs short. No sockets, no clocks.
 #pragma once
 
 #include <map>
@@ -20,29 +20,29 @@ struct SlabScene {
   volume::Levels levels;
   bool lit = true;
   int steps = 1;
-  std::string content;  ///< what tells one data set from another of the same shape
+  std::string content;  ///< identifies the data set among others of the same shape
   bool operator==(const SlabScene&) const = default;
 };
 
 /// Slices [begin, end) of a step, with all voxels of some levels.
 struct SlabWant {
   int step = 0, begin = 0, end = 0;
-  EpochId epoch;                            ///< for which servers are asked
+  EpochId epoch;                            ///< epoch of the requests to servers
   const volume::LevelSet* shown = nullptr;  ///< the levels that this epoch shows
 };
 
-/// What is to be asked for next, and of whom.
+/// The next request: slices of a step, and the server to ask.
 struct VoxelAsk {
   std::string endpoint;
   int step = 0, begin = 0, end = 0;
   uint64_t round = 0;
   EpochId epoch;
-  volume::LevelSet have;  ///< of all of these slices
+  volume::LevelSet have;  ///< levels that all of these slices have already
 };
 
 class SlabStore {
  public:
-  /// budget_bytes: of voxels held, those that leases need not counted.
+  /// budget_bytes: memory for voxels, without those that leases need.
   SlabStore(MakeSlab make, uint64_t budget_bytes) : make_(std::move(make)), budget_bytes_(budget_bytes) {}
 
   /// Forgets everything if it is another volume.
@@ -50,33 +50,32 @@ class SlabStore {
   const std::optional<SlabScene>& scene() const { return scene_; }
   void clear();
 
-  /// Takes the sheet over. For slices that it does not name, older sheets go on holding. Error: slabs, ranges or
-  /// endpoints that make no sense in this scene; nothing has changed then. Precondition: there is a scene.
+  /// Takes over the assignment and its sheet. Older sheets stay valid for slices that it does not name. Error: slab,
+  /// ranges or endpoints make no sense in this scene; then nothing changed. Precondition: scene() is set.
   Status assign(const wire::SlabAssignment& assignment);
-  /// The newest one; partition 0: none.
+  /// The newest assignment; partition 0: no assignment came yet.
   const wire::SlabAssignment& assignment() const { return assignment_; }
-  /// Whether a sheet that holds names this server.
+  /// True if a valid sheet names this server.
   bool names(const std::string& endpoint) const;
-  /// Leases are of this range from now on. Other slabs than it and the assigned one are not kept for long.
+  /// Leases are for this range from now on. Slabs other than this one and the assigned one are not kept for long.
   void use(int begin, int end);
 
-  /// Whether everything for splatting it is here: its slices and one more on both sides.
+  /// True if all that splatting needs is here: the slices and one more on both sides.
   bool holds(const SlabWant& want) const;
-  /// What lacks first, in the order of the sheet. Nothing: all is here, or no sheet says who has it.
+  /// Returns the first missing slices, in the sheet's order. nullopt: all are here, or no sheet names their server.
   std::optional<VoxelAsk> next(const SlabWant& want) const;
-  /// Takes the answer to `ask`; it comes from outside. shown: the levels that the ask's epoch shows. The slices then
-  /// count as having all voxels of those. False: not what was asked for, or too late (other levels are held by now).
-  /// Error: the bytes are no voxels of just the slices that the answer's header names; nothing has changed then.
+  /// Takes the answer to `ask`; it is not trusted. shown: the levels that the ask's epoch shows; from then on the
+  /// slices count as having all voxels of them. False: it does not answer `ask`, or comes too late (other levels are
+  /// held by now). Error: the bytes are not voxels of exactly the slices in the answer's header; nothing changed.
   Result<bool> take(const VoxelAsk& ask, const wire::VoxelData& data, const volume::LevelSet& shown);
-  /// The slab, arranged for splatting; null: not all of it is here. It stays valid when the store lets go of it.
+  /// Returns the slab, arranged for splatting; null: not all of it is here. It stays valid when the store drops it.
   std::shared_ptr<const Slab> slab(const SlabWant& want);
   bool arranged(const SlabWant& want) const { return find(want) != nullptr; }
 
-  /// If more is held than the budget allows, lets go: first slices of neither the assigned range nor the one in use;
-  /// then steps, the one farthest after `step` first; then voxels of levels that are not in `shown`. `step` itself
-  /// stays.
+  /// If more is held than the budget allows, drops first slices of neither the assigned range nor the one in use; then
+  /// steps, the one farthest after `step` first; then voxels of levels that are not in `shown`. `step` itself stays.
   void trim(int step, const volume::LevelSet& shown);
-  /// How many steps after `step`, in the order in which they play, fit in memory beside it if they are as large.
+  /// Returns the number of steps after `step`, in playing order, that fit in memory beside it if they are as large.
   int steps_ahead(int step) const;
 
   uint64_t bytes() const;
@@ -89,7 +88,7 @@ class SlabStore {
   };
   struct Arranged {
     int step, begin, end;
-    volume::LevelSet have;  // of all of its slices, when it was arranged
+    volume::LevelSet have;  // levels that all of its slices had when it was arranged
     std::shared_ptr<const Slab> slab;
   };
   using Key = std::pair<int, int>;  // step, k
@@ -110,7 +109,7 @@ class SlabStore {
   uint64_t budget_bytes_;
   std::optional<SlabScene> scene_;
   wire::SlabAssignment assignment_;
-  std::vector<wire::SheetEntry> sheet_;  // by round; older sheets' after
+  std::vector<wire::SheetEntry> sheet_;  // by round; entries of older sheets follow
   Range used_;
   std::map<Key, Slice> slices_;
   std::vector<Arranged> arranged_;

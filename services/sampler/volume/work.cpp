@@ -25,7 +25,7 @@ Result<volume::Session> read(const wire::Welcome& welcome, const std::string& cl
   return session;
 }
 
-// Each image by itself, then one after the other.
+// Encodes all images in parallel, and appends the streams to one another.
 std::vector<uint8_t> encode(const std::vector<volume::SliceImage>& images) {
   std::vector<std::vector<uint8_t>> parts(images.size());
   in_parallel(size_t{0}, images.size(), [&](size_t i) { parts[i] = volume::encode_slice(images[i]); });
@@ -51,7 +51,7 @@ VolumeWork::VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::st
 void VolumeWork::on_welcome(const wire::Welcome& welcome) {
   if (epochs_.follow(welcome.master)) told_ready_ = {};
   const scene::SessionView view(welcome);
-  if (!view.kind()) return;  // no scene for now: parts of another volume are missing, or nobody serves data yet
+  if (!view.kind()) return;  // no scene now: parts of a volume are missing, or there is no data server
   const std::string transfer = view.fact("transfer"), clip = view.fact(scene::kClipFact);
   const Epoch* known = epochs_.find(welcome.epoch);
   if (known && known->parameters == welcome.parameters && known->transfer == transfer && known->clip_text == clip)
@@ -89,7 +89,7 @@ void VolumeWork::take(net::Socket& from, const net::Message& message, bool takes
       told_ready_ = {};
       bytes_before_ = bytes_received_;
       progress_s_ = now_s;
-      // An answer to what the old sheet asked for is as good as any.
+      // An open request of the old sheet stays: its answer is as good as any.
       forget_servers();
     }
   });
@@ -157,7 +157,7 @@ Delivery VolumeWork::sample_next() {
   return out;
 }
 
-// What the first lease lacks, then what the newest epoch lacks of the assigned slab, then what the steps after it do.
+// Returns the next request: for the first lease, else for the newest epoch's assigned slab, else for later steps.
 std::optional<VoxelAsk> VolumeWork::next_ask() {
   if (!leases_.empty()) {
     const wire::SliceLease& lease = leases_.front().lease;
@@ -226,7 +226,7 @@ void VolumeWork::tell_ready() {
   const EpochId id = epochs_.newest_id();
   const Epoch& newest = epochs_.newest();
   if (told_ready_ == std::pair{a.partition, id} || !newest.scene) return;
-  // The slab is arranged at once, so that the first lease does not wait for it. A spare holds nothing: it is ready.
+  // Arrange the slab at once, so that the first lease does not wait for it. A spare sampler holds nothing and is ready.
   if (a.begin < a.end) {
     const SlabWant w = want(id, newest, int(a.begin), int(a.end));
     if (!store_.arranged(w)) {
@@ -240,7 +240,7 @@ void VolumeWork::tell_ready() {
   master_.ready({master_.instance, a.partition, id, store_.voxels(), bytes_received_ - bytes_before_});
 }
 
-// A step of a series that is here already, while there is nothing else to do.
+// Arranges a later step of a series whose voxels are here, while there is nothing else to do.
 void VolumeWork::arrange_ahead() {
   const auto& a = store_.assignment();
   if (a.partition == 0 || a.begin >= a.end || epochs_.empty()) return;
@@ -289,7 +289,7 @@ void VolumeWork::receive(double now_s) {
           socket, *message, [&, &from = endpoint, &socket = socket](const wire::VoxelData& data) {
             if (!asked_ || asked_->ask.endpoint != from || data.epoch != asked_->ask.epoch ||
                 data.step != uint64_t(asked_->ask.step))
-              return;  // too late: it was asked again, or is not needed any more
+              return;  // too late: it was asked for again, or is not needed any more
             const VoxelAsk ask = asked_->ask;
             if (!data.known || data.begin >= data.end) {
               forget_asked();

@@ -1,5 +1,5 @@
-// Leases of a volume (T4.5, T5.3): fetches the voxels of the slab it was assigned, round by round, and splats the slab
-// into slice images, one a layer.
+// Works on leases of a volume (T4.5, T5.3): fetches the voxels of its assigned slab, round by round, and splats the
+// slab into slice images, one for each layer.
 #pragma once
 
 #include <algorithm>
@@ -20,29 +20,29 @@ namespace telesplat::sampler {
 
 class VolumeWork final : public Work {
  public:
-  static constexpr uint64_t kAnswerBytes = 3 << 20;  ///< that an answer has about, before one has come
-  static constexpr double kPause_s = 0.05;           ///< one that does not know the epoch yet is asked again after this
-  static constexpr double kExtend_s = 0.1;           ///< between two requests for more time
-  static constexpr double kPatience_s = 6;  ///< a lease whose voxels do not come for longer is extended no more
+  static constexpr uint64_t kAnswerBytes = 3 << 20;  ///< assumed size of an answer before one has come
+  static constexpr double kPause_s = 0.05;  ///< a server that does not know the epoch yet is asked again after this
+  static constexpr double kExtend_s = 0.1;  ///< between two requests for more time
+  static constexpr double kPatience_s = 6;  ///< if no voxels come for longer, leases are not extended any more
 
-  /// What it says to the master.
+  /// Messages to the master.
   struct Master {
-    InstanceId instance;  ///< ours
+    InstanceId instance;  ///< this sampler's
     std::function<void(const wire::SlabReady&)> ready;
     std::function<void(const wire::LeaseExtend&)> extend;
     std::function<double(double)> to_master_s;
   };
 
-  /// make: arranges slabs. threads: to encode with; 0: one a core. cache_bytes: of voxels. Keeps references to the
-  /// context and the spans.
+  /// make: arranges slabs. threads: number that encode; 0: one a core. cache_bytes: memory for voxels. Keeps references
+  /// to the context and the spans.
   VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name, net::Context& context,
              Master master, metrics::SpanRecorder& spans);
 
   const char* name() const override { return "volume"; }
-  /// Remembers the epoch's transfer function and step. Bad ones are told once, and that epoch's leases are hopeless.
+  /// Remembers the epoch's transfer function and step. Logs bad ones once; that epoch's leases are hopeless.
   void on_welcome(const wire::Welcome& session) override;
   bool takes_leases() const override { return !epochs_.empty(); }
-  /// Slice leases and slab assignments.
+  /// Takes slice leases and slab assignments.
   void take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) override;
   size_t leases() const override { return leases_.size(); }
   void drop_leases() override { leases_.clear(); }
@@ -59,7 +59,7 @@ class VolumeWork final : public Work {
     std::string transfer;
     std::string clip_text;  // the fact "clip"
     geometry::Clip clip;
-    std::optional<SlabScene> scene;  // none: the parameters are bad
+    std::optional<SlabScene> scene;  // nullopt: the parameters are bad
     int step = 0;
     std::vector<volume::LevelColour> colours;  // by level
     volume::LevelSet shown;
@@ -72,7 +72,7 @@ class VolumeWork final : public Work {
   struct Asked {
     VoxelAsk ask;
     uint64_t failed_before = 0;  // Socket::failed_connections()
-    double refused_s = 0;        // when an answer came that was none; 0: none did
+    double refused_s = 0;        // when a bad answer came; 0: no bad answer came
   };
 
   Readiness readiness(const Held& held, double now_s);
@@ -97,7 +97,7 @@ class VolumeWork final : public Work {
   std::optional<Asked> asked_;
   RetryClock retry_;
   uint64_t answer_bytes_ = kAnswerBytes;
-  std::pair<uint64_t, EpochId> told_ready_;  // partition and epoch
+  std::pair<uint64_t, EpochId> told_ready_;  // partition and epoch of the last SlabReady
   uint64_t bytes_received_ = 0, bytes_before_ = 0, rejected_ = 0;
   double pause_until_s_ = 0, last_extend_s_ = -1e9, progress_s_ = -1e9;
 };

@@ -1,4 +1,4 @@
-// Compositing a pixel row of a slice under what the layer has so far, and a layer's pixels when it is done.
+// Composites a pixel row of a slice behind the layer's pixels so far, and writes a layer's pixels when it is done.
 #if defined(TELESPLAT_SHEAR_COMPOSITE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SHEAR_COMPOSITE_INL_H_
 #undef TELESPLAT_SHEAR_COMPOSITE_INL_H_
@@ -16,7 +16,7 @@ namespace telesplat::sampler::HWY_NAMESPACE {
 // Pixels of a tile's layer: premultiplied colour so far and the light that is left.
 struct TilePixels {
   uint64_t live[kTileHeight];     // blocks that are not opaque yet
-  uint64_t touched[kTileHeight];  // blocks that mean something
+  uint64_t touched[kTileHeight];  // blocks that hold values
   alignas(64) float at[kTileHeight][kTileBlocks * kBlockFloats];
 };
 
@@ -37,7 +37,7 @@ HWY_INLINE V Attenuation(V x) {
   return hn::Div(r, hn::Add(hn::Mul(x, r), hn::Set(d, 1.0f)));
 }
 
-// Composites the blocks `mask` of pixel row y: a + (b - a) * w of two lines where kTwo, else a.
+// Composites the blocks `mask` of pixel row y: a + (b - a) * w of two lines if kTwo, else a.
 template <bool kTwo>
 inline void CompositeRow(const float* paths, uint64_t mask, const Line& a, const Line& b, float w, int y,
                          TilePixels& tile) {
@@ -102,7 +102,7 @@ inline void FinishLayer(const SplatScene& scene, const SplatTile& job, const Til
       uint32_t opaque = 0, seen = 0;
       for (int l = 0; l < kSplatBlock; l += int(hn::Lanes(d))) {
         const auto left = hn::Load(d, p + 3 * kSplatBlock + l);
-        // Colours do not exceed alpha but for rounding.
+        // Only by rounding do colours exceed alpha.
         const auto alpha = hn::Min(hn::Sub(one, left), one);
         const auto a = hn::ConvertTo(di, hn::Add(hn::Mul(alpha, scale), half));
         const auto channel = [&](int c) HWY_ATTR {
@@ -118,7 +118,7 @@ inline void FinishLayer(const SplatScene& scene, const SplatTile& job, const Til
         hn::Store(now, d, remaining + l);
         job.begun[y] |= uint64_t{1} << block;
         for (int n = 0; n < int(hn::Lanes(d)); ++n) {
-          // By this layer, alone or last: what was opaque before has lost a margin since, which must not come back.
+          // Made opaque by this layer, alone or as the last one: a margin that earlier ones lost must not come back.
           opaque |=
               uint32_t{remaining[l + n] < kOpaque && (earlier[n] >= kOpaque || p[3 * kSplatBlock + l + n] < kOpaque)}
               << (l + n);

@@ -4,7 +4,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "services/sampler/volume/shear/kernels.cpp"
-#include <hwy/foreach_target.h>  // compiles what follows once a target
+#include <hwy/foreach_target.h>  // compiles the rest once for each target
 
 #include <hwy/highway.h>
 
@@ -15,8 +15,8 @@ namespace telesplat::sampler::HWY_NAMESPACE {
 
 struct Scratch {
   TilePixels tile;
-  Line lines[2];   // of voxel rows, the one of row v in lines[v & 1]
-  Line mixed[2];   // of pixel rows, where several voxel rows make one
+  Line lines[2];   // lines of voxel rows; row v has lines[v & 1]
+  Line mixed[2];   // lines of pixel rows that several voxel rows make up
   DenseRow dense;  // all 0 between rows
 };
 
@@ -31,7 +31,7 @@ struct SliceInTile {
   int own_lo, own_hi;  // voxel rows whose centres lie in the tile's own rows: their voxels count
 };
 
-// The cells of a row that a clip keeps.
+// Returns the cells of a row that a clip keeps.
 CellRow KeptOf(const CellRow& row, const KeptCells& kept) {
   const auto before = [](const ShearCell& cell, int u) { return int(cell.u) < u; };
   CellRow out{std::lower_bound(row.begin, row.end, int(kept.first), before), row.end};
@@ -39,7 +39,7 @@ CellRow KeptOf(const CellRow& row, const KeptCells& kept) {
   return kept.first <= kept.last ? out : CellRow{row.end, row.end};
 }
 
-// The line of a voxel row.
+// Makes the line of voxel row v.
 void MakeLine(const SliceInTile& s, int v, uint64_t needed, Scratch& scratch, Line& line, SplatOutcome& out) {
   const ShearRows& rows = *s.scene.rows;
   line.row = v;
@@ -66,7 +66,7 @@ const float* PathsOf(const SliceInTile& s, int y) {
   return s.scene.paths + 3 * (size_t(s.job.y0 + y) * size_t(s.scene.blocks_across) + size_t(s.job.x0 / kSplatBlock));
 }
 
-// Voxel rows at least as high as pixel rows: every pixel row lies between two.
+// For voxel rows at least as high as pixel rows: every pixel row lies between two.
 void Magnify(const SliceInTile& s, Scratch& scratch, SplatOutcome& out) {
   const double pitch = s.slice.v.pitch;
   const auto row_at = [&](int y) { return s.origin + y * pitch; };
@@ -78,7 +78,7 @@ void Magnify(const SliceInTile& s, Scratch& scratch, SplatOutcome& out) {
     for (const int of : {v, v + 1}) {
       Line& line = scratch.lines[of & 1];
       if (line.row == of) continue;
-      uint64_t needed = 0;  // by the pixel rows that it will be part of
+      uint64_t needed = 0;  // blocks of the pixel rows that it will be part of
       for (int next = y; next < s.y_end && row_at(next) < of + 1; ++next) needed |= scratch.tile.live[next];
       MakeLine(s, of, needed, scratch, line, out);
     }
@@ -108,15 +108,15 @@ void AddLine(const Line& added, float weight, uint64_t live, Line& line) {
   line.mask |= mask;
 }
 
-// Pixel rows higher than voxel rows: a pixel row is the mean of the voxel rows within a pixel's height on both sides,
-// weighted by a tent. So a voxel row is part of two pixel rows, of which one is finished when the next but one begins.
+// For pixel rows higher than voxel rows: a pixel row is the mean of the voxel rows within a pixel's height on both
+// sides, weighted by a tent. So a voxel row is part of two pixel rows; a row is finished when the next but one begins.
 void Minify(const SliceInTile& s, Scratch& scratch, SplatOutcome& out) {
   const double pitch = s.slice.v.pitch;
   const SliceAxis& axis = s.slice.v;
   const auto row_at = [&](int y) { return s.origin + y * pitch; };
   const auto first_voxel = [&](int y) { return std::max(std::ceil(row_at(y) - pitch), axis.lattice_lo); };
   const auto last_voxel = [&](int y) { return std::min(std::floor(row_at(y) + pitch), axis.lattice_hi); };
-  float inverse[kTileHeight];  // of the sum of all weights in a pixel row, voxels or not
+  float inverse[kTileHeight];  // inverse sum of all weights in a pixel row, with or without voxels
   for (int y = s.y_begin; y < s.y_end; ++y) {
     double sum = 0;
     for (double v = first_voxel(y); v <= last_voxel(y); ++v) sum += std::max(1 - std::abs(v - row_at(y)) / pitch, 0.0);

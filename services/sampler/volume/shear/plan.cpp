@@ -8,7 +8,7 @@
 namespace telesplat::sampler {
 namespace {
 
-// Goes through the planes of one layer after the other.
+// Makes the planes of one layer after the other.
 class Planner {
  public:
   Planner(const volume::Grid& grid, const volume::ShearFrame& frame, const ShearRows& rows, const SlabRange& slab)
@@ -22,7 +22,7 @@ class Planner {
     for (int n = 0; n < layer.end - layer.begin; ++n) {
       const int s = forward ? layer.begin + n : layer.end - 1 - n;
       if (frame_.axis == 2 && (s < slab_.begin || s >= slab_.end)) continue;
-      // The plane behind a slice, in index order, goes with it; the one before the first slice goes with that.
+      // A slice takes along the plane behind it, in index order; the first slice takes the plane before it, too.
       if (planes == 2 && forward && s == 0) add_plane(-0.5, {-1, 0});
       if (planes == 2 && !forward) add_plane(s + 0.5, {s, s + 1});
       add_plane(s, {s});
@@ -41,7 +41,7 @@ class Planner {
   ShearPlan take() { return std::move(out_); }
 
  private:
-  // The plane at index coordinate `at`: the mean of the slices `of`. Left out if they hold nothing that the raster
+  // Adds the plane at index coordinate `at`, the mean of the slices `of`, unless they hold nothing that the raster
   // sees.
   void add_plane(double at, std::initializer_list<int> of) {
     SplatSlice slice;
@@ -58,7 +58,7 @@ class Planner {
     out_.slices.push_back(slice);
   }
 
-  // Which of the slices are held and have voxels, and where. False: none.
+  // Fills in which of the slices are held and have voxels, and their bounds. False: no slice has.
   bool hold(SplatSlice& slice, std::initializer_list<int> of) const {
     int count = 0;
     for (const int s : of) {
@@ -83,7 +83,7 @@ class Planner {
     slice.v.pitch = f.dv * t;
     slice.v.end = f.height;
     if (f.axis == 2) return;
-    // The slab's ends cut across the raster.
+    // The ends of the slab cut across the raster.
     SliceAxis& cut = f.axis == 0 ? slice.v : slice.u;
     const auto [first, last] = volume::owned_pixels(grid_, f, at, slab_.begin, slab_.end);
     cut.begin = first, cut.end = last;
@@ -91,7 +91,7 @@ class Planner {
     if (slab_.held_end < grid_.size[2]) cut.lattice_hi = slab_.held_end - 1;
   }
 
-  // Pixels [from, to] that voxels lo to hi of the axis reach. False: none.
+  // Finds the pixels [from, to] that voxels lo to hi of the axis reach. False: no pixels.
   static bool reach(const SliceAxis& axis, int lo, int hi, int& from, int& to) {
     const double radius = std::max(axis.pitch, 1.0);
     const double a = std::ceil((lo - radius - axis.origin) / axis.pitch);
@@ -129,7 +129,7 @@ ShearPlan plan_slices(const volume::Grid& grid, const volume::ShearFrame& frame,
 
 std::vector<float> block_paths(const volume::Grid& grid, const volume::ShearFrame& frame, int across, int planes) {
   std::vector<float> out(3 * size_t(across) * size_t(frame.height));
-  // The ray's direction is a + x b + y c; its length the root of a quadratic form.
+  // The ray's direction is a + x b + y c; its length is the root of a quadratic form.
   const glm::dmat3 m(grid.index_to_room);
   glm::dvec3 first(0.0);
   first[frame.axis] = frame.direction;

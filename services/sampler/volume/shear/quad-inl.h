@@ -1,5 +1,4 @@
-// Four floats of a voxel or pixel: (r, g, b, extinction). A vector where the target has one, an array where it has
-// none.
+// Four floats of a voxel or pixel: (r, g, b, extinction). A vector if the target has vectors of four, else an array.
 #if defined(TELESPLAT_SHEAR_QUAD_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SHEAR_QUAD_INL_H_
 #undef TELESPLAT_SHEAR_QUAD_INL_H_
@@ -54,7 +53,7 @@ HWY_INLINE Quad Add(Quad a, Quad b) { return hn::Add(a, b); }
 HWY_INLINE Quad Sub(Quad a, Quad b) { return hn::Sub(a, b); }
 HWY_INLINE Quad Mul(Quad a, Quad b) { return hn::Mul(a, b); }
 
-// Four voxels' or pixels' (r, g, b, e) to four of each channel, channels `stride` apart.
+// Stores (r, g, b, e) of four voxels or pixels as four values of each channel, channels `stride` apart.
 HWY_INLINE void StoreTransposed(Quad p0, Quad p1, Quad p2, Quad p3, float* to, int stride) {
   const QuadTag d;
   const auto rg0 = hn::InterleaveLower(d, p0, p1), rg1 = hn::InterleaveLower(d, p2, p3);

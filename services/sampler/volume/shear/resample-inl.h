@@ -1,4 +1,4 @@
-// Rows of voxels to lines of pixels: the horizontal half of resampling a slice.
+// Resamples rows of voxels to lines of pixels: the horizontal half of resampling a slice.
 #if defined(TELESPLAT_SHEAR_RESAMPLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SHEAR_RESAMPLE_INL_H_
 #undef TELESPLAT_SHEAR_RESAMPLE_INL_H_
@@ -24,24 +24,23 @@ inline constexpr int kBlockFloats = 4 * kSplatBlock;  // r, g, b, extinction (or
 
 // A line or pixel row of a tile.
 struct Line {
-  uint64_t mask = 0;  // blocks that mean something
+  uint64_t mask = 0;  // blocks that hold values
   int row = 0;
   alignas(64) float at[kTileBlocks * kBlockFloats];
 };
 
-// Voxels of a row, side by side, 0 where there are none: (r, g, b, extinction) of index u stands at 4 * (u + kMargin).
+// Voxels of a row, side by side, 0 where no voxel is: (r, g, b, extinction) of index u stands at 4 * (u + kMargin).
 inline constexpr int kMargin = 16;
 struct DenseRow {
   alignas(64) float at[4 * (volume::kMaxSide + 2 * kMargin)] = {};
 };
 
-// How the columns of a slice lie in a tile. Index coordinates are counted from `base`, so that single precision is
-// enough.
+// The columns of a slice in a tile. Index coordinates are counted from `base`, so that single precision is enough.
 struct TileColumns {
   int base;
   float origin, pitch;         // index coordinate, less base, of the tile's first pixel centre; per pixel
-  float inverse, reach;        // pixels a voxel; how many pixels from its centre a voxel reaches
-  float radius;                // the kernel's, voxels: more than 1 where a pixel is larger than a voxel
+  float inverse, reach;        // pixels a voxel; pixels from its centre that a voxel reaches
+  float radius;                // radius of the kernel, voxels: more than 1 if a pixel is larger than a voxel
   int lattice_lo, lattice_hi;  // less base
   int begin, end;              // pixels that may be written, from the tile's first
 };
@@ -62,10 +61,10 @@ inline TileColumns columns_of(const SliceAxis& axis, int x0, int width) {
   return c;
 }
 
-// Blocks [first, last].
+// Returns the bits of blocks [first, last].
 inline uint64_t blocks(int first, int last) { return (~uint64_t{0} << first) & (~uint64_t{0} >> (63 - last)); }
 
-// A block's pixels where a voxel is at least as large as a pixel: linear between the voxels on both sides.
+// Resamples a block if a voxel is at least as large as a pixel: linear between the voxels on both sides.
 HWY_INLINE void MagnifyBlock(const TileColumns& c, const DenseRow& dense, int block, float* to) {
   const Pixels d;
   const PixelIndices di;
@@ -78,7 +77,7 @@ HWY_INLINE void MagnifyBlock(const TileColumns& c, const DenseRow& dense, int bl
     hn::Store(hn::ConvertTo(di, floor), di, index + l);
     hn::Store(hn::Sub(at, floor), d, weight + l);
   }
-  // A tile may begin far beside the volume, so that only the sum leads into the row.
+  // A tile may begin far beside the volume, so only base and index together lie within the row.
   const auto pixel = [&](int n) HWY_ATTR {
     const float* p = dense.at + 4 * (c.base + kMargin + index[n]);
     const auto a = LoadQuad(p), b = LoadQuad(p + 4);
@@ -88,7 +87,7 @@ HWY_INLINE void MagnifyBlock(const TileColumns& c, const DenseRow& dense, int bl
   StoreTransposed(pixel(4), pixel(5), pixel(6), pixel(7), to + 4, kSplatBlock);
 }
 
-// Where a pixel is larger: the mean of the voxels within a pixel's width on both sides, weighted by a tent.
+// Likewise if a pixel is larger: the mean of the voxels within a pixel's width on both sides, weighted by a tent.
 HWY_INLINE void MinifyBlock(const TileColumns& c, const DenseRow& dense, int block, int size_u, float* to) {
   const float inverse_radius = 1 / c.radius;
   const auto pixel = [&](int n) HWY_ATTR {
@@ -106,14 +105,14 @@ HWY_INLINE void MinifyBlock(const TileColumns& c, const DenseRow& dense, int blo
     }
     return weights > 0 ? Mul(sum, QuadOf(1 / weights)) : sum;
   };
-  // Pixel after pixel, not in an argument list, whose order is nobody's.
+  // Pixel after pixel, not in an argument list, whose order of evaluation is not defined.
   for (int half = 0; half < kSplatBlock; half += 4) {
     const auto p0 = pixel(half), p1 = pixel(half + 1), p2 = pixel(half + 2), p3 = pixel(half + 3);
     StoreTransposed(p0, p1, p2, p3, to + half, kSplatBlock);
   }
 }
 
-// Nothing beside the pixels [begin, end).
+// Clears the pixels outside [begin, end).
 HWY_INLINE void TrimBlock(const TileColumns& c, int block, float* to) {
   for (int n = 0; n < kSplatBlock; ++n) {
     const int x = block * kSplatBlock + n;
@@ -131,8 +130,8 @@ struct CellRow {
 // Adjacent pixels of a line, and the voxels that reach them.
 struct Segment {
   int x_begin, x_end;
-  int u_lo, u_hi;      // that reach them
-  int own_lo, own_hi;  // that have their centres in them: those are counted
+  int u_lo, u_hi;      // voxels that reach them
+  int own_lo, own_hi;  // voxels with their centres in them, which are counted
 };
 
 inline Segment segment_of(const TileColumns& c, int first_block, int last_block) {
@@ -147,7 +146,7 @@ inline Segment segment_of(const TileColumns& c, int first_block, int last_block)
   return s;
 }
 
-// Cells of a row that reach a segment.
+// Returns the cells of a row from the first that reaches a segment.
 inline CellRow cells_of(const CellRow& row, const Segment& segment) {
   CellRow out = row;
   if (row.end - row.begin > 16)
@@ -165,7 +164,7 @@ HWY_INLINE uint64_t FillRow(const SplatScene& scene, const TileColumns& c, const
   float* at = dense.at + 4 * kMargin;
   const Quad w = QuadOf(weight);
   uint64_t mask = 0;
-  // Runs of voxels side by side reach the blocks of the pixels between half-open ends.
+  // Collect runs of voxels side by side: each run reaches a range of pixels, and these pixels' blocks.
   int run = -2, last = -2;
   const auto close = [&]() {
     if (run < 0) return;
@@ -192,7 +191,7 @@ HWY_INLINE uint64_t FillRow(const SplatScene& scene, const TileColumns& c, const
   return mask;
 }
 
-// The line of a row of voxels, or of the sum of two, of `needed` blocks alone. Returns how many voxels it was made of.
+// Makes the line of a row of voxels, or of the sum of two rows, in `needed` blocks only. Returns the number of voxels.
 inline uint64_t ResampleRow(const SplatScene& scene, const TileColumns& c, const CellRow* rows, int count, float weight,
                             uint64_t needed, DenseRow& dense, Line& line) {
   line.mask = 0;

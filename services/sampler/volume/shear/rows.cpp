@@ -9,7 +9,7 @@
 namespace telesplat::sampler {
 namespace {
 
-// Where the voxels of axis p go: its slices, rows, and columns as functions of (i, j, k).
+// Calls visit(j, k, begin, end) for each row along i that has voxels [begin, end).
 template <class Visit>
 void for_each_run(const volume::Grid& grid, const volume::Voxels& voxels, const Visit& visit) {
   size_t row = 0;
@@ -36,7 +36,7 @@ ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int ax
     out.first = voxels.rows;
     for (uint32_t n = 0; n < voxels.size(); ++n) out.cells[n] = cell(voxels.i[n], n);
   } else {
-    // Rows of axis 0 are those of one (i, k), with j in order; of axis 1 of one (j, i), with k in order. Voxels come in
+    // A row of axis 0 has one (i, k), with j in order; a row of axis 1 has one (j, i), with k in order. Voxels come in
     // order of (k, j, i), so that appending keeps columns in order.
     const auto row_of = [&](int i, int j, int k) {
       return axis == 0 ? size_t(i) * size_t(out.rows) + size_t(k - voxels.k_begin)
@@ -96,7 +96,7 @@ std::vector<KeptCells> kept_cells(const volume::Grid& grid, const ShearRows& row
         else
           hi = std::min(hi, least / plane.u);
       }
-      // Rounding does not decide about voxels that lie in a plane.
+      // The margin keeps voxels that lie in a plane, however they are rounded.
       lo = std::ceil(lo - 1e-6), hi = std::floor(hi + 1e-6);
       if (lo <= hi && hi >= 0) out[size_t(s) * size_t(rows.rows) + size_t(r)] = {uint16_t(lo), uint16_t(hi)};
     }

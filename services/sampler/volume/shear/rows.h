@@ -1,5 +1,5 @@
-// The voxels of a slab, arranged for one principal axis: cells of the same slice and row lie together, in the order of
-// the raster's columns.
+// The voxels of a slab, arranged for one principal axis: cells of one slice and row lie together, in the order of the
+// raster's columns.
 #pragma once
 
 #include <cstdint>
@@ -26,18 +26,18 @@ struct ShearRows {
   struct Bounds {
     int u_lo = 65536, u_hi = -1, v_lo = 65536, v_hi = -1;
   };
-  std::vector<Bounds> bounds;  ///< one a held slice
+  std::vector<Bounds> bounds;  ///< one for each held slice
 };
 
-/// What of a row is kept: u in [first, last].
+/// The part of a row that is kept: u in [first, last].
 struct KeptCells {
   uint16_t first = 1, last = 0;
 };
-/// One a row of `rows`, in their order: of voxels, whose centres decide.
+/// Returns the kept part of each row of `rows`, in their order: voxels whose centres the clip keeps.
 std::vector<KeptCells> kept_cells(const volume::Grid& grid, const ShearRows& rows, int axis,
                                   const geometry::Clip& clip);
 
-/// Arranges by counting: O(voxels + rows). axis: the principal one.
+/// Arranges voxels by counting: O(voxels + rows). axis: the principal axis.
 ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int axis);
 
 }  // namespace telesplat::sampler

@@ -1,10 +1,10 @@
-// What the splatting kernels work on: one frame of one slab, cut into tiles of the raster, and the layers of a tile one
+// Input of the splatting kernels: one frame of one slab, cut into tiles of the raster. They splat a tile's layers one
 // after the other.
 //
 // Extinction and extinction times colour of a slice are resampled separably. A row of voxels becomes a *line* of
-// pixels; pixel rows are mixed from the lines of the voxel rows about them. Everything goes by blocks of 8 pixels. A
-// tile is 64 blocks wide, so that one bit of a 64-bit word says whether a block of a row has anything in it, or can
-// still be seen.
+// pixels; pixel rows are mixed from the lines of the voxel rows around them. All work is done in blocks of 8
+// pixels. A tile is 64 blocks wide, so that one bit of a 64-bit word says whether a block of a row has anything in it,
+// or can still be seen.
 #pragma once
 
 #include <cstdint>
@@ -25,32 +25,32 @@ inline constexpr float kOpaque = 1.0f / 512;
 /// One axis of a slice: pixel x of the raster has its centre at index coordinate origin + x * pitch.
 struct SliceAxis {
   double origin = 0, pitch = 1;
-  int begin = 0, end = 0;  ///< pixels the slab owns
-  /// Voxels that are there, or are known to be empty; kernels wider than a voxel are cut off where these end.
+  int begin = 0, end = 0;  ///< pixels that the slab owns
+  /// Voxels that are held, or are known to be empty; kernels wider than a voxel are cut off at their ends.
   double lattice_lo = -1e9, lattice_hi = 1e9;
 };
 
 /// A slice, or a plane half way between two: the mean of both, the field being linear there.
 struct SplatSlice {
-  int held[2] = {-1, -1};    ///< indices in ShearRows; -1: none
-  float weight = 1;          ///< of the voxels of each
-  ShearRows::Bounds bounds;  ///< of the voxels of both
+  int held[2] = {-1, -1};    ///< slices in ShearRows; -1: no slice
+  float weight = 1;          ///< weight of the voxels of each
+  ShearRows::Bounds bounds;  ///< bounds of the voxels of both
   SliceAxis u, v;
 };
 
 struct SplatScene {
   const ShearRows* rows = nullptr;
-  int size_u = 0;                        ///< voxels of a row of the grid
-  const SplatSlice* slices = nullptr;    ///< of all layers, front to back
+  int size_u = 0;                        ///< voxels in a row of the grid
+  const SplatSlice* slices = nullptr;    ///< slices of all layers, front to back
   const float* colours = nullptr;        ///< r, g, b times extinction, and extinction of every level; 16-byte aligned
   const uint8_t* light = nullptr;        ///< intensity by normal, in 1/255
   const float* light_factors = nullptr;  ///< (i, i, i, 1) of every intensity i; 16-byte aligned
-  /// For each raster row and block: path from a plane to the next, as the coefficients of 1, n and n^2 of its pixel n.
+  /// For each raster row and block: path from a plane to the next, as the coefficients of 1, n and n^2 for its pixel n.
   const float* paths = nullptr;
-  /// Where a clip cuts rows: of each held row the first and last index u that is kept, none if first > last; null: all
-  /// is kept.
+  /// If a clip cuts rows: first and last index u that is kept of each held row; first > last: the row is cut away;
+  /// null: all is kept.
   const KeptCells* kept = nullptr;
-  int blocks_across = 0;  ///< of the raster, rounded up
+  int blocks_across = 0;  ///< blocks across the raster, rounded up
   int width = 0, height = 0;
 };
 
@@ -58,13 +58,13 @@ struct SplatScene {
 struct SplatTile {
   int x0 = 0, y0 = 0, rows = 0;  ///< raster pixels; rows <= kTileHeight
   int slice_begin = 0, slice_end = 0;
-  const uint8_t* hidden =
-      nullptr;  ///< a byte for each block of the raster, of `blocks_across`: 255 where nearer layers hide it
+  /// A byte for each block of the raster, `blocks_across` a row: 255 if nearer layers hide it.
+  const uint8_t* hidden = nullptr;
   float* remaining = nullptr;  ///< light that comes through the layers so far: raster rows of 8 * blocks_across
-  uint64_t* begun = nullptr;   ///< for each row of the tile: blocks of `remaining` that have a value; others are 1
-  uint8_t* opaque = nullptr;   ///< as hidden: bits of pixels that this layer made opaque, added
-  /// Pixels of the image, 0xAARRGGBB premultiplied; raster pixel (image_x, image_y) is the first. Blocks outside have
-  /// nothing.
+  uint64_t* begun = nullptr;  ///< for each row of the tile, bits: blocks of `remaining` that have a value; others are 1
+  uint8_t* opaque = nullptr;  ///< as hidden; bits of pixels that this layer made opaque are added
+  /// Pixels of the image, 0xAARRGGBB premultiplied; raster pixel (image_x, image_y) is the first. Blocks outside are
+  /// empty.
   uint32_t* image = nullptr;
   int image_x = 0, image_y = 0, image_width = 0, image_height = 0;
 };
@@ -75,7 +75,7 @@ struct SplatOutcome {
   int x_lo = 1 << 30, x_hi = -1, y_lo = 1 << 30, y_hi = -1;  ///< raster pixels that are not transparent, inclusive
 };
 
-/// Splats the layer, composites its slices and writes the pixels. Any number of threads, one a tile.
+/// Splats the layer, composites its slices and writes the pixels. Several threads may call it, for a tile each.
 void splat_tile(const SplatScene& scene, const SplatTile& tile, SplatOutcome& outcome);
 
 }  // namespace telesplat::sampler

@@ -22,13 +22,13 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// How far heads turn about the volume's middle before a newer frame comes: 5 degrees and some more. What may come into
-// sight by that is splatted even where it is hidden now.
+// Angle by which heads turn about the volume's middle before a newer frame comes, rad: 5 degrees and some more. Voxels
+// that may come into sight by that are splatted even if they are hidden now.
 constexpr double kHeadMove = 0.12;
 
 using Floats = hwy::AlignedFreeUniquePtr<float[]>;
 
-// Extinction times colour, and extinction, by level.
+// Returns extinction times colour, and extinction, by level.
 Floats colour_table(const std::vector<volume::LevelColour>& colours) {
   Floats out = hwy::AllocateAligned<float>(4 * size_t(volume::kMaxLevels));
   std::fill_n(out.get(), 4 * size_t(volume::kMaxLevels), 0.0f);
@@ -41,7 +41,7 @@ Floats colour_table(const std::vector<volume::LevelColour>& colours) {
   return out;
 }
 
-// Keeps only what lies in `rect`.
+// Keeps only the pixels in `rect`.
 void crop(volume::SliceImage& image, const geometry::Rect& rect) {
   if (image.rect == rect) return;
   uint32_t* to = image.pixels.data();
@@ -52,7 +52,7 @@ void crop(volume::SliceImage& image, const geometry::Rect& rect) {
   image.rect = rect;
 }
 
-// Intensity by normal, in 1/255.
+// Returns intensities by normal, in 1/255.
 std::vector<uint8_t> light_table(const SlabVolume& volume, const volume::ShearFrame& frame) {
   std::vector<uint8_t> light(65536, 255);
   if (volume.voxels().normal.empty()) return light;
@@ -62,7 +62,7 @@ std::vector<uint8_t> light_table(const SlabVolume& volume, const volume::ShearFr
   return light;
 }
 
-// By how many pixels a layer's plane moves against another's, seen from an eye that moved (kHeadMove).
+// Pixels by which a layer's plane moves against another's, seen from an eye that moved by kHeadMove.
 struct Parallax {
   double x, y;
 
@@ -77,7 +77,7 @@ struct Parallax {
   }
 };
 
-// The raster while layers are splatted, front to back: how much light still comes through.
+// The raster while layers are splatted, front to back: the light that still comes through.
 class Canvas {
  public:
   Canvas(const volume::ShearFrame& frame, int blocks_across)
@@ -88,7 +88,7 @@ class Canvas {
         hidden_(frame.width, frame.height),
         opaque_(size_t(blocks_across) * size_t(frame.height), 0) {}
 
-  // Hides what lies behind the layers so far, but for a margin of dx and dy pixels.
+  // Hides the pixels behind the layers so far, except for a margin of dx and dy pixels.
   void hide(int dx, int dy) {
     for (size_t n = 0; n < opaque_.size(); ++n) hidden_.bytes()[n] |= opaque_[n];
     std::fill(opaque_.begin(), opaque_.end(), uint8_t{0});
@@ -141,7 +141,7 @@ class Canvas {
   std::vector<uint8_t> opaque_;
 };
 
-// The voxels that are held of the slices [k_begin, k_end).
+// Returns the number of voxels held of the slices [k_begin, k_end).
 uint64_t voxels_between(const SlabVolume& volume, int k_begin, int k_end) {
   const volume::Voxels& voxels = volume.voxels();
   if (voxels.size() == 0) return 0;
@@ -207,7 +207,7 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
   for (size_t l = 0; l < frame.layers.size(); ++l) {
     if (l > 0) {
       const double shift = std::abs(1 / frame.t(frame.layers[l - 1].plane) - 1 / frame.t(frame.layers[l].plane));
-      // Rounded up, and half a pixel for what the warp interpolates: newly opaque pixels have no margin yet.
+      // Rounded up, and half a pixel more as the warp interpolates: newly opaque pixels have no margin yet.
       canvas.hide(int(std::ceil(std::min(parallax.x * shift + 0.5, 4096.0))),
                   int(std::ceil(std::min(parallax.y * shift + 0.5, 4096.0))));
     }
@@ -233,7 +233,7 @@ HiddenPixels::HiddenPixels(int width, int height)
 
 void HiddenPixels::shrink(int dx, int dy) {
   if (dx <= 0 && dy <= 0) return;
-  // Rows as words, most rows being empty or whole in most of them. A word's neighbours on both sides lend their ends.
+  // Rows as words of 64 pixels: most words are empty or full. Shifts take bits from the neighbours of a word.
   const size_t words = size_t(across_ + 7) / 8;
   std::vector<uint64_t> rows(words * size_t(height_));
   std::vector<uint8_t> some(size_t(height_), 0);
@@ -253,7 +253,7 @@ void HiddenPixels::shrink(int dx, int dy) {
       if (beyond > 0) bits |= ~uint64_t{0} << (64 - std::min(beyond, 64));
       row[w + 1] = bits;
     }
-    // By 1, 2, 4 ... pixels and the rest, less than a word each.
+    // Shrink by 1, 2, 4 ... pixels and the rest, each less than a word.
     for (int left = dx, reached = 1; left > 0; reached *= 2) {
       const int by = std::min({left, reached, 63});
       for (size_t w = 1; w <= words; ++w) {
