@@ -37,9 +37,9 @@ constexpr bool contains(const Rect& outer, const Rect& inner) {
 }
 
 /// A perspective camera. left, right, bottom, top are the tangents of the frustum's edges (the frustum cut at z = -1),
-/// so off-axis frusta need no further numbers. Pixel (x, y) has its centre at u = left + (x + 0.5) / width * (right -
-/// left),   v = top - (y + 0.5) / height * (top - bottom) and sees along (u, v, -1) in camera space. "Depth" is always
-/// distance along -z in metres, not along the ray.
+/// so off-axis frusta need no further numbers. Pixel (x, y) has its centre at
+///   u = left + (x + 0.5) / width * (right - left),   v = top - (y + 0.5) / height * (top - bottom)
+/// and sees along (u, v, -1) in camera space. "Depth" is always distance along -z in metres, not along the ray.
 struct Camera {
   Pose pose;
   double left = -1, right = 1, bottom = -0.625, top = 0.625;

@@ -8,8 +8,8 @@
 //   0                               ChunkHeader     64 bytes
 //   64                              float[3][V]     positions, metres
 //   64 + 12 V                       uint32[V]       normals, octahedral, 2 x 16 bits (image/normal.h: encode_normal32)
-// 64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo; or, with ChunkHeader::scalars,
-// float[V] scalars (NaN: none), which a colouring makes colours of
+//   64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo; or, with ChunkHeader::scalars,
+//                                                   float[V] scalars (NaN: none) that a colouring turns into colours
 //   64 + 20 V                       uint32[3][T]    vertex indices, each < V
 //   64 + 20 V + 12 T                zero bytes      to a multiple of 64, at least 16 (Embree reads beyond the end)
 #pragma once

@@ -88,7 +88,7 @@ Status RuntimeFolder::put(const std::string& name, const std::string& text, Plac
   unlinkat(fd_, partial.c_str(), 0);  // left by a process of this number that died here
   const int fd = openat(fd_, partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (fd < 0) return failed(path_ + "/" + name, "cannot be written");
-  // A new file must not be lost: its bytes are on the disk before its name is.
+  // A new file must not be lost: writes its bytes to the disk before it gets its name.
   const bool is_new = place == Place::kIsNew, written = write_all(fd, text) && (!is_new || fsync(fd) == 0);
   const bool whole = close(fd) == 0 && written;
   if (whole && !is_new && renameat(fd_, partial.c_str(), fd_, name.c_str()) == 0) return ok_status();

@@ -79,7 +79,7 @@ const Row* find(const Table& table, const std::string& flag);
 std::string text_of(const Row& row);
 /// Sets the row's value, within its limits. Error: "--flag TEXT: PROBLEM".
 Status set(const Row& row, const std::string& text);
-/// The same errors; the value does not change, unless its type is Text.
+/// Checks a text as set() does; the value does not change, unless its type is Text.
 Status check(const Row& row, const std::string& text);
 
 /// A number as people write it, without exponent: "0.00001", "1000000". The shortest that reads back the same.

@@ -40,7 +40,7 @@ struct Merge {
 /// as the points merged so far. If the result is not small, it also takes in points of coarser mosaics that finer
 /// points surround: such a point is as exact as they are, so it needs no larger splat. The other points of a coarser
 /// mosaic stay a mosaic.
-/// Mosaics of a coarse pass stay unchanged. Those of a head at rest are merged among themselves.
+///   Mosaics of a coarse pass stay unchanged. Those of a head at rest are merged among themselves.
 ///   A merged mosaic has the mean pixel range of its parts, by their points, their mean direction if they are alike,
 ///   and fresh's sequence and frame.
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh);

@@ -60,12 +60,12 @@ struct ModelConfig {
 Status validate(const ModelConfig& config);
 
 /// Points of one cluster, of about equal density: the part of one patch (of one tile) inside it, or several such parts
-/// after a merge (compaction.h). One allocation with three levels of detail. Positions are fractions of the leaf:
-/// position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB (top byte = flags, 0). A coarse
-/// level's points are the first ones of the finer level, so that it shares their positions and normals and adds its
-/// mean colours alone. With n0 >= n1 >= n2 points the allocation holds uint16 x[n0], y[n0], z[n0], normal[n0]; uint32
-/// colour0[n0]; colour1[n1] if n1 < n0; colour2[n2] if n2 < n1 (where two levels have equally many points they are the
-/// same points): 12 to 14 bytes a point.
+/// after a merge (compaction.h). One allocation with three levels of detail.
+/// Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB
+/// (top byte = flags, 0). A coarse level's points are the first ones of the finer level, so that it shares their
+/// positions and normals and adds only its mean colours. With n0 >= n1 >= n2 points the allocation holds
+///   uint16 x[n0], y[n0], z[n0], normal[n0]; uint32 colour0[n0]; colour1[n1] if n1 < n0; colour2[n2] if n2 < n1
+/// (if two levels have equally many points, these are the same points): 12 to 14 bytes a point.
 class Mosaic {
  public:
   /// Arrays of `count` elements; colour starts at a multiple of 4 bytes, the others of 2.
@@ -166,13 +166,13 @@ struct PreparedPatch {
 
 /// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes
 /// each mosaic's attributes.
-/// frame: tag (tagged()) of the tile's sampling frame, which its mosaics share.
+///   frame: tag (tagged()) of the tile's sampling frame, which its mosaics share.
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
 ///   Level l+1 makes one point of covered pixels in each block of 2x2 pixels of level l (blocks are aligned to the
 ///   frame's pixel grid): of those that fall in the same leaf and lie within 2 % of the first one's depth. The point is
-///   the sample nearest the block's centre (the first in Z order of several), with the mean colour of them all. Pixels
-///   that are left make further points in the same way.
-///   So coverage never vanishes at coarse levels, neither of a surface nor of what is behind its edge.
+///   the sample nearest the block's centre (the first in Z order of several), with the mean colour of them all. The
+///   other pixels make further points in the same way.
+///   So coarse levels keep the coverage of a surface and of surfaces behind its edge.
 /// Runs in the calling thread; several threads may prepare several tiles at once.
 /// Preconditions: valid(config), valid(camera), tile inside the camera's image, image canonical and of the tile's size.
 PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,

@@ -25,8 +25,8 @@
 //   least are near, the others far. The pixel's colour becomes
 //     coverage * mean of the near + (1 - coverage) * mean of the far, with weights [1 2 1] x [1 2 1],
 //   and coverage depends on the weight of the near and on whether the pixel is one of them (kCoverage). It is less than
-// their share: splats reach half of a sample distance beyond a silhouette, and the nearest of the samples in a pixel is
-// drawn. So near surfaces look thicker than they are, all the more with more samples.
+//   their share: splats reach half of a sample distance beyond a silhouette, and the nearest of the samples in a pixel
+//   is drawn. So near surfaces look thicker than they are, all the more with more samples.
 #pragma once
 
 #include <array>

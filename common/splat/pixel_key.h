@@ -3,7 +3,7 @@
 //   bit 63       1 in every key; 0 outside a splat (kOutsideSplat flips it): larger than all keys
 //   bits 62..45  depth code, 18 bits: (bits of the depth as float - bits of `near` as float) >> 9, that is 2^14
 //                steps an octave, 16 octaves from `near` on; positive floats are ordered as their bits are
-// bits 44..43  spacing class: distance of the samples on the screen (spacing_class)
+//   bits 44..43  spacing class: distance of the samples on the screen (spacing_class)
 //   bits 42..40  ring: floor(8 q), at most 7; q = squared distance from the splat's centre, 1 on its contour
 //   bits 39..24  normal (image/normal.h, 16 bits)
 //   bits 23..0   albedo, RRGGBB
@@ -14,9 +14,9 @@
 // (paraboloids).
 //
 // Resolving turns each key into the shaded colour, 0x00RRGGBB, and the info word
-// depth code << 8 | spacing class << 3 | ring, or kEmptyInfo for an empty pixel, which take the keys' place row by row
-// (finish.h, ResolvedTile). Finish stages work on these; where they are written out the ring's mean bias is taken off
-// the depth again (RimBias).
+//   depth code << 8 | spacing class << 3 | ring, or kEmptyInfo for an empty pixel.
+// They take the keys' place row by row (finish.h, ResolvedTile). Finish stages work on them; writing subtracts the
+// ring's mean bias from the depth again (RimBias).
 #pragma once
 
 #include <algorithm>

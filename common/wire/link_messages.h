@@ -17,7 +17,7 @@ struct Receipt {
   InstanceId viewer;
   InstanceId packer;  ///< packer that numbers the events
   Sequence newest;    ///< newest event that was applied
-  double viewer_s = 0;  ///< time of that, on the viewer's own clock
+  double viewer_s = 0;  ///< when it was applied, on the viewer's own clock
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("packer", m.packer); f("newest", m.newest); f("viewer_s", m.viewer_s);
   }

@@ -45,8 +45,8 @@ inline float widest_spacing(float share) {
 
 /// As closest_level, but near the ratio at which the level changes only a share of the finer level's additional points
 /// is drawn. The share rises continuously from 0 to 1 with `wanted`, so that the density is quadratic in `wanted`. The
-/// same share of the coarse level's points has its own colours instead of mean ones. dither: in [0, 1), different for
-/// each mosaic: sets the ratio at which a small one switches.
+/// same share of the coarse level's points has its own colours instead of mean ones.
+///   dither: in [0, 1), different for each mosaic: sets the ratio at which a small one switches.
 inline Drawn between_levels(const points::Mosaic& m, float wanted, float dither) {
   static_assert(points::kLevels == 3);
   int fine = 0;

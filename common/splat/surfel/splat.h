@@ -112,8 +112,8 @@ inline float ellipse_bias(float radius_m, float w) {
   return std::min(surfel_share(radius_m, w, kBiasPerRadius, kLeastBias, kMostBias), static_cast<float>(kMaxBias));
 }
 
-/// Limits of det S = radius^4: the number of limits that it reaches is the spacing_class of the samples' mean distance
-/// on the screen. scale: of the drawn splats (DrawList::scale): their radius is scale / 2 distances.
+/// Limits of det S = radius^4: it reaches as many as the spacing_class of the samples' mean distance on the screen.
+///   scale: DrawList::scale of the drawn splats: their radius is scale / 2 distances.
 using SpacingLimits = std::array<float, 3>;
 inline SpacingLimits spacing_limits(float scale) {
   const auto limit = [&](float spacing_px) {
