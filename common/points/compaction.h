@@ -45,9 +45,9 @@ struct Merge {
 ///   and fresh's sequence and frame.
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh);
 
-/// All points of some mosaics of one cluster as one mosaic, as a merge makes it. Preconditions: at least one.
+/// Merges some mosaics of one cluster into one. Precondition: at least one mosaic.
 ///   A coarser level has one point of each cell of a grid: the one nearest to the cell's centre, with the mean colour
-///   of all points in the cell. Where normals in a cell point along different axes, it has one of each. Cells of level
+///   of all points in the cell. If normals in a cell point along different axes, it has one for each. Cells of level
 ///   1 have about two sample distances a side, cells of level 2 four.
 ///   Points that a level adds come in two halves, of cells like the black and the white fields of a board: so every
 ///   prefix covers the cluster evenly.

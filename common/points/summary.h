@@ -25,7 +25,7 @@ struct Summary {
 /// Bit in a cluster's key: the key names a brick, not a leaf.
 inline constexpr ClusterKey kSummaryKey = 1u << 31;
 
-/// Key: brick_key.
+/// Summaries by brick_key.
 using Summaries = std::unordered_map<ClusterKey, std::unique_ptr<Summary>>;
 
 /// Takes all points of a brick that has few; else one for each cell of the brick's surface, with the mean colour of the

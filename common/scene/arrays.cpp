@@ -27,7 +27,7 @@ std::string names_of(std::span<const ArrayInfo> arrays) {
   return out;
 }
 
-// The number of a component, from the suffix of an array's name, and the suffix's length: ".x", "[12]".
+// A suffix of an array's name that selects a component, ".x" or "[12]": the component's number, the suffix's length.
 struct Suffix {
   int component;
   size_t bytes;

@@ -34,7 +34,7 @@ inline constexpr uint32_t kMaxDepthCode = (1u << kDepthCodeBits) - 2;  ///< all 
 inline constexpr uint32_t kMaxCentreCode = kMaxDepthCode - kMaxBias;
 inline constexpr int kKeyDepthBit = 45, kKeyClassBit = 43, kKeyRingBit = 40, kKeyNormalBit = 24;
 inline constexpr uint64_t kKeySign = 1ull << 63;
-inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: larger than all keys, if signed
+inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: above every key as a signed number
 inline constexpr int64_t kEmptyKey = -1;               ///< an empty pixel: larger than every key
 inline constexpr uint32_t kEmptyInfo = 0xffffffffu;    ///< an empty pixel
 

@@ -57,7 +57,7 @@ HWY_INLINE Pixels Shade(Pixels albedo, const uint8_t* HWY_RESTRICT light) {
   return hn::Or(hn::And(hn::ShiftRight<8>(rb_over), red_blue), hn::And(g_over, hn::Set(d, 0xff00u)));
 }
 
-// Looks up intensities of `n` keys' normals, by scalars: gathers of 8 lanes were slower (bench splat_square).
+// Looks up intensities of `n` keys' normals, by scalars: 8-lane gathers took longer (bench splat_square, resolve_ms).
 HWY_INLINE void LookUpLight(const uint64_t* HWY_RESTRICT keys, size_t n, const uint8_t* HWY_RESTRICT intensity,
                             uint8_t* HWY_RESTRICT light) {
 #pragma GCC unroll 8

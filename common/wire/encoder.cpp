@@ -26,8 +26,8 @@ class Packer : Appender, public msgpack::packer<Appender> {
   explicit Packer(std::string& out) : Appender{out}, msgpack::packer<Appender>(static_cast<Appender&>(*this)) {}
 };
 
-// Returns text that is not UTF-8 in the form that receivers take: to_utf8(text) may be three times as long, so it is
-// cut at a character, to the limit that the text kept.
+// Converts text that is not UTF-8 for receivers. to_utf8(text) may be three times as long: it is cut at a character, to
+// the smallest of the limits that `text` itself is within.
 std::string presentable(std::string_view text) {
   std::string out = to_utf8(text);
   for (const size_t limit : {kMaxString, kMaxFact, kMaxControlBytes}) {

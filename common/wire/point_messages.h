@@ -39,7 +39,7 @@ struct Patch {
   /// Rays finer than a view's: mask of those that met nothing (codec::encode_mask), over missed_rect; else empty.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
-  Moments moments;                        ///< moments of its last tile, if it completes an update; else empty
+  Moments moments;                        ///< moments of its last tile, if it completes an update; empty when resent
   bool refinable = false;                 ///< points that its image leaves out may follow: Refine
   /// Not 0: its points are removed when the head has moved on, by this tag (points::tagged).
   uint64_t rest = 0;

@@ -60,7 +60,7 @@ struct SessionSettings {
   double max_rate_mbit = 0;           ///< wished rate to each viewer; 0: as much as its link carries
   // Sampling.
   bool steering = true;               ///< the packer plans which rays of a view are cast
-  double view_cell_m = 0.2;           ///< a head movement this long shall uncover nothing unknown; 0: no rays for that
+  double view_cell_m = 0.2;           ///< extra rays let the head move this far before it sees unknown places; 0: none
   uint64_t validation = 32;           ///< every good pixel is cast once in this many plans of a view; 0: never
   uint64_t still_rays = 16;           ///< rays a pixel everywhere while the head stands still: 1, 4 or 16
   uint64_t max_sampling_pixels = 1u << 24;  ///< pixels of a view; larger views are sampled coarser

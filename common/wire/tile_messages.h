@@ -156,8 +156,8 @@ struct PlanRequest {
   }
 };
 
-/// Packer -> master: the tiles of that frame. Without tiles the frame is over, and the packer has published that the
-/// view's update is complete.
+/// Packer -> master: the tiles of that frame. Without tiles the frame is over; if it was a view's (not extra), the
+/// packer has published that its update is complete.
 struct Plan {
   static constexpr std::string_view kName = "plan";
   static constexpr bool kBulk = true;
@@ -167,7 +167,7 @@ struct Plan {
   bool full = false;             ///< the model knows too little: sample all pixels, as without a plan
   std::vector<uint32_t> tiles;   ///< kPlanNumbers a tile: x, y, width, height, rays, words of its mask; most
                                  ///< urgent first; no two overlap
-  std::vector<uint32_t> masks;   ///< masks of all tiles, one behind the other (codec::encode_mask); 0 words: no mask
+  std::vector<uint32_t> masks;   ///< all tiles' masks, one after the other (codec::encode_mask); 0 words: all pixels
   std::map<std::string, double> figures;  ///< for the record: rays.nothing, rays.sparse, rays.edge, rays.stale,
                                           ///< rays.validation, rays.refinement, rays.cell, pixels.*, plan_ms
   template <class F> static void fields(F& f, auto& m) {

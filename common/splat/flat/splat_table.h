@@ -18,7 +18,7 @@ inline constexpr int kBiasShift = kDepthCodeShift;  ///< one bias step = 2^9 uni
 /// A flat splat of one size: the figures that both renderers use.
 struct FlatSplat {
   float size = 1;          ///< side of a square, diameter of a disc, pixels: a multiple of 0.25, 1..kMaxSplatSide
-  int side = 1;            ///< side of the square of pixels that holds it anywhere, 1..kMaxSplatSide
+  int side = 1;            ///< side of the pixel square that holds it for any centre, 1..kMaxSplatSide
   int sub_bits = 0;        ///< the projected centre's place in a pixel is known to 2^-sub_bits pixels on each axis
   double bias_growth = 0;  ///< splat_bias_growth
   uint32_t rim_bias = 0;   ///< bias on the contour, q = 1

@@ -12,7 +12,8 @@ namespace {
 constexpr float kMinCosine = 0.35f;     // samples taken at a steeper slope count as taken at this one
 constexpr float kPixelRadius2 = 0.25f;  // variance of the low-pass, squared pixels
 constexpr float kMoreCovered = 1.1f, kApart = 0.1f;
-constexpr float kAreaOff = 1.5f, kCentreOff = 0.5f;  // for n samples: a share kAreaOff / sqrt n, spacings
+// Errors of estimates from n samples: kAreaOff / sqrt n of the area, and kCentreOff spacings for the centre.
+constexpr float kAreaOff = 1.5f, kCentreOff = 0.5f;
 
 // Cosine of the slope at which samples were taken, at least kMinCosine.
 float sampled_cosine(const glm::vec3& normal, const glm::vec3& to_eye) {
