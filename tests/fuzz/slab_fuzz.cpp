@@ -19,7 +19,7 @@ struct PlainSlab final : sampler::Slab {
   }
 };
 
-// Checks that arranged voxels survive encoding and decoding: their rows fit them.
+// Checks that the voxels survive encoding and decoding, so that their rows are consistent.
 std::shared_ptr<const sampler::Slab> arranged(const volume::Grid&, volume::Voxels voxels) {
   const auto bytes = volume::encode_voxels(voxels, kSizeX, kSizeY);
   const auto again = volume::decode_voxels(bytes, kSizeX, kSizeY, voxels.k_begin, voxels.k_end, kLevels);

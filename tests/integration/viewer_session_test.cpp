@@ -184,8 +184,8 @@ TEST(PointSession, LooselyUpdatesAreHeldUntilTheirFrame) {
   expect_complete(s, 30);
   expect_one_update_a_frame(s);
   EXPECT_LE(s.counts.most_open, 3u);
-  // Two patches an update, one event more where an epoch begins: after the n-th answer exactly that many events are
-  // shown.
+  // An update has two patches, and the start of an epoch is an event: the frame with the n-th answer shows exactly the
+  // events up to it.
   for (size_t i = 0; i < s.sequence.size(); ++i) {
     const double n = s.request[i];
     EXPECT_EQ(s.sequence[i], 2 * n + std::floor(n / 5)) << "frame " << i;

@@ -38,7 +38,7 @@ class Cases {
     const auto cosine = [&] { return std::abs(glm::dot(c.sample.normal, c.sample.to_eye)); };
     do c.sample.to_eye = direction();
     while (cosine() < 0.02 || (cosine() < splat::kMinSampledCosine) != steep);
-    // Up to a tenth of the distance: far more than where projection is nearly parallel.
+    // Radius up to a tenth of the distance: so large that projection is far from parallel.
     c.sample.radius_m = c.depth * std::exp(uniform(std::log(0.0005), std::log(steep ? 0.03 : 0.1)));
     return c;
   }

@@ -170,7 +170,7 @@ TEST(Finish, FillLeavesGapsBetweenRibsOpen) {
   EXPECT_GT(splat::fill_holes(all.tile, 2, Gaps::kAll, scratch), 300);
 }
 
-// A row of empty pixels along a silhouette, which the nearer surface hid until now.
+// Empty pixels beside a silhouette: the nearer surface hid them until now.
 TEST(Finish, FillShowsTheFartherSurfaceBesideASilhouette) {
   OwnTile t(32, 32);
   for (int y = -5; y < 37; ++y)

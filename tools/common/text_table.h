@@ -10,7 +10,7 @@ class TextTable {
  public:
   struct Column {
     std::string title;
-    bool right = true;  ///< numbers; else texts, which begin at the left
+    bool right = true;  ///< true: numbers, aligned right; false: texts, aligned left
   };
   explicit TextTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
 

@@ -10,7 +10,7 @@
 namespace telesplat::terrain {
 namespace {
 
-constexpr int kSide = 560;  // 25 m: finer forms are noise (terrain.cpp)
+constexpr int kSide = 560;  // cells of 25 m: finer forms are noise (terrain.cpp)
 constexpr double kRimRadiusM = 3300, kFloorM = 1480, kRimM = 2330, kFootM = 1050;
 constexpr double kPi = 3.14159265358979323846;
 

@@ -238,7 +238,7 @@ TEST(CodecFormat, GoldenBytesOfASparseTile) {
   EXPECT_TRUE(*back == image);
 }
 
-// With canonical normals, which a pole turns: most of a session's images have them.
+// Canonical normals, as most of a session's images have them: the tile's pole turns them.
 TEST(CodecFormat, GoldenBytesOfASparseTileThatIsTurned) {
   DepthImage image(9, 8);
   for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {

@@ -99,7 +99,7 @@ TEST_F(Companions, OfASeriesAndOfASurfaceAreLookedAt) {
   EXPECT_FALSE(check_companions(iso));
 }
 
-// A header beside a link to it counts where the link is; one file's name does not stand for another file.
+// Names in a linked header count from the link's folder: data/other, not secret/other. A scene without a file passes.
 TEST_F(Companions, ALinkToAHeaderCountsWhereItLies) {
   const Named& n = kNaming[0];
   folder.write("secret/a.nhdr", n.begin + "other" + n.end);

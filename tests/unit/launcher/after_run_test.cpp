@@ -62,7 +62,7 @@ TEST(ProcessorWait, IsTheShareOfTimeThatTheKernelCounts) {
   EXPECT_GE(wait.share(), 0);
   EXPECT_LT(wait.share(), 1e-3) << "seconds of 12 days";
   ProcessorWait none;
-  none.look(0, 1), none.look(0, 2);  // this process does not exist
+  none.look(0, 1), none.look(0, 2);  // there is no process 0
   EXPECT_EQ(none.share(), 0);
 }
 

@@ -397,7 +397,7 @@ TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
   sent<wire::Welcome>("p");
   core.on("p2", hello("packer", "packer", 20), 1);
   EXPECT_EQ(status()["processes"].size(), 6u);
-  // The one that was taken for the other's old life is alive: it is asked for its hello and sends it.
+  // The packer that was taken for a former life of the other is alive: the master asks for its hello and gets it.
   core.on("p", wire::StatusReport{}, 1.5);
   ASSERT_EQ(sent<wire::WhoAreYou>("p").size(), 1u);
   core.on("p", hello("packer", "packer", 2), 1.6);
@@ -419,7 +419,7 @@ TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
   EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "the other one packs now";
 }
 
-// The same with two different names.
+// Two packers with different names: the first stays in use until it leaves.
 TEST_F(Master, ASecondPackerWaitsForTheFirstToLeave) {
   join_all();
   sent<wire::Welcome>("v");

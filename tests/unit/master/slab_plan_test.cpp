@@ -845,7 +845,7 @@ TEST_F(VolumeMaster, ASamplerThatNeverDeliversHasItsSlabMoreAndMoreSeldom) {
     if (lease) finish(*lease, 1), ask(1);
     ++(lease ? delivered : stood_still);
   }
-  // It lets leases of 2 s run out, after 0, 2, 4, ... 32 s, and not again.
+  // Its leases of 2 s run out after rests of 0, 2, 4, ... 32 s; the next rest outlasts the test.
   EXPECT_NEAR(stood_still * 0.05, 7 * 2, 3);
   EXPECT_GT(delivered, 0);
 }

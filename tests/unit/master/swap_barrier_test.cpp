@@ -203,7 +203,7 @@ TEST_F(Swaps, AnotherMasterGoesOnWhereTheWallIs) {
   EXPECT_EQ(swaps.begin()->second.frame, 501u);
 }
 
-// Numbers beyond the limit would be refused: a wall that begins there stands still.
+// Larger numbers than this one are refused: a wall that began at it would stand still.
 TEST_F(Swaps, OneViewersNumberLeadsNoWallToTheLastFrame) {
   say(0, uint64_t{1} << 53, 1);
   for (uint64_t v = 1; v < 4; ++v) say(v, 500, 1);

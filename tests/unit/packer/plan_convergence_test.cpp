@@ -226,7 +226,7 @@ TEST(Plan, WhatIsBeyondAViewIsLookedForInPieces) {
   config.validation = 0;
   Session s(config);
   s.view(test::scene_camera({0.6, 0.3, 0.2}, 160, 120));
-  // Past the scene, where nothing can be.
+  // A look past the scene, where no surface can be.
   const geometry::Camera away = geometry::make_camera(geometry::look_at({1, 0.3, 0.2}, {3, 0.3, 0.2}), 60, 1280, 960);
   EXPECT_EQ(s.view(away), 0u);
   EXPECT_EQ(s.view(away), 0u);

@@ -658,7 +658,7 @@ TEST_F(StateAnswersTest, WhoThrewItAwayGetsItAgainOverTheSameConnection) {
   EXPECT_EQ(begins, (std::vector<uint64_t>{0, 0, 9}));
 }
 
-// A replica that stands elsewhere would not take an answer to everything.
+// A request claims a position that no replica can have: the answer starts from the empty model.
 TEST_F(StateAnswersTest, WhoStandsWhereNobodyCanStandStartsFromNothing) {
   ask({kFrames + 1}, packer, 2);
   ASSERT_EQ(sent.size(), 1u);

@@ -224,7 +224,7 @@ TEST_F(EventRecord, EventsAreSkippedToButNeverPassed) {
     ASSERT_TRUE((*replay)->advance(events[to].sequence).ok());
     EXPECT_EQ((*replay)->applied(), events[to].sequence);
     EXPECT_EQ((*replay)->model()->digest(), expected[to]);
-    ASSERT_TRUE((*replay)->advance(events[to / 2].sequence).ok());  // before its position: nothing changes
+    ASSERT_TRUE((*replay)->advance(events[to / 2].sequence).ok());  // an event already applied: nothing changes
     EXPECT_EQ((*replay)->applied(), events[to].sequence);
   }
 }

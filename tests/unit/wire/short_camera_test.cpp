@@ -139,7 +139,7 @@ TEST(ShortCamera, StandsInBriefMessagesAlone) {
   const auto back = decode<Patch>(bytes_of(body));
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->camera, c);
-  // Other messages have all fourteen numbers.
+  // In other messages a camera has all its fourteen numbers.
   ViewRequest request = sample_message<ViewRequest>();
   request.camera = c;
   const auto asked = decode<ViewRequest>(bytes_of(encode(request)));

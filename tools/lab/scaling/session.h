@@ -28,7 +28,7 @@ class Session {
   /// Starts samplers with these flags until there are `count`; returns when all of them have joined. Errors as start().
   Status add_samplers(size_t count, const std::vector<std::string>& flags);
 
-  /// Progress of a frame. rows: those that have arrived here.
+  /// Progress of a frame. rows: number of rows that have arrived here.
   struct Progress {
     double elapsed_s = 0;
     int rows = 0;

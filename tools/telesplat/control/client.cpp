@@ -25,7 +25,7 @@ ControlClient::ControlClient(const std::string& master_endpoint, const net::Acce
     : endpoint_(master_endpoint), access_(access) {}
 ControlClient::~ControlClient() = default;
 
-// Sends something at once: the master counts a connection without messages as a rejected message.
+// Connects on first use; callers send a message at once: the master counts a silent connection as a rejected message.
 ControlClient::Line& ControlClient::line() {
   if (line_) return *line_;
   line_ = std::make_unique<Line>(access_);

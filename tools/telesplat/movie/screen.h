@@ -59,7 +59,7 @@ class Screen {
   std::vector<Tile> tiles_;
   std::map<EpochId, std::shared_ptr<const image::Legend>> legends_;  // only epochs with a legend
   int width_ = 0, height_ = 0;                                       // size of the whole
-  std::vector<geometry::Rect> places_;                               // tiles' places in it
+  std::vector<geometry::Rect> places_;                               // tiles' places in the whole
   double begin_s_ = 0, duration_s_ = 0;
   uint64_t drawn_ = 0;
   image::View view_;

@@ -31,7 +31,7 @@ struct DisplayedFrame {
   double detail = 1;                      ///< SelectionOptions::detail it was drawn with
   viewer::Look look;                      ///< how it was drawn; a person may have changed it in the window
   uint64_t summaries = ~uint64_t{0};      ///< summaries of bricks that its viewer had made; by default all
-  EpochId epoch;                          ///< that of all its points
+  EpochId epoch;                          ///< epoch of all its points
   double refined = 0;                     ///< share of its pixels that were drawn with sub-pixels
   int sub_pixels = 1;                     ///< per axis
 };

@@ -12,7 +12,7 @@
 namespace telesplat::launcher {
 
 struct ReportOptions {
-  std::vector<std::string> runs;    ///< folders; the others are compared with the first; or a sweep's folder alone
+  std::vector<std::string> runs;    ///< run folders, all compared with the first; or a single sweep folder
   std::vector<std::string> labels;  ///< names of the runs on the page; empty: those of summary.json and folders
   double skip_s = 0;                ///< left out at the begin of each run
   std::string out;                  ///< the page; empty: report.html in the run, or beside the first of several runs

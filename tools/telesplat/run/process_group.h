@@ -46,7 +46,7 @@ class Restarts {
   int all_ = 0;
 };
 
-/// Returns the folder of the running program: the others lie beside it.
+/// Returns the folder of the running program: the other programs lie there, too.
 std::string program_directory();
 /// Returns the output of a program beside it; empty: the program is missing, or prints nothing.
 std::string output_of(const std::string& program, const std::string& argument);

@@ -46,7 +46,7 @@ bool asks_for_nothing(const SweepOptions& o) { return o.scene.empty() && o.vary.
 
 // Returns the grid of the command line; `before`: the folder's manifest.
 Result<Grid> wanted_grid(SweepOptions o, const std::optional<Manifest>& before) {
-  // Without a scene, the first word behind "--" has taken its place: it is a flag.
+  // Without a scene, the parser took the first flag behind "--" for the scene.
   if (o.scene.starts_with("-")) o.flags.insert(o.flags.begin(), std::exchange(o.scene, {}));
   Grid out;
   if (before && asks_for_nothing(o)) {

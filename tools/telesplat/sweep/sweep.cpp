@@ -87,7 +87,7 @@ constexpr Refused kRefused[] = {
 namespace fs = std::filesystem;
 
 constexpr int kAttempts = 2;
-constexpr double kStarting_s = 4;  // starting a run, beside its own time: a guess until a run is done
+constexpr double kStarting_s = 4;  // time to start a run: a guess until one is done
 constexpr double kUnknown_s = 10;  // a run that ends after a number of frames
 constexpr double kLimitTimes = 10, kLimitMore_s = 600;
 

@@ -28,12 +28,12 @@ struct RunEnd {
   double wall_s = 0;
 };
 
-/// Runs it to its end. Calls watch(seconds since its start) every 50 ms. Passes signals to this process on: the first
-/// one lets the run end in order, the second one again, the third one kills it.
+/// Runs a request to its end. Calls watch(seconds since its start) every 50 ms. Passes signals to this process on: the
+/// first one lets the run end in order, the second one again, the third one kills it.
 RunEnd carry_out(const RunRequest& request, const std::function<void(double)>& watch);
 
 inline constexpr uintmax_t kMostLastWords = 1 << 20;
-/// Returns what a file has behind its first `offset` bytes, the last kMostLastWords bytes of it.
+/// Returns the end of a file: the bytes after its first `offset`, at most the last kMostLastWords of them.
 std::string last_words(const std::string& path, uintmax_t offset);
 
 /// Returns a run's last complaint: the last line that begins "telesplat: ", else the last line; without control

@@ -29,8 +29,8 @@ struct Cell {
   size_t configuration;
   const Measure* figure;
   std::vector<double> runs;
-  /// From the first configuration's runs to these, and its p after Holm, with the figure's other comparisons. Nothing:
-  /// it is the first, or one of the two has fewer than two runs.
+  /// Difference of these runs from the first configuration's, and its p after Holm's correction for all comparisons of
+  /// the figure. Nothing: this is the first configuration, or one of the two has fewer than two runs.
   std::optional<tools::Difference> difference;
   double p_holm = 1;
 };

@@ -68,7 +68,7 @@ TEST(VtkLegacy, StructuredAndRectilinearGrids) {
   }
 }
 
-// A file with everything that may stand among the data.
+// A file with every section that may stand among the data.
 std::string with_all_kinds(bool binary) {
   Legacy out(binary);
   const std::vector<float> four{1, 2, 3, 4}, twelve{1, 0, 0, 0, 2, 0, 0, 0, 2, 3, 4, 0};
