@@ -61,8 +61,8 @@ double scalar_origin(const ValueSpan& span);
 /// The value that chunks hold; NaN if `value` is not finite.
 float stored_scalar(double value, double origin);
 
-/// Colours of a range in kEntries equal steps, and the colour of missing values: samplers look them up. entry =
-/// floor((stored - lo) * scale), limited to [0, kEntries); if the range is empty, the middle one.
+/// Colours of a range in kEntries equal steps, and the colour of missing values: samplers look them up. The entry is
+/// rounded down and limited to [0, kEntries); if the range is empty, it is the middle one.
 struct ColourTable {
   static constexpr int kEntries = 4096;
   float lo = 0, scale = 0, offset = 0;  ///< entry = (stored - lo) * scale + offset

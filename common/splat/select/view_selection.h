@@ -34,7 +34,7 @@ struct DrawItem {
   const points::Cluster* cluster;
   points::Mosaic::Level level;  ///< the points drawn
   float splat_px;               ///< side (square) or diameter (disc) in display pixels, >= 1
-  /// The mosaic's sequence. With cluster->key it names the points, for renderers that keep copies. 0: not to be kept.
+  /// The mosaic's sequence. With cluster->key it names the points, for renderers that keep copies. 0: keep none.
   Sequence sequence{};
   /// Surfel kernels: radius of a splat that faces its sampling view, metres in room space. It is half of splat_px at
   /// the leaf's centre, but not widened to a pixel.
