@@ -25,7 +25,7 @@ class Shaper {
   size_t room(double now_s);
   /// Returns when the queue has room again, if it is full.
   double room_at_s() const { return queue_.empty() ? 0 : queue_.front().end_s; }
-  /// Takes bytes that arrive at the link; returns when the last of them comes out at its other end, not before earlier
+  /// Takes bytes that arrive at the link. Returns the time at which the last of them leaves it, not before earlier
   /// bytes. Precondition: bytes <= room(now_s). 0 bytes: an end of stream, which keeps its place.
   double pass(double now_s, size_t bytes);
   /// The largest piece to pass as one: the bottleneck takes about a millisecond for it.

@@ -30,7 +30,7 @@ enum class Consequence {
   kRestart,
   kGiveUp,  ///< the session goes on without it, and its windows say why
   kFinish,  ///< the session's end, in order
-  kFail,    ///< kFinish, as an error
+  kFail,    ///< the session's end, as an error
   kRefuse,  ///< kFinish: its input cannot be used
 };
 /// Returns the consequence of a process' end.
