@@ -11,7 +11,7 @@ namespace telesplat::master {
 /// Outcome of a command to a scene.
 struct Obeyed {
   bool begins_epoch = false;
-  std::string answer;      ///< for the person; unused where an epoch begins: its number is the answer
+  std::string answer;      ///< for the person; unused if an epoch begins: its number is the answer
   bool tells_all = false;  ///< every process gets a new welcome, though no epoch begins
 };
 

@@ -60,7 +60,7 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
   told_lacks_ = lacks();
 }
 
-// ---- who takes part -------------------------------------------------------------------------------------------------
+// ---- processes that take part ---------------------------------------------------------------------------------------
 
 MasterCore::Peer* MasterCore::known(const std::string& peer, double now_s) {
   const auto it = peers_.find(peer);
@@ -153,7 +153,7 @@ void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m
   bool told = false;
   for (auto& [id, p] : peers_) {
     if (id == peer || p.hello.role != m.role) continue;
-    const bool moved = p.hello.instance == m.instance;  // to another connection
+    const bool moved = p.hello.instance == m.instance;  // the process changed its connection
     if (!moved && (m.role == "ctl" || p.hello.name != m.name || hold_different_parts(p.hello, m))) continue;
     if (!moved && !p.gone && (here || lives_on)) {
       if (!here && !std::exchange(told, true) && gate_.may_log(now_s))
@@ -279,7 +279,7 @@ void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_
   if (const auto by = instances_.find(m.instance); it == peers_.end() && by != instances_.end())
     it = peers_.find(by->second);
   if (it == peers_.end() || it->second.gone) return;
-  const std::string id = it->first;  // not the other connection's
+  const std::string id = it->first;  // the process' own, not the other connection's
   lose(it->second, id, "left", true);
   follow_another_packer(now_s);
   dispatch(now_s);

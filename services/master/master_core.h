@@ -47,7 +47,7 @@ class MasterCore {
   void on(const std::string& peer, const wire::TileDone& m, double now_s);
   void on(const std::string& peer, const wire::TileRefused& m, double now_s);
   void on(const std::string& peer, const wire::Goodbye& m, double now_s);
-  /// key: the name of the sender's key; empty: it has none.
+  /// key: the name of the sender's key; empty: it has no key.
   void on(const std::string& peer, const wire::Control& m, double now_s, const std::string& key = {});
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
   void on(const std::string& peer, const wire::OrderAnswer& m, double now_s);
@@ -119,7 +119,7 @@ class MasterCore {
     double seen_s = 0;
     uint64_t joined = 0;  ///< rises with each process that joins or comes back
     bool gone = false;
-    bool refused = false;                   ///< a data server whose scene cannot be shown
+    bool refused = false;                   ///< true for a data server whose scene cannot be shown
     std::optional<CouplingOrder> coupling;  ///< ordered for this viewer; nullopt: not ordered
     int leases_at_once = 0;                 ///< for samplers: see Idle::Sampler::at_once
     Pace hello_pace{8, 4};               ///< burst for new facts; then the rate of a process that waits for its welcome
@@ -190,7 +190,7 @@ class MasterCore {
   bool scene_known_ = false;
   EpochId epoch_{1};
   std::map<std::string, Peer> peers_;                      // by routing id
-  std::unordered_map<InstanceId, std::string> instances_;  // routing ids
+  std::unordered_map<InstanceId, std::string> instances_;  // routing ids, by instance
   Namesakes namesakes_;
   Departed departed_;
   std::string shows_;  // routing id of the data server whose scene is shown

@@ -29,7 +29,7 @@ const char* name_of(Progressive progressive);
 
 struct MasterOptions {
   ScheduleOptions schedule;
-  wire::SessionSettings settings;  ///< as far as they do not depend on the scene
+  wire::SessionSettings settings;  ///< those that do not depend on the scene
   Limits limits;
   Progressive progressive = Progressive::kAuto;
   julia::Timeline animation;  ///< changes the scene's parameters from the first view on; empty: the data server's

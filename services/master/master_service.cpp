@@ -29,7 +29,7 @@ namespace {
 
 // Time for others to say goodbye; shorter after a signal, when someone waits for the master to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
-constexpr int kMessagesAtOnce = 1000;   // between two ticks
+constexpr int kMessagesAtOnce = 1000;   // messages handled between two ticks, at most
 constexpr size_t kMostOutgoing = 2000;  // messages that wait to be sent before more are read
 constexpr double kMetricsPeriod_s = 1;
 constexpr double kStandstill_s = 1;  // the loop runs every 20 ms; after a longer gap others only seem silent

@@ -19,7 +19,7 @@ namespace telesplat::master {
 
 class Errands {
  public:
-  static constexpr double kPatience_s = 3;  ///< for an answer
+  static constexpr double kPatience_s = 3;  ///< time for an answer
   static constexpr size_t kMost = 256;      ///< orders under way; more are refused
   static constexpr size_t kMostOfOne = 16;  ///< orders of one person: a quarter of what a viewer keeps waiting
 
@@ -56,7 +56,7 @@ class Errands {
     std::set<std::string> open;  // processes that have not answered yet
     std::string refusal;         // text of the newest refusal; empty: no refusal yet
     double until_s = 0;
-    std::optional<wire::Control> wish;  // for the launcher
+    std::optional<wire::Control> wish;  // order for the launcher; nullopt: for others
   };
   uint64_t last_ = 0;
   std::map<uint64_t, Errand> errands_;

@@ -48,7 +48,7 @@ class Outbox {
   }
   void send(Outgoing message) { messages_.push_back(std::move(message)); }
   size_t size() const { return messages_.size(); }
-  /// In the order in which they were sent.
+  /// Takes the messages, in the order in which they were sent.
   std::vector<Outgoing> take() { return std::exchange(messages_, {}); }
 
  private:

@@ -76,7 +76,7 @@ class Departed {
 inline constexpr size_t kMaxNameBytes = 128;
 inline constexpr size_t kMaxEndpoints = 16;
 inline constexpr size_t kMaxFacts = 64;
-inline constexpr size_t kMaxFactsBytes = 512u << 10;  ///< all of them together: a welcome with them is a message
+inline constexpr size_t kMaxFactsBytes = 512u << 10;  ///< all facts together: they must fit into a welcome
 inline constexpr size_t kMaxParameters = 256;
 
 /// Error: one of these is exceeded; the role is not "data", "sampler", "packer", "viewer" or "ctl"; the instance is 0

@@ -64,7 +64,7 @@ class Scene {
   }
 };
 
-/// Leases that a tick() found wanting.
+/// Late leases that a tick() found.
 struct Ticked {
   int expired = 0;                   ///< leases that ran out
   std::vector<std::string> overdue;  ///< samplers with late leases: they may be dead
@@ -86,7 +86,7 @@ class Schedule {
   virtual Views& views() = 0;
   /// Drops the frames, for a new epoch or packer; their views wait again.
   virtual void drop_frames() = 0;
-  /// The packer is another than before: it has none of the tiles that the old one had.
+  /// Another packer leads: it has no tiles of the old one.
   virtual void new_packer() { drop_frames(); }
   /// Another plan leads the session from now on: drops the frames.
   virtual void put_aside() { drop_frames(); }
@@ -106,9 +106,9 @@ class Schedule {
   virtual Status planned(const wire::Plan& /*plan*/, double /*now_s*/) { return ok_status(); }
   /// Gives out all leases that idle samplers can have of the frames in flight.
   virtual void give_leases(Idle& idle, double now_s) = 0;
-  /// Gives a lease of this sampler its full time again, up to ScheduleOptions::longest_fetch_s. Others are ignored.
+  /// Gives a lease of this sampler its full time again, up to ScheduleOptions::longest_fetch_s. Ignores others.
   virtual void extend(LeaseId lease, const std::string& sampler, double now_s) = 0;
-  /// The packer cannot use what this sampler (empty: unknown) made of a tile.
+  /// The packer cannot use this sampler's tile. sampler: empty: unknown.
   virtual void refused(const wire::TileRefused& refused, const std::string& sampler, double now_s) = 0;
   /// The packer has this tile, from `sampler` (empty: unknown). False: it came twice, or its frame is not in flight
   /// any more.
@@ -119,16 +119,16 @@ class Schedule {
   virtual std::map<std::string, double> link_of(InstanceId /*viewer*/) const { return {}; }
   /// True if a lease for an idle sampler may be due before the next tick, in 20 ms.
   virtual bool hurried() const { return false; }
-  /// To be called every 50 ms or so.
+  /// Takes back leases that ran out. To be called every 50 ms or so.
   virtual Ticked tick(double now_s) = 0;
 
-  /// A sampler is here; also for plans that do not lead.
+  /// A sampler is here; called for plans that do not lead, too.
   virtual void join(const std::string& /*sampler*/, double /*now_s*/) {}
   /// A sampler asks for work: it has finished what it had.
   virtual void heard_of(const std::string& /*sampler*/) {}
   /// A sampler holds its slab of a partition.
   virtual void slab_ready(const std::string& /*sampler*/, const wire::SlabReady& /*slab*/) {}
-  /// A sampler is gone; also for plans that do not lead. Returns the number of leases that it held.
+  /// A sampler is gone; called for plans that do not lead, too. Returns the number of leases that it held.
   virtual int release_sampler(const std::string& sampler) = 0;
   virtual size_t leases_of(const std::string& sampler) const = 0;
   /// Returns for how many seconds it had leases and delivered nothing; nullopt: it delivers, or had too little time.

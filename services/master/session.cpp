@@ -55,7 +55,7 @@ Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data,
   if (!std::exchange(scene_known_, true) && !adopted->in_parts)
     record_epoch(now_s);
   else if (other_plan || adopted->changed || other_clip)
-    next_epoch(now_s);  // another scene than that of the server before
+    next_epoch(now_s);  // the scene differs from the one before
   return ok_status();
 }
 
@@ -262,7 +262,7 @@ Result<std::string> MasterCore::order_coupling(const wire::Control& m, double no
 
 Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
   if (m.command == "coupling") return order_coupling(m, now_s);
-  Obeyed obeyed{.begins_epoch = true, .answer = {}};  // "epoch"
+  Obeyed obeyed{.begins_epoch = true, .answer = {}};  // for "epoch"
   if (m.command == "set" || m.command == "animate" || m.command == "tf" || m.command == "colour" ||
       m.command == "play") {
     auto by_scene = plan_->obey(m);

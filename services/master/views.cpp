@@ -17,7 +17,7 @@ void ViewQueue::add(const wire::ViewRequest& request) {
     requests.assign(1, request);
     return;
   }
-  // A viewer that was asynchronous waits for nothing that it asked for before.
+  // A viewer that was asynchronous does not want its earlier request any more.
   std::erase_if(requests, [](const wire::ViewRequest& r) { return r.buffers == 0; });
   for (wire::ViewRequest& r : requests)
     if (r.request == request.request) return void(r = request);  // the view wanted now

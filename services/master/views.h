@@ -147,7 +147,7 @@ class Views {
   bool view_waiting() const { return !waiting_.empty(); }
   /// True if a view waits of a viewer for which of() is true.
   bool view_waits(const std::function<bool(InstanceId)>& of) const { return waiting_.next(false, of) != nullptr; }
-  /// True if a person's view waits who has no view in flight, while others have.
+  /// True if a view waits of a person who has no view in flight, while other persons have.
   bool another_waits() const;
   /// The viewer's first request that waits; nullptr: no request waits.
   const wire::ViewRequest* waiting_of(InstanceId viewer) const { return waiting_.first(viewer); }
@@ -206,7 +206,7 @@ class Views {
 
   ViewQueue waiting_;
   Spending spending_;
-  std::vector<Begun> in_flight_;  // few
+  std::vector<Begun> in_flight_;  // few: searched one by one
   FrameId next_frame_{1};
   LeaseId next_lease_{1};
   uint64_t completed_ = 0;

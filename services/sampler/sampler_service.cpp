@@ -84,7 +84,7 @@ void DrainGuard::watch(const std::string& master, InstanceId instance, const net
 
 class SamplerTurns final : public SamplerService {
  public:
-  /// mesh_sampler: made beforehand, or null. replay: delivers tiles instead of sampling scenes of any kind, or null.
+  /// mesh_sampler: made beforehand, or null. replay: source of all tiles, for scenes of every kind, or null.
   SamplerTurns(const SamplerOptions& o, InstanceId instance, std::unique_ptr<Sampler> mesh_sampler,
                std::unique_ptr<TileSource> replay, net::Context& context)
       : options_(o),

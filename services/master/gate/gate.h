@@ -96,7 +96,7 @@ class Senders {
   struct Owner {
     std::string peer;                       ///< routing id of the connection that said hello
     std::string user;                       ///< the name of its key; empty: there are no keys
-    std::list<InstanceId>::iterator place;  ///< in of_user_
+    std::list<InstanceId>::iterator place;  ///< place in of_user_
   };
   void forget(InstanceId instance);
 

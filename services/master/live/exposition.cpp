@@ -14,9 +14,9 @@ namespace {
 
 /// A family of series: one for each process that reports the value.
 struct Family {
-  const char* name;  ///< after "telesplat_"; those of counters end in _total
+  const char* name;  ///< comes after "telesplat_"; names of counters end in _total
   const char* role;  ///< role of the processes; empty: all, with a label for the role
-  const char* key;   ///< in LiveProcess::values
+  const char* key;   ///< key in LiveProcess::values
   double unit;       ///< factor that turns a value into seconds or bytes
   const char* help;
 };
@@ -71,7 +71,7 @@ constexpr Family kRates[] = {
      "Bytes received a second, of the last seconds."},
 };
 
-// Infinities and NaN have names of their own.
+// Prints a number. Infinities and NaN have names of their own.
 std::string number(double v) {
   if (std::isnan(v)) return "NaN";
   if (std::isinf(v)) return v > 0 ? "+Inf" : "-Inf";

@@ -87,7 +87,7 @@ struct LiveProcess {
 /// A moment of the session.
 struct LiveSnapshot {
   std::string version, scene, kind;
-  double started_at_s = 0;  ///< since 1970
+  double started_at_s = 0;  ///< seconds since 1970
   double epoch = 0, views_completed = 0, views_in_flight = 0, views_waiting = 0, leases_expired = 0, leases_backup = 0,
          views_overtaken = 0, frames_given_up = 0, tiles_released = 0;
   std::vector<LiveProcess> processes;

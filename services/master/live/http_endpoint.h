@@ -17,7 +17,7 @@ class HttpEndpoint {
   static constexpr double kPatience_s = 5;           ///< for a whole request and its answer
 
   struct Options {
-    std::string address = "127.0.0.1";  ///< a number, or localhost
+    std::string address = "127.0.0.1";  ///< IP address, or localhost
     int port = 0;
     bool insecure = false;  ///< the address need not be loopback
   };

@@ -18,7 +18,7 @@ struct Beginning {
 };
 Beginning begin_now();
 
-/// "2026-01-31T14:25:00.123456789+01:00", in this machine's time zone.
+/// Returns a time as "2026-01-31T14:25:00.123456789+01:00", in this machine's time zone.
 std::string iso_time(int64_t unix_ns);
 
 /// Losses of a record. Rows are counted by file.

@@ -18,7 +18,7 @@ namespace telesplat::metrics {
 /// The tables of a record.
 enum class Csv { kFrames, kUpdates, kStages, kTiles, kPlans, kEpochs, kAssignment };
 inline constexpr size_t kCsvs = 7;
-/// "frames.csv"
+/// Returns the name of a table's file, such as "frames.csv".
 const char* file_of(Csv csv);
 
 struct Life {

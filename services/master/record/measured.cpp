@@ -252,7 +252,7 @@ void Measured::add_lost(ViewerFigures& viewer, const Row& row) {
 
 // A still frame's delay does not count: nothing was drawn for it.
 void Measured::add_delay(ViewerFigures& viewer, const Row& row) {
-  const double ms = row.of("inter_frame_ms").value_or(0);  // 0: a viewer's first frame has none
+  const double ms = row.of("inter_frame_ms").value_or(0);  // 0: a viewer's first frame has no delay
   if (row.of("still").value_or(0) > 0) {
     ++frames_still;
     ++viewer.still;
@@ -293,7 +293,7 @@ void Measured::add_coupling(ViewerFigures& viewer, const Row& row) {
 void Measured::add_skew(const Row& row) {
   const auto number = row.of("wall_frame"), skew = row.of("swap_skew_ms");
   if (!number || !skew || !(*number > 0) || !(*skew >= 0)) return;
-  if (*number + 2 * kMostOpenSkews < closed_skew_) close_skews();  // another wall, or another master's
+  if (*number + 2 * kMostOpenSkews < closed_skew_) close_skews();  // numbers of another wall, or of another master
   if (*number <= closed_skew_) return;
   open_skews_[*number] = *skew;
   if (open_skews_.size() <= kMostOpenSkews) return;

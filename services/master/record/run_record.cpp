@@ -171,7 +171,7 @@ Status RunRecord::go_on() {
   for (size_t i = 0; i < kCsvs; ++i) {
     const std::string path = path_of(file_of(Csv(i)));
     now.bytes[i] = whole_rows(path);
-    if (now.bytes[i] == 0 && (Csv(i) == Csv::kPlans || Csv(i) == Csv::kAssignment)) continue;  // there was nothing
+    if (now.bytes[i] == 0 && (Csv(i) == Csv::kPlans || Csv(i) == Csv::kAssignment)) continue;  // it has no rows
     if (!files_[i].open_behind(path, now.bytes[i], options_.table_bytes)) return cannot_write(directory_);
   }
   if (now.bytes[size_t(Csv::kTiles)] == 0) file(Csv::kTiles).write(csv_line(names(kTileColumns)));

@@ -111,7 +111,7 @@ ordered_json peak_rss(const Roster& roster) {
 
 // ---- the sections of the summary, in its order ---------------------------------------------------------------------
 
-/// Simulated links, by the process that they lie before.
+/// Returns the simulated links, by the process before which they lie.
 ordered_json links_of(const std::vector<Process>& processes) {
   auto out = ordered_json::object();
   for (const Process& p : processes)

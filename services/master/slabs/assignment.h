@@ -48,9 +48,9 @@ struct AssignmentSheet {
 /// The largest number of transfers of a node.
 uint32_t busiest(std::span<const Transfer> transfers);
 
-/// A sheet of busiest() rounds, in which no node has two transfers in a round. rounds above 0: at most that many
-/// rounds; a node of more transfers then has them spread over the rounds as evenly as can be. weighted: false
-/// ignores the bytes. Error: too many nodes or transfers.
+/// Returns a sheet of busiest() rounds, in which no node has two transfers in a round. rounds above 0: their number at
+/// most; a node of more transfers then has them spread over the rounds as evenly as can be. weighted: false ignores
+/// the bytes. Error: too many nodes or transfers.
 Result<AssignmentSheet> schedule_scatter(std::span<const Transfer> transfers, uint32_t rounds = 0,
                                          bool weighted = true);
 
@@ -69,8 +69,8 @@ struct AssignedTransfer {
   uint64_t bytes = 0;      ///< expected
 };
 
-/// All transfers of the slabs' slices, one slice more on both sides, by rounds. No server sends and no sampler receives
-/// twice in a round. A slab has at most wire::kMaxSlabs of them.
+/// Returns all transfers of the slabs' slices and one slice more on both sides, by rounds. No server sends and no
+/// sampler receives twice in a round. A slab has at most wire::kMaxSlabs transfers.
 std::vector<AssignedTransfer> assignment(const Partition& partition, const VolumeScene& scene);
 
 }  // namespace telesplat::master

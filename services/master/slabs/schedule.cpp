@@ -30,7 +30,7 @@ volume::ShearFrame empty_frame(const volume::Grid& grid, const glm::dvec3& eye_r
   const int slice = out.direction > 0 ? grid.size[size_t(out.axis)] - 1 : 0;
   if (farthest < 1) out.eye[out.axis] = slice - out.direction;  // the eye is in the middle of a single voxel
   out.layers = {{slice, slice + 1, double(slice)}};
-  // Where this slope meets the slice is beyond the grid's farthest voxel.
+  // This slope meets the slice beyond the grid's farthest voxel.
   out.u0 = (std::abs(out.eye[out.u()]) + 2.0 * volume::kMaxSide) / out.t(slice);
   out.v0 = (std::abs(out.eye[out.v()]) + 2.0 * volume::kMaxSide) / out.t(slice);
   return out;

@@ -27,7 +27,7 @@ class SlabPlan final : public Plan {
 
   Views& views() override { return schedule_; }
   void drop_frames() override { schedule_.drop_frames(); }
-  /// Samplers let go of their slabs: they are cut and fetched anew when this plan leads again.
+  /// Drops the frames. Samplers drop their slabs: these are cut and fetched anew when this plan leads again.
   void put_aside() override;
   void prepare(double now_s) override;
   bool may_begin(const Idle& idle) override;

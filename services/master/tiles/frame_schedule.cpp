@@ -16,9 +16,9 @@ wire::Moments leased(wire::Moments moments, double now_s) {
 
 bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   const bool steered = plans_.on(now_s);
-  // The plan of a viewer's next view must know the samples of the one before.
   in_turns_ = turns_only;
   const auto ready = [&](InstanceId viewer) { return open(viewer, now_s); };
+  // With plans, each viewer has one view in flight: the next view's plan must know its samples.
   const auto request = take_view(turns_only, now_s, steered ? InFlight::kOneAViewer : InFlight::kAny, ready);
   if (!request) return false;
   close_extras(*request, now_s);
@@ -327,7 +327,7 @@ size_t FrameSchedule::leases_of(const std::string& sampler) const {
 }
 
 void FrameSchedule::drop_frames() {
-  // Newest first, each view once.
+  // Put back the newest view first, each view once.
   const auto& open = plans_.open();
   for (auto asked = open.rbegin(); asked != open.rend(); ++asked)
     if (!asked->request.extra) put_back(asked->view.frame);

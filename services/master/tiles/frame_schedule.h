@@ -24,9 +24,9 @@ inline constexpr double kLeastOverdue_s = 0.015;  ///< a tile that has been out 
 /// samplers' processes.
 inline constexpr double kTargetPerSampler_s = 0.25e-3;
 
-/// A busy sampler gets none of a frame's last rows if a row takes longer. Cheaper ones it may keep in store: without
-/// them it would wait longer for its next lease (3 to 8 ms between idle and busy with 40 samplers on two cores;
-/// `telesplat-lab scaling`).
+/// A busy sampler gets none of a frame's last rows if a row takes longer than this: it would delay the frame. It may
+/// keep cheaper rows in store, since it would wait longer for its next lease (3 to 8 ms between idle and busy with 40
+/// samplers on two cores; `telesplat-lab scaling`).
 inline constexpr double kDearRow_s = 0.01;
 
 /// Time that all samplers together should take for an extra frame: a view that comes waits for its tiles that are out.
@@ -111,11 +111,11 @@ class PlanQuestions {
   wire::PlanRequest ask(const PlannedView& view, const PlanLimits& limits, double now_s);
   /// Notes that the view is sampled without a plan.
   void begin_unplanned(const PlannedView& view) { see(view); }
-  /// The view has its plan, or is complete: more may be cast for it.
+  /// The view has its plan, or is complete: extra rays may be cast for it.
   void known(const PlannedView& view);
 
   enum class Extra {
-    kAny,  ///< any view: there is nothing else to do
+    kAny,  ///< all viewers', as there is nothing else to do
     kDue   ///< only of viewers that have had no extra frame for kViewsPerExtra views
   };
   /// True if ask_extra() has a question for some view.
@@ -239,7 +239,7 @@ class FrameSchedule : public Views {
   bool tile_open() const;
   /// True if a tile has been out so long that any sampler other than its own could take a backup.
   bool backup_due(double now_s) const;
-  /// See Trust.
+  /// Takes the news of samplers that deliver nothing, or deliver again: Trust::news().
   std::vector<Trust::News> take_news(double now_s);
   std::optional<double> stuck_s(const std::string& sampler, double now_s) const {
     return trust_.stuck_s(sampler, now_s);
@@ -267,12 +267,12 @@ class FrameSchedule : public Views {
     geometry::Camera camera;
     FrameTiles tiles;
     bool planned = false;              // the tiles are a plan's
-    bool extra = false;                // rays beyond a view
+    bool extra = false;                // its rays lie beyond a view
     double begun_s = 0;                // time of its plan; without a plan, its view's begin
     double refining = 0, put_off = 0;  // RefiningRays::learn()
     double held_from_s = 0;            // since then its viewer's link takes nothing; 0: it takes more
   };
-  // A lease whose tile another sampler delivered first; its own may be dead or slow.
+  // A lease whose tile another sampler delivered first; the lease's own sampler may be dead or slow.
   struct Overtaken {
     std::string sampler;
     double leased_s, expires_s;

@@ -33,7 +33,7 @@ class LinkGate {
 
   void report(const wire::LinkReport& link, double now_s);
   enum class Rays {
-    kPlanned,  ///< rays of a plan; most of them find what is known
+    kPlanned,  ///< rays of a plan; most of them hit known surfaces
     kAll       ///< rays of a view that is sampled whole
   };
   /// A part of a frame went to all viewers. rays: number cast for it; 0: not known.
@@ -61,7 +61,7 @@ class LinkGate {
   struct Link {
     wire::LinkReport told;
     double told_s = 0;
-    double since_bytes = 0;                 // published since
+    double since_bytes = 0;                 // bytes published since the report
     double wished_bytes = 0, wished_s = 0;  // bytes that a link of the wished rate held at wished_s
     double backlog() const { return double(told.backlog_bytes) + since_bytes; }
   };

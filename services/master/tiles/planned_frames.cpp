@@ -42,7 +42,7 @@ constexpr double kLeastTileRays = 1024, kMostRays = 1 << 24;
 // tile: packer and viewers pay for each tile in every cluster to which it adds points, and links pay for the
 // overhead of its image. With 1024 pixels that view had a second tile with a fifth of its rays.
 constexpr int kPlannedSide = 2, kPlannedSideOfFew = 8;
-constexpr double kTargetsOfFew = 3;  // lease targets that a tile may take
+constexpr double kTargetsOfFew = 3;  // with few samplers a tile takes this many lease targets
 constexpr size_t kFewSamplers = 2;
 constexpr uint64_t kUnknownTileRays = 16384;  // rays of an extra frame's tile while no link is known
 constexpr double kMuchUnseen = 0.25;          // share of a view's pixels

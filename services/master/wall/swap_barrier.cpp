@@ -8,7 +8,7 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kFramesRemembered = 8;  // until all viewers have reported that they presented them
+constexpr size_t kFramesRemembered = 8;  // frames kept until all viewers report their presentation
 constexpr double kPeriodShare = 0.1;     // share of the newest frame in between_s_
 constexpr double kSourcePatience_s = 1;  // until the wall shows another packer's model without a viewer that lacks it
 constexpr uint64_t kMostFirstFrame = uint64_t{1} << 52;  // wire::check() refuses 2^53 and more

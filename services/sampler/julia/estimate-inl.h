@@ -1,5 +1,5 @@
-// The distance estimate, a vector of points at a time. Included once a target, by kernels.cpp. See julia/plain.h for
-// the algorithm: operations and their order are the same, so that every target gives equal bits.
+// The distance estimate, a vector of points at a time. Included once for each target, by kernels.cpp. See julia/plain.h
+// for the algorithm: operations and their order are the same, so that every target gives equal bits.
 #if defined(TELESPLAT_JULIA_ESTIMATE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_JULIA_ESTIMATE_INL_H_
 #undef TELESPLAT_JULIA_ESTIMATE_INL_H_

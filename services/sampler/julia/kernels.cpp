@@ -7,7 +7,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "services/sampler/julia/kernels.cpp"
-#include <hwy/foreach_target.h>  // compiles what follows once a target
+#include <hwy/foreach_target.h>  // compiles the rest once for each target
 
 #include <hwy/highway.h>
 

@@ -1,5 +1,5 @@
 // Cones, clipping and marching: from a part of an image to brackets of the depths at which its rays meet the surface.
-// Included once a target, by kernels.cpp.
+// Included once for each target, by kernels.cpp.
 #if defined(TELESPLAT_JULIA_MARCH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_JULIA_MARCH_INL_H_
 #undef TELESPLAT_JULIA_MARCH_INL_H_
@@ -150,9 +150,9 @@ struct Lanes {
   HWY_ALIGN float d[4][kMost], inverse[kMost], t[kMost], t1[kMost], last_t[kMost], last_r[kMost], steps[kMost];
   HWY_ALIGN float g[kMost];  // the estimate less the threshold, in depth
   int ray[kMost];
-  uint64_t busy = 0;  // bits
+  uint64_t busy = 0;  // bits of lanes that have a ray
 
-  // Gives lane i the ray, or, if that is -1, a point that has escaped already.
+  // Gives lane i the ray `next`, or, if that is -1, a point that has escaped already.
   HWY_INLINE void begin(int i, int next, const Queue& queue) {
     ray[i] = next;
     last_r[i] = steps[i] = 0;

@@ -28,7 +28,8 @@ class JuliaSampler {
   /// surface: 1/4 for a camera that takes every fourth pixel of every fourth row, 4 for one that has 4 x 4 rays for
   /// each of the view's pixels. Colours are unlit albedo, darkened by occlusion and shadow; normals face the camera.
   /// mask, of the rectangle's size: only its pixels are sampled, the others are empty; null: all. Returns a canonical
-  /// image of rect.width x rect.height. A pixel does not depend on the rectangle and mask of the call. Precondition: rect lies in the camera's image. Any number of threads may call it.
+  /// image of rect.width x rect.height. A pixel does not depend on the rectangle and mask of the call. Precondition:
+  /// rect lies in the camera's image. Any number of threads may call it.
   image::DepthImage sample(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect,
                            double footprint_px, const image::PixelMask* mask = nullptr);
 

@@ -34,7 +34,7 @@ inline constexpr int kRefinements = 2;
 inline constexpr int kMarchWays = 2;  ///< vectors of rays that are marched side by side (tuned)
 inline constexpr int kRefill = 2;     ///< lanes that are given new rays at once (tuned)
 
-inline constexpr float kLeast = 0.02f;  ///< cosine at which normals that faced away are left
+inline constexpr float kLeast = 0.02f;  ///< cosine to which normals that face away are turned
 
 // Steep normals: the mean of two, the second half a pixel further in (julia/plain.h, widen)
 inline constexpr float kSteep = 0.95f;    ///< cosine between normal and ray below which a normal is steep

@@ -1,6 +1,6 @@
 // Makes a depth image's colours and normals of ray hits, eight at a time: both are interpolated over the triangle.
 //
-//   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel; of scalars: the colour of the one interpolated
+//   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel; for scalars: that of the interpolated one
 //   each nk is negated first if it points away from the side of the triangle that the ray sees:
 //     sign(nk . g) == sign(d . g); so the winding of a triangle does not matter
 //   if n faces away all the same, as over an edge or a coarse mesh, it is turned across the ray, because viewers

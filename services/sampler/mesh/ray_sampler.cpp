@@ -22,7 +22,7 @@ constexpr int kPacketWidth = 4, kPacketHeight = 2;
 static_assert(kPacketWidth * kPacketHeight == kPacket);
 
 // Rays through the pixel centres of a camera. A direction is R (u, v, -1), so a ray's parameter is depth in metres.
-// It is the sum of a term per column and a term per row, both held in double precision for the range that is traced.
+// A direction is a term per column plus a term per row, both held in double precision for the range that is traced.
 class PixelRays {
  public:
   // Rays for pixels [x0, x1) x [y0, y1), which may lie outside the image; they see only what `clip` keeps.

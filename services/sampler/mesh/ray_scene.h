@@ -65,7 +65,7 @@ class RayScene {
   std::vector<unsigned> free_;
   std::unordered_map<ChunkId, unsigned> slot_of_;
   geometry::Clip clip_;
-  Scene top_;  // after the slots, so that it goes first
+  Scene top_;  // after the slots, so that it is destroyed first
   bool changed_ = true;
 };
 

@@ -17,7 +17,7 @@ constexpr double kMostListPatience_s = 16;    // an array that is being read may
 constexpr double kExtend_s = 0.1;             // between two requests for more time
 constexpr double kPatience_s = 6.0;  // if nothing comes for this time, and for what the link needs: no more time
 
-// Chunk bytes must be 4-byte aligned to be used in place; a received field may lie anywhere.
+// Copies bytes that are not aligned to 16, as a received field may lie anywhere; others are used in place.
 geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
   if (reinterpret_cast<uintptr_t>(data.data()) % 16 == 0) return {data, message.owner};
   auto copy = std::make_shared<std::vector<std::byte>>(data.begin(), data.end());

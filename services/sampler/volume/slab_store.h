@@ -14,7 +14,7 @@
 
 namespace telesplat::sampler {
 
-/// The volume, as far as voxels depend on it.
+/// The properties of a volume on which its voxels depend.
 struct SlabScene {
   volume::Grid grid;
   volume::Levels levels;
@@ -45,7 +45,7 @@ class SlabStore {
   /// budget_bytes: memory for voxels, without those that leases need.
   SlabStore(MakeSlab make, uint64_t budget_bytes) : make_(std::move(make)), budget_bytes_(budget_bytes) {}
 
-  /// Forgets everything if it is another volume.
+  /// Sets the scene; forgets everything if it is another one.
   void set_scene(const SlabScene& scene);
   const std::optional<SlabScene>& scene() const { return scene_; }
   void clear();

@@ -84,7 +84,7 @@ inline void CompositeRow(const float* paths, uint64_t mask, const Line& a, const
   tile.live[y] &= ~dead;
 }
 
-// Writes a layer's pixels, and takes the layer's light from what remains.
+// Writes a layer's pixels, and reduces the remaining light by the layer's opacity.
 inline void FinishLayer(const SplatScene& scene, const SplatTile& job, const TilePixels& tile, SplatOutcome& out) {
   const Pixels d;
   const hn::RebindToSigned<Pixels> di;

@@ -130,8 +130,8 @@ struct CellRow {
 // Adjacent pixels of a line, and the voxels that reach them.
 struct Segment {
   int x_begin, x_end;
-  int u_lo, u_hi;      // voxels that reach them
-  int own_lo, own_hi;  // voxels with their centres in them, which are counted
+  int u_lo, u_hi;      // voxels that reach the pixels
+  int own_lo, own_hi;  // voxels whose centres lie in the pixels: these are counted
 };
 
 inline Segment segment_of(const TileColumns& c, int first_block, int last_block) {
@@ -158,7 +158,7 @@ inline CellRow cells_of(const CellRow& row, const Segment& segment) {
 }
 
 // Adds weight times the voxels of a segment to the dense row. Returns the blocks that they reach; `voxels` counts them.
-// row: ends with the last cell that was looked at.
+// row: set to end with the last cell that was visited.
 HWY_INLINE uint64_t FillRow(const SplatScene& scene, const TileColumns& c, const Segment& segment, float weight,
                             CellRow& row, DenseRow& dense, uint64_t& voxels) {
   float* at = dense.at + 4 * kMargin;

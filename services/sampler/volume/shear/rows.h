@@ -22,7 +22,7 @@ struct ShearRows {
   /// Row v of slice s has the cells [first[r], first[r + 1]), r = (s - slice_begin) * rows + (v - row_begin).
   std::vector<uint32_t> first;
   std::vector<ShearCell> cells;
-  /// Where a slice has cells: u in [u_lo, u_hi], v in [v_lo, v_hi]; nowhere if u_lo > u_hi.
+  /// Bounds of a slice's cells: u in [u_lo, u_hi], v in [v_lo, v_hi]; u_lo > u_hi: it has no cells.
   struct Bounds {
     int u_lo = 65536, u_hi = -1, v_lo = 65536, v_hi = -1;
   };

@@ -19,7 +19,7 @@ inline constexpr int kTileWidth = kSplatBlock * kTileBlocks;
 /// Accumulated pixels of a tile fill half the second-level cache of common processors (bench volume_bench).
 inline constexpr int kTileHeight = 32;
 
-/// A pixel through which less light comes hides what is behind it: half a step of 8-bit output.
+/// A pixel that lets less light through hides all behind it: half a step of 8-bit output.
 inline constexpr float kOpaque = 1.0f / 512;
 
 /// One axis of a slice: pixel x of the raster has its centre at index coordinate origin + x * pitch.
