@@ -93,8 +93,8 @@ class MasterCore {
   LimitsHit limits_hit() const { return gate_.hit(); }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
-  /// Returns a snapshot for programs that watch. The caller adds the version, and the master itself to the processes;
-  /// live() has the rest.
+  /// Returns a snapshot for programs that watch; live() has the histograms. The caller adds the version, and the master
+  /// itself to the processes.
   LiveSnapshot live_snapshot() const;
   const LiveFigures& live() const { return live_; }
   Figures figures() const;  ///< sum over all plans

@@ -190,7 +190,7 @@ class SamplerTurns final : public SamplerService {
     if (const Status s = tiles_->connect(endpoint); !s) log::error("{}", s.error().text);
   }
 
-  // Makes another work if the kind of scene is another one.
+  // Makes new work if the session's scene is of another kind.
   void follow_kind(const std::string& name) {
     if (name.empty() || name == kind_) return;
     kind_ = name;

@@ -66,7 +66,7 @@ class VolumeScene {
   /// a value out of limits; then nothing changed.
   Status set(const std::map<std::string, std::string>& arguments);
   /// "play": goes on, pauses, or pauses some steps farther on or back, cyclically. Error: the volume has one step, or
-  /// plays none a second. True: the step changed.
+  /// 0 steps a second. True: the step changed.
   Result<bool> play(const PlayOrder& order);
   /// "animate": on, off.
   Status animate(const std::string& text);
