@@ -12,8 +12,7 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
-// How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each
-// cycle.
+// The worker takes the display's news this often. While the display waits for updates, each cycle loses that time.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
 constexpr double kWallPoll_s = 0.003;  // views of a wall wait for each other at the master
 
@@ -70,7 +69,7 @@ FrameFigures ViewerWorker::figures() const {
   return out;
 }
 
-// What a person wishes goes before what the session tells.
+// A person's wish goes before the session's setting.
 void ViewerWorker::take_sampling() {
   const auto wish = news_.take_wish();
   if (!wish) return;
@@ -126,7 +125,7 @@ void ViewerWorker::receive_control() {
   if (link_.shutdown_requested() && !end_.shutdown()) end_.on_shutdown(link_.shutdown_reason());
 }
 
-// What was received speaks for the instance before: with the next welcome it begins anew.
+// Content that was received belongs to the instance before: it begins anew with the next welcome.
 void ViewerWorker::renew(InstanceId instance) {
   board_.instance = instance;
   requester_.set_viewer(instance);
@@ -329,7 +328,7 @@ void ViewerWorker::report(double now_s, bool last) {
   if (received_) received_->report();
 }
 
-// How well poses were predicted, means: those of view requests, and those that a tracker's poses were displayed with.
+// Adds mean errors of predicted poses: of view requests, and of a tracker's poses as they were displayed.
 void ViewerWorker::add_prediction(net::MasterLink::Values& values) const {
   const auto add = [&](const char* what, const tracking::PredictionMeter::Figures& f) {
     if (f.count == 0) return;

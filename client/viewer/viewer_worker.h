@@ -59,7 +59,7 @@ class ViewerWorker : public net::Turns {
   void on_expected(double t_s, const geometry::Pose& pose) { news_.on_expected(t_s, pose); }
   /// The next pose or frame is in another space: earlier movements of the head mean nothing.
   void on_jump() { news_.on_jump(); }
-  /// How far ahead views are asked for, seconds.
+  /// Returns the time ahead for which views are asked for, seconds.
   double horizon_s() const { return board_.horizon_s; }
   /// Something of the scene was displayed for the first time (later calls change nothing).
   void on_first_points(double now_s) { meter_.on_first_points(now_s); }
@@ -71,7 +71,7 @@ class ViewerWorker : public net::Turns {
   void on_measured(const MeasuredFrame& frame) { meter_.measured(frame); }
   /// The display has waited this long for a view update, seconds; 0: it does not wait, or not for long.
   void on_waiting(double waits_s) { meter_.waits(waits_s); }
-  /// What to draw from, see Succession::at. Null: it is not known yet what the session shows.
+  /// Returns the content to draw from, see Succession::at. Null: the session's scene is not known yet.
   std::shared_ptr<Received> received_at(RequestId request) { return succession_.at(request); }
   /// True once one view update is complete.
   bool first_update_complete() const { return meter_.updates() > 0; }
@@ -92,11 +92,11 @@ class ViewerWorker : public net::Turns {
   std::shared_ptr<const wire::Welcome> session() const { return board_.session(); }
   /// Views are sampled like this from now on.
   void set_sampling(const SamplingWish& wish) { news_.on_wish(wish); }
-  /// What there is to show; an empty box until that is known.
+  /// Returns the scene to show; its box is empty until it is known.
   ShownScene shown_scene() const { return board_.scene().shown; }
-  /// What others ask of this viewer, for the display to carry out.
+  /// Orders to this viewer, which the display carries out.
   OrderDesk& orders() { return orders_; }
-  /// What the session's data are told in; null until the master told it.
+  /// Returns names, units and placement of the session's data; null before the first session.
   std::shared_ptr<const SceneTerms> terms() const { return board_.scene().terms; }
   /// Null: frames of this epoch have no legend.
   std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return board_.legends.at(epoch); }

@@ -1,4 +1,4 @@
-// What standard walks cost and show is as tests/simulation/figures.json has it.
+// Standard walks cost and show the figures of tests/simulation/figures.json.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 

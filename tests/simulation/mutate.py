@@ -50,7 +50,7 @@ NUMBERS = {'double', 'float', 'int', 'size_t', 'uint32_t', 'uint64_t', 'int64_t'
 COMPARED = {' < ': ' <= ', ' <= ': ' < ', ' > ': ' >= ', ' >= ': ' > ', ' == ': ' != ', ' != ': ' == '}
 NOBODY = 65534
 SCRATCH = Path(tempfile.mkdtemp(prefix='telesplat-mutate-'))
-MOST_CPU_S = 40  # of a session, which takes 1
+MOST_CPU_S = 40  # that one session may take; it takes 1
 ASSIGNED = (' = ', ' += ', ' -= ', ' |= ', ' &= ', ' ? ', ' : ')
 HEADER = '''#pragma once
 #include <fcntl.h>

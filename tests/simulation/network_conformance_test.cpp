@@ -1,4 +1,4 @@
-// What a socket keeps, drops and refuses: each test runs over ZeroMQ and TCP, and over the simulated network.
+// Messages that a socket keeps, drops and refuses: each test runs over ZeroMQ and TCP, and over the simulated network.
 #include <gtest/gtest.h>
 
 #include <netinet/in.h>
@@ -280,7 +280,7 @@ TEST_P(Network, ReadAheadTakesWhatComesUntilAThousandMessagesWait) {
   Peer pull = bed_->bound(Kind::kPull, at_, {.high_water_mark = 8, .read_ahead = true});
   Peer push = bed_->connected(Kind::kPush, at_, {.high_water_mark = 8});
   EXPECT_FALSE(pull->receive());
-  const int sent = fill(push);  // of 64 KiB: 1024 are 64 MiB
+  const int sent = fill(push);  // messages of 64 KiB: 1024 are 64 MiB
   EXPECT_GE(sent, 1024 + 16);
   EXPECT_LE((sent - 1024) * kLarge, kKernels);
   for (int i = 0; i < sent; ++i) ASSERT_EQ(number(bed_->next(pull)), i);
@@ -359,7 +359,7 @@ TEST_P(Network, ASubscriberMissesWhatWasPublishedWhileItWasAway) {
   EXPECT_EQ(std::ranges::count(after, 3), 0);
 }
 
-// What was on the wire or at the other end is lost; what still waited goes over the next connection.
+// Messages on the wire or at the other end are lost; those that still waited go over the next connection.
 TEST_P(Network, WhatStillWaitsAtTheSideThatConnectsOutlivesTheConnection) {
   Peer pull = bed_->bound(Kind::kPull, at_, {.high_water_mark = 8});
   Peer push = bed_->connected(Kind::kPush, at_, {.high_water_mark = 8});
@@ -510,7 +510,7 @@ TEST_P(Network, WhoSendsMoreThanIsReadIsHungUpOn) {
   Peer push = bed_->connected(Kind::kPush, at_, {.high_water_mark = 1000, .watch_connecting = true});
   for (int i = 0; i < 1000; ++i) ASSERT_TRUE(send(push, i, kLarge));
   EXPECT_TRUE(bed_->until([&] { return pull->connections_refused() > 0; }));
-  // What was whole is not lost; beside it comes what is sent over the next connection.
+  // Whole messages are not lost; messages sent over the next connection come beside them.
   std::vector<int> got = numbers_until(pull, 63);
   std::erase_if(got, [](int n) { return n > 63; });
   ASSERT_EQ(got.size(), 64u);
@@ -589,7 +589,7 @@ TEST(StoppedProcess, IsStillGivenMessages) {
   for (int i = 0; i < 16; ++i) EXPECT_TRUE(pull.receive()) << i;
 }
 
-// How many messages of 64 KiB are taken before one is refused for good.
+// Returns the number of messages of 64 KiB that are taken before one is refused for good.
 int fill_up(net::Socket& push, const std::function<void()>& wait) {
   int sent = 0;
   for (int refused = 0; refused < 80;)
@@ -597,7 +597,7 @@ int fill_up(net::Socket& push, const std::function<void()>& wait) {
   return sent;
 }
 
-// What its kernel had, and what had come, is still read; what waited in its own queue is lost.
+// Messages in its kernel, and those that had come, are still read; those in its own queue are lost.
 TEST(KilledProcess, WhatItsKernelHadArrives) {
   Child child([](int out, int in) {
     net::Context context;

@@ -55,7 +55,7 @@ class Surfaces : public ::testing::TestWithParam<Surface> {
 };
 INSTANTIATE_TEST_SUITE_P(All, Surfaces, ::testing::Values(Surface::kSpheres, Surface::kTerrain, Surface::kFence));
 
-// What a session is told when this data server has said hello.
+// The welcome of a session after this data server has said hello.
 wire::Welcome welcome_of(const data::Served& served) {
   wire::Hello hello;
   served.describe(hello);

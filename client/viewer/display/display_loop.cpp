@@ -52,7 +52,7 @@ void add(const DrawnFrame& other, DrawnFrame& sum) {
   sum.detail = std::min(sum.detail, other.detail);
 }
 
-// What frames are drawn from: what the worker received, and a source that draws it.
+// The content that the worker received, and the source that draws frames from it.
 class DrawnScene {
  public:
   DrawnScene(ViewerWorker& worker, DisplaySurface& surface, const SourceMaker& make)
@@ -143,7 +143,7 @@ class DisplayLoop {
   // Returns the request to draw next if the display does not wait.
   RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
 
-  // Of the frame that begins; the surface knows by then what there is to show.
+  // Returns the camera of the frame that begins. The surface learns of the scene first.
   geometry::Camera next_camera(double now_s, double t_s) {
     auto session = worker_.session();  // first, so that the surface gets a session's scene before the session
     const ShownScene scene = worker_.shown_scene();
@@ -558,7 +558,7 @@ class DisplayLoop {
   ShownScene scene_;  // as given to the surface; so is session_
   std::shared_ptr<const wire::Welcome> session_;
   image::View view_;
-  std::array<image::View, 2> eye_views_;  // of a surface that has eyes
+  std::array<image::View, 2> eye_views_;  // for a surface that has eyes
   bool view_intact_ = false;              // it holds what is on display
   DisplayResult result_;
   bool last_ = false;

@@ -1,4 +1,4 @@
-// Which coupling is in force, as the session orders it and as views come. No sockets, no clocks.
+// Changes the coupling as the session orders it and as views come. No sockets, no clocks.
 #pragma once
 
 #include <optional>
@@ -21,7 +21,7 @@ class CouplingFollower {
   /// The coupling that comes into force now; nothing: none does. A display that does not wait yet goes on to show what
   /// comes until its open request is answered, so that the first frame that waits has an update to wait for.
   std::optional<CouplingState> next(bool answer_open, double now_s);
-  /// Whether views come as pictures, which no order changes. Returns the coupling that comes into force; nothing: that
+  /// The session's views come as pictures or as points. Returns the coupling that comes into force; nothing: that
   /// in force fits.
   std::optional<CouplingState> follow_pictures(bool pictures) const;
   /// A view came, where views come as pictures; ahead: views that were under way when it was asked for. Returns the

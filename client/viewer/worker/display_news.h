@@ -1,4 +1,4 @@
-// What the display tells the worker: where the head is, what frames showed, and what people wish.
+// News from the display to the worker: poses of the head, updates that frames showed, wishes of people.
 #pragma once
 
 #include <mutex>

@@ -1,4 +1,4 @@
-// What the worker knows of the session and other threads may read.
+// The session's state that the worker writes and other threads read.
 #pragma once
 
 #include <atomic>
@@ -52,7 +52,7 @@ class SessionBoard {
 
   LegendBook legends;
   std::atomic<InstanceId> instance;
-  std::atomic<double> offset_s{0};   ///< of the master's clock, from the monotonic one
+  std::atomic<double> offset_s{0};   ///< the master's clock less the monotonic clock
   std::atomic<double> horizon_s{0};  ///< how far ahead views are asked for
 
  private:
@@ -62,7 +62,7 @@ class SessionBoard {
   int sampled_width_ = 0, sampled_height_ = 0;
 };
 
-/// How a viewer's session ends. Thread-safe.
+/// The end of a viewer's session, and its reason. Thread-safe.
 class SessionEnd {
  public:
   void stop() { stop_ = true; }

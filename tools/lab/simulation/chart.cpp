@@ -9,7 +9,7 @@ namespace {
 
 constexpr size_t kWidth = 11;
 
-// What tells one message of its type from the next.
+// Returns the fields that tell one message from the next of its type.
 struct Summary {
   std::string text;
   void operator()(const char* name, const auto& value, size_t = 0) {

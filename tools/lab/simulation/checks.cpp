@@ -24,7 +24,7 @@ constexpr double kOrderAnswers_s = 2.5;
 constexpr double kEpoch_s = 4;  // from an epoch's beginning until each viewer shows it
 constexpr double kLook_s = 0.1;
 constexpr double kLast_s = 1.5, kMostLateViews = 1.5;  // views whose rays a standing head casts at the end, at most
-constexpr double kLeast_dB[] = {22, 27, 12};           // of what a standing head sees: spheres, terrain, bars
+constexpr double kLeast_dB[] = {22, 27, 12};  // least PSNR of a standing head's picture: spheres, terrain, bars
 constexpr double kMostForgets = 32e6;  // bytes of forgets that the log keeps beyond its limit, at most (event_log.h)
 constexpr double kMostHoles = 0.02, kMostWrong = 0.05;  // shares of pixels that one surface covers whole
 constexpr double kBehind_s = 2.5;  // events that were published earlier have arrived, and were told of
@@ -84,7 +84,7 @@ int sampler_of(const Event& e) {
   }
 }
 
-// Whether a sampler works from before the event until after what it does.
+// True if a sampler works from before the event until the event is over.
 bool has_another(const Scenario& s, const Event& event) {
   const auto touches = [&](int sampler) {
     return std::any_of(s.events.begin(), s.events.end(), [&](const Event& e) {
@@ -158,7 +158,7 @@ void Checks::digest(const viewer::DrawnFrame& drawn, const image::View& view) {
 
 void Checks::sent(const Passed& m) {
   const auto from = parts_.find(m.from);
-  if (from == parts_.end()) {  // somebody without a part
+  if (from == parts_.end()) {  // a peer without a part
     if (const auto order = read<wire::Control>(m)) orders_[m.from] = {m.now_s, *order, speaker_};
     return;
   }
@@ -369,7 +369,7 @@ void Checks::on_unexpected(Part part, const std::string& what, double now_s) {
 
 // Clients of strangers aside, all here say what others expect. What comes faster than a limit allows is refused, too.
 void Checks::on_rejected(Part part, std::string_view socket, const net::Message& message, const std::string& why) {
-  // Who has not heard of another scene yet asks for what the former one had.
+  // A process that has not heard of another scene yet asks for content of the former one.
   const bool shows = std::any_of(excuses_.begin(), excuses_.end(), [&](const Event& e) {
     return e.fault == Fault::kShow && e.at_s <= now_s_ && now_s_ <= e.at_s + lasts_s(scenario_, e);
   });
@@ -377,7 +377,7 @@ void Checks::on_rejected(Part part, std::string_view socket, const net::Message&
   fail("rejected", fmt::format("{} refuses {} at {}: {}", text_of(part), message.type, socket, why), now_s_);
 }
 
-// Whether orders have changed a Julia set: it may have left the view, or change for ever.
+// True if orders have changed a Julia set: it may have left the view, or change for ever.
 bool Checks::reshaped() const {
   return std::any_of(ordered_.begin(), ordered_.end(), [](const auto& o) { return o.first.starts_with("c."); });
 }
@@ -444,7 +444,7 @@ void Checks::look_at_late_rays(const Session& session) {
          session.now_s());
 }
 
-// Who takes part, as the master told it last.
+// The master's last status names the processes that run.
 void Checks::look_at_status(const Session& session) {
   const auto status = nlohmann::json::parse(status_, nullptr, false);
   if (!status.is_object()) return;
@@ -460,7 +460,7 @@ void Checks::look_at_status(const Session& session) {
   }
 }
 
-// What was ordered last is what the master tells, and what viewers were told.
+// The last order of each setting is in the master's session, and in each viewer's.
 void Checks::look_at_orders(Session& session) {
   const auto told = [](const wire::Welcome& w, const std::string& name) {
     if (name == "volume.layers") return fmt::format("{}", w.settings.layers);
@@ -488,7 +488,7 @@ namespace {
 
 constexpr double kAlike = 8, kUnlike = 64;  // differences of colours, of 255
 
-// Whether one surface covers the whole pixel; nearest and farthest: of it, m.
+// True if one surface covers the whole pixel; nearest and farthest: its depths there, m.
 bool is_whole(const image::View& truth, int x, int y, float& nearest, float& farthest) {
   nearest = std::numeric_limits<float>::infinity(), farthest = 0;
   for (int n = 0; n < kFine * kFine; ++n) {
@@ -573,8 +573,8 @@ void Checks::compare_pictures(Session& session) {
   }
 }
 
-// Rows that came are in the record, each once. Of a viewer that the master did not know at that moment, the record
-// counts them as lost: sessions with such faults are left out.
+// Rows that came are in the record, each once. The record counts rows as lost that come from a viewer that the master
+// does not know at that moment: sessions with such faults are left out.
 void Checks::at_end(const std::string& folder, double now_s) {
   const bool whole = std::none_of(scenario_.events.begin(), scenario_.events.end(), [](const Event& e) {
     return e.fault != Fault::kOrder && e.fault != Fault::kSlowWork && e.fault != Fault::kSlowLink;

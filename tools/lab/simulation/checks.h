@@ -1,5 +1,5 @@
-// What must hold in every session, looked at all the time: by what passes over the network, by what viewers display and
-// by what processes report. A check that fails ends the session.
+// Checks of every session, made all the time: they look at the messages of the network, at the frames of viewers and at
+// the reports of processes. A check that fails ends the session.
 #pragma once
 
 #include <cstdint>
@@ -40,14 +40,14 @@ struct Failure {
   double at_s = 0;
 };
 
-/// What a session came to, the same for the same scenario.
+/// The figures of a session, the same for the same scenario.
 struct Figures {
-  uint64_t digest = 0;  ///< of all messages that were delivered, with their times, and of all frames
+  uint64_t digest = 0;  ///< digest of all delivered messages with their times, and of all frames
   uint64_t messages = 0, frames = 0, updates = 0, turns = 0;
-  uint64_t leases = 0, rays = 0;   ///< of tiles, and that they named
+  uint64_t leases = 0, rays = 0;   ///< leases of tiles, and the rays that they name
   uint64_t bytes = 0, points = 0;  ///< sent to viewers; of the packer's model at the end
   double waited_s = 0;             ///< for all `updates`, each from the request that it answers
-  double holes = 0, psnr_db = 0;   ///< of the last frame of viewer 0, against the truth; -1: not known
+  double holes = 0, psnr_db = 0;   ///< last frame of viewer 0 against the truth; -1: not known
 };
 struct Outcome : Figures {
   std::optional<Failure> failure;
@@ -122,7 +122,7 @@ class Checks final : public Observer {
   Viewer* viewer_of(int process);
 
   const Scenario scenario_;
-  std::vector<Event> excuses_, delays_;  // what may hold up everybody, and what another sampler can make good
+  std::vector<Event> excuses_, delays_;  // that may hold up all viewers; that another sampler can make good
   Outcome outcome_;
   std::map<int, Part> parts_;                                 // by process
   std::map<int, Viewer> viewers_;                             // by process
@@ -146,7 +146,7 @@ class Checks final : public Observer {
   uint64_t late_rays_ = 0;
   int master_ = -1;                                    // the process of the newest
   std::deque<std::pair<double, uint64_t>> sequences_;  // that the packer had, and when
-  uint64_t rows_ = 0;                                  // of updates, that came to the master
+  uint64_t rows_ = 0;                                  // rows of updates that came to the master
   bool strangers_ = false, rests_ = false, packer_welcomed_ = false;
   Event speaker_;  // who speaks is begun by it
 };

@@ -11,7 +11,7 @@
 
 namespace telesplat::simulation {
 
-/// What was sent so far, for strangers to say again.
+/// Messages that were sent so far, which strangers send again.
 struct Heard {
   std::map<std::string, std::string> to_master;  ///< bodies, the newest of each type
   std::map<std::string, std::string> to_packer;  ///< to its socket "state"
@@ -24,7 +24,7 @@ class Session::Peer {
  public:
   Peer(SimulatedNetwork& network, int process, bool keys, const Event& event);
 
-  /// Says what the event is about. name: of somebody with the role of event.b.
+  /// Sends the event's message. name: a process with the role of event.b.
   void speak(const Event& event, const std::string& name, const Heard& heard, Dice& dice);
 
  private:

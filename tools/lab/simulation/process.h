@@ -37,7 +37,7 @@ struct Schedule {
   double next_turn_s(double now_s) const;
 };
 
-/// What faults and orders make of a process.
+/// Faults and orders that end, stop or restart a process.
 struct Fate {
   bool stopped = false, told_to_stop = false;
   bool gone = false;  ///< it does not start again

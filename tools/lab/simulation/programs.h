@@ -13,7 +13,7 @@
 
 namespace telesplat::simulation {
 
-/// What runs as a process, of one role.
+/// The program of a process with one role.
 class Program {
  public:
   virtual ~Program() = default;
@@ -26,16 +26,16 @@ class Program {
 
 struct Surroundings {
   const Scenario& scenario;
-  Show show = Show::kSpheres;                 ///< of data servers: what they show
+  Show show = Show::kSpheres;                 ///< data servers show this
   int number = 0;                             ///< likewise: which of them it is
-  std::string name;                           ///< of the process
-  std::string folder;                         ///< of the record; empty: none
+  std::string name;                           ///< the process' name
+  std::string folder;                         ///< the record's folder; empty: no record
   bool first = true;                          ///< its first life
   std::function<void(double seconds)> spend;  ///< the process works for so long
   std::function<double()> slowness;           ///< times by which its work takes longer now
 };
 
-/// What is sampled of this show; nothing: it is no surface.
+/// Returns the surface that is sampled for this show; nothing: it is no surface.
 std::optional<Surface> surface_of(Show show);
 
 inline constexpr const char* kMasterEndpoint = "tcp://127.0.0.1:7700";

@@ -17,7 +17,7 @@
 namespace telesplat::simulation {
 namespace {
 
-// What a child writes to its pipe: in one piece, and short.
+// A child's report on its pipe: in one piece, and short.
 struct Report {
   Figures figures;
   double at_s;
@@ -25,7 +25,7 @@ struct Report {
   char check[32], text[512];
 };
 
-// The master tells everybody where its record lies: it must be called the same on every machine.
+// The master's messages name the folder of its record: its name must be the same on every machine.
 constexpr const char* kFolder = "/proc/self/cwd/run";
 
 void put(char* to, size_t size, const std::string& text) {

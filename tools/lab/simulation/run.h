@@ -12,7 +12,7 @@ namespace telesplat::simulation {
 /// others: watch too. folder: of the record, where the scenario has one; made and removed.
 Outcome run_scenario(const Scenario& scenario, const std::vector<Observer*>& others = {});
 
-/// What run_child() came to.
+/// The result of one child.
 struct Ran {
   Outcome outcome;
   bool crashed = false;  ///< the process that simulated it ended by a signal or a CHECK

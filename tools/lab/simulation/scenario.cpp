@@ -126,8 +126,8 @@ void draw_settings(Dice& dice, Scenario& s) {
   if (dice.chance(0.15)) s.log_limit_mb = 1;
 }
 
-// What comes on the heels of an event: a second order, a connection that breaks while the first is carried out, a peer
-// that is quicker than those who come back.
+// Draws an event on the heels of another: a second order, a connection that breaks while the first is carried out, a
+// peer that is quicker than those that come back.
 void add_follower(Dice& dice, Scenario& s, double calm_at_s) {
   const Event first = s.events.back();
   const bool order = first.fault == Fault::kOrder, kill = first.fault == Fault::kKill;

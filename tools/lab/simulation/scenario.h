@@ -1,5 +1,5 @@
-// What a simulated session is: who takes part, over which links, what they look at, and what goes wrong when. All of it
-// is drawn from one seed.
+// A simulated session: its processes, links and scene, and the faults with their times. All of it is drawn from one
+// seed.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +21,14 @@ enum class Show : uint8_t { kSpheres, kTerrain, kBars, kJulia, kBall, kSeries, k
 inline constexpr std::string_view kShowNames[] = {"spheres", "terrain", "fence", "julia", "ball", "series", "mesh"};
 inline bool is_volume(Show show) { return show == Show::kBall || show == Show::kSeries; }
 
-/// What goes wrong, or what people do.
+/// A fault, or an action of a person.
 enum class Fault : uint8_t {
   kKill,           ///< SIGKILL; the launcher starts it again after `amount` s
   kTerminate,      ///< SIGTERM; likewise
   kStop,           ///< SIGSTOP, SIGCONT after `amount` s
   kBreak,          ///< resets connections between `a` and `b`
   kSilence,        ///< nothing passes between `a` and `b` for `amount` s
-  kIsolate,        ///< nothing passes between `a` and anybody for `amount` s
+  kIsolate,        ///< nothing passes to or from `a` for `amount` s
   kClockStep,      ///< its clock jumps `amount` s forward, as after a virtual machine was moved
   kSlowLink,       ///< `amount` bytes a second to `a`, until the calm
   kSlowWork,       ///< a tile takes `a` this many times as long, until the calm
@@ -76,17 +76,17 @@ struct Scenario {
   double duration_s = 16;  ///< in its last calm_s nothing goes wrong, and heads stand still
   double calm_s = 6;
   Show show = Show::kSpheres;
-  std::string file;                         ///< of Show::kMesh
-  std::vector<geometry::Trajectory> heads;  ///< of the first viewers; those of others are drawn
+  std::string file;                         ///< file of Show::kMesh
+  std::vector<geometry::Trajectory> heads;  ///< movements of the first viewers; those of others are drawn
   int samplers = 2, viewers = 1;
   int data_servers = 1;         ///< each has a part of a volume, or all of another scene
-  int width = 48, height = 36;  ///< of a display, pixels
+  int width = 48, height = 36;  ///< display, pixels
   double display_hz = 20;
   viewer::CouplingState coupling;
   wire::SessionSettings settings;
   int tile_size = 32;
   double tile_s = 0.004;      ///< a tile of tile_size² pixels takes a sampler
-  double log_limit_mb = 512;  ///< of the packer
+  double log_limit_mb = 512;  ///< limit of the packer's log
   bool one_machine = true;    ///< with one clock; else each process has its own
   bool keys = false;
   bool records = false;  ///< in a folder

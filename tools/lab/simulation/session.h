@@ -17,7 +17,7 @@
 
 namespace telesplat::simulation {
 
-/// What a session tells while it runs. Times are the network's, in s.
+/// Is called while a session runs. Times are the network's, in s.
 class Observer {
  public:
   virtual ~Observer() = default;
@@ -45,7 +45,7 @@ class Session final : public World {
   /// Takes turns until then, or until stop() is called.
   void run_until(double until_s);
   void stop() { stopped_ = true; }
-  /// Tells the master to end the session, and takes turns until everybody has gone.
+  /// Tells the master to end the session, and takes turns until all processes have ended.
   void end();
 
   double now_s() const { return now_s_; }
@@ -54,9 +54,9 @@ class Session final : public World {
   /// Null: it does not run.
   SimulatedViewer* viewer(int number);
   bool runs(Part part) const;
-  /// What the data servers show now.
+  /// Returns the scene that the data servers show now.
   Show show() const { return show_; }
-  /// How many of a role have a part, running or about to.
+  /// Returns the number of processes of a role that run or are about to.
   int count(Role role) const;
   geometry::Pose head(int viewer) const;
   uint64_t turns() const { return turns_; }

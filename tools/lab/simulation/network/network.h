@@ -42,9 +42,9 @@ struct ProcessOptions {
 struct Passed {
   enum class What : uint8_t { kSent, kDelivered, kDropped };
   What what = What::kSent;
-  double sent_s = 0, now_s = 0;  ///< of the network
+  double sent_s = 0, now_s = 0;  ///< the network's time
   int from = -1, to = -1;        ///< processes; to: -1 where the receiver is not known
-  net::Kind kind{};              ///< of the socket that sent it
+  net::Kind kind{};              ///< the sender's socket
   std::string_view socket, type;
   wire::Bytes body;  ///< empty where a message was refused before it was made
 };
@@ -56,7 +56,7 @@ class SimulatedNetwork {
   /// Sockets must be gone by then.
   ~SimulatedNetwork();
 
-  /// What the process' net::Context is made of. process: a number for one life of one process, from 0.
+  /// Makes the network of a process' net::Context. process: a number for one life of one process, from 0.
   std::unique_ptr<net::Network> attach(int process, ProcessOptions options = {});
 
   /// Options of all links but those of set_link().
@@ -87,8 +87,8 @@ class SimulatedNetwork {
   std::function<void(const Passed&)> on_passed;
   /// A socket of the process has become readable. It may be called more often.
   std::function<void(int process)> on_ready;
-  /// For how long the process whose turn it is has worked since now_s(), in s: what it sends leaves so much later.
-  /// Empty: not at all.
+  /// Returns the time, s, that the process whose turn it is has worked since now_s(): its messages leave that much
+  /// later. Empty: 0.
   std::function<double()> ahead_s;
   /// A process refuses a message that came.
   std::function<void(int process, std::string_view socket, const net::Message& message, const std::string& why)>

@@ -1,4 +1,4 @@
-// What a simulated network consists of: queues, connections and sockets, as ZeroMQ has them. Private to this library.
+// Parts of a simulated network: queues, connections and sockets, as ZeroMQ has them. Private to this library.
 #pragma once
 
 #include <cstdint>
@@ -76,7 +76,7 @@ struct Wire {
   Way ways[2] = {};
 };
 
-/// What a socket has of one connection. That of a socket that connects outlives TCP's connections.
+/// A socket's end of one connection. The end of a socket that connects outlives TCP's connections.
 struct End {
   SimulatedSocket& socket;
   int side;  // 0: connected, 1: accepted

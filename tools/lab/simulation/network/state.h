@@ -101,7 +101,7 @@ class SimulatedNetwork::State {
   std::optional<net::Message> take(SimulatedSocket& s);
 
   uint64_t random_;
-  uint64_t numbers_ = 0;  // of events
+  uint64_t numbers_ = 0;  // number of events
   uint32_t peers_ = 0;
   int ports_ = 20000;
   std::map<std::pair<int, int>, Silence> silences_;  // the lower number first

@@ -13,8 +13,8 @@ namespace telesplat::simulation {
 std::unique_ptr<data::Served> serve_julia_set();
 
 /// A ball of 32^3 voxels, in 256 levels that fall from its middle to 0 at its surface; lit. About half of the voxels
-/// are shown. series: of 24^3 voxels, in three steps, each smaller, that play at one step a second. Of its slices it
-/// has part 0 .. parts - 1.
+/// are shown. series: three steps of 24^3 voxels, each smaller, that play at one step a second. It has slices of
+/// `part`, 0 .. parts - 1.
 std::unique_ptr<data::Served> serve_ball_volume(bool series = false, int part = 0, int parts = 1);
 
 }  // namespace telesplat::simulation

@@ -15,8 +15,8 @@
 namespace telesplat::simulation {
 namespace {
 
-constexpr double kCube_m = 0.05;      // of the checkerboard
-constexpr double kRounding_m = 1e-9;  // of depths, for rounding
+constexpr double kCube_m = 0.05;      // side of the checkerboard's cubes
+constexpr double kRounding_m = 1e-9;  // margin of depths, for rounding
 
 uint64_t hash_of(const SurfaceParts& surface) {  // FNV-1a
   uint64_t hash = 0xcbf29ce484222325;
@@ -52,8 +52,8 @@ struct Hit {
   double depth_m = std::numeric_limits<double>::infinity();
 };
 
-// A camera's rays, of which only parts are looked at that its pixels `rect` may show. A ray's parameter is depth in
-// metres.
+// A camera's rays through its pixels `rect`. They meet only parts that these pixels may show. A ray's parameter is
+// depth in metres.
 class Rays {
  public:
   Rays(const SurfaceParts& surface, const geometry::Camera& camera, const geometry::Rect& rect,
@@ -79,7 +79,7 @@ class Rays {
                      [](const Seen& a, const Seen& b) { return a.nearest_m < b.nearest_m; });
   }
 
-  /// Of a pixel counted from the rectangle's corner.
+  /// The pixel is counted from the rectangle's corner.
   glm::dvec3 direction(int x, int y) const { return columns_[size_t(x)] + rows_[size_t(y)]; }
   glm::dvec3 at(const glm::dvec3& direction, double depth_m) const { return eye_ + depth_m * direction; }
 
@@ -116,7 +116,7 @@ class Rays {
     const SurfacePart* part;
     geometry::DBox box_room;
     glm::dvec3 square;
-    glm::dvec3 gradient;  // of the part's function, at the eye
+    glm::dvec3 gradient;  // gradient of the part's function at the eye
     double value;         // likewise
     double nearest_m;     // depth of the box's nearest corner
     bool flat;            // square is 0
@@ -207,7 +207,7 @@ class SurfaceSampler final : public sampler::Sampler {
   }
 
   const SurfaceParts* surface_;
-  std::map<size_t, geometry::Box> boxes_;  // of held chunks
+  std::map<size_t, geometry::Box> boxes_;  // boxes of held chunks
   geometry::Clip clip_;
 };
 

@@ -28,12 +28,12 @@ std::unique_ptr<data::Served> serve_surface(Surface surface);
 
 /// A sampler of the surface, for MeshTiles in place of the ray sampler. Once it is given a chunk of another surface it
 /// samples that one. It refuses chunks that do not validate. A pixel is empty where its ray's first hit belongs to a
-/// chunk that is not held, or that has another box than the surface's chunk: nothing behind the hit is shown. Colours
-/// of arrays are ignored.
+/// chunk that is not held, or that has another box than the surface's chunk: nothing behind the hit is shown. It
+/// ignores colours of arrays.
 std::unique_ptr<sampler::Sampler> sample_surface(Surface surface);
 
-/// What `camera` sees of all chunks, shaded with unquantised normals: the truth that pictures are compared with. Depth
-/// in metres, +infinity where nothing is.
+/// Renders all chunks, shaded with unquantised normals: the truth that pictures are compared with. Depth in
+/// metres, +infinity where nothing is.
 image::View render_surface(Surface surface, const geometry::Camera& camera, const image::Shading& shading,
                            const geometry::Clip& clip = {});
 

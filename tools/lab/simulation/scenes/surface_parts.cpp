@@ -5,7 +5,7 @@
 namespace telesplat::simulation {
 namespace {
 
-constexpr double kMargin_m = 1e-6;  // of boxes, which are rounded to float
+constexpr double kMargin_m = 1e-6;  // margin of boxes, which are rounded to float
 
 geometry::Box box_about(const glm::dvec3& lo, const glm::dvec3& hi) {
   return {glm::vec3(lo - kMargin_m), glm::vec3(hi + kMargin_m)};
