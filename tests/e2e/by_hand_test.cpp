@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 class ByHand : public testing::Test {
  protected:
-  // As README prints it: the master with a folder, everyone else without.
+  // As docs/using.md prints it: the master with a folder, everyone else without.
   void begin(const std::vector<std::string>& scene) {
     start("master", {"--bind", "tcp://127.0.0.1:*", "--out", out()});
     ASSERT_TRUE(wait_until([&] { return service("master").out().find("listening on ") != std::string::npos; }));
