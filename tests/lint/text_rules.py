@@ -163,7 +163,7 @@ def _texts(tree):
         for number, line in enumerate(file.lines, 1):
             fenced ^= line.startswith("```")
             if not fenced:
-                yield file, number, re.sub(r"`[^`]*`", "x", line.strip())
+                yield file, number, re.sub(r"`[^`]*`", "x", line.lstrip("# ").strip())
 
 
 def english(tree):
