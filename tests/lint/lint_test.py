@@ -35,6 +35,8 @@ LONG = "int f(int a) {\n" + "  a += g{1}.value;\n" * 60 + "}\n"
 
 # rule, file, its text, line of the finding, part of what is said
 VIOLATIONS = [
+    ("english", "common/core/x.h", "int x;  ///< of a frame\n", 1, 'begins with "of"'),
+    ("english", "docs/x.md", "# What\n\nPages name nobody.\n", 3, "name the process or the person"),
     (
         "directions", "common/core/up.cpp",
         '\n#include "services/data/data.h"\n', 2, "common/ must not include services/",

@@ -446,6 +446,40 @@ TEST(Plan, AnotherPlannerGoesOnWithTheModelThatIsThere) {
   EXPECT_FALSE(extra.full);
 }
 
+TEST(Plan, ChecksKnownEmptyPixelsInTurn) {
+  PlanConfig config = plan_config();
+  config.validation = 4;  // 32 sets of pixels, four in each plan of a still view, one of them where nothing is
+  Session s(config);
+  const geometry::Camera camera = test::scene_camera({0.7, 0.3, 0.2}, 320, 240);
+  for (int i = 0; i < 4; ++i) s.view(camera);
+  const image::DepthImage scene = test::sample_scene(camera, {0, 0, 320, 240});
+  std::vector<int> cast(scene.pixels());
+  for (int i = 0; i < 64; ++i) {
+    s.now_s += 0.1;
+    const wire::PlanRequest r = s.request(camera);
+    const wire::Plan plan = s.ask(r);
+    for (size_t tile = 0, word = 0; tile < plan.tiles.size() / wire::kPlanNumbers; ++tile) {
+      const uint32_t* n = &plan.tiles[tile * wire::kPlanNumbers];
+      const auto mask = codec::decode_mask(std::span(plan.masks).subspan(word, n[5]), int(n[2]), int(n[3]));
+      ASSERT_TRUE(mask.ok());
+      for (int y = 0; y < int(n[3]); ++y)
+        for (int x = 0; x < int(n[2]); ++x) cast[(n[1] + size_t(y)) * 320 + n[0] + size_t(x)] += mask->at(x, y);
+      word += n[5];
+    }
+    s.cast(r, plan);
+  }
+  int empty = 0;
+  for (int y = 8; y < 232; ++y)
+    for (int x = 8; x < 312; ++x) {
+      bool nothing = true;
+      for (int n = 0; n < 289; ++n) nothing &= scene.depth[size_t(y + n / 17 - 8) * 320 + size_t(x + n % 17 - 8)] == 0;
+      if (!nothing) continue;
+      ++empty;
+      EXPECT_EQ(cast[size_t(y) * 320 + size_t(x)], 2) << x << ", " << y;
+    }
+  EXPECT_GT(empty, 5000);
+}
+
 TEST(Plan, AWalkNeedsFewRays) {
   Session s;
   uint64_t rays = 0, full = 0;

@@ -13,7 +13,7 @@ namespace {
 // fewer where plans follow each other in less than kTurn_s, and where the head stands still.
 constexpr int kSets = 8, kStillSets = 4;
 constexpr double kTurn_s = 0.25;
-// Known empty pixels are checked in one set of every kEmptyShare sets of a plan.
+// Known empty pixels are checked this many times as seldom.
 constexpr int kEmptyShare = 4;
 
 // Sampling, coding and packing one ray of a mask takes about four times as long as one of a whole tile.
@@ -103,7 +103,8 @@ Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
   for (int y = 0; y < height; ++y) {
     uint64_t picked = 0, picked_empty = 0;
     for (uint64_t i = 0; i < picks; ++i) picked |= blue_noise_.row(y, view.round + i);
-    for (uint64_t i = 0; i < picks; i += kEmptyShare) picked_empty |= blue_noise_.row(y, view.round + i);
+    for (uint64_t r = view.round; r < view.round + picks; ++r)
+      if (r % kEmptyShare == 0) picked_empty |= blue_noise_.row(y, r / kEmptyShare);
     for (size_t w = 0; w < map.covered.words_per_row(); ++w) {
       const uint64_t inside = w + 1 == map.covered.words_per_row() ? last_word_mask(width) : ~uint64_t{0};
       const uint64_t covered = map.covered.row(y)[w], lacking = map.lacking.row(y)[w], edge = map.edge.row(y)[w];
