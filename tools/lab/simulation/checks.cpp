@@ -17,13 +17,10 @@
 namespace telesplat::simulation {
 namespace {
 
-constexpr double kRecovers_s = 6;   // what a fault does may last so long after it
 constexpr double kAnswers_s = 1;    // a view, besides what its link and its samplers take
 constexpr double kTakesOver_s = 2;  // another sampler, from one that fails: lease_timeout_s
-constexpr double kOrderAnswers_s = 2.5;
-constexpr double kEpoch_s = 4;  // from an epoch's beginning until each viewer shows it
 constexpr double kLook_s = 0.1;
-constexpr double kLast_s = 1.5, kMostLateViews = 1.5;  // views whose rays a standing head casts at the end, at most
+constexpr double kMostLateViews = 1.5;        // views whose rays a standing head casts at the end, at most
 constexpr double kLeast_dB[] = {22, 27, 12};  // least PSNR of a standing head's picture: spheres, terrain, bars
 constexpr double kMostForgets = 32e6;  // bytes of forgets that the log keeps beyond its limit, at most (event_log.h)
 constexpr double kMostHoles = 0.02, kMostWrong = 0.05;  // shares of pixels that one surface covers whole
@@ -34,10 +31,6 @@ std::optional<M> read(const Passed& m) {
   if (m.type != M::kName) return std::nullopt;
   auto out = wire::decode<M>(m.body);
   return out ? std::optional<M>(*std::move(out)) : std::nullopt;
-}
-
-std::string fact_of(const wire::Welcome& w, const std::string& name) {
-  return scene::value_or(w.facts, name, std::string());
 }
 
 // FNV-1a over words.
@@ -52,75 +45,18 @@ void mix(uint64_t& digest, const void* data, size_t bytes) {
   for (; bytes > 0; --bytes, ++at) digest = (digest ^ *at) * 0x100000001b3u;
 }
 
-// For so long an event keeps the session busy.
-double lasts_s(const Scenario& s, const Event& e) {
-  using enum Fault;
-  const Fault f = e.fault;
-  if (f == kOrder || f == kIntruder) return 0;
-  if (f == kSlowLink || f == kSlowWork || f == kKillAtMessage)
-    return std::max(0.0, s.duration_s - s.calm_s - e.at_s) + kRecovers_s;
-  const bool lasts =
-      f == kStop || f == kSilence || f == kIsolate || f == kKill || f == kDiskFull || f == kClockStep || f == kShow;
-  return (lasts ? e.amount : 0) + kRecovers_s;
-}
-
-// The number of the sampler whose work this event holds up, and nothing else; -1: it holds up others.
-int sampler_of(const Event& e) {
-  switch (e.fault) {
-    case Fault::kBreak:
-    case Fault::kSilence:
-      return e.a.role == Role::kSampler ? e.a.number : -1;
-    case Fault::kKill:
-    case Fault::kTerminate:
-    case Fault::kStop:
-    case Fault::kIsolate:
-    case Fault::kClockStep:
-    case Fault::kSlowWork:
-    case Fault::kKillAtMessage:
-    case Fault::kLeave:
-      return e.a.role == Role::kSampler ? e.a.number : -1;
-    default:
-      return -1;
-  }
-}
-
-// True if a sampler works from before the event until the event is over.
-bool has_another(const Scenario& s, const Event& event) {
-  const auto touches = [&](int sampler) {
-    return std::any_of(s.events.begin(), s.events.end(), [&](const Event& e) {
-      if (sampler_of(e) != sampler) return false;
-      const bool lasts = e.fault == Fault::kLeave || e.at_s + lasts_s(s, e) >= event.at_s;
-      return lasts && e.at_s <= event.at_s + lasts_s(s, event);
-    });
-  };
-  for (int n = 0; n < s.samplers; ++n)
-    if (n != sampler_of(event) && !touches(n)) return true;
-  return false;
-}
-
-bool has_any(const std::vector<Event>& events, const Scenario& s, double from_s, double until_s) {
-  return std::any_of(events.begin(), events.end(),
-                     [&](const Event& e) { return e.at_s <= until_s && e.at_s + lasts_s(s, e) >= from_s; });
-}
-
 }  // namespace
 
-Checks::Checks(const Scenario& scenario) : scenario_(scenario) {
-  for (const Event& e : scenario.events)
-    (sampler_of(e) >= 0 && has_another(scenario, e) ? delays_ : excuses_).push_back(e);
-  strangers_ = std::any_of(scenario_.events.begin(), scenario_.events.end(),
-                           [](const Event& e) { return e.fault == Fault::kStranger || e.fault == Fault::kImpostor; });
-}
+Checks::Checks(const Scenario& scenario)
+    : scenario_(scenario),
+      excuses_(scenario_),
+      orders_(scenario.duration_s, [this](const std::string& text) { fail("order", text, now_s_); }) {}
 
 void Checks::fail(std::string_view check, const std::string& text, double now_s) {
   if (outcome_.failure) return;
   outcome_.failure = Failure{std::string(check), text, now_s};
   if (on_failure) on_failure();
 }
-
-bool Checks::disturbed(double from_s, double until_s) const { return has_any(excuses_, scenario_, from_s, until_s); }
-
-bool Checks::delayed(double from_s, double until_s) const { return has_any(delays_, scenario_, from_s, until_s); }
 
 Checks::Viewer* Checks::viewer_of(int process) {
   const auto found = viewers_.find(process);
@@ -159,7 +95,7 @@ void Checks::digest(const viewer::DrawnFrame& drawn, const image::View& view) {
 void Checks::sent(const Passed& m) {
   const auto from = parts_.find(m.from);
   if (from == parts_.end()) {  // a peer without a part
-    if (const auto order = read<wire::Control>(m)) orders_[m.from] = {m.now_s, *order, speaker_};
+    if (const auto order = read<wire::Control>(m)) orders_.on_order(m.from, *order, m.now_s);
     return;
   }
   const Part part = from->second;
@@ -177,47 +113,11 @@ void Checks::sent(const Passed& m) {
     if (const auto lease = read<wire::Lease>(m)) on_lease(*lease);
     if (const auto slab = read<wire::SliceLease>(m))
       leases_[slab->lease.value] = {slab->frame.value, slab->slab}, ++outcome_.leases;
-    if (const auto welcome = read<wire::Welcome>(m)) on_welcome(*welcome, m.sent_s);
+    if (const auto welcome = read<wire::Welcome>(m)) orders_.on_welcome(*welcome, m.sent_s);
   } else if (part.role == Role::kPacker) {
     if (m.kind == net::Kind::kPub) on_patch(m, part);
     if (const auto done = read<wire::TileDone>(m)) on_done(*done, m.now_s);
   }
-}
-
-void Checks::on_welcome(const wire::Welcome& welcome, double now_s) {
-  // Orders go with the data that they were given for.
-  for (const char* name : {"kind", "content_hash", scene::kPlacementFact})
-    if (fact_of(session_, name) != fact_of(welcome, name)) ordered_.clear(), scene_since_s_ = now_s;
-  session_ = welcome;
-  if (epochs_.empty() || epochs_.back().second < welcome.epoch.value) epochs_.emplace_back(now_s, welcome.epoch.value);
-  while (epochs_.size() > 1 && epochs_[1].first < now_s - kEpoch_s) epochs_.pop_front();
-}
-
-// Answers to two people may come in another order than they were given in.
-void Checks::on_reply(const wire::ControlReply& reply, const Passed& m) {
-  const auto asked = orders_.find(m.to);
-  if (asked == orders_.end()) return;
-  const auto [at_s, order, speaker] = asked->second;
-  const bool wrong = speaker.fault == Fault::kOrder && speaker.amount == 1;
-  orders_.erase(asked);
-  if (reply.ok && order.command == "status" && now_s_ > scenario_.duration_s - kLast_s) status_ = reply.text;
-  const auto now_is = [&](const std::string& name, const std::string& value) {
-    Ordered& o = ordered_[name];
-    if (m.sent_s >= o.at_s) o = {m.sent_s, m.sent_s > o.at_s ? value : ""};
-  };
-  if (wrong && (reply.ok || reply.text.empty()))
-    fail("order", fmt::format("the wrong order {} is answered by \"{}\"", order.command, reply.text), now_s_);
-  if (m.sent_s <= scene_since_s_ || fact_of(session_, "kind").empty()) return;
-  const bool fits =
-      order.command == "epoch" || order.command == "clip" ||
-      (fact_of(session_, "kind") == "volume" && (order.command == "tf" || order.arguments.contains("volume.layers")));
-  if (!reply.ok && !wrong && fits && speaker.fault == Fault::kOrder)
-    fail("order", fmt::format("{} is refused: {}", order.command, reply.text), now_s_);
-  if (!reply.ok) return;
-  if (order.command == "animate" || order.command == "play")
-    for (const char* name : {"c.x", "c.y", "c.z", "volume.step"}) now_is(name, "");
-  if (order.command == "set" || order.command == "clip" || order.command == "tf")
-    for (const auto& [name, value] : order.arguments) now_is(name, value);
 }
 
 void Checks::on_updates(const wire::MetricRows& rows, Part part) {
@@ -232,7 +132,7 @@ void Checks::on_lease(const wire::Lease& lease) {
   leases_[lease.lease.value] = {lease.frame.value, lease.tile};
   ++outcome_.leases;
   outcome_.rays += lease.rays > 0 ? lease.rays : uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
-  if (now_s_ > scenario_.duration_s - kLast_s)
+  if (now_s_ > scenario_.duration_s - OrderChecks::kLast_s)
     late_rays_ += lease.rays > 0 ? lease.rays : uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
 }
 
@@ -280,7 +180,7 @@ void Checks::delivered(const Passed& m) {
   const auto to = parts_.find(m.to);
   if (m.type == wire::Welcome::kName && m.from == master_ && to != parts_.end() && to->second.role == Role::kPacker)
     packer_welcomed_ = true;
-  if (const auto reply = read<wire::ControlReply>(m)) on_reply(*reply, m);
+  if (const auto reply = read<wire::ControlReply>(m)) orders_.on_reply(m.to, *reply, m.sent_s, now_s_);
   if (intruders_.contains(m.to) && m.type != wire::Shutdown::kName)
     fail("intruder", fmt::format("a process without a right to it is sent {}", m.type), m.now_s);
   const auto rows = read<wire::MetricRows>(m);
@@ -300,22 +200,18 @@ void Checks::look_at_requests(double now_s) {
   double most_s = kAnswers_s + 6 * scenario_.to_viewers.latency_s + 3 * tiles * scenario_.tile_s;
   if (scenario_.to_viewers.bytes_s > 0) most_s += 3e5 / scenario_.to_viewers.bytes_s;
   for (const auto& [process, v] : viewers_)
-    if (v.open_since_s && now_s - *v.open_since_s > most_s + (delayed(*v.open_since_s, now_s) ? kTakesOver_s : 0) &&
-        !disturbed(*v.open_since_s, now_s))
+    if (v.open_since_s &&
+        now_s - *v.open_since_s > most_s + (excuses_.delayed(*v.open_since_s, now_s) ? kTakesOver_s : 0) &&
+        !excuses_.disturbed(*v.open_since_s, now_s))
       fail("request",
            fmt::format("{} has had no answer for {:.1f} s, requests from {} on are open", text_of(parts_.at(process)),
                        now_s - *v.open_since_s, v.open.begin()->first),
            now_s);
-  for (const auto& [process, asked] : orders_)
-    if (now_s - asked.at_s > kOrderAnswers_s && !disturbed(asked.at_s - kRecovers_s, now_s))
-      fail("order", asked.order.command + " has no answer", now_s);
-  if (epochs_.empty() || now_s - epochs_.front().first < kEpoch_s || disturbed(epochs_.front().first, now_s)) return;
+  orders_.look_at_open(now_s, excuses_);
+  const uint64_t due = orders_.due_epoch(now_s, excuses_);
   for (const auto& [process, v] : viewers_)
-    if (v.pictured && v.epoch < epochs_.front().second)
-      fail("order",
-           fmt::format("{} shows epoch {}, {} began {:.1f} s before", text_of(parts_.at(process)), v.epoch,
-                       epochs_.front().second, now_s - epochs_.front().first),
-           now_s);
+    if (v.pictured && v.epoch < due)
+      fail("order", fmt::format("{} shows epoch {}, not {}", text_of(parts_.at(process)), v.epoch, due), now_s);
 }
 
 void Checks::on_status(const Passed& m, Part part) {
@@ -337,7 +233,7 @@ void Checks::on_status(const Passed& m, Part part) {
 
 // ---- what happens ---------------------------------------------------------------------------------------------------
 
-void Checks::on_event(const Event& e) { speaker_ = e; }
+void Checks::on_event(const Event& e) { orders_.on_event(e); }
 
 void Checks::on_begin(Part part, int process, double) {
   if (part.number >= kFirstIntruder) {
@@ -350,9 +246,7 @@ void Checks::on_begin(Part part, int process, double) {
     leases_.clear();
     master_ = process;
     packer_welcomed_ = false;
-    epochs_.clear();
-    ordered_.clear();
-    session_ = {};
+    orders_.on_new_master();
     for (auto& [number, v] : viewers_) v.another_master = true;
   }
   if (part.role == Role::kMaster || part.role == Role::kPacker) published_.clear();
@@ -370,16 +264,8 @@ void Checks::on_unexpected(Part part, const std::string& what, double now_s) {
 // Clients of strangers aside, all here say what others expect. What comes faster than a limit allows is refused, too.
 void Checks::on_rejected(Part part, std::string_view socket, const net::Message& message, const std::string& why) {
   // A process that has not heard of another scene yet asks for content of the former one.
-  const bool shows = std::any_of(excuses_.begin(), excuses_.end(), [&](const Event& e) {
-    return e.fault == Fault::kShow && e.at_s <= now_s_ && now_s_ <= e.at_s + lasts_s(scenario_, e);
-  });
-  if (strangers_ || shows || intruder_keys_.contains(message.user)) return;
+  if (has_strangers() || excuses_.changes_show(now_s_) || intruder_keys_.contains(message.user)) return;
   fail("rejected", fmt::format("{} refuses {} at {}: {}", text_of(part), message.type, socket, why), now_s_);
-}
-
-// True if orders have changed a Julia set: it may have left the view, or change for ever.
-bool Checks::reshaped() const {
-  return std::any_of(ordered_.begin(), ordered_.end(), [](const auto& o) { return o.first.starts_with("c."); });
 }
 
 void Checks::on_frame(Part part, SimulatedViewer& viewer, const viewer::DrawnFrame& drawn, double now_s) {
@@ -397,7 +283,7 @@ void Checks::on_frame(Part part, SimulatedViewer& viewer, const viewer::DrawnFra
   if (drawn.epoch.value < v.epoch && !std::exchange(v.another_master, false))
     fail("backwards", fmt::format("{} shows epoch {} after {}", text_of(part), drawn.epoch.value, v.epoch), now_s);
   v.epoch = drawn.epoch.value;
-  if (drawn.empty && drawn.cached == 0 && v.pictured && !reshaped())
+  if (drawn.empty && drawn.cached == 0 && v.pictured && !orders_.reshaped())
     fail("blank", fmt::format("{} has no picture any more", text_of(part)), now_s);
   v.pictured = v.pictured || !drawn.empty;
 }
@@ -423,11 +309,20 @@ void Checks::at_rest(Session& session) {
   }
   if (packer_["log_bytes"] > scenario_.log_limit_mb * 1.1e6 + kMostForgets)
     fail("limit", fmt::format("the packer's log has {} bytes", packer_["log_bytes"]), now_s);
-  const std::string kind = fact_of(session_, "kind"), scene = kind == "julia" ? kind : fact_of(session_, "scene");
+  const std::string kind = fact_of(orders_.session(), "kind");
+  const std::string scene = kind == "julia" ? kind : fact_of(orders_.session(), "scene");
   if (session.show() != Show::kMesh && scene != kShowNames[size_t(session.show())])
     fail("scene", fmt::format("the session shows \"{}\"", scene), now_s);
   if (!intruders_.empty()) fail("intruder", "a process whose key is not of its role goes on", now_s);
-  if (!strangers_) look_at_orders(session), look_at_status(session);
+  if (!has_strangers()) {
+    orders_.look_at_values();
+    for (const auto& [process, v] : viewers_) {
+      SimulatedViewer* const viewer = session.viewer(parts_.at(process).number);
+      if (const auto known = viewer ? viewer->session() : nullptr)
+        orders_.look_at_values(*known, text_of(parts_.at(process)));
+    }
+    look_at_status(session);
+  }
   look_at_late_rays(session);
   compare_pictures(session);
 }
@@ -438,7 +333,7 @@ void Checks::look_at_late_rays(const Session& session) {
       std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.status.at("coupling") != 0; });
   const double views = double(late_rays_) / double(scenario_.width * scenario_.height);
   const bool forgets = scenario_.settings.obsolete_after_s > 0;  // looks from beside, which come again
-  if (scenario_.settings.steering && !waits && !forgets && !reshaped() &&
+  if (scenario_.settings.steering && !waits && !forgets && !orders_.reshaped() &&
       views > kMostLateViews * double(viewers_.size()))
     fail("standing", fmt::format("rays of {:.1f} views are cast for {} heads that stand", views, viewers_.size()),
          session.now_s());
@@ -446,7 +341,7 @@ void Checks::look_at_late_rays(const Session& session) {
 
 // The master's last status names the processes that run.
 void Checks::look_at_status(const Session& session) {
-  const auto status = nlohmann::json::parse(status_, nullptr, false);
+  const auto status = nlohmann::json::parse(orders_.status(), nullptr, false);
   if (!status.is_object()) return;
   std::map<std::string, int> alive;
   for (const auto& p : status["processes"]) alive[p["role"]] += p["alive"].get<bool>();
@@ -457,30 +352,6 @@ void Checks::look_at_status(const Session& session) {
            session.now_s());
     if (const std::string lacks = status["lacks"]; session.count(role) > 0 && lacks.find(name) != std::string::npos)
       fail("order", fmt::format("status lacks {}, {} run", lacks, session.count(role)), session.now_s());
-  }
-}
-
-// The last order of each setting is in the master's session, and in each viewer's.
-void Checks::look_at_orders(Session& session) {
-  const auto told = [](const wire::Welcome& w, const std::string& name) {
-    if (name == "volume.layers") return fmt::format("{}", w.settings.layers);
-    if (const auto number = w.parameters.find(name); number != w.parameters.end())
-      return fmt::format("{}", number->second);
-    const std::string fact = fact_of(w, name == "clip" ? scene::kClipOrderFact : name);
-    return fact.empty() ? "off" : fact;
-  };
-  for (const auto& [name, o] : ordered_)
-    if (!o.value.empty() && told(session_, name) != o.value)
-      fail("order", fmt::format("{} was ordered to be {} and is {}", name, o.value, told(session_, name)),
-           session.now_s());
-  for (const auto& [process, v] : viewers_) {
-    SimulatedViewer* const viewer = session.viewer(parts_.at(process).number);
-    const auto known = viewer ? viewer->session() : nullptr;
-    if (!known || known->epoch != session_.epoch) continue;
-    for (const auto& [name, o] : ordered_)
-      if (told(*known, name) != told(session_, name))
-        fail("order", fmt::format("{} takes {} for {}", text_of(parts_.at(process)), name, told(*known, name)),
-             session.now_s());
   }
 }
 
@@ -549,7 +420,7 @@ Compared compare(const image::View& view, const image::View& truth) {
 // Holes and errors of the last frames, against the truth.
 void Checks::compare_pictures(Session& session) {
   const auto surface = surface_of(session.show());
-  const auto clip = geometry::clip_from_text(fact_of(session_, scene::kClipFact));
+  const auto clip = geometry::clip_from_text(fact_of(orders_.session(), scene::kClipFact));
   outcome_.holes = outcome_.psnr_db = -1;
   // A surface that comes back after other data is sampled as the mesh of its chunks, which is not the surface.
   const bool changed = std::any_of(scenario_.events.begin(), scenario_.events.end(),

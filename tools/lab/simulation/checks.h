@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tools/lab/simulation/order_checks.h"
 #include "tools/lab/simulation/session.h"
 
 namespace telesplat::simulation {
@@ -92,11 +93,6 @@ class Checks final : public Observer {
     std::map<std::string, double> status;
     double digests_equal_at_calm = -1;
   };
-  struct Asked {
-    double at_s = 0;
-    wire::Control order;
-    Event speaker;
-  };
   void fail(std::string_view check, const std::string& text, double now_s);
   void digest(const Passed& m);
   void digest(const viewer::DrawnFrame& drawn, const image::View& view);
@@ -110,45 +106,30 @@ class Checks final : public Observer {
   void on_status(const Passed& m, Part part);
   void answered(int process, InstanceId viewer, RequestId request, double now_s);
   void look_at_requests(double now_s);
-  bool reshaped() const;
   void look_at_late_rays(const Session& session);
   void look_at_status(const Session& session);
-  void on_reply(const wire::ControlReply& reply, const Passed& m);
-  void on_welcome(const wire::Welcome& welcome, double now_s);
-  void look_at_orders(Session& session);
   void compare_pictures(Session& session);
-  bool disturbed(double from_s, double until_s) const;
-  bool delayed(double from_s, double until_s) const;
+  bool has_strangers() const { return excuses_.has({Fault::kStranger, Fault::kImpostor}); }
   Viewer* viewer_of(int process);
 
   const Scenario scenario_;
-  std::vector<Event> excuses_, delays_;  // that may hold up all viewers; that another sampler can make good
+  const Excuses excuses_;
+  OrderChecks orders_;
   Outcome outcome_;
   std::map<int, Part> parts_;                                 // by process
   std::map<int, Viewer> viewers_;                             // by process
   std::map<std::pair<uint64_t, uint64_t>, int> published_;    // frame and tile, of this packer and master
   std::map<uint64_t, std::pair<uint64_t, uint64_t>> leases_;  // lease: frame and tile, of this master
   std::set<std::pair<uint64_t, uint64_t>> updates_;           // rows of updates that viewers sent
-  std::map<int, Asked> orders_;                               // by process of who asked
-  struct Ordered {
-    double at_s = 0;
-    std::string value;  // empty: not known
-  };
-  std::map<std::string, Ordered> ordered_;          // what orders changed
-  std::deque<std::pair<double, uint64_t>> epochs_;  // that this master told, and when
-  wire::Welcome session_;                           // as it told last
-  std::set<int> intruders_;                         // that run
+  std::set<int> intruders_;                                   // that run
   std::set<std::string> intruder_keys_;
-  double scene_since_s_ = 0;
   std::map<std::string, double> packer_;  // its newest status
-  std::string status_;                    // in the last second, as JSON
   double looked_s_ = 0, now_s_ = 0;
   uint64_t late_rays_ = 0;
   int master_ = -1;                                    // the process of the newest
   std::deque<std::pair<double, uint64_t>> sequences_;  // that the packer had, and when
   uint64_t rows_ = 0;                                  // rows of updates that came to the master
-  bool strangers_ = false, rests_ = false, packer_welcomed_ = false;
-  Event speaker_;  // who speaks is begun by it
+  bool rests_ = false, packer_welcomed_ = false;
 };
 
 }  // namespace telesplat::simulation
