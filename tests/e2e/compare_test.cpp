@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <sstream>
 
@@ -170,28 +168,6 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   EXPECT_FALSE(read_csv(run.folder() / "stopped/compare.csv").empty());
   for (const auto& entry : fs::directory_iterator(run.folder() / "stopped"))
     EXPECT_NE(entry.path().extension(), ".part") << entry.path();
-}
-
-TEST(Compare, RefusesWhatIsNoRunOrEndsTooEarlyInOneLine) {
-  TemporaryFolder folder;
-  const std::string run = folder / "run";
-  fs::create_directory(run);
-  write_terrain(folder / "terrain.ply", 4);
-  std::ofstream(run + "/session.toml") << "[[process]]\nrole = \"viewer\"\nname = \"viewer-1\"\nwidth = \"160\"\n"
-                                       << "height = \"100\"\n[scene]\nfile = \"" << (folder / "terrain.ply")
-                                       << "\"\ncache = \"" << (folder / "cache") << "\"\n";
-  std::ofstream(run + "/frames.csv") << "viewer,frame,t_s,points_drawn,sequence,px,py,pz,qw,qx,qy,qz\n"
-                                        "viewer-1,0,0.5,5000,3,0,0,1,1,0,0,0\n";
-  std::ofstream(run + "/points.events") << "TSEVENT2";
-  for (const auto& [path, said] :
-       {std::pair{folder / "MISSING", "MISSING: no such file"}, {run, "displayed event 3"}}) {
-    Program compare("telesplat", {"compare", path, "--renderers", "cpu", "--out", folder / "out"}, folder / "log");
-    EXPECT_EQ(compare.wait(60), 2) << compare.err();
-    const std::string err = compare.err();
-    EXPECT_NE(err.find(said), std::string::npos) << err;
-    EXPECT_EQ(err.rfind("telesplat: "), err.rfind('\n', err.size() - 2) + 1) << err;
-    EXPECT_FALSE(fs::exists(folder / "out")) << "a folder was left";
-  }
 }
 
 }  // namespace

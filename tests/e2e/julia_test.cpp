@@ -2,9 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 #include "tests/support/patience.h"
@@ -131,33 +129,6 @@ TEST(Julia, ParametersAreSetAndAnimatedWhileItRuns) {
   EXPECT_EQ(palettes.back(), 7);
   EXPECT_EQ(std::count(values.begin(), values.end(), 7), 0);
   EXPECT_TRUE(run.all_gone());
-}
-
-TEST(JuliaUsage, AnAnimationIntoNothingIsRefusedInOneLine) {
-  PipelineRun run(with({"--animate", "slice.offset=0:1.75:1s;c.w=-0.2:1.5:1s"}), "julia");
-  EXPECT_EQ(run.program().wait(60), 2) << run.program().err();
-  const std::string err = run.program().complaint();
-  EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
-  EXPECT_TRUE(err.starts_with("telesplat: ")) << err;
-  EXPECT_NE(err.find("s of the animation"), std::string::npos) << err;
-  EXPECT_FALSE(fs::exists(run.out())) << "a run folder was left";
-  EXPECT_TRUE(run.all_gone());
-}
-
-TEST(JuliaUsage, MeshesTakeNoParametersAndHelpTellsThemAll) {
-  {
-    PipelineRun run({"--palette", "ice"});
-    EXPECT_EQ(run.program().wait(60), 2);
-    EXPECT_NE(run.program().err().find("terrain.ply"), std::string::npos) << run.program().err();
-  }
-  TemporaryFolder folder;
-  Program help("telesplat", {"run", "julia", "--help", "all"}, folder / "help");
-  EXPECT_EQ(help.wait(), 0);
-  for (const char* part : {"--c.w", "--slice.turn-y", "1..4096", "trap-plane", "spectrum", "--animate"})
-    EXPECT_NE(help.out().find(part), std::string::npos) << part;
-  Program list("telesplat", {"presets"}, folder / "list");
-  EXPECT_EQ(list.wait(), 0);
-  EXPECT_NE(list.out().find("lantern"), std::string::npos);
 }
 
 }  // namespace

@@ -301,40 +301,5 @@ TEST(KeysOfSessions, BadFoldersAreRefusedInALine) {
   }
 }
 
-TEST(KeysCommand, MakesListsHandsOutAndRevokes) {
-  const TemporaryFolder folder;
-  const std::string keys = folder / "keys";
-  const auto run = [&](std::vector<std::string> arguments, int code) {
-    arguments.insert(arguments.begin(), "keys");
-    Program p("telesplat", arguments, folder / "keys-command");
-    EXPECT_EQ(p.wait(20), code) << p.out() << p.err();
-    if (code != 0) {
-      EXPECT_EQ(std::ranges::count(p.err(), '\n'), 1) << p.err();
-    }
-    return p.out() + p.err();
-  };
-  EXPECT_NE(run({keys, "--list"}, 2).find("holds no keys"), std::string::npos);
-  const std::string made = run({keys}, 0);
-  EXPECT_NE(made.find("made keys of server, data, packer, sampler, viewer, operator"), std::string::npos) << made;
-  EXPECT_NE(made.find("server.pub sampler.key"), std::string::npos) << made;
-  EXPECT_EQ(run({keys}, 0).find("made keys"), std::string::npos) << "a second time nothing is made";
-  run({keys, "--person", "anna"}, 0);
-  run({keys, "--person", "anna", "--role", "operator"}, 2);
-  run({keys, "--person", "ben", "--role", "king"}, 2);
-  EXPECT_NE(run({keys, "--list"}, 0).find("anna"), std::string::npos);
-  run({keys, "--bundle", "anna", folder / "laptop"}, 0);
-  EXPECT_TRUE(std::filesystem::exists(folder / "laptop/anna.key"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "laptop/server.pub"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "laptop/server.key"));
-  run({keys, "--bundle", "anna", folder / "laptop"}, 2);
-  run({keys, "--bundle", "nobody", folder / "other"}, 2);
-  run({keys, "--bundle", "anna"}, 2);
-  run({keys, "--revoke", "anna"}, 0);
-  EXPECT_EQ(run({keys, "--list"}, 0).find("anna"), std::string::npos);
-  run({keys, "--revoke", "anna"}, 2);
-  run({keys, "--revoke", "server"}, 2);
-  run({keys, "--person", "ben", "--revoke", "sampler"}, 2);
-}
-
 }  // namespace
 }  // namespace telesplat::test

@@ -203,27 +203,6 @@ TEST(Movie, WithoutFfmpegIsASequenceOfPicturesAndTellsHowToGoOn) {
   EXPECT_TRUE(words.ends_with("\n" + file + "\n")) << words;
 }
 
-TEST(Movie, IsRefusedBeforeTheRunBegins) {
-  const std::pair<std::vector<std::string>, std::string> cases[] = {
-      // Without ffmpeg pictures go into the folder a-frames.
-      {{"--movie", "/proc/nowhere/a.mp4"},
-       !need("ffmpeg").empty() ? "/proc/nowhere/a.mp4: cannot be written"
-                               : "/proc/nowhere/a-frames/: cannot be written"},
-      {{"--movie", "a.xyz"}, "a.xyz: ends in none of"},
-      {{"--movie", "a.mp4", "--movie-size", "13x13"}, "--movie-size 13x13"},
-      {{"--movie", "a.mp4", "--movie-fps", "nan"}, "--movie-fps"},
-      {{"--movie", "a.mp4", "--movie-fps", "0"}, "--movie-fps"},
-      {{"--movie", "a.mp4", "--record-points", "0"}, "--record-points 0"},
-      {{"--movie-fps", "10"}, "no --movie"}};
-  for (const auto& [arguments, reason] : cases) {
-    PipelineRun run(arguments);
-    EXPECT_EQ(run.program().wait(20), 2) << reason;
-    EXPECT_NE(run.program().err().find(reason), std::string::npos) << reason << ": " << run.program().err();
-    EXPECT_EQ(lines(run.program().err()), 1u) << run.program().err();
-    EXPECT_FALSE(fs::exists(run.out())) << reason;
-  }
-}
-
 TEST(Movie, EndsWhereTheRecordWasCutShortAndSaysSo) {
   TemporaryFolder data;
   write_volume(data / "balls.mha", 64);

@@ -145,11 +145,6 @@ TEST(Record, EveryFileIsThereAndTrue) {
     }
   for (const char* name : {"sample", "encode", "pack", "decode", "insert", "display frame", "view update"})
     EXPECT_GT(spans[name], 0) << name;
-
-  // Its picture and itself can be inspected.
-  Program inspect("telesplat", {"inspect", run.out()}, run.folder() / "inspect");
-  EXPECT_EQ(inspect.wait(), 0) << inspect.err();
-  EXPECT_NE(inspect.out().find("summary.json"), std::string::npos);
 }
 
 // Where the time of each view update went: the stages of its last published tile, which add up to its latency.
@@ -182,9 +177,47 @@ void expect_stages(PipelineRun& run) {
   }
 }
 
+// What `telesplat inspect` tells of a run by its latest link, and of a depth image that it recorded.
+void expect_inspected(const PipelineRun& run) {
+  const auto inspect = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "inspect");
+    Program program("telesplat", arguments, run.folder() / "inspect");
+    EXPECT_EQ(program.wait(60), 0) << program.err();
+    return program.out();
+  };
+  const auto expect_told = [](const std::string& out, std::initializer_list<const char*> parts) {
+    for (const char* part : parts) EXPECT_NE(out.find(part), std::string::npos) << part << " is not in\n" << out;
+  };
+  const std::string latest = run.folder() / "latest", picture = run.folder() / "a.exr", values = run.folder() / "a.npy";
+  fs::create_directory_symlink(run.out(), latest);
+  expect_told(inspect({latest}), {": a run", "20000 triangles", "inter-frame delay", "frames.csv", "bytes"});
+  const auto json = nlohmann::json::parse(inspect({latest, "--json"}), nullptr, false);
+  ASSERT_TRUE(json.is_object());
+  EXPECT_EQ(json["summary"]["kind"], "mesh");
+  EXPECT_TRUE(json["files"].is_array());
+
+  std::string depth;  // the first frame's: later ones hold what was lacking
+  for (const auto& entry : fs::directory_iterator(run.out() + "/depth"))
+    if (const std::string path = entry.path().string(); entry.path().extension() == ".depth")
+      depth = depth.empty() ? path : std::min(depth, path);
+  ASSERT_FALSE(depth.empty());
+  const auto image = nlohmann::json::parse(inspect({depth, "--json", "--out", values}), nullptr, false);
+  ASSERT_TRUE(image.is_object());
+  // The head is some tens of centimetres from a terrain of 0.8 m.
+  EXPECT_GT(image["coverage"], 0.05);
+  EXPECT_GT(image["depth_m"]["min"], 0.1);
+  EXPECT_LT(image["depth_m"]["max"], 3);
+  EXPECT_LE(image["depth_m"]["min"], image["depth_m"]["median"]);
+  EXPECT_EQ(fs::file_size(values), 128 + 4 * uint64_t(image["size"][0]) * uint64_t(image["size"][1]));
+  expect_told(inspect({depth, "--out", picture}), {"a sampled depth image", "camera", "near plane"});
+  expect_told(inspect({picture}), {"a picture with depth"});
+}
+
 TEST(Record, TheStagesOfAnUpdateAddUpAndNoneIsNegative) {
-  PipelineRun run({"--duration", "3"});
+  PipelineRun run({"--duration", "3", "--record-depth", "--report"});
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
+  EXPECT_NE(run.program().out().find("The report is " + run.out() + "/report.html"), std::string::npos);
+  EXPECT_TRUE(read_text(run.out() + "/report.html").starts_with("<!DOCTYPE html>"));
   expect_stages(run);
   // A frame and the update that it shows, on one clock.
   const auto begin = run.column("frames.csv", "begin_s"), construction = run.column("frames.csv", "construction_ms"),
@@ -200,6 +233,7 @@ TEST(Record, TheStagesOfAnUpdateAddUpAndNoneIsNegative) {
     }
   EXPECT_GT(joined, begin.size() / 2);
   for (size_t f = 1; f < begin.size(); ++f) EXPECT_NEAR(begin[f] - begin[0], t[f] - t[0], 1e-8);
+  expect_inspected(run);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <sys/types.h>
 
 #include <functional>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "common/net/keys/access.h"
+#include "tests/support/files/made_data.h"
 
 namespace telesplat::launcher {
 class ControlClient;
@@ -19,28 +19,7 @@ class ControlClient;
 
 namespace telesplat::test {
 
-/// A temporary folder; the destructor deletes it.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  const std::string& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
-/// Writes a coloured, bumpy terrain of 2 * cells^2 triangles as binary PLY.
-void write_terrain(const std::string& path, int cells = 100);
-
-/// Writes a volume of `side`^3 voxels as MetaImage (.mha), 8 bit: two soft balls of 200 and 140 that pass into each
-/// other, a rod of 255 through them, 0 around. `turn` moves the smaller ball around the larger: 0 to 1 is once around.
-void write_volume(const std::string& path, int side = 40, double turn = 0);
-
-std::string read_text(const std::string& path);
-
-/// Polls `condition` until it holds. False: it did not within `deadline_s`, which like all deadlines here is that of
+/// Asks `condition` until it holds. False: it did not within `deadline_s`, which like all deadlines here is that of
 /// ordinary builds (patience.h).
 bool wait_until(const std::function<bool()>& condition, double deadline_s = 30);
 

@@ -106,12 +106,5 @@ TEST(Stereo, PatternsTakeTheScenesPlace) {
   EXPECT_EQ(shown.colour[1] & 0xffffff, 0x0000ffu);
 }
 
-TEST(Stereo, QuadBuffersNeedAWindow) {
-  PipelineRun run({"--stereo", "quad-buffer"}, "julia");
-  EXPECT_EQ(run.program().wait(), 2);
-  EXPECT_NE(run.program().complaint().find("--stereo quad-buffer: needs a window"), std::string::npos)
-      << run.program().complaint();
-}
-
 }  // namespace
 }  // namespace telesplat::test

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <set>
 
 #include "common/image/file.h"
 #include "tests/support/pipeline_run.h"
@@ -154,18 +153,6 @@ TEST(Wall, ACylinderIsUnrolled) {
   EXPECT_EQ(stitched->colour[84] & 0xffffff, 0u) << "a bezel";
   const Row first = frames(run).front();
   EXPECT_GT(std::hypot(first.px, first.pz), 0.1) << "frames.csv has the head";
-}
-
-TEST(Wall, WhatIsWrongWithADescriptionIsSaidBeforeAnythingStarts) {
-  TemporaryFolder folder;
-  const std::string path = write_wall(folder, "[head]\nposition = [0, 0, 1]\n[[planar]]\nsize = [0.4, 0.3]\n");
-  PipelineRun run({"--wall", path});
-  EXPECT_EQ(run.program().wait(20), 2);
-  EXPECT_NE(run.program().err().find("lab.toml:3: [[planar]] 1 resolution: is missing"), std::string::npos)
-      << run.program().err();
-  PipelineRun sized({"--wall", write_wall(folder), "--size", "100x100"});
-  EXPECT_EQ(sized.program().wait(20), 2);
-  EXPECT_NE(sized.program().err().find("--size: the screens of"), std::string::npos) << sized.program().err();
 }
 
 }  // namespace

@@ -87,22 +87,5 @@ TEST(Tracking, TheDisplayGoesOnWithoutAPublisherAndAfterIt) {
   EXPECT_EQ(x[x.size() - 1], x[x.size() - 10]);
 }
 
-TEST(Tracking, WhatCannotBeIsRefused) {
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--poses", "nowhere"},
-                                                    {"--poses", "tcp://127.0.0.1:1", "--trajectory", "orbit"},
-                                                    {"--prediction", "gaze"}}) {
-    PipelineRun run(arguments);
-    EXPECT_EQ(run.program().wait(), 2) << arguments[1];
-    EXPECT_NE(run.program().complaint().find(arguments[0]), std::string::npos) << run.program().complaint();
-  }
-  TemporaryFolder folder;
-  Program missing("telesplat-lab", {"pose-replay", folder / "nothing.csv"}, folder / "missing");
-  EXPECT_EQ(missing.wait(), 2);
-  write_swaying(folder / "swaying.csv");
-  Program open("telesplat-lab", {"pose-replay", folder / "swaying.csv", "--bind", "tcp://0.0.0.0:*"}, folder / "open");
-  EXPECT_EQ(open.wait(), 2);
-  EXPECT_NE(open.err().find("--insecure"), std::string::npos) << open.err();
-}
-
 }  // namespace
 }  // namespace telesplat::test

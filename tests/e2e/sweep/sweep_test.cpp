@@ -109,30 +109,5 @@ TEST_F(Sweeps, ARunThatFailsTwiceIsToldAndTheOthersGoOn) {
   EXPECT_NE(read_text(folder / "sweep/report.html").find("exit code 2"), std::string::npos);
 }
 
-TEST_F(Sweeps, NothingIsStartedBeforeAllIsChecked) {
-  for (const auto& [own, complaint] :
-       {std::pair<std::vector<std::string>, std::string>{{"--vary", "samplers=1,two"},
-                                                         "--samplers two: is not a whole number"},
-        {{"--vary", "smplers=1"}, "--vary smplers: no such flag of telesplat run; did you mean samplers?"},
-        {{"--vary", "coupling=sync,lose"}, "--coupling lose: "},
-        {{"--vary", "iso=3"}, "iso=3: --iso"},
-        {{"--repeat", "0"}, "--repeat 0: is not between 1 and 1000"}}) {
-    Program sweep("telesplat", words(own), folder / "wrong");
-    EXPECT_EQ(sweep.wait(30), 2) << sweep.err();
-    EXPECT_NE(sweep.err().find(complaint), std::string::npos) << sweep.err();
-    EXPECT_FALSE(fs::exists(folder / "sweep")) << complaint;
-  }
-  Program listed("telesplat", words({"--vary", "samplers=1,2", "--dry-run"}), folder / "listed");
-  EXPECT_EQ(listed.wait(30), 0) << listed.err();
-  EXPECT_NE(listed.out().find("6 runs (2 configurations, 3 times each), 6 to do"), std::string::npos) << listed.out();
-  EXPECT_FALSE(fs::exists(folder / "sweep"));
-
-  fs::create_directories(folder / "sweep");
-  std::ofstream(folder / "sweep/mine") << "mine";
-  Program full("telesplat", words({"--vary", "samplers=1,2"}), folder / "full");
-  EXPECT_EQ(full.wait(30), 2);
-  EXPECT_NE(full.err().find("is not empty, and holds no sweep"), std::string::npos) << full.err();
-}
-
 }  // namespace
 }  // namespace telesplat::test

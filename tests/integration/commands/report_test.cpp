@@ -9,7 +9,8 @@
 #include <fstream>
 #include <memory>
 
-#include "tests/support/pipeline_run.h"
+#include "common/image/file.h"
+#include "tests/integration/commands/here.h"
 #include "tools/telesplat/movie/movie_target.h"
 
 namespace telesplat::test {
@@ -17,19 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int code = 0;
-  std::string out, err;
-};
-
-Outcome report(const TemporaryFolder& folder, std::vector<std::string> arguments) {
+Said report(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "report");
-  Program program("telesplat", arguments, folder / "telesplat");
-  Outcome o;
-  o.code = program.wait(100);
-  o.out = program.out();
-  o.err = program.err();
-  return o;
+  return telesplat(arguments);
 }
 
 std::string browser() {
@@ -112,24 +103,6 @@ void write_run(const std::string& directory, int frames, double slow) {
             "errors": {"messages_rejected": 2, "gaps_resynced": 0, "leases_expired": 0}})");
 }
 
-TEST(Report, OfARunOpensWithoutAnErrorAndShowsAllItsParts) {
-  if (browser().empty()) GTEST_SKIP() << kNoBrowser;
-  const TemporaryFolder folder;
-  write_run(folder / "run", 600, 1);
-  const Outcome made = report(folder, {folder / "run"});
-  ASSERT_EQ(made.code, 0) << made.err;
-  EXPECT_NE(made.out.find(folder / "run/report.html"), made.out.npos);
-  const std::string dom = opened(folder, folder / "run/report.html");
-  expect_no_error(dom);
-  for (const char* part : {"delay", "stages", "trace", "time", "walk", "measures", "about", "configuration", "errors"})
-    EXPECT_NE(dom.find(fmt::format("<section id=\"{}\"", part)), dom.npos) << part;
-  // Names are text: in the page's own elements there is none that a run wrote.
-  const std::string shown = dom.substr(dom.find("<main"), dom.find("</main>") - dom.find("<main"));
-  EXPECT_NE(shown.find("&lt;img src=x onerror=alert(1)&gt;"), shown.npos);
-  EXPECT_EQ(shown.find("<img src=\"x\""), shown.npos);
-  EXPECT_EQ(shown.find("<b>full"), shown.npos);
-}
-
 std::string attribute(const std::string& dom, const std::string& name) {
   const std::string begin = "data-" + name + "=\"";
   const size_t at = dom.find(begin);
@@ -137,18 +110,33 @@ std::string attribute(const std::string& dom, const std::string& name) {
   return dom.substr(at + begin.size(), dom.find('"', at + begin.size()) - at - begin.size());
 }
 
-TEST(Report, AnswersHandsAndZoomsAllItsChartsTogether) {
+// With a person's hands on it (act.js), which zoom all its charts together.
+TEST(Report, OfARunOpensWithoutAnErrorShowsAllItsPartsAndAnswersHands) {
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const TemporaryFolder folder;
   write_run(folder / "run", 600, 1);
-  ASSERT_EQ(report(folder, {folder / "run"}).code, 0);
+  fs::create_directory(folder / "run/images");
+  const image::View picture{64, 48, std::vector<uint32_t>(64 * 48, 0x804020), {}};
+  ASSERT_TRUE(image::write_png(folder / "run/images/verify-worst-000002.png", picture));
+  const Said made = report({folder / "run"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(made.out.find(folder / "run/report.html"), made.out.npos);
   std::string page = read_text(folder / "run/report.html");
-  const std::string act = read_text("tests/e2e/report/act.js");
+  const std::string act = read_text("tests/integration/commands/act.js");
   ASSERT_FALSE(act.empty());
   page.insert(page.rfind("</body>"), "<script>" + act + "</script>");
   write(folder / "act.html", page);
   const std::string dom = opened(folder, folder / "act.html");
   expect_no_error(dom);
+  for (const char* part : {"delay", "stages", "trace", "time", "walk", "measures", "about", "configuration", "errors"})
+    EXPECT_NE(dom.find(fmt::format("<section id=\"{}\"", part)), dom.npos) << part;
+  EXPECT_NE(dom.find("Beside the reference"), dom.npos);
+  // Names are text: in the page's own elements there is none that a run wrote.
+  const std::string shown = dom.substr(dom.find("<main"), dom.find("</main>") - dom.find("<main"));
+  EXPECT_NE(shown.find("&lt;img src=x onerror=alert(1)&gt;"), shown.npos);
+  EXPECT_EQ(shown.find("<img src=\"x\""), shown.npos);
+  EXPECT_EQ(shown.find("<b>full"), shown.npos);
+
   EXPECT_NE(attribute(dom, "chart").find("ms"), std::string::npos);
   EXPECT_NE(attribute(dom, "histogram").find("%"), std::string::npos);
   EXPECT_NE(attribute(dom, "map").find("position"), std::string::npos);
@@ -166,7 +154,7 @@ TEST(Report, OfTwoRunsTellsTheirDifferences) {
   const TemporaryFolder folder;
   write_run(folder / "<b>quick", 300, 1);
   write_run(folder / "slow", 200, 2);
-  const Outcome made = report(folder, {folder / "<b>quick", folder / "slow", "--out", folder / "both.html"});
+  const Said made = report({folder / "<b>quick", folder / "slow", "--out", folder / "both.html"});
   ASSERT_EQ(made.code, 0) << made.err;
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const std::string dom = opened(folder, folder / "both.html");
@@ -184,7 +172,7 @@ TEST(Report, OfASweepShowsItsRuns) {
   write(folder / "sweep/sweep.csv",
         "configuration,repetition,flag.coupling,state,reason,noisy,folder\n"
         "a,1,<i>sync</i>,done,,,a/1\na,2,<i>sync</i>,done,,,a/2\nb,1,async,done,,,b/1\nb,2,async,failed,why,,b/2\n");
-  const Outcome made = report(folder, {folder / "sweep"});
+  const Said made = report({folder / "sweep"});
   ASSERT_EQ(made.code, 0) << made.err;
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
   const std::string dom = opened(folder, folder / "sweep/report.html");
@@ -201,21 +189,21 @@ TEST(Report, OfARunThatBrokeOffOpensAndSaysWhatItLacks) {
   for (const char* file : {"summary.json", "stages.csv", "quality.csv", "session.toml", "trace.json"})
     fs::remove(folder / (std::string("run/") + file));
   write(folder / "run/updates.csv", "viewer,request");
-  ASSERT_EQ(report(folder, {folder / "run"}).code, 0);
+  ASSERT_EQ(report({folder / "run"}).code, 0);
   const std::string dom = opened(folder, folder / "run/report.html");
   expect_no_error(dom);
   EXPECT_NE(dom.find("summary.json is not there"), dom.npos);
   EXPECT_NE(dom.find("trace.json is not there"), dom.npos);
   // With nothing at all but its id.
   write(folder / "empty/run.id", "telesplat-run 0123456789abcdef\n");
-  ASSERT_EQ(report(folder, {folder / "empty"}).code, 0);
+  ASSERT_EQ(report({folder / "empty"}).code, 0);
   expect_no_error(opened(folder, folder / "empty/report.html"));
 }
 
 TEST(Report, OfTenMinutesStaysSmallAndOpens) {
   const TemporaryFolder folder;
   write_run(folder / "run", 36'000, 1);
-  const Outcome made = report(folder, {folder / "run"});
+  const Said made = report({folder / "run"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_LT(fs::file_size(folder / "run/report.html"), 15'000'000u);
   if (browser().empty()) GTEST_SKIP() << kNoBrowser;
@@ -224,24 +212,22 @@ TEST(Report, OfTenMinutesStaysSmallAndOpens) {
   EXPECT_NE(dom.find("Thinned: "), dom.npos) << "the page does not say that it leaves something out";
 }
 
-TEST(Report, RefusesAFolderThatIsNoRunInOneLine) {
+TEST(Report, RefusesAFolderThatIsNoRunAndWritesThroughNoLink) {
   const TemporaryFolder folder;
   for (const std::string& path : {folder.path(), folder / "not there"}) {
-    const Outcome o = report(folder, {path});
-    EXPECT_EQ(o.code, 2);
-    EXPECT_EQ(o.err, fmt::format("telesplat: {}: is no run folder\n", path));
+    const Said refused = report({path});
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_EQ(refused.err, fmt::format("telesplat: {}: is no run folder\n", path));
   }
-}
-
-TEST(Report, IsMadeAtTheEndOfARun) {
-  PipelineRun run({"--duration", "2", "--size", "160x120", "--verify", "20", "--report"});
-  ASSERT_EQ(run.program().wait(120), 0) << run.program().err();
-  EXPECT_NE(run.program().out().find("The report is " + run.out() + "/report.html"), std::string::npos);
-  ASSERT_TRUE(fs::exists(run.out() + "/report.html"));
-  if (browser().empty()) GTEST_SKIP() << kNoBrowser;
-  const std::string dom = opened(run.folder(), run.out() + "/report.html");
-  expect_no_error(dom);
-  EXPECT_NE(dom.find("Beside the reference"), dom.npos);
+  // Nothing but what its own folder holds is written: a report of a stranger's run, too.
+  const fs::path run = folder / "run";
+  write(run / "summary.json", "{}"), write(run / "frames.csv", "viewer,t_s\nviewer-1,0\n");
+  write(folder / "precious", "precious");
+  for (const char* name : {"report.html", "report.html.part"}) fs::create_symlink(folder / "precious", run / name);
+  EXPECT_EQ(report({run}).code, 0);
+  EXPECT_EQ(read_text(folder / "precious"), "precious");
+  EXPECT_FALSE(fs::is_symlink(run / "report.html"));
+  EXPECT_TRUE(read_text(run / "report.html").starts_with("<!DOCTYPE html>"));
 }
 
 }  // namespace

@@ -6,8 +6,9 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
-#include "tests/support/pipeline_run.h"
+#include "tests/integration/commands/here.h"
 
 namespace telesplat::test {
 namespace {
@@ -49,10 +50,9 @@ class Inspect : public testing::Test {
   // Exit code; what it said is in out_ and err_.
   int inspect(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "inspect");
-    Program program("telesplat", arguments, folder_ / "telesplat");
-    const int code = program.wait(60);
-    out_ = program.out(), err_ = program.err();
-    return code;
+    const Said said = telesplat(arguments);
+    out_ = said.out, err_ = said.err;
+    return said.code;
   }
   bool tells(const std::string& part) const { return out_.find(part) != std::string::npos; }
   // Code 2, one line that names it.
@@ -145,7 +145,8 @@ TEST_F(Inspect, WarningsDoNotGetIntoTheJson) {
 TEST_F(Inspect, WhatRunRefusesIsRefusedAlike) {
   write_png(folder_ / "dem.png", 16);
   std::ofstream(folder_ / "cube.raw", std::ios::binary) << std::string(64 * 64 * 64, 'x');
-  fs::create_directory(folder_ / "empty");
+  fs::create_directory(folder_ / "empty"), fs::create_directory(folder_ / "run");
+  std::ofstream(folder_ / "run/summary.json") << "{}";
   expect_refused({folder_ / "dem.png", "--tf", "bone"}, "--tf: ");
   expect_refused({folder_ / "cube.raw"}, "raw voxels need --raw");
   expect_refused({folder_ / "cube.raw"}, "--raw 64x64x64:u8");
@@ -156,6 +157,7 @@ TEST_F(Inspect, WhatRunRefusesIsRefusedAlike) {
     arguments.insert(arguments.end(), flags.begin(), flags.end());
     expect_refused(arguments, "empty: is a folder that holds neither a finished run, which has a summary.json, nor a");
   }
+  expect_refused({folder_ / "run", "--tf", "bone"}, "is a run folder, which has no --tf");
   expect_refused({folder_ / "none.ply"}, "none.ply: no such file");
   expect_refused({folder_ / "dem.png", "--out", "a.npy"}, "--out: ");
   expect_refused({folder_ / "dem.png", "--near", "nan"}, "--near");
@@ -182,41 +184,6 @@ TEST_F(Inspect, AVolumeAndItsSurfaceStandAtOnePlace) {
     EXPECT_NEAR(metres / units, 2.0 / 40, 1e-5) << a;
   }
   EXPECT_EQ(volume["voxels"], (nlohmann::json{40, 40, 40}));
-}
-
-TEST_F(Inspect, ARunItsLatestLinkAndItsDepthAreTold) {
-  PipelineRun run({"--duration", "1", "--record-depth"});
-  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
-  fs::create_directory_symlink(run.out(), folder_ / "latest");
-  ASSERT_EQ(inspect({folder_ / "latest"}), 0) << err_;
-  for (const char* part : {": a run", "20000 triangles", "inter-frame delay", "frames.csv", "bytes"})
-    EXPECT_TRUE(tells(part)) << part << " is not in\n" << out_;
-  ASSERT_EQ(inspect({folder_ / "latest", "--json"}), 0) << err_;
-  const auto json = nlohmann::json::parse(out_, nullptr, false);
-  ASSERT_TRUE(json.is_object());
-  EXPECT_EQ(json["summary"]["kind"], "mesh");
-  EXPECT_TRUE(json["files"].is_array());
-  expect_refused({folder_ / "latest", "--tf", "bone"}, "is a run folder, which has no --tf");
-
-  std::string depth;  // the first frame's: later ones hold what was lacking
-  for (const auto& entry : fs::directory_iterator(run.out() + "/depth"))
-    if (const std::string path = entry.path().string(); entry.path().extension() == ".depth")
-      depth = depth.empty() ? path : std::min(depth, path);
-  ASSERT_FALSE(depth.empty());
-  ASSERT_EQ(inspect({depth, "--json", "--out", folder_ / "a.npy"}), 0) << err_;
-  const auto image = nlohmann::json::parse(out_, nullptr, false);
-  ASSERT_TRUE(image.is_object()) << out_;
-  // The head is some tens of centimetres from a terrain of 0.8 m.
-  EXPECT_GT(image["coverage"], 0.05);
-  EXPECT_GT(image["depth_m"]["min"], 0.1);
-  EXPECT_LT(image["depth_m"]["max"], 3);
-  EXPECT_LE(image["depth_m"]["min"], image["depth_m"]["median"]);
-  const uint64_t pixels = uint64_t(image["size"][0]) * uint64_t(image["size"][1]);
-  EXPECT_EQ(fs::file_size(folder_ / "a.npy"), 128 + 4 * pixels);
-  ASSERT_EQ(inspect({depth, "--out", folder_ / "a.exr"}), 0) << err_;
-  EXPECT_TRUE(tells("a sampled depth image") && tells("camera") && tells("near plane")) << out_;
-  ASSERT_EQ(inspect({folder_ / "a.exr"}), 0) << err_;
-  EXPECT_TRUE(tells("a picture with depth")) << out_;
 }
 
 }  // namespace
