@@ -8,7 +8,6 @@
 
 #include <csignal>
 #include <cstdlib>
-#include <filesystem>
 #include <sstream>
 #include <vector>
 
@@ -60,7 +59,7 @@ VirtualDisplay::VirtualDisplay() : display_before_(variable("DISPLAY")), wayland
     const int null = ::open("/dev/null", O_RDWR);
     for (const int fd : {0, 1, 2}) dup2(null, fd);
     const std::string fd = std::to_string(ends[1]);
-    execlp("Xvfb", "Xvfb", "-displayfd", fd.c_str(), "-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset",
+    execlp("Xvfb", "Xvfb", "-displayfd", fd.c_str(), "-screen", "0", "1024x2048x24", "-nolisten", "tcp", "-noreset",
            nullptr);
     _exit(127);
   }

@@ -2,13 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <thread>
 
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
@@ -92,15 +90,12 @@ class PanelTest : public testing::Test {
     EXPECT_TRUE(wait_until([&] { return (window = display_->find(title)).has_value(); }, 60)) << program.err();
     return window.value_or(0);
   }
+  // Each at once after the other: what a press is meant for is decided by where the pointer was then.
   void click(VirtualDisplay::WindowId window, const Place& p) {
     display_->move_pointer(window, p.x, p.y);
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
     display_->button(1, true);
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
     display_->button(1, false);
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
-  // Each at once after the other: what a press is meant for is decided by where the pointer was then.
   void drag(VirtualDisplay::WindowId window, const Place& from, const Place& to) {
     display_->move_pointer(window, from.x, from.y);
     display_->button(1, true);

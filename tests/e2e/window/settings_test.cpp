@@ -5,7 +5,6 @@
 #include <fstream>
 #include <optional>
 #include <sstream>
-#include <thread>
 
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
@@ -46,9 +45,12 @@ class SettingsTest : public testing::Test {
     display_.emplace();
     ASSERT_TRUE(display_->ready()) << "Xvfb did not start";
     write_plate(plate_);
-    run_.emplace(std::vector<std::string>{"view", plate_, "--size", "1000x740", "--trajectory", "still", "--samplers",
-                                          "1", "--sampler-threads", "1", "--cache", folder_ / "cache", "--up", "z"});
-    program_.emplace("telesplat", *run_, folder_ / "view");
+    // High enough for all of the panel.
+    program_.emplace("telesplat",
+                     std::vector<std::string>{"view", plate_, "--size", "500x1900", "--sampling-size", "320x200",
+                                              "--trajectory", "still", "--samplers", "1", "--sampler-threads", "1",
+                                              "--cache", folder_ / "cache", "--up", "z"},
+                     folder_ / "view");
     ASSERT_TRUE(wait_until([&] { return (window_ = display_->find(" fps, ").value_or(0)) != 0; }, 60))
         << program_->err();
   }
@@ -61,49 +63,61 @@ class SettingsTest : public testing::Test {
     EXPECT_EQ(program_->wait(60), 0) << program_->err();
   }
 
-  struct Place {
-    int x, y, left, right;
+  struct Widget {
+    int x = 0, y = 0, left = 0, right = 0, uses = 0;
   };
-  // Where a widget can be reached; nothing: nowhere.
-  std::optional<Place> widget(const std::string& name) const {
+  // One that can be reached; nothing: there is none.
+  std::optional<Widget> widget(const std::string& name) const {
     std::istringstream in(read_text(log_));
     for (std::string line; std::getline(in, line);) {
       if (!line.starts_with(name + "\t")) continue;
       std::istringstream fields(line.substr(name.size() + 1));
       std::string kind;
-      int left = 0, top = 0, right = 0, bottom = 0, here = 0, reachable = 0;
-      fields >> kind >> left >> top >> right >> bottom >> here >> reachable;
-      if (here && reachable) return Place{(left + right) / 2, (top + bottom) / 2, left, right};
+      Widget w;
+      int top = 0, bottom = 0, here = 0, reachable = 0;
+      fields >> kind >> w.left >> top >> w.right >> bottom >> here >> reachable >> w.uses;
+      w.x = (w.left + w.right) / 2, w.y = (top + bottom) / 2;
+      if (here && reachable) return w;
     }
     return std::nullopt;
   }
-  // Turns the wheel over the panel until it is in view.
-  Place find(const std::string& name) {
-    std::optional<Place> out;
-    int turns = 0;
-    EXPECT_TRUE(wait_until([&] {
-      if ((out = widget(name))) return true;
-      display_->move_pointer(window_, 8, 400);
-      const int wheel = turns++ % 60 < 30 ? 5 : 4;  // down, then up again
-      display_->button(wheel, true);
-      display_->button(wheel, false);
-      std::this_thread::sleep_for(std::chrono::milliseconds(120));
-      return false;
-    })) << "the panel has no "
-        << name << ":\n"
-        << read_text(log_);
-    return out.value_or(Place{});
+  Widget find(const std::string& name) {
+    std::optional<Widget> out;
+    EXPECT_TRUE(wait_until([&] { return (out = widget(name)).has_value(); })) << "the panel has no " << name << ":\n"
+                                                                              << read_text(log_);
+    return out.value_or(Widget{});
   }
-  void press(const Place& at, bool down) {
-    display_->move_pointer(window_, at.x, at.y);
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
-    display_->button(1, down);
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  }
+  // Until the panel says that it was used; one that is gone then, as a list's entry, was. News at the panel's top come
+  // and go, and with them all below moves.
   void click(const std::string& name) {
-    const Place at = find(name);
-    press(at, true);
-    press(at, false);
+    Widget at = find(name);
+    const auto press = [&] {
+      display_->move_pointer(window_, at.x, at.y);
+      display_->button(1, true);
+      display_->button(1, false);
+    };
+    press();
+    EXPECT_TRUE(wait_until([&] {
+      const auto now = widget(name);
+      if (!now || now->uses > at.uses) return true;
+      if (now->y != at.y) at = *now, press();
+      return false;
+    })) << name
+        << ":\n"
+        << read_text(log_);
+  }
+  // From a slider's beginning to three quarters of it, where its grab must be before the button is let go.
+  void drag(const std::string& name) {
+    const Widget slider = find(name);
+    const int to = (slider.left + 3 * slider.right) / 4;
+    display_->move_pointer(window_, slider.left + 4, slider.y);
+    display_->button(1, true);
+    display_->move_pointer(window_, to, slider.y);
+    EXPECT_TRUE(wait_until([&] {
+      const auto shown = display_->content(window_);
+      return shown && (shown->colour[size_t(slider.y * shown->width + to)] & 0xff) > 0xe8;  // white
+    })) << "the grab does not follow";
+    display_->button(1, false);
   }
   int ctl(std::vector<std::string> arguments, std::string* said = nullptr) {
     arguments.insert(arguments.begin(), "ctl");
@@ -136,7 +150,6 @@ class SettingsTest : public testing::Test {
   TemporaryFolder folder_;
   std::string log_ = folder_ / "widgets", plate_ = folder_ / "plate.vtk";
   std::optional<VirtualDisplay> display_;
-  std::optional<std::vector<std::string>> run_;
   std::optional<Program> program_;
   VirtualDisplay::WindowId window_ = 0;
   int asked_ = 0;
@@ -144,20 +157,18 @@ class SettingsTest : public testing::Test {
 
 TEST_F(SettingsTest, ColoursAndCutsAreChosenInTheWindow) {
   EXPECT_TRUE(coloured_by("heat")) << "the file's active scalars";
-  click("panel/Figures");  // makes room
-  click("Colours/array");
-  click("Colours/array=age");
-  EXPECT_TRUE(coloured_by("age"));
+  find("Colours/array");  // the panel knows the session
   click("panel/Cut");
-  Place slider = find("Cut/x from");
-  slider.x = slider.left + 4;
-  press(slider, true);
-  slider.x = (slider.left + slider.right) / 2;
-  press(slider, false);
+  const int second_row = find("panel/hide").y + 30;
+  EXPECT_TRUE(wait_until([&] { return find("panel/open ...").y < second_row; })) << "the news stay";
+  drag("Cut/x from");
   EXPECT_TRUE(wait_status(
       [](const Json& s) { return s.contains("clip") && s["clip"].get<std::string>().starts_with("plane x>="); }));
   click("Cut/off");
   EXPECT_TRUE(wait_status([](const Json& s) { return !s.contains("clip"); }));
+  click("Colours/array");
+  click("Colours/array=age");
+  EXPECT_TRUE(coloured_by("age"));
 }
 
 TEST_F(SettingsTest, CtlChangesTheWindowAndTheSamplersOrSaysWhyNot) {
