@@ -80,11 +80,46 @@ class Hands : public testing::Test {
     return {"--duration", "0", "--trajectory",    "still",   "--eye",   "0,0,0.9",
             "--up",       "y", "--sampling-size", "320x200", "--cache", folder_ / "cache"};
   }
+  void expect_book(PipelineRun& run, const std::string& mesh);
   TemporaryFolder folder_;
   int asked_ = 0;
 };
 
-TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
+// Bookmarks and notes lie beside the data.
+void Hands::expect_book(PipelineRun& run, const std::string& mesh) {
+  const std::string book = mesh + ".notes.json";
+  std::string out, err;
+  ASSERT_EQ(ctl(run, {"bookmark", "add", "in", "front"}, &out, &err), 0) << err;
+  ASSERT_EQ(ctl(run, {"notes", "add", "a scratch", "--at", "50%,50%"}, &out, &err), 0) << err;
+  const Json json = Json::parse(read_text(book), nullptr, false);
+  ASSERT_TRUE(json.is_object());
+  EXPECT_EQ(json["bookmarks"][0]["name"], "in front");
+  EXPECT_NEAR(json["bookmarks"][0]["position"][2].get<double>(), 0.9, 1e-6);
+  EXPECT_EQ(json["notes"][0]["text"], "a scratch");
+  EXPECT_NEAR(json["notes"][0]["place"][2].get<double>(), 30, 0.5);
+  ASSERT_EQ(ctl(run, {"notes"}, &out), 0);
+  EXPECT_NE(out.find("a scratch"), std::string::npos) << out;
+  EXPECT_EQ(ctl(run, {"bookmark", "go", "in front"}, nullptr, &err), 2) << "a head on a trajectory stays on it";
+  EXPECT_EQ(ctl(run, {"bookmark", "go", "nowhere"}, nullptr, &err), 2);
+  EXPECT_EQ(ctl(run, {"notes", "add", "nothing", "--at", "1,1"}, nullptr, &err), 2);
+  EXPECT_EQ(ctl(run, {"notes", "remove", "7"}, nullptr, &err), 2);
+
+  // A book that came with the data changes nothing in the terminal.
+  std::ofstream(book) << "{\"telesplat_notes\": 1, \"notes\": [{\"number\": 1, \"text\": \"red \\u001b[31m\\nnext\"}]}";
+  ASSERT_EQ(ctl(run, {"notes"}, &out, &err), 0) << err;
+  EXPECT_EQ(out.find('\x1b'), std::string::npos) << out;
+  EXPECT_NE(out.find("red "), std::string::npos) << out;
+
+  // A broken file is refused and stays.
+  std::ofstream(book) << "{\"telesplat_notes\": 1, \"notes\": [";
+  const std::string broken = read_text(book);
+  EXPECT_EQ(ctl(run, {"notes"}, nullptr, &err), 2);
+  EXPECT_NE(err.find(book), std::string::npos) << err;
+  EXPECT_EQ(ctl(run, {"notes", "add", "more"}, nullptr, &err), 2);
+  EXPECT_EQ(read_text(book), broken);
+}
+
+TEST_F(Hands, PicksMeasuresCutsAndNotesOfAMesh) {
   const std::string mesh = folder_ / "boards.ply";
   write_boards(mesh);
   PipelineRun run(looking(), mesh);
@@ -131,6 +166,7 @@ TEST_F(Hands, PicksMeasuresAndCutsAMesh) {
   EXPECT_EQ(ctl(run, {"pick", "5000,1"}, nullptr, &err), 2);
   EXPECT_NE(err.find("outside"), std::string::npos) << err;
   EXPECT_EQ(ctl(run, {"pick", "1,1", "--viewer", "nobody"}, nullptr, &err), 2);
+  expect_book(run, mesh);
   EXPECT_EQ(run.stop(), 0);
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
   // The record tells what was cut in which epoch.
@@ -276,44 +312,6 @@ TEST_F(Hands, APickOfAVolumeTellsItsValue) {
   EXPECT_GE(place["value_error"].get<double>(), 0.5) << "half a level at least";
   EXPECT_FALSE(place.contains("normal"));
   EXPECT_EQ(ctl(run, {"play", "pause"}), 2) << "one step has nothing to play";
-  EXPECT_EQ(run.stop(), 0);
-}
-
-TEST_F(Hands, BookmarksAndNotesLieBesideTheData) {
-  const std::string mesh = folder_ / "boards.ply", book = mesh + ".notes.json";
-  write_boards(mesh);
-  PipelineRun run(looking(), mesh);
-  ASSERT_TRUE(run.wait_showing());
-  ASSERT_TRUE(wait_pick(run, [](const Json& p) { return p.is_object(); }));
-  std::string out, err;
-  ASSERT_EQ(ctl(run, {"bookmark", "add", "in", "front"}, &out, &err), 0) << err;
-  ASSERT_EQ(ctl(run, {"notes", "add", "a scratch", "--at", "50%,50%"}, &out, &err), 0) << err;
-  const Json json = Json::parse(read_text(book), nullptr, false);
-  ASSERT_TRUE(json.is_object());
-  EXPECT_EQ(json["bookmarks"][0]["name"], "in front");
-  EXPECT_NEAR(json["bookmarks"][0]["position"][2].get<double>(), 0.9, 1e-6);
-  EXPECT_EQ(json["notes"][0]["text"], "a scratch");
-  EXPECT_NEAR(json["notes"][0]["place"][2].get<double>(), 30, 0.5);
-  ASSERT_EQ(ctl(run, {"notes"}, &out), 0);
-  EXPECT_NE(out.find("a scratch"), std::string::npos) << out;
-  EXPECT_EQ(ctl(run, {"bookmark", "go", "in front"}, nullptr, &err), 2) << "a head on a trajectory stays on it";
-  EXPECT_EQ(ctl(run, {"bookmark", "go", "nowhere"}, nullptr, &err), 2);
-  EXPECT_EQ(ctl(run, {"notes", "add", "nothing", "--at", "1,1"}, nullptr, &err), 2);
-  EXPECT_EQ(ctl(run, {"notes", "remove", "7"}, nullptr, &err), 2);
-
-  // A book that came with the data changes nothing in the terminal.
-  std::ofstream(book) << "{\"telesplat_notes\": 1, \"notes\": [{\"number\": 1, \"text\": \"red \\u001b[31m\\nnext\"}]}";
-  ASSERT_EQ(ctl(run, {"notes"}, &out, &err), 0) << err;
-  EXPECT_EQ(out.find('\x1b'), std::string::npos) << out;
-  EXPECT_NE(out.find("red "), std::string::npos) << out;
-
-  // A broken file is refused and stays.
-  std::ofstream(book) << "{\"telesplat_notes\": 1, \"notes\": [";
-  const std::string broken = read_text(book);
-  EXPECT_EQ(ctl(run, {"notes"}, nullptr, &err), 2);
-  EXPECT_NE(err.find(book), std::string::npos) << err;
-  EXPECT_EQ(ctl(run, {"notes", "add", "more"}, nullptr, &err), 2);
-  EXPECT_EQ(read_text(book), broken);
   EXPECT_EQ(run.stop(), 0);
 }
 

@@ -101,20 +101,51 @@ TEST(Movie, OfAMeshDrawnByOpenGlShowsWhatWasDisplayedToTheLastBit) {
   EXPECT_GT(expect_as_displayed(run, 10), 5u);
 }
 
+// As far as its record goes: where that was cut short, the movie ends and says so, and what is none is refused.
 TEST(Movie, OfAVolumeShowsWhatWasDisplayedToTheLastBit) {
   TemporaryFolder data;
   write_volume(data / "balls.mha");
   PipelineRun run(with(kEveryFrame, {"--samplers", "2"}), data / "balls.mha");
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
-  EXPECT_TRUE(fs::exists(run.out() + "/slices.events"));
+  const std::string record = run.out() + "/slices.events", good = read_text(record);
   EXPECT_GT(expect_as_displayed(run, 30), 20u);
+
+  fs::resize_file(record, good.size() / 2);
+  const Outcome cut = movie(run, run.folder() / "cut/", {"--fps", "20"});
+  EXPECT_EQ(cut.code, 0) << cut.err;
+  EXPECT_NE(cut.out.find("the record was cut short"), std::string::npos) << cut.out;
+  const size_t all = on_screen(run.out(), 20).size(),
+               count = size_t(std::distance(fs::directory_iterator(run.folder() / "cut"), {}));
+  EXPECT_GT(count, 0u);
+  EXPECT_LT(count, all);
+
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "is not a record"},
+      {"TSSLICE", "is not a record"},
+      {std::string(5000, '\xff'), "is not a record"},
+      {good.substr(0, 30), "ends before frame"},
+      {good.substr(0, 8) + std::string(300, '\x7f'), "ends before frame"},
+      {good.substr(0, 400) + std::string(good.size() - 400, '\0'), "slices.events"}};
+  for (const auto& [content, reason] : cases) {
+    std::ofstream(record, std::ios::binary | std::ios::trunc) << content;
+    const Outcome made = movie(run, run.folder() / "none/");
+    EXPECT_EQ(made.code, 2) << reason;
+    EXPECT_NE(made.err.find(reason), std::string::npos) << reason << ": " << made.err;
+    EXPECT_EQ(lines(made.err), 1u) << made.err;
+    EXPECT_FALSE(fs::exists(run.folder() / "none")) << "nothing is left behind";
+  }
+  fs::remove(record);
+  const Outcome none = movie(run, run.folder() / "none/");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("slices.events: is not there"), std::string::npos) << none.err;
+  EXPECT_EQ(telesplat(run.folder(), {"movie", run.folder() / "no-run", "a.mp4"}).code, 2);
 }
 
 TEST(Movie, OfATransparentRunHasPicturesWithItsAlpha) {
   for (const char* scene : {"", "volume"}) {
     TemporaryFolder data;
     write_volume(data / "balls.mha");
-    PipelineRun run(with(kEveryFrame, {"--background", "transparent"}), *scene ? data / "balls.mha" : "");
+    PipelineRun run(with(kEveryFrame, {"--background", "transparent", "--exr"}), *scene ? data / "balls.mha" : "");
     ASSERT_EQ(run.program().wait(), 0) << run.program().err();
     ASSERT_EQ(movie(run, run.folder() / "frames/", {"--fps", "10"}).code, 0);
     const auto wanted = on_screen(run.out(), 10);
@@ -125,6 +156,12 @@ TEST(Movie, OfATransparentRunHasPicturesWithItsAlpha) {
       if (recorded.empty()) continue;
       ASSERT_GT(recorded.size(), 26u);
       EXPECT_EQ(recorded[25], 6) << "not RGBA";
+      const std::string frame = fmt::format("{}/images/frame-{:06}.", run.out(), wanted[k]);
+      const auto picture = image::read_view(frame + "png");
+      ASSERT_TRUE(picture);
+      EXPECT_EQ(picture->colour.front() & 0xffffff, 0u) << "no background";
+      EXPECT_NE(picture->colour[picture->colour.size() / 2 + 80] & 0xffffff, 0u);
+      EXPECT_TRUE(image::read_view(frame + "exr").ok());
       EXPECT_TRUE(read_text(run.folder() / fmt::format("frames/{:06}.png", k)) == recorded) << k;
       ++compared;
     }
@@ -201,50 +238,6 @@ TEST(Movie, WithoutFfmpegIsASequenceOfPicturesAndTellsHowToGoOn) {
   const std::string words = read_text(run.folder() / "words");
   EXPECT_NE(words.find("\ncrop=trunc(iw/2)*2:trunc(ih/2)*2\n"), std::string::npos) << words;
   EXPECT_TRUE(words.ends_with("\n" + file + "\n")) << words;
-}
-
-TEST(Movie, EndsWhereTheRecordWasCutShortAndSaysSo) {
-  TemporaryFolder data;
-  write_volume(data / "balls.mha", 64);
-  PipelineRun run({"--duration", "2", "--size", "160x120"}, data / "balls.mha");
-  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
-  const std::string record = run.out() + "/slices.events";
-  fs::resize_file(record, fs::file_size(record) / 2);
-  const Outcome made = movie(run, run.folder() / "frames/", {"--fps", "20"});
-  EXPECT_EQ(made.code, 0) << made.err;
-  EXPECT_NE(made.out.find("the record was cut short"), std::string::npos) << made.out;
-  const size_t all = on_screen(run.out(), 20).size(),
-               count = size_t(std::distance(fs::directory_iterator(run.folder() / "frames"), {}));
-  EXPECT_GT(count, 0u);
-  EXPECT_LT(count, all);
-}
-
-TEST(Movie, OfRecordsThatAreNoneIsRefusedInOneLine) {
-  TemporaryFolder data;
-  write_volume(data / "balls.mha", 24);
-  PipelineRun run({"--duration", "1", "--size", "96x64"}, data / "balls.mha");
-  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
-  const std::string record = run.out() + "/slices.events", good = read_text(record);
-  const std::pair<std::string, std::string> cases[] = {
-      {"", "is not a record"},
-      {"TSSLICE", "is not a record"},
-      {std::string(5000, '\xff'), "is not a record"},
-      {good.substr(0, 30), "ends before frame"},
-      {good.substr(0, 8) + std::string(300, '\x7f'), "ends before frame"},
-      {good.substr(0, 400) + std::string(good.size() - 400, '\0'), "slices.events"}};
-  for (const auto& [content, reason] : cases) {
-    std::ofstream(record, std::ios::binary | std::ios::trunc) << content;
-    const Outcome made = movie(run, run.folder() / "frames/");
-    EXPECT_EQ(made.code, 2) << reason;
-    EXPECT_NE(made.err.find(reason), std::string::npos) << reason << ": " << made.err;
-    EXPECT_EQ(lines(made.err), 1u) << made.err;
-    EXPECT_FALSE(fs::exists(run.folder() / "frames")) << "nothing is left behind";
-  }
-  fs::remove(record);
-  const Outcome none = movie(run, run.folder() / "frames/");
-  EXPECT_EQ(none.code, 2);
-  EXPECT_NE(none.err.find("slices.events: is not there"), std::string::npos) << none.err;
-  EXPECT_EQ(telesplat(run.folder(), {"movie", run.folder() / "no-run", "a.mp4"}).code, 2);
 }
 
 TEST(Movie, ThatIsInterruptedLeavesNoFileAndNoProcess) {

@@ -62,23 +62,6 @@ TEST(Views, AnEyeStandsWhereItIsToldAndABackgroundIsBehindPicturesOfBothRenderer
   }
 }
 
-TEST(Views, TransparentPicturesHaveAlphaAndNoBackground) {
-  TemporaryFolder folder;
-  write_volume(folder / "ball.mha");
-  for (const std::string& mesh : {std::string(), folder / "ball.mha"}) {
-    PipelineRun run({"--background", "transparent", "--exr", "--duration", "0.3", "--trajectory", "still"}, mesh);
-    ASSERT_EQ(run.program().wait(), 0) << run.program().err();
-    const std::string path = picture_of(run);
-    ASSERT_FALSE(path.empty());
-    EXPECT_EQ(colour_type(path), 6);
-    const auto picture = image::read_view(path);
-    ASSERT_TRUE(picture);
-    EXPECT_EQ(picture->colour.front() & 0xffffff, 0u);
-    EXPECT_NE(picture->colour[picture->colour.size() / 2 + size_t(picture->width) / 2] & 0xffffff, 0u);
-    EXPECT_TRUE(image::read_view(path.substr(0, path.size() - 3) + "exr").ok());
-  }
-}
-
 // What is compared with direct rendering does not change with what lies behind it.
 TEST(Views, HolesOfAVolumeDoNotDependOnTheBackground) {
   TemporaryFolder folder;

@@ -210,7 +210,7 @@ TEST_F(WindowTest, TellsItsKeysOnTheTerminalAndInTheWindow) {
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
-TEST_F(WindowTest, TheLegendLiesInTheWindowAndInScreenshots) {
+TEST_F(WindowTest, OfAVolumeHasItsLegendInScreenshotsTooAndNoKeysOfPoints) {
   TemporaryFolder folder;
   write_volume(folder / "balls.mha");
   PipelineRun run({"--tf", "grey"}, folder / "balls.mha", "view");
@@ -232,6 +232,12 @@ TEST_F(WindowTest, TheLegendLiesInTheWindowAndInScreenshots) {
   const auto picture = image::read_view(screenshots(run.out() + "/images")[0]);
   ASSERT_TRUE(picture);
   EXPECT_GT(ink(*picture), 200);
+  for (const char* key : {"1", "5", "8"}) {
+    display_->tap(key);
+    const std::string line = "key " + std::string(key) + " has no meaning for volumes";
+    EXPECT_TRUE(wait_until([&] { return run.program().err().find(line) != std::string::npos; })) << run.program().err();
+  }
+  EXPECT_EQ(run.program().err().find("splats:"), std::string::npos);
   display_->tap("q", "Control_L");
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
@@ -311,21 +317,6 @@ TEST_F(WindowTest, AMovieShowsWhatKeysHadChanged) {
   display_->tap("q", "Control_L");
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
   EXPECT_GT(expect_as_displayed(run, 15), 10u);
-}
-
-TEST_F(WindowTest, KeysOfPointsDoNothingToAVolume) {
-  TemporaryFolder folder;
-  write_volume(folder / "ball.mha");
-  PipelineRun run({}, folder / "ball.mha", "view");
-  ASSERT_NE(live_window(run.program()), 0u);
-  for (const char* key : {"1", "5", "8"}) {
-    display_->tap(key);
-    const std::string line = "key " + std::string(key) + " has no meaning for volumes";
-    EXPECT_TRUE(wait_until([&] { return run.program().err().find(line) != std::string::npos; })) << run.program().err();
-  }
-  EXPECT_EQ(run.program().err().find("splats:"), std::string::npos);
-  display_->tap("q", "Control_L");
-  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
 TEST_F(WindowTest, EndsInOrderWhenTheDisplayGoesAway) {
