@@ -161,7 +161,8 @@ TEST_F(Inspect, WhatRunRefusesIsRefusedAlike) {
   expect_refused({folder_ / "none.ply"}, "none.ply: no such file");
   expect_refused({folder_ / "dem.png", "--out", "a.npy"}, "--out: ");
   expect_refused({folder_ / "dem.png", "--near", "nan"}, "--near");
-  write_png(folder_ / "photo.png", 8);
+  write_png(folder_ / "photo.png", 8), write_volume(folder_ / "balls.mha");
+  expect_refused({folder_ / "balls.mha", "--series", "1"}, "--series: ");
   expect_refused({folder_ / "photo.png", "--tf", "bone"}, "is a picture, which has no --tf");
   expect_refused({folder_ / "photo.png", "--out", folder_ / "a.npy"}, "has no depth");
 }
