@@ -66,6 +66,13 @@ TEST(Tracking, AReplayedTrackerMovesTheHead) {
   replay.program().signal(SIGINT);
   EXPECT_EQ(replay.program().wait(), 0);
   EXPECT_NE(replay.program().err().find("lost on purpose"), std::string::npos);
+  for (const auto& [arguments, named] :
+       {std::pair<std::vector<std::string>, std::string>{{"pose-replay", folder / "nothing.csv"}, "nothing.csv"},
+        {{"pose-replay", folder / "swaying.csv", "--bind", "tcp://0.0.0.0:*"}, "--insecure"}}) {
+    Program refused("telesplat-lab", arguments, folder / "refused");
+    EXPECT_EQ(refused.wait(), 2);
+    EXPECT_NE(refused.err().find(named), std::string::npos) << refused.err();
+  }
 }
 
 TEST(Tracking, TheDisplayGoesOnWithoutAPublisherAndAfterIt) {
