@@ -1,7 +1,6 @@
 // A session whose services are started one by one leaves the record that telesplat run leaves.
 #include <gtest/gtest.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -18,10 +17,7 @@ class ByHand : public testing::Test {
   // As docs/using.md prints it: the master with a folder, everyone else without.
   void begin(const std::vector<std::string>& scene) {
     start("master", {"--bind", "tcp://127.0.0.1:*", "--out", out()});
-    ASSERT_TRUE(wait_until([&] { return service("master").out().find("listening on ") != std::string::npos; }));
-    const std::string said = service("master").out();
-    const size_t at = said.find("tcp://");
-    master_ = said.substr(at, said.find('\n', at) - at);
+    master_ = address_of(service("master"));
     start("data", scene);
     start("packer", {});
     start("sampler", {"--name", "sampler-1", "--threads", "1"});
@@ -124,10 +120,7 @@ TEST_F(ByHand, AJuliaSetLeavesARecordTooAndEveryoneIsToldWhoEndedTheSession) {
 
 TEST_F(ByHand, WhatIsWaitedForIsSaid) {
   start("master", {"--bind", "tcp://127.0.0.1:*"});
-  ASSERT_TRUE(wait_until([&] { return service("master").out().find("listening on ") != std::string::npos; }));
-  const std::string said = service("master").out();
-  const size_t at = said.find("tcp://");
-  master_ = said.substr(at, said.find('\n', at) - at);
+  master_ = address_of(service("master"));
   EXPECT_NE(service("master").err().find("everybody on this machine can watch and end this session"), std::string::npos)
       << service("master").err();
   write_terrain(folder_ / "hill.ply", 20);

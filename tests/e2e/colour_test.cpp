@@ -1,10 +1,8 @@
 // A mesh coloured by its arrays: whole runs of a small one, made here.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -57,16 +55,6 @@ class ColouredRun : public ::testing::Test {
   }
   TemporaryFolder folder_;
 };
-
-int ctl(PipelineRun& run, std::vector<std::string> arguments, std::string* out = nullptr, std::string* err = nullptr) {
-  arguments.insert(arguments.begin(), "ctl");
-  arguments.insert(arguments.end(), {"--master", run.master()});
-  Program program("telesplat", arguments, run.folder() / "ctl");
-  const int code = program.wait(30);
-  if (out) *out = program.out();
-  if (err) *err = program.err();
-  return code;
-}
 
 std::vector<scene::Colouring> colourings(const PipelineRun& run) {
   std::vector<scene::Colouring> out;

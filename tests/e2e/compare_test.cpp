@@ -68,15 +68,6 @@ void expect_plausible(const Row& row, double least_ssim = 0.4) {
   EXPECT_GT(number(row, "points_drawn"), 1000) << name;
 }
 
-// 255 where identical.
-double psnr(const image::View& a, const image::View& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.colour.size(); ++i)
-    for (const int shift : {0, 8, 16})
-      sum += std::pow(double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255), 2);
-  return sum > 0 ? 10 * std::log10(255.0 * 255 * 3 * double(a.colour.size()) / sum) : 255;
-}
-
 TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   PipelineRun run({"--duration", "2", "--hold", "1", "--splat", "disc", "--renderer", "cpu"});
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
@@ -133,7 +124,7 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   ASSERT_TRUE(displayed.ok() && drawn.ok());
   ASSERT_EQ(displayed->colour.size(), drawn->colour.size());
   // Tiles of a still picture that waited for their turn when points had just come are replayed with these.
-  EXPECT_GT(psnr(*displayed, *drawn), 34);
+  EXPECT_GT(psnr_db(*displayed, *drawn), 34);
   EXPECT_TRUE(fs::exists(run.folder() / ("again/pose-" + digits + "-disc-cpu-flip.png")));
   EXPECT_TRUE(fs::exists(run.folder() / ("again/pose-" + digits + "-reference.png")));
 

@@ -56,11 +56,6 @@ class Sessions : public testing::Test {
     EXPECT_TRUE(wait_until([&] { return out->out().find("asks this session") != std::string::npos; })) << out->err();
     return out;
   }
-  static std::string address(const Program& master) {
-    const std::string said = master.out(), words = "listening on ";
-    const size_t begin = said.find(words);
-    return begin == std::string::npos ? "" : said.substr(begin + words.size(), said.find('\n') - words.size());
-  }
   void expect_status_for_programs(PipelineRun& run);
   size_t files() const { return size_t(std::distance(fs::directory_iterator(runtime_), fs::directory_iterator())); }
 
@@ -159,29 +154,29 @@ TEST_F(Sessions, OfSeveralOneIsChosen) {
   EXPECT_EQ(refused.code, 2);
   for (const std::string& told :
        {std::string("2 sessions of yours run on this machine"), std::string("--master ADDRESS"),
-        std::string("--session PID"), address(*first), address(*second)})
+        std::string("--session PID"), address_of(*first), address_of(*second)})
     EXPECT_TRUE(holds(refused.err, told)) << told << " in\n" << refused.err;
   EXPECT_EQ(ctl({"stop"}).code, 2) << "which one?";
   EXPECT_EQ(telesplat({"run", "--master", "auto", "--out", folder_ / "none"}).code, 2);
 
   const auto by_number = ctl({"status", "--session", std::to_string(second->pid())});
   EXPECT_EQ(by_number.code, 0) << by_number.err;
-  EXPECT_TRUE(holds(by_number.out, address(*second))) << by_number.out;
+  EXPECT_TRUE(holds(by_number.out, address_of(*second))) << by_number.out;
   EXPECT_EQ(ctl({"status", "--session", "nosuch"}).code, 2);
-  EXPECT_EQ(ctl({"status", "--session", std::to_string(second->pid()), "--master", address(*first)}).code, 2);
+  EXPECT_EQ(ctl({"status", "--session", std::to_string(second->pid()), "--master", address_of(*first)}).code, 2);
 
-  setenv("TELESPLAT_MASTER", address(*first).c_str(), 1);
-  EXPECT_TRUE(holds(ctl({"status"}).out, address(*first)));
-  EXPECT_TRUE(holds(ctl({"status", "--session", std::to_string(second->pid())}).out, address(*second)));
-  EXPECT_TRUE(holds(ctl({"status", "--master", address(*second)}).out, address(*second)));
-  EXPECT_TRUE(holds(ctl({"--master", address(*second), "status"}).out, address(*second))) << "in front, too";
+  setenv("TELESPLAT_MASTER", address_of(*first).c_str(), 1);
+  EXPECT_TRUE(holds(ctl({"status"}).out, address_of(*first)));
+  EXPECT_TRUE(holds(ctl({"status", "--session", std::to_string(second->pid())}).out, address_of(*second)));
+  EXPECT_TRUE(holds(ctl({"status", "--master", address_of(*second)}).out, address_of(*second)));
+  EXPECT_TRUE(holds(ctl({"--master", address_of(*second), "status"}).out, address_of(*second))) << "in front, too";
   setenv("TELESPLAT_MASTER", "auto", 1);
   EXPECT_EQ(ctl({"status"}).code, 2);
   unsetenv("TELESPLAT_MASTER");
 
   EXPECT_EQ(ctl({"stop", "--session", std::to_string(first->pid())}).code, 0);
   EXPECT_EQ(first->wait(), 0);
-  EXPECT_TRUE(holds(ctl({"status"}).out, address(*second)));
+  EXPECT_TRUE(holds(ctl({"status"}).out, address_of(*second)));
 }
 
 TEST_F(Sessions, TheKilledAreForgotten) {
@@ -192,13 +187,13 @@ TEST_F(Sessions, TheKilledAreForgotten) {
   EXPECT_EQ(files(), 2u) << "nobody tidied up";
   const auto status = ctl({"status"});
   EXPECT_EQ(status.code, 0) << status.err;
-  EXPECT_TRUE(holds(status.out, address(*living)));
+  EXPECT_TRUE(holds(status.out, address_of(*living)));
   EXPECT_EQ(files(), 1u);
   // A master that is asked for all the same is known to be dead at once.
-  const auto dead = ctl({"status", "--master", address(*killed)});
+  const auto dead = ctl({"status", "--master", address_of(*killed)});
   EXPECT_EQ(dead.code, 1);
   EXPECT_LT(dead.took_s, kAtOnce_s);
-  EXPECT_TRUE(holds(dead.err, "no master is at " + address(*killed))) << dead.err;
+  EXPECT_TRUE(holds(dead.err, "no master is at " + address_of(*killed))) << dead.err;
 }
 
 TEST_F(Sessions, SignalsEndThemAndTheirFiles) {
@@ -208,7 +203,7 @@ TEST_F(Sessions, SignalsEndThemAndTheirFiles) {
     const std::string said = by_hand->out() + by_hand->err(), words = "listening on ";
     EXPECT_EQ(said.find(words), said.rfind(words)) << said;
     EXPECT_TRUE(
-        holds(said, "telesplat ctl status asks this session; others join it with --master " + address(*by_hand)))
+        holds(said, "telesplat ctl status asks this session; others join it with --master " + address_of(*by_hand)))
         << said;
     const auto sessions = nlohmann::json::parse(ctl({"list", "--json"}).out, nullptr, false);
     ASSERT_TRUE(sessions.is_array() && sessions.size() == 1);
@@ -227,11 +222,11 @@ TEST_F(Sessions, WithoutAFolderForFilesTheSessionRunsAllTheSame) {
   const auto hidden = master("hidden");
   EXPECT_TRUE(holds(hidden->err(), "telesplat ctl will not find this session: /nonexistent/telesplat"))
       << hidden->err();
-  EXPECT_TRUE(holds(hidden->out(), "telesplat ctl status --master " + address(*hidden) + " asks this session"))
+  EXPECT_TRUE(holds(hidden->out(), "telesplat ctl status --master " + address_of(*hidden) + " asks this session"))
       << hidden->out();
   EXPECT_EQ(ctl({"status"}).code, 1);
-  EXPECT_EQ(ctl({"status", "--master", address(*hidden)}).code, 0);
-  EXPECT_EQ(ctl({"stop", "--master", address(*hidden)}).code, 0);
+  EXPECT_EQ(ctl({"status", "--master", address_of(*hidden)}).code, 0);
+  EXPECT_EQ(ctl({"stop", "--master", address_of(*hidden)}).code, 0);
   EXPECT_EQ(hidden->wait(), 0);
   const auto run = telesplat({"run", "julia", "--out", folder_ / "none"});
   EXPECT_EQ(run.code, 2);

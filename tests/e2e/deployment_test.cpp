@@ -22,10 +22,7 @@ class Deployment {
   Deployment() {
     write_terrain(folder_ / "hill.ply");
     start("master", {"--bind", "tcp://127.0.0.1:*", "--out", out()});
-    EXPECT_TRUE(wait_until([&] { return service("master").out().find("listening on ") != std::string::npos; }));
-    const std::string line = service("master").out();
-    const size_t begin = line.find("tcp://");
-    master_ = line.substr(begin, line.find('\n', begin) - begin);
+    master_ = address_of(service("master"));
   }
 
   Program& start(const std::string& role, std::vector<std::string> arguments) {

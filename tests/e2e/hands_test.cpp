@@ -37,16 +37,6 @@ void write_boards(const std::string& path) {
 
 class Hands : public testing::Test {
  protected:
-  int ctl(PipelineRun& run, std::vector<std::string> arguments, std::string* out = nullptr,
-          std::string* err = nullptr) {
-    arguments.insert(arguments.begin(), "ctl");
-    arguments.insert(arguments.end(), {"--master", run.master()});
-    Program program("telesplat", arguments, run.folder() / ("ctl-" + std::to_string(++asked_)));
-    const int code = program.wait(30);
-    if (out) *out = program.out();
-    if (err) *err = program.err();
-    return code;
-  }
   Json pick(PipelineRun& run, std::vector<std::string> places) {
     places.insert(places.begin(), "pick");
     places.push_back("--json");
@@ -82,7 +72,6 @@ class Hands : public testing::Test {
   }
   void expect_book(PipelineRun& run, const std::string& mesh);
   TemporaryFolder folder_;
-  int asked_ = 0;
 };
 
 // Bookmarks and notes lie beside the data.

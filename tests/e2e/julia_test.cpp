@@ -105,23 +105,16 @@ TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
 TEST(Julia, ParametersAreSetAndAnimatedWhileItRuns) {
   PipelineRun run(with({"--duration", "0", "--trajectory", "still"}), "julia");
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  const auto ctl = [&](std::vector<std::string> arguments, const std::string& name) {
-    arguments.insert(arguments.begin(), "ctl");
-    arguments.insert(arguments.end(), {"--master", run.master()});
-    auto program = std::make_unique<Program>("telesplat", arguments, run.folder() / name);
-    program->wait(30);
-    return program;
-  };
-  EXPECT_EQ(ctl({"set", "c.y=0.3", "palette=ice"}, "set")->wait(), 0);
-  EXPECT_NE(ctl({"set", "c.y=7"}, "far")->wait(), 0);
-  EXPECT_NE(ctl({"set", "c.q=1"}, "unknown")->wait(), 0);
-  EXPECT_EQ(ctl({"set", "c.y"}, "no-value")->wait(), 2);
-  EXPECT_EQ(ctl({"set"}, "nothing")->wait(), 2);
-  EXPECT_EQ(ctl({"animate", "c.y"}, "no-timeline")->wait(), 2);
-  EXPECT_EQ(ctl({"animate", "c.x=0.3:0.4:1s"}, "animate")->wait(), 0);
+  EXPECT_EQ(ctl(run, {"set", "c.y=0.3", "palette=ice"}), 0);
+  EXPECT_NE(ctl(run, {"set", "c.y=7"}), 0);
+  EXPECT_NE(ctl(run, {"set", "c.q=1"}), 0);
+  EXPECT_EQ(ctl(run, {"set", "c.y"}), 2);
+  EXPECT_EQ(ctl(run, {"set"}), 2);
+  EXPECT_EQ(ctl(run, {"animate", "c.y"}), 2);
+  EXPECT_EQ(ctl(run, {"animate", "c.x=0.3:0.4:1s"}), 0);
   EXPECT_TRUE(wait_until([&] { return run.column("epochs.csv", "epoch").size() > 4; }))
       << run.column("epochs.csv", "epoch").size();
-  EXPECT_EQ(ctl({"animate", "off"}, "off")->wait(), 0);
+  EXPECT_EQ(ctl(run, {"animate", "off"}), 0);
   EXPECT_EQ(run.stop(), 0) << run.program().err();
   const auto values = run.column("epochs.csv", "c.y"), palettes = run.column("epochs.csv", "palette");
   ASSERT_FALSE(values.empty());

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <fstream>
 
 #include "common/colour/colour_map.h"
@@ -33,13 +31,7 @@ void write_hill(const std::string& path, int n = 50) {
 }
 
 image::View last_picture(const PipelineRun& run) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(run.out() + "/images", error))
-    if (entry.path().filename().string().starts_with("frame-")) names.push_back(entry.path());
-  EXPECT_FALSE(names.empty());
-  if (names.empty()) return {};
-  auto view = image::read_view(*std::max_element(names.begin(), names.end()));
+  auto view = image::read_view(newest_picture(run));
   EXPECT_TRUE(view);
   return view ? std::move(*view) : image::View{};
 }

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -81,10 +80,7 @@ class SeveralLives : public testing::Test {
   }
   Program& start_master(const std::string& bind) {
     Program& master = start("master", {"--bind", bind, "--out", out(), "--continue"});
-    EXPECT_TRUE(wait_until([&] { return master.out().find("listening on ") != std::string::npos; })) << master.err();
-    const std::string said = master.out();
-    const size_t at = said.find("tcp://");
-    if (at != said.npos) master_ = said.substr(at, said.find('\n', at) - at);
+    master_ = address_of(master);
     return master;
   }
   std::string out() const { return folder_ / "runs/lives"; }

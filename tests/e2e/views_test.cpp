@@ -1,7 +1,6 @@
 // Where a run looks from and what lies behind the data: flags, pictures, the record and its verification.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -12,15 +11,6 @@ namespace telesplat::test {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string picture_of(const PipelineRun& run) {
-  std::string out;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(run.out() + "/images", error))
-    if (entry.path().filename().string().starts_with("frame-") && entry.path().extension() == ".png")
-      out = std::max(out, entry.path().string());
-  return out;
-}
 
 // The byte of a PNG's header that tells its channels: 2 RGB, 6 RGBA.
 int colour_type(const std::string& png) { return read_text(png).substr(25, 1) == "\x06" ? 6 : 2; }
@@ -52,7 +42,7 @@ TEST(Views, AnEyeStandsWhereItIsToldAndABackgroundIsBehindPicturesOfBothRenderer
       ASSERT_FALSE(column.empty());
       for (const double v : column) ASSERT_NEAR(v, value, 1e-6) << name;
     }
-    const std::string path = picture_of(run);
+    const std::string path = newest_picture(run);
     const auto picture = image::read_view(path);
     ASSERT_TRUE(picture) << picture.error().text;
     EXPECT_EQ(picture->colour.front() & 0xffffff, 0xfee0c0u) << renderer;

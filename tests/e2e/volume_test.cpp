@@ -34,16 +34,6 @@ class VolumeRun : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-/// Runs `telesplat ctl` and returns its exit code.
-int ctl(PipelineRun& run, std::vector<std::string> arguments, std::string* err = nullptr) {
-  arguments.insert(arguments.begin(), "ctl");
-  arguments.insert(arguments.end(), {"--master", run.master()});
-  Program program("telesplat", arguments, run.folder() / "ctl");
-  const int code = program.wait(30);
-  if (err) *err = program.err();
-  return code;
-}
-
 std::vector<std::string> texts(const PipelineRun& run, const std::string& file, const std::string& name) {
   std::vector<std::string> out;
   std::ifstream in(run.out() + "/" + file);
@@ -54,27 +44,6 @@ std::vector<std::string> texts(const PipelineRun& run, const std::string& file, 
   while (at < header.size() && std::getline(in, line))
     if (const auto fields = tools::csv_fields(line); fields && at < fields->size()) out.push_back((*fields)[at]);
   return out;
-}
-
-std::string newest_picture(const std::string& folder) {
-  std::string out;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error))
-    if (const std::string path = entry.path().string();
-        path.find("frame-") != std::string::npos && path.ends_with(".png"))
-      out = std::max(out, path);
-  return out;
-}
-
-// Over all pixels, those of the background too.
-double psnr_db(const image::View& a, const image::View& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.colour.size(); ++i)
-    for (const int shift : {0, 8, 16}) {
-      const double d = double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255);
-      sum += d * d;
-    }
-  return sum == 0 ? 99 : 10 * std::log10(255.0 * 255.0 * 3 * double(a.colour.size()) / sum);
 }
 
 TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
@@ -134,7 +103,7 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
   ASSERT_TRUE(single.wait_at_rest()) << single.program().err();
   ASSERT_EQ(single.stop(), 0) << single.program().err();
   const auto stitched = image::read_view(wall.out() + "/images/wall.png"),
-             whole = image::read_view(newest_picture(single.out() + "/images"));
+             whole = image::read_view(newest_picture(single));
   ASSERT_TRUE(stitched.ok()) << stitched.error().text;
   ASSERT_TRUE(whole.ok()) << whole.error().text;
   ASSERT_EQ(stitched->width, 640);
@@ -170,14 +139,14 @@ TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
   // A colour-map file's points lie between 0 and 1 and are spread over the volume's range.
   std::ofstream(run.folder() / "map.json")
       << R"([{"Name": "two", "RGBPoints": [0, 0, 0, 1, 1, 1, 1, 0], "Points": [0, 0, 0.5, 0, 1, 0.8, 0.5, 0]}])";
-  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json:two"}, &err), 0) << err;
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json:two"}, nullptr, &err), 0) << err;
   EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") == 4; }));
   const double updates = value(run.status(), "viewer-1", "updates");
   EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 1; }));
-  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json:three"}, &err), 2);
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json:three"}, nullptr, &err), 2);
   EXPECT_NE(err.find("\"three\""), std::string::npos) << err;
 
-  EXPECT_NE(ctl(run, {"tf", "nonesuch"}, &err), 0);
+  EXPECT_NE(ctl(run, {"tf", "nonesuch"}, nullptr, &err), 0);
   EXPECT_NE(err.find("nonesuch"), std::string::npos) << err;
   EXPECT_NE(ctl(run, {"tf", "5:#00:0"}), 0);
   EXPECT_EQ(ctl(run, {"tf"}), 2);
@@ -186,10 +155,10 @@ TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
                                                 {"set", "volume.step=7"},
                                                 {"set", "c.y=0.3"},
                                                 {"animate", "on"}}) {
-    EXPECT_EQ(ctl(run, wrong, &err), 2) << wrong[0] << ": " << err;
+    EXPECT_EQ(ctl(run, wrong, nullptr, &err), 2) << wrong[0] << ": " << err;
     EXPECT_TRUE(err.starts_with("telesplat: ")) << err;
   }
-  EXPECT_EQ(ctl(run, {"tf", run.folder() / "none.json"}, &err), 2);
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "none.json"}, nullptr, &err), 2);
   EXPECT_NE(err.find("none.json"), std::string::npos) << err;
   std::ofstream(run.folder() / "broken.json") << "{\"RGBPoints\": [0, 1";
   EXPECT_EQ(ctl(run, {"tf", run.folder() / "broken.json"}), 2);

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -17,7 +18,6 @@
 #include <thread>
 
 #include "common/core/clock.h"
-#include "common/image/file.h"
 #include "common/net/master_address.h"
 #include "tests/support/patience.h"
 #include "tools/common/csv_table.h"
@@ -110,6 +110,17 @@ std::string Program::complaint() const {
 
 void Program::signal(int number) {
   if (exit_code_ < 0) ::kill(pid_, number);
+}
+
+std::string address_of(const Program& master) {
+  std::string out;
+  EXPECT_TRUE(wait_until([&] {
+    const std::string said = master.out(), words = "listening on ";
+    const size_t begin = said.find(words), end = said.find('\n', begin);
+    if (begin != said.npos && end != said.npos) out = said.substr(begin + words.size(), end - begin - words.size());
+    return !out.empty();
+  })) << master.err();
+  return out;
 }
 
 PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh, const std::string& command)
@@ -245,6 +256,16 @@ std::vector<double> PipelineRun::column(const std::string& file, const std::stri
   return out;
 }
 
+int ctl(PipelineRun& run, std::vector<std::string> arguments, std::string* out, std::string* err) {
+  arguments.insert(arguments.begin(), "ctl");
+  arguments.insert(arguments.end(), {"--master", run.master()});
+  Program program("telesplat", arguments, run.folder() / "ctl");
+  const int code = program.wait(30);
+  if (out) *out = program.out();
+  if (err) *err = program.err();
+  return code;
+}
+
 nlohmann::json process(const nlohmann::json& status, const std::string& name) {
   if (status.is_object())
     for (const auto& p : status["processes"])
@@ -255,6 +276,23 @@ nlohmann::json process(const nlohmann::json& status, const std::string& name) {
 double value(const nlohmann::json& status, const std::string& name, const std::string& key) {
   const auto p = process(status, name);
   return p.is_object() && p.contains("values") ? p["values"].value(key, 0.0) : 0.0;
+}
+
+std::string newest_picture(const PipelineRun& run) {
+  std::string out;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(run.out() + "/images", error))
+    if (entry.path().filename().string().starts_with("frame-") && entry.path().extension() == ".png")
+      out = std::max(out, entry.path().string());
+  return out;
+}
+
+double psnr_db(const image::View& a, const image::View& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.colour.size(); ++i)
+    for (const int shift : {0, 8, 16})
+      sum += std::pow(double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255), 2);
+  return sum == 0 ? 99 : 10 * std::log10(255.0 * 255 * 3 * double(a.colour.size()) / sum);
 }
 
 std::vector<uint64_t> on_screen(const std::string& run, double fps) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/image/file.h"
 #include "common/net/keys/access.h"
 #include "tests/support/files/made_data.h"
 
@@ -48,7 +49,10 @@ class Program {
   int exit_code_ = -1;
 };
 
-/// Flags of a run whose head moves for two seconds and then stands still, until the test stops it after wait_at_rest().
+/// Where a master that was started by hand listens; waits until it says so.
+std::string address_of(const Program& master);
+
+/// Flags of a run whose head moves for two seconds and then stands, until the test stops it after wait_at_rest().
 inline const std::vector<std::string> kComesToRest{"--duration", "60", "--hold", "58"};
 
 /// `telesplat run` of a small terrain at a small size with its cache and record in a temporary folder.
@@ -96,12 +100,21 @@ class PipelineRun {
   std::unique_ptr<launcher::ControlClient> control_;
 };
 
-/// Finds the living process of this name in a status answer, or null.
+/// Runs `telesplat ctl` about the run's session; its exit code, and what it says.
+int ctl(PipelineRun& run, std::vector<std::string> arguments, std::string* out = nullptr, std::string* err = nullptr);
+
+/// Looks into a status answer: the living process of this name, or null.
 nlohmann::json process(const nlohmann::json& status, const std::string& name);
 /// Returns its value, 0 if it has none.
 double value(const nlohmann::json& status, const std::string& name, const std::string& key);
 
-/// Returns the numbers of the displayed frames that a movie of this run, `fps` frames a second, must show in turn.
+/// The last picture of a displayed frame that the run recorded; empty: there is none.
+std::string newest_picture(const PipelineRun& run);
+/// Over all pixels, those of the background too; 99 where they are the same.
+double psnr_db(const image::View& a, const image::View& b);
+
+/// What a movie of `fps` frames a second of the run in this folder must show: for each of its frames the number of the
+/// displayed one.
 std::vector<uint64_t> on_screen(const std::string& run, double fps);
 /// Makes a folder of pictures of the run, which recorded every frame, and expects each to equal the recorded one.
 /// Returns the number of compared pictures: the disk may have been too slow for some.

@@ -16,10 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 image::View last_picture(PipelineRun& run) {
-  std::string newest;
-  for (const auto& entry : fs::directory_iterator(run.out() + "/images"))
-    if (entry.path().filename().string().starts_with("frame-")) newest = std::max(newest, entry.path().string());
-  const auto picture = image::read_view(newest);
+  const auto picture = image::read_view(newest_picture(run));
   EXPECT_TRUE(picture) << run.program().err();
   return picture ? *picture : image::View{};
 }

@@ -1,7 +1,6 @@
 // Walls of screens: what they show together, that they show it together, and what becomes of them when one goes.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -21,26 +20,6 @@ namespace fs = std::filesystem;
 constexpr const char* kPlane =
     "[wall]\nanchor = \"head\"\n[head]\nposition = [0, 0, 1]\n[[planar]]\ncolumns = 2\nrows = 2\n"
     "size = [0.5773502691896258, 0.3608439182435161]\nresolution = [160, 100]\n";
-
-std::string newest_picture(const std::string& folder) {
-  std::string out;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error))
-    if (const std::string path = entry.path().string();
-        path.find("frame-") != std::string::npos && path.ends_with(".png"))
-      out = std::max(out, path);
-  return out;
-}
-
-double psnr_db(const image::View& a, const image::View& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.colour.size(); ++i)
-    for (const int shift : {0, 8, 16}) {
-      const double d = double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255);
-      sum += d * d;
-    }
-  return 10 * std::log10(255 * 255 / std::max(sum / (3.0 * double(a.colour.size())), 1e-9));
-}
 
 std::string write_wall(const TemporaryFolder& folder, const char* text = kPlane) {
   const std::string path = folder / "lab.toml";
@@ -109,7 +88,7 @@ TEST(Wall, FourScreensShowWhatOneDisplayShows) {
   ASSERT_TRUE(single.wait_at_rest()) << single.program().err();
   ASSERT_EQ(single.stop(), 0) << single.program().err();
   const auto stitched = image::read_view(wall.out() + "/images/wall.png"),
-             whole = image::read_view(newest_picture(single.out() + "/images"));
+             whole = image::read_view(newest_picture(single));
   ASSERT_TRUE(stitched.ok()) << stitched.error().text;
   ASSERT_TRUE(whole.ok()) << whole.error().text;
   ASSERT_EQ(stitched->width, 320);

@@ -9,21 +9,10 @@
 namespace telesplat::test {
 namespace {
 
-struct Said {
-  int code;
-  std::string out, err;
-};
-Said ctl(PipelineRun& run, std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "ctl");
-  arguments.insert(arguments.end(), {"--master", run.master()});
-  Program p("telesplat", arguments, run.folder() / "ctl");
-  const int code = p.wait();
-  return {code, p.out(), p.err()};
-}
-
 TEST(ChangedCouplings, EachFrameSaysWhichWasInForce) {
   PipelineRun run({"--duration", "0", "--size", "320x200", "--sampling-size", "240x150", "--record-points", "0"});
   ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 3; })) << run.program().err();
+  std::string out, err;
   // In each coupling some more updates are displayed.
   const auto goes_on_with = [&](double mode, double buffers) {
     double before = -1;
@@ -41,14 +30,12 @@ TEST(ChangedCouplings, EachFrameSaysWhichWasInForce) {
                                              {{"async"}, 0, 0}}) {
     auto order = words;
     order.insert(order.begin(), "coupling");
-    const Said said = ctl(run, order);
-    EXPECT_EQ(said.code, 0) << said.err;
-    EXPECT_TRUE(said.out.starts_with("viewer-1: " + words.front())) << said.out;
+    EXPECT_EQ(ctl(run, order, &out, &err), 0) << err;
+    EXPECT_TRUE(out.starts_with("viewer-1: " + words.front())) << out;
     EXPECT_TRUE(goes_on_with(mode, buffers)) << words.front();
   }
-  const Said refused = ctl(run, {"coupling", "images"});
-  EXPECT_EQ(refused.code, 2) << refused.out;
-  EXPECT_NE(refused.err.find("is of a session from its beginning"), std::string::npos) << refused.err;
+  EXPECT_EQ(ctl(run, {"coupling", "images"}, &out, &err), 2) << out;
+  EXPECT_NE(err.find("is of a session from its beginning"), std::string::npos) << err;
   ASSERT_EQ(run.stop(), 0) << run.program().err();
   const auto s = run.summary();
   EXPECT_EQ(s["coupling"], "async") << "as it began";
