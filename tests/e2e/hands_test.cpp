@@ -277,7 +277,7 @@ TEST_F(Hands, CutScenesAreComparedWithCutScenes) {
     std::string file = scene;
     if (scene == "volume") write_volume(file = folder_ / "balls.mha");
     auto flags = kComesToRest;
-    flags.insert(flags.end(), {"--clip", "plane x<=55%; plane z>=30%", "--verify", "12", "--sampling-size", "320x200"});
+    flags.insert(flags.end(), {"--clip", "plane x<=55%; plane z>=30%", "--verify", "60", "--sampling-size", "320x200"});
     PipelineRun run(flags, file);
     ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
     ASSERT_EQ(run.stop(), 0) << run.program().err();

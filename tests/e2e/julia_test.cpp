@@ -20,7 +20,7 @@ std::vector<std::string> with(std::vector<std::string> more) {
 
 TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
   auto flags = with(kComesToRest);
-  flags.insert(flags.end(), {"--preset", "wings", "--verify", "10", "--samplers", "2"});
+  flags.insert(flags.end(), {"--preset", "wings", "--verify", "60", "--samplers", "2"});
   PipelineRun run(flags, "julia");
   ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
   ASSERT_EQ(run.stop(), 0) << run.program().err();

@@ -48,7 +48,7 @@ std::vector<std::string> texts(const PipelineRun& run, const std::string& file, 
 
 TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
   auto flags = with(kComesToRest);
-  flags.insert(flags.end(), {"--tf", kGlass, "--verify", "10", "--samplers", "2"});
+  flags.insert(flags.end(), {"--tf", kGlass, "--verify", "60", "--samplers", "2"});
   PipelineRun run(flags, volume());
   ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
   ASSERT_EQ(run.stop(), 0) << run.program().err();
@@ -212,7 +212,7 @@ TEST_F(VolumeRun, TheSurfaceOfARawVolumeIsShownVerifiedAndCompared) {
   const std::string mha = read_text(volume());
   std::ofstream(folder_ / "balls.raw", std::ios::binary) << mha.substr(mha.size() - 40 * 40 * 40);
   auto flags = kComesToRest;
-  flags.insert(flags.end(), {"--raw", "40x40x40:u8", "--iso", "100", "--verify", "20"});
+  flags.insert(flags.end(), {"--raw", "40x40x40:u8", "--iso", "100", "--verify", "60"});
   PipelineRun run(flags, folder_ / "balls.raw");
   ASSERT_TRUE(run.wait_at_rest()) << run.program().err();
   ASSERT_EQ(run.stop(), 0) << run.program().err();
