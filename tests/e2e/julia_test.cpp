@@ -59,15 +59,19 @@ TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
 }
 
 TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
-  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration",
-                        ordinary_or_slow("4", "10"), "--verify", "10", "--trajectory", "still"}),
+  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration", "0", "--verify", "10",
+                        "--trajectory", "still"}),
                   "julia");
-  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  ASSERT_TRUE(wait_until([&] {
+    const auto set = run.column("epochs.csv", "c.y"), seen = run.column("frames.csv", "epoch");
+    const auto [least, most] = std::minmax_element(set.begin(), set.end());
+    return set.size() > 5 && *most - *least > 0.1 && std::set<double>(seen.begin(), seen.end()).size() > 4;
+  })) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto epochs = run.column("epochs.csv", "epoch"), values = run.column("epochs.csv", "c.y"),
              others = run.column("epochs.csv", "c.x"), shown = run.column("frames.csv", "epoch"),
              drawn = run.column("frames.csv", "points_drawn");
-  ASSERT_GT(epochs.size(), 5u);
   ASSERT_EQ(values.size(), epochs.size());
   EXPECT_TRUE(std::is_sorted(epochs.begin(), epochs.end()));
   EXPECT_EQ(std::set<double>(epochs.begin(), epochs.end()).size(), epochs.size());
@@ -75,12 +79,10 @@ TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
     EXPECT_GE(v, -0.5 - 1e-9);
     EXPECT_LE(v, -0.3 + 1e-9);
   }
-  EXPECT_GT(*std::max_element(values.begin(), values.end()) - *std::min_element(values.begin(), values.end()), 0.1);
   EXPECT_EQ(std::set<double>(others.begin(), others.end()).size(), 1u) << "c.x is not animated";
 
   // Epochs are displayed in their order, each known, and never nothing once there was something.
   ASSERT_EQ(shown.size(), drawn.size());
-  std::set<double> displayed;
   double newest = 0;
   bool something = false;
   for (size_t i = 0; i < shown.size(); ++i) {
@@ -91,10 +93,8 @@ TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
     something = true;
     EXPECT_GE(shown[i], newest) << "frame " << i;
     newest = shown[i];
-    displayed.insert(shown[i]);
     EXPECT_NE(std::find(epochs.begin(), epochs.end(), shown[i]), epochs.end()) << shown[i];
   }
-  EXPECT_GT(displayed.size(), 3u);
   // Compared with the set of its own epoch each frame is right (31 dB; 26 where programs are slow); compared with the
   // first epoch's all are at 21 dB.
   const auto s = run.summary();

@@ -42,7 +42,7 @@ TEST(FullDisk, ARunGoesOnSaysItOnceAndEndsWithOne) {
     const SmallDisk disk(100'000);
     run = std::make_unique<Program>(
         "telesplat",
-        std::vector<std::string>{"run", folder / "terrain.ply", "--no-cache", "--size", "240x160", "--out",
+        std::vector<std::string>{"run", folder / "terrain.ply", "--no-cache", "--size", "480x320", "--out",
                                  folder / "out", "--sampler-threads", "1", "--duration", ordinary_or_slow("6", "40"),
                                  "--record-every", "1", "--record-depth"},
         folder / "run");

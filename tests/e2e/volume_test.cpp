@@ -186,7 +186,10 @@ TEST_F(VolumeRun, ASeriesPlaysAndStands) {
   PipelineRun run(with({"--tf", kGlass, "--series-rate", "8", "--duration", "0", "--trajectory", "still",
                         "--target-fps", "20", "--verify", "10"}),
                   series);
-  EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") >= 7; })) << run.program().err();
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    const auto played = run.column("epochs.csv", "volume.step");
+    return value(s, "viewer-1", "epoch") >= 7 && std::set<double>(played.begin(), played.end()).size() == 4;
+  })) << run.program().err();
   EXPECT_EQ(ctl(run, {"set", "volume.step=2"}), 0);
   EXPECT_NE(ctl(run, {"set", "volume.step=4"}), 0);
   EXPECT_TRUE(run.wait_status([](const auto& s) { return s["parameters"].value("volume.step", -1.0) == 2; }));
@@ -196,7 +199,6 @@ TEST_F(VolumeRun, ASeriesPlaysAndStands) {
   EXPECT_EQ(run.status()["epoch"], stopped) << "it plays on";
   ASSERT_EQ(run.stop(), 0) << run.program().err();
   const auto steps = run.column("epochs.csv", "volume.step");
-  EXPECT_EQ(std::set<double>(steps.begin(), steps.end()), (std::set<double>{0, 1, 2, 3}));
   EXPECT_EQ(steps.back(), 2);
   const auto shown = run.column("frames.csv", "epoch");
   EXPECT_TRUE(std::is_sorted(shown.begin(), shown.end()));
