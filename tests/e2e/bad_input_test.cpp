@@ -1,4 +1,4 @@
-// What cannot be shown is refused: exit code 2, one line that names it, nothing left behind.
+// Files that cannot be shown are refused: exit code 2, one line that names the file, nothing left behind.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -49,7 +49,7 @@ TEST(Import, EndsWhereTheProcessThatWantedItDiedBefore) {
   ::unsetenv("TELESPLAT_IMPORT_PARENT");
 }
 
-// What a data server says by which it is started by hand.
+// Returns the output of a data server that is started by hand.
 TEST(DataServer, AFileThatIsCutOffWhileItIsReadIsNamed) {
   TemporaryFolder folder;
   const std::string path = folder / "cut.ply";

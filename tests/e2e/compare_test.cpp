@@ -109,7 +109,7 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
     EXPECT_GT(std::set<uint32_t>(sheet->colour.begin(), sheet->colour.end()).size(), 500u) << name;
   }
 
-  // What is replayed is what was displayed: the run's last picture, drawn again, is the same or nearly so.
+  // A replay shows the frames that were displayed: the run's last picture, drawn again, is the same or nearly so.
   std::string last;
   for (const auto& entry : fs::directory_iterator(run.out() + "/images"))
     last = std::max(last, entry.path().filename().string());

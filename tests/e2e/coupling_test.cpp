@@ -1,4 +1,4 @@
-// Loose coupling (T6.4): the display shows one frame per view update. Of synchronous coupling: ChangedCouplings.
+// Loose coupling (T6.4): the display shows one frame per view update. ChangedCouplings tests synchronous coupling.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -188,7 +188,7 @@ TEST(Deployment, AMasterDoesNotWaitLongForTheDead) {
   d.service("sampler").signal(SIGCONT);
 }
 
-// What is being read is given up: the chunk store that the file would have become is not there afterwards.
+// The data server gives up the file: the chunk store that the file would have become is not there afterwards.
 TEST(Deployment, ADataServerEndsOnASignalWhileItReads) {
   Deployment d;
   write_terrain(d.folder() / "mountains.ply", 1500);

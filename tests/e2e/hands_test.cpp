@@ -271,7 +271,7 @@ TEST_F(Hands, ATerrainsPickHasTheFilesCoordinatesAndTrueHeights) {
   EXPECT_EQ(run.stop(), 0);
 }
 
-// What is displayed of a cut scene is what rays see of it. Simulated sessions show it of meshes.
+// The display of a cut scene shows the points that rays hit. Simulated sessions show it for meshes.
 TEST_F(Hands, CutScenesAreComparedWithCutScenes) {
   for (const std::string scene : {"julia", "volume"}) {
     std::string file = scene;

@@ -1,4 +1,4 @@
-// Sessions with keys, in processes of their own: everybody who should comes in, nobody else does or can do anything.
+// Sessions with keys, in processes of their own: peers with a right to it come in; others do not, and change nothing.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -89,7 +89,7 @@ TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
     arguments.insert(arguments.end(), flags.begin(), flags.end());
     Program stranger("telesplat", arguments, folder / "stranger");
     EXPECT_EQ(stranger.wait(20), 1);
-    // Had it waited in vain, it would say that nobody answers.
+    // Had it waited in vain, it would say that no master answers.
     EXPECT_NE(stranger.err().find("refuses: it "), std::string::npos) << stranger.err();
     EXPECT_EQ(std::ranges::count(stranger.err(), '\n'), 1) << stranger.err();
   }
@@ -129,7 +129,7 @@ TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
 }
 
-// What the person who started a run needs no flag for.
+// Commands that need no flag from the person who started the run.
 TEST(KeysOfSessions, TheOwnerOfARunNeedsNoKeysFlag) {
   PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
@@ -257,7 +257,7 @@ TEST(KeysOfSessions, TunnelsCarryThoseWithKeysAndNobodyElse) {
   Program stranger("telesplat-viewer", viewer("stranger", others.path()), folder / "stranger-viewer");
   Program anna("telesplat-viewer", viewer("anna", folder / "laptop"), folder / "anna-viewer");
   EXPECT_EQ(anna.wait(60), 0) << anna.err();
-  // What breaks off may be a tunnel whose other end is not there yet: so a stranger tries on, and says why.
+  // A connection that breaks off may be a tunnel whose other end is not there yet: so a stranger tries on and says why.
   EXPECT_TRUE(wait_until([&] { return stranger.err().find("does not let stranger in") != std::string::npos; }))
       << stranger.err();
   stranger.signal(SIGTERM);

@@ -1,4 +1,4 @@
-// What colours mean stands in pictures, and nowhere where it would be compared.
+// Pictures have the legend of their colours; frames that are compared do not.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ image::View last_picture(const PipelineRun& run) {
   return view ? std::move(*view) : image::View{};
 }
 
-// How many pixels of the legend's place have what the legend has there; 1: all that it covers wholly.
+// Returns the share of pixels at the legend's place that show the legend; 1: all that it covers wholly.
 double matches(const image::View& picture, const image::Legend& legend) {
   const image::View over = image::legend_picture(legend, picture.width, picture.height);
   const auto place = image::legend_place(over, picture.width, picture.height);

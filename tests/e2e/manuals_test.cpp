@@ -1,4 +1,4 @@
-// What people are told beside --help, by the programs as they are built: versions, manual pages, completion.
+// The programs' own descriptions beside --help: versions, manual pages, completion.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -68,7 +68,7 @@ void set_halved(const PipelineRun& run, char value) {
   std::ofstream(path) << all;
 }
 
-// Which frames are drawn at half their size depends on the machine; so the record is made to say it.
+// The machine decides which frames are drawn at half their size; so the test writes that into the record.
 TEST(Movie, OfFramesOfHalfTheirSizeShowsThemDoubled) {
   PipelineRun run({"--duration", "1", "--size", "160x120", "--still-samples", "1"});
   ASSERT_EQ(run.program().wait(), 0) << run.program().err();
@@ -101,7 +101,7 @@ TEST(Movie, OfAMeshDrawnByOpenGlShowsWhatWasDisplayedToTheLastBit) {
   EXPECT_GT(expect_as_displayed(run, 10), 5u);
 }
 
-// As far as its record goes: where that was cut short, the movie ends and says so, and what is none is refused.
+// A movie goes as far as its record: where that was cut short it ends and says so; another file is refused.
 TEST(Movie, OfAVolumeShowsWhatWasDisplayedToTheLastBit) {
   TemporaryFolder data;
   write_volume(data / "balls.mha");

@@ -1,4 +1,4 @@
-// Whose the folder of a record is, and what is left of a run that ends before its time.
+// The owner of a record's folder, and the files of a run that ends before its time.
 #include <gtest/gtest.h>
 
 #include <csignal>

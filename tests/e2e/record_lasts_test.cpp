@@ -48,7 +48,7 @@ TEST(FullDisk, ARunGoesOnSaysItOnceAndEndsWithOne) {
         folder / "run");
   }
   EXPECT_EQ(run->wait(patient(90)), 1) << run->err();
-  // What is missing and why, as the system has it; a full disk has another word at the same place.
+  // The message names the missing file and the system's reason; a full disk has another word at the same place.
   for (const char* told : {"out: not all of the record could be written: ", "trace.json: File too large\n",
                            " pictures, points.events: File too large\n"})
     EXPECT_NE(run->err().find(told), std::string::npos) << told << ": " << run->err();

@@ -177,7 +177,7 @@ void expect_stages(PipelineRun& run) {
   }
 }
 
-// What `telesplat inspect` tells of a run by its latest link, and of a depth image that it recorded.
+// `telesplat inspect` describes a run by its latest link, and a depth image that it recorded.
 void expect_inspected(const PipelineRun& run) {
   const auto inspect = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "inspect");

@@ -52,7 +52,7 @@ TEST(Views, AnEyeStandsWhereItIsToldAndABackgroundIsBehindPicturesOfBothRenderer
   }
 }
 
-// What is compared with direct rendering does not change with what lies behind it.
+// The background does not change the comparison with direct rendering.
 TEST(Views, HolesOfAVolumeDoNotDependOnTheBackground) {
   TemporaryFolder folder;
   write_volume(folder / "ball.mha");

@@ -122,7 +122,7 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
       }
     return sum / v.height / 3;
   };
-  EXPECT_NEAR(step(*stitched, 320), step(*whole, 320), 1.0);  // of 255
+  EXPECT_NEAR(step(*stitched, 320), step(*whole, 320), 1.0);  // levels, 255 at most
 }
 
 TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
@@ -150,7 +150,7 @@ TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
   EXPECT_NE(err.find("nonesuch"), std::string::npos) << err;
   EXPECT_NE(ctl(run, {"tf", "5:#00:0"}), 0);
   EXPECT_EQ(ctl(run, {"tf"}), 2);
-  // What the master refuses is bad usage as well.
+  // An order that the master refuses is bad usage as well.
   for (const std::vector<std::string>& wrong : {std::vector<std::string>{"tf", "0:#000000:7"},
                                                 {"set", "volume.step=7"},
                                                 {"set", "c.y=0.3"},

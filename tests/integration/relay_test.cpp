@@ -80,7 +80,7 @@ class RunningRelay {
     return fd;
   }
   bool ended() const { return ended_; }
-  // What passed.
+  // Messages that passed.
   std::string end() {
     kill(getpid(), SIGTERM);
     thread_.join();

@@ -108,13 +108,13 @@ nlohmann::json process(const nlohmann::json& status, const std::string& name);
 /// Returns its value, 0 if it has none.
 double value(const nlohmann::json& status, const std::string& name, const std::string& key);
 
-/// The last picture of a displayed frame that the run recorded; empty: there is none.
+/// The last picture of a displayed frame that the run recorded; empty: the run recorded no picture.
 std::string newest_picture(const PipelineRun& run);
 /// Over all pixels, those of the background too; 99 where they are the same.
 double psnr_db(const image::View& a, const image::View& b);
 
-/// What a movie of `fps` frames a second of the run in this folder must show: for each of its frames the number of the
-/// displayed one.
+/// Returns the numbers of the displayed frames that a movie of the run in this folder must show, one for each of its `fps`
+/// frames a second.
 std::vector<uint64_t> on_screen(const std::string& run, double fps);
 /// Makes a folder of pictures of the run, which recorded every frame, and expects each to equal the recorded one.
 /// Returns the number of compared pictures: the disk may have been too slow for some.

@@ -101,7 +101,7 @@ TEST(Wall, ADisplayThatStopsDoesNotHoldTheOthers) {
   PipelineRun run({"--wall", write_wall(folder), "--duration", "0", "--target-fps", "20"});
   ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 20; }))
       << run.program().err();
-  // It is stopped, not dead: nobody says goodbye.
+  // It is stopped, not dead: no goodbye is sent.
   pid_t stopped = 0;
   const auto status = run.status();
   for (const auto& p : status["processes"])

@@ -1,5 +1,5 @@
 // A running session to which something happens: what the display did meanwhile, when new views were shown again, and
-// that nothing is left behind. What was measured goes into the test's properties, of which tools/faults makes a table.
+// that nothing is left behind. Measured figures go into the test's properties; tools/faults makes a table of them.
 #pragma once
 
 #include <sys/types.h>
@@ -13,7 +13,7 @@
 
 namespace telesplat::test {
 
-/// What a fault may cost. With TELESPLAT_FAULTS=strict in the environment (tools/faults) what is promised; else more,
+/// Limits of a fault's cost. With TELESPLAT_FAULTS=strict in the environment (tools/faults) those promised; else more,
 /// since other tests run beside this one.
 struct FaultBounds {
   double gap_ms = 0;    ///< between two displayed frames
@@ -52,7 +52,7 @@ class Fault {
   /// Waits until views that were asked for after ends() are displayed, and, of points, until the packer has told a
   /// digest that the viewer has, too.
   void expect_resynchronised(const std::string& viewer = "viewer-1");
-  /// The same without the digest: whoever waits for updates of the display is content.
+  /// The same without the digest, for tests that wait for updates of the display.
   void expect_updates(const std::string& viewer = "viewer-1");
   /// Between begins() and ends() the display shows at least this share of the frames a second that it showed before.
   /// Asked for on quiet machines only (TELESPLAT_FAULTS=strict).

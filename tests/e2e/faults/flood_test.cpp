@@ -30,7 +30,7 @@ std::map<std::string, std::string> endpoints_of(PipelineRun& run) {
 const std::vector<std::string> kDisplay{"--size", "1280x800", "--target-fps", "60"};
 constexpr double kLeastRate = 0.9;
 constexpr double kUndisturbed_s = 3;
-constexpr double kPatience_s = 20;  // until whoever does not end is hung up on
+constexpr double kPatience_s = 20;  // until a peer that does not end is hung up on
 
 struct Figures {
   std::map<std::string, pid_t> pids;
@@ -84,7 +84,7 @@ TEST(Crowd, OfAThousandConnectionsComesAndGoes) {
   fault.ends();
   fault.expect_resynchronised();
   expect_as_before(fault, before, 100);
-  // Whoever comes now is let in.
+  // A peer that comes now is let in.
   fault.start_guest();
   fault.finish();
 }

@@ -49,7 +49,7 @@ void offend(const std::string& endpoint, net::Kind kind, const char* zmtp_type, 
     peer.send_frames({}, type, body);               // fields are missing
     peer.send_frames({}, type, body.substr(0, 7));  // cut short
     body[body.find("\xa1v") + 2] = 9;
-    peer.send_frames({}, type, body);                          // of another version
+    peer.send_frames({}, type, body);                          // another version
     peer.send_frames({}, type, std::string(2 << 20, '\xc1'));  // too large for most, and no msgpack for all
   }
 }
@@ -75,7 +75,7 @@ TEST(Hostile, RubbishOnEverySocketIsCountedAndTheRunGoesOn) {
     return value(s, "data", "messages_rejected") >= kPerSocket &&
            value(s, "packer", "messages_rejected") >= 3 * kPerSocket;
   })) << run.status().dump(1);
-  // Everyone still serves: frames are displayed, views updated, and nobody had to be started again.
+  // All processes still serve: frames are displayed, views updated, and no process was started again.
   const auto now = run.status();
   EXPECT_TRUE(run.wait_status([&](const auto& s) {
     return value(s, "viewer-1", "frames") > value(now, "viewer-1", "frames") &&
@@ -102,7 +102,7 @@ TEST(Hostile, ConnectionsBeyondTheLimitAreRefusedAndTold) {
   std::vector<std::unique_ptr<RawPeer>> strangers;
   for (const auto& endpoint : endpoints)
     for (int i = 0; i < kStrangers; ++i) strangers.push_back(std::make_unique<RawPeer>(endpoint));
-  const double refused = kStrangers - kMost;  // of each socket, at least
+  const double refused = kStrangers - kMost;  // each socket refuses at least these
   EXPECT_TRUE(run.wait_status([&](const auto& s) {
     return value(s, "data", "connections_refused") >= refused &&
            value(s, "packer", "connections_refused") >= 3 * refused &&

@@ -1,4 +1,4 @@
-// kill -9 of each process while a frame waits for somebody: it is started again, the display goes on, and views are
+// kill -9 of each process while a frame waits for a process: it is started again, the display goes on, and views are
 // displayed again within seconds.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 namespace telesplat::test {
 namespace {
 
-// What a frame waits for while the process is killed. Others are stopped, so that it stays there.
+// The step that a frame waits for while the process is killed. Other processes are stopped, so that it stays there.
 enum class Stage {
   kFetching,  // a sampler has a lease and waits for the data server
   kLeased,    // samplers have all of it

@@ -34,7 +34,7 @@ pid_t relay_called(const std::string& name, const std::string& run_folder) {
 TEST(CutOff, ASamplerFromTheDataServerAlone) {
   Fault fault("a sampler is cut off from the data server alone", {"--samplers", "1"});
   ASSERT_TRUE(fault.showing());
-  // What must be known before leases are asked for passes; chunks do not.
+  // Messages that precede the first lease request pass; chunks do not.
   auto relay = std::make_unique<OwnRelay>(fault, kTrickle);
   const std::string at = relay->address();
   fault.begins();
@@ -45,7 +45,7 @@ TEST(CutOff, ASamplerFromTheDataServerAlone) {
     const auto p = process(s, "cut-off");
     return p.is_object() && p["leases"] > 0;
   })) << guest.err();
-  // What it cannot sample others do: views are completed on and on.
+  // Other samplers take the tiles that it cannot sample: views are completed on and on.
   fault.ends();
   fault.expect_updates();
   for (int i = 0; i < 3; ++i) {

@@ -1,5 +1,5 @@
-// What lies around a session goes wrong: the data set changes, disks are full, the wall clock is set, names are not
-// UTF-8, everybody is told to stop at once.
+// Faults around a session: the data set changes, disks are full, the wall clock is set, names are not UTF-8, all
+// processes are told to stop at once.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/mount.h>

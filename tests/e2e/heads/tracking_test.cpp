@@ -77,7 +77,7 @@ TEST(Tracking, AReplayedTrackerMovesTheHead) {
 
 TEST(Tracking, TheDisplayGoesOnWithoutAPublisherAndAfterIt) {
   TemporaryFolder folder;
-  // Nobody publishes there.
+  // No process publishes there.
   PipelineRun alone({"--poses", "tcp://127.0.0.1:9", "--duration", "1"});
   ASSERT_EQ(alone.program().wait(), 0) << alone.program().err();
   EXPECT_GT(alone.column("frames.csv", "px").size(), 10u);

@@ -11,7 +11,7 @@
 namespace telesplat::test {
 namespace {
 
-// Updates have rows; the stages of each are its latency, and none is less than -error_ms.
+// Updates have rows; the stages of each add up to its latency, and each is at least -error_ms.
 void expect_stages(const PipelineRun& run, double error_ms = 0) {
   const auto latency = run.column("stages.csv", "latency_ms"), request = run.column("stages.csv", "request");
   const auto updates = run.column("updates.csv", "request"), of_updates = run.column("updates.csv", "latency_ms");
@@ -68,7 +68,7 @@ TEST_P(Stages, AddUpAndNoneIsNegative) {
 INSTANTIATE_TEST_SUITE_P(Of, Stages, testing::Values(Scene{"julia", "async"}, Scene{"volume", "sync"}),
                          [](const auto& info) { return std::string(info.param.name) + "_" + info.param.coupling; });
 
-// What chrome://tracing and Perfetto ask of a file, and that it can be joined with the tables. A mesh, loosely coupled.
+// The trace has all that chrome://tracing and Perfetto need, and joins the tables. A mesh, loosely coupled.
 TEST(Trace, IsValidAndTellsFramesTilesAndRequests) {
   PipelineRun run({"--duration", "3", "--samplers", "2", "--coupling", "loose"});
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();

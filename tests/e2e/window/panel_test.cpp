@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of a display of 96 dots an inch, as an X server without a screen is one.
+// The scale of a display of 96 dots an inch, as an X server without a screen has.
 constexpr int kLetter = 15, kPanelWidth = 24 * kLetter;
 constexpr uint32_t kCheckMark = 0x56b4e9;
 
@@ -28,7 +28,7 @@ bool alike(uint32_t a, uint32_t b) {
   return true;
 }
 
-// Whether the panel lies over the left side: its ground is there, and nothing like it at the right.
+// True if the panel lies over the left side: its ground is there, and nothing like it at the right.
 bool shows_panel(const image::View& v) {
   int ground = 0;
   for (int y = 0; y < v.height; ++y) ground += alike(at(v, 3, y), 0x171819);
@@ -62,7 +62,7 @@ std::vector<Place> marks(const image::View& v) {
   return out;
 }
 
-// A process of this program that `parent` started; 0: there is none that runs.
+// Returns a process of this program that `parent` started; 0: no such process runs.
 pid_t child_of(pid_t parent, const std::string& program) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator("/proc", error)) {
@@ -124,7 +124,7 @@ TEST_F(PanelTest, LiesOverTheFrameKeepsThePointerAndGoesWithTab) {
   const auto window = live_window(run.program());
   ASSERT_NE(window, 0u);
   ASSERT_TRUE(panel_is(window, true));
-  // The first view leaves free what the panel covers, and follows it as long as nobody has moved the camera.
+  // The first view leaves free what the panel covers, and follows it until a person moves the camera.
   // The columns right of the panel that show something else than the background.
   const auto shows = [&](int from) {
     const auto v = shown(window);
@@ -325,7 +325,7 @@ TEST_F(PanelTest, AFileThatIsDroppedIsOpenedInTheSameWindow) {
   EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"),
             folder_ / "second.mha" + "\n" + (folder_ / "first.ply") + "\n");
 
-  // What cannot be read is said, and the next one is opened all the same.
+  // The window names a file that cannot be read, and opens the next one all the same.
   std::ofstream(folder_ / "broken.ply") << "ply\nformat ascii 1.0\nelement vertex 3\nend_header\n1 2";
   ASSERT_TRUE(display_->drop_file(window, folder_ / "broken.ply"));
   EXPECT_TRUE(wait_until([&] { return view.err().find("broken.ply: ") != std::string::npos; }, 30)) << view.err();

@@ -1,4 +1,4 @@
-// What can be changed while a session runs, changed at a real window and by `telesplat ctl`: the session has it.
+// Settings that change while a session runs, at a real window and by `telesplat ctl`: the session has them.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -66,7 +66,7 @@ class SettingsTest : public testing::Test {
   struct Widget {
     int x = 0, y = 0, left = 0, right = 0, uses = 0;
   };
-  // One that can be reached; nothing: there is none.
+  // Returns a widget that can be reached; nothing: no widget can.
   std::optional<Widget> widget(const std::string& name) const {
     std::istringstream in(read_text(log_));
     for (std::string line; std::getline(in, line);) {

@@ -290,7 +290,7 @@ TEST_F(WindowTest, APathIsRecordedPlayedAgainAndATrajectory) {
   display_->close(window);
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 
-  // What the window wrote, and what the run recorded, move a head without a window, for as long as they last.
+  // The path that the window wrote and the one that the run recorded move a head without a window while they last.
   for (const std::string& file : {path, run.out() + "/frames.csv"}) {
     const auto trajectory = geometry::Trajectory::read_csv(file);
     ASSERT_TRUE(trajectory) << trajectory.error().text;

@@ -15,7 +15,7 @@ struct Said {
   std::string out, err;
 };
 
-/// What `program`, which is a main(), returns or exits with, and says.
+/// Runs `program`, which is a main(). Returns its exit code and its output.
 Said said_by(const std::function<int()>& program);
 
 /// `telesplat` with these arguments. Sessions of the person at this machine are not found.

@@ -1,4 +1,4 @@
-// What commands refuse before they start another program: exit code 2, one line that names it, nothing left behind.
+// Commands refuse bad usage before they start another program: exit code 2, a line that names it, nothing left behind.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

@@ -1,4 +1,4 @@
-// `telesplat report` as a person has it: its page opens in a browser without an error, whatever the runs hold.
+// `telesplat report` as a person has it: its page opens in a browser without an error, for runs of all kinds.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ std::string browser() {
 
 constexpr const char* kNoBrowser = "no Chromium is installed (Debian: chromium-headless-shell), so no page is opened";
 
-// What the browser has made of a page when all its scripts have run.
+// Returns the page in the browser once all its scripts have run.
 std::string opened(const TemporaryFolder& folder, const std::string& page) {
   const std::string command = fmt::format(
       "HOME='{0}' timeout 90 '{1}' --headless --no-sandbox --disable-gpu --user-data-dir='{0}/profile' "
@@ -131,7 +131,7 @@ TEST(Report, OfARunOpensWithoutAnErrorShowsAllItsPartsAndAnswersHands) {
   for (const char* part : {"delay", "stages", "trace", "time", "walk", "measures", "about", "configuration", "errors"})
     EXPECT_NE(dom.find(fmt::format("<section id=\"{}\"", part)), dom.npos) << part;
   EXPECT_NE(dom.find("Beside the reference"), dom.npos);
-  // Names are text: in the page's own elements there is none that a run wrote.
+  // Names are text: the page has no element that a run wrote.
   const std::string shown = dom.substr(dom.find("<main"), dom.find("</main>") - dom.find("<main"));
   EXPECT_NE(shown.find("&lt;img src=x onerror=alert(1)&gt;"), shown.npos);
   EXPECT_EQ(shown.find("<img src=\"x\""), shown.npos);

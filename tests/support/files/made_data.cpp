@@ -81,7 +81,7 @@ std::string read_text(const std::string& path) try {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 } catch (const std::ios_base::failure&) {
-  return {};  // of /proc: its process has ended meanwhile
+  return {};  // a process of /proc has ended meanwhile
 }
 
 }  // namespace telesplat::test

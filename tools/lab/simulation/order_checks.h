@@ -59,7 +59,7 @@ class OrderChecks {
   std::map<std::string, Value> values_;  // that orders changed
   wire::Welcome session_;
   double scene_since_s_ = 0;
-  std::deque<std::pair<double, uint64_t>> epochs_;  // of this master, and when they began
+  std::deque<std::pair<double, uint64_t>> epochs_;  // when this master's epochs began, and their numbers
   std::string status_;
   Event speaker_;
 };
