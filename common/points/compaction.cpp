@@ -125,12 +125,17 @@ struct Cell {
   uint32_t mean() const { return (r + n / 2) / n << 16 | (g + n / 2) / n << 8 | (b + n / 2) / n; }
 };
 
+// Cells of a grid, and the cell of each point (of level 2: of each cell of level 1).
+struct Level {
+  std::vector<Cell> cells;
+  std::vector<uint32_t> cell_of;
+};
+
 // Buffers of a merge, kept from merge to merge.
 struct Scratch {
   PointSet points, rest;
   CellTable table;
-  std::vector<Cell> cells1, cells2;
-  std::vector<uint32_t> cell1, cell2;  // cell1: cell of each point; cell2: of each cell1
+  Level level1, level2;
   std::vector<uint32_t> counts;
   std::vector<uint8_t> rank, surrounded;
 };
@@ -141,14 +146,15 @@ constexpr uint32_t kLeastTaken = 4;
 constexpr int kMergedRanks = 5;  // level 2 has one rank, levels 1 and 0 two halves each
 
 // Gathers `count` points into cells: point(i) lies in the cell grid key of i.
-void fill_cells(const PointSet& p, const Grid& grid, CellTable& table, std::vector<Cell>& cells,
-                std::vector<uint32_t>& cell_of, uint32_t count, const auto& point, const auto& add_colour) {
-  table.begin(count);
+void fill_cells(const PointSet& p, const Grid& grid, Level& level, uint32_t count, const auto& point,
+                const auto& add_colour) {
+  auto& [cells, cell_of] = level;
+  scratch.table.begin(count);
   cells.clear();
   cell_of.resize(count);
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t at = point(i);
-    const uint32_t c = table.number(grid.key(p.x[at], p.y[at], p.z[at], face_of(p.normal[at])));
+    const uint32_t c = scratch.table.number(grid.key(p.x[at], p.y[at], p.z[at], face_of(p.normal[at])));
     const int64_t off2 = grid.off2(p.x[at], p.y[at], p.z[at]);
     if (c == cells.size()) cells.push_back({at, off2, 0, 0, 0, 0});
     Cell& cell = cells[c];
@@ -178,16 +184,16 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
   const Grid grid2{cells_a_side(range, 4)}, grid1{2 * grid2.side}, grid0{4 * grid2.side};
 
   fill_cells(
-      p, grid1, s.table, s.cells1, s.cell1, n, [](uint32_t i) { return i; },
+      p, grid1, s.level1, n, [](uint32_t i) { return i; },
       [&](Cell& cell, uint32_t i) {
         const uint32_t c = p.colour[i];
         cell.r += c >> 16 & 255, cell.g += c >> 8 & 255, cell.b += c & 255, ++cell.n;
       });
   fill_cells(
-      p, grid2, s.table, s.cells2, s.cell2, static_cast<uint32_t>(s.cells1.size()),
-      [&](uint32_t i) { return s.cells1[i].representative; },
+      p, grid2, s.level2, static_cast<uint32_t>(s.level1.cells.size()),
+      [&](uint32_t i) { return s.level1.cells[i].representative; },
       [&](Cell& cell, uint32_t i) {
-        const Cell& fine = s.cells1[i];
+        const Cell& fine = s.level1.cells[i];
         cell.r += fine.r, cell.g += fine.g, cell.b += fine.b, cell.n += fine.n;
       });
 
@@ -195,9 +201,9 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
   s.rank.resize(n);
   std::array<uint32_t, kMergedRanks> count{};
   for (uint32_t i = 0; i < n; ++i) {
-    const uint32_t c1 = s.cell1[i];
-    const bool of_level1 = s.cells1[c1].representative == i;
-    const bool of_level2 = of_level1 && s.cells2[s.cell2[c1]].representative == i;
+    const uint32_t c1 = s.level1.cell_of[i];
+    const bool of_level1 = s.level1.cells[c1].representative == i;
+    const bool of_level2 = of_level1 && s.level2.cells[s.level2.cell_of[c1]].representative == i;
     const Grid& grid = of_level1 ? grid1 : grid0;
     const int rank = of_level2 ? 0 : (of_level1 ? 1 : 3) + grid.is_odd(p.x[i], p.y[i], p.z[i]);
     s.rank[i] = static_cast<uint8_t>(rank);
@@ -212,8 +218,8 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
     out.x[at] = p.x[i], out.y[at] = p.y[i], out.z[at] = p.z[i];
     out.normal[at] = p.normal[i];
     out.colour[at] = p.colour[i];
-    if (s.rank[i] < 3 && out.mean1) out.mean1[at] = s.cells1[s.cell1[i]].mean();
-    if (s.rank[i] == 0 && out.mean2) out.mean2[at] = s.cells2[s.cell2[s.cell1[i]]].mean();
+    if (s.rank[i] < 3 && out.mean1) out.mean1[at] = s.level1.cells[s.level1.cell_of[i]].mean();
+    if (s.rank[i] == 0 && out.mean2) out.mean2[at] = s.level2.cells[s.level2.cell_of[s.level1.cell_of[i]]].mean();
   }
   return out.finish(p.pixel_range(), p.direction_to_eye());
 }

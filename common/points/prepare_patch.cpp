@@ -33,7 +33,7 @@ UnprojectedTile unproject(const OctreeGrid& grid, const geometry::Camera& camera
       continue;
     }
     unproject_row(row_rays(grid, camera, tile.x, tile.y + row), image.depth.data() + first, tile.width,
-                  out.keys.get() + first, out.x.get() + first, out.y.get() + first, out.z.get() + first);
+                  out.keys.get() + first, {out.x.get() + first, out.y.get() + first, out.z.get() + first});
   }
   return out;
 }

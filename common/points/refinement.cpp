@@ -19,8 +19,8 @@ struct UnprojectedRow {
   void set(const RowRays& rays, const image::DepthImage& image, int row) {
     const auto n = static_cast<size_t>(image.width);
     keys.resize(n), x.resize(n), y.resize(n), z.resize(n);
-    unproject_row(rays, image.depth.data() + static_cast<size_t>(row) * n, n, keys.data(), x.data(), y.data(),
-                  z.data());
+    unproject_row(rays, image.depth.data() + static_cast<size_t>(row) * n, n, keys.data(),
+                  {x.data(), y.data(), z.data()});
   }
 };
 
@@ -69,8 +69,8 @@ uint64_t PreparedRefinement::points() const {
 }
 
 PreparedRefinement prepare_refinement(const ModelConfig& config, Sequence sequence, Sequence of,
-                                      const geometry::Camera& camera, const geometry::Rect& tile,
-                                      const image::DepthImage& bounded, const image::DepthImage& exact, FrameId frame) {
+                                      const RefinedPatch& patch) {
+  const auto& [camera, tile, bounded, exact, frame] = patch;
   CHECK(tile.width == bounded.width && tile.height == bounded.height);
   CHECK(tile.width == exact.width && tile.height == exact.height);
   const OctreeGrid grid = octree_grid(config);

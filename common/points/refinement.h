@@ -28,13 +28,18 @@ struct PreparedRefinement {
   uint64_t points() const;
 };
 
-/// camera, tile, frame: of the patch, as for prepare_patch(). bounded, exact: the patch's image as published, and as
-/// sampled; ignores pixels that only one of them covers.
+/// A patch's image as it was published, and as it was sampled; camera, tile and frame as prepare_patch() takes them.
+struct RefinedPatch {
+  const geometry::Camera& camera;
+  const geometry::Rect& tile;
+  const image::DepthImage &bounded, &exact;
+  FrameId frame{};
+};
+
+/// The event `sequence` refines the patch of the event `of`. Pixels that only one image covers are left out.
 /// Preconditions: as prepare_patch(); both images of the tile's size.
 PreparedRefinement prepare_refinement(const ModelConfig& config, Sequence sequence, Sequence of,
-                                      const geometry::Camera& camera, const geometry::Rect& tile,
-                                      const image::DepthImage& bounded, const image::DepthImage& exact,
-                                      FrameId frame = {});
+                                      const RefinedPatch& patch);
 
 /// The changes to the model, for PointModel::commit: mosaics with such points are made anew in place, with the same
 /// sequence and frame. Ignores missing clusters and points. If bounded points are equal, the first in the model becomes

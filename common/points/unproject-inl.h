@@ -15,14 +15,13 @@ namespace telesplat::points {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x, uint16_t* y,
-                   uint16_t* z) {
+void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys,
+                   const std::array<uint16_t*, 3>& positions) {
   const hn::ScalableTag<double> df;
   const hn::Rebind<int32_t, decltype(df)> di;
   const hn::Rebind<uint16_t, decltype(df)> dh;
   const size_t lanes = hn::Lanes(df);
   const auto zero = hn::Zero(df), limit = hn::Set(df, rays.limit), scale = hn::Set(df, rays.depth_scale);
-  uint16_t* const positions[3] = {x, y, z};
 
   size_t i = 0;
   for (; i + lanes <= n; i += lanes) {
@@ -53,7 +52,7 @@ void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, Cluster
   if (i < n) {
     RowRays rest = rays;
     rest.x_first += static_cast<double>(i);
-    unproject_row_scalar(rest, codes + i, n - i, keys + i, x + i, y + i, z + i);
+    unproject_row_scalar(rest, codes + i, n - i, keys + i, {positions[0] + i, positions[1] + i, positions[2] + i});
   }
 }
 

@@ -25,14 +25,13 @@ RowRays row_rays(const OctreeGrid& grid, const geometry::Camera& camera, int x, 
           65536.0 * (1 << grid.depth)};
 }
 
-void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x, uint16_t* y,
-                   uint16_t* z) {
-  HWY_DYNAMIC_DISPATCH(unproject_row)(rays, codes, n, keys, x, y, z);
+void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys,
+                   const std::array<uint16_t*, 3>& positions) {
+  HWY_DYNAMIC_DISPATCH(unproject_row)(rays, codes, n, keys, positions);
 }
 
-void unproject_row_scalar(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x,
-                          uint16_t* y, uint16_t* z) {
-  uint16_t* const positions[3] = {x, y, z};
+void unproject_row_scalar(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys,
+                          const std::array<uint16_t*, 3>& positions) {
   for (size_t i = 0; i < n; ++i) {
     keys[i] = kNoCluster;
     if (codes[i] == 0) continue;

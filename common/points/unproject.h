@@ -28,10 +28,10 @@ RowRays row_rays(const OctreeGrid& grid, const geometry::Camera& camera, int x, 
 
 /// Returns for each of n depth codes its leaf's key, or kNoCluster if it is 0 or outside the cube, and the position in
 /// the leaf (16 bits an axis; undefined without a key). Arrays of n elements each. SIMD, run-time dispatch.
-void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x, uint16_t* y,
-                   uint16_t* z);
+void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys,
+                   const std::array<uint16_t*, 3>& positions);
 /// The same without SIMD: the oracle for tests.
-void unproject_row_scalar(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x,
-                          uint16_t* y, uint16_t* z);
+void unproject_row_scalar(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys,
+                          const std::array<uint16_t*, 3>& positions);
 
 }  // namespace telesplat::points

@@ -14,7 +14,7 @@ Result<std::optional<points::PreparedRefinement>> BoundedPatches::refine(const p
   const auto exact = codec::decode_refinement(stream, *bounded);
   if (!exact) return exact.error();
   return std::optional(
-      points::prepare_refinement(config, sequence, of, patch->camera, patch->rect, *bounded, *exact, patch->tag));
+      points::prepare_refinement(config, sequence, of, {patch->camera, patch->rect, *bounded, *exact, patch->tag}));
 }
 
 }  // namespace telesplat::refinement

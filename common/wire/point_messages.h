@@ -17,6 +17,17 @@ namespace telesplat::wire {
 
 // ---- events of the model: packer (PUB) -> viewers (SUB), and in answer to state_request (ROUTER -> DEALER) ----------
 
+/// Covered pixels of a tile before and after elimination.
+struct SampleCounts {
+  uint64_t samples = 0, kept = 0;
+};
+
+/// Rays finer than a view's that met nothing; no words: no rays.
+struct MissedRays {
+  std::vector<uint32_t> words;  ///< codec::encode_mask
+  geometry::Rect rect{0, 0, 1, 1};  ///< where they lie
+};
+
 struct Patch {
   static constexpr std::string_view kName = "patch";
   static constexpr bool kBulk = true;
@@ -28,27 +39,25 @@ struct Patch {
   InstanceId viewer;
   RequestId request;
   uint64_t tile = 0, tiles_in_frame = 0;  ///< blocks (Lease::block): a frame is published block by block
-  uint64_t step = 1;                      ///< Lease::step
-  bool extra = false;                     ///< Lease::extra
-  bool frame_complete = false;            ///< the last tile of its frame to be packed
-  uint64_t left_out = 0;                  ///< tiles that are not sampled (FrameEnd): this patch ends the frame
-  uint64_t samples = 0, kept = 0;
+  uint64_t step = 1;  ///< Lease::step
+  bool extra = false;  ///< Lease::extra
+  bool frame_complete = false;  ///< the last tile of its frame to be packed
+  uint64_t left_out = 0;  ///< tiles that are not sampled (FrameEnd): this patch ends the frame
+  SampleCounts counts;
   geometry::Camera camera;  ///< camera of the whole frame
-  geometry::Rect rect;      ///< the tile in it
-  Bytes image;              ///< codec stream; eliminated pixels are not covered
-  /// Rays finer than a view's: mask of those that met nothing (codec::encode_mask), over missed_rect; else empty.
-  std::vector<uint32_t> missed;
-  geometry::Rect missed_rect{0, 0, 1, 1};
-  Moments moments;                        ///< moments of its last tile, if it completes an update; empty when resent
-  bool refinable = false;                 ///< points that its image leaves out may follow: Refine
+  geometry::Rect rect;  ///< the tile in it
+  Bytes image;  ///< codec stream; eliminated pixels are not covered
+  MissedRays missed;
+  Moments moments;  ///< moments of its last tile, if it completes an update; empty when resent
+  bool refinable = false;  ///< points that its image leaves out may follow: Refine
   /// Not 0: its points are removed when the head has moved on, by this tag (points::tagged).
   uint64_t rest = 0;
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
-    f("extra", m.extra); f("frame_complete", m.frame_complete); f("left_out", m.left_out); f("samples", m.samples); f("kept", m.kept);
+    f("extra", m.extra); f("frame_complete", m.frame_complete); f("left_out", m.left_out); f("samples", m.counts.samples); f("kept", m.counts.kept);
     f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
-    f("missed", m.missed, kMaxMaskWords); f("missed_rect", m.missed_rect); f("moments", m.moments);
+    f("missed", m.missed.words, kMaxMaskWords); f("missed_rect", m.missed.rect); f("moments", m.moments);
     f("refinable", m.refinable); f("rest", m.rest);
   }
 };
@@ -59,7 +68,7 @@ struct Forget {
   Sequence sequence;
   EpochId epoch;
   std::vector<uint32_t> clusters;  ///< keys (as bin, little-endian u32), at most kMaxKeys
-  std::vector<uint32_t> frames;    ///< empty: whole clusters; else one a cluster: only its mosaics with this frame tag
+  std::vector<uint32_t> frames;  ///< empty: whole clusters; else one a cluster: only its mosaics with this frame tag
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("clusters", m.clusters);
     f("frames", m.frames);
@@ -73,7 +82,7 @@ struct Refine {
   Sequence sequence;
   EpochId epoch;
   Sequence patch;  ///< patch that becomes exact
-  Bytes image;     ///< the part that its image left out (codec::decode_refinement)
+  Bytes image;  ///< the part that its image left out (codec::decode_refinement)
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("patch", m.patch);
     f("image", m.image, kMaxBulkBytes);
@@ -92,7 +101,7 @@ struct EpochBegin {
 struct StateMark {
   static constexpr std::string_view kName = "state_mark";
   InstanceId packer;
-  Sequence sequence;    ///< sequence of the newest event
+  Sequence sequence;  ///< sequence of the newest event
   EpochId epoch;
   bool answer = false;  ///< true: everything a state_request asked for has been sent
   uint64_t points = 0;  ///< points of the model after that event
@@ -110,7 +119,7 @@ struct StateRequest {
   static constexpr std::string_view kName = "state_request";
   InstanceId viewer;
   InstanceId packer;  ///< packer that the viewer follows; 0: none yet
-  Sequence after;     ///< newest event that was applied; 0: send everything
+  Sequence after;  ///< newest event that was applied; 0: send everything
   bool anew = false;  ///< the viewer drops all answers to earlier requests over this connection
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("packer", m.packer); f("after", m.after); f("anew", m.anew);

@@ -137,8 +137,8 @@ std::optional<Error> check(const DepthTile& m) { return check(m.lease); }
 
 std::optional<Error> check(const Patch& m) {
   if (auto bad = check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame)) return bad;
-  if (auto bad = check_tile(m.camera, m.missed_rect, m.tile, m.tiles_in_frame)) return bad;
-  if (auto bad = check_pixels(m.missed_rect)) return bad;
+  if (auto bad = check_tile(m.camera, m.missed.rect, m.tile, m.tiles_in_frame)) return bad;
+  if (auto bad = check_pixels(m.missed.rect)) return bad;
   return check_step(m.step);
 }
 

@@ -20,11 +20,11 @@ namespace telesplat::wire {
 /// First message of every process. It is repeated when the master asks "who_are_you" or a bound endpoint changes.
 struct Hello {
   static constexpr std::string_view kName = "hello";
-  std::string role;      ///< "data", "sampler", "packer", "viewer", "ctl"
-  std::string name;      ///< for people: "sampler-1"
+  std::string role;  ///< "data", "sampler", "packer", "viewer", "ctl"
+  std::string name;  ///< for people: "sampler-1"
   InstanceId instance;
   uint64_t pid = 0;
-  double sent_s = 0;     ///< sender's own clock: for the clock offset
+  double sent_s = 0;  ///< sender's own clock: for the clock offset
   /// Bound sockets that others connect to. data: "chunks" or "voxels"; packer: "tiles", "patches", "state".
   std::map<std::string, std::string> endpoints;
   /// data: "scene", "kind", "triangles"; sampler: "sampler"; viewer: "renderer"; docs/protocol.md has all.
@@ -48,38 +48,44 @@ enum class CouplingOrder : uint8_t {
 };
 inline constexpr uint64_t kCouplingOrders = 4;
 
+/// Largest errors of points as compared with their samples. Negative: chosen by the link; 0: exact.
+struct PointErrors {
+  double depth = -1;  ///< in pixels' footprints at their depth
+  double normal = -1;  ///< codes of the octahedral map, each coordinate
+  double colour = -1;  ///< each channel, of 255
+  bool operator==(const PointErrors&) const = default;
+};
+
 /// Settings of a session. All defaults stand here; serial.cpp has the limits.
 struct SessionSettings {
   // The point model, and how it travels.
-  bool keep_redundant = false;        ///< also packs points that the model shows already (T7.3)
-  uint64_t max_points = 20'000'000;   ///< least recently drawn clusters are forgotten above it; 0: no limit
-  double obsolete_after_s = 0;        ///< clusters that nothing drew for longer are forgotten (T4.3.3); 0: never
-  double depth_error = -1;            ///< error of points, in pixels' footprints at their depth; negative: by the link
-  double normal_error = -1;           ///< likewise of normals, in codes
-  double colour_error = -1;           ///< likewise of colours, in steps of 255
-  double max_rate_mbit = 0;           ///< wished rate to each viewer; 0: as much as its link carries
+  bool keep_redundant = false;  ///< also packs points that the model shows already (T7.3)
+  uint64_t max_points = 20'000'000;  ///< least recently drawn clusters are forgotten above it; 0: no limit
+  double obsolete_after_s = 0;  ///< clusters that nothing drew for longer are forgotten (T4.3.3); 0: never
+  PointErrors errors;
+  double max_rate_mbit = 0;  ///< wished rate to each viewer; 0: as much as its link carries
   // Sampling.
-  bool steering = true;               ///< the packer plans which rays of a view are cast
-  double view_cell_m = 0.2;           ///< extra rays let the head move this far before it sees unknown places; 0: none
-  uint64_t validation = 32;           ///< every good pixel is cast once in this many plans of a view; 0: never
-  uint64_t still_rays = 16;           ///< rays a pixel everywhere while the head stands still: 1, 4 or 16
+  bool steering = true;  ///< the packer plans which rays of a view are cast
+  double view_cell_m = 0.2;  ///< extra rays let the head move this far before it sees unknown places; 0: none
+  uint64_t validation = 32;  ///< every good pixel is cast once in this many plans of a view; 0: never
+  uint64_t still_rays = 16;  ///< rays a pixel everywhere while the head stands still: 1, 4 or 16
   uint64_t max_sampling_pixels = 1u << 24;  ///< pixels of a view; larger views are sampled coarser
-  uint64_t layers = 16;               ///< slice images that a frame of a volume has at most
+  uint64_t layers = 16;  ///< slice images that a frame of a volume has at most
   // Viewers.
-  double least_sampling = 0.5;        ///< sampled pixels a displayed pixel, on each axis, at least
+  double least_sampling = 0.5;  ///< sampled pixels a displayed pixel, on each axis, at least
   CouplingOrder coupling = CouplingOrder::kOwn;
-  uint64_t buffers = 3;               ///< buffers of loose coupling
+  uint64_t buffers = 3;  ///< buffers of loose coupling
   // Views that come as pictures.
   bool pictures = false;
-  uint64_t picture_quality = 80;      ///< quality of JPEG, 1 to 100
-  uint64_t picture_samples = 1;       ///< rays a pixel: 1, 4 or 16
-  uint64_t picture_shading = 0;       ///< index in image::kShadingNames
+  uint64_t picture_quality = 80;  ///< quality of JPEG, 1 to 100
+  uint64_t picture_samples = 1;  ///< rays a pixel: 1, 4 or 16
+  uint64_t picture_shading = 0;  ///< index in image::kShadingNames
   uint64_t picture_background = 0x141820;  ///< 0xRRGGBB
   bool operator==(const SessionSettings&) const = default;
   template <class F> static void fields(F& f, auto& m) {
     f("keep_redundant", m.keep_redundant); f("max_points", m.max_points);
-    f("obsolete_after_s", m.obsolete_after_s); f("depth_error", m.depth_error);
-    f("normal_error", m.normal_error); f("colour_error", m.colour_error); f("max_rate_mbit", m.max_rate_mbit);
+    f("obsolete_after_s", m.obsolete_after_s); f("depth_error", m.errors.depth);
+    f("normal_error", m.errors.normal); f("colour_error", m.errors.colour); f("max_rate_mbit", m.max_rate_mbit);
     f("steering", m.steering); f("view_cell_m", m.view_cell_m); f("validation", m.validation);
     f("still_rays", m.still_rays); f("max_sampling_pixels", m.max_sampling_pixels); f("layers", m.layers);
     f("least_sampling", m.least_sampling); f("coupling", m.coupling, kCouplingOrders); f("buffers", m.buffers);
@@ -101,16 +107,16 @@ struct Welcome {
   static constexpr std::string_view kName = "welcome";
   InstanceId master;
   double hello_sent_s = 0;  ///< Hello::sent_s, echoed; 0 in an unasked welcome
-  double master_s = 0;      ///< master's clock when sent
-  std::string clock;        ///< clock_id() of that clock
+  double master_s = 0;  ///< master's clock when sent
+  std::string clock;  ///< clock_id() of that clock
   EpochId epoch;
   uint64_t octree_depth = 0;
-  geometry::Box box_room;                        ///< empty until a data server said hello
+  geometry::Box box_room;  ///< empty until a data server said hello
   std::map<std::string, std::string> endpoints;  ///< as in the hellos, once they are known
-  std::map<std::string, std::string> facts;      ///< "scene", "kind", "triangles"
-  std::map<std::string, double> parameters;      ///< parameters of the scene in this epoch
+  std::map<std::string, std::string> facts;  ///< "scene", "kind", "triangles"
+  std::map<std::string, double> parameters;  ///< parameters of the scene in this epoch
   SessionSettings settings;
-  std::vector<uint32_t> lease_key;               ///< sent to the packer alone: kLeaseKeyWords numbers (lease_seal.h)
+  std::vector<uint32_t> lease_key;  ///< sent to the packer alone: kLeaseKeyWords numbers (lease_seal.h)
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s);
     f("clock", m.clock); f("epoch", m.epoch);
@@ -130,16 +136,16 @@ struct WhoAreYou {
 /// Every process -> master, and its answer: the time of the master's clock (common/net/master_link.h).
 struct ClockRequest {
   static constexpr std::string_view kName = "clock_request";
-  double sent_s = 0;      ///< sender's own clock
+  double sent_s = 0;  ///< sender's own clock
   template <class F> static void fields(F& f, auto& m) { f("sent_s", m.sent_s); }
 };
 struct ClockReply {
   static constexpr std::string_view kName = "clock_reply";
   InstanceId master;
-  double sent_s = 0;      ///< ClockRequest::sent_s
+  double sent_s = 0;  ///< ClockRequest::sent_s
   double received_s = 0;  ///< master's clock when it took the request
-  double replied_s = 0;   ///< master's clock when it answered
-  std::string clock;      ///< clock_id() of the master's clock
+  double replied_s = 0;  ///< master's clock when it answered
+  std::string clock;  ///< clock_id() of that clock
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("sent_s", m.sent_s); f("received_s", m.received_s); f("replied_s", m.replied_s);
     f("clock", m.clock);
@@ -161,7 +167,7 @@ struct MetricRows {
   InstanceId instance;
   std::string table;
   std::vector<std::string> columns;  ///< for "spans": the span names that column "name" indexes
-  std::vector<double> values;        ///< rows x columns, row-major (as bin, little-endian f64)
+  std::vector<double> values;  ///< rows x columns, row-major (as bin, little-endian f64)
   template <class F> static void fields(F& f, auto& m) {
     f("instance", m.instance); f("table", m.table); f("columns", m.columns); f("values", m.values);
   }
@@ -206,7 +212,7 @@ struct OrderAnswer {
   InstanceId instance;  ///< process that answers
   uint64_t number = 0;
   bool ok = false;
-  std::string text;     ///< JSON, or the reason of a refusal; at most kMaxControlBytes
+  std::string text;  ///< JSON, or the reason of a refusal; at most kMaxControlBytes
   template <class F> static void fields(F& f, auto& m) {
     f("instance", m.instance); f("number", m.number); f("ok", m.ok); f("text", m.text, kMaxControlBytes);
   }

@@ -116,12 +116,12 @@ options::Row error_row(double& value, const char* flag, double most, bool whole,
 }
 
 options::Table error_table(wire::SessionSettings& s) {
-  return {error_row(s.depth_error, "--depth-error", 1, false,
+  return {error_row(s.errors.depth, "--depth-error", 1, false,
                     "how far points may be from where they were sampled, in pixels' footprints at their depth; auto: "
                     "1/32 behind slow links, else off; what stands still becomes exact"),
-          error_row(s.normal_error, "--normal-error", 3, true,
+          error_row(s.errors.normal, "--normal-error", 3, true,
                     "likewise normals, in codes; auto: 1 behind slow links (docs/links.md has degrees)"),
-          error_row(s.colour_error, "--colour-error", 15, true,
+          error_row(s.errors.colour, "--colour-error", 15, true,
                     "likewise each channel of colours, of 255; auto: 1 behind slow links")};
 }
 

@@ -118,7 +118,7 @@ void points_unproject(benchmark::State& state) {
       for (int row = 0; row < t.rect.height; ++row)
         kUnproject(points::row_rays(grid, f.camera, t.rect.x, t.rect.y + row),
                    &t.image.depth[static_cast<size_t>(row) * t.rect.width], static_cast<size_t>(t.rect.width),
-                   keys.data(), x.data(), y.data(), z.data());
+                   keys.data(), {x.data(), y.data(), z.data()});
   benchmark::DoNotOptimize(keys.data());
   finish(state, f.samples);
 }

@@ -50,7 +50,7 @@ struct Session : test::SteeredSession {
   size_t wrong(const geometry::Camera& camera) {
     splat::ViewKeys keys(2);
     ViewMap map;
-    render_view_map(core().model(), camera, {}, true, keys, map);
+    render_view_map(core().model(), camera, {}, keys, map);
     const image::DepthImage there = sampler().sample(camera, {0, 0, camera.width, camera.height});
     const Validation judge(core().model().config());
     size_t out = 0;

@@ -30,7 +30,7 @@ std::vector<Sample> unproject(const ModelConfig& config, const geometry::Camera&
     for (int x = 0; x < tile.width; ++x) {
       const size_t i = static_cast<size_t>(y) * tile.width + x;
       Sample s{tile.x + x, tile.y + y, kNoCluster, image.depth[i], image.colour[i], 0, 0, 0, image.normal[i]};
-      unproject_row_scalar(row_rays(grid, camera, s.x, s.y), &s.code, 1, &s.key, &s.qx, &s.qy, &s.qz);
+      unproject_row_scalar(row_rays(grid, camera, s.x, s.y), &s.code, 1, &s.key, {&s.qx, &s.qy, &s.qz});
       if (s.key != kNoCluster) out.push_back(s);
     }
   }

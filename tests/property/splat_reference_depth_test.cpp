@@ -299,7 +299,7 @@ TEST(EliminateRedundancy, WhereFewWereCastLeavesTheSame) {
       }
     image::DepthImage expected = came;
     const auto whole = splat::eliminate_redundancy(camera, tile, reference_m, 0.005f, expected);
-    const auto some = splat::eliminate_where_cast(camera, tile, cast, reference_m, 0.005f, came);
+    const auto some = splat::eliminate_where_cast(camera, tile, {cast, reference_m}, 0.005f, came);
     EXPECT_TRUE(came == expected);
     EXPECT_EQ(some.samples, whole.samples);
     EXPECT_EQ(some.kept, whole.kept);

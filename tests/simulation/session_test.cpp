@@ -48,7 +48,7 @@ TEST(Sessions, AnUpdateThatWaitsForAnEarlierOneEndsWhereItWasComplete) {
   s.links.latency_s = 0.00019407448;
   s.to_viewers = {.latency_s = 0.028236543, .jitter_s = 0.0001823445, .bytes_s = 2744789};
   s.settings.obsolete_after_s = 4.2616848;
-  s.settings.depth_error = 0.40622853, s.settings.normal_error = 4, s.settings.colour_error = 8;
+  s.settings.errors.depth = 0.40622853, s.settings.errors.normal = 4, s.settings.errors.colour = 8;
   s.events = {{.at_s = 2.0865,
                .fault = Fault::kOrder,
                .a = {},

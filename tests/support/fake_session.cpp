@@ -274,7 +274,7 @@ void FakeSession::publish_points(const wire::ViewRequest& request) {
     p.tiles_in_frame = uint64_t(tiles);
     p.step = step;
     p.frame_complete = tile + 1 == tiles;
-    p.samples = p.kept = 100;
+    p.counts = {100, 100};
     p.camera = camera;
     p.rect = rect;
     p.image = bytes_of(image);

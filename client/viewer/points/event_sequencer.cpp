@@ -15,7 +15,7 @@ size_t ModelEvent::bytes() const {
   const auto* forget = std::get_if<wire::Forget>(&body);
   const auto* refine = std::get_if<wire::Refine>(&body);
   return 512 + (refine ? refine->image.size() : 0) +
-         (patch ? patch->image.size() + patch->missed.size() * sizeof patch->missed[0] : 0) +
+         (patch ? patch->image.size() + patch->missed.words.size() * sizeof patch->missed.words[0] : 0) +
          (forget ? (forget->clusters.size() + forget->frames.size()) * sizeof(uint32_t) : 0);
 }
 
@@ -125,13 +125,13 @@ void EventSequencer::drain() {
 }
 
 Status add_rays(const wire::Patch& patch, const image::DepthImage& image, FineRays& rays) {
-  if (patch.missed.empty()) {
+  if (patch.missed.words.empty()) {
     rays.revise(patch.camera, patch.rect, image);
     return ok_status();
   }
-  const auto missed = codec::decode_mask(patch.missed, patch.missed_rect.width, patch.missed_rect.height);
+  const auto missed = codec::decode_mask(patch.missed.words, patch.missed.rect.width, patch.missed.rect.height);
   if (!missed) return missed.error();
-  rays.add({patch.epoch, patch.camera, patch.missed_rect, &*missed, patch.rect, &image});
+  rays.add({patch.epoch, patch.camera, patch.missed.rect, &*missed, patch.rect, &image});
   return ok_status();
 }
 

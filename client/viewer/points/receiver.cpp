@@ -127,9 +127,9 @@ void PointReceiver::apply(const ModelEvent& event) {
 // The record omits the misses of finer rays of other viewers' views.
 void PointReceiver::record(const ModelEvent& event) {
   const auto* patch = std::get_if<wire::Patch>(&event.body);
-  if (!patch || patch->missed.empty() || patch->viewer == options_.viewer) return options_.events->add(event);
+  if (!patch || patch->missed.words.empty() || patch->viewer == options_.viewer) return options_.events->add(event);
   ModelEvent without = event;
-  std::get<wire::Patch>(without.body).missed.clear();
+  std::get<wire::Patch>(without.body).missed.words.clear();
   options_.events->add(without);
 }
 
@@ -163,7 +163,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   }
   if (patch.viewer == options_.viewer && !patch.extra) rays_.follow(patch.camera);
   // Finer rays of other viewers' views: their misses are not shown here, their hits are.
-  if (!patch.missed.empty() && patch.viewer != options_.viewer) {
+  if (!patch.missed.words.empty() && patch.viewer != options_.viewer) {
     rays_.revise(patch.camera, patch.rect, tile_);
   } else if (const Status rays = add_rays(patch, tile_, rays_); !rays) {
     ++decode_errors_;
@@ -182,7 +182,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   const metrics::SpanOf of{double(patch.frame.value), double(patch.tile), double(patch.request.value)};
   spans_.add("decode", links_.to_master_s(begin), links_.to_master_s(decoded), 1, of);
   spans_.add("insert", links_.to_master_s(decoded), links_.to_master_s(inserted), 1, of);
-  points_received_ += patch.kept;
+  points_received_ += patch.counts.kept;
   bytes_received_ += patch.image.size();
   if (!options_.hold) {
     const bool complete = patch.frame_complete && !patch.extra && patch.left_out == 0;

@@ -215,8 +215,10 @@ Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry:
 }
 
 Elimination eliminate_where_cast(const geometry::Camera& camera, const geometry::Rect& tile,
-                                 const image::PixelMask& cast, std::span<const float> reference_depth_m,
-                                 float relative_epsilon, image::DepthImage& image, float nearest) {
+                                 const KnownReference& known, float relative_epsilon, image::DepthImage& image,
+                                 float nearest) {
+  const image::PixelMask& cast = known.cast;
+  const std::span<const float> reference_depth_m = known.nearest_m;
   CHECK(reference_depth_m.size() == static_cast<size_t>(camera.width) * camera.height);
   CHECK(image.width == tile.width && image.height == tile.height);
   CHECK(cast.width() == tile.width && cast.height() == tile.height);

@@ -40,10 +40,15 @@ Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry:
                                  const std::vector<float>& reference_depth_m, float relative_epsilon,
                                  image::DepthImage& image, float nearest = kNearestSample);
 
-/// The same for a tile in which only the pixels of `cast` were sampled; all other pixels of the image are empty. cast:
-/// has the tile's size. reference_depth_m: of the whole frame.
+/// The model as seen where a tile was sampled, if it was rendered already.
+struct KnownReference {
+  const image::PixelMask& cast;      ///< as large as the tile; pixels outside it are not covered
+  std::span<const float> nearest_m;  ///< frame-sized render_reference_depth(), without the frame's own samples
+};
+
+/// The same for a tile in which only the pixels of `known.cast` were sampled; all other pixels of the image are empty.
 Elimination eliminate_where_cast(const geometry::Camera& camera, const geometry::Rect& tile,
-                                 const image::PixelMask& cast, std::span<const float> reference_depth_m,
-                                 float relative_epsilon, image::DepthImage& image, float nearest = kNearestSample);
+                                 const KnownReference& known, float relative_epsilon, image::DepthImage& image,
+                                 float nearest = kNearestSample);
 
 }  // namespace telesplat::splat

@@ -14,8 +14,11 @@
 #include "common/image/depth_image.h"
 #include "common/image/pixel_mask.h"
 #include "common/points/point_model.h"
+#include "common/splat/reference/reference_depth.h"
 
 namespace telesplat::packer {
+
+using splat::KnownReference;
 
 // A tile's label: it goes unchanged from the lease to the patch.
 
@@ -93,13 +96,6 @@ struct Event : FramePart {
 
   /// The frame tag that prepare_patch() gets for a patch.
   FrameId tag() const { return points::tagged(frame, step, rest); }
-};
-
-// The model as seen where a tile was sampled, if the planner has rendered it already.
-
-struct KnownReference {
-  const image::PixelMask& cast;      ///< as large as the tile; pixels outside it are not covered
-  std::span<const float> nearest_m;  ///< frame-sized render_reference_depth(), without the frame's own samples
 };
 
 // Observer of the packer's model.

@@ -139,8 +139,8 @@ struct PackerCore::Impl {
       return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
     }
     if (known)
-      return splat::eliminate_where_cast(tile.camera, tile.rect, known->cast, known->nearest_m, config.relative_epsilon,
-                                         tile.image, config.nearest_sample);
+      return splat::eliminate_where_cast(tile.camera, tile.rect, *known, config.relative_epsilon, tile.image,
+                                         config.nearest_sample);
     // The reference is rendered for this tile alone and as of now: it includes what other frames added or forgot
     // meanwhile, and clusters outside the tile's frustum cost next to nothing. It has one pixel more on each side,
     // inside the frame, for the tile's border.
@@ -259,9 +259,9 @@ struct PackerCore::Impl {
     Event event = next_event(Event::Kind::kRefine);
     event.refines = of;
     event.blob = std::move(next->second.stream);
-    model.commit(
-        points::plan_refinement(model, points::prepare_refinement(config.model, event.sequence, of, patch.camera,
-                                                                  patch.rect, *bounded, *exact, patch.tag())));
+    model.commit(points::plan_refinement(
+        model, points::prepare_refinement(config.model, event.sequence, of,
+                                          {patch.camera, patch.rect, *bounded, *exact, patch.tag()})));
     log.add_refinement(event);
     ++statistics.patches_refined;
     statistics.bytes_refined += event.blob->size();

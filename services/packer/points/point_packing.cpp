@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/core/clock.h"
 #include "common/core/log.h"
-#include "common/net/connections/peer_rates.h"
 #include "common/net/dispatch.h"
 #include "common/wire/lease_seal.h"
 
@@ -74,49 +72,8 @@ metrics::SpanOf of(const wire::TileDone& tile) {
   return {double(tile.frame.value), double(tile.tile), double(tile.request.value)};
 }
 
-// Returns about the event's size as a message, bytes.
-uint64_t size_on_wire(const Event& e) {
-  constexpr uint64_t kRest = 320;  // camera, moments, numbers, names; tests/unit/wire (BriefMessages) guards it
-  return kRest + (e.blob ? e.blob->size() : 0) + 4 * (e.missed.size() + e.clusters.size() + e.frames.size());
-}
-
 // True if viewers use the event's moments, to show how an update came about (metrics/stages.h).
 bool completes_update(const Event& e) { return e.frame_complete && !e.extra && e.step <= 1; }
-
-// Converts the event to messages: calls send(message) for each.
-void with_message(InstanceId packer, const Event& e, const wire::Moments& moments, auto&& send) {
-  switch (e.kind) {
-    case Event::Kind::kPatch:
-      return send(wire::Patch{.packer = packer,
-                              .sequence = e.sequence,
-                              .epoch = e.epoch,
-                              .frame = e.frame,
-                              .viewer = e.viewer,
-                              .request = e.request,
-                              .tile = e.tile,
-                              .tiles_in_frame = e.tiles_in_frame,
-                              .step = e.step,
-                              .extra = e.extra,
-                              .frame_complete = e.frame_complete,
-                              .left_out = e.left_out,
-                              .samples = e.samples + e.untold_samples,
-                              .kept = e.kept,
-                              .camera = e.camera,
-                              .rect = e.rect,
-                              .image = std::as_bytes(std::span(*e.blob)),
-                              .missed = e.missed,
-                              .missed_rect = e.missed_rect,
-                              .moments = moments,
-                              .refinable = e.refinable,
-                              .rest = e.rest});
-    case Event::Kind::kRefine:
-      return send(wire::Refine{packer, e.sequence, e.epoch, e.refines, std::as_bytes(std::span(*e.blob))});
-    case Event::Kind::kForget:
-      return send(wire::Forget{packer, e.sequence, e.epoch, e.clusters, e.frames});
-    case Event::Kind::kEpoch:
-      return send(wire::EpochBegin{packer, e.sequence, e.epoch});
-  }
-}
 
 }  // namespace
 
@@ -142,36 +99,22 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   lease_key_ = session.lease_key;
   if (another_master) {
     core_->forget_frames();
-    if (planner_) planner_->forget_frames();
+    if (planning_.planner()) planning_.planner()->forget_frames();
     gatherer_.clear();
   }
-  if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
-    if (core_) instance_ = net::make_instance_id();  // viewers start anew
-    answers_.clear();
-    meter_.clear();
-    completions_.clear();
-    model_ = config.model;
-    planner_.reset();
+  if (!core_ || core_->model().config() != config.model ||
+      (another_master && core_->redundancy() == Redundancy::kKeep)) {
+    feed_.begin_model(core_.has_value());
+    planning_.drop();
     core_.emplace(config, session.epoch);
     gatherer_.clear();
   } else if (const auto event = core_->begin_epoch(session.epoch)) {
-    publish(*event);
+    feed_.publish(*event);
     gatherer_.clear();
   }
-  const wire::SessionSettings& settings = session.settings;
-  errors_ = {settings.depth_error, settings.normal_error, settings.colour_error};
+  exactness_.follow(session.settings.errors);
   choose_errors();
-  begin_planner(plan_config_of(settings, config));
-}
-
-// Another configuration means another planner; it learns the model anew.
-void PointPacking::begin_planner(const PlanConfig& config) {
-  if (core_->redundancy() == Redundancy::kKeep) return core_->watch(nullptr), planner_.reset();
-  if (planner_ && plan_config_ == config) return;
-  plan_config_ = config;
-  planner_.emplace(config);
-  planner_->learn(core_->model());
-  core_->watch(&*planner_);
+  planning_.follow(*core_, plan_config_of(session.settings, config));
 }
 
 void PointPacking::take_sampled(net::Socket& from, const net::Message& message, double now_s) {
@@ -228,18 +171,19 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
                                 wire::TileDone& done, double now_s) {
   const double begin_s = outlets_.master_now();
   record(block);
-  if (!block.extra) heads_.seen(block.viewer, block.camera.pose, now_s);
-  if (planner_) planner_->take(block, whole, now_s), block.missed = planner_->missed(block);
-  const auto reference = planner_ ? planner_->reference(block) : std::nullopt;
+  if (!block.extra) exactness_.heads().seen(block.viewer, block.camera.pose, now_s);
+  Planner* planner = planning_.planner();
+  if (planner) planner->take(block, whole, now_s), block.missed = planner->missed(block);
+  const auto reference = planner ? planner->reference(block) : std::nullopt;
   // The counts of a block go to the tile that completed it.
   const auto announce = [&](const Event& event) {
     // The moment is taken before sending: a viewer may have the event in its replica before the send returns.
     done.moments.packed_s = outlets_.master_now();
     if (event.is_told()) {
       done.moments.published_s = done.moments.packed_s;
-      publish(event, completes_update(event) ? done.moments : wire::Moments{});
+      feed_.publish(event, completes_update(event) ? done.moments : wire::Moments{});
     }
-    if (event.kept > 0) points_came_s_ = now_s;
+    if (event.kept > 0) exactness_.points_came(now_s);
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
     done.depth_error_m = event.bounds.depth / 4294967296.0 * event.farthest_m;
     done.normal_error_deg = codec::normal_error_degrees(event.bounds.normal);
@@ -251,9 +195,9 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   const auto event = core_->submit(std::move(block), now_s, std::move(stream), announce, reference);
   if (!event) return event.error();
   if (*event && (*event)->frame_complete)
-    for (const auto& forget : core_->forget_superseded()) publish(forget);
-  if (planner_)
-    for (const auto& forget : core_->forget(planner_->disproved())) publish(forget);
+    for (const auto& forget : core_->forget_superseded()) feed_.publish(forget);
+  if (planner)
+    for (const auto& forget : core_->forget(planner->disproved())) feed_.publish(forget);
   spans_.add("pack", begin_s, outlets_.master_now(), 0, of(done));
   return ok_status();
 }
@@ -266,13 +210,13 @@ void PointPacking::end_frame(const wire::FrameEnd& end, double now_s) {
                         .request = end.request,
                         .tiles_in_frame = uint32_t(std::min<uint64_t>(end.tiles, kMaxTilesInFrame)),
                         .camera = end.camera};
-  if (planner_) planner_->end_frame(end.frame);
+  if (planning_.planner()) planning_.planner()->end_frame(end.frame);
   const auto event = core_->end_frame(frame, now_s);
   if (!event) return log::warn("frame {} cannot be ended: {}", end.frame.value, event.error().text);
   if (!*event) return;
   wire::Moments moments = end.moments;
   moments.published_s = outlets_.master_now();
-  publish(**event, moments);
+  feed_.publish(**event, moments);
 }
 
 wire::Plan PointPacking::plan(const wire::PlanRequest& request, double now_s) {
@@ -281,26 +225,10 @@ wire::Plan PointPacking::plan(const wire::PlanRequest& request, double now_s) {
 }
 
 std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& request, double now_s) {
-  if (!request.extra) heads_.seen(request.viewer, request.camera.pose, now_s);
-  if (!core_ || !planner_ || request.epoch != core_->epoch()) return all_rays(request);
-  const double begin_s = monotonic_s(), begin_master_s = outlets_.master_now();
-  auto piece = planner_->plan_piece(core_->model(), core_->sequence(), request, now_s);
-  spans_.add("plan", begin_master_s, outlets_.master_now(), 0,
-             {.frame = double(request.frame.value), .request = double(request.request.value)});
-  double took_s = monotonic_s() - begin_s;
-  if (request.extra) {
-    if (std::exchange(planning_, request.frame) == request.frame) took_s += planning_s_;
-    planning_s_ = took_s;
-  }
-  if (!piece) return std::nullopt;
-  wire::Plan plan = *std::move(piece);
-  plan.figures["plan_ms"] = took_s * 1e3;
-  ++plans_;
-  const uint64_t pixels = uint64_t(request.camera.width) * uint64_t(request.camera.height);
-  if (pixels > Planner::kMaxPixels && !std::exchange(told_of_size_, true))
-    log::warn("views of {}x{} pixels are sampled whole: up to {} pixels are planned", request.camera.width,
-              request.camera.height, Planner::kMaxPixels);
-  if (request.extra || plan.full || !plan.tiles.empty()) return plan;
+  if (!request.extra) exactness_.heads().seen(request.viewer, request.camera.pose, now_s);
+  if (!core_ || !planning_.planner() || request.epoch != core_->epoch()) return all_rays(request);
+  auto plan = planning_.piece(*core_, request, now_s);
+  if (!plan || request.extra || plan->full || !plan->tiles.empty()) return plan;
   const FramePart frame{.frame = request.frame,
                         .epoch = request.epoch,
                         .viewer = request.viewer,
@@ -309,8 +237,8 @@ std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& requ
   const auto event = core_->complete_empty(frame, now_s);
   wire::Moments moments = request.moments;
   moments.planned_s = moments.published_s = outlets_.master_now();
-  if (event && *event) publish(**event, moments);
-  for (const auto& forget : core_->forget_superseded()) publish(forget);
+  if (event && *event) feed_.publish(**event, moments);
+  for (const auto& forget : core_->forget_superseded()) feed_.publish(forget);
   return plan;
 }
 
@@ -335,152 +263,41 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
     using M = std::decay_t<decltype(m)>;
     if (!senders_.may_speak(message, m.viewer)) return from.reject(message, kNotItsViewer);
     if constexpr (std::is_same_v<M, wire::Receipt>)
-      on_receipt(m, message.peer, now_s);
+      feed_.receive(m, message.peer, now_s);
     else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
     else
-      answer(m, message, now_s);
+      feed_.answer(*core_, m, message, now_s);
   });
 }
 
-void PointPacking::answer(const wire::StateRequest& request, const net::Message& message, double now_s) {
-  const std::string& peer = message.peer;
-  const Sequence after = request.packer == instance_ ? request.after : Sequence{};
-  const bool known = after <= core_->sequence() && core_->remembers(after);
-  const bool follows = request.packer == instance_ || request.packer.value == 0;
-  if (known && answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
-  if (!beginnings_.admit(peer, now_s)) return;  // an answer searches all events; the viewer asks again
-  if (answers_.is_full(peer)) return;           // its viewer asks again
-  if (!known) {
-    // A mark with an unknown packer id makes the viewer ask for all events.
-    answers_.drop(peer);
-    outlets_.send(wire::StateMark{.packer = net::make_instance_id(), .epoch = core_->epoch()}, peer);
-    if (told_of_viewers_.allow(now_s)) log::info("a viewer that stopped after {} starts anew", after.value);
-    return;
-  }
-  if (!outlets_.send(wire::StateBegin{instance_, after}, peer)) return;
-  const std::string* payer = net::payer(message);
-  StateAnswers::Answer answer{.viewer = request.viewer,
-                              .payer = payer ? *payer : message.user,
-                              .left = core_->replay(after),
-                              .mark = mark(true)};
-  completions_.fill(answer.left.others, request.viewer, after);
-  answers_.begin(peer, after, std::move(answer));
-  meter_.replayed(request.viewer);
-  send_answers();
-}
+void PointPacking::choose_errors() { core_->allow_errors(exactness_.allowed(feed_.meter().slowest_bytes_s())); }
 
-// After a failed send no mark goes out: it would cover events that the viewer lacks, and leave its replica wrong.
-void PointPacking::send_answers() {
-  answers_.pump([&](EventLog::Replay& left) { return core_->next(left); },
-                [&](const std::string& peer, const Event& event) {
-                  bool sent = false;
-                  with_message(instance_, event, {}, [&](const auto& m) { sent = outlets_.send(m, peer); });
-                  return sent;
-                },
-                [&](const std::string& peer, const StateAnswers::Answer& answer) {
-                  if (!outlets_.send(answer.mark, peer)) return false;
-                  meter_.replayed(answer.viewer);
-                  if (told_of_viewers_.allow(monotonic_s()))
-                    log::info("a viewer caught up: {} events up to {}", answer.events, answer.mark.sequence.value);
-                  return true;
-                },
-                size_on_wire, [&](const std::string& peer) { return outlets_.waiting ? outlets_.waiting(peer) : 0; });
-}
-
-void PointPacking::on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s) {
-  if (receipt.packer != instance_) return;
-  answers_.received(peer, receipt.newest);
-  meter_.received(receipt.viewer, receipt.newest, receipt.viewer_s, now_s);
-  const auto f = meter_.figures(receipt.viewer, now_s);
-  if (f && outlets_.tell_link)
-    outlets_.tell_link({receipt.viewer, f->rate_bytes_s, f->backlog_bytes, f->rtt_s, f->oldest_s});
-}
-
-void PointPacking::publish(const Event& event, const wire::Moments& moments) {
-  meter_.published(event.sequence, size_on_wire(event), monotonic_s());
-  completions_.add(event);
-  with_message(instance_, event, moments, [&](const auto& m) { outlets_.publish(m); });
-}
-
-wire::StateMark PointPacking::mark(bool answer) const {
-  return {.packer = instance_,
-          .sequence = core_->sequence(),
-          .epoch = core_->epoch(),
-          .answer = answer,
-          .points = core_->model().points()};
-}
-
-uint64_t PointPacking::due_digest(double now_s) {
-  if (now_s < next_digest_s_) return 0;
-  const double begin_s = thread_cpu_s();  // time of other threads does not count
-  const uint64_t digest = core_->model().digest();
-  next_digest_s_ = now_s + std::max(kDigestPeriod_s, (thread_cpu_s() - begin_s) / kDigestShare);
-  digests_told_ += digest != 0;
-  return digest;
-}
-
-// Messages wait meanwhile, so settling takes at most a quarter of the time, unless it saves more than it takes.
-bool PointPacking::idle(double now_s) {
-  constexpr double kPause = 3;
-  if (!planner_ || (now_s < next_settle_s_ && !planner_->settles_soon())) return false;
-  const double begin_s = outlets_.master_now(), started_s = monotonic_s();
-  if (!planner_->settle()) return false;
-  next_settle_s_ = now_s + (1 + kPause) * (monotonic_s() - started_s);
-  spans_.add("settle", begin_s, outlets_.master_now());
-  return true;
-}
-
-void PointPacking::choose_errors() {
-  if (!core_) return;
-  const double rate = meter_.slowest_bytes_s();
-  slow_ = rate > 0 && rate < (slow_ ? 1.125 : 1) * kSlowLink_bytes_s;
-  const AllowedErrors automatic = slow_ ? kSlowErrors : AllowedErrors{};
-  const auto said = [](double value, auto otherwise) { return value < 0 ? otherwise : decltype(otherwise)(value); };
-  core_->allow_errors({said(errors_[0], automatic.depth_pixels), said(errors_[1], automatic.normal),
-                       said(errors_[2], automatic.colour)});
-}
-
-bool PointPacking::refine(double now_s) {
-  if (now_s < next_refine_s_ || !heads_.still(now_s)) return false;
-  if (now_s - points_came_s_ < kQuiet_s && heads_.still_s(now_s) < kLongStill_s) return false;
+void PointPacking::refine(double now_s) {
   const double begin_s = outlets_.master_now();
-  uint64_t bytes = 0;
-  bool more = true;
-  while (more && bytes < kRefineStep && meter_.all_free(kRefineBacklog_s, kRefineBytes, now_s)) {
-    const auto event = core_->refine(now_s - kDrawnLately_s);
-    if (!(more = event.has_value())) break;
-    bytes += event->blob->size();
-    publish(*event);
-  }
-  if (!more) next_refine_s_ = now_s + kRefinePause_s;
+  const uint64_t bytes =
+      exactness_.refine(*core_, feed_.meter(), now_s, [this](const Event& event) { feed_.publish(event); });
   bytes_sent_ += bytes;
   if (bytes > 0) spans_.add("refine", begin_s, outlets_.master_now());
-  return bytes >= kRefineStep;
 }
 
 void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
-  meter_.expire(now_s);
+  feed_.expire(now_s);
   if (!core_) return;
-  send_answers();
+  feed_.send_answers(*core_);
   choose_errors();
-  refining_ = refine(now_s);
+  refine(now_s);
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;
-    for (const auto& event : core_->tick(now_s)) publish(event);
+    for (const auto& event : core_->tick(now_s)) feed_.publish(event);
   }
-  if (now_s - last_mark_s_ >= kMarkPeriod_s) {
-    last_mark_s_ = now_s;
-    wire::StateMark told = mark(false);
-    told.digest = due_digest(now_s);
-    outlets_.publish(told);
-  }
+  feed_.send_mark(*core_, now_s);
 }
 
 void PointPacking::add_status(net::MasterLink::Values& values) const {
   values["bytes_sent"] += double(bytes_sent_);
-  values["messages_refused"] += double(beginnings_.refused());
+  values["messages_refused"] += double(feed_.requests_refused());
   values[metrics::kRecordFailed] = double(records_failed_);
   if (!core_) return;
   const auto& s = core_->statistics();
@@ -504,11 +321,11 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"patches_bounded", double(s.patches_bounded)},
                  {"patches_refined", double(s.patches_refined)},
                  {"bytes_refined", double(s.bytes_refined)},
-                 {"answers", double(answers_.size())},
-                 {"answer_bytes", double(answers_.bytes_under_way())},
-                 {"plans", double(plans_)},
-                 {"planned_frames", planner_ ? double(planner_->frames()) : 0},
-                 {"digests_told", double(digests_told_)}});
+                 {"answers", double(feed_.answers().size())},
+                 {"answer_bytes", double(feed_.answers().bytes_under_way())},
+                 {"plans", double(planning_.plans())},
+                 {"planned_frames", planning_.planner() ? double(planning_.planner()->frames()) : 0},
+                 {"digests_told", double(feed_.digests_told())}});
 }
 
 }  // namespace telesplat::packer

@@ -119,14 +119,15 @@ class ReceiverPlay {
     p.tile = dice_.below(2), p.tiles_in_frame = 2, p.step = dice_.chance(70) ? 1 : 4;
     p.extra = dice_.chance(30), p.frame_complete = dice_.chance(50), p.left_out = dice_.below(3) / 2;
     p.camera = tile.camera, p.rect = tile.rect;
-    p.samples = p.kept = 100;
+    p.counts = {100, 100};
     p.refinable = dice_.chance(40);
     const auto& stream = !dice_.chance(90) ? dice_.pick(tiles().all).stream : p.refinable ? tile.bounded : tile.stream;
     p.image = std::as_bytes(std::span(stream));
     if (p.refinable) refinable_ = {p.sequence, &tile};
     if (dice_.chance(15)) {
-      p.missed_rect = {0, 0, int(1 + dice_.below(kPlayWidth)), int(1 + dice_.below(kPlayHeight))};
-      for (uint64_t n = 1 + dice_.below(6); n-- > 0;) p.missed.push_back(uint32_t(dice_.below(256)) * 0x01010101u);
+      p.missed.rect = {0, 0, int(1 + dice_.below(kPlayWidth)), int(1 + dice_.below(kPlayHeight))};
+      for (uint64_t n = 1 + dice_.below(6); n-- > 0;)
+        p.missed.words.push_back(uint32_t(dice_.below(256)) * 0x01010101u);
     }
     send(over_the_wire(p));
   }

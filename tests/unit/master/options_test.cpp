@@ -31,12 +31,12 @@ TEST(MasterFlags, ErrorsAreFractionsNumbersAutoOrOff) {
   };
   EXPECT_EQ(text("--depth-error"), "auto");
   EXPECT_TRUE(give(o, "--depth-error", "1/32"));
-  EXPECT_EQ(o.master.settings.depth_error, 1.0 / 32);
+  EXPECT_EQ(o.master.settings.errors.depth, 1.0 / 32);
   EXPECT_EQ(text("--depth-error"), "0.03125") << "as children are told it";
   EXPECT_TRUE(give(o, "--depth-error", "off"));
-  EXPECT_EQ(o.master.settings.depth_error, 0);
+  EXPECT_EQ(o.master.settings.errors.depth, 0);
   EXPECT_TRUE(give(o, "--depth-error", "auto"));
-  EXPECT_EQ(o.master.settings.depth_error, -1);
+  EXPECT_EQ(o.master.settings.errors.depth, -1);
   EXPECT_TRUE(give(o, "--normal-error", "3"));
   EXPECT_TRUE(give(o, "--colour-error", "15"));
   for (const char* bad : {"-1", "1/0", "1/", "/32", "1/-32", "1.5", "nan", "inf", "1 /32", "", "on"})

@@ -47,7 +47,7 @@ class ViewMapTest : public testing::Test {
                                        FrameId{sequence}));
   }
   const ViewMap& look(const geometry::Camera& camera, float nearest = 0.6f) {
-    render_view_map(model, camera, {0.005f, nearest}, true, keys, map);
+    render_view_map(model, camera, {0.005f, nearest}, keys, map);
     return map;
   }
   // Counts without the outermost pixels, which the view that sampled the plane may not have seen.

@@ -150,7 +150,7 @@ TEST(Plan, PatchesOfFinerRaysTellWhichOfThemMetNothing) {
 ViewMap shown(const PackerCore& core, const geometry::Camera& camera) {
   splat::ViewKeys keys(1);
   ViewMap map;
-  render_view_map(core.model(), camera, {}, true, keys, map);
+  render_view_map(core.model(), camera, {}, keys, map);
   return map;
 }
 

@@ -115,9 +115,9 @@ class PointPackingTest : public testing::Test {
 
 TEST_F(PointPackingTest, ErrorsAreToldAndWhatStandsStillBecomesExact) {
   wire::Welcome session = welcome();
-  session.settings.depth_error = 1.0 / 32;
-  session.settings.normal_error = 1;
-  session.settings.colour_error = 2;
+  session.settings.errors.depth = 1.0 / 32;
+  session.settings.errors.normal = 1;
+  session.settings.errors.colour = 2;
   ASSERT_TRUE(packing.follow(session, 0));
   sample(tile(1, 0), 10);
   sample(tile(1, 1), 10);
@@ -216,7 +216,7 @@ TEST_F(PointPackingTest, AViewThatNeedsNoRaysIsCompleteWithItsPlan) {
   EXPECT_TRUE(patch.frame_complete);
   EXPECT_EQ(patch.frame.value, 2u);
   EXPECT_EQ(patch.request.value, 6u);
-  EXPECT_EQ(patch.kept, 0u);
+  EXPECT_EQ(patch.counts.kept, 0u);
   again.epoch = {test::kEpoch.value + 1};
   EXPECT_TRUE(packing.plan(again, 4).full) << "of an epoch that is not the model's";
   EXPECT_EQ(status("plans"), 2);
@@ -252,8 +252,8 @@ TEST_F(PointPackingTest, ATileKeepsItsLabelFromLeaseToPatch) {
   EXPECT_EQ(told[0].moments.published_s, 0) << "published with the tile that completed the block";
   EXPECT_EQ(told[1].moments.published_s, 99);
   EXPECT_EQ(told[0].bytes_sent, 0u);
-  EXPECT_EQ(told[0].samples + told[1].samples, patch.samples);
-  EXPECT_EQ(told[1].kept, patch.kept) << "counted to the tile that completed the block";
+  EXPECT_EQ(told[0].samples + told[1].samples, patch.counts.samples);
+  EXPECT_EQ(told[1].kept, patch.counts.kept) << "counted to the tile that completed the block";
   EXPECT_EQ(told[1].bytes_sent, patch.image.size());
   sample(tile(1, 1), 5);
   EXPECT_EQ(told.size(), 3u) << "a duplicate is done, too";
@@ -322,9 +322,9 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   packing.tick(3);
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_FALSE(decoded<wire::StateMark>(sent[0]).answer);
-  packing.tick(3 + PointPacking::kMarkPeriod_s / 2);
+  packing.tick(3 + ModelFeed::kMarkPeriod_s / 2);
   EXPECT_EQ(sent.size(), 1u);
-  packing.tick(3 + PointPacking::kMarkPeriod_s);
+  packing.tick(3 + ModelFeed::kMarkPeriod_s);
   EXPECT_EQ(sent.size(), 2u);
 }
 
@@ -338,7 +338,7 @@ TEST_F(PointPackingTest, AnswersThatBeginAnewAreFewASecond) {
                                 [&](const Sent& s) { return s.peer == peer && s.type == wire::StateBegin::kName; }));
   };
   sent.clear();
-  constexpr size_t kMost = size_t(2 * PointPacking::kBeginnings_s);
+  constexpr size_t kMost = size_t(2 * ModelFeed::kBeginnings_s);
   for (int i = 0; i < 300; ++i) {
     ask({}, {}, 2, "anew", 78, true);
     ask({uint64_t(i % 2)}, packer, 2, "to and fro", 79);
@@ -361,7 +361,7 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
   sent.clear();
   size_t told_digests = 0;
   uint64_t digest = 0;
-  for (double now_s = 10; now_s < 20; now_s += PointPacking::kMarkPeriod_s) {
+  for (double now_s = 10; now_s < 20; now_s += ModelFeed::kMarkPeriod_s) {
     packing.tick(now_s);
     const auto mark = decoded<wire::StateMark>(sent.back());
     EXPECT_EQ(mark.sequence.value, 1u);
@@ -371,7 +371,7 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
     }
     digest = mark.digest;
   }
-  EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));
+  EXPECT_EQ(told_digests, size_t(10 / ModelFeed::kDigestPeriod_s));
   for (const int half : {0, 1}) {
     wire::DepthTile from_elsewhere = tile(2, half);
     from_elsewhere.lease.camera = test::scene_camera({0, 0.4, 0.7}, 96, 64);
@@ -411,7 +411,7 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
       newest = patch.sequence;
       EXPECT_EQ(patch.viewer.value, 77u);
       EXPECT_TRUE(patch.frame_complete);
-      EXPECT_EQ(patch.kept > 0, patch.request.value == 5) << "the points come once";
+      EXPECT_EQ(patch.counts.kept > 0, patch.request.value == 5) << "the points come once";
       requests.push_back(patch.request.value);
     }
     EXPECT_TRUE(decoded<wire::StateMark>(sent.back()).answer);

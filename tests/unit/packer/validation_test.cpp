@@ -42,7 +42,7 @@ struct Wall {
   }
   image::PixelMask check(Validation& v, double now_s) const {
     image::PixelMask out;
-    v.check(shown(), all, cast, came, now_s, out);
+    v.check(shown(), {all, cast, came}, now_s, out);
     return out;
   }
 };
@@ -118,12 +118,12 @@ TEST(Validation, WhereRaysHaveContradictedBeforeNothingBecomesStaleAgain) {
   EXPECT_EQ(doubted.count(), 10u);
   const size_t marks = v.marks();
   image::PixelMask contradicted;
-  v.check(wall.shown(), wall.all, wall.cast, wall.came, 10.1, contradicted, &doubted);
+  v.check(wall.shown(), {wall.all, wall.cast, wall.came, &doubted}, 10.1, contradicted);
   EXPECT_EQ(v.marks(), marks);
   EXPECT_EQ(contradicted.count(), 10u);
   EXPECT_EQ(v.statistics().missed, 20u) << "it is evidence all the same";
   wall.put(100, 80, 0, 0);
-  v.check(wall.shown(), wall.all, wall.cast, wall.came, 10.2, contradicted, &doubted);
+  v.check(wall.shown(), {wall.all, wall.cast, wall.came, &doubted}, 10.2, contradicted);
   EXPECT_EQ(v.marks(), marks + 1) << "news";
 }
 

@@ -85,7 +85,7 @@ TEST_P(Refinement, MakesAModelOfWhatWasSampled) {
   EXPECT_GT(differences(points_of(bounded), wanted).size(), points * 9 / 10);
   for (uint64_t seed = views.size(); seed > 0; --seed) {
     const View& v = views[seed - 1];
-    const auto refinement = prepare_refinement(c, {++sequence}, {seed}, v.camera, v.tile, v.bounded, v.exact);
+    const auto refinement = prepare_refinement(c, {++sequence}, {seed}, {v.camera, v.tile, v.bounded, v.exact});
     EXPECT_GT(refinement.points(), 100u);
     bounded.commit(plan_refinement(bounded, refinement));
   }
@@ -107,7 +107,7 @@ TEST_P(Refinement, OfNothingThatIsThereChangesNothing) {
   PointModel model(c);
   model.insert(prepare_patch(c, {1}, other.camera, other.tile, other.bounded, {1}));
   const uint64_t digest = model.digest();
-  const auto refinement = prepare_refinement(c, {3}, {2}, v.camera, v.tile, v.bounded, v.exact);
+  const auto refinement = prepare_refinement(c, {3}, {2}, {v.camera, v.tile, v.bounded, v.exact});
   EXPECT_TRUE(plan_refinement(model, refinement).changes.empty());
   model.commit(plan_refinement(model, refinement));
   EXPECT_EQ(model.digest(), digest);
@@ -115,7 +115,7 @@ TEST_P(Refinement, OfNothingThatIsThereChangesNothing) {
 
 TEST_P(Refinement, OfWhatIsExactSaysNothing) {
   const View v = view(5, 0.5);
-  EXPECT_TRUE(prepare_refinement(config(GetParam()), {2}, {1}, v.camera, v.tile, v.exact, v.exact).parts.empty());
+  EXPECT_TRUE(prepare_refinement(config(GetParam()), {2}, {1}, {v.camera, v.tile, v.exact, v.exact}).parts.empty());
 }
 
 TEST_P(Refinement, KeepsTheMemoryThatTheModelCounts) {
@@ -123,8 +123,7 @@ TEST_P(Refinement, KeepsTheMemoryThatTheModelCounts) {
   PointModel model(c);
   const View v = view(6, 0.9);
   model.insert(prepare_patch(c, {1}, v.camera, v.tile, v.bounded, {1}));
-  model.commit(
-      plan_refinement(model, prepare_refinement(c, {2}, {1}, v.camera, v.tile, v.bounded, v.exact)));
+  model.commit(plan_refinement(model, prepare_refinement(c, {2}, {1}, {v.camera, v.tile, v.bounded, v.exact})));
   PointModel again(c);
   std::vector<ClusterKey> keys;
   for (const auto& [key, cluster] : model.clusters()) keys.push_back(key);

@@ -40,8 +40,8 @@ TEST_P(UnprojectOnTarget, EqualsThePlainLoop) {
         c = random() % 5 == 0 ? static_cast<uint32_t>(random() % 3) : image::encode_depth(metres, camera.near_m);
       }
       Row simd(n), plain(n);
-      unproject_row(rays, codes.data(), n, simd.keys.data(), simd.x.data(), simd.y.data(), simd.z.data());
-      unproject_row_scalar(rays, codes.data(), n, plain.keys.data(), plain.x.data(), plain.y.data(), plain.z.data());
+      unproject_row(rays, codes.data(), n, simd.keys.data(), {simd.x.data(), simd.y.data(), simd.z.data()});
+      unproject_row_scalar(rays, codes.data(), n, plain.keys.data(), {plain.x.data(), plain.y.data(), plain.z.data()});
       ASSERT_EQ(simd.keys, plain.keys);
       for (size_t i = 0; i < n; ++i) {
         ++(plain.keys[i] == kNoCluster ? refused : placed);

@@ -27,8 +27,8 @@ class Requester : public testing::Test {
     p.tile = tile;
     p.tiles_in_frame = tiles;
     p.frame_complete = tile + 1 == tiles;
-    p.samples = 100;
-    p.kept = 10;
+    p.counts.samples = 100;
+    p.counts.kept = 10;
     return p;
   }
 };
@@ -203,7 +203,7 @@ class SteeredRequester : public Requester {
       if (open.value == 0 || now_s < answer_s) continue;
       auto p = part(open, 0, 1);
       p.left_out = left_out;
-      p.kept = kept, p.samples = kept + 300;  // the others were cast to see whether they agree
+      p.counts.kept = kept, p.counts.samples = kept + 300;  // the others were cast to see whether they agree
       EXPECT_TRUE(requester.on_part(part_of(p), now_s).has_value());
       open = {};
     }
@@ -321,7 +321,7 @@ class AdaptiveRequester : public testing::Test {
     last.viewer = kMe;
     last.request = request->request;
     last.frame_complete = true;
-    last.samples = whole ? uint64_t(request->camera.width) * uint64_t(request->camera.height) : 0;
+    last.counts.samples = whole ? uint64_t(request->camera.width) * uint64_t(request->camera.height) : 0;
     EXPECT_TRUE(requester.on_part(part_of(last), now_s).has_value());
     return request->camera;
   }

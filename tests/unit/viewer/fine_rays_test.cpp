@@ -228,19 +228,19 @@ TEST(FineRays, ComeWithPatches) {
   FineRays rays;
   const Sampled s = Sampled(4, {600, 300, 40, 40}).miss(600, 300).hit(601, 300);
   wire::Patch patch;
-  patch.epoch = kEpoch, patch.camera = s.camera, patch.rect = patch.missed_rect = s.rect;
+  patch.epoch = kEpoch, patch.camera = s.camera, patch.rect = patch.missed.rect = s.rect;
   patch.extra = true;
   ASSERT_TRUE(add_rays(patch, s.image, rays).ok());
   EXPECT_EQ(at(rays, finer(4), 601, 300), 0) << "from beside a view";
-  patch.missed = codec::encode_mask(s.missed);
+  patch.missed.words = codec::encode_mask(s.missed);
   ASSERT_TRUE(add_rays(patch, s.image, rays).ok());
   EXPECT_EQ(at(rays, finer(4), 600, 300), kInf);
   EXPECT_NEAR(at(rays, finer(4), 601, 300), 2, 1e-3);
-  patch.missed.assign(5, 0xffffffff);
+  patch.missed.words.assign(5, 0xffffffff);
   EXPECT_FALSE(add_rays(patch, s.image, rays).ok());
 
   Sampled view(4, {600, 300, 1, 1});
-  patch.extra = false, patch.missed.clear(), patch.camera = view.camera, patch.rect = view.rect;
+  patch.extra = false, patch.missed.words.clear(), patch.camera = view.camera, patch.rect = view.rect;
   view.hit(600, 300, 1);
   ASSERT_TRUE(add_rays(patch, view.image, rays).ok());
   EXPECT_EQ(at(rays, finer(4), 600, 300), 0) << "something came";

@@ -268,12 +268,12 @@ TEST(Limits, OfTiles) {
   expect_tiles_checked<DepthTile>();
   expect_tiles_checked<Patch>();
   Patch patch = sample_message<Patch>();
-  patch.missed_rect = {316, 0, 5, 5};
+  patch.missed.rect = {316, 0, 5, 5};
   EXPECT_TRUE(refused<Patch>(encode(patch), "frame"));
   patch.camera.width = patch.camera.height = 8192;
-  patch.missed_rect = {0, 0, 8192, 512};
+  patch.missed.rect = {0, 0, 8192, 512};
   EXPECT_TRUE(decode<Patch>(bytes_of(encode(patch))));
-  patch.missed_rect = {0, 0, 8192, 513};
+  patch.missed.rect = {0, 0, 8192, 513};
   EXPECT_TRUE(refused<Patch>(encode(patch), "pixels"));
   Lease lease = sample_message<Lease>();
   lease.tile = kMaxTiles;

@@ -233,7 +233,7 @@ TEST(BriefMessages, AreWithoutWhatANewOneHolds) {
   const auto back = decode<Patch>(bytes_of(encode(Patch{.tiles_in_frame = 1})));
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->step, 1u);
-  EXPECT_EQ(back->missed_rect, fresh.missed_rect);
+  EXPECT_EQ(back->missed.rect, fresh.missed.rect);
   EXPECT_EQ(back->tiles_in_frame, 1u);
 
   // A patch as sessions send it, with an image of a few hundred bytes.

@@ -133,7 +133,7 @@ TEST(ShortCamera, StandsInBriefMessagesAlone) {
   const geometry::Camera c = shortened(RandomCameras{}.next());
   Patch patch = sample_message<Patch>();
   const size_t usual = encode(patch).size();
-  patch.camera = c, patch.rect = patch.missed_rect = {0, 0, 1, 1};
+  patch.camera = c, patch.rect = patch.missed.rect = {0, 0, 1, 1};
   const std::string body = encode(patch);
   EXPECT_LT(body.size() + 30, usual);
   const auto back = decode<Patch>(bytes_of(body));

@@ -164,7 +164,7 @@ void Checks::on_patch(const Passed& m, Part) {
   if (!patch) return;
   note_sequence(patch->sequence.value, m.now_s);
   if (patch->image.empty()) return;
-  if (++published_[{patch->frame.value, patch->tile * 64 + patch->step}] > 1 && patch->kept > 0)
+  if (++published_[{patch->frame.value, patch->tile * 64 + patch->step}] > 1 && patch->counts.kept > 0)
     fail("twice", fmt::format("tile {} of frame {} is published twice", patch->tile, patch->frame.value), m.now_s);
 }
 

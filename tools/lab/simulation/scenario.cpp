@@ -120,7 +120,7 @@ void draw_settings(Dice& dice, Scenario& s) {
   w.keep_redundant = !w.steering && dice.chance(0.2);
   if (dice.chance(0.3)) w.max_points = 40'000 + dice.below(40'000);
   if (dice.chance(0.2)) w.obsolete_after_s = dice.between(0.5, 6);
-  if (dice.chance(0.3)) w.depth_error = dice.between(0, 0.5), w.normal_error = 4, w.colour_error = 8;
+  if (dice.chance(0.3)) w.errors = {.depth = dice.between(0, 0.5), .normal = 4, .colour = 8};
   if (dice.chance(0.3)) w.view_cell_m = 0;
   if (dice.chance(0.3)) w.still_rays = 1;
   if (dice.chance(0.15)) s.log_limit_mb = 1;

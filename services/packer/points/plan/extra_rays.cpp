@@ -197,7 +197,7 @@ bool Planner::plan_cell(Question& q, ViewerView& view, unsigned turn) {
   if (!geometry::validate(camera) || known_empty_.unseen_at(camera.pose.position_room)) return false;
   q.look_at(camera);
   const std::shared_ptr<ViewMap> map = new_map();
-  render_view_map(q.model, camera, {kEpsilonFromBeside, kNearestFromBeside}, true, keys_, *map);
+  render_view_map(q.model, camera, {kEpsilonFromBeside, kNearestFromBeside}, keys_, *map);
   image::PixelMask cast;
   known_empty_.project(camera, map->depth_m, config_.threads, cast);
   drop_far_from_edges(*map, cast);
@@ -243,7 +243,7 @@ void Planner::look_closer(Question& q, ViewerView& view) {
   } else {
     view.fine_map = nullptr;
     const std::shared_ptr<ViewMap> map = new_map();
-    render_view_map(q.model, view.camera, test_, true, keys_, *map, true);
+    render_view_map(q.model, view.camera, test_, keys_, *map, true);
     view.fine_map = map;
   }
   view.fine_changes = changes_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "common/codec/mask_stream.h"
 #include "common/parallel/in_parallel.h"
@@ -285,6 +286,13 @@ size_t pixels_in(const ViewerView& v) {
 geometry::Box grown(const geometry::Box& box, float by_m) { return {box.lo - by_m, box.hi + by_m}; }
 
 }  // namespace
+
+uint64_t ValidationTurn::take_due(int sets, double turn_s, double most, double now_s) {
+  sets_due = std::clamp(sets_due + sets * (now_s - std::exchange(at_s, now_s)) / turn_s, 0.0, most);
+  const double due = std::floor(sets_due);
+  sets_due -= due;
+  return static_cast<uint64_t>(due);
+}
 
 void forget_casts(ViewerView& view) {
   const int width = view.camera.width, height = view.camera.height;

@@ -139,6 +139,15 @@ struct LostTiles {
   std::vector<RayTile> tiles;
 };
 
+/// The turn of a view's good pixels: each is cast now and then to be checked.
+struct ValidationTurn {
+  uint64_t round = 0;  ///< sets of pixels that had their turn
+  double sets_due = 0, at_s = -1e9;
+
+  /// Returns how many sets are due, at most `most`: each turn_s `sets` more become due.
+  uint64_t take_due(int sets, double turn_s, double most, double now_s);
+};
+
 /// The planner's memory of a viewer: its last view, and the rays that were cast for it already.
 struct ViewerView {
   InstanceId viewer;
@@ -150,8 +159,7 @@ struct ViewerView {
   uint64_t map_changes = 0;      ///< Planner::changes_ when `map` was rendered
   image::PixelMask done;         ///< pixels that were cast for this camera
   image::PixelMask doubted;      ///< pixels whose rays contradicted the model, from this camera
-  uint64_t round = 0;            ///< validation: number of pixel sets that had their turn
-  double sets_due = 0, validated_s = -1e9;
+  ValidationTurn validation;
 
   // Extra rays for this camera.
   unsigned cell_turn = 0;                   ///< the next direction; goes on from view to view

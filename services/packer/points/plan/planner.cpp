@@ -75,19 +75,13 @@ std::shared_ptr<ViewMap> Planner::new_map() {
 void Planner::map_view(Question& q, ViewerView& view) {
   if (view.map && view.map_changes == changes_) return;
   view.map = new_map();
-  render_view_map(q.model, view.camera, test_, true, keys_, *view.map);
+  render_view_map(q.model, view.camera, test_, keys_, *view.map);
   view.map_changes = changes_;
 }
 
 uint64_t Planner::validation_sets(const Question& q, ViewerView& view) const {
   if (config_.validation == 0) return 0;
-  const double most = view.still ? kStillSets : kSets;
-  const double since_s = q.now_s - view.validated_s;
-  view.sets_due = std::clamp(view.sets_due + kSets * since_s / kTurn_s, 0.0, most);
-  view.validated_s = q.now_s;
-  const double sets = std::floor(view.sets_due);
-  view.sets_due -= sets;
-  return static_cast<uint64_t>(sets);
+  return view.validation.take_due(kSets, kTurn_s, view.still ? kStillSets : kSets, q.now_s);
 }
 
 Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
@@ -102,8 +96,8 @@ Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
   const uint64_t picks = validation_sets(q, view);
   for (int y = 0; y < height; ++y) {
     uint64_t picked = 0, picked_empty = 0;
-    for (uint64_t i = 0; i < picks; ++i) picked |= blue_noise_.row(y, view.round + i);
-    for (uint64_t r = view.round; r < view.round + picks; ++r)
+    for (uint64_t i = 0; i < picks; ++i) picked |= blue_noise_.row(y, view.validation.round + i);
+    for (uint64_t r = view.validation.round; r < view.validation.round + picks; ++r)
       if (r % kEmptyShare == 0) picked_empty |= blue_noise_.row(y, r / kEmptyShare);
     for (size_t w = 0; w < map.covered.words_per_row(); ++w) {
       const uint64_t inside = w + 1 == map.covered.words_per_row() ? last_word_mask(width) : ~uint64_t{0};
@@ -139,7 +133,7 @@ Planner::ViewClasses Planner::classify(Question& q, ViewerView& view) {
       out.cast.row(y)[w] = cast;
     }
   }
-  view.round += picks;
+  view.validation.round += picks;
   for (size_t i = 0; i < kRayClasses; ++i) {
     const auto c = static_cast<RayClass>(i);
     if (c != RayClass::kValidation) out.figures[fmt::format("pixels.{}", name_of(c))] = static_cast<double>(pixels[i]);

@@ -106,8 +106,8 @@ void Planner::take_planned(PlannedFrame& frame, const SampledTile& tile, double 
   image::PixelMask contradicted;
   ViewerView* view = viewers_.find(frame.viewer);
   const bool same = view && view->known && view->camera == frame.camera;
-  validation_.check({map.camera, map.depth_m, map.colour, map.normal, frame.firm}, tile.rect, cast, tile.image, now_s,
-                    contradicted, same ? &view->doubted : nullptr);
+  validation_.check({map.camera, map.depth_m, map.colour, map.normal, frame.firm},
+                    {tile.rect, cast, tile.image, same ? &view->doubted : nullptr}, now_s, contradicted);
   if (same) merge(contradicted, tile.rect.x, tile.rect.y, view->doubted);
   refill_empty(frame, tile, contradicted);
 }

@@ -86,28 +86,28 @@ Validation::Verdict Validation::judge(const ShownView& shown, int shown_x, int s
   return around.cosine < tolerance_.normal_cosine ? Verdict::kNormal : Verdict::kAgrees;
 }
 
-void Validation::check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
-                       const image::DepthImage& came, double now_s, image::PixelMask& contradicted,
-                       const image::PixelMask* doubted) {
+void Validation::check(const ShownView& shown, const CastTile& tile, double now_s, image::PixelMask& contradicted) {
+  const geometry::Rect& rect = tile.rect;
+  const image::PixelMask& cast = tile.cast;
   const size_t pixels = static_cast<size_t>(shown.camera.width) * shown.camera.height;
   CHECK(shown.depth_m.size() == pixels && shown.colour.size() == pixels && shown.normal.size() == pixels);
   CHECK(shown.firm.width() == shown.camera.width && shown.firm.height() == shown.camera.height);
   CHECK(geometry::contains({0, 0, shown.camera.width, shown.camera.height}, rect));
   CHECK(cast.width() == rect.width && cast.height() == rect.height);
-  CHECK(came.width == rect.width && came.height == rect.height);
+  CHECK(tile.came.width == rect.width && tile.came.height == rect.height);
   contradicted.reset(rect.width, rect.height);
   marked_.reset((rect.width + kMarkPixels - 1) / kMarkPixels, (rect.height + kMarkPixels - 1) / kMarkPixels);
   for (int y = 0; y < rect.height; ++y)
     image::for_each_set(cast.row(y), cast.words_per_row(), [&](size_t x) {
       const int column = static_cast<int>(x);
       if (!shown.firm.at(rect.x + column, rect.y + y)) return;
-      if (take(shown, rect, column, y, came, now_s, doubted)) contradicted.set(column, y);
+      if (take(shown, tile, column, y, now_s)) contradicted.set(column, y);
     });
 }
 
 // Takes one ray at a firm pixel. Returns true if it contradicts.
-bool Validation::take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
-                      double now_s, const image::PixelMask* doubted) {
+bool Validation::take(const ShownView& shown, const CastTile& tile, int x, int y, double now_s) {
+  const auto& [rect, cast, came, doubted] = tile;
   const int px = rect.x + x, py = rect.y + y;
   const size_t at = static_cast<size_t>(y) * rect.width + x;
   const float shown_m = shown.depth_m[static_cast<size_t>(py) * shown.camera.width + px];

@@ -50,6 +50,17 @@ struct ShownView {
   const image::PixelMask& firm;      ///< pixels whose content is believed: good and known empty ones
 };
 
+/// A tile, and the pixels of it that were cast.
+struct CastTile {
+  const geometry::Rect& rect;
+  const image::PixelMask& cast;   ///< as large as rect
+  const image::DepthImage& came;  ///< likewise, as sampled
+  /// Null, or a mask of the view's size: pixels where rays have contradicted before, from this camera. There they are
+  /// evidence, but make nothing stale: splats cannot show what is there, and a still view would cast the squares around
+  /// again and again.
+  const image::PixelMask* doubted = nullptr;
+};
+
 /// Allowed difference of a ray from the shown model. A sample agrees if it lies within the range of the pixels around,
 /// widened by these tolerances.
 struct Tolerance {
@@ -76,15 +87,11 @@ class Validation {
 
   explicit Validation(const points::ModelConfig& model, const Tolerance& tolerance = {});
 
-  /// Compares a tile's rays at firm pixels with the model as seen when its frame was planned.
-  ///     cast: as large as rect; came: the samples, likewise. shown.camera's image holds rect.
-  ///     doubted: as large as the view, or null: pixels where rays have contradicted before, from this camera. There
-  /// rays are evidence, but make nothing stale: splats cannot show such places, and a still view would cast the squares
-  /// around them again and again.
-  ///     contradicted: becomes a mask as large as rect: the rays that contradict the model; their hits are new points.
-  void check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
-             const image::DepthImage& came, double now_s, image::PixelMask& contradicted,
-             const image::PixelMask* doubted = nullptr);
+  /// Compares a tile's rays at firm pixels with what was shown when its frame was planned; shown.camera's image holds
+  /// the tile.
+  ///   contradicted: becomes a mask of the tile's size: the rays that saw something else than what is shown; their hits
+  ///   are new points.
+  void check(const ShownView& shown, const CastTile& tile, double now_s, image::PixelMask& contradicted);
 
   /// Sets in `mask`, which is as large as the camera's image, a square of kMarkPixels pixels around each mark in sight.
   void mark_stale(const geometry::Camera& camera, double now_s, image::PixelMask& mask);
@@ -114,8 +121,7 @@ class Validation {
     double s = 0, strike_s = 0;
     uint8_t strikes = 0;  // times the cluster was disproved: each doubles the proof that is needed
   };
-  bool take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
-            double now_s, const image::PixelMask* doubted);
+  bool take(const ShownView& shown, const CastTile& tile, int x, int y, double now_s);
   void count(Verdict verdict, bool empty);
   void note(points::ClusterKey key, bool agrees, double now_s);
   void mark(const glm::dvec3& position_room, double now_s);

@@ -99,8 +99,9 @@ HWY_INLINE hn::Mask<I32> Steps(hn::Vec<I32> before, hn::Vec<I32> a, hn::Vec<I32>
   return hn::Or(sharp, hn::Xor(hn::Eq(a, none), hn::Eq(b, none)));
 }
 
-void CompareRows(const int32_t* before, const PixelRow& a, const PixelRow& b, const int32_t* after, int first, int last,
-                 int32_t* out) {
+void CompareRows(const NeighbourRows& rows, int first, int last, int32_t* out) {
+  const int32_t *before = rows.before, *after = rows.after;
+  const PixelRow a = rows.a, b = rows.b;
   const I32 di;
   const U32 du;
   const int lanes = static_cast<int>(hn::Lanes(du));
@@ -145,8 +146,8 @@ HWY_INLINE hn::Vec<F32> Metres(hn::Vec<I32> code, float near_m) {
   return hn::BitCast(F32(), hn::Add(hn::ShiftLeft<splat::kDepthCodeShift>(code), hn::Set(di, first)));
 }
 
-RowBits JudgeRow64(const int32_t* code, const int32_t* beside, const int32_t* above, const int32_t* below,
-                   const uint32_t* depth_bits, float near_m, float farther, int x0) {
+RowBits JudgeRow64(const ContrastRow& row, float near_m, float farther, int x0) {
+  const int32_t *code = row.code, *beside = row.beside, *above = row.above, *below = row.below;
   const I32 di;
   const F32 d;
   const int lanes = static_cast<int>(hn::Lanes(di));
@@ -155,7 +156,7 @@ RowBits JudgeRow64(const int32_t* code, const int32_t* beside, const int32_t* ab
     const int x = x0 + i;
     const auto c = hn::LoadU(di, code + x);
     const auto covered = hn::Ne(c, hn::Set(di, kNoCode));
-    const auto point = hn::BitCast(d, hn::LoadU(U32(), depth_bits + x));
+    const auto point = hn::BitCast(d, hn::LoadU(U32(), row.depth_bits + x));
     const auto own = hn::Le(point, hn::Mul(Metres(hn::IfThenElseZero(covered, c), near_m), hn::Set(d, farther)));
     const auto level = hn::Max(hn::Max(hn::LoadU(di, beside + x), hn::LoadU(di, beside + x - 1)),
                                hn::Max(hn::LoadU(di, above + x), hn::LoadU(di, below + x)));

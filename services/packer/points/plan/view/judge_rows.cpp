@@ -26,14 +26,12 @@ void split_row(const uint64_t* keys, int first, int last, const BiasTable& bias,
   HWY_DYNAMIC_DISPATCH(SplitRow)(keys, first, last, bias, out);
 }
 
-void compare_rows(const int32_t* before, const PixelRow& a, const PixelRow& b, const int32_t* after, int first,
-                  int last, int32_t* out) {
-  HWY_DYNAMIC_DISPATCH(CompareRows)(before, a, b, after, first, last, out);
+void compare_rows(const NeighbourRows& rows, int first, int last, int32_t* out) {
+  HWY_DYNAMIC_DISPATCH(CompareRows)(rows, first, last, out);
 }
 
-RowBits judge_row_64(const int32_t* code, const int32_t* beside, const int32_t* above, const int32_t* below,
-                     const uint32_t* depth_bits, float near_m, float farther, int x) {
-  return HWY_DYNAMIC_DISPATCH(JudgeRow64)(code, beside, above, below, depth_bits, near_m, farther, x);
+RowBits judge_row_64(const ContrastRow& row, float near_m, float farther, int x) {
+  return HWY_DYNAMIC_DISPATCH(JudgeRow64)(row, near_m, farther, x);
 }
 
 void write_row(const PixelRow& row, float near_m, int last, float* depth_m, uint32_t* colour, uint16_t* normal) {

@@ -33,10 +33,14 @@ enum Contrast : int32_t { kSame, kWeak, kStrong, kEdge };
 /// Splits pixels [first, last) of a row of keys into `out`.
 void split_row(const uint64_t* keys, int first, int last, const BiasTable& bias, const PixelRow& out);
 
-/// out[x] = contrast of pixel x of `a` with pixel x of `b`, for x in [first, last). before, after: the codes beyond a
-/// and b. For neighbours within a row, a and b are the same row, one pixel apart.
-void compare_rows(const int32_t* before, const PixelRow& a, const PixelRow& b, const int32_t* after, int first,
-                  int last, int32_t* out);
+/// Neighbours a and b, and the codes on the far sides of both. In a row a and b are the same row, one pixel apart.
+struct NeighbourRows {
+  const int32_t* before;
+  const PixelRow &a, &b;
+  const int32_t* after;
+};
+/// out[x] = contrast of pixel x of `a` with pixel x of `b`, for x in [first, last).
+void compare_rows(const NeighbourRows& rows, int first, int last, int32_t* out);
 
 /// Results for 64 pixels of a row from x on, as bits.
 struct RowBits {
@@ -44,10 +48,15 @@ struct RowBits {
   uint64_t own = 0;  ///< covered, and a point of the covering surface lies in the pixel
   uint64_t weak = 0, strong = 0, edge = 0;
 };
-/// beside[x], beside[x - 1]: contrasts with the next and the previous pixel of the row; below, above: with the rows
-/// around. depth_bits: nearest points (depth_tile()). farther: 1 + relative epsilon.
-RowBits judge_row_64(const int32_t* code, const int32_t* beside, const int32_t* above, const int32_t* below,
-                     const uint32_t* depth_bits, float near_m, float farther, int x);
+/// A row and how it contrasts with what is around.
+struct ContrastRow {
+  const int32_t* code;
+  const int32_t* beside;         ///< [x], [x - 1]: with the next and the previous pixel of the row
+  const int32_t *above, *below;  ///< with pixels of the rows around
+  const uint32_t* depth_bits;    ///< nearest points (depth_tile())
+};
+/// farther: 1 + relative epsilon.
+RowBits judge_row_64(const ContrastRow& row, float near_m, float farther, int x);
 
 /// Writes pixels [0, last) as planes: metres (+infinity: no surface), 0x00RRGGBB, 16-bit normals.
 void write_row(const PixelRow& row, float near_m, int last, float* depth_m, uint32_t* colour, uint16_t* normal);

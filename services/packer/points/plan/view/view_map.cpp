@@ -98,7 +98,7 @@ void PixelJudge::judge(const splat::ViewKeys::Tile& tile, int x, int y, ViewMap&
   const auto split = [&](int row) { split_row(tile.key_row(row), -kReach, width + kReach, bias_, rows.row(row)); };
   // Compares a row with the one below.
   const auto compare = [&](int row) {
-    compare_rows(rows.row(row - 1).code, rows.row(row), rows.row(row + 1), rows.row(row + 2).code, 0, width,
+    compare_rows({rows.row(row - 1).code, rows.row(row), rows.row(row + 1), rows.row(row + 2).code}, 0, width,
                  rows.between(row));
   };
   for (int row = -kReach; row < kReach; ++row) split(row);
@@ -108,23 +108,23 @@ void PixelJudge::judge(const splat::ViewKeys::Tile& tile, int x, int y, ViewMap&
     compare(row);
     const PixelRow at = rows.row(row);
     const PixelRow next{at.code + 1, at.attributes + 1, at.normal_high + 1};
-    compare_rows(at.code - 1, at, next, at.code + 2, -1, width, rows.beside());
+    compare_rows({at.code - 1, at, next, at.code + 2}, -1, width, rows.beside());
     if (planes) {
       const size_t first = static_cast<size_t>(y + row) * map.covered.width() + x;
       write_row(at, near_m_, width, map.depth_m.data() + first, map.colour.data() + first, map.normal.data() + first);
       std::memcpy(map.nearest_m.data() + first, tile.depth_row(row), static_cast<size_t>(width) * sizeof(float));
     }
-    for (int x0 = 0; x0 < width; x0 += 64)
-      judge_64(tile, rows, x0, row, static_cast<size_t>(x + x0) >> 6, y + row, map);
+    for (int x0 = 0; x0 < width; x0 += 64) judge_64(tile, rows, x0, row, {x + x0, y + row}, map);
   }
 }
 
-void PixelJudge::judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0, int y, size_t word, int map_y,
+void PixelJudge::judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0, int y, const glm::ivec2& at,
                           ViewMap& map) const {
   const int left = tile.rect.width - x0;
   const uint64_t inside = left >= 64 ? ~uint64_t{0} : (uint64_t{1} << left) - 1;
-  const RowBits bits = judge_row_64(rows.row(y).code, rows.beside(), rows.between(y - 1), rows.between(y),
-                                    tile.depth_row(y), near_m_, 1.0f + test_.relative_epsilon, x0);
+  const RowBits bits =
+      judge_row_64({rows.row(y).code, rows.beside(), rows.between(y - 1), rows.between(y), tile.depth_row(y)}, near_m_,
+                   1.0f + test_.relative_epsilon, x0);
   uint64_t lacking = 0;
   // Few pixels need a closer look: those without a point of their own, and pin-holes at edges.
   for (uint64_t rest = (bits.covered & ~bits.own) & inside; rest != 0; rest &= rest - 1) {
@@ -134,11 +134,12 @@ void PixelJudge::judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0,
   }
   for (uint64_t rest = bits.covered & bits.edge & ~lacking & inside; rest != 0; rest &= rest - 1)
     if (rows.pin_hole(x0 + std::countr_zero(rest), y)) lacking |= rest & -rest;
-  map.covered.row(map_y)[word] |= bits.covered & inside;
-  map.lacking.row(map_y)[word] |= lacking;
-  map.edge.row(map_y)[word] |= bits.edge & inside;
-  map.strong.row(map_y)[word] |= bits.strong & inside;
-  map.weak.row(map_y)[word] |= bits.weak & inside;
+  const size_t word = static_cast<size_t>(at.x) >> 6;
+  map.covered.row(at.y)[word] |= bits.covered & inside;
+  map.lacking.row(at.y)[word] |= lacking;
+  map.edge.row(at.y)[word] |= bits.edge & inside;
+  map.strong.row(at.y)[word] |= bits.strong & inside;
+  map.weak.row(at.y)[word] |= bits.weak & inside;
 }
 
 void reset_masks(int width, int height, ViewMap& map) {
@@ -147,10 +148,10 @@ void reset_masks(int width, int height, ViewMap& map) {
 }
 
 void render_view_map(const points::PointModel& model, const geometry::Camera& camera, const PixelTest& test,
-                     bool with_planes, splat::ViewKeys& keys, ViewMap& map, bool rests) {
+                     splat::ViewKeys& keys, ViewMap& map, bool rests) {
   map.camera = camera;
   reset_masks(camera.width, camera.height, map);
-  const size_t pixels = with_planes ? static_cast<size_t>(camera.width) * camera.height : 0;
+  const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
   map.depth_m.resize(pixels), map.colour.resize(pixels), map.normal.resize(pixels);
   map.nearest_m.resize(pixels);
   keys.begin(model, camera, kPlanTileWidth, kPlanTileHeight, rests);

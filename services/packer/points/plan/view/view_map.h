@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <vector>
 
 #include "common/geometry/camera.h"
@@ -41,11 +42,9 @@ struct ViewMap {
   image::PixelMask weak;    ///< the same, with a smaller difference
 };
 
-/// Renders the model and judges its pixels. with_planes: depth_m, colour, normal and nearest_m are filled; else they
-/// are empty.
-///   threads: those of `keys`. rests: ViewKeys::begin().
+/// Renders the model and judges its pixels. threads: those of `keys`. rests: ViewKeys::begin().
 void render_view_map(const points::PointModel& model, const geometry::Camera& camera, const PixelTest& test,
-                     bool with_planes, splat::ViewKeys& keys, ViewMap& map, bool rests = false);
+                     splat::ViewKeys& keys, ViewMap& map, bool rests = false);
 
 /// Judges pixels tile by tile, for views that are searched in parts.
 class PixelJudge {
@@ -59,8 +58,8 @@ class PixelJudge {
 
  private:
   struct Rows;
-  void judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0, int y, size_t word, int map_y,
-                ViewMap& map) const;
+  // at: the place of (x0, y) in the map.
+  void judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0, int y, const glm::ivec2& at, ViewMap& map) const;
   bool has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y, float depth_m, uint16_t normal) const;
   float near_m_;
   splat::TangentPlanes planes_;
