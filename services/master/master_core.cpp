@@ -1,22 +1,19 @@
 #include "services/master/master_core.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdlib>
+#include <tuple>
 #include <utility>
 
 #include "common/core/log.h"
 #include "common/core/utf8.h"
 #include "common/scene/session.h"
-#include "services/master/peers.h"
 #include "services/master/record/measured.h"
 
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMaxDeparted = 1024;  // processes that left and are remembered
 constexpr size_t kMaxWalls = 64;
 constexpr size_t kMostOfTableName = 32;  // bytes, in error texts
 constexpr double kCatchUp_s = 0.5;       // after this process stood still: time to read all that has come
@@ -37,119 +34,62 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
       record_(record),
       outbox_(instance,
               [this](const std::string& id) {
-                const auto p = peers_.find(id);
-                return p == peers_.end() ? InstanceId{} : p->second.hello.instance;
+                const Peer* p = peers_.find(id);
+                return p ? p->hello.instance : InstanceId{};
               }),
-      clipping_(options.clip) {
-  const auto name_of = [this](const std::string& id) {
-    const auto p = peers_.find(id);
-    return p == peers_.end() ? std::string("?") : p->second.hello.name;
-  };
-  const auto name_of_instance = [this, name_of](InstanceId instance) {
-    const auto id = instances_.find(instance);
-    return id == instances_.end() ? std::string("?") : name_of(id->second);
-  };
-  const PlanLinks links{
-      .outbox = outbox_, .record = record_, .name_of = name_of, .name_of_instance = name_of_instance, .packer = [this] {
-        return packer();
-      }};
-  for (const auto kind : scene::kKinds)
-    if (auto& plan = plans_[scene::pipeline_of(kind)]; !plan)
-      plan = make_plan(scene::pipeline_of(kind), options_, links);
-  plan_ = &plan_of({});
-  told_lacks_ = lacks();
+      scene_(options_, plan_links()) {}
+
+PlanLinks MasterCore::plan_links() {
+  return {.outbox = outbox_,
+          .record = record_,
+          .name_of =
+              [this](const std::string& id) {
+                const Peer* p = peers_.find(id);
+                return p ? p->hello.name : std::string("?");
+              },
+          .name_of_instance =
+              [this](InstanceId instance) {
+                const auto* p = peers_.find(instance);
+                return p ? p->second.hello.name : std::string("?");
+              },
+          .packer = [this] { return peers_.packer(); }};
 }
 
 // ---- processes that take part ---------------------------------------------------------------------------------------
 
-MasterCore::Peer* MasterCore::known(const std::string& peer, double now_s) {
-  const auto it = peers_.find(peer);
-  if (it == peers_.end() || it->second.gone) {
+Peer* MasterCore::known(const std::string& peer, double now_s) {
+  Peer* p = peers_.find(peer);
+  if (!p || p->gone) {
     outbox_.send(peer, wire::WhoAreYou{instance_});
     return nullptr;
   }
-  it->second.seen_s = now_s;
-  return &it->second;
+  p->seen_s = now_s;
+  return p;
 }
 
-MasterCore::Peer* MasterCore::known_sampler(const std::string& peer, double now_s) {
+Peer* MasterCore::known_sampler(const std::string& peer, double now_s) {
   Peer* p = known(peer, now_s);
   return p && p->hello.role == "sampler" ? p : nullptr;
 }
 
-std::string MasterCore::packer() const {
-  auto longest = peers_.end();
-  for (auto p = peers_.begin(); p != peers_.end(); ++p)
-    if (!p->second.gone && p->second.hello.role == "packer" &&
-        (longest == peers_.end() || p->second.joined < longest->second.joined))
-      longest = p;
-  return longest == peers_.end() ? std::string() : longest->first;
-}
-
 // Begins anew with another packer: it has nothing of what the packer before it had.
 void MasterCore::follow_packer() {
-  const std::string now = packer();
-  if (now.empty() || now == leading_packer_) return;
-  leading_packer_ = now;
-  plan_->new_packer();
+  if (peers_.follow_packer()) plan().new_packer();
 }
 
 // If a packer that waited takes the place of one that is gone, sends its endpoints to everyone.
 void MasterCore::follow_another_packer(double now_s) {
-  const bool gone = leading_packer_.empty();
+  const bool gone = !peers_.leads_packer();
   follow_packer();
-  if (gone && !leading_packer_.empty()) announce(now_s);
-}
-
-bool MasterCore::samplers_here() const {
-  return std::any_of(peers_.begin(), peers_.end(),
-                     [](const auto& p) { return !p.second.gone && p.second.hello.role == "sampler"; });
-}
-
-std::string MasterCore::lacks() const {
-  std::vector<std::string> out;
-  for (const char* role : {"data", "packer", "sampler"})
-    if (std::none_of(peers_.begin(), peers_.end(),
-                     [&](const auto& p) { return !p.second.gone && !p.second.refused && p.second.hello.role == role; }))
-      out.emplace_back(role);
-  return fmt::format("{}", fmt::join(out, ","));
-}
-
-// Makes room for a process: forgets one that left if kMaxDeparted are remembered. False: max_peers are here.
-bool MasterCore::make_room(const std::string& peer) {
-  const auto before = peers_.find(peer);
-  if (before != peers_.end() && !before->second.gone) return true;
-  const auto here = size_t(std::count_if(peers_.begin(), peers_.end(), [](const auto& p) { return !p.second.gone; }));
-  if (here >= options_.limits.max_peers) return false;
-  if (before != peers_.end() || peers_.size() < here + kMaxDeparted) return true;
-  const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
-  if (departed == peers_.end()) return true;
-  forget(departed->second, departed->first);
-  peers_.erase(departed);
-  return true;
-}
-
-void MasterCore::forget(const Peer& p, const std::string& routing_id) {
-  if (const auto by = instances_.find(p.hello.instance); by != instances_.end() && by->second == routing_id)
-    instances_.erase(by);
-  if (p.hello.role != "ctl") departed_.add(p.process);
-}
-
-void MasterCore::forget_departed(double now_s) {
-  std::erase_if(peers_, [&](const auto& entry) {
-    const auto& [id, p] = entry;
-    if (!p.gone || (p.hello.role != "ctl" && now_s - p.seen_s < Departed::kAfter_s)) return false;
-    forget(p, id);
-    return true;
-  });
+  if (gone && peers_.leads_packer()) announce(now_s);
 }
 
 // A restarted process replaces the old one of its name, whose socket may not be known to be dead yet. If both live,
 // both stay: they would replace each other for ever.
 void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s) {
-  const auto before = peers_.find(peer);
-  const bool here = before != peers_.end() && !before->second.gone && before->second.hello.instance == m.instance;
-  const bool lives_on = namesakes_.lives_on(m.instance, now_s);
+  const Peer* before = peers_.here(peer);
+  const bool here = before && before->hello.instance == m.instance;
+  const bool lives_on = peers_.namesakes().lives_on(m.instance, now_s);
   bool told = false;
   for (auto& [id, p] : peers_) {
     if (id == peer || p.hello.role != m.role) continue;
@@ -162,47 +102,20 @@ void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m
     }
     if (!p.gone) {
       lose(p, id, "was replaced");
-      if (!moved) namesakes_.replaced(p.hello.instance, now_s);
+      if (!moved) peers_.namesakes().replaced(p.hello.instance, now_s);
     }
     p.process.replaced = true;
   }
 }
 
-MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
-  Peer& p = peers_[peer];
-  if (p.hello.instance != m.instance || p.hello.role != m.role) {
-    forget_viewer(p.hello);
-    p.coupling.reset();
+Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
+  if (const Peer* before = peers_.find(peer)) {
+    const wire::Hello& hello = before->hello;
+    if (hello.instance != m.instance || hello.role != m.role) forget_viewer(hello);
+    live_.set_here(hello.role, hello.name, false);  // its name may be another now
   }
-  if (p.hello.instance != m.instance || p.hello.role != m.role || p.gone)
-    p.joined = ++joined_, p.process.replaced = false;
-  live_.set_here(p.hello.role, p.hello.name, false);  // its name may be another now
-  instances_.erase(p.hello.instance);
-  instances_[m.instance] = peer;
-  p.hello = m;
-  p.process.role = m.role;
-  p.process.name = m.name;
-  p.process.pid = m.pid;
-  p.process.facts = m.facts;
-  const std::string at_once = scene::value_or(m.facts, "leases", std::string());
-  if (!at_once.empty()) p.leases_at_once = std::clamp(std::atoi(at_once.c_str()), 0, kMaxWaitingLeases);
-  if (p.gone) p.reports.clear();
-  p.seen_s = now_s;
-  p.gone = p.refused = p.process.lost = false;
   live_.set_here(m.role, m.name, true);
-  return p;
-}
-
-bool MasterCore::serves(const std::string& peer) const {
-  const auto p = peers_.find(peer);
-  const std::string role = p == peers_.end() || p->second.gone ? std::string() : p->second.hello.role;
-  return role == "data" || role == "packer" || role == "sampler";
-}
-
-bool MasterCore::admit(const std::string& peer, double now_s) {
-  const auto p = peers_.find(peer);
-  const bool packer = p != peers_.end() && !p->second.gone && p->second.hello.role == "packer";
-  return packer || gate_.admit(peer, now_s);
+  return peers_.enter(peer, m, now_s);
 }
 
 // Sends the reason with Shutdown, so that the process ends: it could do nothing here.
@@ -214,43 +127,41 @@ void MasterCore::refuse(const std::string& peer, const wire::Hello& m, const std
 
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
   if (const Status fits = check_hello(m); !fits) return refuse(peer, m, fits.error().text, now_s);
-  if (!make_room(peer))
+  if (!peers_.make_room(peer, options_.limits.max_peers))
     return refuse(peer, m, fmt::format("{} processes take part already (--max-peers)", options_.limits.max_peers),
                   now_s);
-  if (const auto said = peers_.find(peer); said != peers_.end()) {
-    if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
-    said->second.hello_pace.count(now_s);
-    said->second.put_off.reset();
+  if (Peer* said = peers_.find(peer)) {
+    if (!said->hello_pace.allows(now_s)) return void(said->put_off = m);
+    said->hello_pace.count(now_s);
+    said->put_off.reset();
   }
   replace_namesakes(peer, m, now_s);
-  const auto before = peers_.find(peer);
-  const bool changed = before == peers_.end() || before->second.hello.instance != m.instance || before->second.gone ||
-                       before->second.hello.endpoints != m.endpoints;
-  if (changed && peer == leading_packer_) leading_packer_.clear();
-  if (changed && m.role == "sampler")
-    for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new process holds no leases yet
+  const Peer* before = peers_.here(peer);
+  const bool changed = !before || before->hello.instance != m.instance || before->hello.endpoints != m.endpoints;
+  if (changed) peers_.leave_packer(peer);
+  if (changed && m.role == "sampler") scene_.release_sampler(peer);  // a new process holds no leases yet
   Peer& p = enter(peer, m, now_s);
   if (m.role == "packer") follow_packer();
   if (changed && m.role != "ctl" && gate_.may_log(now_s)) log::info("{} {} joined", m.role, m.name);
-  const EpochId epoch = epoch_;
+  const EpochId epoch = scene_.epoch();
   if (m.role == "data")
     if (const Status s = adopt_scene(peer, m, now_s); !s) {
       p.refused = true;
-      if (shows_ == peer) shows_.clear();
+      scene_.refuse(peer);
       if (gate_.may_log(now_s)) log::error("the scene of {} is refused: {}", m.name, s.error().text);
     }
   wire::Welcome w = welcome(p, now_s);
   w.hello_sent_s = m.sent_s;
   outbox_.send(peer, w);
-  if (changed && epoch == epoch_ && (!m.endpoints.empty() || m.role == "data")) announce_soon(now_s);
-  if (m.role == "sampler") join(peer, now_s);
+  if (changed && epoch == scene_.epoch() && (!m.endpoints.empty() || m.role == "data")) announce_soon(now_s);
+  if (m.role == "sampler") scene_.join(peer, now_s);
   dispatch(now_s);
 }
 
 // Adopts scenes that were refused because they did not fit beside the scene of a data server that has left.
 void MasterCore::adopt_refused(double now_s) {
   for (auto& [id, p] : peers_) {
-    if (p.gone || !p.refused || p.hello.role != "data" || !adopt_scene(id, p.hello, now_s)) continue;
+    if (!p.serves_as("data") || !p.refused || !adopt_scene(id, p.hello, now_s)) continue;
     p.refused = false;
     announce_soon(now_s);
   }
@@ -261,7 +172,7 @@ void MasterCore::take_put_off_hellos(double now_s) {
   for (const auto& [id, p] : peers_)
     if (p.put_off && p.hello_pace.allows(now_s)) due.emplace_back(id, *p.put_off);
   for (const auto& [id, hello] : due)
-    if (const auto p = peers_.find(id); p != peers_.end() && p->second.put_off) on(id, hello, now_s);
+    if (const Peer* p = peers_.find(id); p && p->put_off) on(id, hello, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
@@ -274,13 +185,12 @@ void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double
 }
 
 void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_s) {
-  auto it = peers_.find(peer);
+  Peer* p = peers_.find(peer);
+  std::string id = peer;
   // A process whose own connection is busy says goodbye over another.
-  if (const auto by = instances_.find(m.instance); it == peers_.end() && by != instances_.end())
-    it = peers_.find(by->second);
-  if (it == peers_.end() || it->second.gone) return;
-  const std::string id = it->first;  // the process' own, not the other connection's
-  lose(it->second, id, "left", true);
+  if (auto* by = p ? nullptr : peers_.find(m.instance)) std::tie(id, p) = std::pair(by->first, &by->second);
+  if (!p || p->gone) return;
+  lose(*p, id, "left", true);
   follow_another_packer(now_s);
   dispatch(now_s);
 }
@@ -288,14 +198,13 @@ void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_
 void MasterCore::undeliverable(const std::string& peer) {
   for (auto& [name, wall] : walls_) wall.unreachable(peer, now_s_);
   send_swaps();
-  const auto it = peers_.find(peer);
-  if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "cannot be reached");
+  if (Peer* p = peers_.find(peer); p && !p->gone) lose(*p, peer, "cannot be reached");
 }
 
 // Forgets the viewer in all plans, too: others may have led while it was here.
 void MasterCore::forget_viewer(const wire::Hello& hello) {
   if (hello.role != "viewer") return;
-  for (auto& [pipeline, plan] : plans_) plan->views().forget_viewer(hello.instance);
+  scene_.forget_viewer(hello.instance);
   for (auto& [name, wall] : walls_) wall.forget(hello.instance, now_s_);
   send_swaps();
 }
@@ -304,16 +213,11 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   p.gone = true;
   p.process.lost = !said_goodbye;
   p.put_off.reset();
-  if (routing_id == leading_packer_) leading_packer_.clear();
+  peers_.leave_packer(routing_id);
   live_.set_here(p.hello.role, p.hello.name, false);
   idle_.remove(routing_id);
-  int leases = 0;
-  data_left_ = data_left_ || p.hello.role == "data";
-  for (auto& [pipeline, plan] : plans_) {
-    leases += plan->release_sampler(routing_id);
-    if (p.hello.role == "data") plan->leave_data(p.hello.instance);
-  }
-  if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
+  scene_.release_sampler(routing_id, !said_goodbye);
+  if (p.hello.role == "data") scene_.leave_data(p.hello);
   forget_viewer(p.hello);
   for (const auto& [peer, reply] : errands_.lost(routing_id)) outbox_.send(peer, reply);
   if (p.hello.role != "ctl" && gate_.may_log(now_s_)) log::info("{} {} {}", p.hello.role, p.hello.name, why);
@@ -334,10 +238,9 @@ Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double
 
 void MasterCore::on(const std::string& peer, const wire::SwapReady& m, double now_s) {
   now_s_ = now_s;
-  const auto by = instances_.find(m.viewer);
-  const auto viewer = by == instances_.end() ? peers_.end() : peers_.find(by->second);
+  auto* viewer = peers_.find(m.viewer);
   // An unknown viewer says hello over its other connection, and then sends this again.
-  if (viewer == peers_.end() || viewer->second.gone || viewer->second.hello.role != "viewer") return;
+  if (!viewer || !viewer->second.serves_as("viewer")) return;
   viewer->second.seen_s = now_s;
   if (walls_.size() >= kMaxWalls && !walls_.contains(m.wall)) return;
   walls_.try_emplace(m.wall, instance_).first->second.on(peer, m, now_s);
@@ -351,8 +254,7 @@ void MasterCore::send_swaps() {
       ++wall;
       continue;
     }
-    swaps_.frames += wall->second.figures().frames;
-    swaps_.incomplete += wall->second.figures().incomplete;
+    swaps_ += wall->second.figures();
     wall = walls_.erase(wall);
   }
 }
@@ -373,46 +275,40 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
   wire::ViewRequest request = gate_.admit(m);
   if (!geometry::validate(geometry::subsample(request.camera, kCoarseStep))) return;
   request.moments = {.requested_s = m.moments.requested_s, .received_s = now_s};
-  plan_->views().spending().asked(m.viewer, guest, now_s);
-  plan_->views().request_view(request);
+  plan().views().spending().asked(m.viewer, guest, now_s);
+  plan().views().request_view(request);
   dispatch(now_s);
-}
-
-void MasterCore::join(const std::string& sampler, double now_s) {
-  for (auto& [pipeline, plan] : plans_) plan->join(sampler, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double now_s) {
   const Peer* p = known_sampler(peer, now_s);
   if (!p || !idle_.add(peer, p->leases_at_once)) return;
-  plan_->heard_of(peer);
-  join(peer, now_s);
+  plan().heard_of(peer);
+  scene_.join(peer, now_s);
   dispatch(now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double now_s) {
   if (!known_sampler(peer, now_s)) return;
-  join(peer, now_s);
-  plan_->extend(m.lease, peer, now_s);
+  scene_.join(peer, now_s);
+  plan().extend(m.lease, peer, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::SlabReady& m, double now_s) {
   if (!known_sampler(peer, now_s)) return;
-  join(peer, now_s);
-  plan_->slab_ready(peer, m);
+  scene_.join(peer, now_s);
+  plan().slab_ready(peer, m);
   dispatch(now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return;
-  const auto by = instances_.find(m.sampler);
-  const auto sampler = by == instances_.end() ? peers_.end() : peers_.find(by->second);
-  const bool known_sampler = sampler != peers_.end();
-  if (!plan_->done(m, known_sampler ? sampler->first : std::string(), now_s)) return;
-  const std::string& name = known_sampler ? sampler->second.hello.name : std::string("?");
+  const auto* sampler = peers_.find(m.sampler);
+  if (!plan().done(m, sampler ? sampler->first : std::string(), now_s)) return;
+  const std::string name = sampler ? sampler->second.hello.name : "?";
   record_.add_tile(name, m);
-  live_.add_tile(name, m, known_sampler && !sampler->second.gone);
+  live_.add_tile(name, m, sampler && !sampler->second.gone);
   dispatch(now_s);
 }
 
@@ -420,11 +316,9 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
 void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double now_s) {
   const Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return;
-  const auto by = instances_.find(m.sampler);
-  if (by == instances_.end()) return;
-  const auto sampler = peers_.find(by->second);
-  if (sampler == peers_.end()) return;
-  plan_->refused(m, sampler->first, now_s);
+  const auto* sampler = peers_.find(m.sampler);
+  if (!sampler) return;
+  plan().refused(m, sampler->first, now_s);
   if (refused_tiles_.allow(now_s))
     log::warn("{} cannot use what sampler {} made of tile {} of frame {}: {}", p->hello.name,
               sampler->second.hello.name, m.tile, m.frame.value, m.why);
@@ -434,10 +328,9 @@ void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double 
 void MasterCore::on(const std::string& peer, const wire::LinkReport& m, double now_s) {
   const Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return;
-  const auto by = instances_.find(m.viewer);
-  const auto viewer = by == instances_.end() ? peers_.end() : peers_.find(by->second);
-  if (viewer == peers_.end() || viewer->second.gone || viewer->second.hello.role != "viewer") return;
-  plan_->on_link(m, now_s);
+  const auto* viewer = peers_.find(m.viewer);
+  if (!viewer || !viewer->second.serves_as("viewer")) return;
+  plan().on_link(m, now_s);
   dispatch(now_s);
 }
 
@@ -445,7 +338,7 @@ Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s
   const Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return ok_status();
   const std::string name = p->hello.name;
-  const Status taken = plan_->planned(m, now_s);
+  const Status taken = plan().planned(m, now_s);
   dispatch(now_s);
   if (taken) return taken;
   return Error{fmt::format("{}: {}", name, taken.error().text)};
@@ -464,47 +357,46 @@ void MasterCore::tick(double now_s) {
   take_put_off_hellos(now_s);
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
-  forget_departed(now_s);
-  if (std::exchange(data_left_, false)) adopt_refused(now_s);
+  peers_.forget_departed(now_s);
+  if (scene_.take_data_left()) adopt_refused(now_s);
   follow_another_packer(now_s);
-  if (announce_due_ || told_lacks_ != lacks()) announce_soon(now_s);
+  if (announcements_.due(peers_.lacks())) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
-  const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : plan_->tick(now_s);
-  leases_expired_ += uint64_t(ticked.expired);
+  const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : scene_.tick(now_s);
   // Send a message to each overdue sampler: if it died, the message is undeliverable, long before its lease runs out.
   for (const auto& sampler : ticked.overdue)
-    if (const auto p = peers_.find(sampler); p != peers_.end() && now_s - p->second.probed_s > kProbeEvery_s) {
-      p->second.probed_s = now_s;
-      outbox_.send(sampler, welcome(p->second, now_s));
+    if (Peer* p = peers_.find(sampler); p && now_s - p->probed_s > kProbeEvery_s) {
+      p->probed_s = now_s;
+      outbox_.send(sampler, welcome(*p, now_s));
     }
   dispatch(now_s);
 }
 
 bool MasterCore::begin_view(double now_s) {
-  if (!plan_->may_begin(idle_)) return false;
-  if (!plan_->playing()) return plan_->begin(epoch_, false, now_s);
+  if (!plan().may_begin(idle_)) return false;
+  if (!plan().playing()) return plan().begin(scene_.epoch(), false, now_s);
   // One view at a time, so that each epoch has a complete one. All viewers that wait when an epoch begins are served
   // from it, in turn.
-  if (plan_->views().views_in_flight() > 0) return false;
-  if (!plan_->views().turn_waiting()) {
-    if (plan_->step(now_s)) next_epoch(now_s);
-    plan_->views().begin_turns();
+  if (plan().views().views_in_flight() > 0) return false;
+  if (!plan().views().turn_waiting()) {
+    if (plan().step(now_s)) next_epoch(now_s);
+    plan().views().begin_turns();
   }
-  return plan_->begin(epoch_, true, now_s);
+  return plan().begin(scene_.epoch(), true, now_s);
 }
 
 void MasterCore::dispatch(double now_s) {
-  plan_->prepare(now_s);
-  const bool early = plan_->begins_early(now_s) && samplers_here();
+  plan().prepare(now_s);
+  const bool early = plan().begins_early(now_s) && peers_.has("sampler");
   // Before a scene is known, the pipeline is not; samplers that served another master may ask for leases already.
-  if (stop_ || !scene_known_ || (idle_.empty() && !early) || packer().empty()) return;
-  do plan_->give_leases(idle_, now_s);
+  if (stop_reason_ || !scene_.known() || (idle_.empty() && !early) || !peers_.has("packer")) return;
+  do plan().give_leases(idle_, now_s);
   while ((!idle_.empty() || early) && begin_view(now_s));
-  if (early) plan_->begin_extra(epoch_, now_s);
+  if (early) plan().begin_extra(scene_.epoch(), now_s);
 }
 
 void MasterCore::shut_down(const std::string& reason) {
-  stop_ = true;
+  if (!stop_reason_) stop_reason_ = reason;
   log::info("{}", reason);
   for (const auto& [id, p] : peers_)
     if (!p.gone) outbox_.send(id, wire::Shutdown{reason});

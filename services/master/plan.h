@@ -17,7 +17,7 @@
 #include "common/scene/kind.h"
 #include "common/wire/messages.h"
 #include "services/master/control.h"
-#include "services/master/idle.h"
+#include "services/master/peers/idle.h"
 #include "services/master/views.h"
 
 namespace telesplat::metrics {
@@ -72,6 +72,7 @@ struct Ticked {
 
 struct Figures {
   uint64_t frames_completed = 0, frames_in_flight = 0;
+  uint64_t expired = 0;    ///< leases that ran out, or whose sampler fell silent
   uint64_t released = 0;   ///< leases that were taken back
   uint64_t backups = 0;    ///< tiles that were leased to a second sampler, as the first was slow
   uint64_t given_up = 0;   ///< frames that ended without tiles or slabs that cannot be had

@@ -1,4 +1,4 @@
-// The scene of a session, its epochs, and the commands that begin them.
+// Tells processes of the session, and carries out what people order.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -9,7 +9,6 @@
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/utf8.h"
-#include "common/points/point_model.h"
 #include "common/scene/session.h"
 #include "common/scene/settings.h"
 #include "services/master/master_core.h"
@@ -23,80 +22,45 @@ constexpr size_t kMostOfEnder = 100;  // bytes of the sender's name in the reaso
 
 }  // namespace
 
-// A data server that names no kind, or one that this program does not know, is taken for one of points.
-Plan& MasterCore::plan_of(const wire::Hello& data) {
-  const auto kind = scene::kind_named(scene::value_or(data.facts, "kind", std::string()));
-  return *plans_.at(scene::pipeline_of(kind.value_or(scene::Kind::kMesh)));
-}
-
 Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data, double now_s) {
-  // The packer and viewers refuse a bad box; an empty one means to them that there is no scene.
-  if (!data.box_room.empty())
-    if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
-  Plan& plan = plan_of(data);
-  if (options_.settings.pictures && &plan != plans_.at(scene::Pipeline::kPoints).get())
-    return Error{"views of a volume do not come as pictures (--coupling images): they come as slice images"};
-  const auto adopted = plan.adopt(data, now_s);
+  using Adoption = ShownScene::Adoption;
+  const auto adopted = scene_.adopt(peer, data, now_s);
   if (!adopted) return adopted.error();
-  if (!adopted->whole) return ok_status();
-  shows_ = peer;
-  const bool other_plan = plan_ != &plan;
-  if (other_plan) {
-    plan_->put_aside();
-    plan.views().take_over(plan_->views());
-    plan_ = &plan;
-  }
-  std::string problem;
-  const bool other_clip = clipping_.adopt(data, problem);
-  if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
+  if (*adopted == Adoption::kInParts) return ok_status();
   session_.kind = scene::value_or(data.facts, "kind", std::string());
   session_.scene = scene::value_or(data.facts, "scene", std::string());
-  kind_ = scene::kind_named(session_.kind);
-  if (!std::exchange(scene_known_, true) && !adopted->in_parts)
-    record_epoch(now_s);
-  else if (other_plan || adopted->changed || other_clip)
-    next_epoch(now_s);  // the scene differs from the one before
+  if (*adopted == Adoption::kFirst) scene_.record_epoch(now_s);
+  if (*adopted == Adoption::kOther) next_epoch(now_s);
   return ok_status();
-}
-
-wire::Welcome MasterCore::scene_as_told() const {
-  wire::Welcome w;
-  w.octree_depth = octree_depth();
-  w.settings = master::settings(options_, kind_);
-  plan_->describe(w);  // the scene stays what it is while its data server is away
-  clipping_.describe(w);
-  return w;
 }
 
 // Adds each endpoint from the process that has it; claims of others do not count. Each part of a volume has its own
 // "voxels", which samplers get in their sheets.
 void MasterCore::add_endpoints(wire::Welcome& w) const {
   const auto add = [&](const std::string& id, std::initializer_list<const char*> names) {
-    const auto p = peers_.find(id);
-    if (p == peers_.end() || p->second.gone) return;
+    const Peer* p = peers_.here(id);
     for (const char* name : names)
-      if (const auto at = p->second.hello.endpoints.find(name); at != p->second.hello.endpoints.end())
-        w.endpoints.insert(*at);
+      if (p && p->hello.endpoints.contains(name)) w.endpoints.insert(*p->hello.endpoints.find(name));
   };
-  add(shows_, {"chunks"});
+  add(scene_.shown_by(), {"chunks"});
   // While that data server is away, another one with the same mesh will do.
   const std::string hash = scene::value_or(w.facts, "content_hash", std::string());
   for (const auto& [id, p] : peers_)
     if (!hash.empty() && p.hello.role == "data" && !p.refused &&
         scene::value_or(p.hello.facts, "content_hash", std::string()) == hash)
       add(id, {"chunks"});
-  add(packer(), {"tiles", "patches", "state"});
+  add(peers_.packer(), {"tiles", "patches", "state"});
 }
 
 wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
-  wire::Welcome w = scene_as_told();
+  wire::Welcome w = scene_.describe();
   w.master = instance_;
   w.master_s = now_s;
   w.clock = clock_id();
-  w.epoch = epoch_;
+  w.epoch = scene_.epoch();
   add_endpoints(w);
   w.facts.erase(metrics::kRecordFact);  // for the master only
-  if (std::string lacking = lacks(); !lacking.empty()) w.facts["lacks"] = std::move(lacking);
+  if (std::string lacking = peers_.lacks(); !lacking.empty()) w.facts["lacks"] = std::move(lacking);
   if (!run_id_.empty()) {
     w.facts["run_folder"] = session_.run_folder;
     w.facts["run_id"] = run_id_;
@@ -109,16 +73,12 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   return w;
 }
 
-// Sends a welcome to everyone now, or later if that would exceed the pace announcements_.
 void MasterCore::announce_soon(double now_s) {
-  announce_due_ = !announcements_.allows(now_s);
-  if (!announce_due_) announce(now_s);
+  if (announcements_.change(now_s)) announce(now_s);
 }
 
 void MasterCore::announce(double now_s) {
-  announcements_.count(now_s);
-  announce_due_ = false;
-  told_lacks_ = lacks();
+  announcements_.told(peers_.lacks(), now_s);
   const std::string body = wire::encode(welcome({}, now_s));
   if (!outbox_.fits<wire::Welcome>(body)) return;
   // The packer first: it should know an epoch before tiles of it come.
@@ -129,17 +89,9 @@ void MasterCore::announce(double now_s) {
             {id, std::string(wire::Welcome::kName), p.coupling || packer ? wire::encode(welcome(p, now_s)) : body});
 }
 
-void MasterCore::record_epoch(double now_s) {
-  if (!scene_known_) return;
-  auto texts = plan_->epoch_texts();
-  texts[scene::kClipFact] = clipping_.text();
-  record_.add_epoch(epoch_, now_s, scene_as_told().parameters, texts);
-}
-
 void MasterCore::next_epoch(double now_s) {
-  epoch_ = epoch_.next();
-  plan_->drop_frames();
-  record_epoch(now_s);
+  scene_.next_epoch();
+  scene_.record_epoch(now_s);
   announce(now_s);
 }
 
@@ -148,7 +100,7 @@ Status MasterCore::on(const std::string& peer, const wire::SliceWeights& m, doub
   if (!p) return ok_status();
   if (p->hello.role != "data" || p->hello.instance != m.data)
     return Error{fmt::format("slice weights of another process than {} {}", p->hello.role, p->hello.name)};
-  if (Status s = plan_of(p->hello).weigh(m); !s) return s;
+  if (Status s = scene_.plan_of(p->hello).weigh(m); !s) return s;
   dispatch(now_s);
   return ok_status();
 }
@@ -159,11 +111,11 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   if (m.command == "health") return outbox_.send(peer, health(m, now_s));
   if (m.command == "stop") {
     outbox_.send(peer, wire::ControlReply{true, "stopping"});
-    stop_ = true;
+    if (!stop_reason_) stop_reason_ = "the session was ended";
     // The sender chooses the argument "by" freely; its key is proven.
     if (const std::string by = scene::value_or(m.arguments, "by", std::string()); !by.empty())
       stop_reason_ = "the session was ended by " + printable(by, kMostOfEnder);
-    if (!key.empty()) stop_reason_ += fmt::format(" (key {})", key);
+    if (!key.empty()) *stop_reason_ += fmt::format(" (key {})", key);
     return;
   }
   if (m.command == "done") return answer_of_launcher(peer, m);
@@ -209,7 +161,7 @@ Status MasterCore::pass_on(const Errands::Asker& asker, const wire::Control& m, 
   };
   std::vector<Here> here;
   for (const auto& [id, p] : peers_)
-    if (!p.gone && !p.refused && p.hello.role == role) here.push_back({p.hello.name, now_s - p.seen_s, id});
+    if (p.serves_as(role) && !p.refused) here.push_back({p.hello.name, now_s - p.seen_s, id});
   if (here.empty()) return Error{fmt::format("{}: no {} is here", m.command, role == "data" ? "data server" : role)};
   std::sort(here.begin(), here.end());
   if (!wanted.empty()) {
@@ -244,7 +196,7 @@ Result<std::string> MasterCore::order_coupling(const wire::Control& m, double no
   if (!order) return order.error();
   std::vector<std::string> here, told;
   for (auto& [id, p] : peers_) {
-    if (p.gone || p.hello.role != "viewer") continue;
+    if (!p.serves_as("viewer")) continue;
     here.push_back(p.hello.name);
     if (!order->viewer.empty() && order->viewer != p.hello.name) continue;
     p.coupling = *order;
@@ -262,26 +214,12 @@ Result<std::string> MasterCore::order_coupling(const wire::Control& m, double no
 
 Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
   if (m.command == "coupling") return order_coupling(m, now_s);
-  Obeyed obeyed{.begins_epoch = true, .answer = {}};  // for "epoch"
-  if (m.command == "set" || m.command == "animate" || m.command == "tf" || m.command == "colour" ||
-      m.command == "play") {
-    auto by_scene = plan_->obey(m);
-    if (!by_scene) return by_scene.error();
-    obeyed = *std::move(by_scene);
-  } else if (m.command == "clip") {
-    auto clipped = clipping_.obey(m);
-    if (!clipped) return clipped.error();
-    obeyed = *std::move(clipped);
-  } else if (m.command != "epoch") {
-    std::set<std::string_view> known{"status", "health", "stop", "epoch", "pick", "where", "go", "measure", "probe"};
-    for (const auto& setting : scene::settings())
-      if (setting.keeper != scene::Keeper::kNotes) known.insert(setting.order);
-    return Error{fmt::format("unknown command '{}'; known: {}", m.command.substr(0, 64), fmt::join(known, ", "))};
-  }
-  if (obeyed.tells_all) announce(now_s);
-  if (!obeyed.begins_epoch) return obeyed.answer;
+  const auto obeyed = scene_.obey(m);
+  if (!obeyed) return obeyed.error();
+  if (obeyed->tells_all) announce(now_s);
+  if (!obeyed->begins_epoch) return obeyed->answer;
   next_epoch(now_s);
-  return fmt::format("epoch {}", epoch_.value);
+  return fmt::format("epoch {}", scene_.epoch().value);
 }
 
 }  // namespace telesplat::master

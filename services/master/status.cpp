@@ -68,47 +68,22 @@ Json told(const net::RunningSession& s) {
 
 }  // namespace
 
-Figures MasterCore::figures() const {
-  Figures out;
-  for (const auto& [pipeline, plan] : plans_) {
-    const Figures f = plan->figures();
-    out.frames_completed += f.frames_completed;
-    out.frames_in_flight += f.frames_in_flight;
-    out.released += f.released;
-    out.backups += f.backups;
-    out.overtaken += f.overtaken;
-    out.given_up += f.given_up;
-    out.viewers += f.viewers;
-  }
-  return out;
-}
-
-std::vector<metrics::Process> MasterCore::processes() const {
-  std::vector<metrics::Process> out(departed_.kept().begin(), departed_.kept().end());
-  for (const auto& [id, p] : peers_)
-    if (p.hello.role != "ctl") out.push_back(p.process);
-  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-  return out;
-}
-
 std::map<std::string, double> MasterCore::counters() const {
   const Figures f = figures();
   std::map<std::string, double> out{
-      {"leases_expired", double(leases_expired_)}, {"tiles_released", double(f.released)},
-      {"leases_backup", double(f.backups)},        {"views_overtaken", double(f.overtaken)},
-      {"frames_given_up", double(f.given_up)},     {"frames_completed", double(f.frames_completed)}};
+      {"leases_expired", double(f.expired)},   {"tiles_released", double(f.released)},
+      {"leases_backup", double(f.backups)},    {"views_overtaken", double(f.overtaken)},
+      {"frames_given_up", double(f.given_up)}, {"frames_completed", double(f.frames_completed)}};
   SwapBarrier::Figures swaps = swaps_;
-  for (const auto& [name, wall] : walls_) {
-    swaps.frames += wall.figures().frames;
-    swaps.incomplete += wall.figures().incomplete;
-  }
+  for (const auto& [name, wall] : walls_) swaps += wall.figures();
   const LimitsHit hit = gate_.hit();
   out["limits.views_coarser"] = double(hit.views_coarser);
   out["limits.hellos_refused"] = double(hit.hellos_refused);
   out["limits.messages_refused"] = double(hit.messages_refused);
   if (swaps.frames > 0) out["swaps"] = double(swaps.frames), out["swaps_incomplete"] = double(swaps.incomplete);
-  if (departed_.forgotten() > 0) out["processes_forgotten"] = double(departed_.forgotten());
-  for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
+  if (const auto forgotten = peers_.departed().forgotten(); forgotten > 0)
+    out["processes_forgotten"] = double(forgotten);
+  scene_.add_counters(out);
   return out;
 }
 
@@ -118,11 +93,11 @@ LiveSnapshot MasterCore::live_snapshot() const {
                    .scene = session_.scene,
                    .kind = session_.kind,
                    .started_at_s = session_.started_at_s,
-                   .epoch = double(epoch_.value),
+                   .epoch = double(scene_.epoch().value),
                    .views_completed = double(f.frames_completed),
                    .views_in_flight = double(f.frames_in_flight),
-                   .views_waiting = double(plan_->views().views_waiting()),
-                   .leases_expired = double(leases_expired_),
+                   .views_waiting = double(plan().views().views_waiting()),
+                   .leases_expired = double(f.expired),
                    .leases_backup = double(f.backups),
                    .views_overtaken = double(f.overtaken),
                    .frames_given_up = double(f.given_up),
@@ -134,9 +109,9 @@ LiveSnapshot MasterCore::live_snapshot() const {
     e.role = p.hello.role;
     e.name = p.hello.name;
     e.alive = !p.gone;
-    if (p.hello.role == "sampler") e.leases = double(plan_->leases_of(id));
+    if (p.hello.role == "sampler") e.leases = double(plan().leases_of(id));
     e.values = p.process.values;
-    for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e.values[key] = value;
+    for (const auto& [key, value] : plan().link_of(p.hello.instance)) e.values[key] = value;
     e.rates = rates(p.reports);
   }
   return out;
@@ -148,13 +123,13 @@ Json MasterCore::process_json(const std::string& id, const Peer& p, double now_s
          {"pid", p.hello.pid},
          {"alive", !p.gone},
          {"silent_s", std::max(0.0, now_s - p.seen_s)}};
-  if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
-  if (const auto stuck_s = plan_->stuck_s(id, now_s)) e["delivers_nothing_s"] = *stuck_s;
+  if (p.hello.role == "sampler") e["leases"] = plan().leases_of(id);
+  if (const auto stuck_s = plan().stuck_s(id, now_s)) e["delivers_nothing_s"] = *stuck_s;
   for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
   for (const auto& [key, value] : p.hello.facts)
     if (key != metrics::kRecordFact) e["facts"][key] = all ? value : shortened(value);
   for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
-  for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e["values"][key] = number(value);
+  for (const auto& [key, value] : plan().link_of(p.hello.instance)) e["values"][key] = number(value);
   e["rates"] = Json(rates(p.reports));
   return e;
 }
@@ -168,19 +143,19 @@ std::string MasterCore::status_json(double now_s, bool all) const {
     const auto add = [&](const metrics::Process& p) {
       if (const double n = scene::value_or(p.values, key, 0.0); n > 0 && n < 1e15) sum += n;
     };
-    for (const auto& p : departed_.kept()) add(p);
+    for (const auto& p : peers_.departed().kept()) add(p);
     for (const auto& [id, p] : peers_) add(p.process);
     return number(sum);
   };
   Json out{{"session", told(session_)},
-           {"lacks", lacks()},
+           {"lacks", peers_.lacks()},
            {"messages_rejected", door_.messages_rejected},
            {"keys_refused", door_.keys_refused},
-           {"epoch", epoch_.value},
+           {"epoch", scene_.epoch().value},
            {"frames_completed", f.frames_completed},
            {"frames_in_flight", f.frames_in_flight},
-           {"views_waiting", plan_->views().views_waiting()},
-           {"leases_expired", leases_expired_},
+           {"views_waiting", plan().views().views_waiting()},
+           {"leases_expired", f.expired},
            {"tiles_released", f.released},
            {"leases_backup", f.backups},
            {"views_overtaken", f.overtaken},
@@ -198,12 +173,12 @@ std::string MasterCore::status_json(double now_s, bool all) const {
              {"queue_refused", of_all(door_.queue_refused, "queue_refused")}}},
            {"parameters", Json::object()},
            {"animation", animation()}};
-  for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
-  if (!clipping_.order().empty()) out["clip"] = clipping_.order();
+  for (const auto& [name, value] : scene_.describe().parameters) out["parameters"][name] = number(value);
+  if (!scene_.clip_order().empty()) out["clip"] = scene_.clip_order();
   if (const auto failed = record_.losses().failed; !failed.empty()) out["record_failed"] = failed;
   add_wishes(errands_, out);
-  plan_->add_status(out);
-  out["departed"] = departed_.count();
+  plan().add_status(out);
+  out["departed"] = peers_.departed().count();
   // Processes that are here come first: an answer is one message, and what is too much is left out.
   out["processes"] = Json::array();
   size_t bytes = dumped(out).size(), left_out = 0;

@@ -158,7 +158,7 @@ std::string coupling_name(double mode, double buffers) {
 }  // namespace
 
 /// A row of a table, whose values are found by the names of their columns.
-struct Measured::Row {
+struct MeasuredRow {
   const std::vector<std::string>& columns;
   std::span<const double> values;
 
@@ -203,21 +203,25 @@ Status Measured::add(const std::string& viewer, const wire::MetricRows& more) {
   table.columns = more.columns;
   table.rows += more.values.size() / width;
   for (size_t i = 0; i < more.values.size(); i += width) {
-    const Row row{table.columns, std::span(more.values).subspan(i, width)};
-    if (&table == &frames_)
-      add_frame(viewer_of(viewer), row);
-    else if (&table == &updates_)
-      add_update(viewer_of(viewer), row);
-    else
-      add_stages(row);
+    const MeasuredRow row{table.columns, std::span(more.values).subspan(i, width)};
+    if (&table == &frames_) {
+      ViewerFigures& by = viewer_of(viewer);
+      frame_sums.add(by, row);
+      couplings.add(by, row);
+      wall_skews.add(row);
+    } else if (&table == &updates_) {
+      update_sums.add(viewer_of(viewer), row);
+    } else {
+      stage_sums.add(row);
+    }
   }
   return ok_status();
 }
 
-void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
+void FrameSums::add(ViewerFigures& viewer, const MeasuredRow& row) {
   if (const auto t_s = row.of("t_s")) {
     add_lost(viewer, row);
-    ++frames_shown;
+    ++shown;
     ++viewer.frames;
     viewer.frames_of_views += row.of("request").value_or(0) > 0;
     // A viewer that was started again counts its time anew.
@@ -229,16 +233,14 @@ void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
   row.add_to(update_age_ms, "update_age_ms");
   if (const auto lead_ms = row.of("lead_ms")) {
     headset = headset || *lead_ms != 0;
-    frames_late += *lead_ms < 0;
+    late += *lead_ms < 0;
   }
   refreshed = refreshed || row.of("refresh_ms").value_or(0) > 0;
   refreshes_missed += row.of("missed").value_or(0);
-  add_coupling(viewer, row);
-  add_skew(row);
 }
 
 // Counts missing frame numbers as rows that were lost on the way. A restarted viewer begins at a lower number.
-void Measured::add_lost(ViewerFigures& viewer, const Row& row) {
+void FrameSums::add_lost(ViewerFigures& viewer, const MeasuredRow& row) {
   const auto frame = row.of("frame");
   if (!frame) return;
   const double before = std::exchange(viewer.last_frame, *frame);
@@ -246,15 +248,15 @@ void Measured::add_lost(ViewerFigures& viewer, const Row& row) {
   const auto lost = uint64_t(*frame - before) - 1;
   viewer.rows_lost += lost;
   viewer.frames += lost;
-  frames_shown += lost;
-  frame_rows_lost += lost;
+  shown += lost;
+  rows_lost += lost;
 }
 
 // A still frame's delay does not count: nothing was drawn for it.
-void Measured::add_delay(ViewerFigures& viewer, const Row& row) {
+void FrameSums::add_delay(ViewerFigures& viewer, const MeasuredRow& row) {
   const double ms = row.of("inter_frame_ms").value_or(0);  // 0: a viewer's first frame has no delay
   if (row.of("still").value_or(0) > 0) {
-    ++frames_still;
+    ++still;
     ++viewer.still;
     viewer.still_s += ms / 1e3;
     viewer.last_ms = 0;
@@ -274,52 +276,50 @@ void Measured::add_delay(ViewerFigures& viewer, const Row& row) {
   ++jitters;
 }
 
-void Measured::add_coupling(ViewerFigures& viewer, const Row& row) {
+void Couplings::add(ViewerFigures& viewer, const MeasuredRow& row) {
   const auto mode = row.of("coupling"), buffers = row.of("buffers");
   if (!mode || !buffers) return;
-  coupled = true;
+  known = true;
   const std::string name = coupling_name(*mode, *buffers);
-  const auto known = std::find_if(frames_by_coupling.begin(), frames_by_coupling.end(),
-                                  [&](const auto& c) { return c.first == name; });
-  if (known != frames_by_coupling.end())
-    ++known->second;
-  else if (frames_by_coupling.size() < kMostCouplings)
-    frames_by_coupling.emplace_back(name, 1);
-  coupling_changes += !viewer.coupling.empty() && viewer.coupling != name;
+  const auto of_it = std::find_if(frames.begin(), frames.end(), [&](const auto& c) { return c.first == name; });
+  if (of_it != frames.end())
+    ++of_it->second;
+  else if (frames.size() < kMostCouplings)
+    frames.emplace_back(name, 1);
+  changes += !viewer.coupling.empty() && viewer.coupling != name;
   viewer.coupling = name;
 }
 
-// Counts each of a wall's frames once, though several viewers report it.
-void Measured::add_skew(const Row& row) {
+void WallSkews::add(const MeasuredRow& row) {
   const auto number = row.of("wall_frame"), skew = row.of("swap_skew_ms");
   if (!number || !skew || !(*number > 0) || !(*skew >= 0)) return;
-  if (*number + 2 * kMostOpenSkews < closed_skew_) close_skews();  // numbers of another wall, or of another master
-  if (*number <= closed_skew_) return;
-  open_skews_[*number] = *skew;
-  if (open_skews_.size() <= kMostOpenSkews) return;
-  closed_skew_ = open_skews_.begin()->first;
-  skews_.add(open_skews_.begin()->second);
-  open_skews_.erase(open_skews_.begin());
+  if (*number + 2 * kMostOpenSkews < closed_) close();  // numbers of another wall, or of another master
+  if (*number <= closed_) return;
+  open_[*number] = *skew;
+  if (open_.size() <= kMostOpenSkews) return;
+  closed_ = open_.begin()->first;
+  skews_.add(open_.begin()->second);
+  open_.erase(open_.begin());
 }
 
-void Measured::close_skews() {
-  skews_ = swap_skew_ms();
-  open_skews_.clear();
-  closed_skew_ = 0;
+void WallSkews::close() {
+  skews_ = ms();
+  open_.clear();
+  closed_ = 0;
 }
 
-void Measured::begin_life() {
-  close_skews();
-  tiles_.begin_life();
-}
-
-Quantiles Measured::swap_skew_ms() const {
+Quantiles WallSkews::ms() const {
   Quantiles out = skews_;
-  for (const auto& [frame, ms] : open_skews_) out.add(ms);
+  for (const auto& [frame, ms] : open_) out.add(ms);
   return out;
 }
 
-void Measured::add_update(ViewerFigures& viewer, const Row& row) {
+void Measured::begin_life() {
+  wall_skews.close();
+  tiles_.begin_life();
+}
+
+void UpdateSums::add(ViewerFigures& viewer, const MeasuredRow& row) {
   row.add_to(start_up_ms, "start_up_ms");
   points_received += row.of("points").value_or(0);
   extra_points += row.of("extra_points").value_or(0);
@@ -330,10 +330,11 @@ void Measured::add_update(ViewerFigures& viewer, const Row& row) {
   viewer.latency_ms.add(*ms);
 }
 
-void Measured::add_stages(const Row& row) {
-  if (const auto ms = row.of("latency_ms")) stages_latency_ms += *ms;
-  for (const auto& stage : kStageColumns) row.add_to(stages_ms[stage.name], stage.name);
-  if (const auto ms = row.of("display_ms"); ms && *ms >= 0) display_ms.add(*ms);  // below 0: no frame showed it
+void StageSums::add(const MeasuredRow& row) {
+  if (const auto sum = row.of("latency_ms")) latency_ms += *sum;
+  for (const auto& stage : kStageColumns) row.add_to(ms[stage.name], stage.name);
+  if (const auto shown = row.of("display_ms"); shown && *shown >= 0)
+    display_ms.add(*shown);  // below 0: no frame showed it
 }
 
 namespace {

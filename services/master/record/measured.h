@@ -128,6 +128,71 @@ struct ViewerFigures {
   double fps() const;
 };
 
+struct MeasuredRow;
+
+/// Sums over the frames of all viewers.
+struct FrameSums {
+  void add(ViewerFigures& viewer, const MeasuredRow& row);
+
+  // Drawn frames.
+  Quantiles inter_frame_ms, construction_ms, motion_to_photon_ms;
+  /// Sum of the differences between successive delays of the same viewer, and their number.
+  double jitter_sum_ms = 0;
+  uint64_t jitters = 0;
+  // All frames.
+  Quantiles points_drawn, update_age_ms;
+  uint64_t shown = 0, still = 0, rows_lost = 0;
+  bool headset = false;  ///< true if a frame had a lead
+  uint64_t late = 0;
+  bool refreshed = false;  ///< true if a frame had a refresh to be in time for
+  double refreshes_missed = 0;
+
+ private:
+  void add_lost(ViewerFigures& viewer, const MeasuredRow& row);
+  void add_delay(ViewerFigures& viewer, const MeasuredRow& row);
+};
+
+/// Returns the frames under each coupling, and how often viewers went from one to another.
+struct Couplings {
+  void add(ViewerFigures& viewer, const MeasuredRow& row);
+
+  bool known = false;
+  uint64_t changes = 0;
+  std::vector<std::pair<std::string, uint64_t>> frames;  ///< in the order in which they came up
+};
+
+/// Skew of each of a wall's frames once, though several viewers report it.
+class WallSkews {
+ public:
+  void add(const MeasuredRow& row);
+  /// Frames are counted anew.
+  void close();
+  Quantiles ms() const;
+
+ private:
+  std::map<double, double> open_;  // by the wall's frame: other viewers may still report these
+  double closed_ = 0;              // frames up to this one are not reported any more
+  Quantiles skews_;
+};
+
+/// Sums over the view updates of all viewers.
+struct UpdateSums {
+  void add(ViewerFigures& viewer, const MeasuredRow& row);
+
+  Quantiles latency_ms;  ///< except updates from which something was left out
+  Quantiles start_up_ms;
+  double points_received = 0, extra_points = 0;
+};
+
+/// Where the time of view updates went.
+struct StageSums {
+  void add(const MeasuredRow& row);
+
+  std::map<std::string, Quantiles> ms;
+  double latency_ms = 0;  ///< sum over all updates
+  Quantiles display_ms;
+};
+
 class Measured {
  public:
   static constexpr size_t kMostViewers = 256;  ///< viewers by name; further ones are "others"
@@ -147,52 +212,18 @@ class Measured {
   /// Figures of each viewer by itself: viewers need not begin or end together.
   const std::map<std::string, ViewerFigures>& viewers() const { return viewers_; }
 
-  // Drawn frames of all viewers.
-  Quantiles inter_frame_ms, construction_ms, motion_to_photon_ms;
-  /// Sum of the differences between successive delays of the same viewer, and their number.
-  double jitter_sum_ms = 0;
-  uint64_t jitters = 0;
-  // All frames of all viewers.
-  Quantiles points_drawn, update_age_ms;
-  uint64_t frames_shown = 0, frames_still = 0, frame_rows_lost = 0;
-  bool headset = false;  ///< true if a frame had a lead
-  uint64_t frames_late = 0;
-  bool refreshed = false;  ///< true if a frame had a refresh to be in time for
-  double refreshes_missed = 0;
-  bool coupled = false;  ///< true if couplings are known
-  uint64_t coupling_changes = 0;
-  std::vector<std::pair<std::string, uint64_t>> frames_by_coupling;  ///< in the order in which they came up
-  /// Skew of each of a wall's frames once, though several viewers report it.
-  Quantiles swap_skew_ms() const;
-
-  // View updates of all viewers, except those from which something was left out.
-  Quantiles latency_ms;
-  // All view updates.
-  Quantiles start_up_ms;
-  double points_received = 0, extra_points = 0;
-
-  // Stages of updates.
-  std::map<std::string, Quantiles> stages_ms;
-  double stages_latency_ms = 0;  ///< sum over all updates
-  Quantiles display_ms;
+  // Figures of all viewers together.
+  FrameSums frame_sums;
+  Couplings couplings;
+  WallSkews wall_skews;
+  UpdateSums update_sums;
+  StageSums stage_sums;
 
  private:
-  struct Row;
-  void add_frame(ViewerFigures& viewer, const Row& row);
-  void add_lost(ViewerFigures& viewer, const Row& row);
-  void add_delay(ViewerFigures& viewer, const Row& row);
-  void add_coupling(ViewerFigures& viewer, const Row& row);
-  void add_skew(const Row& row);
-  void add_update(ViewerFigures& viewer, const Row& row);
-  void add_stages(const Row& row);
-  void close_skews();
   ViewerFigures& viewer_of(const std::string& name);
 
   Table frames_, updates_, stages_;
   std::map<std::string, ViewerFigures> viewers_;
-  std::map<double, double> open_skews_;  // by the wall's frame: other viewers may still report these
-  double closed_skew_ = 0;               // frames up to this one are not reported any more
-  Quantiles skews_;
   TileSums tiles_;
   uint64_t epochs_ = 0;
 };

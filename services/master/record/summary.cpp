@@ -36,7 +36,7 @@ ordered_json rows_of(const std::map<std::string, uint64_t>& rows) {
 /// Rows that no file took, and rows of frames that never came.
 std::map<std::string, uint64_t> lost_rows(const Measured& measured, const RecordLosses& losses) {
   auto out = losses.lost;
-  if (measured.frame_rows_lost > 0) out["frames.csv"] += measured.frame_rows_lost;
+  if (const auto lost = measured.frame_sums.rows_lost; lost > 0) out["frames.csv"] += lost;
   return out;
 }
 /// Returns a figure that has a meaning only if `measured`; else null.
@@ -74,7 +74,7 @@ Traffic traffic(const Measured& m, bool slices, double points) {
     // `samples` counts voxels, and `kept` the pixels that they made.
     out.eliminates = false;
     out.bytes_raw = kept * kRawBytesPerSlicePixel;
-    out.bytes_consumed += m.points_received * kRawBytesPerSlicePixel;
+    out.bytes_consumed += m.update_sums.points_received * kRawBytesPerSlicePixel;
   } else {
     out.bytes_raw = samples * image::kRawBytesPerPixel;
     out.redundancy = samples > 0 ? 1 - kept / samples : 0;
@@ -163,12 +163,12 @@ ordered_json what_was_shown(const std::vector<Process>& processes, const Roster&
 }
 
 /// Returns each stage's distribution of time in view updates, and its share of the sum of all latencies.
-ordered_json where_time_went(const Measured& m) {
-  const double sum = m.stages_latency_ms;
+ordered_json where_time_went(const StageSums& stages) {
+  const double sum = stages.latency_ms;
   auto out = ordered_json::object();
   for (const std::string& column : names(kStageColumns)) {
-    const auto ms = m.stages_ms.find(column);
-    if (ms == m.stages_ms.end() || ms->second.empty()) continue;
+    const auto ms = stages.ms.find(column);
+    if (ms == stages.ms.end() || ms->second.empty()) continue;
     ordered_json& entry = out[column.substr(0, column.rfind("_ms"))];
     entry = distribution_json(ms->second);
     entry["share"] = sum > 0 ? std::round(ms->second.sum() / sum * 1e4) / 1e4 : 0.0;
@@ -215,9 +215,9 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
                   {"view_update_latency_ms", distribution_json(v.latency_ms)}};
   }
   return {{"epochs", m.epochs()},
-          {"frames", m.frames_shown},
-          {"frames_still", m.frames_still},
-          {"updates", m.latency_ms.count()},
+          {"frames", m.frame_sums.shown},
+          {"frames_still", m.frame_sums.still},
+          {"updates", m.update_sums.latency_ms.count()},
           {"duration_s", if_measured(longest_s(viewers) > 0, thousandths(longest_s(viewers)))},
           {"fps", if_measured(fps > 0, hundredths(fps))},
           {"updates_per_s", if_measured(longest_s(viewers) > 0, hundredths(updates_per_s))},
@@ -225,32 +225,33 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
           {"frames_sampled", whole(frames_completed)}};
 }
 
-/// Returns the frames under each coupling, and how often viewers went from one to another.
-ordered_json how_coupled(const Measured& m) {
-  if (!m.coupled) return {{"coupling_changes", nullptr}, {"frames_by_coupling", nullptr}};
+ordered_json how_coupled(const Couplings& c) {
+  if (!c.known) return {{"coupling_changes", nullptr}, {"frames_by_coupling", nullptr}};
   auto frames = ordered_json::object();
-  for (const auto& [name, count] : m.frames_by_coupling) frames[name] = count;
-  return {{"coupling_changes", m.coupling_changes}, {"frames_by_coupling", frames}};
+  for (const auto& [name, count] : c.frames) frames[name] = count;
+  return {{"coupling_changes", c.changes}, {"frames_by_coupling", frames}};
 }
 
-/// Returns how well the displays of a wall kept in step: each of the wall's frames counts once.
+/// Reports how well the displays of a wall kept in step.
 ordered_json how_together(const Measured& m, double incomplete) {
-  const Quantiles ms = m.swap_skew_ms();
+  const Quantiles ms = m.wall_skews.ms();
   return {{"swap_skew_ms", distribution_json(ms)},
           {"swaps", if_measured(!ms.empty(), ms.count())},
           {"swaps_incomplete", if_measured(!ms.empty(), whole(incomplete))}};
 }
 
 ordered_json how_long(const Measured& m) {
+  const FrameSums& f = m.frame_sums;
   const FrameDurations durations = m.tiles().durations();
-  return {{"motion_to_photon_ms", distribution_json(m.motion_to_photon_ms)},
-          {"inter_frame_delay_ms", distribution_json(m.inter_frame_ms)},
-          {"inter_frame_jitter_ms", if_measured(m.jitters > 0, thousandths(m.jitter_sum_ms / double(m.jitters)))},
-          {"view_construction_ms", distribution_json(m.construction_ms)},
-          {"view_update_latency_ms", distribution_json(m.latency_ms)},
-          {"start_up_latency_ms", distribution_json(m.start_up_ms)},
-          {"latency_stages_ms", where_time_went(m)},
-          {"display_latency_ms", distribution_json(m.display_ms)},  // completion to the end of the first frame with it
+  return {{"motion_to_photon_ms", distribution_json(f.motion_to_photon_ms)},
+          {"inter_frame_delay_ms", distribution_json(f.inter_frame_ms)},
+          {"inter_frame_jitter_ms", if_measured(f.jitters > 0, thousandths(f.jitter_sum_ms / double(f.jitters)))},
+          {"view_construction_ms", distribution_json(f.construction_ms)},
+          {"view_update_latency_ms", distribution_json(m.update_sums.latency_ms)},
+          {"start_up_latency_ms", distribution_json(m.update_sums.start_up_ms)},
+          {"latency_stages_ms", where_time_went(m.stage_sums)},
+          {"display_latency_ms",
+           distribution_json(m.stage_sums.display_ms)},  // completion to the end of the first frame with it
           {"sampling_ms", distribution_json(durations.sampling_ms)},
           {"lease_to_sampled_ms", distribution_json(durations.leased_ms)},
           {"packing_ms", distribution_json(durations.packing_ms)},
@@ -297,8 +298,8 @@ ordered_json what_was_held(const Measured& m, const Roster& roster, double parti
                first_points_s = roster.present("viewer", "first_points_s");
   return {{"points_cached", if_measured(!roster.each("packer", "points").empty(), whole(points))},
           {"bytes_per_cached_point", if_measured(points > 0, roster.present("packer", "model_bytes") / points)},
-          {"points_drawn", distribution_json(m.points_drawn)},
-          {"update_age_ms", distribution_json(m.update_age_ms)},
+          {"points_drawn", distribution_json(m.frame_sums.points_drawn)},
+          {"update_age_ms", distribution_json(m.frame_sums.update_age_ms)},
           {"voxels_fetched", if_measured(!roster.each("data", "voxels_sent").empty(), whole(voxels))},
           {"bytes_per_voxel", if_measured(voxels > 0, roster.counted("data", "bytes_sent") / voxels)},
           {"partitions", if_measured(partitions > 0, whole(partitions))},
@@ -328,9 +329,9 @@ ordered_json predicted(const Roster& roster, const std::string& what) {
           {"over_none_deg", if_measured(none_deg > 0, thousandths(deg / none_deg))}};
 }
 
-ordered_json how_in_time(const Measured& m) {
-  return {{"frames_late", if_measured(m.headset, m.frames_late)},
-          {"refreshes_missed", if_measured(m.headset || m.refreshed, whole(m.refreshes_missed))}};
+ordered_json how_in_time(const FrameSums& f) {
+  return {{"frames_late", if_measured(f.headset, f.late)},
+          {"refreshes_missed", if_measured(f.headset || f.refreshed, whole(f.refreshes_missed))}};
 }
 
 ordered_json how_heads_moved(const Roster& roster) {
@@ -352,10 +353,10 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(what_was_done(about, processes));
   out.update(what_was_shown(processes, roster));
   out.update(how_often(measured, figures, counter("frames_completed")));
-  out.update(how_coupled(measured));
+  out.update(how_coupled(measured.couplings));
   out.update(how_long(measured));
   out.update(how_together(measured, counter("swaps_incomplete")));
-  out.update(how_in_time(measured));
+  out.update(how_in_time(measured.frame_sums));
   out.update(how_heads_moved(roster));
   out["clock"] = clocks(processes);
   out.update(
@@ -395,12 +396,13 @@ void measure_again(const Measured& m, ordered_json& summary) {
   const bool slices = has_slices(text("kind"));
   ordered_json again = how_often(m, m.viewers(), 0);
   for (const ordered_json& part :
-       {how_coupled(m), how_long(m), how_together(m, 0), how_in_time(m), what_was_steered(m.tiles()),
-        how_much(traffic(m, slices, slices ? 0 : m.points_received + m.extra_points), longest_s(m.viewers()),
-                 std::max<double>(1, double(m.viewers().size())))})
+       {how_coupled(m.couplings), how_long(m), how_together(m, 0), how_in_time(m.frame_sums),
+        what_was_steered(m.tiles()),
+        how_much(traffic(m, slices, slices ? 0 : m.update_sums.points_received + m.update_sums.extra_points),
+                 longest_s(m.viewers()), std::max<double>(1, double(m.viewers().size())))})
     again.update(part);
-  again["points_drawn"] = distribution_json(m.points_drawn);
-  again["update_age_ms"] = distribution_json(m.update_age_ms);
+  again["points_drawn"] = distribution_json(m.frame_sums.points_drawn);
+  again["update_age_ms"] = distribution_json(m.frame_sums.update_age_ms);
   for (const char* counted : {"frames_sampled", "swaps_incomplete"}) again.erase(counted);
   summary.update(again);
 }

@@ -35,6 +35,7 @@ class SwapBarrier {
   struct Figures {
     uint64_t frames = 0;      ///< frames presented
     uint64_t incomplete = 0;  ///< frames presented without a viewer that was waited for
+    void operator+=(const Figures& more) { frames += more.frames, incomplete += more.incomplete; }
   };
 
   explicit SwapBarrier(InstanceId master) : master_(master) {}

@@ -1,4 +1,4 @@
-#include "services/master/idle.h"
+#include "services/master/peers/idle.h"
 
 #include <algorithm>
 
