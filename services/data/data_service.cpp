@@ -40,19 +40,26 @@ Progress make_progress(bool to_stdout, const std::string& scene) {
   };
 }
 
-// Binds the socket for requests, if this kind of scene answers any.
-Result<std::string> bind_requests(std::optional<net::Socket>& socket, net::Context& context,
-                                  const Served::Requests& requests, const net::ServiceOptions& o) {
-  if (requests.endpoint.empty()) return std::string();
-  socket.emplace(context, net::Kind::kRouter, o.name + ":" + std::string(requests.endpoint),
-                 net::SocketOptions{.high_water_mark = requests.high_water_mark,
-                                    .patience_s = net::kBulkPatience_s,
-                                    .serves = requests.endpoint,
-                                    .most_connections = o.max_connections,
-                                    .most_queued_bytes = o.queue_limit_bytes()});
-  const auto bound = socket->bind(o.bind, o.insecure);
+// Where requests come in. Without a socket there is nothing to ask for.
+struct RequestDoor {
+  std::optional<net::Socket> socket;
+  std::string endpoint;
+};
+
+Result<RequestDoor> bind_requests(net::Context& context, const Served::Requests& requests,
+                                  const net::ServiceOptions& o) {
+  RequestDoor out;
+  if (requests.endpoint.empty()) return out;
+  out.socket.emplace(context, net::Kind::kRouter, o.name + ":" + std::string(requests.endpoint),
+                     net::SocketOptions{.high_water_mark = requests.high_water_mark,
+                                        .patience_s = net::kBulkPatience_s,
+                                        .serves = requests.endpoint,
+                                        .most_connections = o.max_connections,
+                                        .most_queued_bytes = o.queue_limit_bytes()});
+  const auto bound = out.socket->bind(o.bind, o.insecure);
   if (!bound) return bound.error();
-  return net::announced(*bound, o.advertise);
+  out.endpoint = net::announced(*bound, o.advertise);
+  return out;
 }
 
 net::MasterLink::Values status_of(const Served& served, const std::optional<net::Socket>& requests,
@@ -119,13 +126,13 @@ namespace {
 
 class DataTurns final : public DataService {
  public:
-  DataTurns(net::Context& context, Served& served, const net::ServiceOptions& o, std::optional<net::Socket> requests,
-            wire::Hello hello, const std::vector<std::string>& files, std::function<bool()> stop)
+  DataTurns(net::Context& context, Served& served, const net::ServiceOptions& o, RequestDoor door,
+            const Recorded& recorded, std::function<bool()> stop)
       : served_(served),
         stop_(std::move(stop)),
-        requests_(std::move(requests)),
-        link_(context, o.master, std::move(hello), o.give_up_after_s),
-        hash_(files),
+        requests_(std::move(door.socket)),
+        link_(context, o.master, hello_of(o.name, door.endpoint, recorded), o.give_up_after_s),
+        hash_(recorded.files),
         rates_(o.max_messages) {
     served_.begin(link_.instance());
     link_.on_order([&](const wire::Order& order) {
@@ -150,6 +157,11 @@ class DataTurns final : public DataService {
   int exit_code() const override { return link_.exit_code(); }
 
  private:
+  wire::Hello hello_of(const std::string& name, const std::string& endpoint, const Recorded& recorded) const {
+    wire::Hello hello = make_hello(served_, name, endpoint);
+    for (const auto& [fact, value] : recorded.facts) hello.facts[fact] = value;
+    return hello;
+  }
   void receive() {
     link_.receive();
     if (link_.version() != version_) {
@@ -178,13 +190,9 @@ class DataTurns final : public DataService {
 Result<std::unique_ptr<DataService>> DataService::open(net::Context& context, Served& served,
                                                        const net::ServiceOptions& o, const Recorded& recorded,
                                                        std::function<bool()> stop) {
-  std::optional<net::Socket> requests;
-  const auto endpoint = bind_requests(requests, context, served.requests(), o);
-  if (!endpoint) return endpoint.error();
-  wire::Hello hello = make_hello(served, o.name, *endpoint);
-  for (const auto& [fact, value] : recorded.facts) hello.facts[fact] = value;
-  return {std::make_unique<DataTurns>(context, served, o, std::move(requests), std::move(hello), recorded.files,
-                                      std::move(stop))};
+  auto door = bind_requests(context, served.requests(), o);
+  if (!door) return door.error();
+  return {std::make_unique<DataTurns>(context, served, o, *std::move(door), recorded, std::move(stop))};
 }
 
 int serve(net::Context& context, Served& served, const net::ServiceOptions& o, const std::function<bool()>& stop,

@@ -50,7 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (slices.ok() && slices->empty()) std::abort();
   for (size_t i = 0; slices.ok() && i < slices->size(); ++i) {
     const DicomSlice& s = (*slices)[i];
-    if (!s.deflated && (s.data_at > size || s.data_bytes > size - s.data_at)) std::abort();
+    if (!s.data.deflated && (s.data.at > size || s.data.bytes > size - s.data.at)) std::abort();
   }
   if (slices.ok()) order_slices(*slices, [](auto& a, auto& b) { return a.frame == b.frame; });
   volume_format({std::string(content), false, size}, "fuzz.nii");

@@ -99,9 +99,10 @@ struct Depth {
 
 }  // namespace
 
-Result<scene::Probed> cast(const volume::Session& session, int begin, int end, const LevelAt& level_at,
+Result<scene::Probed> cast(const volume::Session& session, const std::pair<int, int>& held, const LevelAt& level_at,
                            const volume::TransferFunction& transfer, const geometry::Clip& clip,
                            const scene::Probe& probe) {
+  const auto [begin, end] = held;
   const glm::dmat4 to_index = session.grid.room_to_index();
   const glm::dvec3 from(to_index * glm::dvec4(probe.origin_room, 1)),
       on(to_index * glm::dvec4(probe.direction_room, 0));

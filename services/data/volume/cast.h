@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "common/geometry/clip.h"
 #include "common/scene/probe.h"
@@ -24,9 +25,9 @@ using LevelAt = std::function<double(int i, int j, int k)>;
 /// bound. The value's bound covers all values between these places; without these places, the values possible at the
 /// place.
 ///
-/// begin, end: this server's slices; levels of one more on each side are known, where the grid has one. Error: the ray
-/// does not meet enough, or first meets slices that are not known.
-Result<scene::Probed> cast(const volume::Session& session, int begin, int end, const LevelAt& level_at,
+/// held: this server's slices, from the first to the one after the last; levels of one more on each side are known,
+/// where the grid has one. Error: the ray does not meet enough, or first meets slices that are not known.
+Result<scene::Probed> cast(const volume::Session& session, const std::pair<int, int>& held, const LevelAt& level_at,
                            const volume::TransferFunction& transfer, const geometry::Clip& clip,
                            const scene::Probe& probe);
 

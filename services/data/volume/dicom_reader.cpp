@@ -22,25 +22,27 @@ using Bytes = std::vector<std::byte>;
 
 constexpr size_t kLayersAtOnce = 64;
 
-bool needs_gdcm(const DicomSlice& s) { return s.compressed || s.components == 3; }
+bool needs_gdcm(const DicomSlice& s) { return s.data.compressed || s.pixels.components == 3; }
 
 // Decodes slices by GDCM, all of one size: returns all frames of their files, by file.
 std::map<std::string, Bytes> decode(const std::map<std::string, const DicomSlice*>& files, const std::string& path) {
   std::map<std::string, Bytes> out;
   if (files.empty()) return out;
   const DicomSlice& any = *files.begin()->second;
-  const size_t bytes = stored_bytes(stored_type(any)), frame_bytes = size_t(any.columns) * size_t(any.rows) * bytes;
+  const size_t bytes = stored_bytes(any.pixels.stored_type()),
+               frame_bytes = size_t(any.pixels.columns) * size_t(any.pixels.rows) * bytes;
   uint64_t frames = 0;
   for (const auto& [name, slice] : files) frames += uint64_t(slice->frames);
   std::vector<std::string> paths;
   for (const auto& [name, slice] : files) paths.push_back(name);
   const uint64_t unpacked = frames * frame_bytes;
-  const std::vector<std::string> words{"dicom", path, std::to_string(unpacked * uint64_t(any.components))};
+  const std::vector<std::string> words{"dicom", path, std::to_string(unpacked * uint64_t(any.pixels.components))};
   const auto received = need(import_volume("GDCM's", words, paths, unpacked, nullptr));
   const VolumeFileHeader& h = received.header;
-  if (h.size != std::array<int64_t, 3>{any.columns, any.rows, int64_t(frames)} || stored_bytes(h.stored) != bytes)
+  if (h.size != std::array<int64_t, 3>{any.pixels.columns, any.pixels.rows, int64_t(frames)} ||
+      stored_bytes(h.stored) != bytes)
     refuse("{}: GDCM finds {} x {} x {} pixels of {} bytes, the header says {} x {} x {} of {}", path, h.size[0],
-           h.size[1], h.size[2], stored_bytes(h.stored), any.columns, any.rows, frames, bytes);
+           h.size[1], h.size[2], stored_bytes(h.stored), any.pixels.columns, any.pixels.rows, frames, bytes);
   const std::byte* from = received.bytes.data();
   for (const auto& [name, slice] : files) {
     const std::byte* end = from + size_t(slice->frames) * frame_bytes;
@@ -69,19 +71,19 @@ class Pixels {
   }
 
   const std::byte* of(const DicomSlice& s) {
-    const size_t bytes = size_t(s.rows) * size_t(s.columns) * stored_bytes(stored_type(s));
+    const size_t bytes = size_t(s.pixels.rows) * size_t(s.pixels.columns) * stored_bytes(s.pixels.stored_type());
     if (needs_gdcm(s)) return decoded_[s.path].data() + size_t(s.frame) * bytes;
     if (s.path != name_) {
       file_ = need(MappedFile::open(s.path));
-      if (s.deflated) {
+      if (s.data.deflated) {
         inflated_ = need(inflate_dicom(file_->text(), s.path));
       }
       name_ = s.path;
     }
-    const std::string_view content = s.deflated ? std::string_view(inflated_) : file_->text();
-    if (s.data_at > content.size() || bytes > content.size() - s.data_at)
+    const std::string_view content = s.data.deflated ? std::string_view(inflated_) : file_->text();
+    if (s.data.at > content.size() || bytes > content.size() - s.data.at)
       refuse("{}: changed while it was read", s.path);
-    return reinterpret_cast<const std::byte*>(content.data()) + s.data_at;
+    return reinterpret_cast<const std::byte*>(content.data()) + s.data.at;
   }
 
  private:
@@ -108,9 +110,10 @@ T value_of(T raw, int up, int down, bool inverted) {
 template <class T>
 std::optional<std::pair<T, T>> padding_of(const DicomSlice& s) {
   if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
-    if (!s.padding) return std::nullopt;
-    const T a = T(*s.padding), b = T(s.padding_limit.value_or(*s.padding));
-    const int unused = s.bits_allocated - s.bits_stored;
+    const DicomPixels& p = s.pixels;
+    if (!p.padding) return std::nullopt;
+    const T a = T(*p.padding), b = T(p.padding_limit.value_or(*p.padding));
+    const int unused = p.bits_allocated - p.bits_stored;
     const T from = value_of<T>(a, unused, unused, is_inverted(s)), to = value_of<T>(b, unused, unused, is_inverted(s));
     return std::minmax(from, to);
   }
@@ -119,9 +122,10 @@ std::optional<std::pair<T, T>> padding_of(const DicomSlice& s) {
 
 template <class T>
 void unpack(const DicomSlice& s, const std::byte* from, size_t count, std::byte* to, bool rescale) {
-  const int high = s.high_bit.value_or(s.bits_stored - 1);
-  const int up = s.bits_allocated - 1 - high, down = s.bits_allocated - s.bits_stored;
-  const bool inverted = is_inverted(s), swap = s.big_endian && !needs_gdcm(s);
+  const DicomPixels& p = s.pixels;
+  const int high = p.high_bit.value_or(p.bits_stored - 1);
+  const int up = p.bits_allocated - 1 - high, down = p.bits_allocated - p.bits_stored;
+  const bool inverted = is_inverted(s), swap = s.data.big_endian && !needs_gdcm(s);
   const auto padding = padding_of<T>(s);
   for (size_t i = 0; i < count; ++i) {
     std::byte bytes[sizeof(T)];
@@ -136,7 +140,7 @@ void unpack(const DicomSlice& s, const std::byte* from, size_t count, std::byte*
     }
     const bool padded = padding && value >= padding->first && value <= padding->second;
     const float scaled =
-        padded ? std::numeric_limits<float>::quiet_NaN() : float(double(value) * s.slope + s.intercept);
+        padded ? std::numeric_limits<float>::quiet_NaN() : float(double(value) * p.slope + p.intercept);
     std::memcpy(to + i * sizeof scaled, &scaled, sizeof scaled);
   }
 }
@@ -170,9 +174,9 @@ void take_padding(const DicomSlice& s, Bytes& bytes, std::string& remark) {
   const double away = std::max(double(lo) - double(padding->second), double(padding->first) - double(hi));
   if (padded == 0 || padded == count || away <= 0.01 * (double(hi) - double(lo))) return;
   for (size_t i = 0; i < count; ++i)
-    if (voxels[i] >= padding->first && voxels[i] <= padding->second) voxels[i] = s.slope < 0 ? hi : lo;
+    if (voxels[i] >= padding->first && voxels[i] <= padding->second) voxels[i] = s.pixels.slope < 0 ? hi : lo;
   remark += fmt::format("{}{} voxels are padding ({}) and count as the lowest value", remark.empty() ? "" : "; ",
-                        padded, double(padding->first) * s.slope + s.intercept);
+                        padded, double(padding->first) * s.pixels.slope + s.pixels.intercept);
 }
 
 void fill(const DicomSeries& series, size_t step, const std::string& path, const ReadProgress& progress, Bytes& bytes) {
@@ -184,9 +188,9 @@ void fill(const DicomSeries& series, size_t step, const std::string& path, const
   // Writes a slice as the volume stores it.
   const auto read = [&](const DicomSlice& s, std::byte* to) {
     const auto from = source.of(s);
-    const bool rescale =
-        h.stored == StoredType::kF32 && (stored_type(s) != h.stored || h.scale != s.slope || h.offset != s.intercept);
-    with_type(stored_type(s), [&](auto zero) { unpack<decltype(zero)>(s, from, pixels, to, rescale); });
+    const bool rescale = h.stored == StoredType::kF32 && (s.pixels.stored_type() != h.stored ||
+                                                          h.scale != s.pixels.slope || h.offset != s.pixels.intercept);
+    with_type(s.pixels.stored_type(), [&](auto zero) { unpack<decltype(zero)>(s, from, pixels, to, rescale); });
   };
   Bytes below, above;
   for (size_t k = 0; k < layers.size(); ++k) {

@@ -140,8 +140,8 @@ class Store final : public VolumeStore {
                              const scene::Probe& probe) override {
     const auto slices = step_of(step);
     if (!slices) return slices.error();
-    auto found = data::cast(
-        session_, begin_, end_, [&](int i, int j, int k) { return (*slices)->level(i, j, k); }, transfer, clip, probe);
+    const auto level_at = [&](int i, int j, int k) { return (*slices)->level(i, j, k); };
+    auto found = data::cast(session_, {begin_, end_}, level_at, transfer, clip, probe);
     if (found && session_.range.hounsfield) found->array_unit = "HU";
     return found;
   }

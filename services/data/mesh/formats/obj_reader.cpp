@@ -17,7 +17,33 @@ namespace telesplat::data {
 namespace {
 
 constexpr uint32_t kNone = ~uint32_t{0};
-constexpr int kMostSteps = 64;  // through a position's variants: a million normals at one place must not cost hours
+constexpr int kMostSteps = 64;  // through a position's corners: a million normals at one place cost no hours
+
+// Corners of the output mesh: a position with one normal, one material and, where that has a texture, one place in it.
+class Corners {
+ public:
+  struct Corner {
+    uint32_t normal, material, place, position;
+    bool operator==(const Corner&) const = default;
+  };
+
+  // Returns the number of this corner, which is new or has been there before.
+  uint32_t number_of(const Corner& corner) {
+    if (first_.size() <= corner.position) first_.resize(corner.position + 1, kNone);
+    int steps = 0;
+    for (uint32_t c = first_[corner.position]; c != kNone && ++steps <= kMostSteps; c = next_[c])
+      if (corners_[c] == corner) return c;
+    const auto id = static_cast<uint32_t>(corners_.size());
+    corners_.push_back(corner);
+    next_.push_back(first_[corner.position]);
+    return first_[corner.position] = id;
+  }
+  const std::vector<Corner>& all() const { return corners_; }
+
+ private:
+  std::vector<Corner> corners_;
+  std::vector<uint32_t> first_, next_;  // newest corner of each position; the corner of the same position before
+};
 
 class ObjReader {
  public:
@@ -53,11 +79,7 @@ class ObjReader {
   }
 
  private:
-  // A corner of the output mesh: a position with one normal, one material and, if textured, one place in the texture.
-  // Variants of one position form a list.
-  struct Variant {
-    uint32_t normal, material, place, vertex, next;
-  };
+  using Corner = Corners::Corner;
 
   void read_materials() {
     std::map<int64_t, uint32_t> looks;
@@ -144,54 +166,45 @@ class ObjReader {
         bad("a face names normal {}, there are {} so far", index, normals_.size());
     }
     const bool textured = material_ != kNone && !materials_[material_].texture.empty();
-    return variant_of(position, normal, textured ? place : kNone);
-  }
-
-  uint32_t variant_of(uint32_t position, uint32_t normal, uint32_t place) {
-    if (first_variant_.size() < positions_.size()) first_variant_.resize(positions_.size(), kNone);
-    int steps = 0;
-    for (uint32_t v = first_variant_[position]; v != kNone && ++steps <= kMostSteps; v = variants_[v].next)
-      if (variants_[v].normal == normal && variants_[v].material == material_ && variants_[v].place == place) return v;
-    const auto id = static_cast<uint32_t>(variants_.size());
-    variants_.push_back({normal, material_, place, position, first_variant_[position]});
-    return first_variant_[position] = id;
+    return corners_.number_of({normal, material_, textured ? place : kNone, position});
   }
 
   void read_face() {
-    corners_.clear();
-    while (more()) corners_.push_back(read_corner());
-    if (corners_.size() < 3) ++mesh_.degenerate_dropped;
-    if (corners_.size() == 3) mesh_.indices.insert(mesh_.indices.end(), corners_.begin(), corners_.end());
-    if (corners_.size() > 3) cut_face();
+    face_.clear();
+    while (more()) face_.push_back(read_corner());
+    if (face_.size() < 3) ++mesh_.degenerate_dropped;
+    if (face_.size() == 3) mesh_.indices.insert(mesh_.indices.end(), face_.begin(), face_.end());
+    if (face_.size() > 3) cut_face();
   }
 
   void cut_face() {
     ring_.clear(), cut_.clear();
-    for (const uint32_t corner : corners_) ring_.push_back(variants_[corner].vertex);
+    for (const uint32_t corner : face_) ring_.push_back(corners_.all()[corner].position);
     cut_corners(ring_, positions_, cut_);
-    for (const uint32_t i : cut_) mesh_.indices.push_back(corners_[i]);
+    for (const uint32_t i : cut_) mesh_.indices.push_back(face_[i]);
   }
 
-  uint32_t colour_of_variant(const Variant& v, bool own_colours, bool textured) const {
+  uint32_t colour_of(const Corner& v, uint32_t own, bool own_colours, bool textured) const {
     const auto kd = v.material == kNone ? std::nullopt : materials_[v.material].colour;
     // A material tints its texture; many programs write black beside a texture and mean no tint.
     if (textured) return kd && *kd != 0 ? *kd : 0xffffff;
-    return !own_colours && kd ? *kd : vertex_colours_[v.vertex];
+    return !own_colours && kd ? *kd : own;
   }
 
   Mesh finish() {
     auto use = read_textures();
     const bool own_colours = !colours_.empty();  // they take precedence over materials
     bool any_colour = own_colours || !use.textures.empty(), any_normal = false;
-    for (const Variant& v : variants_)
+    for (const Corner& v : corners_.all())
       any_colour |= v.material != kNone && materials_[v.material].colour, any_normal |= v.normal != kNone;
     colours_.fill(positions_.size());
-    vertex_colours_ = colours_.packed(kNeutralAlbedo);
-    mesh_.positions.reserve(variants_.size());
-    for (const Variant& v : variants_) {
-      mesh_.positions.push_back(positions_[v.vertex]);
+    const auto vertex_colours = colours_.packed(kNeutralAlbedo);
+    mesh_.positions.reserve(corners_.all().size());
+    for (const Corner& v : corners_.all()) {
+      mesh_.positions.push_back(positions_[v.position]);
       const uint32_t texture = v.material == kNone || v.place == kNone ? kNoTexture : textures_of_[v.material];
-      if (any_colour) mesh_.colours.push_back(colour_of_variant(v, own_colours, texture != kNoTexture));
+      if (any_colour)
+        mesh_.colours.push_back(colour_of(v, vertex_colours[v.position], own_colours, texture != kNoTexture));
       if (any_normal)
         mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // 0: to be computed
       if (use.textures.empty()) continue;
@@ -204,7 +217,7 @@ class ObjReader {
     return std::move(mesh_);
   }
 
-  glm::vec2 place_in_picture(const Variant& v) const {
+  glm::vec2 place_in_picture(const Corner& v) const {
     const ObjMaterial& m = materials_[v.material];
     const glm::vec2 uv = places_[v.place] * m.scale + m.offset;
     return {uv.x, 1 - uv.y};
@@ -215,7 +228,7 @@ class ObjReader {
     NamedTextures textures(name_, companions_);
     textures_of_.assign(materials_.size(), kNoTexture);
     std::vector<bool> used(materials_.size(), false);
-    for (const Variant& v : variants_)
+    for (const Corner& v : corners_.all())
       if (v.material != kNone && v.place != kNone) used[v.material] = true;
     for (size_t m = 0; m < materials_.size(); ++m) {
       const ObjMaterial& material = materials_[m];
@@ -239,17 +252,15 @@ class ObjReader {
   Mesh mesh_;
   std::vector<glm::dvec3> positions_;
   std::vector<glm::vec3> normals_;
-  RawColours colours_;                    // empty, or one per vertex
-  std::vector<uint32_t> vertex_colours_;  // the same colours, packed
-  std::vector<uint32_t> first_variant_;
-  std::vector<Variant> variants_;
+  RawColours colours_;  // empty, or one per vertex
+  Corners corners_;
   std::vector<glm::vec2> places_;  // texture coordinates
   std::unordered_map<std::string, uint32_t> material_numbers_;
   std::vector<ObjMaterial> materials_;
   std::vector<uint32_t> textures_of_;  // per material: its number in TextureUse::textures, or kNoTexture
   uint32_t material_ = kNone;
-  std::vector<uint32_t> corners_, ring_, cut_;  // buffers for the current face
-  size_t others_ = 0;                           // number of statements left out
+  std::vector<uint32_t> face_, ring_, cut_;  // buffers for the current face
+  size_t others_ = 0;                        // number of statements left out
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -17,39 +18,70 @@
 
 namespace telesplat::data {
 
-struct DicomSlice {
-  std::string path;
-  int frame = 0;             ///< number in the file, from 0
-  std::string uid;           ///< SOP Instance UID; the same in all frames of a file
-  std::string series;        ///< Series Instance UID
-  std::string series_text;   ///< Series Description; often empty
-  double series_number = 0;  ///< Series Number
-  std::string modality;      ///< "CT", "MR", ...
-  std::string image_type;    ///< "ORIGINAL\PRIMARY\LOCALIZER"
-  std::string photometric;   ///< "MONOCHROME2", "RGB", ...
-  std::string syntax;        ///< Transfer Syntax UID; empty: not given
-  double instance = 0;       ///< Instance Number
-  /// Values that distinguish slices at one place, see kDicomTimes; 0: not given.
-  std::array<double, 6> times{};
-  int rows = 0, columns = 0, components = 1, frames = 1;
+/// Storage of a slice's values: Image Pixel module and rescaling (PS3.3 C.7.6.3, C.11.1).
+struct DicomPixels {
+  int rows = 0, columns = 0, components = 1;
   int bits_allocated = 0, bits_stored = 0;
   std::optional<int> high_bit;
-  bool is_signed = false, big_endian = false, is_float = false;
-  bool compressed = false;                    ///< pixels lie in fragments; data_at and data_bytes then cover all frames
-  bool deflated = false;                      ///< data_at is an offset in the result of inflate_dicom()
-  bool stacked = false;                       ///< this frame's position is computed from the first one's and a spacing
+  bool is_signed = false, is_float = false;
   std::optional<int> padding, padding_limit;  ///< Pixel Padding Value and Range Limit, as 16 bits without sign
   double slope = 1, intercept = 0;
+  std::string photometric;  ///< "MONOCHROME2", "RGB", ...
+
+  uint64_t bytes() const {
+    return uint64_t(rows) * uint64_t(columns) * (uint64_t(components) * uint64_t(bits_allocated) / 8);
+  }
+  /// Before any values are cleared of what lies beside their bits.
+  StoredType stored_type() const;
+  /// Values of both mean the same.
+  bool is_stored_as(const DicomPixels& other) const {
+    return slope == other.slope && intercept == other.intercept && stored_type() == other.stored_type() &&
+           bits_stored == other.bits_stored;
+  }
+};
+
+/// Where a slice lies: Image Plane module (PS3.3 C.7.6.2).
+struct DicomPlane {
   std::optional<glm::dvec3> position;  ///< centre of the first pixel, patient space (left, posterior, superior), mm
   glm::dvec3 along_row{1, 0, 0};       ///< direction in which the column index grows
   glm::dvec3 along_column{0, 1, 0};    ///< direction in which the row index grows
   glm::dvec2 spacing{1, 1};            ///< mm along a row, along a column
   double thickness = 0, slice_spacing = 0;  ///< mm; 0: not given
-  uint64_t data_at = 0, data_bytes = 0;     ///< the pixels; 0 bytes: no pixels (a directory, a report)
+  bool stacked = false;                     ///< this frame's position is computed from the first one's and a spacing
 
-  uint64_t pixel_bytes() const {
-    return uint64_t(rows) * uint64_t(columns) * (uint64_t(components) * uint64_t(bits_allocated) / 8);
+  glm::dvec3 normal() const { return glm::cross(along_row, along_column); }
+  /// Both have a position or none, and are turned and spaced alike.
+  bool is_like(const DicomPlane& other) const {
+    return position.has_value() == other.position.has_value() && glm::distance(along_row, other.along_row) <= 1e-3 &&
+           glm::distance(along_column, other.along_column) <= 1e-3 &&
+           glm::distance(spacing, other.spacing) <= 1e-3 * glm::length(other.spacing);
   }
+};
+
+/// Where in its file a slice's pixels are, and how they are packed.
+struct DicomData {
+  std::string syntax;          ///< Transfer Syntax UID; empty: not given
+  uint64_t at = 0, bytes = 0;  ///< the pixels; 0 bytes: no pixels (a directory, a report)
+  bool big_endian = false;
+  bool compressed = false;  ///< pixels lie in fragments, and these are those of all frames
+  bool deflated = false;    ///< `at` counts in inflate_dicom()
+};
+
+struct DicomSlice {
+  std::string path;
+  int frame = 0, frames = 1;  ///< number in the file, from 0
+  std::string uid;            ///< SOP Instance UID; the same in all frames of a file
+  std::string series;         ///< Series Instance UID
+  std::string series_text;    ///< Series Description; often empty
+  double series_number = 0;   ///< Series Number
+  std::string modality;       ///< "CT", "MR", ...
+  std::string image_type;     ///< "ORIGINAL\PRIMARY\LOCALIZER"
+  double instance = 0;        ///< Instance Number
+  /// Values that distinguish slices at one place, see kDicomTimes; 0: not given.
+  std::array<double, 6> times{};
+  DicomPixels pixels;
+  DicomPlane plane;
+  DicomData data;
 };
 
 /// Names of the values in DicomSlice::times; time steps are ordered by the first that differs.
@@ -121,8 +153,6 @@ bool holds_dicom(const std::string& folder);
 /// such series; values that are not 8 to 64 bits wide; rescaling by 0. Damaged files are left out with a remark.
 Result<std::shared_ptr<const DicomSeries>> find_dicom_series(const std::string& path, const std::string& which = "");
 
-/// Returns the type of a slice's stored values, before the unused bits beside them are cleared.
-StoredType stored_type(const DicomSlice& slice);
 /// True if low values are bright, and have no unit: they are then inverted.
 bool is_inverted(const DicomSlice& slice);
 

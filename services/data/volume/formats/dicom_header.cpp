@@ -54,9 +54,9 @@ class Parser {
   std::vector<DicomSlice> run() {
     if (!is_dicom(content_)) refuse("{}: is no DICOM file: no DICM at byte 128, and no elements before", path_);
     end_of_meta();
-    if (base_.syntax == kDeflated) {
+    if (base_.data.syntax == kDeflated) {
       inflated_ = need(inflate_dicom(content_, path_));
-      content_ = inflated_, at_ = 0, base_.deflated = true;
+      content_ = inflated_, at_ = 0, base_.data.deflated = true;
     }
     choose_syntax();
     while (!done_ && at_ + 8 <= content_.size()) element(0, false);
@@ -91,8 +91,8 @@ class Parser {
 
   // A file's own statement on types may be false: the first element itself shows whether it has one.
   void choose_syntax() {
-    big_ = base_.big_endian = base_.syntax == "1.2.840.10008.1.2.2";
-    explicit_ = base_.syntax != "1.2.840.10008.1.2";
+    big_ = base_.data.big_endian = base_.data.syntax == "1.2.840.10008.1.2.2";
+    explicit_ = base_.data.syntax != "1.2.840.10008.1.2";
     if (!big_ && at_ + 6 <= content_.size()) explicit_ = is_type(content_.substr(at_ + 4, 2));
   }
 
@@ -168,39 +168,39 @@ class Parser {
 
   void pixels(const Element& e) {
     constexpr std::string_view kBase = "1.2.840.10008.1.2";
-    const std::string_view syntax = base_.syntax;
+    const std::string_view syntax = base_.data.syntax;
     const bool plain = syntax.empty() || syntax == kBase || syntax == "1.2.840.10008.1.2.1" || syntax == kDeflated ||
                        syntax == "1.2.840.10008.1.2.2";
-    base_.compressed = e.length == kUndefined;
-    base_.is_float = e.tag != kPixels;
-    if (!base_.compressed && !plain && syntax.starts_with(kBase))
+    base_.data.compressed = e.length == kUndefined;
+    base_.pixels.is_float = e.tag != kPixels;
+    if (!base_.data.compressed && !plain && syntax.starts_with(kBase))
       refuse("{}: its transfer syntax is {}, a compressed one, but its pixels are not in fragments", path_,
              in_quotes(syntax));
-    if (!base_.compressed && e.length > content_.size() - at_)
+    if (!base_.data.compressed && e.length > content_.size() - at_)
       refuse("{}: is cut: claims {} bytes of pixels, has {}", path_, e.length, content_.size() - at_);
-    base_.data_at = at_, base_.data_bytes = base_.compressed ? content_.size() - at_ : e.length;
+    base_.data.at = at_, base_.data.bytes = base_.data.compressed ? content_.size() - at_ : e.length;
     done_ = true;
   }
 
   // Returns a slice for each frame; also one for a file without pixels.
   std::vector<DicomSlice> slices() {
-    const size_t count = base_.data_bytes > 0 ? size_t(base_.frames) : 1;
+    const size_t count = base_.data.bytes > 0 ? size_t(base_.frames) : 1;
     if (count > kMostFrames) refuse("{}: has {} frames, limit {}", path_, count, kMostFrames);
     const bool described = frames_.size() >= count && count > 0;
     if (!frames_.empty() && !described)
       refuse("{}: has {} frames, and places {} of them", path_, count, frames_.size());
-    const uint64_t bytes = base_.pixel_bytes();
-    if (count > 1 && (bytes == 0 || count > base_.data_bytes / (base_.compressed ? 1 : bytes)))
+    const uint64_t bytes = base_.pixels.bytes();
+    if (count > 1 && (bytes == 0 || count > base_.data.bytes / (base_.data.compressed ? 1 : bytes)))
       refuse("{}: claims {} frames of {} x {} pixels ({} bytes each), has {} bytes of them", path_, count,
-             base_.columns, base_.rows, bytes, base_.data_bytes);
+             base_.pixels.columns, base_.pixels.rows, bytes, base_.data.bytes);
     if (!described) place_frames(count);
     frames_.resize(count);
     for (size_t f = 0; f < count; ++f) {
       DicomSlice& s = frames_[f];
       s.frame = int(f), s.frames = int(count);
-      s.compressed = base_.compressed, s.is_float = base_.is_float;
-      s.data_at = base_.data_at, s.data_bytes = base_.data_bytes;
-      if (count > 1 && !s.compressed) s.data_at += f * bytes, s.data_bytes = bytes;
+      s.data.compressed = base_.data.compressed, s.pixels.is_float = base_.pixels.is_float;
+      s.data.at = base_.data.at, s.data.bytes = base_.data.bytes;
+      if (count > 1 && !s.data.compressed) s.data.at += f * bytes, s.data.bytes = bytes;
     }
     return std::move(frames_);
   }
@@ -209,12 +209,12 @@ class Parser {
   void place_frames(size_t count) {
     frames_.assign(count, base_);
     if (count == 1) return;
-    const double spacing = std::abs(base_.slice_spacing);
+    const double spacing = std::abs(base_.plane.slice_spacing);
     const bool offsets = offsets_.size() >= count;
-    const glm::dvec3 normal = glm::cross(base_.along_row, base_.along_column);
+    const glm::dvec3 normal = base_.plane.normal();
     for (size_t f = 0; f < count; ++f) {
-      auto& position = frames_[f].position;
-      if (!offsets) frames_[f].stacked = true;
+      auto& position = frames_[f].plane.position;
+      if (!offsets) frames_[f].plane.stacked = true;
       if (position && offsets)
         *position += normal * (offsets_[f] - offsets_[0]);
       else if (position && spacing > 0)
@@ -253,24 +253,26 @@ class Parser {
   void keep_text(uint32_t tag, std::string_view text) {
     DicomSlice& out = *into_;
     const std::pair<uint32_t, std::string*> texts[] = {
-        {0x00020010, &out.syntax}, {0x00080008, &out.image_type},  {0x00089007, &out.image_type},
-        {0x00080018, &out.uid},    {0x00080060, &out.modality},    {0x0008103e, &out.series_text},
-        {0x0020000e, &out.series}, {0x00280004, &out.photometric},
+        {0x00020010, &out.data.syntax}, {0x00080008, &out.image_type},         {0x00089007, &out.image_type},
+        {0x00080018, &out.uid},         {0x00080060, &out.modality},           {0x0008103e, &out.series_text},
+        {0x0020000e, &out.series},      {0x00280004, &out.pixels.photometric},
     };
     for (const auto& [t, to] : texts)
       if (t == tag) *to = std::string(text.substr(0, 64));
     const std::pair<uint32_t, double*> reals[] = {
-        {0x00080032, &out.times[5]},      {0x00180050, &out.thickness}, {0x00180081, &out.times[3]},
-        {0x00180088, &out.slice_spacing}, {0x00181060, &out.times[1]},  {0x00200011, &out.series_number},
-        {0x00200012, &out.times[2]},      {0x00200013, &out.instance},  {0x00200100, &out.times[0]},
-        {0x00281052, &out.intercept},     {0x00281053, &out.slope},     {0x3004000e, &out.slope},
+        {0x00080032, &out.times[5]},     {0x00180050, &out.plane.thickness},
+        {0x00180081, &out.times[3]},     {0x00180088, &out.plane.slice_spacing},
+        {0x00181060, &out.times[1]},     {0x00200011, &out.series_number},
+        {0x00200012, &out.times[2]},     {0x00200013, &out.instance},
+        {0x00200100, &out.times[0]},     {0x00281052, &out.pixels.intercept},
+        {0x00281053, &out.pixels.slope}, {0x3004000e, &out.pixels.slope},
     };
     for (const auto& [t, to] : reals)
       if (t == tag) decimals(text, *to);
-    keep_places(tag, text, out);
+    keep_places(tag, text, out.plane);
   }
 
-  void keep_places(uint32_t tag, std::string_view text, DicomSlice& out) {
+  void keep_places(uint32_t tag, std::string_view text, DicomPlane& out) {
     glm::dvec3 a, b;
     double frames = 1;
     switch (tag) {
@@ -282,7 +284,7 @@ class Parser {
           out.along_row = glm::normalize(a), out.along_column = glm::normalize(b);
         break;
       case 0x00280008:
-        if (decimals(text, frames) && frames >= 1 && frames < 1e9) out.frames = int(frames);
+        if (decimals(text, frames) && frames >= 1 && frames < 1e9) into_->frames = int(frames);
         break;
       case 0x00181164:
       case 0x00280030:
@@ -297,7 +299,7 @@ class Parser {
   }
 
   void keep_word(uint32_t tag, int word) {
-    DicomSlice& out = *into_;
+    DicomPixels& out = into_->pixels;
     const std::pair<uint32_t, int*> words[] = {{0x00280002, &out.components},
                                                {0x00280010, &out.rows},
                                                {0x00280011, &out.columns},

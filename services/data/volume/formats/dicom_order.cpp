@@ -28,23 +28,20 @@ std::string name_of(const DicomSlice& s) {
 
 std::string counted(size_t n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-glm::dvec3 normal_of(const DicomSlice& s) { return glm::cross(s.along_row, s.along_column); }
-
 bool is_localizer(const DicomSlice& s) { return s.image_type.find("LOCALIZER") != std::string::npos; }
 
 bool same_kind(const DicomSlice& a, const DicomSlice& b) {
-  if (a.stacked && b.stacked && a.path != b.path) return false;
-  return a.rows == b.rows && a.columns == b.columns && is_localizer(a) == is_localizer(b) &&
-         a.position.has_value() == b.position.has_value() && glm::distance(a.along_row, b.along_row) <= 1e-3 &&
-         glm::distance(a.along_column, b.along_column) <= 1e-3 &&
-         glm::distance(a.spacing, b.spacing) <= 1e-3 * glm::length(b.spacing);
+  if (a.plane.stacked && b.plane.stacked && a.path != b.path) return false;
+  return a.pixels.rows == b.pixels.rows && a.pixels.columns == b.pixels.columns && is_localizer(a) == is_localizer(b) &&
+         a.plane.is_like(b.plane);
 }
 
 std::string why_other(const DicomSlice& s, const DicomSlice& taken) {
   if (is_localizer(s) && !is_localizer(taken)) return "a localizer";
-  if (s.rows != taken.rows || s.columns != taken.columns)
-    return fmt::format("of {} x {} pixels instead of {} x {}", s.columns, s.rows, taken.columns, taken.rows);
-  return s.stacked ? "another file of frames" : "turned, spaced or placed otherwise";
+  if (s.pixels.rows != taken.pixels.rows || s.pixels.columns != taken.pixels.columns)
+    return fmt::format("of {} x {} pixels instead of {} x {}", s.pixels.columns, s.pixels.rows, taken.pixels.columns,
+                       taken.pixels.rows);
+  return s.plane.stacked ? "another file of frames" : "turned, spaced or placed otherwise";
 }
 
 // Returns the largest group of slices that can make one volume.
@@ -88,18 +85,19 @@ bool earlier(const DicomSlice& a, const DicomSlice& b) {
 
 // Groups slices by ascending height; without positions each slice has its own place.
 std::vector<Place> places_of(const Slices& slices) {
-  const glm::dvec3 normal = normal_of(slices.front());
+  const glm::dvec3 normal = slices.front().plane.normal();
   std::vector<std::pair<double, size_t>> by_height;
   for (size_t i = 0; i < slices.size(); ++i)
-    by_height.emplace_back(slices[i].position ? glm::dot(*slices[i].position, normal) : 0, i);
+    by_height.emplace_back(slices[i].plane.position ? glm::dot(*slices[i].plane.position, normal) : 0, i);
   std::stable_sort(by_height.begin(), by_height.end(), [&](auto& a, auto& b) {
     const DicomSlice &s = slices[a.second], &t = slices[b.second];
-    return s.position ? a.first < b.first : std::tie(s.instance, s.frame) < std::tie(t.instance, t.frame);
+    return s.plane.position ? a.first < b.first : std::tie(s.instance, s.frame) < std::tie(t.instance, t.frame);
   });
   std::vector<Place> places;
   double height = 0;
   for (const auto& [h, i] : by_height) {
-    const bool same = !places.empty() && slices[i].position && h - height <= kSamePlace * slices[i].spacing.x;
+    const bool same =
+        !places.empty() && slices[i].plane.position && h - height <= kSamePlace * slices[i].plane.spacing.x;
     if (!same) places.emplace_back(), height = h;
     places.back().push_back(i);
   }
@@ -214,7 +212,7 @@ GridPlaces grid_of(const std::vector<double>& heights, const std::function<std::
 // Computes the offset from one layer to the next from the positions; it may be askew (gantry tilt).
 void place(DicomOrder& out, const std::vector<Place>& places, double distance) {
   const DicomSlice &first = out.slices[places.front()[0]], &last = out.slices[places.back()[0]];
-  const glm::dvec3 normal = normal_of(first), way = *last.position - *first.position;
+  const glm::dvec3 normal = first.plane.normal(), way = *last.plane.position - *first.plane.position;
   out.step = way * (distance / glm::dot(way, normal));
   const double tilt = std::acos(std::min(1.0, distance / glm::length(out.step))) * 180 / M_PI;
   if (tilt > kSilentlyTilted)
@@ -230,19 +228,20 @@ DicomOrder order_slices(Slices slices, const std::function<bool(const DicomSlice
   std::vector<Place> places = places_of(out.slices);
   sort_out(out.slices, places, same_pixels, out.remark);
   const DicomSlice first = out.slices[places.front()[0]];
-  const double said = first.slice_spacing > 0 ? first.slice_spacing : first.thickness > 0 ? first.thickness : 1;
-  out.origin = first.position.value_or(glm::dvec3(0));
-  out.step = normal_of(first) * said;
+  const DicomPlane& plane = first.plane;
+  const double said = plane.slice_spacing > 0 ? plane.slice_spacing : plane.thickness > 0 ? plane.thickness : 1;
+  out.origin = plane.position.value_or(glm::dvec3(0));
+  out.step = plane.normal() * said;
   GridPlaces at;
   for (size_t k = 0; k < places.size(); ++k) at.push_back(double(k));
-  if (first.position && places.size() > 1) {
+  if (plane.position && places.size() > 1) {
     std::vector<double> heights;
-    for (const Place& p : places) heights.push_back(glm::dot(*out.slices[p[0]].position, normal_of(first)));
+    for (const Place& p : places) heights.push_back(glm::dot(*out.slices[p[0]].plane.position, plane.normal()));
     at = grid_of(
         heights, [&](size_t k) { return name_of(out.slices[places[k][0]]); }, out.remark);
     place(out, places, (heights.back() - heights.front()) / at.back());
   }
-  if (places.size() > 1 && (!first.position || first.stacked))
+  if (places.size() > 1 && (!plane.position || plane.stacked))
     say(out.remark, fmt::format("{} of no position of their own are stacked {:.4g} mm apart",
                                 counted(places.size(), first.frames > 1 ? "frame" : "slice"), glm::length(out.step)));
   Slices used;

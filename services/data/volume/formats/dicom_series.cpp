@@ -38,7 +38,7 @@ void scan(const std::string& path, Found& found) {
     return;
   }
   found.slices += slices->size();
-  if (slices->front().data_bytes > 0)
+  if (slices->front().data.bytes > 0)
     for (DicomSlice& s : *slices) found.series[s.series].push_back(std::move(s));
 }
 
@@ -62,7 +62,7 @@ std::vector<DicomSeriesName> names_of(const std::vector<Slices>& all) {
   std::vector<DicomSeriesName> out;
   for (const Slices& slices : all) {
     const DicomSlice& any = slices.front();
-    out.push_back({any.series, any.series_text, any.modality, slices.size(), any.columns, any.rows});
+    out.push_back({any.series, any.series_text, any.modality, slices.size(), any.pixels.columns, any.pixels.rows});
   }
   return out;
 }
@@ -85,38 +85,43 @@ size_t choose(const std::vector<DicomSeriesName>& all, const std::string& which,
   refuse("{}: --series {}: there is none of that place or UID; there are {}", folder, in_quotes(which), list_of(all));
 }
 
+void check_pixels(const DicomPixels& p, const std::string& path) {
+  if (p.photometric == "PALETTE COLOR") refuse("{}: has a palette of colours; supported are values", path);
+  if (p.components != 1 && (p.components != 3 || p.bits_allocated != 8))
+    refuse("{}: has {} components of {} bits a pixel; supported are 1, and colours of 3 of 8 bits", path, p.components,
+           p.bits_allocated);
+  const bool whole = p.bits_allocated == 8 || p.bits_allocated == 16 || p.bits_allocated == 32;
+  const bool real = p.bits_allocated == 32 || p.bits_allocated == 64;
+  if (!(p.is_float ? real : whole && p.bits_stored >= 1 && p.bits_stored <= p.bits_allocated))
+    refuse("{}: has {} bits a pixel in {}; supported are up to 8 in 8, 16 in 16 and 32 in 32", path, p.bits_stored,
+           p.bits_allocated);
+  if (!p.is_float &&
+      (p.high_bit.value_or(p.bits_stored - 1) < p.bits_stored - 1 || p.high_bit.value_or(0) >= p.bits_allocated))
+    refuse("{}: its highest bit is {}, with {} bits a pixel in {}", path, *p.high_bit, p.bits_stored, p.bits_allocated);
+  if (p.rows < 1 || p.columns < 1 || p.rows > volume::kMaxSide || p.columns > volume::kMaxSide)
+    refuse("{}: has {} x {} pixels, limits 1 and {}", path, p.columns, p.rows, volume::kMaxSide);
+  if (!std::isfinite(p.slope) || !std::isfinite(p.intercept) || p.slope == 0)
+    refuse("{}: its values are scaled by {} and shifted by {}", path, p.slope, p.intercept);
+}
+
 void check_slice(const DicomSlice& s) {
-  if (s.syntax.starts_with("1.2.840.10008.1.2.4.10"))
-    refuse("{}: is a film (transfer syntax {}), no volume", s.path, in_quotes(s.syntax));
-  if (s.photometric == "PALETTE COLOR") refuse("{}: has a palette of colours; supported are values", s.path);
-  if (s.components != 1 && (s.components != 3 || s.bits_allocated != 8))
-    refuse("{}: has {} components of {} bits a pixel; supported are 1, and colours of 3 of 8 bits", s.path,
-           s.components, s.bits_allocated);
-  const bool whole = s.bits_allocated == 8 || s.bits_allocated == 16 || s.bits_allocated == 32;
-  const bool real = s.bits_allocated == 32 || s.bits_allocated == 64;
-  if (!(s.is_float ? real : whole && s.bits_stored >= 1 && s.bits_stored <= s.bits_allocated))
-    refuse("{}: has {} bits a pixel in {}; supported are up to 8 in 8, 16 in 16 and 32 in 32", s.path, s.bits_stored,
-           s.bits_allocated);
-  if (!s.is_float &&
-      (s.high_bit.value_or(s.bits_stored - 1) < s.bits_stored - 1 || s.high_bit.value_or(0) >= s.bits_allocated))
-    refuse("{}: its highest bit is {}, with {} bits a pixel in {}", s.path, *s.high_bit, s.bits_stored,
-           s.bits_allocated);
-  if (s.rows < 1 || s.columns < 1 || s.rows > volume::kMaxSide || s.columns > volume::kMaxSide)
-    refuse("{}: has {} x {} pixels, limits 1 and {}", s.path, s.columns, s.rows, volume::kMaxSide);
-  if (!s.compressed && s.photometric != "YBR_FULL_422" && s.data_bytes < s.pixel_bytes())
-    refuse("{}: claims {} x {} pixels of {} bits ({} bytes), has {} bytes of them", s.path, s.columns, s.rows,
-           s.bits_allocated, s.pixel_bytes(), s.data_bytes);
-  if (!std::isfinite(s.slope) || !std::isfinite(s.intercept) || s.slope == 0)
-    refuse("{}: its values are scaled by {} and shifted by {}", s.path, s.slope, s.intercept);
+  const DicomPixels& p = s.pixels;
+  if (s.data.syntax.starts_with("1.2.840.10008.1.2.4.10"))
+    refuse("{}: is a film (transfer syntax {}), no volume", s.path, in_quotes(s.data.syntax));
+  check_pixels(p, s.path);
+  if (!s.data.compressed && p.photometric != "YBR_FULL_422" && s.data.bytes < p.bytes())
+    refuse("{}: claims {} x {} pixels of {} bits ({} bytes), has {} bytes of them", s.path, p.columns, p.rows,
+           p.bits_allocated, p.bytes(), s.data.bytes);
 }
 
 // True if two slices have equal pixels, as far as their files show without unpacking.
 bool same_pixels(const DicomSlice& a, const DicomSlice& b) {
-  if (a.deflated || b.deflated || a.data_bytes != b.data_bytes || (a.compressed && a.frames > 1)) return false;
+  if (a.data.deflated || b.data.deflated || a.data.bytes != b.data.bytes || (a.data.compressed && a.frames > 1))
+    return false;
   const auto file = MappedFile::open(a.path), other = MappedFile::open(b.path);
-  if (!file || !other || a.data_at + a.data_bytes > (*file)->text().size()) return false;
-  return (*file)->text().substr(a.data_at, a.data_bytes) ==
-         (*other)->text().substr(std::min<size_t>(b.data_at, (*other)->text().size()), b.data_bytes);
+  if (!file || !other || a.data.at + a.data.bytes > (*file)->text().size()) return false;
+  return (*file)->text().substr(a.data.at, a.data.bytes) ==
+         (*other)->text().substr(std::min<size_t>(b.data.at, (*other)->text().size()), b.data.bytes);
 }
 
 // Returns the header common to all steps. If slices are stored or scaled differently, all become f32.
@@ -124,27 +129,27 @@ VolumeFileHeader header_of(const DicomOrder& order) {
   const DicomSlice& first = order.slices.front();
   VolumeFileHeader h;
   h.format = "dicom";
-  h.size = {first.columns, first.rows, int64_t(order.steps[0].size())};
-  h.index_to_data =
-      placement(first.along_row * first.spacing.x, first.along_column * first.spacing.y, order.step, order.origin);
+  h.size = {first.pixels.columns, first.pixels.rows, int64_t(order.steps[0].size())};
+  h.index_to_data = placement(first.plane.along_row * first.plane.spacing.x,
+                              first.plane.along_column * first.plane.spacing.y, order.step, order.origin);
   h.unit = "mm";
   h.space = scene::Space::kLps;
   h.ct = first.modality == "CT";
+  const DicomPixels& stored = first.pixels;
   const bool even = std::all_of(order.slices.begin(), order.slices.end(), [&](const DicomSlice& s) {
-    return s.slope == first.slope && s.intercept == first.intercept && stored_type(s) == stored_type(first) &&
-           s.bits_stored == first.bits_stored && is_inverted(s) == is_inverted(first);
+    return s.pixels.is_stored_as(stored) && is_inverted(s) == is_inverted(first);
   });
-  h.stored = even ? stored_type(first) : StoredType::kF32;
-  if (even) h.scale = first.slope, h.offset = first.intercept;
+  h.stored = even ? stored.stored_type() : StoredType::kF32;
+  if (even) h.scale = stored.slope, h.offset = stored.intercept;
   return h;
 }
 
 void say_values(DicomSeries& series) {
   const DicomSlice& first = series.order.slices.front();
   std::string& remark = series.order.remark;
-  if (first.components == 3) say(remark, "colours are shown as their brightness");
+  if (first.pixels.components == 3) say(remark, "colours are shown as their brightness");
   if (is_inverted(first)) say(remark, "low values are bright in the file (MONOCHROME1), and were turned round");
-  if (first.photometric == "MONOCHROME1" && !is_inverted(first))
+  if (first.pixels.photometric == "MONOCHROME1" && !is_inverted(first))
     say(remark, "low values are bright in the file (MONOCHROME1); values are kept");
 }
 
@@ -157,8 +162,8 @@ std::shared_ptr<const DicomSeries> series_at(const std::string& path, const std:
     const auto slices = need(parse_dicom(file->text(), path));
     const fs::path parent = fs::path(path).parent_path();
     folder = parent.empty() ? "." : parent.string();
-    if (slices.front().data_bytes > 0) wanted = slices.front().series;
-    lone = slices.front().stacked;
+    if (slices.front().data.bytes > 0) wanted = slices.front().series;
+    lone = slices.front().plane.stacked;
   }
   auto found = read_slices(folder);
   if (lone)  // an ultrasound film: other files of its series are other films
@@ -190,14 +195,15 @@ std::shared_ptr<const DicomSeries> series_at(const std::string& path, const std:
 
 }  // namespace
 
-StoredType stored_type(const DicomSlice& s) {
-  if (s.is_float) return s.bits_allocated == 32 ? StoredType::kF32 : StoredType::kF64;
-  if (s.components == 3) return StoredType::kU8;
-  return whole_type(s.bits_allocated > 16 ? 4 : size_t(s.bits_allocated) / 8, s.is_signed);
+StoredType DicomPixels::stored_type() const {
+  if (is_float) return bits_allocated == 32 ? StoredType::kF32 : StoredType::kF64;
+  if (components == 3) return StoredType::kU8;
+  return whole_type(bits_allocated > 16 ? 4 : size_t(bits_allocated) / 8, is_signed);
 }
 
 bool is_inverted(const DicomSlice& s) {
-  return s.photometric == "MONOCHROME1" && s.slope == 1 && s.intercept == 0 && s.modality != "CT" && s.modality != "PT";
+  return s.pixels.photometric == "MONOCHROME1" && s.pixels.slope == 1 && s.pixels.intercept == 0 &&
+         s.modality != "CT" && s.modality != "PT";
 }
 
 std::vector<std::string> DicomSeries::files() const {

@@ -42,9 +42,14 @@ struct Values {
   double quaternion[3], shift[3], rows[12];
 };
 
+// Where the fields are, in bytes.
+struct Places {
+  size_t dim, type, pixdim, slope, qform, sform, quaternion, rows;
+};
+
 template <class Real, class Size, class Code>
-Values values_of(const NiftiFields& f, size_t dim, size_t type, size_t pixdim, size_t slope, size_t qform, size_t sform,
-                 size_t quaternion, size_t rows) {
+Values values_of(const NiftiFields& f, const Places& at) {
+  const auto& [dim, type, pixdim, slope, qform, sform, quaternion, rows] = at;
   Values v{};
   for (size_t a = 0; a < 8; ++a) v.dim[a] = f.at<Size>(dim + a * sizeof(Size));
   v.type = f.at<int16_t>(type);
@@ -117,8 +122,8 @@ VolumeFileHeader parse(std::string_view content, const std::string& path) {
   if (!single && magic != (two ? "ni2" : "ni1"))
     refuse("{}: is no NIfTI file (an Analyze file?): its magic is {}", path, in_quotes(magic));
   const NiftiFields f(content, swapped);
-  Values v = two ? values_of<double, int64_t, int32_t>(f, 16, 12, 104, 176, 344, 348, 352, 400)
-                 : values_of<float, int16_t, int16_t>(f, 40, 70, 76, 112, 252, 254, 256, 280);
+  Values v = two ? values_of<double, int64_t, int32_t>(f, {16, 12, 104, 176, 344, 348, 352, 400})
+                 : values_of<float, int16_t, int16_t>(f, {40, 70, 76, 112, 252, 254, 256, 280});
   v.data_at = two ? double(f.at<int64_t>(168)) : double(f.at<float>(108));
 
   VolumeFileHeader h;

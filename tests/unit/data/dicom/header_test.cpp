@@ -26,16 +26,16 @@ TEST_P(EnhancedDicom, GivesEachFrameItsOwnPlaceAndScale) {
   for (size_t f = 0; f < 3; ++f) {
     const DicomSlice& s = slices[f];
     EXPECT_EQ(s.frame, int(f));
-    EXPECT_EQ(s.slope, (std::array{2.0, 1.0, 0.5})[f]);
-    EXPECT_EQ(s.intercept, (std::array{7.0, 0.0, -1.0})[f]);
+    EXPECT_EQ(s.pixels.slope, (std::array{2.0, 1.0, 0.5})[f]);
+    EXPECT_EQ(s.pixels.intercept, (std::array{7.0, 0.0, -1.0})[f]);
     const glm::dvec3 at(kPattern.index_to_data * glm::dvec4(0, 0, e.frames[f].k, 1));
-    ASSERT_TRUE(s.position);
-    EXPECT_LT(glm::distance(*s.position, at), 1e-9);
-    EXPECT_LT(glm::distance(s.along_row, glm::normalize(glm::dvec3(kPattern.index_to_data[0]))), 1e-9);
-    EXPECT_EQ(s.spacing, glm::dvec2(0.5, 0.75));
-    EXPECT_FALSE(s.stacked);
-    EXPECT_EQ(s.data_bytes, 40u);
-    EXPECT_EQ(s.data_at, slices[0].data_at + 40 * f);
+    ASSERT_TRUE(s.plane.position);
+    EXPECT_LT(glm::distance(*s.plane.position, at), 1e-9);
+    EXPECT_LT(glm::distance(s.plane.along_row, glm::normalize(glm::dvec3(kPattern.index_to_data[0]))), 1e-9);
+    EXPECT_EQ(s.plane.spacing, glm::dvec2(0.5, 0.75));
+    EXPECT_FALSE(s.plane.stacked);
+    EXPECT_EQ(s.data.bytes, 40u);
+    EXPECT_EQ(s.data.at, slices[0].data.at + 40 * f);
   }
 }
 
@@ -72,7 +72,7 @@ TEST(DicomHeader, BelievesTheElementsRatherThanTheSyntaxThatTheyClaim) {
   const std::string said_explicit = "1.2.840.10008.1.2.1";
   const auto slices =
       parsed(dicom_slice(kPattern, 0, {.syntax = DicomWriter::Syntax::kImplicit, .syntax_uid = said_explicit}));
-  EXPECT_EQ(slices[0].columns, 5);
+  EXPECT_EQ(slices[0].pixels.columns, 5);
 }
 
 TEST(DicomHeader, InflatesDeflatedElements) {
@@ -80,7 +80,7 @@ TEST(DicomHeader, InflatesDeflatedElements) {
   const size_t begin = plain.find(std::string("\x08\0", 2), 132);
   const std::string deflated = plain.substr(0, begin) + packed(plain.substr(begin), -15);
   const auto slices = parsed(deflated);
-  EXPECT_TRUE(slices[0].deflated);
+  EXPECT_TRUE(slices[0].data.deflated);
   EXPECT_EQ(slices[0].instance, 3);
   const auto inflated = inflate_dicom(deflated, "a.dcm");
   ASSERT_TRUE(inflated.ok());
@@ -94,13 +94,13 @@ TEST(DicomHeader, StacksFramesWithoutPositionsAndPlacesThoseOfADose) {
   e.frames = {{0}, {1}, {2}};
   auto slices = parsed(enhanced_dicom(kPattern, e));
   ASSERT_EQ(slices.size(), 3u);
-  EXPECT_TRUE(slices[1].stacked);
-  EXPECT_FALSE(slices[1].position);
+  EXPECT_TRUE(slices[1].plane.stacked);
+  EXPECT_FALSE(slices[1].plane.position);
   e.offsets = "0\\2.5\\7";
   slices = parsed(enhanced_dicom(kPattern, e));
-  ASSERT_TRUE(slices[2].position);
-  EXPECT_NEAR(glm::distance(*slices[2].position, *slices[0].position), 7, 1e-9);
-  EXPECT_FALSE(slices[2].stacked);
+  ASSERT_TRUE(slices[2].plane.position);
+  EXPECT_NEAR(glm::distance(*slices[2].plane.position, *slices[0].plane.position), 7, 1e-9);
+  EXPECT_FALSE(slices[2].plane.stacked);
 }
 
 TEST(DicomHeader, RefusesFramesThatItsPixelsCannotHold) {
@@ -126,7 +126,7 @@ TEST(DicomHeader, EnhancedFilesCutAnywhereAreRefused) {
     const std::string content = enhanced_dicom(kPattern, e);
     for (size_t bytes = 133; bytes < content.size(); ++bytes) {
       const auto slices = parse_dicom(content.substr(0, bytes), "a.dcm");
-      EXPECT_TRUE(!slices.ok() || slices->front().data_bytes == 0) << bytes;
+      EXPECT_TRUE(!slices.ok() || slices->front().data.bytes == 0) << bytes;
     }
   }
 }

@@ -14,8 +14,8 @@ DicomSlice slice(double z, int number = 0) {
   s.path = "slice" + std::to_string(number);
   s.uid = "1." + std::to_string(number);
   s.instance = number;
-  s.rows = 4, s.columns = 5;
-  s.position = glm::dvec3(1, 2, z);
+  s.pixels.rows = 4, s.pixels.columns = 5;
+  s.plane.position = glm::dvec3(1, 2, z);
   return s;
 }
 
@@ -33,7 +33,7 @@ DicomOrder order(std::vector<DicomSlice> slices, bool same = false) {
 std::vector<double> heights_of(const DicomOrder& o, size_t step = 0) {
   std::vector<double> out;
   for (const DicomLayer& l : o.steps[step])
-    out.push_back(o.slices[l.below].position->z * (1 - l.share) + o.slices[l.above].position->z * l.share);
+    out.push_back(o.slices[l.below].plane.position->z * (1 - l.share) + o.slices[l.above].plane.position->z * l.share);
   return out;
 }
 
@@ -86,7 +86,7 @@ TEST(DicomOrder, LeavesOutLocalizersOthersAndCopies) {
   scout.image_type = "ORIGINAL\\PRIMARY\\LOCALIZER";
   for (int n = 0; n < 9; ++n) scout.uid += "0", slices.push_back(scout);
   DicomSlice coronal = slice(1, 20), small = slice(1, 21);
-  coronal.along_column = {0, 0, -1}, small.rows = 3;
+  coronal.plane.along_column = {0, 0, -1}, small.pixels.rows = 3;
   slices.push_back(coronal), slices.push_back(small);
   const DicomOrder o = order(slices);
   expect_even(o, 0, 2, 3);
@@ -125,13 +125,13 @@ TEST(DicomOrder, SamePixelsAtAllPlacesAreCopiesAndAirIsNot) {
   EXPECT_EQ(copies.steps.size(), 1u);
   EXPECT_EQ(copies.remark, "left out 3 slices with the pixels of others at their place");
   const DicomOrder air =
-      order_slices(slices, [](const DicomSlice& a, const DicomSlice&) { return a.position->z == 2; });
+      order_slices(slices, [](const DicomSlice& a, const DicomSlice&) { return a.plane.position->z == 2; });
   EXPECT_EQ(air.steps.size(), 2u) << air.remark;
 }
 
 TEST(DicomOrder, KeepsWhatIsAskewAskew) {
   auto slices = at({0, 2, 4});
-  for (DicomSlice& s : slices) s.position->y += s.position->z * std::tan(0.2);
+  for (DicomSlice& s : slices) s.plane.position->y += s.plane.position->z * std::tan(0.2);
   const DicomOrder o = order(slices);
   EXPECT_NEAR(o.step.y, 2 * std::tan(0.2), 1e-9);
   EXPECT_NEAR(o.step.z, 2, 1e-9);
@@ -141,10 +141,10 @@ TEST(DicomOrder, KeepsWhatIsAskewAskew) {
 TEST(DicomOrder, TakesAnyValuesOfHostileFiles) {
   for (const double odd : {0.0, -1.0, 1e11, -1e11, 1e-300}) {
     auto slices = at({0, 1, 2});
-    slices[1].position->z = odd;
-    slices[2].spacing = {odd, odd};
+    slices[1].plane.position->z = odd;
+    slices[2].plane.spacing = {odd, odd};
     EXPECT_FALSE(order(slices).steps.empty());
-    for (DicomSlice& s : slices) s.along_row = s.along_column = {1, 0, 0}, s.spacing = {odd, odd};
+    for (DicomSlice& s : slices) s.plane.along_row = s.plane.along_column = {1, 0, 0}, s.plane.spacing = {odd, odd};
     EXPECT_FALSE(order(slices).steps.empty());
   }
 }
