@@ -18,12 +18,8 @@ namespace telesplat::net {
 
 namespace {
 constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
-// First asks for the clock in quick succession: the shortest round trip of several is near the shortest possible.
-constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
-constexpr int kFirstClocks = 8;
 constexpr double kSilence_s = 5;       // a master answers once a second
 constexpr double kSignPeriod_s = 1.5;  // period of signs of life while no reports come
-constexpr int kMostRenewals = 3;
 }  // namespace
 
 struct MasterLink::Life {
@@ -38,7 +34,7 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
       socket_(context, Kind::kDealer, hello_.name + ":master",
               {.max_message_bytes = wire::kMaxControlBytes, .watch_connecting = true, .read_ahead = true}),
       endpoint_(endpoint),
-      give_up_after_s_(give_up_after_s),
+      waiting_(give_up_after_s),
       host_(endpoint) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
@@ -61,21 +57,19 @@ void MasterLink::follow_welcomed(bool welcomed) {
   welcomed_ = welcomed;
   life_->said_s = monotonic_s();
   life_->welcomed = welcomed;
-  if (welcomed) hellos_ = renewals_ = 0;
+  if (welcomed) renewals_.welcomed();
 }
 
 void MasterLink::say_hello(double sent_s) {
   hello_.sent_s = sent_s;
   socket_.send(hello_);
-  ++hellos_;
+  renewals_.said_hello();
 }
 
-// Skips refusals of the old instance: the master answers each hello that was sent as it.
 bool MasterLink::renew() {
   if (!renewed_) return false;
-  if (hellos_before_ > 0) return --hellos_before_, true;
-  if (++renewals_ > kMostRenewals) return false;
-  hellos_before_ = std::max(0, std::exchange(hellos_, 0) - 1);
+  if (const auto answer = renewals_.refused(); answer != Renewals::Answer::kRenew)
+    return answer == Renewals::Answer::kToInstanceBefore;
   life_->self = hello_.instance = make_instance_id();
   log::warn("the master knows {} as a process of another key: it joins again as a new one", hello_.name);
   follow_welcomed(false);
@@ -107,14 +101,14 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
     report(status, now_s);
     last_status_s_ = now_s;
   }
-  if (welcomed_) ask_clock(now_s);
+  if (welcomed_ && clock_polls_.ask(now_s)) socket_.send(wire::ClockRequest{monotonic_s()});
   look_for_refusal();
   look_at_waiting(now_s);
 }
 
 // Describes what this process waits for and cannot go on without; empty: nothing.
 std::string MasterLink::awaited() {
-  if (shutdown_ || warned_) return {};
+  if (end_.over || warned_) return {};
   if (welcomed_ && silent_s_ < kSilence_s)
     return session_ ? lacking_text(scene::value_or(session_->facts, "lacks", std::string())) : std::string();
   const char* const before = session_ ? "the master of the session is gone: " : "";
@@ -134,31 +128,24 @@ void MasterLink::look_at_waiting(double now_s) {
   constexpr double kLongestTurn_s = 0.5;
   silent_s_ += std::clamp(now_s - std::exchange(ticked_s_, now_s), 0.0, kLongestTurn_s);
   if (const auto line = waiting_.look(awaited(), now_s)) log::warn("{}", *line);
-  if (give_up_after_s_ <= 0 || shutdown_ || waiting_.waited_s(now_s) < give_up_after_s_) return;
-  log::error("{}; gives up after {} s (--give-up-after)", awaited(), give_up_after_s_);
-  gave_up_ = shutdown_ = true;
+  if (end_.over || !waiting_.gives_up(now_s)) return;
+  log::error("{}; gives up after {} s (--give-up-after)", awaited(), waiting_.most_s());
+  end_.gave_up = end_.over = true;
 }
 
 // A handshake that breaks off is no refusal: it may be a tunnel whose other end is not there yet.
 void MasterLink::look_for_refusal() {
-  if (refused_) return;
+  if (end_.refused) return;
   const auto refusal = socket_.refusal();
   if (refusal.text.empty()) {
     warned_ = false;
   } else if (!refusal.may_pass) {
     log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, refusal.text);
-    refused_ = shutdown_ = true;
+    end_.refused = end_.over = true;
   } else if (!warned_) {
     log::warn("the master at {} does not let {} in: {}; trying on", endpoint_, hello_.name, refusal.text);
     warned_ = true;
   }
-}
-
-void MasterLink::ask_clock(double now_s) {
-  if (now_s - last_clock_s_ < (clock_asked_ < kFirstClocks ? kFirstClockPeriod_s : kClockPeriod_s)) return;
-  socket_.send(wire::ClockRequest{monotonic_s()});
-  last_clock_s_ = now_s;
-  ++clock_asked_;
 }
 
 void MasterLink::learn_clock(const wire::ClockReply& reply, double arrived_s) {
@@ -172,7 +159,7 @@ bool MasterLink::handle(const Message& message) {
   if (message.type == wire::Welcome::kName) {
     if (auto welcome = socket_.decode<wire::Welcome>(message)) {
       const bool another = !session_ || session_->master != welcome->master;
-      if (another) clock_.clear(), clock_asked_ = 0;
+      if (another) clock_.clear(), clock_polls_.begin_anew();
       session_ = std::move(welcome);
       if (!welcomed_) follow_welcomed(true);
       ++version_;
@@ -195,13 +182,14 @@ bool MasterLink::handle(const Message& message) {
   if (message.type == wire::Shutdown::kName) {
     if (const auto shutdown = socket_.decode<wire::Shutdown>(message)) {
       if (shutdown->reason.starts_with(wire::kInstanceTaken) && renew()) return true;
-      shutdown_reason_ = printable(shutdown->reason);
-      refused_ = !welcomed_ && !session_;
-      if (refused_)
-        log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, shutdown_reason_);
+      end_ = {.over = true,
+              .refused = !welcomed_ && !session_,
+              .gave_up = end_.gave_up,
+              .reason = printable(shutdown->reason)};
+      if (end_.refused)
+        log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, end_.reason);
       else
-        log::info("{}", shutdown_reason_);
-      shutdown_ = true;
+        log::info("{}", end_.reason);
     }
     return true;
   }

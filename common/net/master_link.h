@@ -3,12 +3,14 @@
 // tick, the thread that reads the socket sends signs of life.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "common/net/connections/waiting.h"
 #include "common/net/socket.h"
@@ -64,6 +66,60 @@ class ClockEstimate {
   double drift_ = 0, drift_error_ = kUnknownDrift;
 };
 
+/// When the other clock is asked for. Often at first: the shortest round trip of some is near the shortest there is.
+class ClockPolls {
+ public:
+  static constexpr double kPeriod_s = 1.0, kFirstPeriod_s = 0.05;
+  static constexpr int kFirst = 8;
+
+  /// True: it should be asked now, and is taken to be.
+  bool ask(double now_s) {
+    if (now_s - last_s_ < (asked_ < kFirst ? kFirstPeriod_s : kPeriod_s)) return false;
+    last_s_ = now_s;
+    ++asked_;
+    return true;
+  }
+  void begin_anew() { asked_ = 0; }
+
+ private:
+  int asked_ = 0;
+  double last_s_ = -1e9;
+};
+
+/// A process becomes another instance when the master says that the one before is another's: kMost times in a row.
+class Renewals {
+ public:
+  static constexpr int kMost = 3;
+
+  void said_hello() { ++hellos_; }
+  void welcomed() { hellos_ = renewals_ = 0; }
+  enum class Answer {
+    kToInstanceBefore,  ///< each hello that was said as the instance before is answered
+    kRenew,
+    kRefused
+  };
+  /// A hello was answered so.
+  Answer refused() {
+    if (hellos_before_ > 0) return --hellos_before_, Answer::kToInstanceBefore;
+    if (++renewals_ > kMost) return Answer::kRefused;
+    hellos_before_ = std::max(0, std::exchange(hellos_, 0) - 1);
+    return Answer::kRenew;
+  }
+
+ private:
+  int hellos_ = 0;         // hellos of this instance, since the last welcome
+  int hellos_before_ = 0;  // hellos of the instance before: they will be refused, too
+  int renewals_ = 0;       // renewals since the last welcome
+};
+
+/// The end of the session for a process.
+struct SessionEnd {
+  bool over = false;     ///< its end was told, the master does not let the process in, or it waited too long
+  bool refused = false;  ///< the master does not take it in
+  bool gave_up = false;  ///< it waited too long
+  std::string reason;    ///< as the master says it; empty: it has said nothing
+};
+
 class MasterLink {
  public:
   using Values = std::map<std::string, double>;
@@ -104,13 +160,13 @@ class MasterLink {
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
   /// The session is over for this process: a shutdown came, the master does not let it in, or it waited too long.
-  bool shutdown_requested() const { return shutdown_; }
+  bool shutdown_requested() const { return end_.over; }
   /// Reason that the master gave for the session's end; empty: none yet.
-  const std::string& shutdown_reason() const { return shutdown_reason_; }
+  const std::string& shutdown_reason() const { return end_.reason; }
   /// The master does not accept this process (the reason was logged): bad usage.
-  bool refused() const { return refused_; }
+  bool refused() const { return end_.refused; }
   /// The process' exit code as far as the master goes: 2 if it is refused, 1 if it waited too long, else 0.
-  int exit_code() const { return refused_ ? 2 : gave_up_ ? 1 : 0; }
+  int exit_code() const { return end_.refused ? 2 : end_.gave_up ? 1 : 0; }
   /// Converts this machine's monotonic time to the master's clock.
   double to_master_s(double local_s) const { return local_s + clock_.offset_s(local_s); }
   const ClockEstimate& clock() const { return clock_; }
@@ -125,7 +181,6 @@ class MasterLink {
   void report(const std::function<Values()>& status, double now_s);
   void say_hello(double sent_s);
   bool renew();
-  void ask_clock(double now_s);
   void look_for_refusal();
   std::string awaited();
   void look_at_waiting(double now_s);
@@ -138,21 +193,19 @@ class MasterLink {
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;
-  bool shutdown_ = false, welcomed_ = false, refused_ = false, warned_ = false, gave_up_ = false;
-  std::string shutdown_reason_;
+  SessionEnd end_;
+  bool welcomed_ = false;
+  bool warned_ = false;  // that the master does not let it in
   Obey obey_;
   Renewed renewed_;
-  int hellos_ = 0;         // hellos of this instance, since the last welcome
-  int hellos_before_ = 0;  // hellos of the instance before: they will be refused, too
-  int renewals_ = 0;       // renewals since the last welcome
+  Renewals renewals_;
   ClockEstimate clock_;
-  int clock_asked_ = 0;  // requests since the master is known
+  ClockPolls clock_polls_;
   const std::string endpoint_;
-  const double give_up_after_s_;
   Waiting waiting_;
   HostSearch host_;
   double ticked_s_ = -1e9, silent_s_ = 0;  // silent_s_: since the last message of the master, while this process ran
-  double last_hello_s_ = -1e9, last_status_s_ = -1e9, last_clock_s_ = -1e9;
+  double last_hello_s_ = -1e9, last_status_s_ = -1e9;
 };
 
 }  // namespace telesplat::net

@@ -118,6 +118,54 @@ struct ZeroMq final : Network {
   }
 };
 
+// Counts a socket's attempts to connect by their results.
+struct Attempts {
+  void watch(zmq::context_t& context, zmq::socket_t& socket) {
+    if (!monitor)
+      monitor.emplace(context, socket, ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | kHandshakeFailed);
+  }
+  // tunnel: that the socket connects through; null: none.
+  void look(const Tunnel* tunnel) {
+    while (const auto event = monitor ? monitor->next() : std::nullopt) note(event->what, tunnel);
+  }
+  // A server with keys may close a connection before it sends its own greeting, so that libzmq cannot say why.
+  void look_for_mechanism(const std::string& endpoint) {
+    if (!std::exchange(looked_for_mechanism, true) && mechanism_at(endpoint) == "CURVE")
+      turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
+  }
+
+  // Events that tell why it is not let in.
+  static constexpr int kHandshakeFailed =
+      ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+
+  void note(uint16_t what, const Tunnel* tunnel) {
+    in_touch = what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED;
+    if (what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
+      broken_off = 0;
+    } else if (what & kHandshakeFailed) {
+      ++failed_unseen;
+      if (tunnel && tunnel->failed() != tunnel_failed)  // no process listens at the tunnel's other end
+        ++tunnel_failed, ++failed;
+      else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
+        ++broken_off;
+      else
+        turned_away = what;
+    } else if (failed_unseen > 0) {  // a server is there, which did not let us in
+      --failed_unseen;
+    } else {
+      ++failed;
+    }
+  }
+
+  std::optional<Monitor> monitor;
+  std::atomic<uint64_t> failed{0};
+  std::atomic<bool> in_touch{false};
+  std::atomic<uint32_t> broken_off{0}, turned_away{0};  // handshakes; event, 0: none
+  uint64_t tunnel_failed = 0;                           // value of Tunnel::failed() when last read
+  size_t failed_unseen = 0;                             // failed handshakes whose attempt's end was not reported yet
+  bool looked_for_mechanism = false;
+};
+
 struct Parts {
   Parts(ZeroMq& home, Kind kind, std::string name, const SocketOptions& options)
       : home(home), kind(kind), name(std::move(name)), options(options), socket(home.context, zmq_type(kind)) {
@@ -168,32 +216,6 @@ struct Parts {
                 endpoint);
   }
 
-  // Events that show why the server does not let this socket in.
-  static constexpr int kHandshakeFailed =
-      ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
-
-  void note_attempt(uint16_t what) {
-    in_touch = what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED;
-    if (what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
-      broken_off = 0;
-    } else if (what & kHandshakeFailed) {
-      ++failed_unseen;
-      if (tunnel && tunnel->failed() != tunnel_failed)  // no process listens at the tunnel's other end
-        ++tunnel_failed, ++failed_connections;
-      else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
-        ++broken_off;
-      else
-        turned_away = what;
-    } else if (failed_unseen > 0) {  // a server is there, which did not let us in
-      --failed_unseen;
-    } else {
-      ++failed_connections;
-    }
-  }
-  void look_at_attempts() {
-    while (const auto event = attempts ? attempts->next() : std::nullopt) note_attempt(event->what);
-  }
-
   void watch_connections() {
     if (connections) return;
     connections =
@@ -222,7 +244,7 @@ struct Parts {
   void begin_reading() {
     if (connections) connections->begin_reading();
     if (connections && guarded) close_revoked();
-    look_at_attempts();
+    attempts.look(tunnel);
   }
 
   // message: the last frame of a message that took `bytes` on the network.
@@ -439,19 +461,14 @@ struct Parts {
   SocketOptions options;
   zmq::socket_t socket;
   std::unique_ptr<Connections> connections;  // only if the socket binds
-  std::optional<Monitor> attempts;           // only if it connects, with watch_connecting
+  Attempts attempts;                         // only if it connects, with watch_connecting
   Socket::Due due;                           // returns messages that the reading thread sends by itself
-  std::atomic<uint64_t> rejected{0}, failed_connections{0}, queue_refused{0};
-  Tunnel* tunnel = nullptr;    // only if it connects through a proxy; owned by the context
-  uint64_t tunnel_failed = 0;  // value of Tunnel::failed() when last read
+  std::atomic<uint64_t> rejected{0}, queue_refused{0};
+  Tunnel* tunnel = nullptr;  // only if it connects through a proxy; owned by the context
   QueuedBytes queued{options.most_queued_bytes};
   bool guarded = false;                                   // it is bound with keys
   std::shared_ptr<const std::set<std::string>> may_stay;  // the doorkeeper's last answer
-  std::atomic<bool> in_touch{false};                      // only if it connects
-  size_t failed_unseen = 0;                               // failed handshakes whose attempt's end was not reported yet
-  std::atomic<uint32_t> broken_off{0}, turned_away{0};    // only if it connects: handshakes; event, 0: none
   std::string endpoint;                                   // address that it connects to
-  bool looked_for_mechanism = false;
   std::mutex log_mutex;  // guards the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
   std::unique_ptr<ReadAhead> ahead;  // with read_ahead, from the first message on; destroyed first
@@ -485,8 +502,8 @@ class ZeroMqCarrier final : public Carrier {
     return parts_.rejected + parts_.counts().silent;
   }
   uint64_t failed_connections() override {
-    if (!parts_.ahead) parts_.look_at_attempts();
-    return parts_.failed_connections;
+    if (!parts_.ahead) parts_.attempts.look(parts_.tunnel);
+    return parts_.attempts.failed;
   }
   uint64_t keys_refused() override { return parts_.counts().keys_refused; }
   uint64_t connections_refused() override { return parts_.counts().refused; }
@@ -494,8 +511,8 @@ class ZeroMqCarrier final : public Carrier {
   uint64_t queue_refused() override { return parts_.queue_refused; }
   Socket::Refusal refusal() override;
   bool in_touch() override {
-    if (!parts_.ahead) parts_.look_at_attempts();
-    return parts_.in_touch;
+    if (!parts_.ahead) parts_.attempts.look(parts_.tunnel);
+    return parts_.attempts.in_touch;
   }
   bool tunnelled() override { return parts_.tunnel != nullptr; }
   const std::string& name() const override { return parts_.name; }
@@ -538,9 +555,8 @@ Result<std::string> ZeroMqCarrier::bind(const std::string& endpoint, bool insecu
 Status ZeroMqCarrier::connect(const std::string& endpoint) {
   CHECK(!parts_.ahead);
   try {
-    if (parts_.options.watch_connecting && !parts_.attempts && !parts_.connections)
-      parts_.attempts.emplace(parts_.home.context, parts_.socket,
-                              ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | Parts::kHandshakeFailed);
+    if (parts_.options.watch_connecting && !parts_.connections)
+      parts_.attempts.watch(parts_.home.context, parts_.socket);
     if (const Keys* keys = parts_.home.access.keys()) {
       if (!keys->own) return Error{fmt::format("{}: its keys are not for connecting", parts_.name)};
       identify(parts_.socket, *keys);
@@ -558,17 +574,14 @@ Status ZeroMqCarrier::connect(const std::string& endpoint) {
 }
 
 Socket::Refusal ZeroMqCarrier::refusal() {
-  if (!parts_.ahead) parts_.look_at_attempts();
+  if (!parts_.ahead) parts_.attempts.look(parts_.tunnel);
   const Keys* keys = parts_.home.access.keys();
-  if (keys && parts_.turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
+  if (keys && parts_.attempts.turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
     return {.text =
                 fmt::format("the key {} of {} is not let in there", keys->own ? keys->own->name : "", keys->folder)};
-  const bool broken_off = parts_.broken_off >= kBrokenOff;
-  // A server with keys may close a connection before it sends its own greeting, so that libzmq cannot say why.
-  if (!keys && broken_off && !parts_.tunnel && !std::exchange(parts_.looked_for_mechanism, true) &&
-      mechanism_at(parts_.endpoint) == "CURVE")
-    parts_.turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
-  const bool turned_away = parts_.turned_away != 0;
+  const bool broken_off = parts_.attempts.broken_off >= kBrokenOff;
+  if (!keys && broken_off && !parts_.tunnel) parts_.attempts.look_for_mechanism(parts_.endpoint);
+  const bool turned_away = parts_.attempts.turned_away != 0;
   if (!turned_away && !broken_off) return {};
   if (keys)
     return {.text = fmt::format("it does not take the keys of {}: it has others, or none", keys->folder),

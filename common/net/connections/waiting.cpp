@@ -20,7 +20,7 @@ constexpr double kSearchEvery_s = 30;
 
 std::optional<std::string> Waiting::look(const std::string& what, double now_s) {
   if (what.empty()) {
-    *this = {};
+    *this = Waiting(most_s_);
     return std::nullopt;
   }
   if (!since_s_) since_s_ = now_s;

@@ -14,13 +14,19 @@ class Waiting {
   static constexpr double kGrace_s = 3;   ///< for each new cause, before the first line about it
   static constexpr double kEvery_s = 60;  ///< between two lines about the same cause
 
+  /// most_s: after waiting for longer a process gives up; 0: never.
+  explicit Waiting(double most_s = 0) : most_s_(most_s) {}
+
   /// what: what the process waits for now, a sentence without its full stop; empty: for nothing. Returns the line that
   /// is due.
   std::optional<std::string> look(const std::string& what, double now_s);
   /// Seconds that it has waited, for one cause or another.
   double waited_s(double now_s) const { return since_s_ ? now_s - *since_s_ : 0; }
+  bool gives_up(double now_s) const { return most_s_ > 0 && waited_s(now_s) >= most_s_; }
+  double most_s() const { return most_s_; }
 
  private:
+  double most_s_;
   std::string what_;
   std::set<std::string> told_;
   std::optional<double> since_s_;
