@@ -199,7 +199,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     s.scatter_encoder.finish(out);
     return covered;
   }
-  s.dense.put(out, image, rect, full ? nullptr : &s.mask, base, bounds, axes);
+  s.dense.put(out, image, {rect, full ? nullptr : &s.mask, base, bounds}, axes);
   return covered;
 }
 
@@ -246,7 +246,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
     if (!decode_sparse(s, image, rect, first, pole) || !s.scatter_decoder.finished()) return std::nullopt;
     return covered;
   }
-  if (!s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base, bounds)) return std::nullopt;
+  if (!s.dense.get(in, image, {rect, full ? nullptr : &s.mask, *base, bounds})) return std::nullopt;
   return covered;
 }
 

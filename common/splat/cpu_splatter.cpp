@@ -134,6 +134,7 @@ void CpuSplatter::Impl::prepare(const DrawList& list, std::span<const geometry::
     if (kernel->surfel) {
       sight.surfels = {surfel_camera(cameras[i]), nullptr, spacing_limits(list.scale), widest_contour(cameras[i])};
       sight.light = ewa_light(shading.parameters(), sight.surfels.camera);
+      sight.light.background = shading.background();
     }
     if (i == 0 || kernel->surfel) {
       prepare_items(list, cameras[i], sight);
@@ -201,7 +202,6 @@ TileCounts CpuSplatter::Impl::splat(const TileInput& input, const ResolvedTile& 
                              .styles = sight.styles.data(),
                              .surfels = sight.surfels,
                              .light = sight.light,
-                             .background = sight.resolve.background,
                              .keys = {workspace.keys.get(), tile.stride, kMargin},
                              .tile = tile,
                              .reach = layout.reach,

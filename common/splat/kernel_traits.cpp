@@ -13,9 +13,7 @@ double disc_distance2(double dx, double dy) { return dx * dx + dy * dy; }
 
 TileCounts splat_flat(const TileWork& w) { return splat_tile(w.input, w.styles, w.keys); }
 TileCounts splat_ellipses(const TileWork& w) { return ellipse_tile(w.input, w.surfels, w.keys); }
-TileCounts splat_ewa(const TileWork& w) {
-  return ewa_tile(w.input, w.surfels, w.light, w.ewa, w.tile, w.reach, w.background);
-}
+TileCounts splat_ewa(const TileWork& w) { return ewa_tile(w.input, w.surfels, w.light, w.ewa, w.tile, w.reach); }
 
 // Tile for kernels with keys. Set by bench splat_square, 3 pixels, one thread: 14.5 ms at 256 x 256, 13.3 ms here (384
 // KiB keys, which leaves the second-level cache some room), 14.0 ms at 256 x 128, 15.1 ms at 128 x 128 (more clusters

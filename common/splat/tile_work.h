@@ -16,7 +16,6 @@ struct TileWork {
   const ItemStyle* styles = nullptr;  ///< flat kernels: one an item
   const SurfelInput& surfels;         ///< surfel kernels
   const EwaLight& light;              ///< surfel kernels that shade
-  uint32_t background = 0;            ///< 0x00RRGGBB
 
   // The thread. `keys` and `tile` are the same memory: Passes::kKeys leaves keys, Passes::kSums colours and infos.
   const KeyBuffer keys;

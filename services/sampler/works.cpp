@@ -42,8 +42,9 @@ Made volume_work(const WorkTools& tools) {
                                   .extend = [&link](const wire::LeaseExtend& m) { link.socket().send(m); },
                                   .to_master_s = [&link](double s) { return link.to_master_s(s); }};
   const SamplerOptions& o = tools.options;
-  return Made(std::make_unique<VolumeWork>(make_shear_slabs(o.threads), o.threads, cache_bytes(o), o.service.name,
-                                           tools.context, master, tools.spans));
+  const VolumeWork::Options options{
+      .threads = o.threads, .cache_bytes = cache_bytes(o), .service_name = o.service.name};
+  return Made(std::make_unique<VolumeWork>(make_shear_slabs(o.threads), options, tools.context, master, tools.spans));
 }
 
 struct Row {

@@ -86,7 +86,7 @@ void VolumeSplat(benchmark::State& state) {
   ShearSplatter splatter(1);
   ShearStats stats;
   for (auto _ : state)
-    benchmark::DoNotOptimize(splatter.splat(volume, scene.colours, frame, 0, scene.grid.size[2], &stats));
+    benchmark::DoNotOptimize(splatter.splat(volume, scene.colours, frame, {0, scene.grid.size[2]}, &stats));
   report(state, stats);
 }
 BENCHMARK(VolumeSplat)->Arg(1)->Arg(2)->Arg(4)->Unit(benchmark::kMillisecond);
@@ -133,7 +133,8 @@ void VolumeFrame(benchmark::State& state) {
   const SlabVolume volume(scene.grid, scene.voxels);
   ShearSplatter splatter(1);
   ShearStats stats;
-  for (auto _ : state) benchmark::DoNotOptimize(splatter.splat(volume, colours, frame, 0, scene.grid.size[2], &stats));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(splatter.splat(volume, colours, frame, {0, scene.grid.size[2]}, &stats));
   report(state, stats);
 }
 BENCHMARK(VolumeFrame)->Arg(10)->Arg(50)->Arg(99)->Unit(benchmark::kMillisecond);

@@ -63,7 +63,7 @@ TEST(HitPacket, SimdEqualsScalarOnEveryTarget) {
       shade_hits(hits, colour, normal);
       for (int k = 0; k < kPacket; ++k) {
         const SurfacePoint expected =
-            surface_point(*view, first + k, hits.u[k], hits.v[k], g[k], d[k], *neutral_colours());
+            surface_point(*view, first + k, {hits.u[k], hits.v[k]}, g[k], d[k], *neutral_colours());
         EXPECT_NEAR(colour[k] >> 16, expected.colour.x, 0.501);
         EXPECT_NEAR(colour[k] >> 8 & 255, expected.colour.y, 0.501);
         EXPECT_NEAR(colour[k] & 255, expected.colour.z, 0.501);
@@ -107,7 +107,7 @@ TEST(HitPacket, ScalarsAreLookedUpOnEveryTarget) {
       shade_hits(hits, colour, normal, &table);
       for (int k = 0; k < kPacket; ++k) {
         const SurfacePoint expected =
-            surface_point(*view, first + k, hits.u[k], hits.v[k], {0, 0, 1}, {0, 0, -1}, table);
+            surface_point(*view, first + k, {hits.u[k], hits.v[k]}, {0, 0, 1}, {0, 0, -1}, table);
         for (int channel = 0; channel < 3; ++channel)  // neighbours in the table differ by one
           EXPECT_NEAR(colour[k] >> (16 - 8 * channel) & 255, expected.colour[channel], 1.01);
       }

@@ -51,7 +51,7 @@ TEST(VolumeReference, SplattedLayersLookLikeRays) {
       const auto camera = look(eye);
       const auto frame = volume::plan_frame(c.scene.grid, std::span(&camera, 1));
       ASSERT_TRUE(frame);
-      const auto images = ShearSplatter(2).splat(volume, c.scene.colours, *frame, 0, c.scene.grid.size[2]);
+      const auto images = ShearSplatter(2).splat(volume, c.scene.colours, *frame, {0, c.scene.grid.size[2]});
       const double at_pose =
           test::psnr(reference.draw(camera, kBackground),
                      test::warp_plainly(c.scene.grid, *frame, images, camera, kBackground), kBackground);
@@ -66,7 +66,7 @@ TEST(VolumeReference, SplattedLayersLookLikeRays) {
       if (view == 0) {
         auto half = c.scene.colours;
         for (auto& level : half) level.extinction /= 2;
-        const auto wrong = ShearSplatter(1).splat(volume, half, *frame, 0, c.scene.grid.size[2]);
+        const auto wrong = ShearSplatter(1).splat(volume, half, *frame, {0, c.scene.grid.size[2]});
         EXPECT_LT(test::psnr(reference.draw(camera, kBackground),
                              test::warp_plainly(c.scene.grid, *frame, wrong, camera, kBackground), kBackground),
                   at_pose - 6)
@@ -95,7 +95,7 @@ TEST(VolumeReference, EyeInside) {
     // sample as finely as displayed.
     const auto frame = volume::plan_frame(grid, std::span(&camera, 1), {.finest = 0.01});
     ASSERT_TRUE(frame);
-    const auto images = ShearSplatter(2).splat(volume, scene.colours, *frame, 0, 48);
+    const auto images = ShearSplatter(2).splat(volume, scene.colours, *frame, {0, 48});
     const auto expected = reference.draw(camera, kBackground);
     EXPECT_GE(test::psnr(expected, test::warp_plainly(grid, *frame, images, camera, kBackground), kBackground), 32)
         << "view " << view;

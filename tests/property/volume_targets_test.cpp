@@ -48,12 +48,12 @@ TEST(VolumeTargets, ImagesAreTheSameToTheBit) {
     ASSERT_TRUE(frame);
     const SlabVolume volume(scene.grid, scene.voxels);
     const int n = scene.grid.size[2], k = round % 2 ? n : n / 2;
-    const auto expected = ShearSplatter(1).splat(volume, scene.colours, *frame, 0, k);
+    const auto expected = ShearSplatter(1).splat(volume, scene.colours, *frame, {0, k});
     for (const auto& image : expected) pixels += image.pixels.size();
     for (const int64_t target : testing::simd_targets()) {
       const testing::OnTarget on(target);
       for (const int threads : {1, 3})
-        expect_equal(ShearSplatter(threads).splat(volume, scene.colours, *frame, 0, k), expected,
+        expect_equal(ShearSplatter(threads).splat(volume, scene.colours, *frame, {0, k}), expected,
                      hwy::TargetName(target) + (" in round " + std::to_string(round)));
     }
   }
@@ -92,13 +92,13 @@ TEST(VolumeTargets, SlabsMeetWithoutSeams) {
     ASSERT_TRUE(frame);
     const int n = scene.grid.size[2];
     ShearSplatter splatter(2);
-    const auto whole = splatter.splat(SlabVolume(scene.grid, scene.voxels), scene.colours, *frame, 0, n);
+    const auto whole = splatter.splat(SlabVolume(scene.grid, scene.voxels), scene.colours, *frame, {0, n});
     std::vector<volume::SliceImage> parts;
     uint64_t voxels = 0;
     for (const auto& [begin, end] : {std::pair{0, n / 3}, {n / 3, n / 3 + 5}, {n / 3 + 5, n}}) {
       const SlabVolume slab(scene.grid, test::part_of(scene, begin - 1, end + 1));
       ShearStats stats;
-      for (auto& image : splatter.splat(slab, scene.colours, *frame, begin, end, &stats)) {
+      for (auto& image : splatter.splat(slab, scene.colours, *frame, {begin, end}, &stats)) {
         EXPECT_EQ(image.k_begin, begin);
         EXPECT_EQ(image.k_end, end);
         parts.push_back(std::move(image));

@@ -33,8 +33,9 @@ void DenseCoder::put_header(std::vector<uint8_t>& out, size_t part) {
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
-void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
-                     const Pixel& base, const TileBounds& bounds, const RoomAxes* axes) {
+void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, const DenseTile& tile,
+                     const RoomAxes* axes) {
+  const auto& [rect, mask, base, bounds] = tile;
   shape_.reset(static_cast<size_t>(rect.width), static_cast<size_t>(rect.height), mask);
   depth_.reset(shape_, base.depth);
   normals_.reset(shape_, bounds.normal);
@@ -52,7 +53,8 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   if (bounds.depth != nullptr) depth_.to_codes(shape_, *bounds.depth);
   depth_.extend(shape_);
   writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
-  normals_.encode(shape_, rows_of(image.normal, rect), depth_, base.normal, one_colour, axes, writer_.sink);
+  normals_.encode(shape_, rows_of(image.normal, rect), depth_, base.normal, one_colour, axes);
+  normals_.put_header(writer_.sink);
   put_header(headers, 1);
   colours_.encode(shape_, colours, base.colour, depth_, axes, bounds.colour);
   writer_.start(ColourPlanes::kMostHeaderBits + 3 * PlaneEncoder::kMostBits);
@@ -112,11 +114,11 @@ std::optional<DenseCoder::Parts> DenseCoder::get_parts(Reader& in) {
   return parts;
 }
 
-bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask, const Pixel& base,
-                     const TileBounds& bounds) {
+bool DenseCoder::get(Reader& in, image::DepthImage& image, const DenseTile& tile) {
+  const auto& [rect, mask, base, bounds] = tile;
   shape_.reset(static_cast<size_t>(rect.width), static_cast<size_t>(rect.height), mask);
   const auto parts = get_parts(in);
-  if (!parts || !source_.coder.start(parts->states.empty() ? nullptr : parts->states.data())) return false;
+  if (!parts || !source_.start(parts->states.empty() ? nullptr : parts->states.data())) return false;
   source_.end = parts->words.data() + parts->words.size();
   if (!get_depth(*parts, image, rect, base, bounds.depth)) return false;
   begin_part(*parts, 1);
@@ -125,7 +127,7 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   begin_part(*parts, 2);
   colours_.mode = parts->colour_mode;
   if (!colours_.decode_header(shape_, base.colour, depth_, bounds.colour, reader_) || !get_symbols(2)) return false;
-  if (!source_.coder.at_rest()) return false;
+  if (!source_.at_rest()) return false;
   get_values(image, rect);
   return true;
 }

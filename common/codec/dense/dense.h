@@ -16,16 +16,20 @@
 
 namespace telesplat::codec::detail {
 
+struct DenseTile {
+  const TileRect& rect;
+  const Mask* mask;   ///< pixels of `rect` that are coded; null: all of them
+  const Pixel& base;  ///< the first of them; its depth is an index of the bounds' lattice, if there is one
+  const TileBounds& bounds;
+};
+
 /// Codes dense tiles. Use one a thread: it keeps its buffers.
 class DenseCoder {
  public:
-  /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them; with a depth
-  /// bound its depth is a lattice index. axes: of the room, from the tile's centre, or null.
-  void put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
-           const Pixel& base, const TileBounds& bounds, const RoomAxes* axes);
-  /// Writes the covered pixels of `rect`. False: the stream is damaged.
-  [[nodiscard]] bool get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask,
-                         const Pixel& base, const TileBounds& bounds);
+  /// axes: of the room, from the tile's centre, or null.
+  void put(std::vector<uint8_t>& out, const image::DepthImage& image, const DenseTile& tile, const RoomAxes* axes);
+  /// Writes the tile's pixels; false where the stream is damaged.
+  [[nodiscard]] bool get(Reader& in, image::DepthImage& image, const DenseTile& tile);
   /// Adds the bytes of a tile to `info`. False: the stream is cut off.
   [[nodiscard]] static bool skip(Reader& in, StreamInfo& info);
 
@@ -56,7 +60,7 @@ class DenseCoder {
   static constexpr size_t kMostPlanes = 6;
   PlaneEncoder encoders_[kMostPlanes];
   PlaneDecoder decoders_[kMostPlanes];
-  WordSource source_;
+  SymbolDecoder source_;
   BitWriter writer_;
   BitReader reader_;
   std::vector<uint8_t> words_;

@@ -129,14 +129,13 @@ void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
   const auto r = static_cast<ptrdiff_t>(y);
   for (auto& terms : terms_)
     if (terms.size() < shape.width) terms.resize(shape.width);
-  uint32_t *const terms = terms_[0].data(), *const take_left = terms_[1].data(), *const take_slope = terms_[2].data();
-  plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.z.row(r), symbols.tokens.row(r), shape.width, terms,
-              take_left, take_slope);
+  const PlaneTerms of{terms_[0].data(), terms_[1].data(), terms_[2].data()};
+  plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.z.row(r), symbols.tokens.row(r), shape.width, of);
   uint32_t* const row = depth.row(r);
   with_holes(depth.row(r - 1), shape, y, row, [&](ptrdiff_t x, ptrdiff_t end) {
     uint32_t left = row[x - 1], slope = left - row[x - 2];
     for (; x < end; ++x) {
-      const uint32_t next = terms[x] + (left & take_left[x]) + (slope & take_slope[x]);
+      const uint32_t next = of.terms[x] + (left & of.take_left[x]) + (slope & of.take_slope[x]);
       slope = next - left, left = next;  // modulo 2^32, which the mask below makes exact
       row[x] = next & kMaxDepthCode;
     }

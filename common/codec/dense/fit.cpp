@@ -89,9 +89,10 @@ void Samples::choose(const TileShape& shape, size_t about) {
         places.push_back({x, y});
 }
 
-bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
-                  int y0, const double matrix[9], GeometryModel& model) {
+bool fit_geometry(const Samples& samples, const TileShape& shape, const Plane<uint32_t>& depth,
+                  const Plane<int16_t>* const normal[2], const double matrix[9], GeometryModel& model) {
   if (samples.places.size() < kLeastSlopes) return false;
+  const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
   const size_t every = std::max<size_t>(1, samples.places.size() / kEnoughSlopes);
   std::vector<double> sizes;
   for (size_t i = 0; i < samples.places.size(); i += every) {

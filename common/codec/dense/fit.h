@@ -19,9 +19,9 @@ struct Samples {
 };
 
 /// Finds the integers that represent `matrix`, which turns slopes of `depth` into the normals' lattice vectors, row by
-/// row. x0, y0: coordinates of the tile's first pixel. Returns false if normals do not follow it.
-bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
-                  int y0, const double matrix[9], GeometryModel& model);
+/// row. Returns false if normals do not follow it.
+bool fit_geometry(const Samples& samples, const TileShape& shape, const Plane<uint32_t>& depth,
+                  const Plane<int16_t>* const normal[2], const double matrix[9], GeometryModel& model);
 
 /// A plane of fixed-point values and the planes that predict it.
 struct GuidedSamples {

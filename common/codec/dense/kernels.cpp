@@ -98,8 +98,8 @@ VECTORS void plane_residuals(const uint32_t* RESTRICT above2, const uint32_t* RE
 }
 
 VECTORS void plane_terms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above, const uint32_t* RESTRICT z,
-                         const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms,
-                         uint32_t* RESTRICT take_left, uint32_t* RESTRICT take_slope) {
+                         const uint8_t* RESTRICT tokens, size_t n, const PlaneTerms& out) {
+  uint32_t *RESTRICT terms = out.terms, *RESTRICT take_left = out.take_left, *RESTRICT take_slope = out.take_slope;
   for (size_t x = 0; x < n; ++x) {
     const uint32_t up = above[x], corner = above[x - 1], right = above[x + 1];
     const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
@@ -186,7 +186,8 @@ VECTORS void median_residuals(const GuidedRows& rows, size_t n, uint32_t* RESTRI
 // Slopes of the reciprocal depth at a pixel, and its value extrapolated to the tile's centre, are linear in the
 // surface's normal, for any camera (docs/codec.md). 31-bit integers; the quotient by Newton's method.
 VECTORS void geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
-                      int16_t* RESTRICT gx, int16_t* RESTRICT gy) {
+                      int16_t* const guide[2]) {
+  int16_t *RESTRICT gx = guide[0], *RESTRICT gy = guide[1];
   const uint32_t *RESTRICT above = depth[0], *RESTRICT here = depth[1], *RESTRICT below = depth[2];
   int32_t a[3][3];
   for (int i = 0; i < 3; ++i)

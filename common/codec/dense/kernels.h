@@ -90,8 +90,11 @@ void depth_residuals(const uint32_t* above, const uint32_t* row, size_t n, uint3
 void plane_residuals(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
                      uint8_t* tokens);
 /// Terms of each pixel: its depth is terms[x] + (left & take_left[x]) + ((left - one before) & take_slope[x]).
+struct PlaneTerms {
+  uint32_t *terms, *take_left, *take_slope;
+};
 void plane_terms(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
-                 uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
+                 const PlaneTerms& out);
 /// Turns codes by a pole (poles.h) and returns their coordinates in 64ths; the next is the inverse.
 void turn_normals(const uint16_t* codes, size_t n, int pole, int16_t* x, int16_t* y);
 void turn_normals_back(const int16_t* x, const int16_t* y, size_t n, int pole, uint16_t* codes);
@@ -107,8 +110,8 @@ void guided_residuals(const GuidedRows& rows, const int32_t* sums, size_t n, uin
 void median_residuals(const GuidedRows& rows, size_t n, uint32_t* z);
 /// Computes the turned octahedral coordinates, in 64ths, of the normal of the surface at each pixel. depth: rows above,
 /// here and below. Columns x0 to x0 + n - 1 and the row y are counted from the tile's centre.
-void geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
-              int16_t* gy);
+void geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
+              int16_t* const guide[2]);
 /// Measures the variation of the guide around each pixel, as tokens.
 void activity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
 /// Heights of n pixels: (sum + step * column) * scale / depth - low, limited to 0 to 16383, rounded down.

@@ -97,13 +97,13 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
   const uint16_t turned = turn_normal(base, pole_);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    int16_t *const gx = plane[0].guide.row(r), *const gy = plane[1].guide.row(r);
+    int16_t* const guide[2] = {plane[0].guide.row(r), plane[1].guide.row(r)};
     if (has_geometry_) {
       const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
-      geometry(rows, shape.width, x0, y0 + static_cast<int>(y), geometry_, gx, gy);
+      geometry(rows, shape.width, x0, y0 + static_cast<int>(y), geometry_, guide);
     } else {
-      std::fill_n(gx, shape.width, static_cast<int16_t>((turned & 255) * 64));
-      std::fill_n(gy, shape.width, static_cast<int16_t>((turned >> 8) * 64));
+      std::fill_n(guide[0], shape.width, static_cast<int16_t>((turned & 255) * 64));
+      std::fill_n(guide[1], shape.width, static_cast<int16_t>((turned >> 8) * 64));
     }
   }
   for (GuidedPlane& p : plane) p.begin(shape);
@@ -127,15 +127,14 @@ void NormalPlanes::load(const TileShape& shape, const PixelRows<uint16_t>& codes
 }
 
 void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth,
-                          uint16_t base, bool one_colour, const RoomAxes* axes, BitSink& bits) {
+                          uint16_t base, bool one_colour, const RoomAxes* axes) {
   samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
   pole_ = choose_pole(shape, codes);
   load(shape, codes);
   const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
   double matrix[9];
   has_geometry_ = axes != nullptr && pole_ != kRaw && normals_of(*axes, pole_, matrix) &&
-                  fit_geometry(samples_, depth.depth, values, -static_cast<int>(shape.width / 2),
-                               -static_cast<int>(shape.height / 2), matrix, geometry_);
+                  fit_geometry(samples_, shape, depth.depth, values, matrix, geometry_);
   make_guide(shape, depth, base);
   if (may_be_exact_ && one_colour && are_smooth(shape)) use_exact_codes();
   to_lattice(shape);
@@ -151,7 +150,6 @@ void NormalPlanes::encode(const TileShape& shape, const PixelRows<uint16_t>& cod
     p.fit(samples_, before);
     p.encode(shape, before);
   }
-  put_header(bits);
 }
 
 void NormalPlanes::put_header(BitSink& bits) const {

@@ -14,11 +14,12 @@ namespace telesplat::codec::detail {
 struct NormalPlanes {
   /// reach: of a NormalLattice; 0: exact codes.
   void reset(const TileShape& shape, int reach);
-  /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code. one_colour: all pixels
-  /// have the same colour, so that only normals show the surface: if they are smooth they are coded exactly, even with
-  /// a bound. axes: of the room, from the tile's centre, or null.
+  /// codes -> symbols. `depth` must be extended. base: the first pixel's code. one_colour: all pixels have the same
+  /// colour, so that only normals show the surface: if they are smooth they are coded exactly, even with a bound.
+  /// axes: of the room, from the tile's centre, or null.
   void encode(const TileShape& shape, const PixelRows<uint16_t>& codes, const DepthPlane& depth, uint16_t base,
-              bool one_colour, const RoomAxes* axes, BitSink& bits);
+              bool one_colour, const RoomAxes* axes);
+  void put_header(BitSink& bits) const;
   static constexpr size_t kMostBits = 256 + 2 * GuidedPlane::kMostWeightBits;
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
   /// Makes codes of all pixels of row y, once decode_values() made its values.
@@ -28,7 +29,6 @@ struct NormalPlanes {
   Plane<uint8_t> activity;
 
  private:
-  void put_header(BitSink& bits) const;
   void load(const TileShape& shape, const PixelRows<uint16_t>& codes);
   void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
   void to_lattice(const TileShape& shape);

@@ -98,14 +98,15 @@ class SymbolDecoder {
   bool at_rest() const {
     return std::all_of(states_, states_ + kStates, [](uint32_t x) { return x == kStateLow; });
   }
-  /// Decodes `count` symbols from the words [begin, end). table: of make_decode_tables(); tokens below `first` have no
-  /// raw bits. Returns false if words are missing; sets `end` to the end of the words that remain.
+  /// `count` symbols from the words: table is that of make_decode_tables(), tokens below `first` have no raw bits.
+  /// Returns false if words are missing.
   [[nodiscard]] bool get(const uint32_t* table, const uint8_t* contexts, size_t count, unsigned first, uint8_t* tokens,
-                         uint32_t* z, const uint8_t* begin, const uint8_t*& end) {
+                         uint32_t* z) {
     const bool plenty = static_cast<size_t>(end - begin) >= kMostSymbolBytes * count;
-    return plenty ? take<false>(table, contexts, count, first, tokens, z, begin, end)
-                  : take<true>(table, contexts, count, first, tokens, z, begin, end);
+    return plenty ? take<false>(table, contexts, count, first, tokens, z)
+                  : take<true>(table, contexts, count, first, tokens, z);
   }
+  const uint8_t *begin = nullptr, *end = nullptr;  ///< words that are left
 
  private:
   template <bool kChecked>
@@ -119,26 +120,26 @@ class SymbolDecoder {
     return true;
   }
   template <bool kChecked>
-  bool take(const uint32_t* table, const uint8_t* contexts, size_t count, unsigned first, uint8_t* tokens, uint32_t* z,
-            const uint8_t* begin, const uint8_t*& end) {
-    const uint8_t* at = end;
+  bool take(const uint32_t* table, const uint8_t* contexts, size_t count, unsigned first, uint8_t* tokens,
+            uint32_t* z) {
+    const uint8_t *at = end, *const first_word = begin;
     bool good = true;
     for (size_t i = 0; i < count; ++i) {
       uint32_t& state = states_[next_++ % kStates];
       const uint32_t entry = table[contexts[i] * kFrequencyOne + (state & (kFrequencyOne - 1))];
       uint32_t x = ((entry >> 12 & 0xFFF) + 1) * (state >> kFrequencyBits) + (entry & 0xFFF);
-      good &= refill<kChecked>(x, begin, at);
+      good &= refill<kChecked>(x, first_word, at);
       const unsigned token = entry >> 24, over = std::max(token, first) - first;
       unsigned bits = over >> 3;
       uint32_t v = (8 + (over & 7)) << bits;
       if (bits > 15) [[unlikely]] {
         v += (x & ((1u << (bits - 15)) - 1)) << 15;
         x >>= bits - 15, bits = 15;
-        good &= refill<kChecked>(x, begin, at);
+        good &= refill<kChecked>(x, first_word, at);
       }
       v += x & ((1u << bits) - 1);
       x >>= bits;
-      good &= refill<kChecked>(x, begin, at);
+      good &= refill<kChecked>(x, first_word, at);
       tokens[i] = static_cast<uint8_t>(token);
       z[i] = v - 8;
       state = x;

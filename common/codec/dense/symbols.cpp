@@ -157,13 +157,13 @@ bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
   return true;
 }
 
-bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y, WordSource& source) const {
+bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y, SymbolDecoder& source) const {
   const auto r = static_cast<ptrdiff_t>(y);
   find_contexts(plane, shape, y);
   bool good = true;
   shape.for_each_run(y, [&](size_t begin, size_t end) {
-    good = good && source.coder.get(tables_.data(), plane.contexts.row(r) + begin, end - begin, plane.first,
-                                    plane.tokens.row(r) + begin, plane.z.row(r) + begin, source.begin, source.end);
+    good = good && source.get(tables_.data(), plane.contexts.row(r) + begin, end - begin, plane.first,
+                              plane.tokens.row(r) + begin, plane.z.row(r) + begin);
   });
   finish_tokens(plane, shape, y);
   return good;

@@ -85,17 +85,11 @@ class PlaneEncoder {
   std::vector<EncodeEntry> tables_;
 };
 
-/// Words and states from which all planes of a tile are decoded.
-struct WordSource {
-  const uint8_t *begin = nullptr, *end = nullptr;
-  SymbolDecoder coder;
-};
-
 class PlaneDecoder {
  public:
   [[nodiscard]] bool prepare(SymbolPlane& plane, BitReader& bits);
   /// Decodes row y of the plane; earlier rows must be known. False: words are missing.
-  [[nodiscard]] bool get_row(SymbolPlane& plane, const TileShape& shape, size_t y, WordSource& source) const;
+  [[nodiscard]] bool get_row(SymbolPlane& plane, const TileShape& shape, size_t y, SymbolDecoder& source) const;
 
  private:
   TokenLevels levels_;

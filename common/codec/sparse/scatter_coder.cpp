@@ -72,49 +72,6 @@ int on_lattice(const DepthLattice& lattice, int depth) {
   return 16 * static_cast<int>(index) + (step == 0 ? 0 : static_cast<int>(16 * int64_t{above} / step));
 }
 
-// Codes `depth` and sets it to the decoded value. False: the stream gives an invalid one.
-template <class Coder>
-bool code_depth(ScatterContexts& contexts, const DepthLattice* lattice, const Guess& guess, SpreadContext& context,
-                uint32_t& depth, Magnitudes& out, const Coder& coder) {
-  const Predicted predicted(lattice ? on_lattice(*lattice, guess.depth) : guess.depth);
-  const int64_t wanted = int64_t{lattice ? lattice->index(depth) : depth} - predicted.nearest;
-  const int64_t residual =
-      contexts.depth.code(coder, wanted, predicted.rounding, scale_of(0, lattice != nullptr, context));
-  context.before[0] = predicted.error(residual);
-  out.depth = static_cast<uint8_t>(context.before[0]);
-  const int64_t index = predicted.nearest + residual;
-  if (index < 1 || index > (lattice ? lattice->last() : image::kMaxDepthCode)) return false;
-  depth = lattice ? lattice->code(static_cast<uint32_t>(index)) : static_cast<uint32_t>(index);
-  return true;
-}
-
-template <class Coder>
-bool code_normal(ScatterContexts& contexts, const TileBounds& bounds, const Guess& guess, SpreadContext& context,
-                 uint16_t& normal, Magnitudes& out, const Coder& coder) {
-  const NormalLattice lattice(bounds.normal);
-  const bool exact = bounds.normal == 0;
-  uint32_t result = 0;
-  for (int c = 0; c < 2; ++c) {
-    const auto value = static_cast<int>(byte_at(normal, c));
-    const Predicted predicted(exact ? guess.normal[c]
-                                    : lattice.index64(std::clamp(4 * guess.normal[c], 0, 64 * 254)) >> 2);
-    // Bytes wrap, indices do not.
-    const int64_t wanted = exact ? static_cast<int8_t>(static_cast<uint8_t>(value - predicted.nearest))
-                                 : lattice.index(value) - predicted.nearest;
-    const int64_t residual =
-        contexts.normal[c].code(coder, wanted, predicted.rounding, scale_of(1 + c, bounds.depth != nullptr, context));
-    context.before[1] = predicted.error(residual);
-    out.normal[c] = static_cast<uint8_t>(context.before[1]);
-    const int64_t index = predicted.nearest + residual;
-    if (!exact && (index < 0 || index > lattice.most())) return false;
-    result |=
-        (exact ? static_cast<uint32_t>(index) & 255 : static_cast<uint32_t>(lattice.value(static_cast<int>(index))))
-        << 8 * c;
-  }
-  normal = static_cast<uint16_t>(result);
-  return true;
-}
-
 bool is_near(uint32_t a, uint32_t b, int reach) {
   int most = 0;
   for (int c = 0; c < 3; ++c)
@@ -146,61 +103,103 @@ ColourGuess guess_colour(ScatterContexts& contexts, const Guess& guess, const Ra
   return {guess.colour, &contexts.plain[guess.plain_colour], &contexts.colour[0][byte_size(guess.expected.colour)]};
 }
 
-// Codes the colour of `pixel`, whose depth is known, and sets it to the decoded one. False: no such step exists.
+// Codes a pixel, which becomes what is decoded; false where there is no such number.
 template <class Coder>
-bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, Ramp* ramp, int x, int y, Pixel& pixel,
-                 Magnitudes& out, const Coder& coder) {
-  const int height = ramp != nullptr ? ramp->height(x, y, pixel.depth) : 0;
-  const auto [predicted, plain, model_of_green] = guess_colour(contexts, guess, ramp, height);
-  const uint32_t colour = pixel.colour;
-  uint32_t result = predicted;
-  bool good = true;
-  if (coder(!is_near(colour, predicted, reach), *plain) != 0) {
-    const ColourLattice lattice(reach);
-    const auto index = [&](uint32_t word, int c) {
-      return lattice.index(static_cast<int>(byte_at(word, kChannels[c])));
-    };
-    result = 0;
-    int residual[3];
-    const auto code_channel = [&, base = predicted](int c, SignedModel& model, size_t sign) {
-      const int expected = index(base, c) + (c == 0 ? 0 : residual[0]), most = lattice.index(255);
-      residual[c] = model.code(coder, index(colour, c) - expected, sign);
-      const int step = expected + residual[c];
-      good &= step >= 0 && step <= most;
-      result |= static_cast<uint32_t>(lattice.value(std::clamp(step, 0, most))) << 8 * kChannels[c];
-    };
-    code_channel(0, *model_of_green, 1);
-    const auto green = static_cast<int>(byte_at(result, kChannels[0]));
-    const int32_t last = contexts.last_of_green[static_cast<size_t>(green)];
-    const auto known = static_cast<uint32_t>(last);
-    if (last >= 0 &&
-        coder(!is_near(colour, known, reach),
-              contexts.again[farness(known, predicted, green - static_cast<int>(byte_at(predicted, kChannels[0])))]) ==
-            0) {
-      result = known;
-      for (int c = 1; c < 3; ++c) residual[c] = index(known, c) - index(predicted, c) - residual[0];
-    } else {
-      for (int c = 1; c < 3; ++c)
-        code_channel(c, contexts.colour[c][byte_size(size_of(residual[c - 1]))], sign_of(residual[c - 1]));
-    }
-    out.colour = 1;
-    for (const int r : residual) out.colour = std::max(out.colour, static_cast<uint8_t>(byte_size(size_of(r))));
-  }
-  contexts.last_of_green[byte_at(result, kChannels[0])] = static_cast<int32_t>(result);
-  if (ramp != nullptr) ramp->add(height, result);
-  pixel.colour = result;
-  return good;
-}
-
-// Codes a whole pixel. False: the stream gives an invalid one.
-template <class Coder>
-bool code_pixel(ScatterContexts& contexts, const TileBounds& bounds, Ramp* ramp, int x, int y, const Guess& guess,
-                Pixel& pixel, Magnitudes& out, const Coder& coder) {
+struct PixelCoder {
+  ScatterContexts& contexts;
+  const TileBounds& bounds;
+  Ramp* ramp;
+  const Guess& guess;
+  const Coder coder;
   SpreadContext context = context_of(guess, bounds);
-  return code_depth(contexts, bounds.depth, guess, context, pixel.depth, out, coder) &&
-         code_normal(contexts, bounds, guess, context, pixel.normal, out, coder) &&
-         code_colour(contexts, bounds.colour, guess, ramp, x, y, pixel, out, coder);
-}
+
+  bool code(int x, int y, Pixel& pixel, Magnitudes& out) {
+    return code_depth(pixel.depth, out) && code_normal(pixel.normal, out) && code_colour(x, y, pixel, out);
+  }
+  bool code_depth(uint32_t& depth, Magnitudes& out) {
+    const DepthLattice* lattice = bounds.depth;
+    const Predicted predicted(lattice ? on_lattice(*lattice, guess.depth) : guess.depth);
+    const int64_t wanted = int64_t{lattice ? lattice->index(depth) : depth} - predicted.nearest;
+    const int64_t residual =
+        contexts.depth.code(coder, wanted, predicted.rounding, scale_of(0, lattice != nullptr, context));
+    context.before[0] = predicted.error(residual);
+    out.depth = static_cast<uint8_t>(context.before[0]);
+    const int64_t index = predicted.nearest + residual;
+    if (index < 1 || index > (lattice ? lattice->last() : image::kMaxDepthCode)) return false;
+    depth = lattice ? lattice->code(static_cast<uint32_t>(index)) : static_cast<uint32_t>(index);
+    return true;
+  }
+
+  bool code_normal(uint16_t& normal, Magnitudes& out) {
+    const NormalLattice lattice(bounds.normal);
+    const bool exact = bounds.normal == 0;
+    uint32_t result = 0;
+    for (int c = 0; c < 2; ++c) {
+      const auto value = static_cast<int>(byte_at(normal, c));
+      const Predicted predicted(exact ? guess.normal[c]
+                                      : lattice.index64(std::clamp(4 * guess.normal[c], 0, 64 * 254)) >> 2);
+      // Bytes wrap, indices do not.
+      const int64_t wanted = exact ? static_cast<int8_t>(static_cast<uint8_t>(value - predicted.nearest))
+                                   : lattice.index(value) - predicted.nearest;
+      const int64_t residual =
+          contexts.normal[c].code(coder, wanted, predicted.rounding, scale_of(1 + c, bounds.depth != nullptr, context));
+      context.before[1] = predicted.error(residual);
+      out.normal[c] = static_cast<uint8_t>(context.before[1]);
+      const int64_t index = predicted.nearest + residual;
+      if (!exact && (index < 0 || index > lattice.most())) return false;
+      result |=
+          (exact ? static_cast<uint32_t>(index) & 255 : static_cast<uint32_t>(lattice.value(static_cast<int>(index))))
+          << 8 * c;
+    }
+    normal = static_cast<uint16_t>(result);
+    return true;
+  }
+
+  bool code_colour(int x, int y, Pixel& pixel, Magnitudes& out) {
+    const int reach = bounds.colour;
+    const int height = ramp != nullptr ? ramp->height(x, y, pixel.depth) : 0;
+    const auto [predicted, plain, model_of_green] = guess_colour(contexts, guess, ramp, height);
+    const uint32_t colour = pixel.colour;
+    uint32_t result = predicted;
+    bool good = true;
+    if (coder(!is_near(colour, predicted, reach), *plain) != 0) {
+      const ColourLattice lattice(reach);
+      const auto index = [&](uint32_t word, int c) {
+        return lattice.index(static_cast<int>(byte_at(word, kChannels[c])));
+      };
+      result = 0;
+      int residual[3];
+      const auto code_channel = [&, base = predicted](int c, SignedModel& model, size_t sign) {
+        const int expected = index(base, c) + (c == 0 ? 0 : residual[0]), most = lattice.index(255);
+        residual[c] = model.code(coder, index(colour, c) - expected, sign);
+        const int step = expected + residual[c];
+        good &= step >= 0 && step <= most;
+        result |= static_cast<uint32_t>(lattice.value(std::clamp(step, 0, most))) << 8 * kChannels[c];
+      };
+      code_channel(0, *model_of_green, 1);
+      const auto green = static_cast<int>(byte_at(result, kChannels[0]));
+      const int32_t last = contexts.last_of_green[static_cast<size_t>(green)];
+      const auto known = static_cast<uint32_t>(last);
+      if (last >= 0 &&
+          coder(
+              !is_near(colour, known, reach),
+              contexts.again[farness(known, predicted, green - static_cast<int>(byte_at(predicted, kChannels[0])))]) ==
+              0) {
+        result = known;
+        for (int c = 1; c < 3; ++c) residual[c] = index(known, c) - index(predicted, c) - residual[0];
+      } else {
+        for (int c = 1; c < 3; ++c)
+          code_channel(c, contexts.colour[c][byte_size(size_of(residual[c - 1]))], sign_of(residual[c - 1]));
+      }
+      out.colour = 1;
+      for (const int r : residual) out.colour = std::max(out.colour, static_cast<uint8_t>(byte_size(size_of(r))));
+    }
+    contexts.last_of_green[byte_at(result, kChannels[0])] = static_cast<int32_t>(result);
+    if (ramp != nullptr) ramp->add(height, result);
+    pixel.colour = result;
+    return good;
+  }
+};
 
 }  // namespace
 
@@ -224,7 +223,7 @@ void ScatterEncoder::start(const TileBounds& bounds, Ramp* ramp) {
 
 Magnitudes ScatterEncoder::put(int x, int y, Pixel& pixel, const Guess& guess) {
   Magnitudes out;
-  (void)code_pixel(contexts_, *bounds_, ramp_, x, y, guess, pixel, out, BitCoder{coder_});
+  (void)PixelCoder<BitCoder>{contexts_, *bounds_, ramp_, guess, {coder_}}.code(x, y, pixel, out);
   return out;
 }
 
@@ -246,7 +245,7 @@ bool ScatterDecoder::start(Reader& in, const TileBounds& bounds, Ramp* ramp) {
 std::optional<Pixel> ScatterDecoder::get(int x, int y, const Guess& guess, Magnitudes& out) {
   Pixel pixel;
   out = {};
-  if (!code_pixel(contexts_, *bounds_, ramp_, x, y, guess, pixel, out, BitDecoder{coder_})) return std::nullopt;
+  if (!PixelCoder<BitDecoder>{contexts_, *bounds_, ramp_, guess, {coder_}}.code(x, y, pixel, out)) return std::nullopt;
   return pixel;
 }
 

@@ -275,7 +275,7 @@ void PrepareEwa(const geometry::Rect& rect, EwaBuffer& buffer) {
 }
 
 TileCounts EwaTile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
-                   const ResolvedTile& tile, int reach, uint32_t background) {
+                   const ResolvedTile& tile, int reach) {
   PrepareEwa(input.rect, buffer);
   EwaRecord record(buffer);
   EwaVisibility visibility(input, buffer, record);
@@ -288,7 +288,7 @@ TileCounts EwaTile(const TileInput& input, const SurfelInput& surfels, const Ewa
     SurfelStream<EwaAccumulation>(input, surfels, accumulation).run();
     accumulation.flush();
   }
-  EwaResolve(light, buffer, tile, reach, background);
+  EwaResolve(light, buffer, tile, reach);
   return counts;
 }
 

@@ -23,23 +23,21 @@ constexpr float kNothingVisible = std::numeric_limits<float>::infinity();
 
 // Computes ewa_colour and ewa_depth_code of whole rows. Empties the buffer's pixels while they are in the cache.
 #if HWY_TARGET == HWY_SCALAR
-void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTile& tile, int reach,
-                uint32_t background) {
+void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTile& tile, int reach) {
   for (int y = 0; y < buffer.height; ++y)
     for (int x = 0; x < buffer.width; ++x) {
       const size_t at = static_cast<size_t>(y) * buffer.stride + x;
       float* v = buffer.sums.get() + 8 * at;
       const EwaSum sum{v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]};
       const bool shown = buffer.visible[at] < kNothingVisible;
-      tile.colour(y - reach)[x - reach] = shown ? ewa_colour(sum, light) : background;
+      tile.colour(y - reach)[x - reach] = shown ? ewa_colour(sum, light) : light.background;
       tile.info(y - reach)[x - reach] = shown ? ewa_depth_code(sum) << 8 : kEmptyInfo;
       std::fill_n(v, 8, 0.0f);
       buffer.visible[at] = kNothingVisible;
     }
 }
 #else
-void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTile& tile, int reach,
-                uint32_t background) {
+void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTile& tile, int reach) {
   const hn::CappedTag<float, 8> d;
   const hn::RebindToSigned<decltype(d)> di;
   const hn::RebindToUnsigned<decltype(d)> du;
@@ -51,7 +49,7 @@ void EwaResolve(const EwaLight& light, const EwaBuffer& buffer, const ResolvedTi
     for (size_t x = 0; x < static_cast<size_t>(buffer.width); x += lanes) {
       const size_t at = static_cast<size_t>(y) * buffer.stride + x;
       const auto shown = hn::Lt(hn::LoadU(d, buffer.visible.get() + at), hn::Set(d, kNothingVisible));
-      const auto empty = hn::Set(du, kEmptyInfo), paper = hn::Set(du, background);
+      const auto empty = hn::Set(du, kEmptyInfo), paper = hn::Set(du, light.background);
       if (hn::AllFalse(d, shown)) {
         hn::StoreU(paper, du, colours + x);
         hn::StoreU(empty, du, infos + x);

@@ -12,6 +12,7 @@ namespace telesplat::splat {
 struct EwaLight {
   float ambient = 1, head = 0, key = 0;
   std::array<float, 3> key_direction{};  ///< in camera axes
+  uint32_t background = 0;               ///< 0x00RRGGBB, of empty pixels
 };
 
 inline EwaLight ewa_light(const image::ShadingParameters& p, const SurfelCamera& c) {

@@ -20,8 +20,8 @@ TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, cons
 }
 
 TileCounts ewa_tile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
-                    const ResolvedTile& tile, int reach, uint32_t background) {
-  return HWY_DYNAMIC_DISPATCH(EwaTile)(input, surfels, light, buffer, tile, reach, background);
+                    const ResolvedTile& tile, int reach) {
+  return HWY_DYNAMIC_DISPATCH(EwaTile)(input, surfels, light, buffer, tile, reach);
 }
 
 }  // namespace telesplat::splat

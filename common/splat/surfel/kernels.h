@@ -40,9 +40,8 @@ struct EwaBuffer {
 };
 
 /// Splats `input.rect`, which is the tile and `reach` pixels around it, in two passes and writes it as shaded colours
-/// and infos. Pixels within kFinishSlack to the right of it may change too. Depth codes carry no bias. background:
-/// 0x00RRGGBB, for empty pixels.
+/// and infos. Pixels within kFinishSlack to the right of it may change too. Depth codes carry no bias.
 TileCounts ewa_tile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
-                    const ResolvedTile& tile, int reach, uint32_t background);
+                    const ResolvedTile& tile, int reach);
 
 }  // namespace telesplat::splat

@@ -200,8 +200,8 @@ struct BlockDecoder::Parts {
   SymbolDecoder coder;
   Symbols symbols;
 
-  // Takes row y of plane p, after all earlier ones. False: words are missing. `end` becomes the end of the rest.
-  bool get_row(size_t p, size_t y, const uint8_t* begin, const uint8_t*& end) {
+  // Takes row y of plane p, those before being known. False where words are missing.
+  bool get_row(size_t p, size_t y) {
     uint8_t* const tokens = symbols.tokens[p].row(static_cast<ptrdiff_t>(y));
     uint32_t* const z = symbols.z[p][y];
     std::fill_n(tokens, kSide, uint8_t{0});
@@ -210,7 +210,7 @@ struct BlockDecoder::Parts {
     make_contexts(rows_around(symbols, p, y), kSide, scales[p], contexts);
     bool good = true;
     for_each_group(symbols.mask, y, [&](size_t x) {
-      good = good && coder.get(tables[p].data(), contexts + x, kGroupWidth, 0, tokens + x, z + x, begin, end);
+      good = good && coder.get(tables[p].data(), contexts + x, kGroupWidth, 0, tokens + x, z + x);
     });
     return good;
   }
@@ -242,12 +242,11 @@ Status BlockDecoder::decode(std::span<const uint8_t> bytes, uint32_t* pixels) {
     return Error{fmt::format("a block of {} bytes, expected an even number and at least {}", bytes.size(), kHead)};
   std::memcpy(&s.symbols.mask, bytes.data(), kMaskBytes);
   if (!s.coder.start(bytes.data() + kMaskBytes)) return Error{"a block with a state that is out of range"};
-  const auto words = bytes.subspan(kHead);
-  const uint8_t *const begin = words.data(), *end = begin + words.size();
+  s.coder.begin = bytes.data() + kHead, s.coder.end = bytes.data() + bytes.size();
   for (size_t p = 0; p < kPlanes; ++p)
     for (size_t y = 0; y < kSide; ++y)
-      if (!s.get_row(p, y, begin, end)) return Error{"a block that ends too early"};
-  if (end != begin || !s.coder.at_rest()) return Error{"a block with more in it than its pixels"};
+      if (!s.get_row(p, y)) return Error{"a block that ends too early"};
+  if (s.coder.end != s.coder.begin || !s.coder.at_rest()) return Error{"a block with more in it than its pixels"};
   join(s.symbols, pixels);
   return ok_status();
 }

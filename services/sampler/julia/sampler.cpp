@@ -80,20 +80,17 @@ Batches make_batches(const JuliaRays& rays, const geometry::Rect& rect, const im
   return out;
 }
 
-// Calls consume(rays, points) for every batch of the rectangle, on several threads at once.
+// Calls consume(points) for every batch, on several threads at once.
 template <class Consume>
-void trace_rect(tbb::task_arena& arena, JuliaTrace trace, const JuliaScene& scene, const geometry::Camera& camera,
-                const geometry::Rect& rect, double footprint_px, const image::PixelMask* mask, const Consume& consume) {
-  if (rect.width <= 0 || rect.height <= 0) return;
-  const JuliaRays rays(scene, camera, rect, footprint_px);
-  const Batches batches = make_batches(rays, rect, mask);
+void trace_batches(tbb::task_arena& arena, JuliaTrace trace, const JuliaScene& scene, const JuliaRays& rays,
+                   const Batches& batches, const Consume& consume) {
   const std::span<const JuliaPart> parts = batches.parts;
   const auto trace_range = [&](const tbb::blocked_range<size_t>& range) {
     const auto points = std::make_unique_for_overwrite<JuliaPoints>();
     for (size_t i = range.begin(); i < range.end(); ++i) {
       points->count = 0;
       trace(scene.constants(), rays, parts.subspan(batches.begin[i], batches.begin[i + 1] - batches.begin[i]), *points);
-      consume(rays, *points);
+      consume(*points);
     }
   };
   arena.execute([&] { in_parallel(tbb::blocked_range<size_t>(0, batches.begin.size() - 1), trace_range); });
@@ -108,15 +105,16 @@ image::DepthImage JuliaSampler::sample(const JuliaScene& scene, const geometry::
                                        const geometry::Rect& rect, double footprint_px, const image::PixelMask* mask) {
   image::DepthImage out(rect.width, rect.height);
   const JuliaPalette& palette = julia_palette(scene.palette());
-  trace_rect(
-      arena_, trace_, scene, camera, rect, footprint_px, mask, [&](const JuliaRays& rays, const JuliaPoints& points) {
-        for (int i = 0; i < points.count; ++i) {
-          const size_t at = size_t(points.y[i] + rays.y0 - rect.y) * rect.width + (points.x[i] + rays.x0 - rect.x);
-          out.depth[at] = image::encode_depth(points.depth_m[i], camera.near_m);
-          out.colour[at] = palette.rounded(points.tone[i], points.light[i]);
-          out.normal[at] = image::encode_normal16({points.normal[0][i], points.normal[1][i], points.normal[2][i]});
-        }
-      });
+  if (rect.width <= 0 || rect.height <= 0) return out;
+  const JuliaRays rays(scene, camera, rect, footprint_px);
+  trace_batches(arena_, trace_, scene, rays, make_batches(rays, rect, mask), [&](const JuliaPoints& points) {
+    for (int i = 0; i < points.count; ++i) {
+      const size_t at = size_t(points.y[i] + rays.y0 - rect.y) * rect.width + (points.x[i] + rays.x0 - rect.x);
+      out.depth[at] = image::encode_depth(points.depth_m[i], camera.near_m);
+      out.colour[at] = palette.rounded(points.tone[i], points.light[i]);
+      out.normal[at] = image::encode_normal16({points.normal[0][i], points.normal[1][i], points.normal[2][i]});
+    }
+  });
   return out;
 }
 
@@ -127,16 +125,17 @@ image::View render_julia_directly(const JuliaScene& scene, const geometry::Camer
                    std::vector<float>(pixels, std::numeric_limits<float>::infinity())};
   const JuliaPalette& palette = julia_palette(scene.palette());
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-  trace_rect(
-      arena, julia_trace, scene, camera, {0, 0, camera.width, camera.height}, footprint_px, nullptr,
-      [&](const JuliaRays& rays, const JuliaPoints& points) {
-        for (int i = 0; i < points.count; ++i) {
-          const size_t at = size_t(points.y[i] + rays.y0) * camera.width + (points.x[i] + rays.x0);
-          const float intensity = shading.intensity({points.normal[0][i], points.normal[1][i], points.normal[2][i]});
-          view.colour[at] = palette.rounded(points.tone[i], points.light[i] * intensity);
-          view.depth_m[at] = points.depth_m[i];
-        }
-      });
+  const geometry::Rect whole{0, 0, camera.width, camera.height};
+  if (pixels == 0) return view;
+  const JuliaRays rays(scene, camera, whole, footprint_px);
+  trace_batches(arena, julia_trace, scene, rays, make_batches(rays, whole, nullptr), [&](const JuliaPoints& points) {
+    for (int i = 0; i < points.count; ++i) {
+      const size_t at = size_t(points.y[i] + rays.y0) * camera.width + (points.x[i] + rays.x0);
+      const float intensity = shading.intensity({points.normal[0][i], points.normal[1][i], points.normal[2][i]});
+      view.colour[at] = palette.rounded(points.tone[i], points.light[i] * intensity);
+      view.depth_m[at] = points.depth_m[i];
+    }
+  });
   return view;
 }
 

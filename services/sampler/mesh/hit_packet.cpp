@@ -146,9 +146,9 @@ namespace {
 glm::vec3 rgb(uint32_t c) { return {c >> 16 & 255, c >> 8 & 255, c & 255}; }
 }  // namespace
 
-SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v,
+SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, const glm::vec2& uv,
                            const glm::vec3& g, const glm::vec3& direction, const scene::ColourTable& colours) {
-  const float weight[3] = {1 - u - v, u, v};
+  const float weight[3] = {1 - uv.x - uv.y, uv.x, uv.y};
   SurfacePoint out{glm::vec3(0), glm::vec3(0)};
   float scalar = 0;
   const float behind = glm::dot(direction, g);

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "common/geometry/mesh_chunk.h"
@@ -38,7 +39,8 @@ struct SurfacePoint {
   glm::vec3 colour;  ///< 0..255 per channel
   glm::vec3 normal;  ///< unit length, facing the viewer
 };
-SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v,
+/// uv: barycentric weights of corners 1 and 2.
+SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, const glm::vec2& uv,
                            const glm::vec3& geometric_normal, const glm::vec3& direction,
                            const scene::ColourTable& colours);
 

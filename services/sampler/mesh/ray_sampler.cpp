@@ -140,10 +140,11 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
 }
 
 // Traces the pixels of `tile` that `mask`, of its size, covers; consume(task, packet, pixels) as in trace_tile(), the
-// packet's pixels being counted from the tile's corner. A packet holds pixels of the mask that lie close together.
-template <class Begin, class Consume, class End>
+// packet's pixels being counted from the tile's corner; tasks end with task.flush(). Packets hold what of the mask lies
+// close together.
+template <class Begin, class Consume>
 void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile,
-                  const image::PixelMask& mask, const Begin& begin, const Consume& consume, const End& end) {
+                  const image::PixelMask& mask, const Begin& begin, const Consume& consume) {
   const std::vector<MaskedPixel> pixels = gather(mask);
   if (pixels.empty()) return;
   const PixelRays rays(camera, scene.clip(), tile.x, tile.y, tile.x + tile.width, tile.y + tile.height);
@@ -165,7 +166,7 @@ void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometr
       rtcIntersect8(valid, scene.scene(), &context, &packet);
       if (any_hit(packet)) consume(task, packet, group);
     }
-    end(task);
+    task.flush();
   };
   const size_t packets = (pixels.size() + kPacket - 1) / kPacket;
   scene.arena().execute([&] { in_parallel(tbb::blocked_range<size_t>(0, packets, kTask / kPacket), trace); });
@@ -238,8 +239,8 @@ class PendingHits {
   }
 
  private:
-  // Eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet.
-  static constexpr int kCapacity = 64;
+  static constexpr int kCapacity =
+      64;  // eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet
 
   static constexpr uint32_t kNotANumber = 0x7fc00000, kNeutral = 0xc8c8c8;
 
@@ -294,12 +295,10 @@ image::DepthImage RaySampler::sample(const geometry::Camera& camera, const geome
   const auto begin = [&] { return PendingHits(scene_, *colours_, camera.near_m, out); };
   const auto end = [](PendingHits& pending) { pending.flush(); };
   if (mask && mask->count() < out.pixels()) {
-    trace_pixels(
-        scene_, camera, tile, *mask, begin,
-        [](PendingHits& pending, const RTCRayHit8& packet, std::span<const MaskedPixel> pixels) {
-          pending.add(packet, [&](int k) { return std::pair<int, int>(pixels[k].x, pixels[k].y); });
-        },
-        end);
+    trace_pixels(scene_, camera, tile, *mask, begin,
+                 [](PendingHits& pending, const RTCRayHit8& packet, std::span<const MaskedPixel> pixels) {
+                   pending.add(packet, [&](int k) { return std::pair<int, int>(pixels[k].x, pixels[k].y); });
+                 });
     return out;
   }
   trace_tile(
@@ -335,7 +334,7 @@ image::View render_directly(Sampler& ray_sampler, const geometry::Camera& camera
       const int px = x + k % kPacketWidth, py = y + k / kPacketWidth;
       if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID || px >= camera.width || py >= camera.height) continue;
       const SurfacePoint point =
-          surface_point(scene.chunk(packet.hit.instID[0][k]), packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k],
+          surface_point(scene.chunk(packet.hit.instID[0][k]), packet.hit.primID[k], {packet.hit.u[k], packet.hit.v[k]},
                         {packet.hit.Ng_x[k], packet.hit.Ng_y[k], packet.hit.Ng_z[k]},
                         {packet.ray.dir_x[k], packet.ray.dir_y[k], packet.ray.dir_z[k]}, sampler->colours());
       const glm::uvec3 lit(point.colour * shading.intensity(point.normal) + 0.5f);

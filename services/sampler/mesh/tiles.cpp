@@ -99,17 +99,20 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
 void MeshTiles::begin_anew() {
   cache_.forget_waiting();
   retry_.forget();
-  list_asked_s_ = -1e9;
-  list_patience_s_ = RetryClock::kLeast_s;
+  list_clock_.forget();
   broken_ = false;
 }
 
-// Asks for the list of chunks. It is small, unless its array is still being read: waits twice as long each time.
+bool ListClock::ask(bool broken, double now_s) {
+  if (now_s - asked_s_ <= (broken ? RetryClock::kLeast_s : patience_s_)) return false;
+  if (asked_s_ > 0) patience_s_ = std::min(2 * patience_s_, kMostListPatience_s);
+  asked_s_ = now_s;
+  return true;
+}
+
 void MeshTiles::fetch_list(double now_s) {
-  if (now_s - list_asked_s_ <= (broken_ ? RetryClock::kLeast_s : list_patience_s_)) return;
-  if (list_asked_s_ > 0) list_patience_s_ = std::min(2 * list_patience_s_, kMostListPatience_s);
+  if (!list_clock_.ask(broken_, now_s)) return;
   blocks_->send(wire::ChunkListRequest{epoch_, array_});
-  list_asked_s_ = now_s;
   broken_ = false;
 }
 

@@ -66,6 +66,18 @@ class ChunkCache {
   uint64_t use_ = 0, bytes_ = 0;
 };
 
+/// When the list of chunks is asked for. It is small, or its array is being read: each time it is waited for twice as
+/// long.
+class ListClock {
+ public:
+  /// True: it should be asked for now, and is taken to be. broken: what was asked for before may be lost.
+  bool ask(bool broken, double now_s);
+  void forget() { *this = {}; }
+
+ private:
+  double asked_s_ = -1e9, patience_s_ = RetryClock::kLeast_s;
+};
+
 class MeshTiles final : public TileSource {
  public:
   /// Keeps references to the context, the link (to ask for more time while chunks are on their way) and the spans.
@@ -115,7 +127,7 @@ class MeshTiles final : public TileSource {
   bool prefetched_ = false;
   uint64_t chunks_refused_ = 0;
   RetryClock retry_;  // for chunks
-  double list_asked_s_ = -1e9, list_patience_s_ = RetryClock::kLeast_s;
+  ListClock list_clock_;
   uint64_t failed_before_ = 0;
   bool broken_ = false;  // the connection broke after a request
   double last_extend_s_ = -1e9;

@@ -39,11 +39,11 @@ std::vector<uint8_t> encode(const std::vector<volume::SliceImage>& images) {
 
 }  // namespace
 
-VolumeWork::VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name,
-                       net::Context& context, Master master, metrics::SpanRecorder& spans)
-    : store_(std::move(make), cache_bytes),
-      threads_(threads > 0 ? threads : tbb::task_arena::automatic),
-      service_name_(std::move(service_name)),
+VolumeWork::VolumeWork(MakeSlab make, const Options& o, net::Context& context, Master master,
+                       metrics::SpanRecorder& spans)
+    : store_(std::move(make), o.cache_bytes),
+      threads_(o.threads > 0 ? o.threads : tbb::task_arena::automatic),
+      service_name_(o.service_name),
       context_(context),
       master_(std::move(master)),
       spans_(spans) {}

@@ -33,10 +33,13 @@ class VolumeWork final : public Work {
     std::function<double(double)> to_master_s;
   };
 
-  /// make: arranges slabs. threads: number that encode; 0: one a core. cache_bytes: memory for voxels. Keeps references
-  /// to the context and the spans.
-  VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name, net::Context& context,
-             Master master, metrics::SpanRecorder& spans);
+  struct Options {
+    int threads = 0;           ///< to encode with; 0: one a core
+    uint64_t cache_bytes = 0;  ///< for voxels
+    std::string service_name;
+  };
+  /// make: arranges slabs. Keeps references to the context and the spans.
+  VolumeWork(MakeSlab make, const Options& options, net::Context& context, Master master, metrics::SpanRecorder& spans);
 
   const char* name() const override { return "volume"; }
   /// Remembers the epoch's transfer function and step. Logs bad ones once; that epoch's leases are hopeless.

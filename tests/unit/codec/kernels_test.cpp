@@ -105,7 +105,8 @@ TEST(Kernels, DirectionsAreThoseOfTheMatrix) {
       for (int16_t& e : row) e = static_cast<int16_t>(static_cast<int>(random() % 7000) - 3500);
     model.height_shift = 10;
     std::vector<int16_t> gx(width), gy(width);
-    geometry(rows, width, -100, 7, model, gx.data(), gy.data());
+    int16_t* const guide[2] = {gx.data(), gy.data()};
+    geometry(rows, width, -100, 7, model, guide);
     for (size_t i = 0; i < width; ++i) {
       const auto x = static_cast<ptrdiff_t>(i);
       const double u = static_cast<int>(depth.row(1)[x + 1] - depth.row(1)[x - 1]),
@@ -148,7 +149,7 @@ TEST(Kernels, PlanesComeBack) {
     std::vector<uint32_t> z(width), terms(width), left(width), slope(width);
     std::vector<uint8_t> tokens(width), kinds(width);
     plane_residuals(far, up, row, width, z.data(), tokens.data());
-    plane_terms(far, up, z.data(), tokens.data(), width, terms.data(), left.data(), slope.data());
+    plane_terms(far, up, z.data(), tokens.data(), width, {terms.data(), left.data(), slope.data()});
     plane_kinds(tokens.data(), width, kinds.data());
     for (size_t i = 0; i < width; ++i) {
       const auto x = static_cast<ptrdiff_t>(i);

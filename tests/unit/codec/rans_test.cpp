@@ -59,15 +59,15 @@ std::vector<uint8_t> put(const Symbols& s) {
 // False if words are missing. Takes symbols in parts, like rows.
 bool get(const Symbols& s, const std::vector<uint8_t>& bytes, std::vector<uint8_t>& tokens, std::vector<uint32_t>& z,
          bool& rests) {
-  const uint8_t *const begin = bytes.data(), *end = begin + bytes.size() - kStateBytes;
   SymbolDecoder coder;
-  if (!coder.start(end)) return false;
+  coder.begin = bytes.data(), coder.end = coder.begin + bytes.size() - kStateBytes;
+  if (!coder.start(coder.end)) return false;
   tokens.assign(s.z.size(), 0), z.assign(s.z.size(), 0);
   for (size_t at = 0; at < z.size(); at += 70)
     if (!coder.get(s.decode.data(), s.contexts.data() + at, std::min<size_t>(70, z.size() - at), 0, tokens.data() + at,
-                   z.data() + at, begin, end))
+                   z.data() + at))
       return false;
-  rests = coder.at_rest() && end == begin;
+  rests = coder.at_rest() && coder.end == coder.begin;
   return true;
 }
 

@@ -210,7 +210,7 @@ TEST(ClipOfVolumes, IsAsIfTheVoxelsWereNotThere) {
     const Clip clip = random_clip(random, 0.15);
     const auto frame = volume::plan_frame(grid, std::span(&c, 1));
     ASSERT_TRUE(frame);
-    const auto clipped = ShearSplatter(1).splat(volume, scene.colours, *frame, 0, grid.size[2], nullptr, clip);
+    const auto clipped = ShearSplatter(1).splat(volume, scene.colours, *frame, {0, grid.size[2]}, nullptr, clip);
 
     volume::Voxels left;
     left.k_begin = 0, left.k_end = grid.size[2];
@@ -226,7 +226,7 @@ TEST(ClipOfVolumes, IsAsIfTheVoxelsWereNotThere) {
         left.rows.push_back(uint32_t(left.i.size()));
       }
     const auto plain =
-        ShearSplatter(1).splat(SlabVolume(grid, std::move(left)), scene.colours, *frame, 0, grid.size[2]);
+        ShearSplatter(1).splat(SlabVolume(grid, std::move(left)), scene.colours, *frame, {0, grid.size[2]});
     ASSERT_EQ(clipped.size(), plain.size());
     for (size_t n = 0; n < plain.size(); ++n) {
       EXPECT_EQ(clipped[n].rect, plain[n].rect);

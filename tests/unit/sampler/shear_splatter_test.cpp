@@ -52,7 +52,7 @@ TEST(ShearSplatter, EqualsTheOracleAlongAllAxes) {
         const auto camera = from_axis(axis, sign, 0.9, 120);
         const auto frame = volume::plan_frame(grid, std::span(&camera, 1));
         ASSERT_TRUE(frame);
-        const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, 0, grid.size[2]);
+        const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, {0, grid.size[2]});
         ASSERT_FALSE(images.empty());
         const double most =
             -std::log(1 - (lit ? 0.5 : 0.15)) * frame->path(grid, frame->width / 2.0, frame->height / 2.0);
@@ -76,7 +76,7 @@ TEST(ShearSplatter, EqualsTheOracleAtAnySizeOfPixels) {
   for (const auto& [w, h] : {std::pair{160, 40}, {41, 130}, {23, 9}, {9, 11}, {1, 1}, {700, 10}}) {
     frame->width = w, frame->height = h;
     frame->du = width / w, frame->dv = height / h;
-    const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, 0, 40);
+    const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, {0, 40});
     EXPECT_LT(worst_difference(scene, *frame, images), 0.75) << w << " x " << h;
   }
 }
@@ -89,7 +89,7 @@ TEST(ShearSplatter, CropsImagesAndLeavesOutEmptyOnes) {
   const auto frame = volume::plan_frame(grid, std::span(&camera, 1));
   ASSERT_TRUE(frame);
   ShearStats stats;
-  const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, 0, 32, &stats);
+  const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, {0, 32}, &stats);
   ASSERT_FALSE(images.empty());
   for (const auto& image : images) {
     const auto any = [&](int x, int y, int dx, int dy) {
@@ -106,12 +106,12 @@ TEST(ShearSplatter, CropsImagesAndLeavesOutEmptyOnes) {
   EXPECT_GT(stats.pixels, stats.voxels);
 
   const std::vector<volume::LevelColour> nothing(256);
-  EXPECT_TRUE(ShearSplatter(1).splat(volume, nothing, *frame, 0, 32, &stats).empty());
+  EXPECT_TRUE(ShearSplatter(1).splat(volume, nothing, *frame, {0, 32}, &stats).empty());
   EXPECT_EQ(stats.voxels, 0u);
   volume::Voxels none;
   none.k_end = 32;
   none.rows.assign(32 * 32 + 1, 0);
-  EXPECT_TRUE(ShearSplatter(1).splat(SlabVolume(grid, none), scene.colours, *frame, 0, 32, &stats).empty());
+  EXPECT_TRUE(ShearSplatter(1).splat(SlabVolume(grid, none), scene.colours, *frame, {0, 32}, &stats).empty());
 }
 
 // A solid block whose inside is skipped. It looks the same as layers splatted one by one, which are hidden by no other
@@ -133,13 +133,13 @@ TEST(ShearSplatter, SkipsOnlyWhatNobodySees) {
     const auto frame = volume::plan_frame(grid, std::span(&camera, 1));
     ASSERT_TRUE(frame);
     ShearStats stats;
-    const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, 0, 48, &stats);
+    const auto images = ShearSplatter(1).splat(volume, scene.colours, *frame, {0, 48}, &stats);
     EXPECT_GT(stats.skipped, stats.voxels);
     std::vector<volume::SliceImage> whole;
     for (size_t l = 0; l < frame->layers.size(); ++l) {
       auto single = *frame;
       single.layers = {frame->layers[l]};
-      for (auto& image : ShearSplatter(1).splat(volume, scene.colours, single, 0, 48)) {
+      for (auto& image : ShearSplatter(1).splat(volume, scene.colours, single, {0, 48})) {
         image.layer = int(l);
         whole.push_back(std::move(image));
       }

@@ -171,9 +171,10 @@ ShearSplatter::~ShearSplatter() = default;
 
 std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
                                                      const std::vector<volume::LevelColour>& colours,
-                                                     const volume::ShearFrame& frame, int k_begin, int k_end,
+                                                     const volume::ShearFrame& frame, const SlabSlices& slab,
                                                      ShearStats* stats, const geometry::Clip& clip) {
   const auto started = Clock::now();
+  const int k_begin = slab.k_begin, k_end = slab.k_end;
   const volume::Grid& grid = volume.grid();
   const volume::Voxels& voxels = volume.voxels();
   const ShearRows& rows = volume.rows(frame.axis);
@@ -303,7 +304,7 @@ class ShearSlab final : public Slab {
                                         const volume::ShearFrame& frame, int k_begin, int k_end,
                                         const geometry::Clip& clip, uint64_t& voxels) const override {
     ShearStats stats;
-    auto images = splatter_->splat(volume_, colours, frame, k_begin, k_end, &stats, clip);
+    auto images = splatter_->splat(volume_, colours, frame, {k_begin, k_end}, &stats, clip);
     voxels = stats.voxels;
     return images;
   }

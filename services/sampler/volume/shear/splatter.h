@@ -62,6 +62,11 @@ struct ShearStats {
   double arrange_ms = 0, splat_ms = 0;
 };
 
+/// The slices [k_begin, k_end).
+struct SlabSlices {
+  int k_begin, k_end;
+};
+
 /// Splats a field: every voxel has an extinction (per Grid::unit_m) and a colour, lit by volume/lighting.h.
 /// Within a slice, extinction and extinction times colour are interpolated bilinearly: a tent of one voxel, or of one
 /// pixel where a voxel is smaller. The kernel is the same for all voxels of a slice (T4.5.1); its weights add up to 1
@@ -75,12 +80,12 @@ class ShearSplatter {
   explicit ShearSplatter(int threads);  ///< 0: one for each core. Images do not depend on it, nor on the SIMD target
   ~ShearSplatter();
 
-  /// Returns images of the slab [k_begin, k_end) of the frame: pixels of owned_pixels() only. For those the volume must
-  /// hold one slice more on both sides, if the grid has them; where pixels are larger than 1.5 voxels, the kernel is
-  /// cut off at the slices held. colours: one for each level of the epoch. clip: voxels whose centres it cuts away are
-  /// left out, so that the volume ends within a voxel of its planes. Precondition: validate(frame, grid).
+  /// Returns images of a slab of the frame: pixels of owned_pixels() only. For those the volume must hold one slice
+  /// more on both sides, if the grid has them; where pixels are larger than 1.5 voxels, the kernel is cut off at the
+  /// slices held. colours: one for each level of the epoch. clip: voxels whose centres it cuts away are left out, so
+  /// that the volume ends within a voxel of its planes. Precondition: validate(frame, grid).
   std::vector<volume::SliceImage> splat(const SlabVolume& volume, const std::vector<volume::LevelColour>& colours,
-                                        const volume::ShearFrame& frame, int k_begin, int k_end,
+                                        const volume::ShearFrame& frame, const SlabSlices& slab,
                                         ShearStats* stats = nullptr, const geometry::Clip& clip = {});
 
  private:
