@@ -8,12 +8,14 @@ import argparse
 import pathlib
 import sys
 
+import class_rules
 import document_rules
 import include_rules
 import text_rules
 from tree import Tree
 
-RULES = {rule.__name__: rule for module in (include_rules, text_rules, document_rules) for rule in module.RULES}
+MODULES = (include_rules, class_rules, text_rules, document_rules)
+RULES = {rule.__name__: rule for module in MODULES for rule in module.RULES}
 
 
 def main():

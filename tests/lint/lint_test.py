@@ -33,6 +33,10 @@ CLEAN = {
 
 LONG = "int f(int a) {\n" + "  a += g{1}.value;\n" * 60 + "}\n"
 
+# Twenty data members and one more, beside what is none.
+MEMBERS = "  static int s;\n  using A = int;\n  int f() const { return 1; }\n"
+MEMBERS += "  int a = 1, b{2};\n  std::map<int, A> c;\n" * 7
+
 # rule, file, its text, line of the finding, part of what is said
 VIOLATIONS = [
     ("english", "common/core/x.h", "int x;  ///< of a frame\n", 1, 'begins with "of"'),
@@ -97,6 +101,15 @@ VIOLATIONS = [
     ("references", "common/core/x.h", "// See DESIGN section 3.\n", 1, "DESIGN"),
     ("references", "common/core/x.h", "// As in issue 4.\n", 1, "issue 4"),
     ("functions", "common/core/x.cpp", "namespace a {\n" + LONG + "}\n", 2, "f: 62 lines"),
+    ("members", "common/core/x.h", "namespace a {\nclass Wide {\n" + MEMBERS + "};\n}\n", 2, "Wide: 21, more than 20"),
+    (
+        "members", "common/core/x.h",
+        "class Outer {\n struct Inner {\n" + MEMBERS + " } ;\n void f();\n Inner inner_;\n};\n", 1, "Outer: 21",
+    ),
+    (
+        "parameters", "common/core/x.h",
+        "\nvoid f(int a, int b, const A<int, 2>& c, int d, int, int e, B* g = {});\n", 2, "f: 7, more than 6",
+    ),
     ("functions", "common/core/x.cpp", "class A {\n public:\n  A() : b_{1} {}\n" + LONG + "};\n", 4, "f: 62 lines"),
     (
         "messages", "common/wire/more_messages.h",
@@ -183,6 +196,13 @@ class RulesTest(unittest.TestCase):
         )
         file = self.tree(**{"common/core/x.cpp": text}).file("common/core/x.cpp")
         self.assertEqual(list(text_rules.function_extents(file)), [("A", 2, 5), ("twice", 9, 15)])
+
+    def test_public_parts_and_calls_count_as_one(self):
+        text = "struct Outer {\n struct Inner {\n" + MEMBERS + " };\n Inner inner;\n int a;\n};\n"
+        text += "int b = g(1, 2, 3, 4, 5, 6, 7);\nA c{h(1, 2, 3, 4, 5, 6, 7)};\n"
+        tree = self.tree(**{"common/core/x.h": text})
+        found = [f for f in self.findings(tree) if f.rule in ("members", "parameters")]
+        self.assertEqual([f.text for f in found], ["Inner: 21, more than 20"])
 
     def test_the_program_prints_findings_and_exits_with_1(self):
         program = [sys.executable, lint.__file__, "--root"]

@@ -60,7 +60,7 @@ _TRANSPARENT = re.compile(
 _NAME = re.compile(r"([~\w:]+|operator\S+)\s*(?:<[^<>()]*>)?\s*\(")
 
 
-def _code_without_directives(file):
+def code_without_directives(file):
     """The code with preprocessor lines blanked, so that braces in macros do not count."""
     lines, continued = [], False
     for line in file.code.split("\n"):
@@ -75,7 +75,7 @@ def function_extents(file):
 
     Works on formatted code: the brace that opens a body has a space before it, one that initialises a value has none.
     """
-    code = _code_without_directives(file)
+    code = code_without_directives(file)
     head = 0  # where the present declaration begins
     depth_in_body = 0  # braces open since the function's own, which counts as 1; 0: in no function
     begin = name = None

@@ -113,8 +113,8 @@ std::string newest_picture(const PipelineRun& run);
 /// Over all pixels, those of the background too; 99 where they are the same.
 double psnr_db(const image::View& a, const image::View& b);
 
-/// Returns the numbers of the displayed frames that a movie of the run in this folder must show, one for each of its `fps`
-/// frames a second.
+/// Returns the numbers of the displayed frames that a movie of the run in this folder must show, one for each of its
+/// `fps` frames a second.
 std::vector<uint64_t> on_screen(const std::string& run, double fps);
 /// Makes a folder of pictures of the run, which recorded every frame, and expects each to equal the recorded one.
 /// Returns the number of compared pictures: the disk may have been too slow for some.
