@@ -17,14 +17,7 @@ options::Table table(SamplerOptions& o) {
                           {.flag = "--chunk-cache-mb",
                            .value = &o.chunk_cache_mb,
                            .help = "memory for chunks, MB",
-                           .limits = Range{1, 1e6}},
-                          {.flag = "--replay",
-                           .value = &o.replay,
-                           .help = "sample nothing: deliver this file's rows, after as long as they took"},
-                          {.flag = "--cost-scale",
-                           .value = &o.cost_scale,
-                           .help = "with --replay: a row takes this times as long",
-                           .limits = Range{0, 1e6}}});
+                           .limits = Range{1, 1e6}}});
 }
 
 }  // namespace telesplat::sampler

@@ -18,7 +18,6 @@
 #include "common/options/complain.h"
 #include "common/scene/session.h"
 #include "services/sampler/mesh/sampler.h"
-#include "services/sampler/tiles/replay.h"
 #include "services/sampler/tiles/work.h"
 #include "services/sampler/works.h"
 
@@ -84,16 +83,13 @@ void DrainGuard::watch(const std::string& master, InstanceId instance, const net
 
 class SamplerTurns final : public SamplerService {
  public:
-  /// mesh_sampler: made beforehand, or null. replay: source of all tiles, for scenes of every kind, or null.
+  /// mesh_sampler: made beforehand, or null.
   SamplerTurns(const SamplerOptions& o, InstanceId instance, std::unique_ptr<Sampler> mesh_sampler,
-               std::unique_ptr<TileSource> replay, net::Context& context)
+               net::Context& context)
       : options_(o),
         context_(context),
         mesh_sampler_(std::move(mesh_sampler)),
-        replays_(replay != nullptr),
-        link_(context, o.service.master, make_hello(o, instance), o.service.give_up_after_s) {
-    if (replays_) set_work(std::make_unique<TileWork>(std::move(replay), link_));
-  }
+        link_(context, o.service.master, make_hello(o, instance), o.service.give_up_after_s) {}
 
   std::optional<net::Wait> turn() override {
     receive_control(!give_up_s_);
@@ -178,7 +174,7 @@ class SamplerTurns final : public SamplerService {
     }
     const scene::SessionView view(session);
     connect_to_packer(view.endpoint("tiles"));
-    if (!replays_) follow_kind(view.fact("kind"));
+    follow_kind(view.fact("kind"));
     if (work_) work_->on_welcome(session);
   }
 
@@ -256,7 +252,6 @@ class SamplerTurns final : public SamplerService {
   const SamplerOptions& options_;
   net::Context& context_;
   std::unique_ptr<Sampler> mesh_sampler_;
-  const bool replays_;
   metrics::SpanRecorder spans_;
   net::MasterLink link_;
   std::unique_ptr<Work> work_;  // null: the session's kind is not known yet
@@ -277,7 +272,7 @@ class SamplerTurns final : public SamplerService {
 
 std::unique_ptr<SamplerService> SamplerService::open(net::Context& context, const SamplerOptions& o,
                                                      std::unique_ptr<Sampler> mesh_sampler) {
-  return std::make_unique<SamplerTurns>(o, net::make_instance_id(), std::move(mesh_sampler), nullptr, context);
+  return std::make_unique<SamplerTurns>(o, net::make_instance_id(), std::move(mesh_sampler), context);
 }
 
 Result<int> run(const SamplerOptions& given) {
@@ -287,12 +282,7 @@ Result<int> run(const SamplerOptions& given) {
   if (!access) return access.error();
   net::keep_freed_memory();
   std::unique_ptr<Sampler> sampler;
-  std::unique_ptr<TileSource> replay;
-  if (!o.replay.empty()) {
-    auto file = read_replay(o.replay);
-    if (!file) return file.error();
-    replay = std::make_unique<ReplayTiles>(std::move(*file), o.cost_scale);
-  } else if (o.kind != "auto") {  // if it cannot be made, report it now, not when a session comes
+  if (o.kind != "auto") {  // if it cannot be made, report it now, not when a session comes
     auto made = make_sampler(o.kind, o.threads);
     if (!made) return complain(made.error(), 1);
     sampler = std::move(*made);
@@ -300,7 +290,7 @@ Result<int> run(const SamplerOptions& given) {
   const InstanceId instance = net::make_instance_id();
   const DrainGuard guard(o.service.master, instance, *access);
   net::Context context(*access);
-  SamplerTurns service(o, instance, std::move(sampler), std::move(replay), context);
+  SamplerTurns service(o, instance, std::move(sampler), context);
   net::take_turns(service);
   return service.exit_code();
 }

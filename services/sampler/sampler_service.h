@@ -21,7 +21,7 @@ class SamplerService : public net::Turns {
 
 /// Serves until a signal or the master's Shutdown. After SIGINT or SIGTERM it finishes the leases that it holds, asks
 /// for no more, and ends within 2 s; after a Shutdown it ends at once. Exit code: 0; 1 if the sampler asked for cannot
-/// be made; 2 if the replay file cannot be read.
+/// be made.
 Result<int> run(const SamplerOptions& options);
 
 }  // namespace telesplat::sampler

@@ -37,7 +37,7 @@ class Work {
 
   virtual ~Work() = default;
 
-  /// Returns the way of sampling, for people and records: "ray", "raster", "julia", "replay", "volume".
+  /// Returns the way of sampling, for people and records: "ray", "raster", "julia", "volume".
   virtual const char* name() const = 0;
   /// To be called for every welcome of the master, in order.
   virtual void on_welcome(const wire::Welcome& session) = 0;

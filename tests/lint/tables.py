@@ -224,7 +224,7 @@ VERSION_FILE = "common/wire/limits.h"  # kProtocolVersion
 METRICS_PAGE = "docs/metrics.md"
 # Flags that pages name of programs that are not ours, or of scripts.
 FOREIGN_FLAGS = (
-    "build-arg", "build-dir", "exit-code-from", "het-group", "profile", "resolve-image", "seeds",
+    "build-arg", "build-dir", "exit-code-from", "het-group", "profile", "replay", "resolve-image", "seeds",
 )
 # Columns whose names are data: the master passes them on.
 FOREIGN_COLUMNS = ("viewer", "transfer", "colouring", "clip")

@@ -1,4 +1,4 @@
-// The commands of telesplat-lab. Each prints a table or plays a recording; none leaves a process behind.
+// The commands of telesplat-lab.
 #pragma once
 
 #include "tools/telesplat/command.h"
@@ -6,6 +6,5 @@
 namespace telesplat::lab {
 
 launcher::Command pose_replay_command();
-launcher::Command scaling_command();
 
 }  // namespace telesplat::lab

@@ -1,4 +1,4 @@
-// Made-up land for demos and scaling runs: a caldera with a lake, coloured by height and slope.
+// Made-up land for demos: a caldera with a lake, coloured by height and slope.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// The interface for sampling tiles, with an implementation for each kind of scene: MeshTiles, JuliaTiles; ReplayTiles
-// for studies. It fetches the data that a lease needs, then samples it. TileWork (work.h) holds the leases and encodes
-// the depth images. One thread; nothing here may wait.
+// The interface for sampling tiles, with an implementation for each kind of scene: MeshTiles, JuliaTiles. It fetches
+// the data that a lease needs, then samples it. TileWork (work.h) holds the leases and encodes the depth images. One
+// thread; nothing here may wait.
 #pragma once
 
 #include <memory>
@@ -35,7 +35,7 @@ class TileSource {
  public:
   virtual ~TileSource() = default;
 
-  /// Returns the way of sampling, for people and records: "ray", "raster", "julia", "replay".
+  /// Returns the way of sampling, for people and records: "ray", "raster", "julia".
   virtual const char* name() const = 0;
   /// To be called for every welcome of the master, in order.
   virtual void on_welcome(const wire::Welcome& session) = 0;

@@ -20,7 +20,7 @@ TEST(SamplerOptions, ValuesBeyondTheirLimitsAreRefused) {
   SamplerOptions options;
   const options::Table rows = table(options);
   for (const auto& [flag, value] :
-       {std::pair{"--threads", "1025"}, {"--sampler", "gpu"}, {"--chunk-cache-mb", "0.5"}, {"--cost-scale", "much"}})
+       {std::pair{"--threads", "1025"}, {"--sampler", "gpu"}, {"--chunk-cache-mb", "0.5"}})
     EXPECT_FALSE(options::set(*options::find(rows, flag), value).ok()) << flag;
   ASSERT_TRUE(options::set(*options::find(rows, "--chunk-cache-mb"), "512").ok());
   EXPECT_EQ(options.chunk_cache_mb, 512);

@@ -1,10 +1,5 @@
-// Samplers' work for their leases: Julia sets by epoch, replays, masks.
+// Samplers' work for their leases: Julia sets by epoch, masks.
 #include <gtest/gtest.h>
-
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/mask_stream.h"
@@ -12,7 +7,6 @@
 #include "common/julia/parameters.h"
 #include "common/net/dispatch.h"
 #include "services/sampler/julia/tiles.h"
-#include "services/sampler/tiles/replay.h"
 #include "services/sampler/tiles/work.h"
 #include "tests/support/masks.h"
 
@@ -106,54 +100,6 @@ TEST(JuliaTiles, DropsLeasesOfBadParametersAndForgetsAnotherMastersEpochs) {
   EXPECT_EQ(work.readiness(lease(1, {3}, {0, 0, 48, 8}, 0), 0).state, State::kWaits);
 }
 
-Replay replay() {
-  Replay r{{48, 32}, std::vector<double>(32, 0.5)};
-  for (size_t i = 0; i < r.frame.pixels(); ++i) r.frame.depth[i] = uint32_t(i + 1), r.frame.colour[i] = uint32_t(i);
-  r.row_cost_s[9] = 2;
-  return r;
-}
-
-TEST(ReplayTiles, ALeaseTakesWhatItsRowsCostAndLateWakingDoesNotAddUp) {
-  ReplayTiles work(replay(), 2);
-  const auto first = lease(1, {1}, {0, 8, 48, 2}, 100), second = lease(2, {1}, {0, 0, 48, 1}, 101);
-  const auto r = work.readiness(first, 100.5);
-  EXPECT_EQ(r.state, State::kWaits);
-  EXPECT_DOUBLE_EQ(r.again_s, 105);
-  EXPECT_EQ(work.readiness(first, 105.3).state, State::kReady);
-  const auto sampled = work.sample(first);
-  EXPECT_DOUBLE_EQ(sampled.begin_s, 100);
-  EXPECT_DOUBLE_EQ(sampled.end_s, 105);
-  EXPECT_EQ(sampled.image.width, 48);
-  ASSERT_EQ(sampled.image.height, 2);
-  EXPECT_EQ(sampled.image.depth.front(), 8 * 48 + 1u);
-  EXPECT_EQ(sampled.image.depth.back(), 10 * 48u);
-  EXPECT_DOUBLE_EQ(work.readiness(second, 105.3).again_s, 106);  // from 105, not from 105.3
-}
-
-TEST(ReplayTiles, DropsLeasesOfOtherFrames) {
-  ReplayTiles work(replay(), 1);
-  auto other = lease(1, {1}, {0, 0, 12, 8}, 0);
-  other.lease.step = 4;
-  EXPECT_EQ(work.readiness(other, 0).state, State::kHopeless);
-  other.lease.step = 1;
-  other.lease.camera.width = 24;
-  EXPECT_EQ(work.readiness(other, 0).state, State::kHopeless);
-}
-
-TEST(ReplayTiles, AMaskedLeaseCostsItsPartAndHasItsPixelsOnly) {
-  ReplayTiles work(replay(), 1);
-  auto held = lease(1, {1}, {0, 0, 48, 4}, 100);
-  held.mask = test::band_mask(48, 4, 20);
-  const size_t count = held.mask->count();
-  ASSERT_GT(count, 10u);
-  ASSERT_LT(count, 48u * 4);
-  EXPECT_NEAR(work.readiness(held, 100).again_s, 100 + 0.5 * 4 * double(count) / (48 * 4), 1e-9);
-  ASSERT_EQ(work.readiness(held, 103).state, State::kReady);
-  const auto masked = work.sample(held).image;
-  held.mask.reset();
-  EXPECT_EQ(masked, test::masked(work.sample(held).image, test::band_mask(48, 4, 20)));
-}
-
 class Masks : public testing::Test {
  protected:
   Masks() : link_(context_, "tcp://127.0.0.1:9", {}), control_(context_, net::Kind::kDealer, "master") {
@@ -227,44 +173,6 @@ TEST_F(Masks, WhereTheyAreNoneAllPixelsAreSampled) {
   lease.mask = good;
   take(lease);
   EXPECT_EQ(work_.leases(), 1u);
-}
-
-class ReplayFile : public testing::Test {
- protected:
-  void TearDown() override { std::filesystem::remove(path_); }
-  void write(const std::string& text) { std::ofstream(path_, std::ios::binary) << text; }
-  std::string refusal() {
-    const auto r = read_replay(path_);
-    return r ? "" : r.error().text;
-  }
-  std::string path_ =
-      (std::filesystem::temp_directory_path() / ("telesplat-replay-" + std::to_string(getpid()))).string();
-};
-
-TEST_F(ReplayFile, ComesBackAsItWasWritten) {
-  const Replay r = replay();
-  ASSERT_TRUE(write_replay(path_, r));
-  const auto back = read_replay(path_);
-  ASSERT_TRUE(back) << back.error().text;
-  EXPECT_EQ(back->frame, r.frame);
-  EXPECT_EQ(back->row_cost_s, r.row_cost_s);
-}
-
-TEST_F(ReplayFile, RefusesWhatIsNone) {
-  EXPECT_NE(refusal().find(path_), std::string::npos);
-  write("");
-  EXPECT_NE(refusal().find("JSON"), std::string::npos);
-  write("{\"width\":2,\"height\":1,\"row_cost_s\":[-1]}\n");
-  EXPECT_NE(refusal().find("-1"), std::string::npos);
-  write("{\"width\":2,\"height\":1,\"row_cost_s\":[1]}\nnothing of the kind");
-  EXPECT_NE(refusal().find(path_), std::string::npos);
-  ASSERT_TRUE(write_replay(path_, replay()));
-  std::ifstream in(path_, std::ios::binary);
-  const std::string all(std::istreambuf_iterator<char>(in), {});
-  for (size_t n = 0; n < all.size(); n += 7) {
-    write(all.substr(0, n));
-    EXPECT_NE(refusal(), "") << n << " of " << all.size() << " bytes";
-  }
 }
 
 }  // namespace
