@@ -285,7 +285,7 @@ TEST_F(Requester, ExtraPatchesCompleteNothingAndCountApart) {
   requester.on_pose(0, display);
   const RequestId first = requester.next(0)->request;
   auto extra = part(first, 0, 1);
-  extra.extra = true, extra.kept = 7;
+  extra.extra = true, extra.counts.kept = 7;
   const std::array<std::byte, 5> bytes{};
   extra.image = bytes;
   ASSERT_TRUE(extra.frame_complete);

@@ -245,8 +245,7 @@ TEST(BriefMessages, AreWithoutWhatANewOneHolds) {
               .request = RequestId{3000},
               .tile = 2,
               .tiles_in_frame = 4,
-              .samples = 900,
-              .kept = 800};
+              .counts = {900, 800}};
   patch.camera.pose.position_room = {0.1f, 0.2f, 0.3f};
   patch.camera.pose.orientation = {0.6f, 0.1f, 0.78740078f, 0.1f};
   patch.rect = {256, 128, 256, 200};
