@@ -11,8 +11,9 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
-// The worker takes the display's news this often. While the display waits for updates, each cycle loses that time.
+constexpr int kMessagesAtOnce = 16;  // then requests and control have their turn
+// Longest time until the worker looks at what the display did. Where the display waits, this time is lost in each
+// cycle.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
 constexpr double kWallPoll_s = 0.003;  // views of a wall wait for each other at the master
 
@@ -52,10 +53,6 @@ ViewerWorker::~ViewerWorker() {
   if (thread_.joinable()) thread_.join();
 }
 
-void ViewerWorker::on_pose(double now_s, const geometry::Camera& camera) {
-  news_.on_pose({.t_s = now_s, .camera = camera});
-}
-
 void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown,
                             bool waited) {
   meter_.displayed(epoch);
@@ -69,7 +66,7 @@ FrameFigures ViewerWorker::figures() const {
   return out;
 }
 
-// A person's wish goes before the session's setting.
+// A person's wish overrides the session's setting.
 void ViewerWorker::take_sampling() {
   const auto wish = news_.take_wish();
   if (!wish) return;
@@ -125,7 +122,7 @@ void ViewerWorker::receive_control() {
   if (link_.shutdown_requested() && !end_.shutdown()) end_.on_shutdown(link_.shutdown_reason());
 }
 
-// Content that was received belongs to the instance before: it begins anew with the next welcome.
+// Content received so far belongs to the old instance: the next welcome begins anew.
 void ViewerWorker::renew(InstanceId instance) {
   board_.instance = instance;
   requester_.set_viewer(instance);
@@ -145,13 +142,13 @@ void ViewerWorker::follow_session() {
     requester_.on_new_epoch(to_master_s(monotonic_s()));
   requester_.set_steered(session.settings.steering);
   if (std::exchange(followed_.master, session.master) != session.master) {
-    open_.on_all_lost();
+    open_.on_all_lost();  // the new master does not know the open requests
     if (received_) received_->on_new_master();
   }
   const auto pipeline = view.pipeline();
   if (!pipeline && !view.fact("kind").empty())
     log::error("the session's scene is of the kind \"{}\", which this viewer does not know", view.fact("kind"));
-  // The display hears of a session when its scene is there to be shown, or cannot be.
+  // The display gets a session when its scene can be shown, or when it is known that it cannot.
   auto copy = std::make_shared<const wire::Welcome>(session);
   const bool has_scene = !session.box_room.empty() && pipeline;
   const Status followed = has_scene ? follow(*pipeline, session) : ok_status();
@@ -169,7 +166,7 @@ void ViewerWorker::follow_session() {
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
 }
 
-// Views come as pictures or not as long as the session lasts, and no order changes that.
+// The session alone decides if views come as pictures, for as long as it lasts; the viewer's flags do not.
 void ViewerWorker::follow_pictures(const scene::SessionView& session) {
   const auto pipeline = session.pipeline();
   const bool pictures = pipeline == scene::Pipeline::kPictures;
@@ -199,7 +196,7 @@ void ViewerWorker::change_coupling(double now_s) {
   if (!begins_to_wait && received_) received_->on_coupling(after->buffers);
 }
 
-// Where the record lies is known before anything is received.
+// The record must have its folder before any data are received.
 void ViewerWorker::follow_record(const wire::Welcome& session) {
   if (!options_.record) return;
   const std::string before = options_.record->records_in();
@@ -220,7 +217,7 @@ Status ViewerWorker::follow(scene::Pipeline pipeline, const wire::Welcome& sessi
   return ok_status();
 }
 
-// The scene is drawn another way from now on. What was asked for is answered that way.
+// The scene is drawn by another Received from now on: requests are answered that way.
 void ViewerWorker::retire() {
   received_->on_retired();
   feeds_.close();
@@ -247,7 +244,7 @@ void ViewerWorker::on_part(const ViewPart& part) {
   CouplingGate& gate = coupling_.gate();
   meter_.received(part.bytes);
   if (part.viewer != link_.instance()) return;
-  // Rays beyond views answer no request: while they come, one that was lost must be asked for again all the same.
+  // Rays beyond views answer no request: they must not keep a lost request from being repeated.
   if (!part.extra) gate.with([&](Coupling& c) { c.progress(local_s); });
   const auto u = requester_.on_part(part, now_s);
   if (!u) return;
@@ -267,7 +264,7 @@ void ViewerWorker::may_display(const ShownUpdate& update) {
   succession_.on_update(update.request);
 }
 
-// To be called before the display can take them: with the gate closed.
+// Call it with the gate closed, before the display can take them.
 void ViewerWorker::release(const std::vector<RequestId>& requests) {
   for (const RequestId request : requests) may_display(open_.release(request));
 }
@@ -300,7 +297,7 @@ void ViewerWorker::request_views(double now_s) {
   take_news();
   if (!link_.session() || !feeds_.connected()) return;
   ask_again(now_s);
-  if (coupling_.waits()) return;
+  if (coupling_.waits()) return;  // no requests until the coupling has changed
   bool may_ask = coupling_.gate().may_ask();
   while (may_ask) {
     const auto request = requester_.next(to_master_s(now_s));
@@ -312,7 +309,7 @@ void ViewerWorker::request_views(double now_s) {
   }
 }
 
-// Once: the master samples it coarser than it was asked for.
+// Warns once if the master samples coarser than the view asks for.
 void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
   const uint64_t most = link_.session()->settings.max_sampling_pixels;
   const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
@@ -328,7 +325,7 @@ void ViewerWorker::report(double now_s, bool last) {
   if (received_) received_->report();
 }
 
-// Adds mean errors of predicted poses: of view requests, and of a tracker's poses as they were displayed.
+// Adds mean errors of predicted poses: of view requests, and of displayed poses from a tracker.
 void ViewerWorker::add_prediction(net::MasterLink::Values& values) const {
   const auto add = [&](const char* what, const tracking::PredictionMeter::Figures& f) {
     if (f.count == 0) return;

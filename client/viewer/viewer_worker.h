@@ -54,7 +54,7 @@ class ViewerWorker : public net::Turns {
 
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
-  void on_pose(double now_s, const geometry::Camera& camera);
+  void on_pose(double now_s, const geometry::Camera& camera) { news_.on_pose({.t_s = now_s, .camera = camera}); }
   /// The head's tracker expects it here at t_s, which lies ahead (monotonic clock). Goes with the next pose or frame.
   void on_expected(double t_s, const geometry::Pose& pose) { news_.on_expected(t_s, pose); }
   /// The next pose or frame is in another space: earlier movements of the head mean nothing.

@@ -1,4 +1,4 @@
-// Changes the coupling as the session orders it and as views come. No sockets, no clocks.
+// Follows the session's orders, and the pace at which views come, with the coupling. No sockets, no clocks.
 #pragma once
 
 #include <optional>
@@ -18,14 +18,15 @@ class CouplingFollower {
   void follow(const wire::SessionSettings& session, double now_s);
   /// An order waits: no view is asked for until next() has carried it out.
   bool waits() const { return wished_.has_value(); }
-  /// The coupling that comes into force now; nothing: none does. A display that does not wait yet goes on to show what
-  /// comes until its open request is answered, so that the first frame that waits has an update to wait for.
+  /// Returns the coupling that comes into force now; nothing: it stays. Before the display begins to wait, its open
+  /// request is answered and shown, for kPatience_s at most: so no update is lost, and the first frame that waits does
+  /// so for a request made after the change.
   std::optional<CouplingState> next(bool answer_open, double now_s);
-  /// The session's views come as pictures or as points. Returns the coupling that comes into force; nothing: that
-  /// in force fits.
+  /// The session says whether views come as pictures; no order changes that. Returns the coupling that comes into
+  /// force; nothing: the present one fits.
   std::optional<CouplingState> follow_pictures(bool pictures) const;
-  /// A view came, where views come as pictures; ahead: views that were under way when it was asked for. Returns the
-  /// coupling with another number of views under way; nothing: it stays.
+  /// A view came as a picture; ahead: views that were under way when it was asked for. Returns the coupling with as
+  /// many views under way as keep servers and link busy; nothing: it stays.
   std::optional<CouplingState> answered(const metrics::StagesMs& stages, uint64_t ahead);
 
  private:

@@ -1,4 +1,4 @@
-// News from the display to the worker: poses of the head, updates that frames showed, wishes of people.
+// Brings news from the display to the worker: the head's poses, updates shown, and a person's wishes.
 #pragma once
 
 #include <mutex>
@@ -16,8 +16,8 @@ class DisplayNews {
   struct Pose {
     double t_s = 0;  ///< monotonic clock
     geometry::Camera camera;
-    double waited_since_s =
-        0;            ///< master's clock: the frame waited for the update that was requested then; 0: it did not
+    /// Master's clock: the frame waited for the update that was requested then; 0: it did not wait.
+    double waited_since_s = 0;
     RequestId shown;  ///< the newest update in what was displayed; 0: nothing was displayed
     std::optional<tracking::PosePredictor::Sample> expected{};
     bool jumped = false;  ///< the space has changed since the pose before

@@ -1,4 +1,4 @@
-// The session's state that the worker writes and other threads read.
+// Facts about the session that the worker writes and other threads read; and the session's end.
 #pragma once
 
 #include <atomic>
@@ -30,7 +30,7 @@ class SessionBoard {
     session_ = std::move(session);
     if (scene) scene_ = *scene;
   }
-  /// The size of the newest view request, pixels.
+  /// Sets the size of the newest view request, pixels.
   void show_size(int width, int height) {
     const std::lock_guard lock(mutex_);
     sampled_width_ = width, sampled_height_ = height;
@@ -52,8 +52,8 @@ class SessionBoard {
 
   LegendBook legends;
   std::atomic<InstanceId> instance;
-  std::atomic<double> offset_s{0};   ///< the master's clock less the monotonic clock
-  std::atomic<double> horizon_s{0};  ///< how far ahead views are asked for
+  std::atomic<double> offset_s{0};   ///< master's clock minus the monotonic one
+  std::atomic<double> horizon_s{0};  ///< time ahead for which views are asked for
 
  private:
   mutable std::mutex mutex_;

@@ -27,7 +27,7 @@ void ViewerMeter::measured(const MeasuredFrame& f) {
   if (f.previous_s > 0) {
     const double gap_ms = (f.end_s - f.previous_s) * 1e3;
     inter_frame_ms_.add(f.end_s, gap_ms);
-    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // one thread displays
+    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // safe: only one thread displays
   }
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
 }

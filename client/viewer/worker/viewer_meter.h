@@ -28,7 +28,7 @@ class ViewerMeter {
   uint64_t updates() const { return updates_; }
   void add_figures(FrameFigures& figures) const;
   void add_status(net::MasterLink::Values& values) const;
-  /// Medians and 95th percentiles of the last seconds.
+  /// Adds medians and 95th percentiles of the last kRecent_s.
   void add_recent(net::MasterLink::Values& values) const;
 
  private:
