@@ -53,14 +53,18 @@ ViewerWorker::~ViewerWorker() {
   if (thread_.joinable()) thread_.join();
 }
 
+void ViewerWorker::on_pose(double now_s, const geometry::Camera& camera) {
+  news_.on_pose({.t_s = now_s, .camera = camera});
+}
+
 void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown,
                             bool waited) {
   meter_.displayed(epoch);
   news_.on_pose({now_s, camera, waited ? shown.requested_s : 0.0, shown.request});
 }
 
-FrameFigures ViewerWorker::figures() const {
-  FrameFigures out{.renderer = options_.renderer->get()};
+SessionFigures ViewerWorker::figures() const {
+  SessionFigures out{.renderer = options_.renderer->get()};
   board_.add_figures(out);
   meter_.add_figures(out);
   return out;

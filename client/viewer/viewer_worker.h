@@ -54,12 +54,12 @@ class ViewerWorker : public net::Turns {
 
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
-  void on_pose(double now_s, const geometry::Camera& camera) { news_.on_pose({.t_s = now_s, .camera = camera}); }
+  void on_pose(double now_s, const geometry::Camera& camera);
   /// The head's tracker expects it here at t_s, which lies ahead (monotonic clock). Goes with the next pose or frame.
   void on_expected(double t_s, const geometry::Pose& pose) { news_.on_expected(t_s, pose); }
   /// The next pose or frame is in another space: earlier movements of the head mean nothing.
   void on_jump() { news_.on_jump(); }
-  /// Returns the time ahead for which views are asked for, seconds.
+  /// Time ahead for which views are asked for, seconds.
   double horizon_s() const { return board_.horizon_s; }
   /// Something of the scene was displayed for the first time (later calls change nothing).
   void on_first_points(double now_s) { meter_.on_first_points(now_s); }
@@ -71,7 +71,7 @@ class ViewerWorker : public net::Turns {
   void on_measured(const MeasuredFrame& frame) { meter_.measured(frame); }
   /// The display has waited this long for a view update, seconds; 0: it does not wait, or not for long.
   void on_waiting(double waits_s) { meter_.waits(waits_s); }
-  /// Returns the content to draw from, see Succession::at. Null: the session's scene is not known yet.
+  /// Content to draw: Succession::at(). Null: it is not known yet what the session shows.
   std::shared_ptr<Received> received_at(RequestId request) { return succession_.at(request); }
   /// True once one view update is complete.
   bool first_update_complete() const { return meter_.updates() > 0; }
@@ -86,17 +86,16 @@ class ViewerWorker : public net::Turns {
   InstanceId instance() const { return board_.instance; }
   double to_master_s(double local_s) const { return local_s + board_.offset_s; }
 
-  /// The worker's share of a frame's figures.
-  FrameFigures figures() const;
+  SessionFigures figures() const;
   /// The session as its master told it last; null before that.
   std::shared_ptr<const wire::Welcome> session() const { return board_.session(); }
   /// Views are sampled like this from now on.
   void set_sampling(const SamplingWish& wish) { news_.on_wish(wish); }
-  /// Returns the scene to show; its box is empty until it is known.
+  /// Scene to show; its box is empty until the scene is known.
   ShownScene shown_scene() const { return board_.scene().shown; }
-  /// Orders to this viewer, which the display carries out.
+  /// Orders of other processes, for the display to carry out.
   OrderDesk& orders() { return orders_; }
-  /// Returns names, units and placement of the session's data; null before the first session.
+  /// Units and names of the session's data; null until the master sent them.
   std::shared_ptr<const SceneTerms> terms() const { return board_.scene().terms; }
   /// Null: frames of this epoch have no legend.
   std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return board_.legends.at(epoch); }

@@ -54,7 +54,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
     ViewerWorker worker(context, options, gate, table, spans);
     const SourceMaker make = [&](Received& received, double) {
       auto made = received.make_source(display, *renderers);
-      out.sources.push_back((*made)->drawn_name());
+      out.sources.push_back((*made)->units().drawn);
       return made;
     };
     out.result = run_display({display, surface, make, gate, worker, table, spans, nullptr});

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "client/viewer/display/display_surface.h"
+#include "client/viewer/display/frame_figures.h"
 
 namespace telesplat::viewer {
 

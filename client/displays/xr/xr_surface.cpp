@@ -177,13 +177,10 @@ void XrSurface::point(const HandRays& rays, const image::View& view) {
 }
 
 // A frame that is handed over late is shown at a later refresh.
-void XrSurface::measure(MeasuredFrame& m) {
-  const double period_s = frame_.period_s;
-  m.lead_s = frame_.display_s - m.presented_s;
-  m.refresh_s = period_s;
-  m.missed = missed_;
-  const double late_s = m.lead_s < 0 && period_s > 0 ? std::ceil(-m.lead_s / period_s) * period_s : 0;
-  m.seen_s = frame_.display_s + late_s;
+void XrSurface::measure(Seen& seen, double presented_s) {
+  const double period_s = frame_.period_s, lead_s = frame_.display_s - presented_s;
+  const double late_s = lead_s < 0 && period_s > 0 ? std::ceil(-lead_s / period_s) * period_s : 0;
+  seen = {frame_.display_s + late_s, period_s, lead_s, missed_};
 }
 
 // The options take over the size of a headset's pictures. Eyes never stand still, so there are no still pictures.

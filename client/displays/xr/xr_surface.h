@@ -45,7 +45,7 @@ class XrSurface final : public DisplaySurface {
   bool visible() const override { return true; }
   void present(const image::View&, bool) override {}
   void present_eyes(std::array<image::View, 2>& views) override;
-  void measure(MeasuredFrame& frame) override;
+  void measure(Seen& seen, double presented_s) override;
   void report(const FrameFigures&) override {}
   Status set(const std::string&, const std::string&) override {
     return Error{"a headset's display keeps what it began with"};

@@ -30,20 +30,6 @@ geometry::Camera drawn_size(const geometry::Camera& camera, const DrawnFrame& dr
   return drawn.halved ? geometry::half_size(camera) : camera;
 }
 
-// Joins the worker's figures with those of the frame.
-FrameFigures figures_of(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
-                        const ViewerWorker& worker) {
-  FrameFigures out = worker.figures();
-  out.now_s = now_s;
-  out.frames = frames;
-  out.points_drawn = drawn.drawn;
-  out.points_cached = drawn.cached;
-  out.drawn_name = source.drawn_name();
-  out.cached_name = source.cached_name();
-  out.detail = drawn.detail;
-  return out;
-}
-
 // Sums the views of a headset's eyes: both are one frame of the tables.
 void add(const DrawnFrame& other, DrawnFrame& sum) {
   sum.empty = sum.empty && other.empty;
@@ -52,7 +38,7 @@ void add(const DrawnFrame& other, DrawnFrame& sum) {
   sum.detail = std::min(sum.detail, other.detail);
 }
 
-// The content that the worker received, and the source that draws frames from it.
+// Content that the worker received, and a source that draws it.
 class DrawnScene {
  public:
   DrawnScene(ViewerWorker& worker, DisplaySurface& surface, const SourceMaker& make)
@@ -143,7 +129,7 @@ class DisplayLoop {
   // Returns the request to draw next if the display does not wait.
   RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
 
-  // Returns the camera of the frame that begins. The surface learns of the scene first.
+  // Returns the camera of the frame that begins, after telling the surface what there is to show.
   geometry::Camera next_camera(double now_s, double t_s) {
     auto session = worker_.session();  // first, so that the surface gets a session's scene before the session
     const ShownScene scene = worker_.shown_scene();
@@ -228,7 +214,7 @@ class DisplayLoop {
       else
         clear(view_, camera, false);
       present(true);
-      surface_.report({.now_s = monotonic_s(), .scene = worker_.figures().scene});
+      surface_.report({.now_s = monotonic_s(), .session = worker_.figures()});
     }
     return true;
   }
@@ -254,7 +240,10 @@ class DisplayLoop {
       present(true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
       carry_out_orders({picked_with(camera), surface_.head(), drawn.epoch, eyes_.pair()});
-      surface_.report(figures_of(monotonic_s(), 0, drawn, drawn_.source(), worker_));
+      surface_.report({.now_s = monotonic_s(),
+                       .frame = {.drawn = drawn},
+                       .units = drawn_.source().units(),
+                       .session = worker_.figures()});
     }
     return true;
   }
@@ -373,7 +362,7 @@ class DisplayLoop {
     }
     const WallPace::Turn& turn = wall_->turn();
     if (!m.coupling.waits()) drawn_.received().show_state(turn.state);
-    m.wall_frame = turn.frame;
+    m.swap.frame = turn.frame;
     m.head = turn.head;
     // The display that leads took this pose after the frame before the last was presented. Its clock is ours, unless
     // viewers were started by hand.
@@ -429,11 +418,11 @@ class DisplayLoop {
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
     present(m.drawn.changed);
     clock_.seen(m, monotonic_s(), std::max(surface_.refresh_s(), o_.target_fps > 0 ? 1 / o_.target_fps : 0));
-    if (!m.drawn.empty) worker_.on_first_points(m.seen_s);
+    if (!m.drawn.empty) worker_.on_first_points(m.seen.at_s);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     take_wished_picture(m.camera);
     m.presented_s = monotonic_s();
-    surface_.measure(m);
+    surface_.measure(m.seen, m.presented_s);
     if (wall_) note_swap(swapped, m);
     m.filled = gate_.filled();
     drawn_.source().displayed();
@@ -451,10 +440,8 @@ class DisplayLoop {
   }
 
   void tell_of(const MeasuredFrame& m) {
-    live_ = figures_of(m.presented_s, result_.frames, m.drawn, drawn_.source(), worker_);
-    live_.waits_s = stall_.told_s(m.presented_s);
-    live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
-    live_.coupling = m.coupling;
+    live_ = {m.presented_s,           result_.frames,   stall_.told_s(m.presented_s), m,
+             drawn_.source().units(), worker_.figures()};
     surface_.report(live_);
   }
 
@@ -516,8 +503,8 @@ class DisplayLoop {
 
   void note_swap(const WallPace::Swapped& swapped, MeasuredFrame& m) {
     wall_->presented(m.presented_s);
-    m.swap_wait_s = swapped.wait_s;
-    if (swapped.alone) m.wall_frame = 0;
+    m.swap.wait_s = swapped.wait_s;
+    if (swapped.alone) m.swap.frame = 0;
     rows_.note_skew(swapped.skew_frame, swapped.skew_s);
   }
 
@@ -558,7 +545,7 @@ class DisplayLoop {
   ShownScene scene_;  // as given to the surface; so is session_
   std::shared_ptr<const wire::Welcome> session_;
   image::View view_;
-  std::array<image::View, 2> eye_views_;  // for a surface that has eyes
+  std::array<image::View, 2> eye_views_;  // if the surface has eyes
   bool view_intact_ = false;              // it holds what is on display
   DisplayResult result_;
   bool last_ = false;

@@ -24,7 +24,7 @@ struct DisplayResult {
 /// pictures_a_second: DisplaySurface::pictures_a_second().
 using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&, double pictures_a_second)>;
 
-/// The parts of a display. All must outlive it.
+/// Parts of a display. All must outlive it.
 struct DisplayParts {
   const DisplayOptions& options;
   DisplaySurface& surface;

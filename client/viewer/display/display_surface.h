@@ -10,13 +10,11 @@
 #include <optional>
 #include <string>
 
-#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/hands/measurements.h"
 #include "client/viewer/input/look.h"
 #include "client/viewer/input/tracked_head.h"
-#include "client/viewer/render/renderer_trial.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
 #include "common/image/legend.h"
@@ -25,24 +23,6 @@
 
 namespace telesplat::viewer {
 
-/// Figures after a frame. Counters count from the beginning.
-struct FrameFigures {
-  double now_s = 0;                  ///< monotonic clock
-  std::string scene;                 ///< name of the data set; empty until the master sent it
-  uint64_t frames = 0, updates = 0;  ///< displayed; completely received
-  double latency_ms = 0;             ///< the newest view update, request to complete; 0 before the first
-  uint64_t points_drawn = 0, points_cached = 0, bytes_received = 0;
-  uint64_t epochs_shown = 0;          ///< how often a changed scene replaced the one on display
-  const char* drawn_name = "points";  ///< unit of points_drawn
-  const char* cached_name = "";       ///< unit of points_cached, with a space before it
-  double waits_s = 0;                 ///< time that the display has waited for a view update; 0: not for long
-  double inter_frame_ms = 0;          ///< from the end of the frame before to the end of this one; 0: it was the first
-  CouplingState coupling;
-  double detail = 1;                          ///< splat::SelectionOptions::detail of the frame
-  int sampled_width = 0, sampled_height = 0;  ///< pixels of the newest view request; 0: no request yet
-  RendererChoice::Figures renderer;
-};
-
 /// The scene that the session shows.
 struct ShownScene {
   geometry::Box box_room;  ///< empty until the master sent it
@@ -50,7 +30,8 @@ struct ShownScene {
   bool operator==(const ShownScene&) const = default;
 };
 
-struct MeasuredFrame;
+struct FrameFigures;
+struct Seen;
 
 /// A pose that a headset expects for its head.
 struct ExpectedHead {
@@ -104,8 +85,8 @@ class DisplaySurface {
   virtual void present(const image::View& view, bool changed) = 0;
   /// Shows a finished frame to eyes(); may draw over the views, which have depth.
   virtual void present_eyes(std::array<image::View, 2>& /*views*/) {}
-  /// Corrects the time at which the frame presented last is seen, if that is later.
-  virtual void measure(MeasuredFrame& /*frame*/) {}
+  /// Corrects the time at which the frame presented last, at `presented_s`, is seen, if that is later.
+  virtual void measure(Seen& /*seen*/, double /*presented_s*/) {}
   /// True if a person or an order wants the frame that begins as a picture.
   virtual bool wants_picture() const { return false; }
   /// Takes that picture. alpha: meaning of its colours' upper byte.

@@ -18,7 +18,7 @@ void FrameRows::add(const MeasuredFrame& m, double to_master_s) {
 }
 
 void FrameRows::note_skew(uint64_t wall_frame, double skew_s) {
-  if (row_ && wall_frame > 0 && wall_frame == row_->wall_frame) row_->swap_skew_s = skew_s;
+  if (row_ && wall_frame > 0 && wall_frame == row_->swap.frame) row_->swap.skew_s = skew_s;
 }
 
 void FrameRows::flush() {
@@ -42,10 +42,9 @@ void KeptFrames::on_picture(double t_s) {
 
 // A picture that stands needs no refresh.
 void FrameClock::seen(MeasuredFrame& m, double now_s, double refresh_s) {
-  m.seen_s = now_s;
-  m.refresh_s = refresh_s;
-  m.missed = m.drawn.still ? 0 : refreshes_missed(seen_s_, m.seen_s, m.refresh_s);
-  seen_before_s_ = std::exchange(seen_s_, m.seen_s);
+  m.seen = {.at_s = now_s, .refresh_s = refresh_s};
+  if (!m.drawn.still) m.seen.missed = refreshes_missed(seen_s_, now_s, refresh_s);
+  seen_before_s_ = std::exchange(seen_s_, now_s);
 }
 
 double FrameClock::next_s(double begin_s, double target_fps) {

@@ -1,4 +1,4 @@
-// The record of displayed frames: rows of frames.csv, spans of the trace, pictures.
+// Records displayed frames: rows of frames.csv, spans of the trace, pictures.
 #pragma once
 
 #include <memory>
@@ -59,7 +59,7 @@ class FrameClock {
   bool started() const { return start_s_ > 0; }
   void start(double at_s) { start_s_ = at_s; }
   double start_s() const { return start_s_; }
-  /// The end of the frame before; 0 at the first frame.
+  /// The end of the frame before; 0: this is the first.
   double previous_s() const { return previous_s_; }
   /// When the frame before the last one was seen.
   double seen_before_s() const { return seen_before_s_; }

@@ -22,12 +22,12 @@ const glm::dvec3& eye(F f, size_t i) {
 const glm::dquat& orientation(F f) { return f.camera.pose.orientation; }
 
 // -1: nothing moves in a picture that stands. Clocks of several machines may differ by more than a frame takes.
-double motion_to_photon_ms(F f) { return f.drawn.still ? -1.0 : std::max(0.0, (f.seen_s - f.posed.taken_s) * 1e3); }
+double motion_to_photon_ms(F f) { return f.drawn.still ? -1.0 : std::max(0.0, (f.seen.at_s - f.posed.taken_s) * 1e3); }
 
 constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"frame", [](F f) { return double(f.number); }},
     {"t_s", [](F f) { return f.begin_s - f.start_s; }},
-    {"inter_frame_ms", [](F f) { return f.previous_s > 0 ? (f.end_s - f.previous_s) * 1e3 : 0.0; }},
+    {"inter_frame_ms", [](F f) { return f.inter_frame_ms(); }},
     {"construction_ms", [](F f) { return (f.end_s - f.begin_s) * 1e3; }},
     {"select_ms", [](F f) { return (f.drawn.chosen_s - f.begin_s) * 1e3; }},
     {"render_ms", [](F f) { return (f.end_s - f.drawn.chosen_s) * 1e3; }},
@@ -63,16 +63,16 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"finish", [](F f) { return double(splat::finish_bits(f.look.render.finish)); }},
     {"lit", [](F f) { return f.look.lit ? 1.0 : 0.0; }},
     {"begin_s", [](F f) { return f.begin_master_s; }},
-    {"refined", [](F f) { return f.drawn.refined; }},
-    {"refine_ms", [](F f) { return f.drawn.refine_ms; }},
-    {"sub_pixels", [](F f) { return double(f.drawn.sub_pixels); }},
+    {"refined", [](F f) { return f.drawn.refined.share; }},
+    {"refine_ms", [](F f) { return f.drawn.refined.ms; }},
+    {"sub_pixels", [](F f) { return double(f.drawn.refined.sub_pixels); }},
     {"coupling", [](F f) { return double(f.coupling.mode); }},
     {"buffers", [](F f) { return double(f.coupling.buffers); }},
     {"head_light", [](F f) { return f.look.head_light ? 1.0 : 0.0; }},
     {"background", [](F f) { return double(f.look.background); }},
-    {"wall_frame", [](F f) { return double(f.wall_frame); }},
-    {"swap_wait_ms", [](F f) { return f.swap_wait_s * 1e3; }},
-    {"swap_skew_ms", [](F f) { return f.swap_skew_s < 0 ? -1.0 : f.swap_skew_s * 1e3; }},
+    {"wall_frame", [](F f) { return double(f.swap.frame); }},
+    {"swap_wait_ms", [](F f) { return f.swap.wait_s * 1e3; }},
+    {"swap_skew_ms", [](F f) { return f.swap.skew_s < 0 ? -1.0 : f.swap.skew_s * 1e3; }},
     {"stereo", [](F f) { return double(f.stereo.mode); }},
     {"screen_m", [](F f) { return f.stereo.pair.screen_m; }},
     {"left_x", [](F f) { return eye(f, 0).x; }},
@@ -81,11 +81,11 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"right_x", [](F f) { return eye(f, 1).x; }},
     {"right_y", [](F f) { return eye(f, 1).y; }},
     {"right_z", [](F f) { return eye(f, 1).z; }},
-    {"lead_ms", [](F f) { return f.lead_s * 1e3; }},
-    {"missed", [](F f) { return double(f.missed); }},
+    {"lead_ms", [](F f) { return f.seen.lead_s * 1e3; }},
+    {"missed", [](F f) { return double(f.seen.missed); }},
     {"motion_to_photon_ms", motion_to_photon_ms},
     {"predicted_ms", [](F f) { return f.posed.ahead_s * 1e3; }},
-    {"refresh_ms", [](F f) { return f.refresh_s * 1e3; }},
+    {"refresh_ms", [](F f) { return f.seen.refresh_s * 1e3; }},
     {"still", [](F f) { return f.drawn.still ? 1.0 : 0.0; }},
     {"halved", [](F f) { return f.drawn.halved ? 1.0 : 0.0; }},
 };

@@ -9,6 +9,7 @@
 
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/display_surface.h"
+#include "client/viewer/display/frame_figures.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/input/pose_feed.h"
 #include "common/core/clock.h"

@@ -5,10 +5,8 @@
 #include <memory>
 #include <optional>
 
-#include "client/viewer/coupling/coupling.h"
-#include "client/viewer/display/display_surface.h"
+#include "client/viewer/display/frame_figures.h"
 #include "client/viewer/hands/pick.h"
-#include "common/splat/cpu_splatter.h"
 
 namespace telesplat::viewer {
 
@@ -21,26 +19,6 @@ struct FrameInput {
   bool resting = false;        ///< before the first view update is complete: no measurements for later frames
   bool even_empty = true;      ///< draw the background if there is nothing else; else leave the view as it is
   bool intact = false;         ///< the view holds what the last call left in it
-};
-
-/// Columns of frames.csv that depend on the source (docs/metrics.md).
-struct DrawnFrame {
-  bool empty = true;        ///< there was nothing of the scene to draw
-  bool changed = true;      ///< false: the view is as FrameInput::intact found it
-  bool still = false;       ///< nothing was drawn: the picture of the frame before stands
-  double chosen_s = 0;      ///< monotonic clock: when the choice of what to draw was made
-  splat::SplatStats stats;  ///< for volumes the warp counts as resolving
-  uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
-  uint64_t summaries = 0;  ///< summaries of bricks made so far
-  double detail = 1, budget_ms = 0;
-  bool halved = false;                ///< drawn at half its size (splat::RenderOptions)
-  double refined = 0, refine_ms = 0;  ///< still picture: share of pixels drawn with sub-pixels; time for that
-  int sub_pixels = 1;                 ///< sub-pixels of such a pixel, on each axis
-  EpochId epoch;
-  bool between_clips = false;  ///< it has the session's present clip, and points from an epoch before it
-  ShownUpdate update;          ///< newest view update in the frame
-  /// Camera of a picture that a server drew; such a picture has no depth.
-  std::optional<geometry::Camera> picture_of;
 };
 
 /// Used by one thread, the display's.
@@ -62,9 +40,7 @@ class ViewSource {
   virtual std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) = 0;
   /// The frame has been displayed.
   virtual void displayed() {}
-  /// Names of what is drawn and cached, for people: "points".
-  virtual const char* drawn_name() const = 0;
-  virtual const char* cached_name() const = 0;
+  virtual DrawnUnits units() const { return {}; }
 };
 
 }  // namespace telesplat::viewer

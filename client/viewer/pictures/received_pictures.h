@@ -115,8 +115,7 @@ class PictureSource final : public ViewSource {
                        const std::array<splat::FrameTarget, 2>& targets) override;
   /// A picture has no depth to pick from.
   std::optional<Pick> pick(const geometry::Camera&, double, double, double) override { return std::nullopt; }
-  const char* drawn_name() const override { return "pixels"; }
-  const char* cached_name() const override { return " pixels"; }
+  DrawnUnits units() const override { return {"pixels", " pixels"}; }
 
  private:
   PictureShelf& shelf_;

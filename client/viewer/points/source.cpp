@@ -176,10 +176,10 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
     }
     base_stale_ |= still_.share() < share;  // the tile has lost its pixels: draw the picture below it again
     now_s = end_s;
-    out.refine_ms = (end_s - begin_s) * 1e3;
+    out.refined.ms = (end_s - begin_s) * 1e3;
   }
-  out.refined = still_.share();
-  out.sub_pixels = supersampler_.side();
+  out.refined.share = still_.share();
+  out.refined.sub_pixels = supersampler_.side();
 }
 
 void PointSource::add_figures(DrawnFrame& out) const {

@@ -23,8 +23,6 @@ class PointSource final : public ViewSource {
   DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                        const std::array<splat::FrameTarget, 2>& targets) override;
   bool draws_into_parts() const override { return true; }
-  const char* drawn_name() const override { return "points"; }
-  const char* cached_name() const override { return ""; }
 
  private:
   DrawnFrame begin_frame(const FrameInput& input);

@@ -72,8 +72,7 @@ class SliceSource final : public ViewSource {
   DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                        const std::array<splat::FrameTarget, 2>& targets) override;
   void displayed() override { cache_.frame_done(); }
-  const char* drawn_name() const override { return "samples"; }
-  const char* cached_name() const override { return " pixels"; }
+  DrawnUnits units() const override { return {"samples", " pixels"}; }
 
  private:
   DrawnFrame draw_views(const FrameInput& input, std::span<const geometry::Camera> cameras,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/viewer/display/display_surface.h"
+#include "client/viewer/display/frame_figures.h"
 #include "client/viewer/hands/meaning.h"
 #include "client/viewer/legend_book.h"
 #include "common/wire/messages.h"
@@ -44,7 +45,7 @@ class SessionBoard {
     const std::lock_guard lock(mutex_);
     return scene_;
   }
-  void add_figures(FrameFigures& figures) const {
+  void add_figures(SessionFigures& figures) const {
     const std::lock_guard lock(mutex_);
     figures.scene = scene_.name;
     figures.sampled_width = sampled_width_, figures.sampled_height = sampled_height_;

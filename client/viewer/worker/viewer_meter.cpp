@@ -24,15 +24,14 @@ void ViewerMeter::displayed(EpochId epoch) {
 }
 
 void ViewerMeter::measured(const MeasuredFrame& f) {
-  if (f.previous_s > 0) {
-    const double gap_ms = (f.end_s - f.previous_s) * 1e3;
+  if (const double gap_ms = f.inter_frame_ms(); f.previous_s > 0) {
     inter_frame_ms_.add(f.end_s, gap_ms);
     if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // safe: only one thread displays
   }
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
 }
 
-void ViewerMeter::add_figures(FrameFigures& figures) const {
+void ViewerMeter::add_figures(SessionFigures& figures) const {
   figures.updates = updates_;
   figures.latency_ms = latency_ms_;
   figures.bytes_received = bytes_;

@@ -3,8 +3,7 @@
 
 #include <atomic>
 
-#include "client/viewer/display/display_surface.h"
-#include "client/viewer/display/frame_table.h"
+#include "client/viewer/display/frame_figures.h"
 #include "client/viewer/record/recent_values.h"
 #include "common/net/master_link.h"
 
@@ -26,7 +25,7 @@ class ViewerMeter {
   void waits(double waits_s) { waits_s_ = waits_s; }
 
   uint64_t updates() const { return updates_; }
-  void add_figures(FrameFigures& figures) const;
+  void add_figures(SessionFigures& figures) const;
   void add_status(net::MasterLink::Values& values) const;
   /// Adds medians and 95th percentiles of the last kRecent_s.
   void add_recent(net::MasterLink::Values& values) const;

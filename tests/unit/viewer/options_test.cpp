@@ -178,16 +178,11 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   f.filled = 2;
   f.begin_master_s = 4;
   f.drawn.summaries = 9;
-  f.drawn.refined = 0.5;
-  f.drawn.refine_ms = 6;
-  f.drawn.sub_pixels = 4;
+  f.drawn.refined = {0.5, 6, 4};
   f.drawn.halved = true;
   f.coupling = {CouplingMode::kLoose, 5};
-  f.lead_s = 0.25;
-  f.missed = 3;
-  f.seen_s = 4.5;
+  f.seen = {.at_s = 4.5, .refresh_s = 0.0625, .lead_s = 0.25, .missed = 3};
   f.posed = {2.75, 0.5};
-  f.refresh_s = 0.0625;
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
   f.look.head_light = true;
   f.look.background = 0xffeedd;

@@ -274,7 +274,7 @@ TEST_F(StillSource, ConvergesToSixteenRaysAPixelAndThenDrawsNothing) {
   settle();
   insert(4);
   const DrawnFrame last = settle();
-  EXPECT_DOUBLE_EQ(last.refined, 1);
+  EXPECT_DOUBLE_EQ(last.refined.share, 1);
   const double still = test::psnr_db(view_, reference);
   std::printf("moving %.2f dB, still %.2f dB\n", moving, still);
   EXPECT_GT(still, 42);
@@ -296,13 +296,13 @@ TEST_F(StillSource, ConvergesToSixteenRaysAPixelAndThenDrawsNothing) {
 
 TEST_F(StillSource, MovementEndsIt) {
   insert(4);
-  ASSERT_GT(settle().refined, 0);
+  ASSERT_GT(settle().refined.share, 0);
   camera_.pose.position_room.x += 0.001;
   const int before = renders_;
   const DrawnFrame moved = frame();
   EXPECT_TRUE(moved.changed);
   EXPECT_FALSE(moved.still);
-  EXPECT_EQ(moved.refined, 0);
+  EXPECT_EQ(moved.refined.share, 0);
   EXPECT_EQ(renders_, before + 1) << "a frame of a moving head is drawn once, without sub-pixels";
 }
 
@@ -330,7 +330,7 @@ TEST_F(StillSource, NewPointsAreShown) {
 
 TEST_F(StillSource, AFrameNeverShowsTwoEpochs) {
   insert(4);
-  ASSERT_GT(settle().refined, 0);
+  ASSERT_GT(settle().refined.share, 0);
   received_.cache().begin_replica(config_, EpochId{2});
   received_.cache().show_newest();
   const DrawnFrame f = frame();
@@ -371,12 +371,12 @@ TEST_F(StillSource, FramesBetweenTwoClipsAreToldUntilTheirEpochIsShown) {
 TEST_F(StillSource, WithoutAntialiasingAndWithOneSampleAllFramesAreDrawnAlike) {
   look_.render.finish.antialias = false;
   insert(4);
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(frame().refined, 0);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(frame().refined.share, 0);
   EXPECT_EQ(renders_, 20);
   look_.render.finish.antialias = true;
   options_.still_samples = 1;
   source_ = std::make_unique<PointSource>(options_, std::make_unique<CountingRenderer>(renders_), received_);
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(frame().refined, 0);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(frame().refined.share, 0);
   EXPECT_EQ(renders_, 40);
 }
 

@@ -608,20 +608,22 @@ TEST(TitleLine, HasRatesSinceTheLastOne) {
   FrameFigures f;
   f.now_s = 50;
   EXPECT_EQ(line.update(f), "Telesplat - waiting for the data set");
-  f.scene = "crater.ply";
+  f.session.scene = "crater.ply";
   EXPECT_EQ(line.update(f), "crater.ply - waiting for the first view");
   f.frames = 1;
   EXPECT_EQ(line.update(f), "crater.ply");
   f.now_s += 0.25;
   EXPECT_EQ(line.update(f), std::nullopt);
-  f = {50.5, "crater.ply", 31, 2, 212.4, 410'000, 1'200'000, 1'155'000};
+  f.now_s = 50.5, f.frames = 31;
+  f.frame.drawn.drawn = 410'000, f.frame.drawn.cached = 1'200'000;
+  f.session = {"crater.ply", 2, 212.4, 1'155'000};
   EXPECT_EQ(line.update(f),
             "crater.ply - 60.0 fps, 4.0 updates/s, 212 ms latency, 0.41 M points drawn, 1.20 M cached, 2.31 MB/s");
-  f = {51.0, "crater.ply", 61, 4, 212.4, 410'000, 1'200'000, 2'310'000, 3};
+  f.now_s = 51, f.frames = 61, f.session = {"crater.ply", 4, 212.4, 2'310'000, 3};
   EXPECT_EQ(line.update(f),
             "crater.ply - 60.0 fps, 4.0 updates/s, 212 ms latency, 0.41 M points drawn, 1.20 M cached, 2.31 MB/s, 6.0 "
             "epochs/s");
-  f = {51.5, "crater.ply", 91, 6, 212.4, 410'000, 1'200'000, 3'465'000, 3};
+  f.now_s = 51.5, f.frames = 91, f.session = {"crater.ply", 6, 212.4, 3'465'000, 3};
   EXPECT_EQ(line.update(f)->find("epochs"), std::string::npos) << "the scene rests";
 }
 
@@ -675,7 +677,7 @@ TEST(ScreenshotsTest, WritesEveryPictureAndOverwritesNone) {
 
 TEST(TitleLine, TellsAWait) {
   TitleLine title;
-  FrameFigures f{.now_s = 1, .scene = "crater", .frames = 5};
+  FrameFigures f{.now_s = 1, .frames = 5, .session = {.scene = "crater"}};
   title.update(f);
   f.now_s = 4;
   f.waits_s = 3.2;
@@ -688,13 +690,11 @@ TEST(TitleLine, TellsAWait) {
 
 TEST(TitleLine, CountsWhatIsDrawn) {
   TitleLine line;
-  FrameFigures f{.now_s = 1, .scene = "bonsai", .frames = 1};
+  FrameFigures f{.now_s = 1, .frames = 1, .session = {.scene = "bonsai"}};
   line.update(f);
   f.now_s = 2;
-  f.points_drawn = 12'310'000;
-  f.points_cached = 2'100'000;
-  f.drawn_name = "samples";
-  f.cached_name = " pixels";
+  f.frame.drawn.drawn = 12'310'000, f.frame.drawn.cached = 2'100'000;
+  f.units = {"samples", " pixels"};
   const auto text = line.update(f);
   ASSERT_TRUE(text);
   EXPECT_NE(text->find("12.31 M samples drawn, 2.10 M pixels cached"), std::string::npos) << *text;

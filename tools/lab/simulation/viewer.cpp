@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "client/viewer/display/frame_table.h"
 #include "common/core/check.h"
 #include "common/core/clock.h"
 
@@ -103,7 +104,7 @@ std::optional<viewer::DrawnFrame> SimulatedViewer::frame(const geometry::Pose& h
   gate_.displayed();
   if (start_s_ == 0) start_s_ = now_s;
   viewer::MeasuredFrame m{.number = number_++, .start_s = start_s_, .previous_s = previous_s_};
-  m.begin_s = m.end_s = m.presented_s = m.seen_s = previous_s_ = now_s;
+  m.begin_s = m.end_s = m.presented_s = m.seen.at_s = previous_s_ = now_s;
   m.camera = camera_, m.head = head, m.drawn = drawn, m.coupling = gate_.state(), m.look = look_;
   m.begin_master_s = worker_->to_master_s(now_s);
   m.update_age_s = m.begin_master_s - drawn.update.requested_s;

@@ -60,19 +60,19 @@ void Panel::count_rates(const FrameFigures& f) {
   const bool counts = rated_.now_s > 0 && dt_s > 0 && f.frames >= rated_.frames;
   if (counts) {
     frames_a_second_ = double(f.frames - rated_.frames) / dt_s;
-    plots_[kBytes].history.add(f.now_s, double(f.bytes_received - rated_.bytes_received) / 1e6 / dt_s);
+    plots_[kBytes].history.add(f.now_s, double(f.session.bytes_received - rated_.session.bytes_received) / 1e6 / dt_s);
   }
   rated_ = f;
 }
 
 void Panel::on_figures(const FrameFigures& f) {
-  if (f.inter_frame_ms > 0) plots_[kInterFrame].history.add(f.now_s, f.inter_frame_ms);
-  if (f.updates != figures_.updates) plots_[kLatency].history.add(f.now_s, f.latency_ms);
-  plots_[kPoints].name = std::string(f.drawn_name) + " drawn";
-  plots_[kPoints].history.add(f.now_s, double(f.points_drawn) / 1e6);
+  if (const double ms = f.frame.inter_frame_ms(); ms > 0) plots_[kInterFrame].history.add(f.now_s, ms);
+  if (f.session.updates != figures_.session.updates) plots_[kLatency].history.add(f.now_s, f.session.latency_ms);
+  plots_[kPoints].name = std::string(f.units.drawn) + " drawn";
+  plots_[kPoints].history.add(f.now_s, double(f.frame.drawn.drawn) / 1e6);
   count_rates(f);
   figures_ = f;
-  if (wished_coupling_ == f.coupling) wished_coupling_.reset();
+  if (wished_coupling_ == f.frame.coupling) wished_coupling_.reset();
 }
 
 void Panel::on_answer(double now_s, const OrderAnswer& answer) {

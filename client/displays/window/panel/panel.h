@@ -12,7 +12,7 @@
 
 #include "client/displays/window/input/interaction.h"
 #include "client/displays/window/panel/session_status.h"
-#include "client/viewer/display/display_surface.h"
+#include "client/viewer/display/frame_figures.h"
 #include "client/viewer/input/look.h"
 #include "common/scene/kind.h"
 
@@ -107,7 +107,7 @@ class Panel {
   /// Empty: the value is not known.
   std::string value(const std::string& order) const;
   /// The coupling in force, or one that was ordered and is not in force yet.
-  const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.coupling; }
+  const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.frame.coupling; }
   bool coupling_pending() const { return wished_coupling_.has_value(); }
   const std::optional<SessionStatus>& status() const { return status_; }
   /// The oldest message comes first.

@@ -67,8 +67,9 @@ TEST_P(Edges, ThePanelIsBuiltWhateverTheWindowAndTheWords) {
     }
     panel.on_status(1, status, "");
     frames(150, [&](double now_s) {
-      panel.on_figures(
-          {.now_s = now_s, .scene = kWords[int(now_s * 60) % 10], .inter_frame_ms = now_s > 2 ? NAN : 1e300});
+      panel.on_figures({.now_s = now_s,
+                        .frame = {.previous_s = 1, .end_s = now_s > 2 ? NAN : 1e297},
+                        .session = {.scene = kWords[int(now_s * 60) % 10]}});
       show_panel(panel, view, now_s, {});
       show_keys(key_help());
     });

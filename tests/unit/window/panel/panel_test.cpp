@@ -57,14 +57,16 @@ class PanelTest : public testing::Test {
 };
 
 TEST_F(PanelTest, RatesAreMeansOfHalfASecond) {
-  FrameFigures f{
-      .now_s = 100, .frames = 10, .updates = 1, .latency_ms = 80, .points_drawn = 500'000, .inter_frame_ms = 16};
+  FrameFigures f{.now_s = 100,
+                 .frames = 10,
+                 .frame = {.previous_s = 1, .end_s = 1.016, .drawn = {.drawn = 500'000}},
+                 .session = {.updates = 1, .latency_ms = 80}};
   panel_.on_figures(f);
   EXPECT_EQ(panel_.frames_a_second(), 0);
   for (int i = 1; i <= 60; ++i) {
     f.now_s = 100 + i / 60.0;
     ++f.frames;
-    f.bytes_received += 50'000;
+    f.session.bytes_received += 50'000;
     panel_.on_figures(f);
   }
   EXPECT_NEAR(panel_.frames_a_second(), 60, 1e-6);
@@ -97,7 +99,7 @@ TEST_F(PanelTest, ACouplingIsOrderedForThisViewerAndPendingUntilItIsInForce) {
   EXPECT_EQ(panel_.coupling(), coupling_state(CouplingMode::kLoose, 4));
   panel_.choose_coupling(coupling_state(CouplingMode::kLoose, 4));
   EXPECT_TRUE(panel_.take_orders().empty()) << "it is ordered already";
-  panel_.on_figures({.now_s = 1, .coupling = coupling_state(CouplingMode::kLoose, 4)});
+  panel_.on_figures({.now_s = 1, .frame = {.coupling = coupling_state(CouplingMode::kLoose, 4)}});
   EXPECT_FALSE(panel_.coupling_pending());
   panel_.choose_coupling(coupling_state(CouplingMode::kSync, 0));
   EXPECT_FALSE(panel_.take_orders()[0].arguments.contains("buffers"));

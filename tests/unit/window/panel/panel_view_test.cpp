@@ -71,13 +71,12 @@ class PanelView : public testing::TestWithParam<scene::Kind> {
   void frame() {
     now_s_ += 1 / 60.0;
     panel_.on_figures({.now_s = now_s_,
-                       .scene = "a scene",
                        .frames = uint64_t(now_s_ * 60),
-                       .updates = uint64_t(now_s_ * 5),
-                       .latency_ms = 90,
-                       .points_drawn = 100'000,
-                       .inter_frame_ms = 16 + std::sin(now_s_),
-                       .coupling = coupling_});
+                       .frame = {.previous_s = 1,
+                                 .end_s = 1.016 + 1e-3 * std::sin(now_s_),
+                                 .drawn = {.drawn = 100'000},
+                                 .coupling = coupling_},
+                       .session = {.scene = "a scene", .updates = uint64_t(now_s_ * 5), .latency_ms = 90}});
     ImGui::NewFrame();
     show_panel(panel_, view_, now_s_, {[&](Panel&) {
                  show_scene(controls_, scene_view_, now_s_, [this] { ++saved_; });
@@ -211,7 +210,7 @@ TEST_P(PanelView, HasEverySettingOfItsKind) {
       EXPECT_EQ(before, ImGui::GetIO().DisplaySize.y);
     }
   };
-  panel_.on_figures({.now_s = now_s_, .coupling = coupling_state(CouplingMode::kLoose, 3)});
+  panel_.on_figures({.now_s = now_s_, .frame = {.coupling = coupling_state(CouplingMode::kLoose, 3)}});
   coupling_ = coupling_state(CouplingMode::kLoose, 3);
   look_at_all();
   if (GetParam() == scene::Kind::kMesh) {

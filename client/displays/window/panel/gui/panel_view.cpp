@@ -64,11 +64,11 @@ void show_figures(const Panel& panel, double now_s) {
   if (f.waits_s > 0)
     text(fmt::format("waiting for a view update, {:.0f} s", f.waits_s));
   else
-    text(
-        fmt::format("{:.1f} frames a second, {:.2f} M cached", panel.frames_a_second(), double(f.points_cached) / 1e6));
-  if (f.renderer.gl_ms > 0)
-    text(fmt::format("{} draws: a frame took {:.1f} ms on the processor, {:.1f} ms by OpenGL", f.renderer.kept,
-                     f.renderer.cpu_ms, f.renderer.gl_ms));
+    text(fmt::format("{:.1f} frames a second, {:.2f} M cached", panel.frames_a_second(),
+                     double(f.frame.drawn.cached) / 1e6));
+  if (const auto& r = f.session.renderer; r.gl_ms > 0)
+    text(fmt::format("{} draws: a frame took {:.1f} ms on the processor, {:.1f} ms by OpenGL", r.kept, r.cpu_ms,
+                     r.gl_ms));
   for (const auto& plot : panel.plots()) show_plot(plot, now_s);
 }
 
@@ -155,7 +155,7 @@ double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::
                                       ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoSavedSettings;
   if (ImGui::Begin("panel", nullptr, kFixed)) {
     dialog("panel", nullptr);
-    text(panel.figures().scene.empty() ? "Telesplat" : panel.figures().scene);
+    text(panel.figures().session.scene.empty() ? "Telesplat" : panel.figures().session.scene);
     if (small_button("hide")) panel.press(Key::kTab);
     ImGui::SameLine();
     ImGui::TextDisabled("as Tab does; F1 lists keys");

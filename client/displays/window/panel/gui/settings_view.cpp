@@ -155,14 +155,14 @@ void show_display(Panel& panel) {
   if (panel.pipeline() == scene::Pipeline::kPoints) {
     setting_list(panel, "splat", splat::kernel_names());
     show_finish(panel);
-    const std::string shown = fmt::format("at most %.2f, now {:.2f}", panel.figures().detail);
+    const std::string shown = fmt::format("at most %.2f, now {:.2f}", panel.figures().frame.drawn.detail);
     setting_slider(panel, "detail", Look::kLeastDetail, 1, shown.c_str());
   }
   if (!panel.setup().transparent && panel.pipeline() != scene::Pipeline::kPictures) show_background(panel);
 }
 
 void show_sampling(Panel& panel) {
-  const auto& f = panel.figures();
+  const auto& f = panel.figures().session;
   setting_list(panel, "sampling-size", kSizes);
   if (panel.value("sampling-size") == "auto") setting_slider(panel, "least-sampling", 0.1, 1, "%.2f of a pixel");
   row("now");
