@@ -51,8 +51,8 @@ constexpr metrics::Column<MeasuredUpdate> kUpdateColumns[] = {
     {"sampling_width", [](U m) { return double(m.last.camera.width); }},
     {"sampling_height", [](U m) { return double(m.last.camera.height); }},
     {"epoch", [](U m) { return double(m.last.epoch.value); }},
-    {"extra_points", [](U m) { return double(m.update.extra_points); }},
-    {"extra_bytes", [](U m) { return double(m.update.extra_bytes); }},
+    {"extra_points", [](U m) { return double(m.update.extra.points); }},
+    {"extra_bytes", [](U m) { return double(m.update.extra.bytes); }},
     {"left_out", [](U m) { return double(m.last.left_out); }},
 };
 

@@ -12,17 +12,8 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr size_t kMaxOpen = 256;
-constexpr double kMostBeyond_s = 0.02;       // a tracker's pose for a time this much later is not used
-constexpr double kEpochSettles_s = 1.0;      // without a new epoch the scene counts as unchanging again
-constexpr double kFirstPixels = 1280 * 800;  // adaptive sampling begins with this size
-constexpr double kMotionOfRest = 0.002;      // radians, or metres / 0.6, until a view would be displayed
-// Steered: another resolution makes much of the model too coarse or needlessly fine, so it changes by octaves of
-// pixels, and only after several updates that agree.
-constexpr double kScaleStep = 0.70710678118654752;
-constexpr int kSlowUpdates = 3, kFastUpdates = 2;
-// kSteeredAim is a share of the target latency, the others are shares of that time.
-constexpr double kSteeredAim = 0.5, kFastEnough = 0.6, kTooSlow = 1.5, kFarOff = 3;
-constexpr double kWholePart = 4;  // a view with samples in more than 1 of 4 pixels counts as sampled whole
+constexpr double kMotionOfRest = 0.002;  // radians, or metres / 0.6, until a view would be displayed
+constexpr double kWholePart = 4;         // a view with samples in more than 1 of 4 pixels counts as sampled whole
 
 // Returns the side of a sampled image: a multiple of 8, in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
@@ -37,15 +28,9 @@ std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height
 }
 
 void ViewRequester::on_pose(double t_s, const geometry::Camera& display) {
-  predictor_.add(t_s, display.pose);
-  meter_.actual(t_s, display.pose);
+  head_.on_pose(t_s, display.pose);
   if (display_ != display) posed_s_ = t_s;
   display_ = display;
-}
-
-void ViewRequester::on_jump() {
-  predictor_.forget();
-  expected_.reset();
 }
 
 void ViewRequester::on_ask(double now_s, uint64_t ask, const geometry::Camera& camera) {
@@ -56,14 +41,6 @@ void ViewRequester::on_ask(double now_s, uint64_t ask, const geometry::Camera& c
 double ViewRequester::horizon_s() const {
   if (displayed_latency_s_ > 0) return displayed_latency_s_;
   return latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
-}
-
-// Uses the tracker's expected pose until a pose of that time or later is known. Beyond its time, the head's velocity
-// carries it on.
-geometry::Pose ViewRequester::expected_at(double t_s) const {
-  const auto newest = predictor_.newest();
-  const bool ahead = expected_ && newest && expected_->t_s > newest->t_s && expected_->t_s - t_s < kMostBeyond_s;
-  return ahead ? predictor_.carried(expected_->pose, std::max(0.0, t_s - expected_->t_s)) : predictor_.predict(t_s);
 }
 
 // True if content kNearest_m away looks alike from both poses.
@@ -83,24 +60,18 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
       std::tie(camera.width, camera.height) = sampling_size(options_, display_->width, display_->height);
     return camera;
   }
-  if (!asked) {
-    camera.pose = expected_at(now_s + horizon_s);
-    meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
-  }
+  if (!asked) camera.pose = head_.predict(now_s, display_->pose, now_s + horizon_s);
   // The faster the head, the wider the sampled view; a still head gets exactly what it looks at. Steered views of known
   // space come at once; the next one takes longer if something unseen comes into sight.
   const double ahead_s = steered_ ? std::max(horizon_s, options_.target_latency_s) : horizon_s;
-  const double motion = predictor_.turn_rad_s() * ahead_s + predictor_.speed_m_s() * ahead_s / 0.6;
+  const double motion = head_.motion(ahead_s);
   const double margin = motion < kMotionOfRest ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
   // The first view must come soon rather than be sharp, and so must each view of an epoch that may not last.
-  changing_ = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
-  still = margin == 0 && latency_s_ > 0 && !changing_;
+  change_.look(now_s);
+  still = margin == 0 && latency_s_ > 0 && !change_.changing();
   if (options_.adaptive) {
-    if (scale_ == 0)
-      scale_ = std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), min_scale(), 1.0);
-    scale_ = std::clamp(scale_, min_scale(), 1.0);
     // A wider view keeps the sampling density; a still head gets a sample for each pixel.
-    const double per_pixel = scale_ * (1 + margin);
+    const double per_pixel = scale_.of(*display_, min_scale()) * (1 + margin);
     camera.width = still ? display_->width : whole_side(display_->width * per_pixel);
     camera.height = still ? display_->height : whole_side(display_->height * per_pixel);
   } else {
@@ -110,8 +81,8 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
   camera.left -= du, camera.right += du, camera.bottom -= dv, camera.top += dv;
   if (margin > 0) return camera;
   const geometry::Pose& here = asked ? asked->pose : display_->pose;
-  if (sent_ && rests_at(sent_->pose, here))
-    camera.pose = sent_->pose;
+  if (sent_ && rests_at(sent_->camera.pose, here))
+    camera.pose = sent_->camera.pose;
   else if (rests_at(camera.pose, here))
     camera.pose = here;
   return camera;
@@ -119,12 +90,12 @@ geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const 
 
 // True if this camera sees nothing new, as far as is known.
 bool ViewRequester::quiet(const geometry::Camera& camera) const {
-  const bool seen = quiet_ == camera, on_its_way = sent_ == camera && open_.contains(sent_id_);
-  return steered_ && !changing_ && (seen || on_its_way);
+  const bool seen = quiet_ == camera, on_its_way = answer_open() && sent_->camera == camera;
+  return steered_ && !change_.changing() && (seen || on_its_way);
 }
 
 bool ViewRequester::waits_for_answer(double now_s) const {
-  return steered_ && now_s - last_sent_s_ < kPatience_s && open_.contains(sent_id_);
+  return steered_ && answer_open() && now_s - sent_->requested_s < kPatience_s;
 }
 
 void ViewRequester::set_sampling(const SamplingWish& wish) {
@@ -135,32 +106,32 @@ void ViewRequester::set_sampling(const SamplingWish& wish) {
     options_.sampling_width = wish.width;
     options_.sampling_height = wish.height;
   }
-  scale_ = 0;
+  scale_.reset();
   quiet_.reset();  // a head that rests must see the new sampling, too
 }
 
 void ViewRequester::on_epoch(double now_s) {
-  epoch_began_s_ = now_s;
+  change_.on_epoch(now_s);
   quiet_.reset();
 }
 
 void ViewRequester::set_buffers(uint64_t buffers) {
-  if (options_.buffers == 0) std::erase_if(open_, [&](const auto& o) { return o.first != sent_id_; });
+  if (options_.buffers == 0) std::erase_if(open_, [&](const auto& o) { return o.first != sent_->request; });
   // The latency until an update is displayed differs in the new mode.
   if ((options_.buffers == 0) != (buffers == 0)) displayed_latency_s_ = 0;
   options_.buffers = buffers;
-  due_s_ = std::min(due_s_, last_sent_s_ + 1.0 / options_.max_rate_hz);  // credits ignored this rate
+  if (sent_) due_s_ = std::min(due_s_, sent_->requested_s + 1.0 / options_.max_rate_hz);  // credits ignored this rate
 }
 
 // A head that moves gets its newest view. A head that rests asks for the same view once more, and samplers draw it
 // finer. In another epoch the same view counts as a new one.
 bool ViewRequester::picture_due(double now_s) {
   bool still = false;
-  if (!sent_ || *sent_ != wanted(now_s, still) || epoch_began_s_ > last_sent_s_) {
+  if (!sent_ || sent_->camera != wanted(now_s, still) || change_.epoch_s() > sent_->requested_s) {
     settled_ = false;
     return true;
   }
-  if (settled_ || open_.contains(sent_id_) || now_s - last_sent_s_ < kSettles_s) return false;
+  if (settled_ || answer_open() || now_s - sent_->requested_s < kSettles_s) return false;
   return settled_ = true;
 }
 
@@ -173,18 +144,16 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const Ask ask = together ? *std::exchange(asked_, std::nullopt) : Ask{};
   bool still = false;
   const geometry::Camera camera = wanted(now_s, still, together ? &ask.camera : nullptr);
-  if (paced && !together && quiet(camera) && now_s - last_sent_s_ < kQuietPeriod_s) return std::nullopt;
-  last_sent_s_ = now_s;
+  if (paced && !together && quiet(camera) && now_s - sent_->requested_s < kQuietPeriod_s) return std::nullopt;
   const double period_s = 1.0 / (options_.pictures ? options_.picture_rate_hz : options_.max_rate_hz);
   due_s_ = now_s - due_s_ < period_s ? due_s_ + period_s : now_s + period_s;
   const RequestId id = next_;
   next_ = next_.next();
   const uint64_t ahead = paced ? 0 : std::min<uint64_t>(open_.size(), options_.buffers - 1);
-  open_[id] = {
+  sent_ = Update{
       .request = id, .ahead = ahead, .requested_s = now_s, .posed_s = posed_s_, .camera = camera, .still = still};
+  open_[id] = *sent_;
   while (open_.size() > kMaxOpen) open_.erase(open_.begin());
-  sent_ = camera;
-  sent_id_ = id;
   return request(id, camera, now_s, options_.buffers, ask.number);
 }
 
@@ -242,39 +211,23 @@ ViewPart part_of(const wire::Patch& p) {
           .moments = p.moments};
 }
 
-// The step is small, since views differ.
 void ViewRequester::follow_latency(const Update& u, double latency_s) {
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
   if (!options_.adaptive || u.still) return;
   // Requests that were sent before it took their share of the time.
-  const double own_s = latency_s / double(1 + u.ahead);
-  if (steered_) return step_scale(own_s, u);
-  // Time is proportional to the number of pixels, hence the root. On a slow link a few large views would take seconds.
-  slow_ = own_s > 2 * options_.target_latency_s ? slow_ + 1 : 0;
-  const double least = slow_ >= 2 ? 0.5 : 0.85;
-  scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / own_s), least, 1.1), min_scale(), 1.0);
-}
-
-// Steered views need few rays, however many pixels they have, and results stay: frequent views show more than fine
-// ones. On a terrain at 2560x1600, aiming at the whole target gave the same PSNR and a quarter fewer updates. The
-// time of a view that was sampled whole is proportional to its pixels: one that took far too long is enough.
-void ViewRequester::step_scale(double own_s, const Update& u) {
-  const double aim_s = kSteeredAim * options_.target_latency_s;
-  slow_ = own_s > kTooSlow * aim_s ? slow_ + 1 : 0;
-  fast_ = own_s < kFastEnough * aim_s ? fast_ + 1 : 0;
+  const double own_s = latency_s / double(1 + u.ahead), target_s = options_.target_latency_s;
   const bool whole = double(u.samples) * kWholePart > double(u.camera.width) * u.camera.height;
-  const bool far_off = whole && own_s > kFarOff * aim_s;
-  if (!far_off && slow_ < kSlowUpdates && fast_ < kFastUpdates) return;
-  const double octaves = far_off ? std::ceil(std::log2(own_s / (kTooSlow * aim_s))) : slow_ > 0 ? 1 : -1;
-  scale_ = std::clamp(scale_ * std::pow(kScaleStep, octaves), min_scale(), 1.0);
-  slow_ = fast_ = 0;
+  if (steered_)
+    scale_.follow_steered(own_s, target_s, whole, min_scale());
+  else
+    scale_.follow(own_s, target_s, min_scale());
 }
 
 std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part, double now_s) {
   if (part.viewer != viewer_) return std::nullopt;
   if (part.extra) {
-    extra_points_ += part.points;
-    extra_bytes_ += part.bytes;
+    extra_.points += part.points;
+    extra_.bytes += part.bytes;
     return std::nullopt;
   }
   const auto it = open_.find(part.request);
@@ -287,9 +240,9 @@ std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part
   u.bytes += part.bytes;
   u.eliminated += part.eliminated;
   if (!part.complete) return std::nullopt;
-  u.complete_s = last_update_s_ = now_s;
-  u.extra_points = std::exchange(extra_points_, 0);
-  u.extra_bytes = std::exchange(extra_bytes_, 0);
+  u.complete_s = now_s;
+  change_.on_update(now_s);
+  u.extra = std::exchange(extra_, {});
   quiet_ = u.points == 0 && part.left_out == 0 ? std::optional(u.camera) : std::nullopt;
   // A new connection may set back the master's clock as this machine sees it.
   follow_latency(u, std::max(now_s - u.requested_s, 1e-3));

@@ -14,8 +14,8 @@
 
 #include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/request_options.h"
-#include "client/viewer/tracking/pose_predictor.h"
-#include "client/viewer/tracking/prediction_meter.h"
+#include "client/viewer/coupling/sampling_scale.h"
+#include "client/viewer/tracking/head_forecast.h"
 #include "common/geometry/camera.h"
 #include "common/wire/messages.h"
 
@@ -54,7 +54,7 @@ class ViewRequester {
   static constexpr double kAskPatience_s = 0.5;  ///< without a wall's request, until it asks for its own head
 
   ViewRequester(const RequestOptions& options, InstanceId viewer)
-      : options_(options), viewer_(viewer), predictor_(options.prediction) {}
+      : options_(options), viewer_(viewer), head_(options.prediction) {}
 
   /// The viewer is another instance from now on.
   void set_viewer(InstanceId viewer) { viewer_ = viewer; }
@@ -62,9 +62,9 @@ class ViewRequester {
   /// A displayed pose; display: the camera that showed it.
   void on_pose(double t_s, const geometry::Camera& display);
   /// Poses are given in another space, or belong to another head, from now on: past movement means nothing there.
-  void on_jump();
+  void on_jump() { head_.on_jump(); }
   /// The head's tracker expects it here at t_s, which lies ahead: this is better than a prediction from poses.
-  void on_expected(double t_s, const geometry::Pose& pose) { expected_ = {t_s, pose}; }
+  void on_expected(double t_s, const geometry::Pose& pose) { head_.on_expected(t_s, pose); }
   /// All viewers of a wall ask for views of one head now, this viewer with this camera. While such requests come,
   /// nothing else is asked for asynchronously. ask: ViewRequest::ask.
   void on_ask(double now_s, uint64_t ask, const geometry::Camera& camera);
@@ -80,7 +80,7 @@ class ViewRequester {
   /// Sets RequestOptions::pictures.
   void set_pictures(bool pictures) { options_.pictures = pictures; }
   /// True if the newest request waits for its answer.
-  bool answer_open() const { return open_.contains(sent_id_); }
+  bool answer_open() const { return sent_ && open_.contains(sent_->request); }
   /// The scene changed: it may soon change again, and a still head would wait long for each of its views at full
   /// resolution. So views stay coarse for a while.
   void on_epoch(double now_s);
@@ -107,6 +107,10 @@ class ViewRequester {
   /// Returns when it was requested; nothing: it is not ours, or has been answered.
   std::optional<double> requested_s(RequestId request) const;
 
+  /// Received from extra rays.
+  struct Extra {
+    uint64_t points = 0, bytes = 0;
+  };
   struct Update {
     RequestId request;
     uint64_t ahead = 0;  ///< requests that were open when it was sent: those are answered first
@@ -117,7 +121,7 @@ class ViewRequester {
     bool still = false;  ///< requested at full resolution, while the head rested
     /// Sums over all parts, with the coarse pass.
     uint64_t points = 0, samples = 0, bytes = 0, tiles = 0, eliminated = 0;
-    uint64_t extra_points = 0, extra_bytes = 0;  ///< from extra rays since the update before
+    Extra extra;  ///< since the update before
   };
   /// A part of a frame was applied. Returns the finished update if it was the last part at full resolution of our
   /// request; a coarse pass may come before it, with the same request.
@@ -127,23 +131,12 @@ class ViewRequester {
   /// Time that poses are predicted ahead, seconds.
   double horizon_s() const;
   /// Errors of these predictions.
-  tracking::PredictionMeter::Figures prediction() const { return meter_.figures(); }
+  tracking::PredictionMeter::Figures prediction() const { return head_.errors(); }
 
  private:
-  RequestOptions options_;
-  InstanceId viewer_;
-  tracking::PosePredictor predictor_;
-  tracking::PredictionMeter meter_;
-  std::optional<tracking::PosePredictor::Sample> expected_;
-  std::optional<geometry::Camera> display_;
-  double posed_s_ = 0;  // since when display_ has this pose
-  RequestId next_{1};
-  double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
   double min_scale() const {
-    return changing_ ? std::min(options_.min_scale, options_.min_scale_changing) : options_.min_scale;
+    return change_.changing() ? std::min(options_.min_scale, options_.min_scale_changing) : options_.min_scale;
   }
-
-  geometry::Pose expected_at(double t_s) const;
   /// asked: a camera whose pose needs no prediction; else null.
   geometry::Camera wanted(double now_s, bool& still, const geometry::Camera* asked = nullptr);
   geometry::Camera exactly_wanted(double now_s, bool& still, const geometry::Camera* asked);
@@ -154,24 +147,27 @@ class ViewRequester {
   bool waits_for_answer(double now_s) const;
   bool picture_due(double now_s);
   void follow_latency(const Update& update, double latency_s);
-  void step_scale(double own_s, const Update& update);
 
+  RequestOptions options_;
+  InstanceId viewer_;
+  tracking::HeadForecast head_;
+  SamplingScale scale_;
+  SceneChange change_;
+  std::optional<geometry::Camera> display_;
+  double posed_s_ = 0;  // since when display_ has this pose
+  RequestId next_{1};
   struct Ask {
     uint64_t number = 0;
     geometry::Camera camera;
   };
   std::optional<Ask> asked_;  // until it is sent
   double asked_s_ = -1e9;     // time of the newest on_ask()
-
   bool steered_ = false;
-  std::optional<geometry::Camera> sent_, quiet_;  // camera of the last request; of the last update without points
-  RequestId sent_id_;
-  bool settled_ = false;  // pictures: the finer picture has been requested for the view that was sent
-  uint64_t extra_points_ = 0, extra_bytes_ = 0;  // since the last update
-  int slow_ = 0, fast_ = 0;                      // updates in a row that took too long; that left time
-  bool changing_ = false;                        // the scene changes, as of the last request
-  double last_sent_s_ = -1e9, due_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0, epoch_began_s_ = -1e9,
-         last_update_s_ = -1e9;
+  std::optional<Update> sent_;             // the newest request
+  std::optional<geometry::Camera> quiet_;  // camera of the last update without points
+  bool settled_ = false;                   // pictures: the finer picture has been requested for the view that was sent
+  double due_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0;
+  Extra extra_;  // since the last update
   std::map<RequestId, Update> open_;
 };
 

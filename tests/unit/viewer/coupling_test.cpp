@@ -295,11 +295,11 @@ TEST_F(Requester, ExtraPatchesCompleteNothingAndCountApart) {
   EXPECT_EQ(update->points, 10u);
   EXPECT_EQ(update->tiles, 1u);
   EXPECT_DOUBLE_EQ(update->first_s, 0.2);
-  EXPECT_EQ(update->extra_points, 7u);
-  EXPECT_EQ(update->extra_bytes, 5u);
+  EXPECT_EQ(update->extra.points, 7u);
+  EXPECT_EQ(update->extra.bytes, 5u);
   EXPECT_FALSE(requester.on_part(part_of(extra), 0.3).has_value()) << "of an update that is over";
   const RequestId second = requester.next(1)->request;
-  EXPECT_EQ(requester.on_part(part_of(part(second, 0, 1)), 1.1)->extra_points, 7u);
+  EXPECT_EQ(requester.on_part(part_of(part(second, 0, 1)), 1.1)->extra.points, 7u);
 }
 
 class AdaptiveRequester : public testing::Test {

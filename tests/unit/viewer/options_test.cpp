@@ -221,7 +221,7 @@ TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
   ViewRequester::Update u;
   u.requested_s = 1, u.first_s = 1.25, u.complete_s = 1.5;
   u.samples = 100, u.points = 25, u.eliminated = 75;
-  u.extra_points = 8, u.extra_bytes = 16;
+  u.extra = {8, 16};
   const auto row = update_row({u, {.left_out = 3}});
   EXPECT_EQ(row[5], 500);
   EXPECT_EQ(row[6], 250);
