@@ -12,29 +12,29 @@ using options::Range;
 using options::Table;
 
 Status settle_poses(ViewerOptions& o) {
-  const auto prediction = tracking::prediction_named(o.prediction);
-  if (!prediction) return Error{fmt::format("--prediction {}: not none, velocity or kalman", o.prediction)};
+  const auto prediction = tracking::prediction_named(o.head.prediction);
+  if (!prediction) return Error{fmt::format("--prediction {}: not none, velocity or kalman", o.head.prediction)};
   o.requests.prediction = *prediction;
-  if (o.poses.empty() || o.trajectory.empty() || o.trajectory == "still") return ok_status();
-  return Error{
-      fmt::format("--poses {} and --trajectory {}: the head follows the one or the other", o.poses, o.trajectory)};
+  if (o.head.poses.empty() || o.head.trajectory.empty() || o.head.trajectory == "still") return ok_status();
+  return Error{fmt::format("--poses {} and --trajectory {}: the head follows the one or the other", o.head.poses,
+                           o.head.trajectory)};
 }
 
 Status settle_xr(ViewerOptions& o) {
-  if (!o.xr) return ok_status();
-  for (const auto& [given, flag] : {std::pair{!o.poses.empty(), "--poses"},
-                                    {!o.trajectory.empty() && o.trajectory != "still", "--trajectory"},
-                                    {!o.eye.empty(), "--eye"},
-                                    {!o.wall.empty(), "--wall"},
+  if (!o.xr.on) return ok_status();
+  for (const auto& [given, flag] : {std::pair{!o.head.poses.empty(), "--poses"},
+                                    {!o.head.trajectory.empty() && o.head.trajectory != "still", "--trajectory"},
+                                    {!o.head.eye.empty(), "--eye"},
+                                    {!o.wall.name.empty(), "--wall"},
                                     {o.stereo.mode != "off", "--stereo"},
-                                    {o.background == "transparent", "--background transparent"},
-                                    {o.fullscreen, "--fullscreen"},
-                                    {o.coupling != "async", "--coupling"}})
+                                    {o.drawing.background == "transparent", "--background transparent"},
+                                    {o.window.fullscreen, "--fullscreen"},
+                                    {o.coupling.mode != "async", "--coupling"}})
     if (given) return Error{fmt::format("{} has no meaning with --xr: the headset has its own head and clock", flag)};
-  if (o.xr_origin.empty()) return ok_status();
-  const auto origin = parse_point(o.xr_origin);
-  if (!origin) return Error{fmt::format("--xr-origin {}: {}", o.xr_origin, origin.error().text)};
-  o.xr_options.origin_m = *origin;
+  if (o.xr.origin.empty()) return ok_status();
+  const auto origin = parse_point(o.xr.origin);
+  if (!origin) return Error{fmt::format("--xr-origin {}: {}", o.xr.origin, origin.error().text)};
+  o.xr.options.origin_m = *origin;
   return ok_status();
 }
 
@@ -45,7 +45,7 @@ std::string complain_about_point(const std::string& text) {
   return point ? "" : point.error().text;
 }
 
-Table head_source_table(ViewerOptions& o) {
+Table head_source_table(HeadFlags& o) {
   return {
       {.flag = "--poses",
        .value = &o.poses,
@@ -70,23 +70,23 @@ Status settle_head_source(ViewerOptions& o) {
   return poses ? settle_xr(o) : poses;
 }
 
-Table xr_table(ViewerOptions& o) {
+Table xr_table(XrFlags& o) {
   return {
       {.flag = "--xr",
-       .value = &o.xr,
+       .value = &o.on,
        .help = "show it in a headset, through OpenXR, instead of a window; untried on a headset (docs/xr.md)"},
       {.flag = "--xr-origin",
-       .value = &o.xr_origin,
+       .value = &o.origin,
        .help = "--xr: where the data set's centre stands in the headset's space, x,y,z in metres, +y up",
        .limits = options::Check(complain_about_point),
        .default_text = "a metre before the stage's centre, 1.1 m above the floor; without a stage 0.75 m before the "
                        "first view of the head and 0.35 m below"},
       {.flag = "--xr-scale",
-       .value = &o.xr_options.scale,
+       .value = &o.options.scale,
        .help = "--xr: pixels drawn for each that the headset recommends, on each axis",
        .limits = Range{0.1, 2}},
       {.flag = "--xr-depth",
-       .value = &o.xr_options.depth,
+       .value = &o.options.depth,
        .help = "--xr: on: hand the headset each picture's depth, so that it can move pictures that are late",
        .on_off = true}};
 }

@@ -54,7 +54,7 @@ Status check_own(const std::string& directory) {
 
 }  // namespace
 
-Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const Options& options) {
+Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const RecordOptions& options) {
   std::unique_ptr<SessionRecord> out(new SessionRecord(options));
   if (options.out.empty()) return out;
   if (const Status s = check_own(options.out); !s) return s.error();
@@ -71,11 +71,11 @@ Status SessionRecord::open_in(const std::string& directory) {
     return Error{fmt::format("{}: another viewer records there; give another --out", directory)};
   auto spool = FrameSpool::open(directory + "/spool");
   if (!spool) return spool.error();
-  if (options_.received_mb > 0) {
-    auto events = EventRecorder::open(directory + "/points.events", options_.received_mb << 20);
+  if (options_.points_mb > 0) {
+    auto events = EventRecorder::open(directory + "/points.events", options_.points_mb << 20);
     if (!events) return events.error();
     events_ = std::move(*events);
-    slices_ = std::make_unique<SliceRecorder>(directory + "/slices.events", options_.received_mb << 20);
+    slices_ = std::make_unique<SliceRecorder>(directory + "/slices.events", options_.points_mb << 20);
   }
   spool_ = std::move(*spool);
   directory_ = directory;

@@ -8,6 +8,7 @@
 
 #include "client/viewer/record/event_record.h"
 #include "client/viewer/record/frame_spool.h"
+#include "client/viewer/record/record_options.h"
 #include "client/viewer/record/slice_record.h"
 #include "common/core/descriptor.h"
 #include "common/wire/messages.h"
@@ -16,15 +17,8 @@ namespace telesplat::viewer {
 
 class SessionRecord {
  public:
-  struct Options {
-    std::string out;   ///< folder; empty: the session's, if join is set
-    bool join = true;  ///< keep a record in the session's folder
-    std::string name;  ///< the viewer's name: its folder in the session's, if another viewer records there already
-    uint64_t received_mb = 0;  ///< MiB of received data to keep at most; 0: no data are kept
-  };
-
   /// Opens the folder that was given, if one was. Error: it cannot be written to, or another viewer records there.
-  static Result<std::unique_ptr<SessionRecord>> open(const Options& options);
+  static Result<std::unique_ptr<SessionRecord>> open(const RecordOptions& options);
 
   /// Worker's thread: takes the session from its master, before any of its data are received. The first call opens the
   /// session's folder if no folder was given.
@@ -45,11 +39,11 @@ class SessionRecord {
   std::string failure();
 
  private:
-  explicit SessionRecord(const Options& options) : options_(options) {}
+  explicit SessionRecord(const RecordOptions& options) : options_(options) {}
   Status open_in(const std::string& directory);
   Status join(const std::string& folder, const std::string& id);
 
-  const Options options_;
+  const RecordOptions options_;
   bool known_ = false;  // follow() was called
   Descriptor lock_;     // on images/, held while it records
   std::string directory_, records_in_;

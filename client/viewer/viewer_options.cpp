@@ -58,8 +58,7 @@ Table sampling_table(ViewerOptions& o) {
   };
 }
 
-Table head_table(ViewerOptions& o) {
-  auto& d = o.display;
+Table head_table(HeadFlags& o, DisplayOptions& d) {
   return {
       {.flag = "--trajectory",
        .value = &o.trajectory,
@@ -86,9 +85,9 @@ Table head_table(ViewerOptions& o) {
        .help = "seconds from the first displayed frame; 0: until stopped",
        .limits = Range{0, 1e6},
        .default_text = "10; of a file's trajectory its length and --hold; in a window 0"},
-      {.flag = "--frames", .value = &d.frames, .help = "frames to display; 0: no limit"},
+      {.flag = "--frames", .value = &d.span.frames, .help = "frames to display; 0: no limit"},
       {.flag = "--hold",
-       .value = &d.hold_s,
+       .value = &d.span.hold_s,
        .help = "the head stands still for the last so many seconds of --duration",
        .limits = Range{0, 1e6},
        .default_text = "0; of a --wall 2"},
@@ -109,21 +108,20 @@ Table head_table(ViewerOptions& o) {
   };
 }
 
-Table drawing_table(ViewerOptions& o) {
-  auto& d = o.display;
+Table drawing_table(DrawingFlags& o, DisplayOptions& d) {
   return {
       {.flag = "--detail-budget",
-       .value = &d.detail_budget,
+       .value = &d.detail.by_budget,
        .help = "on: lower detail, then draw at half the size, where frames take longer than --target-fps allows",
        .fits = kPoints,
        .on_off = true},
       {.flag = "--least-detail",
-       .value = &d.least_detail,
+       .value = &d.detail.least,
        .help = "the budget lowers detail no further than this",
        .limits = Range{0.3, 1},
        .fits = kPoints},
       {.flag = "--speed-detail",
-       .value = &d.speed_detail,
+       .value = &d.detail.by_speed,
        .help = "on: lower detail while the head moves fast",
        .fits = kPoints,
        .on_off = true},
@@ -169,10 +167,10 @@ Table drawing_table(ViewerOptions& o) {
   };
 }
 
-Table coupling_table(ViewerOptions& o) {
+Table coupling_table(CouplingFlags& o) {
   return {
       {.flag = "--coupling",
-       .value = &o.coupling,
+       .value = &o.mode,
        .help =
            "async: the display never waits for the server; sync: each frame asks for a view update and waits for it; "
            "loose: each frame waits for the next update, --buffers of them are asked for ahead; images: samplers draw "
@@ -191,25 +189,24 @@ Table coupling_table(ViewerOptions& o) {
   };
 }
 
-Table record_table(ViewerOptions& o) {
-  auto& d = o.display;
+Table record_table(RecordOptions& o, KeptOptions& kept) {
   return {
       {.flag = "--record-every",
-       .value = &d.picture_every,
+       .value = &kept.picture_every,
        .help = "record every N-th frame as a PNG; 0: one every 2.5 s and the last",
        .not_in_scene = kWhatIsKept},
       {.flag = "--record-points",
-       .value = &o.record_points_mb,
+       .value = &o.points_mb,
        .help = "keep what was received in OUT, MiB at most, for telesplat compare and movie: the point model's events "
                "in points.events, a volume's slice images in slices.events; 0: do not",
        .limits = Range{0, 1 << 20},
        .not_in_scene = kWhatIsKept},
-      {.flag = "--exr", .value = &d.exr, .help = "record pictures as EXR with depth too"},
+      {.flag = "--exr", .value = &kept.exr, .help = "record pictures as EXR with depth too"},
       {.flag = "--verify",
-       .value = &d.verify_every,
+       .value = &kept.verify_every,
        .help = "compare every N-th frame with direct rendering after the run; 0: none"},
       {.flag = "--verify-consecutive",
-       .value = &d.verify_row,
+       .value = &kept.verify_row,
        .help = "compare so many frames in a row each time: flicker, popping and how long holes last are measured from "
                "one frame to the next",
        .limits = Range{1, 1000}},
@@ -219,39 +216,39 @@ Table record_table(ViewerOptions& o) {
 Table process_table(ViewerOptions& o) {
   return {
       {.flag = "--threads",
-       .value = &o.threads,
+       .value = &o.drawing.threads,
        .help = "threads to draw with; 0: one a core",
        .limits = Range{0, 1024}},
       {.flag = "--started-at",
        .value = &o.started_s,
        .help = "monotonic clock when the session was started, for start-up times; 0: now"},
       {.flag = "--wall",
-       .value = &o.wall,
+       .value = &o.wall.name,
        .help = "this display is a part of a wall: COLUMNSxROWS of tiles, --fov is the wall's, --size the tile's; or "
                "the description of one, NAME.toml"},
       {.flag = "--wall-tile",
-       .value = &o.wall_tile,
+       .value = &o.wall.tile,
        .help = "which tile, counted by rows from the upper left, from 0, or which screen of the description"},
       {.flag = "--clock-from",
-       .value = &o.display.clock_from_s,
+       .value = &o.display.span.clock_from_s,
        .help =
            "monotonic clock when the head's movement and --duration begin, for several viewers that follow one head; "
            "0: with the first displayed frame"},
       {.flag = "--out",
-       .value = &o.out,
+       .value = &o.record.out,
        .help = "run folder for pictures and what is received; default: the master's, if it is on this machine"},
-      {.flag = "!--no-record", .value = &o.join_record, .help = "keep nothing in the master's run folder"},
+      {.flag = "!--no-record", .value = &o.record.join, .help = "keep nothing in the master's run folder"},
       {.flag = "--end-session",
        .value = &o.end_session,
        .help = "when this viewer is done, the session is over for everyone"},
-      {.flag = "--window", .value = &o.window, .help = "show a window; the person at it moves the camera"},
-      {.flag = "--fullscreen", .value = &o.fullscreen, .help = "the window fills the screen"},
+      {.flag = "--window", .value = &o.window.shown, .help = "show a window; the person at it moves the camera"},
+      {.flag = "--fullscreen", .value = &o.window.fullscreen, .help = "the window fills the screen"},
       {.flag = "--launched",
-       .value = &o.launched,
+       .value = &o.window.launched,
        .help = "standard input is the launcher's, which opens the data sets that the person chooses"},
-      {.flag = "--begins-empty", .value = &o.begins_empty, .help = "--launched: there is no data set yet"},
+      {.flag = "--begins-empty", .value = &o.window.begins_empty, .help = "--launched: there is no data set yet"},
       {.flag = "--panel",
-       .value = &o.panel,
+       .value = &o.window.panel,
        .help = "on: the window begins with its panel, which Tab hides and shows",
        .on_off = true},
   };
@@ -259,7 +256,7 @@ Table process_table(ViewerOptions& o) {
 
 constexpr double kDuration_s = 10;
 
-Status settle_eye(ViewerOptions& o) {
+Status settle_eye(HeadFlags& o) {
   if (o.eye.empty())
     return o.look_at.empty() ? ok_status() : Status(Error{"--look-at needs --eye, where to look from"});
   if (o.trajectory != "still")
@@ -281,22 +278,24 @@ Status settle_eye(ViewerOptions& o) {
 // Works out how long the run takes, after its movement is settled.
 void settle_duration(ViewerOptions& o) {
   auto& d = o.display;
-  const double length_s = o.movement.recorded ? o.movement.recorded->duration_s() : 0;
-  d.duration_s = o.duration_s.value_or(has_person(o) ? 0 : length_s > 0 ? length_s + d.hold_s : kDuration_s);
-  if (d.duration_s > 0) d.hold_s = std::min(d.hold_s, d.duration_s);
+  const double length_s = o.head.movement.recorded ? o.head.movement.recorded->duration_s() : 0;
+  d.span.duration_s = o.head.duration_s.value_or(has_person(o)  ? 0
+                                                 : length_s > 0 ? length_s + d.span.hold_s
+                                                                : kDuration_s);
+  if (d.span.duration_s > 0) d.span.hold_s = std::min(d.span.hold_s, d.span.duration_s);
 }
 
 Status settle_wall(ViewerOptions& o) {
-  auto wall = wall_tile(o.wall, o.wall_tile, o.wall_scale);
+  auto wall = wall_tile(o.wall.name, o.wall.tile, o.wall.scale);
   if (!wall) return wall.error();
   o.display.wall = std::move(*wall);
   if (!o.display.wall.described) return ok_status();
   const wall::Wall& all = *o.display.wall.described;
-  const wall::Screen& screen = all.screens[size_t(o.wall_tile)];
+  const wall::Screen& screen = all.screens[size_t(o.wall.tile)];
   if (const auto& panel = o.display.stereo.panel;
       panel && (panel->width != screen.width || panel->height != screen.height))
     return Error{fmt::format("--barrier {}: it is of {} x {} pixels, and screen {} of --wall {} has {} x {}",
-                             o.display.stereo.panel_file, panel->width, panel->height, o.wall_tile, o.wall,
+                             o.display.stereo.panel_file, panel->width, panel->height, o.wall.tile, o.wall.name,
                              screen.width, screen.height)};
   o.display.width = screen.width, o.display.height = screen.height;
   o.display.stereo.screen_width_m = screen.width_m;
@@ -306,32 +305,33 @@ Status settle_wall(ViewerOptions& o) {
   }
   if (all.anchor == wall::Anchor::kHead) return ok_status();
   // The head stands before a wall that stands in the room, unless the flags move it.
-  if (o.trajectory == "orbit")
+  if (o.head.trajectory == "orbit")
     return Error{
         fmt::format("--trajectory orbit: --wall {} stands in the room, and the data set would be seen from "
                     "behind it; a file of poses moves the head before it, and anchor = \"head\" takes the "
                     "wall along",
-                    o.wall)};
-  if (o.trajectory.empty()) o.trajectory = "still";
+                    o.wall.name)};
+  if (o.head.trajectory.empty()) o.head.trajectory = "still";
   return ok_status();
 }
 
 // Places a still head before a wall that stands in the room.
 void stand_before_wall(ViewerOptions& o) {
   const auto& all = o.display.wall.described;
-  if (!all || all->anchor == wall::Anchor::kHead || o.trajectory != "still" || !o.eye.empty()) return;
+  if (!all || all->anchor == wall::Anchor::kHead || o.head.trajectory != "still" || !o.head.eye.empty()) return;
   const auto in_room = [&](const glm::dvec3& p) { return all->in_room.position_room + all->in_room.orientation * p; };
-  o.movement.eye = in_room(all->head);
-  o.movement.look_at = in_room(all->head - glm::dvec3(0, 0, 1));
+  o.head.movement.eye = in_room(all->head);
+  o.head.movement.look_at = in_room(all->head - glm::dvec3(0, 0, 1));
 }
 
 Status settle_head(ViewerOptions& o) {
   if (const Status s = settle_wall(o); !s) return s;
-  if (o.trajectory.empty()) o.trajectory = has_person(o) || !o.eye.empty() || !o.poses.empty() ? "still" : "orbit";
-  auto movement = head_movement(o.trajectory, o.loop);
+  if (o.head.trajectory.empty())
+    o.head.trajectory = has_person(o) || !o.head.eye.empty() || !o.head.poses.empty() ? "still" : "orbit";
+  auto movement = head_movement(o.head.trajectory, o.head.loop);
   if (!movement) return movement.error();
-  o.movement = std::move(*movement);
-  if (const Status s = settle_eye(o); !s) return s;
+  o.head.movement = std::move(*movement);
+  if (const Status s = settle_eye(o.head); !s) return s;
   stand_before_wall(o);
   settle_duration(o);
   return ok_status();
@@ -342,7 +342,7 @@ Status settle_stereo(ViewerOptions& o) {
   auto stereo = settle(o.stereo);
   if (!stereo) return stereo.error();
   o.display.stereo = std::move(*stereo);
-  if (o.display.stereo.mode == stereo::Mode::kQuadBuffer && !o.window)
+  if (o.display.stereo.mode == stereo::Mode::kQuadBuffer && !o.window.shown)
     return Error{"--stereo quad-buffer: needs a window; side-by-side has both pictures without one"};
   if (!o.display.stereo.panel) return ok_status();
   const stereo::Panel& panel = *o.display.stereo.panel;
@@ -352,12 +352,17 @@ Status settle_stereo(ViewerOptions& o) {
   return ok_status();
 }
 
-Status settle_shading(ViewerOptions& o) {
+// Turns the names of renderer and look into the display's options.
+Status settle_drawing(const DrawingFlags& o, DisplayOptions& d) {
   const auto background = image::parse_background(o.background);
   if (!background) return Error{fmt::format("--background {}: {}", o.background, background.error().text)};
-  o.display.shading = *image::shading_named(o.shading);
-  o.display.shading.background = background->colour;
-  o.display.transparent = background->transparent;
+  d.shading = *image::shading_named(o.shading);
+  d.shading.background = background->colour;
+  d.transparent = background->transparent;
+  d.render.kernel = *splat::kernel_named(o.splat);
+  d.render.finish = *splat::finish_named(o.finish);
+  d.splat_scale = float(o.splat_scale);
+  d.still_samples = o.still_samples == "1" ? 1 : o.still_samples == "4" ? 4 : 16;
   return ok_status();
 }
 
@@ -365,37 +370,39 @@ Status settle_shading(ViewerOptions& o) {
 Status check_pictures(const ViewerOptions& o) {
   for (const auto& [given, flag, why] :
        {std::tuple{o.display.stereo.on(), "--stereo", "each picture is one eye's"},
-        {o.xr, "--xr", "a headset needs frames of its head's pose, and pictures are of an earlier one"},
-        {!o.wall.empty(), "--wall", "pictures of several displays are not kept in step"},
-        {o.background == "transparent", "--background transparent", "JPEG pictures have no alpha"}})
+        {o.xr.on, "--xr", "a headset needs frames of its head's pose, and pictures are of an earlier one"},
+        {!o.wall.name.empty(), "--wall", "pictures of several displays are not kept in step"},
+        {o.drawing.background == "transparent", "--background transparent", "JPEG pictures have no alpha"}})
     if (given) return Error{fmt::format("--coupling images and {}: {}", flag, why)};
   return ok_status();
 }
 
 Status settle_coupling(ViewerOptions& o) {
-  const auto coupling = coupling_named(o.coupling);
-  if (!coupling) return Error{fmt::format("--coupling {}: not async, sync, loose or images", o.coupling)};
+  const auto coupling = coupling_named(o.coupling.mode);
+  if (!coupling) return Error{fmt::format("--coupling {}: not async, sync, loose or images", o.coupling.mode)};
   if (*coupling == CouplingMode::kImages)
     if (const Status s = check_pictures(o); !s) return s;
-  if (o.buffers < 1 || uint64_t(o.buffers) > wire::kMaxBuffers)
-    return Error{fmt::format("--buffers {}: not in 1..{}", o.buffers, wire::kMaxBuffers)};
-  o.requests.buffers = uint64_t(buffers_of(*coupling, o.buffers));
+  if (o.coupling.buffers < 1 || uint64_t(o.coupling.buffers) > wire::kMaxBuffers)
+    return Error{fmt::format("--buffers {}: not in 1..{}", o.coupling.buffers, wire::kMaxBuffers)};
+  o.requests.buffers = uint64_t(buffers_of(*coupling, o.coupling.buffers));
   return ok_status();
 }
 
 }  // namespace
 
 Table view_table(ViewerOptions& o) {
-  const Table head = joined(head_table(o), head_source_table(o));
-  const Table looks = joined(drawing_table(o), stereo_table(o.stereo));
+  const Table head = joined(head_table(o.head, o.display), head_source_table(o.head));
+  const Table looks = joined(drawing_table(o.drawing, o.display), stereo_table(o.stereo));
   const Table seen = joined(joined(sampling_table(o), head), looks);
-  return joined(seen, joined(coupling_table(o), record_table(o)));
+  return joined(seen, joined(coupling_table(o.coupling), record_table(o.record, o.display.kept)));
 }
 
-Table wall_table(ViewerOptions& o) {
+std::string WallFlags::shared_name() const { return fmt::format("{} x{}", name, scale); }
+
+Table wall_table(WallFlags& o) {
   return {
       {.flag = "--wall-scale",
-       .value = &o.wall_scale,
+       .value = &o.scale,
        .help = "--wall NAME.toml: of the screens' pixels so many are drawn, on each axis: to try a wall on one machine",
        .limits = Range{0.01, 1}},
       {.flag = "--swap-barrier",
@@ -407,7 +414,7 @@ Table wall_table(ViewerOptions& o) {
 }
 
 Table table(ViewerOptions& o) {
-  const Table own = joined(view_table(o), joined(joined(xr_table(o), process_table(o)), wall_table(o)));
+  const Table own = joined(view_table(o), joined(joined(xr_table(o.xr), process_table(o)), wall_table(o.wall)));
   return joined(net::service_table(o.service, net::Ends::kConnects), own);
 }
 
@@ -423,33 +430,29 @@ Status settle(ViewerOptions& o) {
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.requests.adaptive = o.sampling_size == "auto";
-  o.requests.max_rate_hz = o.update_rate_hz > 0 ? std::max(o.update_rate_hz, kLeastUpdateRate_hz)
-                           : o.xr               ? kHeadsetUpdateRate_hz
-                                                : viewer::RequestOptions{}.max_rate_hz;
-  o.requests.picture_rate_hz = o.update_rate_hz > 0       ? o.requests.max_rate_hz
-                               : o.display.target_fps > 0 ? o.display.target_fps
-                                                          : RequestOptions{}.picture_rate_hz;
+  o.requests.max_rate_hz = o.coupling.update_rate_hz > 0 ? std::max(o.coupling.update_rate_hz, kLeastUpdateRate_hz)
+                           : o.xr.on                     ? kHeadsetUpdateRate_hz
+                                                         : viewer::RequestOptions{}.max_rate_hz;
+  o.requests.picture_rate_hz = o.coupling.update_rate_hz > 0 ? o.requests.max_rate_hz
+                               : o.display.target_fps > 0    ? o.display.target_fps
+                                                             : RequestOptions{}.picture_rate_hz;
   if (const Status s = settle_stereo(o); !s) return s;
   if (const Status s = settle_head_source(o); !s) return s;
   if (const Status s = settle_head(o); !s) return s;
   if (const Status s = settle_coupling(o); !s) return s;
-  o.display.render.kernel = *splat::kernel_named(o.splat);
-  o.display.splat_scale = float(o.splat_scale);
-  if (const Status s = settle_shading(o); !s) return s;
-  o.display.render.finish = *splat::finish_named(o.finish);
-  o.display.still_samples = o.still_samples == "1" ? 1 : o.still_samples == "4" ? 4 : 16;
+  if (const Status s = settle_drawing(o.drawing, o.display); !s) return s;
   o.requests.follow_display = has_person(o);
   return ok_status();
 }
 
 std::string end_of_trajectory(const ViewerOptions& o) {
   const auto& d = o.display;
-  if (!o.movement.recorded || has_person(o)) return {};
-  const double length_s = o.movement.recorded->duration_s();
-  const bool ends = d.duration_s <= 0 || d.duration_s - d.hold_s > length_s + 0.05;
+  if (!o.head.movement.recorded || has_person(o)) return {};
+  const double length_s = o.head.movement.recorded->duration_s();
+  const bool ends = d.span.duration_s <= 0 || d.span.duration_s - d.span.hold_s > length_s + 0.05;
   if (!ends) return {};
   return fmt::format("the trajectory ends after {:.1f} s; {}", length_s,
-                     o.loop ? "it begins again then" : "the head stands still then");
+                     o.head.loop ? "it begins again then" : "the head stands still then");
 }
 
 }  // namespace telesplat::viewer

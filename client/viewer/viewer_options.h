@@ -16,14 +16,8 @@
 
 namespace telesplat::viewer {
 
-struct ViewerOptions {
-  net::ServiceOptions service;
-  DisplayOptions display;
-  RequestOptions requests;
-  std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling_size also auto
-  /// Sampled pixels a displayed pixel, on each axis, at least; not given: the session's setting, else
-  /// requests.min_scale.
-  std::optional<double> least_sampling;
+/// Names the movement of the head, and its prediction.
+struct HeadFlags {
   std::string trajectory;    ///< "orbit", "still" or a CSV file; empty: orbit, in a window or with an eye still
   std::string eye, look_at;  ///< "x,y,z" of the first view, metres in the room; empty: fitted to the data set
   std::string poses;         ///< endpoint of a publisher of poses that moves the head; empty: none
@@ -32,44 +26,79 @@ struct ViewerOptions {
   bool loop = false;                  ///< the trajectory of a file begins again where it ends
   HeadMovement movement;              ///< made from trajectory, eye, look_at and loop
   /// Seconds from the first displayed frame, 0: until stopped; not given: as long as the trajectory of a file (and
-  /// display.hold_s) takes, else 10, in a window until it is closed.
+  /// DisplaySpan::hold_s) takes, else 10, in a window until it is closed.
   std::optional<double> duration_s;
+};
+
+/// Names of renderer and look; they become DisplayOptions::render and ::shading.
+struct DrawingFlags {
   std::string background = "#141820";  ///< "#rrggbb", a name, or "transparent"
-  std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
+  std::string renderer = "auto", splat = "disc", shading = "lit", finish = "on";
   std::string still_samples = "16";
-  StereoFlags stereo;         ///< becomes display.stereo
-  int buffers = 3;            ///< buffers of loose coupling
-  std::string wall;           ///< "CxR", or a description's file: this display is a part of a wall; empty: no wall
-  int wall_tile = 0;          ///< which tile, by rows from the upper left, or which of the file's screens
-  double wall_scale = 1;      ///< with a description: factor on the screens' pixels, on each axis
-  bool swap_barrier = true;   ///< a wall's displays present their frames together
-  double update_rate_hz = 0;  ///< view requests a second at most; 0: as many as suit the display
-  double splat_scale = 0;     ///< scale factor of splat sizes (T eq. 4.8); 0: that which suits the kernel
+  double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: that which suits the kernel
   int threads = 0;
-  uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: no record
-  bool window = false;               ///< show a window instead of running headless
-  bool fullscreen = false;           ///< the window fills the screen
-  bool panel = true;                 ///< the panel is open when the window appears
-  bool launched = false;             ///< the launcher writes to standard input (LauncherLines) and opens data sets
-  bool begins_empty = false;         ///< launched: there is no data set yet
-  bool xr = false;                   ///< show it in a headset, through OpenXR
-  XrOptions xr_options;
-  std::string xr_origin;     ///< "x,y,z" of xr_options.origin_m; empty: that which suits the headset's space
+};
+
+struct CouplingFlags {
+  std::string mode = "async";
+  int buffers = 3;            ///< buffers of loose coupling
+  double update_rate_hz = 0;  ///< view requests a second at most; 0: as many as suit the display
+};
+
+/// A display that is a part of a wall.
+struct WallFlags {
+  std::string name;          ///< "CxR", or a description's file; empty: no wall
+  int tile = 0;              ///< which tile, by rows from the upper left, or which of the file's screens
+  double scale = 1;          ///< with a description: factor on the screens' pixels, on each axis
+  bool swap_barrier = true;  ///< a wall's displays present their frames together
+
+  /// Returns the name that all viewers of the wall give to it.
+  std::string shared_name() const;
+};
+
+struct WindowFlags {
+  bool shown = false;         ///< show a window instead of running headless
+  bool fullscreen = false;    ///< the window fills the screen
+  bool panel = true;          ///< the panel is open when the window appears
+  bool launched = false;      ///< the launcher writes to standard input (LauncherLines) and opens data sets
+  bool begins_empty = false;  ///< launched: there is no data set yet
+};
+
+struct XrFlags {
+  bool on = false;  ///< show it in a headset, through OpenXR
+  XrOptions options;
+  std::string origin;  ///< "x,y,z" of options.origin_m; empty: that which suits the headset's space
+};
+
+struct ViewerOptions {
+  net::ServiceOptions service;
+  DisplayOptions display;
+  RequestOptions requests;
+  std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling_size also auto
+  /// Sampled pixels a displayed pixel, on each axis, at least; not given: the session's setting, else
+  /// requests.min_scale.
+  std::optional<double> least_sampling;
+  HeadFlags head;
+  DrawingFlags drawing;
+  CouplingFlags coupling;
+  StereoFlags stereo;  ///< becomes display.stereo
+  WallFlags wall;
+  WindowFlags window;
+  XrFlags xr;
+  RecordOptions record;
   double started_s = 0;      ///< when the session was started (monotonic clock), for start-up times; 0: now
   bool end_session = false;  ///< ask the master to end the session once this viewer's run is over and recorded
-  std::string out;           ///< run folder; empty: the session's, if this machine has it
-  bool join_record = true;   ///< without `out`: keep a record in the session's folder
 };
 
 /// True if a person is there, who ends the run.
-inline bool has_person(const ViewerOptions& o) { return o.window || o.xr; }
+inline bool has_person(const ViewerOptions& o) { return o.window.shown || o.xr.on; }
 
 /// Flags of headsets, for telesplat-viewer and `telesplat view`.
-options::Table xr_table(ViewerOptions& options);
+options::Table xr_table(XrFlags& flags);
 /// Flags that `telesplat run` and `view` share: size, trajectory, renderer and the like.
 options::Table view_table(ViewerOptions& options);
 /// Flags of walls, which `telesplat run` shares.
-options::Table wall_table(ViewerOptions& options);
+options::Table wall_table(WallFlags& flags);
 /// All flags of telesplat-viewer.
 options::Table table(ViewerOptions& options);
 
@@ -81,7 +110,9 @@ Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
 Status settle(ViewerOptions& options);
 
 /// True if the display presents its frames together with other displays.
-inline bool in_step(const ViewerOptions& options) { return options.swap_barrier && options.display.wall.tiles() > 1; }
+inline bool in_step(const ViewerOptions& options) {
+  return options.wall.swap_barrier && options.display.wall.tiles() > 1;
+}
 
 /// Returns a line for the person that says what happens where the trajectory of a file ends before the viewer does;
 /// empty: that does not happen. Precondition: the options are settled.
@@ -90,7 +121,7 @@ std::string end_of_trajectory(const ViewerOptions& options);
 /// Says what is wrong with "X,Y,Z"; empty: it is a point.
 std::string complain_about_point(const std::string& text);
 /// Flags of pose publishers and of prediction.
-options::Table head_source_table(ViewerOptions& options);
+options::Table head_source_table(HeadFlags& flags);
 /// Settles those flags and the headset's. Error: names the flag that is wrong.
 Status settle_head_source(ViewerOptions& options);
 

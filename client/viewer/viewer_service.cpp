@@ -45,57 +45,58 @@ void tell(const std::string& text) {
 
 // Null: the options name no publisher of poses.
 Result<std::shared_ptr<PoseFeed>> open_poses(const ViewerOptions& o) {
-  if (o.poses.empty()) return std::shared_ptr<PoseFeed>();
-  auto opened = PoseFeed::open({o.poses, o.requests.prediction, o.pose_horizon_s});
+  if (o.head.poses.empty()) return std::shared_ptr<PoseFeed>();
+  auto opened = PoseFeed::open({o.head.poses, o.requests.prediction, o.head.pose_horizon_s});
   if (!opened) return opened.error();
   return std::shared_ptr<PoseFeed>(std::move(*opened));
 }
 
 Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const Displays& displays,
                                                      const DisplayHelp& help) {
-  if (o.xr) return displays.headset(o, help);
-  if (o.window) return displays.window(o, help);
+  if (o.xr.on) return displays.headset(o, help);
+  if (o.window.shown) return displays.window(o, help);
   if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
-  auto made = std::make_unique<HeadlessSurface>(o.display, o.movement, tell);
+  auto made = std::make_unique<HeadlessSurface>(o.display, o.head.movement, tell);
   if (help.poses) made->follow(help.poses);
   return std::unique_ptr<DisplaySurface>(std::move(made));
 }
 
 Result<std::unique_ptr<SessionRecord>> open_record(const ViewerOptions& o) {
-  return SessionRecord::open(
-      {.out = o.out, .join = o.join_record, .name = o.service.name, .received_mb = o.record_points_mb});
+  RecordOptions options = o.record;
+  options.name = o.service.name;
+  return SessionRecord::open(options);
 }
 
 // Adds facts about the file that the head follows.
 void add_trajectory(std::map<std::string, std::string>& facts, const ViewerOptions& o) {
-  facts["trajectory"] = o.trajectory;
-  if (!o.movement.recorded) return;
+  facts["trajectory"] = o.head.trajectory;
+  if (!o.head.movement.recorded) return;
   std::error_code error;
-  facts["trajectory_file"] = std::filesystem::absolute(o.trajectory, error).lexically_normal().string();
-  if (const auto hash = hash_of_files({o.trajectory})) facts["trajectory_hash"] = hash_text(hash->hash);
+  facts["trajectory_file"] = std::filesystem::absolute(o.head.trajectory, error).lexically_normal().string();
+  if (const auto hash = hash_of_files({o.head.trajectory})) facts["trajectory_hash"] = hash_text(hash->hash);
 }
 
 // Returns the facts about this viewer for the master.
 std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers& renderers) {
   const auto& d = o.display;
   const auto& r = o.requests;
-  const double scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(d.render.kernel);
-  std::map<std::string, std::string> out{{"coupling", o.coupling},
+  const double scale = o.drawing.splat_scale > 0 ? o.drawing.splat_scale : splat::suitable_scale(d.render.kernel);
+  std::map<std::string, std::string> out{{"coupling", o.coupling.mode},
                                          {"buffers", std::to_string(r.buffers)},
                                          {"renderer", renderers.name()},
-                                         {"splat", o.splat},
+                                         {"splat", o.drawing.splat},
                                          {"finish", splat::finish_name(d.render.finish)},
-                                         {"shading", o.shading},
+                                         {"shading", o.drawing.shading},
                                          {"width", std::to_string(d.width)},
                                          {"height", std::to_string(d.height)},
                                          {"sampling_width", std::to_string(r.adaptive ? d.width : r.sampling_width)},
                                          {"sampling_height", std::to_string(r.adaptive ? d.height : r.sampling_height)},
                                          {"sampling", r.adaptive ? "adaptive" : "fixed"},
-                                         {"duration_s", fmt::format("{}", d.duration_s)},
-                                         {"frames", std::to_string(d.frames)},
-                                         {"hold_s", fmt::format("{}", d.hold_s)},
-                                         {"prediction", o.prediction},
-                                         {"verify_every", std::to_string(d.verify_every)},
+                                         {"duration_s", fmt::format("{}", d.span.duration_s)},
+                                         {"frames", std::to_string(d.span.frames)},
+                                         {"hold_s", fmt::format("{}", d.span.hold_s)},
+                                         {"prediction", o.head.prediction},
+                                         {"verify_every", std::to_string(d.kept.verify_every)},
                                          {"fov_deg", fmt::format("{}", d.fov_deg)},
                                          {"target_fps", fmt::format("{}", d.target_fps)},
                                          {"update_rate", fmt::format("{}", r.max_rate_hz)},
@@ -105,20 +106,17 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
     out["eye_separation_m"] = fmt::format("{}", d.stereo.eye_separation_m);
   }
   add_trajectory(out, o);
-  if (!o.poses.empty()) out["poses"] = o.poses;
+  if (!o.head.poses.empty()) out["poses"] = o.head.poses;
   if (!o.service.link.empty()) out["link"] = o.service.link;
   if (const std::string device = renderers.device(); !device.empty()) out["gpu"] = device;
   ViewerOptions shown = o;
   out[metrics::kRecordFact] = "\n[display]\n" + options::recorded(view_table(shown), {});
-  if (o.wall.empty()) return out;
-  out["wall"] = o.wall;
-  out["wall_tile"] = std::to_string(o.wall_tile);
-  out["wall_scale"] = fmt::format("{}", o.wall_scale);
+  if (o.wall.name.empty()) return out;
+  out["wall"] = o.wall.name;
+  out["wall_tile"] = std::to_string(o.wall.tile);
+  out["wall_scale"] = fmt::format("{}", o.wall.scale);
   return out;
 }
-
-// Returns the name that all viewers of its wall give to it.
-std::string wall_name(const ViewerOptions& o) { return fmt::format("{} x{}", o.wall, o.wall_scale); }
 
 // Returns the pace that keeps the display in step with a wall's other displays; null: the display runs by itself.
 std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& context, const ViewerWorker& worker) {
@@ -128,7 +126,7 @@ std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& contex
       context,
       WallPace::Options{.master = o.service.master,
                         .name = o.service.name,
-                        .wall = wall_name(o),
+                        .wall = o.wall.shared_name(),
                         .number = uint64_t(d.wall.tile),
                         .viewers = uint64_t(d.wall.tiles()),
                         .period_s = d.target_fps > 0 ? 1 / d.target_fps : 0,
@@ -148,11 +146,11 @@ struct Served {
 Served serve(const ViewerOptions& o, const net::Access& access, const std::shared_ptr<PoseFeed>& poses,
              DisplaySurface& surface, Renderers& renderers, SessionRecord& record) {
   net::Context context(access);
-  CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
+  CouplingGate gate(coupling_state(*coupling_named(o.coupling.mode), o.coupling.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
   RequestOptions requests = o.requests;
-  if (in_step(o)) requests.wall = wall_name(o), requests.wall_viewers = uint64_t(o.display.wall.tiles());
+  if (in_step(o)) requests.wall = o.wall.shared_name(), requests.wall_viewers = uint64_t(o.display.wall.tiles());
   const ViewerWorker::Options options{.service = o.service,
                                       .requests = requests,
                                       .least_sampling = o.least_sampling,
@@ -232,14 +230,14 @@ Result<int> run(ViewerOptions o, const Displays& displays) {
   // The surface comes before the renderers, whose contexts may depend on the window's.
   auto surface = open_surface(o, displays, {*asking, *poses, tell});
   if (!surface) return surface.error();
-  auto renderers = Renderers::make(o.renderer, o.threads);
+  auto renderers = Renderers::make(o.drawing.renderer, o.drawing.threads);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
   if (!record) return record.error();
 
   const Served served = serve(o, *access, *poses, **surface, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
-  if (o.window && served.session_ended && !served.why.empty()) tell(served.why);
+  if (o.window.shown && served.session_ended && !served.why.empty()) tell(served.why);
   const std::string lost = (*surface)->failure();
   surface->reset();  // the window goes at once, before the record is written
   FrameSpool* const spool = (*record)->spool();
@@ -277,7 +275,7 @@ int viewer_main(int argc, char** argv, const Displays& displays) {
       argc, argv,
       "telesplat-viewer: caches points, splats them at display rate, headless or in a window, records frames", options,
       table, [&](ViewerOptions o) {
-        const OpenDisplay& wanted = o.xr ? displays.headset : displays.window;
+        const OpenDisplay& wanted = o.xr.on ? displays.headset : displays.window;
         return has_person(o) && !wanted ? Result<int>(become_display_program(argv)) : run(std::move(o), displays);
       });
 }

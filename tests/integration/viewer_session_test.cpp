@@ -34,8 +34,8 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   display.width = 96;
   display.height = 64;
   display.target_fps = target_fps;
-  display.duration_s = 120;  // a deadline
-  display.frames = frames;
+  display.span.duration_s = 120;  // a deadline
+  display.span.frames = frames;
   display.most_wait_s = most_wait_s;
   const auto orbit = std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit(1.2, 0.4, 20));
   HeadlessSurface surface(display, {.recorded = orbit});

@@ -67,7 +67,7 @@ struct WindowSurface::Lines {
 };
 
 Result<std::unique_ptr<WindowSurface>> WindowSurface::open(const ViewerOptions& o, const DisplayHelp& help) {
-  auto window = Window::open({o.display.width, o.display.height, o.fullscreen, "Telesplat",
+  auto window = Window::open({o.display.width, o.display.height, o.window.fullscreen, "Telesplat",
                               o.display.stereo.mode == stereo::Mode::kQuadBuffer});
   if (!window) return window.error();
   return std::unique_ptr<WindowSurface>(new WindowSurface(o, help, std::move(*window)));
@@ -80,19 +80,22 @@ WindowSurface::WindowSurface(const ViewerOptions& o, const DisplayHelp& help, st
                 o.least_sampling.value_or(o.requests.min_scale)},
       sampling_chosen_(o.least_sampling.has_value()),
       window_(std::move(window)),
-      interaction_(first_movement(o.movement), first_look(o.display.render, o.display.shading)),
+      interaction_(first_movement(o.head.movement), first_look(o.display.render, o.display.shading)),
       lines_(std::make_shared<Lines>(help.tell)),
       bookmarks_([lines = lines_](const std::string& line) { lines->add(line); }),
-      panel_({.transparent = o.display.transparent, .viewer = o.service.name, .shown = o.panel, .opens = o.launched}),
-      opening_(o.launched ? ask_to_open : nullptr, o.launched ? STDIN_FILENO : -1, interaction_, panel_,
+      panel_({.transparent = o.display.transparent,
+              .viewer = o.service.name,
+              .shown = o.panel,
+              .opens = o.window.launched}),
+      opening_(o.window.launched ? ask_to_open : nullptr, o.window.launched ? STDIN_FILENO : -1, interaction_, panel_,
                scene_controls_, [this](const std::string& line) { tell(line); }),
       desk_(std::make_unique<ControlDesk>(o.service.master, help.asking)),
-      screenshots_(o.out.empty() ? "." : o.out + "/images",
+      screenshots_(o.record.out.empty() ? "." : o.record.out + "/images",
                    [lines = lines_](const std::string& line) { lines->add(line); }) {
   quad_buffers_ = o.display.stereo.mode == stereo::Mode::kQuadBuffer;
   interaction_.show_panel(o.panel);
-  interaction_.set_dialog(o.launched, has_scene());
-  interaction_.show_dialog(o.begins_empty);
+  interaction_.set_dialog(o.window.launched, has_scene());
+  interaction_.show_dialog(o.window.begins_empty);
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
   tell(first_keys());
   if (poses_)
@@ -147,7 +150,7 @@ void WindowSurface::fit_views() {
   const std::array<double, 4> now{f.right, f.top, part.middle_x, double(window_->width())};
   if (now == fitted_) return;
   fitted_ = now;
-  const auto& movement = options_.movement;
+  const auto& movement = options_.head.movement;
   const double middle_x = movement.eye ? 0 : part.middle_x;
   interaction_.set_scene(scene_.pipeline, scene_.box_room, movement.first_view(scene_.box_room, f, middle_x), middle_x);
   if (movement.orbits) interaction_.set_recorded(movement.trajectory(scene_.box_room, whole({})));
@@ -171,7 +174,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   for (const auto& side : {interaction_.take_side_wish(), panel_.take_side()})
     if (side) look_from(*side);
   const auto& o = options_.display;
-  const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
+  const bool playback = o.span.moves(t_s);
   tracked_ = false;
   head_ = interaction_.advance(now_s, playback);
   const geometry::Camera camera = camera_of(head_);
@@ -339,7 +342,7 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
     return std::tuple(o.mode, o.eye_separation_m, o.screen_m, o.swap_eyes);
   };
   if (eyes(changed.stereo) != eyes(d.stereo)) {
-    if (!options_.out.empty()) return Error{"a run that is recorded keeps the two eyes that it began with"};
+    if (!options_.record.out.empty()) return Error{"a run that is recorded keeps the two eyes that it began with"};
     stereo_wish_ = d.stereo = changed.stereo;
     fitted_ = {};
   }

@@ -94,9 +94,9 @@ class WindowSurface final : public DisplaySurface {
   double build_panel(double now_s);
   void save_transfer();
   void give(Order order, bool undoes);
-  std::string path_folder() const { return options_.out.empty() ? "." : options_.out; }
+  std::string path_folder() const { return options_.record.out.empty() ? "." : options_.record.out; }
   // True if there is a data set, or if one will come.
-  bool has_scene() const { return !options_.begins_empty || !scene_.box_room.empty(); }
+  bool has_scene() const { return !options_.window.begins_empty || !scene_.box_room.empty(); }
   void follow_bookmarks(const geometry::Pose& pose);
   void follow_notes();
   notes::Shelf shelf() const;  // precondition: terms_

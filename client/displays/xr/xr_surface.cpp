@@ -185,7 +185,7 @@ void XrSurface::measure(Seen& seen, double presented_s) {
 
 // The options take over the size of a headset's pictures. Eyes never stand still, so there are no still pictures.
 Result<std::unique_ptr<DisplaySurface>> open_headset(ViewerOptions& o, const DisplayHelp& help) {
-  auto opened = XrSurface::open(o.xr_options, o.display.near_m, help.tell);
+  auto opened = XrSurface::open(o.xr.options, o.display.near_m, help.tell);
   if (!opened) return Error{"--xr: " + opened.error().text};
   o.display.width = (*opened)->eye_size().width;
   o.display.height = (*opened)->eye_size().height;

@@ -102,7 +102,7 @@ class DisplayLoop {
     if (!draw_from(newest_drawn()) || !rest()) return stopped_early();
     if (!surface_.paces()) {
       worker_.on_first_points(monotonic_s());
-      clock_.start(o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s());
+      clock_.start(o_.span.clock_from_s > 0 ? o_.span.clock_from_s : monotonic_s());
     }
     if (wall_) swap_with_wall();
     while (!last_)
@@ -259,14 +259,13 @@ class DisplayLoop {
   // Ends a display whose frames are not shown, kUnseen_s after its duration.
   void see_whether_over() {
     if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
-    last_ = last_ ||
-            (clock_.started() && o_.duration_s > 0 && monotonic_s() > clock_.start_s() + o_.duration_s + kUnseen_s);
+    last_ = last_ || (clock_.started() && o_.span.over(monotonic_s() - clock_.start_s() - kUnseen_s));
   }
 
   // Sets last_ if the frame that begins now is the last one.
   void see_whether_last(double t_s) {
     if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
-    last_ = last_ || (o_.duration_s > 0 && t_s >= o_.duration_s) || (o_.frames > 0 && result_.frames + 1 >= o_.frames);
+    last_ = last_ || o_.span.over(t_s) || (o_.span.frames > 0 && result_.frames + 1 >= o_.span.frames);
   }
 
   struct Waited {
@@ -288,8 +287,7 @@ class DisplayLoop {
       if (request || !coupling.waits()) end_stall();
       if (request && draw_from(*request)) drawn_.source().advance(*request);
       if (request || !coupling.waits()) return {monotonic_s() - begin_s, coupling, request.has_value()};
-      if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s))
-        return {now_s - begin_s, coupling};
+      if (told_to_stop(worker_, surface_) || o_.span.over(t_s)) return {now_s - begin_s, coupling};
       // A head that rests shows its picture; no request is open to wait for.
       if (coupling.mode == CouplingMode::kImages && !asked_for && now_s - begin_s >= kRestPeriod_s) {
         end_stall();

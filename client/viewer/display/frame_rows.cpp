@@ -29,10 +29,10 @@ void FrameRows::flush() {
 uint32_t KeptFrames::use_of(uint64_t number, double t_s, bool last) const {
   if (!spool_) return 0;
   uint32_t use = 0;
-  if (o_.picture_every ? number % o_.picture_every == 0 : t_s >= next_picture_s_ || last)
-    use |= o_.exr ? kPicture | kExr : kPicture;
+  if (o_.kept.picture_every ? number % o_.kept.picture_every == 0 : t_s >= next_picture_s_ || last)
+    use |= o_.kept.exr ? kPicture | kExr : kPicture;
   if (o_.transparent && (use & kPicture)) use |= kTransparent;
-  if (o_.verify_every && (number % o_.verify_every < o_.verify_row || last)) use |= kVerify;
+  if (o_.kept.verify_every && (number % o_.kept.verify_every < o_.kept.verify_row || last)) use |= kVerify;
   return use;
 }
 

@@ -1,7 +1,6 @@
 // A display without a window: the head follows a trajectory or a publisher of poses; frames are measured and recorded.
 #pragma once
 
-#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -37,13 +36,10 @@ class HeadlessSurface final : public DisplaySurface {
     if (const auto news = cut_off_by_wall(options_, trajectory_.at(0), scene.box_room)) tell_(*news);
   }
   geometry::Camera begin_frame(double now_s, double t_s, Look&) override {
-    const auto& o = options_;
     if (poses_)
       if (const auto told = poses_->begin_frame(now_s)) return camera_of(head_ = *told);
     moves_ = moves_ || t_s >= 0;
-    const double head_s = std::max(0.0, t_s);
-    const double moving_s = o.duration_s > 0 ? std::min(head_s, o.duration_s - o.hold_s) : head_s;
-    head_ = trajectory_.at(moving_s);
+    head_ = trajectory_.at(options_.span.moved_s(t_s));
     return camera_of(head_);
   }
   geometry::Pose head() const override { return head_; }

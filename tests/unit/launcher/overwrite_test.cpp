@@ -49,12 +49,12 @@ class Overwrite : public testing::Test {
 
 TEST_F(Overwrite, FilesOfTheRecordThatTheRunReadsAreRefused) {
   EXPECT_EQ(refusal(), "") << "the scene lies there, but is no part of the record";
-  options_.viewer.trajectory = file("frames.csv");
+  options_.viewer.head.trajectory = file("frames.csv");
   EXPECT_NE(refusal().find("/frames.csv: is part of the record that --overwrite would remove"), std::string::npos);
   fs::create_symlink(options_.out + "/frames.csv", folder_ + "/path.csv");
-  options_.viewer.trajectory = folder_ + "/path.csv";
+  options_.viewer.head.trajectory = folder_ + "/path.csv";
   EXPECT_NE(refusal().find("/path.csv: is part of"), std::string::npos);
-  options_.viewer.trajectory = "orbit";
+  options_.viewer.head.trajectory = "orbit";
   EXPECT_EQ(refusal(), "");
   options_.data.scene = options_.out + "/images";
   EXPECT_NE(refusal().find("/images: is part of"), std::string::npos) << "a folder of files";

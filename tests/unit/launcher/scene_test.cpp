@@ -56,14 +56,14 @@ TEST_F(Scenes, ARawVolumesSurfaceIsAMesh) {
 
 TEST_F(Scenes, ASessionOfPicturesOpensNoVolume) {
   RunOptions shown, volume, mesh;
-  shown.viewer.coupling = "images";
+  shown.viewer.coupling.mode = "images";
   const auto balls = settled(volume, {file("cube.raw"), "--raw=16x16x16:u8"}), land = settled(mesh, {file("mesh.ply")});
   ASSERT_TRUE(balls.ok() && land.ok());
   const Status refused = check_pictures(shown, balls->get());
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().text.find("slice images"), std::string::npos) << refused.error().text;
   EXPECT_TRUE(check_pictures(shown, land->get()));
-  shown.viewer.coupling = "async";
+  shown.viewer.coupling.mode = "async";
   EXPECT_TRUE(check_pictures(shown, balls->get()));
 }
 

@@ -41,7 +41,7 @@ TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
 TEST(ViewerFlags, StillPicturesHaveOneFourOrSixteenSamples) {
   for (const auto& [text, samples] : {std::pair{"1", 1}, {"4", 4}, {"16", 16}}) {
     ViewerOptions o;
-    o.still_samples = text;
+    o.drawing.still_samples = text;
     ASSERT_TRUE(settle(o).ok());
     EXPECT_EQ(o.display.still_samples, samples);
   }
@@ -52,9 +52,9 @@ TEST(ViewerFlags, SayWhatDiffersAndReadItBack) {
   EXPECT_EQ(options::arguments(table(o), table(usual)), Texts{}) << "what nobody gave is not passed on";
   o.size = "640x400";
   o.least_sampling = 0.4;
-  o.display.detail_budget = false;
-  o.display.exr = true;
-  o.buffers = 5;
+  o.display.detail.by_budget = false;
+  o.display.kept.exr = true;
+  o.coupling.buffers = 5;
   const auto arguments = options::arguments(table(o), table(usual));
   EXPECT_EQ(arguments,
             (Texts{"--size=640x400", "--least-sampling=0.4", "--detail-budget=off", "--buffers=5", "--exr"}));
@@ -100,15 +100,15 @@ TEST(ViewerFlags, HaveLimits) {
 TEST(ViewerFlags, AreSettledOrRefused) {
   ViewerOptions o;
   o.size = "640x400";
-  o.wall = "3x2";
-  o.wall_tile = 5;
-  o.coupling = "loose";
+  o.wall.name = "3x2";
+  o.wall.tile = 5;
+  o.coupling.mode = "loose";
   ASSERT_TRUE(settle(o).ok());
   EXPECT_EQ(o.display.width, 640);
   EXPECT_EQ(o.display.wall.tile, 5);
   EXPECT_EQ(o.requests.buffers, 3u);
   EXPECT_TRUE(o.requests.adaptive);
-  o.wall_tile = 6;
+  o.wall.tile = 6;
   const Status s = settle(o);
   ASSERT_FALSE(s.ok());
   EXPECT_EQ(s.error().text, "--wall-tile 6: --wall 3x2 has the tiles 0..5");
@@ -125,20 +125,20 @@ std::string description(const std::string& anchor) {
 
 TEST(Wall, AScreenOfADescriptionHasItsSizeAndSampling) {
   ViewerOptions o;
-  o.wall = description("head");
-  o.wall_tile = 1;
-  o.wall_scale = 0.5;
+  o.wall.name = description("head");
+  o.wall.tile = 1;
+  o.wall.scale = 0.5;
   ASSERT_TRUE(settle(o).ok());
   ASSERT_TRUE(o.display.wall.described);
   EXPECT_EQ(o.display.width, 200);
   EXPECT_EQ(o.display.height, 150);
   EXPECT_FALSE(o.requests.adaptive);
   EXPECT_EQ(o.requests.sampling_width, 100);
-  EXPECT_EQ(o.trajectory, "orbit");
+  EXPECT_EQ(o.head.trajectory, "orbit");
   EXPECT_TRUE(in_step(o));
-  o.swap_barrier = false;
+  o.wall.swap_barrier = false;
   EXPECT_FALSE(in_step(o));
-  o.wall_tile = 2;
+  o.wall.tile = 2;
   const Status s = settle(o);
   ASSERT_FALSE(s.ok());
   EXPECT_NE(s.error().text.find("has the screens 0..1"), std::string::npos) << s.error().text;
@@ -146,12 +146,12 @@ TEST(Wall, AScreenOfADescriptionHasItsSizeAndSampling) {
 
 TEST(Wall, AHeadStandsBeforeAWallThatStandsInTheRoom) {
   ViewerOptions o;
-  o.wall = description("room");
+  o.wall.name = description("room");
   ASSERT_TRUE(settle(o).ok());
-  EXPECT_EQ(o.trajectory, "still");
-  ASSERT_TRUE(o.movement.eye);
-  EXPECT_EQ(*o.movement.eye, glm::dvec3(0, 0.5, 1));
-  o.trajectory = "orbit";
+  EXPECT_EQ(o.head.trajectory, "still");
+  ASSERT_TRUE(o.head.movement.eye);
+  EXPECT_EQ(*o.head.movement.eye, glm::dvec3(0, 0.5, 1));
+  o.head.trajectory = "orbit";
   const Status s = settle(o);
   ASSERT_FALSE(s.ok());
   EXPECT_NE(s.error().text.find("stands in the room"), std::string::npos) << s.error().text;
@@ -159,9 +159,9 @@ TEST(Wall, AHeadStandsBeforeAWallThatStandsInTheRoom) {
 
 TEST(Wall, WhatIsNoDescriptionIsToldByFileAndKey) {
   ViewerOptions o;
-  o.wall = tests::own_folder() + "none.toml";
+  o.wall.name = tests::own_folder() + "none.toml";
   EXPECT_NE(settle(o).error().text.find("none.toml: cannot be read"), std::string::npos);
-  o.wall = "2by1";
+  o.wall.name = "2by1";
   EXPECT_NE(settle(o).error().text.find("neither a file NAME.toml nor COLUMNSxROWS"), std::string::npos);
 }
 

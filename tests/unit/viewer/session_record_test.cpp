@@ -26,7 +26,7 @@ class JoinedRecord : public testing::Test {
   ~JoinedRecord() override { fs::remove_all(folder_); }
   // Folder, within the session's, where a viewer records.
   std::string joined() const {
-    const auto record = SessionRecord::open({.out = {}, .join = true, .name = "guest", .received_mb = 1});
+    const auto record = SessionRecord::open({.out = {}, .join = true, .name = "guest", .points_mb = 1});
     (*record)->follow(session_);
     return (*record)->records_in();
   }
@@ -51,7 +51,7 @@ TEST_F(JoinedRecord, ItIsForItsUserAlone) {
 
 // Otherwise the second viewer would write into the first one's files, draw its frames and take its spool away.
 TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
-  const auto first = SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "first", .received_mb = 1});
+  const auto first = SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "first", .points_mb = 1});
   ASSERT_TRUE(first) << first.error().text;
   EXPECT_EQ(joined(), "viewer-guest");
   (*first)->follow(session_);
@@ -61,7 +61,7 @@ TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
 // Otherwise the second viewer would write over the first one's files.
 TEST_F(JoinedRecord, TwoViewersThatAreToldOneFolderDoNotShareIt) {
   for (const char* folder : {"/own", "/run"}) {
-    const SessionRecord::Options told{.out = folder_ + folder, .join = true, .name = "guest", .received_mb = 0};
+    const RecordOptions told{.out = folder_ + folder, .join = true, .name = "guest", .points_mb = 0};
     auto first = SessionRecord::open(told);
     ASSERT_TRUE(first) << first.error().text;
     const auto second = SessionRecord::open(told);
@@ -88,17 +88,17 @@ TEST_F(JoinedRecord, AFolderWithARecordIsRefused) {
   fs::create_directories(mine + "/spool");
   std::ofstream(mine + "/spool/00000001.frame") << "of an earlier run";
   std::ofstream(mine + "/points.events") << "too";
-  const auto refused = SessionRecord::open({.out = mine, .join = true, .name = "guest", .received_mb = 1});
+  const auto refused = SessionRecord::open({.out = mine, .join = true, .name = "guest", .points_mb = 1});
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().text.find("holds a record already"), std::string::npos) << refused.error().text;
   EXPECT_EQ(fs::file_size(mine + "/points.events"), 3u);
-  EXPECT_TRUE(SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "guest", .received_mb = 1}))
+  EXPECT_TRUE(SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "guest", .points_mb = 1}))
       << "the session's own";
 }
 
 TEST_F(JoinedRecord, WhatCannotBeWrittenIsCounted) {
   fs::create_directories(folder_ + "/own");
-  const auto record = SessionRecord::open({.out = folder_ + "/own", .join = true, .name = "guest", .received_mb = 1});
+  const auto record = SessionRecord::open({.out = folder_ + "/own", .join = true, .name = "guest", .points_mb = 1});
   ASSERT_TRUE(record) << record.error().text;
   // Every write fails, as on a full disk.
   signal(SIGXFSZ, SIG_IGN);

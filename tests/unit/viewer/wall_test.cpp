@@ -17,7 +17,7 @@ TEST(Wall, TilesSeeTogetherWhatTheWholeSees) {
   DisplayOptions whole;
   whole.width = 3 * 80;
   whole.height = 2 * 50;
-  whole.duration_s = 10;
+  whole.span.duration_s = 10;
   const HeadMovement movement{.recorded = std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit())};
   Look look;
   HeadlessSurface all(whole, movement);

@@ -86,7 +86,7 @@ int AfterRun::tell_unseen(bool stopped) const {
 }
 
 int AfterRun::verify(bool stopped) {
-  if (o_.viewer.display.verify_every == 0) return 0;
+  if (o_.viewer.display.kept.verify_every == 0) return 0;
   if (!o_.join_master.empty()) {
     progress_.line("frames of a joined session are not verified: its data are with its data server");
     drop_spools();
@@ -107,8 +107,8 @@ int AfterRun::verify(bool stopped) {
 // Makes the wall's picture, and prints its tiles' moments. A run that was stopped may lack some tiles.
 int AfterRun::stitch(bool stopped) const {
   if (const Status s = keep_barrier(o_.out, o_.viewer.stereo.panel_file); !s) return complain(s.error(), 1);
-  if (o_.viewer.wall.empty()) return 0;
-  if (const Status s = keep_description(o_.out, o_.viewer.wall); !s) return complain(s.error(), 1);
+  if (o_.viewer.wall.name.empty()) return 0;
+  if (const Status s = keep_description(o_.out, o_.viewer.wall.name); !s) return complain(s.error(), 1);
   const auto tiles = stitch_wall(o_.out, o_.viewer.display.wall);
   if (!tiles) return complain(tiles.error(), stopped ? 0 : 1);
   std::string moments;

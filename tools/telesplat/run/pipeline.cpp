@@ -32,7 +32,7 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
     p.group_.join(o.join_master);
   else if (const Status s = p.start_servers(); !s)
     return s.error();
-  if (o.viewer.wall.empty())
+  if (o.viewer.wall.name.empty())
     if (const Status s = p.start_viewers(0); !s) return s.error();
   return p;
 }
@@ -51,7 +51,7 @@ Status Pipeline::start_servers() {
   Member packer{.role = "packer",
                 .name = "packer",
                 .arguments = packer_arguments(o),
-                .nice = o.viewer.xr ? kServersNice : kServersNice / 2};
+                .nice = o.viewer.xr.on ? kServersNice : kServersNice / 2};
   if (const Status s = group_.start(std::move(packer)); !s) return s;
   while (last_sampler_ < o.samplers)
     if (const Status s = start_sampler(++last_sampler_); !s) return s;
@@ -161,7 +161,7 @@ Status Pipeline::start_viewers(double clock_from_s) {
     Member viewer{.role = "viewer",
                   .name = name,
                   .arguments = viewer_arguments(options_, i, clock_from_s),
-                  .told = options_.viewer.launched};
+                  .told = options_.viewer.window.launched};
     if (const Status s = put_link(links::Place::kViewer, name, viewer); !s) return s;
     if (const Status s = group_.start(std::move(viewer)); !s) return s;
   }

@@ -46,7 +46,7 @@ constexpr double kResultPatience_s = 2;
 Status check_display(const RunOptions& o) {
   if (!viewer::has_person(o.viewer)) return ok_status();
   if (const auto program = viewer::display_program(); !program) return program.error();
-  std::string why = o.viewer.xr ? "" : output_of(viewer::kDisplayProgram, "check");
+  std::string why = o.viewer.xr.on ? "" : output_of(viewer::kDisplayProgram, "check");
   if (why.ends_with('\n')) why.pop_back();
   return why.empty() ? ok_status() : Status(Error{why});
 }
@@ -162,7 +162,7 @@ class Run {
         for (const auto& line :
              joined->look(status ? &*status : nullptr, control.nobody_there(), control.refusal(), monotonic_s()))
           progress_.line("telesplat: " + line);
-      if (o_.viewer.window && !o_.viewer.xr && !live.empty())
+      if (o_.viewer.window.shown && !o_.viewer.xr.on && !live.empty())
         progress_.close();  // the window's title has the figures
       else if (!live.empty() || !pipeline.progress().empty())
         progress_.show(live.empty() ? pipeline.progress() : live);
@@ -304,7 +304,7 @@ class Run {
   // A closed window, or Ctrl-C in it, is an ordinary end.
   int nothing_displayed(bool stopped) {
     remove_record();
-    if (o_.viewer.window) return 0;
+    if (o_.viewer.window.shown) return 0;
     complain({stopped ? "interrupted before the first frame; nothing is recorded"
                       : "the session ended before the first frame; nothing is recorded"});
     return stopped ? kInterrupted : 1;
@@ -321,13 +321,13 @@ class Run {
     const bool complete = !o_.join_master.empty() || fs::exists(o_.out + "/summary.json", error);
     complain({fmt::format("interrupted; the record in {} {}", o_.out,
                           complete ? "lacks what is made after the run" : "is not complete")});
-    return o_.viewer.window ? 0 : kInterrupted;
+    return o_.viewer.window.shown ? 0 : kInterrupted;
   }
 
   // True if the run ends by itself.
   bool has_end() const {
     const auto& d = o_.viewer.display;
-    return !o_.viewer.window && (d.duration_s > 0 || d.frames > 0);
+    return !o_.viewer.window.shown && (d.span.duration_s > 0 || d.span.frames > 0);
   }
 
   int complete(bool stopped) {
@@ -342,11 +342,11 @@ class Run {
           fmt::format("telesplat: this machine was too busy: the display waited for a processor {:.0f} % of the time, "
                       "from which delays come, and leases that expire",
                       100 * busy_.share()));
-    if (const int unseen = o_.viewer.window ? 0 : after_.tell_unseen(stopped)) return unseen;
+    if (const int unseen = o_.viewer.window.shown ? 0 : after_.tell_unseen(stopped)) return unseen;
     const bool again = net::stop_requested();
     if (again)
       progress_.line("telesplat: interrupted; the record lacks what is made after the run");
-    else if (stopped && !o_.viewer.window)
+    else if (stopped && !o_.viewer.window.shown)
       progress_.line(fmt::format("telesplat: {}; the record is complete", has_end() ? "interrupted" : "stopped"));
     return (again || stopped) && has_end() ? kInterrupted : 0;
   }
@@ -379,7 +379,7 @@ int find_session(RunOptions& o) {
 int run(RunOptions o, const options::Given& given) {
   o.viewer.started_s = monotonic_s();
   setenv(kLaunchedByVariable, command_line().c_str(), 1);
-  if (o.out.empty() && !o.viewer.window) o.out = dated_folder();
+  if (o.out.empty() && !o.viewer.window.shown) o.out = dated_folder();
   auto scene = settle(o, given);
   if (!scene) return complain(scene.error());
   if (const int code = find_session(o)) return code;
@@ -396,7 +396,7 @@ int run(RunOptions o, const options::Given& given) {
   }
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
-  if (o.viewer.window && !o.data.scene.empty()) keep_recent(o.data.scene);
+  if (o.viewer.window.shown && !o.data.scene.empty()) keep_recent(o.data.scene);
   return Run(std::move(o), std::move(*scene), std::move(movie)).go();
 }
 

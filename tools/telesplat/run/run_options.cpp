@@ -74,17 +74,18 @@ Table by_purpose(const Table& table) {
 
 // Returns the rows of `run` or of `view`.
 Table display_rows(RunOptions& o) {
-  if (o.viewer.window)
-    return joined({{.flag = "--out",
-                    .value = &o.out,
-                    .help = "run folder; without it nothing is recorded",
-                    .not_in_scene = "where a run writes"},
-                   {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"},
-                   {.flag = "--panel",
-                    .value = &o.viewer.panel,
-                    .help = "on: the window begins with its panel, which Tab hides and shows",
-                    .on_off = true}},
-                  viewer::xr_table(o.viewer));
+  if (o.viewer.window.shown)
+    return joined(
+        {{.flag = "--out",
+          .value = &o.out,
+          .help = "run folder; without it nothing is recorded",
+          .not_in_scene = "where a run writes"},
+         {.flag = "--fullscreen", .value = &o.viewer.window.fullscreen, .help = "the window fills the screen"},
+         {.flag = "--panel",
+          .value = &o.viewer.window.panel,
+          .help = "on: the window begins with its panel, which Tab hides and shows",
+          .on_off = true}},
+        viewer::xr_table(o.viewer.xr));
   const Table rows{
       {.flag = "--out",
        .value = &o.out,
@@ -95,11 +96,11 @@ Table display_rows(RunOptions& o) {
        .help = "viewers, each of which follows the trajectory; the first one is verified",
        .limits = Range{1, kMaxViewers}},
       {.flag = "--wall",
-       .value = &o.viewer.wall,
+       .value = &o.viewer.wall.name,
        .help = "a display wall of one viewer a screen: COLUMNSxROWS tiles, each with --size pixels of one picture of "
                "--fov, or the description of one, NAME.toml; its picture at the end becomes images/wall.png",
        .is_file = true}};
-  return joined(rows, viewer::wall_table(o.viewer));
+  return joined(rows, viewer::wall_table(o.viewer.wall));
 }
 
 options::Row metrics_port_row(RunOptions& o) {
@@ -199,36 +200,36 @@ Status refuse_scene_flags(RunOptions& o, const options::Given& given) {
 }
 
 Status settle_wall(RunOptions& o, const options::Given& given) {
-  if (o.viewer.wall.empty()) {
+  if (o.viewer.wall.name.empty()) {
     for (const char* flag : {"--wall-scale", "--swap-barrier"})
       if (std::find(given.begin(), given.end(), flag) != given.end())
         return Error{fmt::format("{} is given, but no --wall", flag)};
     return ok_status();
   }
   const auto is_given = [&](const char* flag) { return std::find(given.begin(), given.end(), flag) != given.end(); };
-  const auto wall = viewer::wall_tile(o.viewer.wall, 0, o.viewer.wall_scale);
+  const auto wall = viewer::wall_tile(o.viewer.wall.name, 0, o.viewer.wall.scale);
   if (!wall) return wall.error();
   if (wall->tiles() > kMaxViewers)
-    return Error{fmt::format("--wall {}: it has {} {}; at most {}", o.viewer.wall, wall->tiles(),
+    return Error{fmt::format("--wall {}: it has {} {}; at most {}", o.viewer.wall.name, wall->tiles(),
                              wall->described ? "screens" : "tiles", kMaxViewers)};
   for (const char* flag : {"--size", "--fov"})
     if (wall->described && is_given(flag))
-      return Error{
-          fmt::format("{}: the screens of {} have their own; --wall-scale draws fewer pixels", flag, o.viewer.wall)};
+      return Error{fmt::format("{}: the screens of {} have their own; --wall-scale draws fewer pixels", flag,
+                               o.viewer.wall.name)};
   if (!wall->described && is_given("--wall-scale"))
-    return Error{fmt::format("--wall-scale: --wall {} is no description; --size is its tiles'", o.viewer.wall)};
+    return Error{fmt::format("--wall-scale: --wall {} is no description; --size is its tiles'", o.viewer.wall.name)};
   if (!is_given("--viewers")) o.viewers = wall->tiles();
-  if (!is_given("--hold")) o.viewer.display.hold_s = kWallHold_s;
+  if (!is_given("--hold")) o.viewer.display.span.hold_s = kWallHold_s;
   if (o.viewers == wall->tiles()) return ok_status();
-  return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.viewer.wall, wall->tiles())};
+  return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.viewer.wall.name, wall->tiles())};
 }
 
 // Refuses a flag that records into a folder, if there is no folder.
 Status refuse_records_without_folder(const RunOptions& o) {
   const auto& d = o.viewer.display;
-  for (const auto& [asked, flag] : {std::pair{d.verify_every > 0, "--verify"},
-                                    {d.picture_every > 0, "--record-every"},
-                                    {d.exr, "--exr"},
+  for (const auto& [asked, flag] : {std::pair{d.kept.verify_every > 0, "--verify"},
+                                    {d.kept.picture_every > 0, "--record-every"},
+                                    {d.kept.exr, "--exr"},
                                     {o.record_depth, "--record-depth"},
                                     {!o.movie.file.empty(), "--movie"},
                                     {o.report, "--report"}})
@@ -237,8 +238,8 @@ Status refuse_records_without_folder(const RunOptions& o) {
   return ok_status();
 }
 
-// A viewer that joins takes the coupling from its session.
-bool shows_pictures(const RunOptions& o) { return o.viewer.coupling == "images" && o.join_master.empty(); }
+// A viewer that joins is told by its session.
+bool shows_pictures(const RunOptions& o) { return o.viewer.coupling.mode == "images" && o.join_master.empty(); }
 
 namespace fs = std::filesystem;
 
@@ -271,7 +272,7 @@ Status check_movie(const RunOptions& o, const options::Given& given) {
         "FILE makes a movie of it afterwards"};
   if (shows_pictures(o))
     return Error{"--movie and --coupling images: a movie is drawn of recorded points, and pictures leave none"};
-  if (o.viewer.record_points_mb == 0) return Error{"--movie needs the record that --record-points 0 leaves out"};
+  if (o.viewer.record.points_mb == 0) return Error{"--movie needs the record that --record-points 0 leaves out"};
   return ok_status();
 }
 
@@ -309,7 +310,7 @@ std::vector<std::string> arguments(Options o) {
 
 RunOptions view_defaults() {
   RunOptions o;
-  o.viewer.window = true;
+  o.viewer.window.shown = true;
   return o;
 }
 
@@ -328,8 +329,8 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   std::shared_ptr<Scene> out;
   if (o.data.scene.empty()) {
     if (o.join_master.empty()) o.join_master = net::master_from_environment();
-    // A window may begin empty: the person opens a data set in it.
-    if (o.join_master.empty() && !(o.viewer.window && o.out.empty()))
+    // A window may begin with nothing: the person opens something there.
+    if (o.join_master.empty() && !(o.viewer.window.shown && o.out.empty()))
       return Error{"a scene is needed: a mesh or volume file, a folder of DICOM slices, or the word julia"};
     if (const Status s = refuse_scene_flags(o, given); !s) return s.error();
   } else {
@@ -351,17 +352,17 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   if (const Status s = image::validate_samples(o.verify_samples); !s)
     return Error{"--verify-samples: " + s.error().text};
   if (const Status s = viewer::settle(o.viewer); !s) return s.error();
-  o.viewer.launched = o.viewer.window && o.join_master.empty();
-  o.viewer.begins_empty = o.viewer.launched && o.data.scene.empty();
+  o.viewer.window.launched = o.viewer.window.shown && o.join_master.empty();
+  o.viewer.window.begins_empty = o.viewer.window.launched && o.data.scene.empty();
   return out;
 }
 
 std::vector<std::string> master_arguments(const RunOptions& o) {
   auto out = arguments(o.master);
-  out.insert(out.end(), {"--bind", "tcp://127.0.0.1:*", "--started-by", o.viewer.window ? "view" : "run"});
+  out.insert(out.end(), {"--bind", "tcp://127.0.0.1:*", "--started-by", o.viewer.window.shown ? "view" : "run"});
   if (!o.out.empty()) out.insert(out.end(), {"--out", o.out});
   if (shows_pictures(o))
-    out.insert(out.end(), {"--images", o.viewer.shading, "--image-background", o.viewer.background});
+    out.insert(out.end(), {"--images", o.viewer.drawing.shading, "--image-background", o.viewer.drawing.background});
   return out;
 }
 
@@ -391,14 +392,14 @@ std::vector<std::string> sampler_arguments(const RunOptions& o) {
 
 std::vector<std::string> viewer_arguments(const RunOptions& o, int number, double clock_from_s) {
   viewer::ViewerOptions v = o.viewer;
-  v.window = v.window && !v.xr;
-  if (number != 1) v.display.verify_every = 0;
+  v.window.shown = v.window.shown && !v.xr.on;
+  if (number != 1) v.display.kept.verify_every = 0;
   if (o.out.empty())
-    v.join_record = false;  // a guest without a folder leaves no files in the host's
+    v.record.join = false;  // a guest without a folder leaves nothing in that of others
   else
-    v.out = viewer_directory(o.out, number);
-  if (!v.wall.empty()) v.wall_tile = number - 1;
-  v.display.clock_from_s = clock_from_s;
+    v.record.out = viewer_directory(o.out, number);
+  if (!v.wall.name.empty()) v.wall.tile = number - 1;
+  v.display.span.clock_from_s = clock_from_s;
   return arguments(v);
 }
 
@@ -415,7 +416,7 @@ Status check_overwrite(const RunOptions& o) {
   const auto record = metrics::recorded_files(o.out);
   std::error_code error;
   const fs::path folder = fs::canonical(o.out, error);
-  for (const std::string& input : {o.data.scene, o.viewer.trajectory, o.data.mesh.elevation.texture,
+  for (const std::string& input : {o.data.scene, o.viewer.head.trajectory, o.data.mesh.elevation.texture,
                                    o.data.volume.transfer, o.data.mesh.colouring.map}) {
     const fs::path path = input.empty() ? fs::path() : fs::canonical(input, error);
     if (path.empty() || is_or_holds(path, folder)) continue;

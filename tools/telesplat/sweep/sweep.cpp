@@ -156,8 +156,9 @@ Result<double> check_run(const std::vector<std::string>& arguments) {
   o.out = "run";  // settle() needs a folder
   if (const auto scene = settle(o, given); !scene) return scene.error();
   const auto& display = o.viewer.display;
-  if (display.duration_s <= 0 && display.frames == 0) return Error{"--duration 0: such a run does not end by itself"};
-  return display.duration_s;
+  if (display.span.duration_s <= 0 && display.span.frames == 0)
+    return Error{"--duration 0: such a run does not end by itself"};
+  return display.span.duration_s;
 }
 
 double expected_wall_s(const Manifest& m, size_t configuration, double lasts_s) {
