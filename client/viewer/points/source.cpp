@@ -9,17 +9,11 @@
 namespace telesplat::viewer {
 namespace {
 
-// Share of a frame's time for drawing. The rest is for the worker, and the sampler of a small machine.
-constexpr double kBudgetShare = 0.85;
 // Share of a frame's time for sub-pixels. The samplers of a small machine need the rest: they have the most to do when
 // a head has just come to rest.
 constexpr double kStillShare = 0.5;
-// A camera that is the same for this many frames stands still.
-constexpr int kStillFrames = 4;
 // Frame period if frames are not paced.
 constexpr double kStillPeriod_s = 1.0 / 60;
-// Least time that a frame saves for the next tile, even if its own time is over.
-constexpr double kLeastRefining_s = 0.5e-3;
 // Period at which a picture that is not drawn again is reported as seen: packers forget points that no viewer sees.
 constexpr double kSeenPeriod_s = 0.5;
 
@@ -31,9 +25,7 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
     : options_(options),
       renderer_(std::move(renderer)),
       received_(received),
-      budget_(options.detail_budget && options.target_fps > 0 ? kBudgetShare * 1e3 / options.target_fps : 0,
-              options.least_detail),
-      half_size_(budget_.budget_ms()),
+      detail_(options.detail, options.target_fps),
       supersampler_(*renderer_, still_side(options)) {}
 
 // Splats that soften their edges let the background through; drawing the same over another background shows how much.
@@ -47,16 +39,6 @@ void PointSource::find_coverage(const FrameInput& input, const geometry::Camera&
   image::find_coverage(over_white_, view);
 }
 
-// Counts the frames for which camera, look and clips have been the same.
-void PointSource::count_same(const FrameInput& input) {
-  const uint64_t cut_before = cut_.version;
-  cut_ = received_.cut();
-  const bool same = !input.resting && input.camera == camera_ && input.look == look_ && cut_.version == cut_before;
-  same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
-  camera_ = input.camera;
-  look_ = input.look;
-}
-
 void PointSource::find_coverage(const FrameInput& input, const geometry::Camera& camera,
                                 const splat::FrameTarget& target) {
   const size_t pixels = size_t(target.width) * size_t(target.height);
@@ -66,9 +48,9 @@ void PointSource::find_coverage(const FrameInput& input, const geometry::Camera&
 }
 
 bool PointSource::stands_still(const FrameInput& input) {
-  count_same(input);
+  head_.frame(input, cut_.version);
   const bool refines = options_.still_samples > 1 && input.look.render.finish.antialias && !options_.transparent;
-  if (!refines || same_frames_ < kStillFrames) {
+  if (!refines || !head_.stands_still()) {
     still_shading_.reset();
     return false;
   }
@@ -101,30 +83,12 @@ void PointSource::draw_list(const FrameInput& input, const image::Shading& shadi
   drawn_ = out.stats.points_drawn;
 }
 
-double PointSource::wanted_detail(const FrameInput& input) {
-  if (!input.resting && options_.speed_detail)
-    speed_.frame(input.begin_s, input.camera, list_.distance_m > 0 ? list_.distance_m : 1);
-  return std::min(budget_.detail(), speed_.detail());
-}
-
-// Measures the cost of this frame alone: a core that samplers held for a while is no reason for a coarser picture.
-void PointSource::measure(const FrameInput& input, double detail, const DrawnFrame& out) {
-  const double end_s = monotonic_s();
-  const splat::SplatStats& s = out.stats;
-  const double threads_ms = s.project_ms + s.resolve_ms + s.fill_ms + s.smooth_ms + s.antialias_ms;
-  const double work_ms = s.prepare_ms + threads_ms / std::max(renderer_->threads(), 1);
-  const double draw_ms = std::min((end_s - out.chosen_s) * 1e3, work_ms);
-  budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, draw_ms, double(list_.points), detail);
-  if (renderer_->halves() && out.halved == half_size_.on())
-    half_size_.frame_done(draw_ms, budget_.detail() <= options_.least_detail);
-}
-
 void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out) {
-  const double detail = wanted_detail(input);
-  out.halved = half_size_.on() && renderer_->halves() && !input.resting && !input.with_coverage;
+  const double detail = detail_.wanted(input, list_.distance_m);
+  out.halved = detail_.halves() && renderer_->halves() && !input.resting && !input.with_coverage;
   select(input, input.resting ? 1.0 : detail, out);
   if (list_.points > 0 || input.even_empty) draw_list(input, image::Shading(options_.shading, input.camera), view, out);
-  if (!input.resting) measure(input, detail, out);
+  if (!input.resting) detail_.measure(input, detail, out, list_, *renderer_);
 }
 
 void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFrame& out) {
@@ -150,9 +114,8 @@ void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFr
 
 void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame& out) {
   const double period_s = options_.target_fps > 0 ? 1 / options_.target_fps : kStillPeriod_s;
-  const double begin_s = monotonic_s(), until_s = input.begin_s + kStillShare * period_s;
-  // Tiles that take longer than a frame allows are drawn in every second frame, or less often.
-  saved_s_ = std::min(saved_s_ + std::max(until_s - begin_s, kLeastRefining_s), tile_s_);
+  const double begin_s = monotonic_s();
+  tile_time_.begin(begin_s, input.begin_s + kStillShare * period_s);
   const Supersampler::Scene scene{
       [this](const geometry::Camera& camera, const splat::SelectionOptions& selection, splat::DrawList& list) {
         received_.cache().select_part(camera, selection, list);
@@ -161,8 +124,8 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
       options_.selection, input.look.render, *still_shading_, &received_.fine_rays()};
   for (double now_s = begin_s;;) {
     const auto tile = still_.next(now_s);
-    if (!tile || (now_s + tile_s_ > until_s && (now_s > begin_s || saved_s_ < tile_s_))) break;
-    saved_s_ = 0;
+    if (!tile || !tile_time_.allows(now_s)) break;
+    tile_time_.use();
     const double share = still_.share();
     const bool drawn =
         supersampler_.draw(scene, input.camera, still_.rect(*tile), still_.pixels(*tile), size_t(input.camera.width));
@@ -172,7 +135,7 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
       still_.put_over(view, *tile);
       out.changed = true;
       out.still = false;
-      tile_s_ = tile_s_ == 0 ? end_s - now_s : 0.8 * tile_s_ + 0.2 * (end_s - now_s);
+      tile_time_.drawn(end_s - now_s);
     }
     base_stale_ |= still_.share() < share;  // the tile has lost its pixels: draw the picture below it again
     now_s = end_s;
@@ -191,7 +154,7 @@ void PointSource::add_figures(DrawnFrame& out) const {
   out.sequence = list_.applied.value;
   out.summaries = list_.summaries;
   out.detail = options_.selection.detail;
-  out.budget_ms = budget_.budget_ms();
+  out.budget_ms = detail_.budget_ms();
   out.epoch = list_.epoch;
   out.between_clips = list_.epoch.value < cut_.epoch.value;
 }
@@ -206,6 +169,7 @@ DrawnFrame PointSource::begin_frame(const FrameInput& input) {
   DrawnFrame out;
   out.update = received_.shown();
   received_.cache().take_changes(changes_);
+  cut_ = received_.cut();
   return out;
 }
 
@@ -232,10 +196,9 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
                                   const std::array<splat::FrameTarget, 2>& targets) {
   DrawnFrame out = begin_frame(input);
   options_.selection.eyes = eyes;
-  count_same(input);
-  // A head that turns on the spot moves its eyes, but not the place between them.
-  if (std::exchange(eyes_, eyes) != eyes) same_frames_ = 0;
-  const bool still = same_frames_ >= kStillFrames;
+  head_.frame(input, cut_.version);
+  head_.frame_of(eyes);
+  const bool still = head_.stands_still();
   if (still && pair_sharp_ && input.intact && !changes_.any && !input.with_depth && !input.with_coverage) {
     out.changed = false;
     out.still = true;
@@ -247,7 +210,7 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
     end_frame(out);
     return out;
   }
-  const double allowed = wanted_detail(input), detail = still || input.resting ? 1 : allowed;
+  const double allowed = detail_.wanted(input, list_.distance_m), detail = still || input.resting ? 1 : allowed;
   select(input, detail, out);
   pair_sharp_ = still;
   if (list_.points > 0 || input.even_empty) {
@@ -256,7 +219,7 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
     drawn_ = out.stats.points_drawn;
     for (size_t i = 0; i < eyes.size() && input.with_coverage; ++i) find_coverage(input, eyes[i], targets[i]);
   }
-  if (!input.resting && !still) measure(input, detail, out);
+  if (!input.resting && !still) detail_.measure(input, detail, out, list_, *renderer_);
   end_frame(out);
   return out;
 }

@@ -1,9 +1,9 @@
 // The display's source for scenes of points: selects from the model cache, and splats.
 #pragma once
 
-#include "client/viewer/coupling/frame_budget.h"
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/view_source.h"
+#include "client/viewer/points/frame_detail.h"
 #include "client/viewer/points/received_points.h"
 #include "client/viewer/points/still_picture.h"
 #include "client/viewer/render/supersampler.h"
@@ -28,9 +28,6 @@ class PointSource final : public ViewSource {
   DrawnFrame begin_frame(const FrameInput& input);
   void end_frame(DrawnFrame& out);
   bool stands_still(const FrameInput& input);
-  void count_same(const FrameInput& input);
-  double wanted_detail(const FrameInput& input);
-  void measure(const FrameInput& input, double detail, const DrawnFrame& out);
   void select(const FrameInput& input, double detail, DrawnFrame& out);
   void draw_list(const FrameInput& input, const image::Shading& shading, image::View& view, DrawnFrame& out);
   void draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out);
@@ -44,26 +41,23 @@ class PointSource final : public ViewSource {
   std::unique_ptr<Renderer> renderer_;
   ReceivedPoints& received_;
   image::View over_white_;
-  FrameBudget budget_;
-  HalfSize half_size_;
-  SpeedDetail speed_;
+  FrameDetail detail_;
   splat::DrawList list_;
   uint64_t drawn_ = 0;  // points of list_ that were drawn
   ReceivedPoints::Cut cut_;
 
-  // The resting camera, its look, and what was drawn since it came to rest.
-  geometry::Camera camera_;
-  std::optional<std::array<geometry::Camera, 2>> eyes_;  // cameras of the last pair
-  Look look_;
-  int same_frames_ = 0;
+  StillHead head_;
+
+  // Drawn since the camera came to rest.
   ModelCache::Changes changes_;
   std::vector<geometry::Rect> ray_changes_;  // rectangles of the picture
   StillPicture still_;
   Supersampler supersampler_;
+  TileTime tile_time_;
   std::optional<image::Shading> still_shading_;  // nothing: no still picture has begun
   uint64_t base_ = 0;                            // splat::names_of() for the picture without sub-pixels
   bool base_stale_ = true;  // the picture without sub-pixels, where the view shows it, is older than the model
-  double tile_s_ = 0, saved_s_ = 0, seen_s_ = 0;
+  double seen_s_ = 0;
   bool pair_sharp_ = false;  // the pair on display was drawn at full detail
 };
 
