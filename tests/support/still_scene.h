@@ -26,8 +26,8 @@ inline image::View traced(const geometry::Camera& camera, int side, const image:
         rays.depth[i] ? image::Shading::apply(rays.colour[i], shading.table()[rays.normal[i]]) : shading.background();
   const auto pixels = size_t(camera.width) * size_t(camera.height);
   image::View out{camera.width, camera.height, std::vector<uint32_t>(pixels), {}};
-  viewer::box_filter(colour.data(), size_t(fine.width), side, camera.width, camera.height, out.colour.data(),
-                     size_t(camera.width));
+  viewer::box_filter(colour.data(), size_t(fine.width), side,
+                     {out.colour.data(), size_t(camera.width), camera.width, camera.height});
   return out;
 }
 

@@ -56,9 +56,9 @@ void Opening::take_launcher_lines(double now_s, bool has_scene, bool seen) {
     panel_.tell(now_s, line.substr(8), true);
     if (!seen) interaction_.show_dialog(true);
   }
-  interaction_.set_dialog(bool(ask_), has_scene);
+  interaction_.open().allow(bool(ask_), has_scene);
   if (interaction_.take(Wish::kOpen)) open("");
-  if (interaction_.shows_dialog() != view_.shown) view_ = {.shown = interaction_.shows_dialog()};
+  if (interaction_.open().dialog != view_.shown) view_ = {.shown = interaction_.open().dialog};
 }
 
 void Opening::open(const std::string& path) {

@@ -212,7 +212,7 @@ struct Window::Impl {
   // letter that opens the dialog must not be the first of its path.
   void on_key(int key, int scancode, int action, int mods) {
     if (!interaction) return;
-    const bool dialog = interaction->shows_dialog(), field = gui->takes_text();
+    const bool dialog = interaction->open().dialog, field = gui->takes_text();
     if (action == GLFW_PRESS) writes = dialog || field;  // a held key goes on as it began
     if (action == GLFW_PRESS && key == GLFW_KEY_ESCAPE && gui->close_popup()) return;
     gui->on_key(key, scancode, action, mods);
@@ -227,7 +227,7 @@ struct Window::Impl {
     if (down && !writes && (mods & GLFW_MOD_SHIFT) && interaction->shifted(letter_of(key, scancode))) return;
     if (down && field && !(dialog && key == GLFW_KEY_ESCAPE)) return;
     if (const auto known = key_of(key)) interaction->key(*known, down);
-    gui->expect_text(interaction->shows_dialog());
+    gui->expect_text(interaction->open().dialog);
   }
 
   void listen() {
@@ -393,7 +393,7 @@ void Window::poll(Interaction& interaction) {
     impl_->pointer.reset();  // while it is caught, its places are not in the window
     glfwSetInputMode(impl_->window, GLFW_CURSOR, impl_->pointer_caught ? GLFW_CURSOR_DISABLED : GLFW_CURSOR_NORMAL);
   }
-  impl_->gui->expect_text(interaction.shows_dialog());
+  impl_->gui->expect_text(interaction.open().dialog);
   read_size();
 }
 

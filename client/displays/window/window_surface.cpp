@@ -93,8 +93,8 @@ WindowSurface::WindowSurface(const ViewerOptions& o, const DisplayHelp& help, st
       screenshots_(o.record.out.empty() ? "." : o.record.out + "/images",
                    [lines = lines_](const std::string& line) { lines->add(line); }) {
   quad_buffers_ = o.display.stereo.mode == stereo::Mode::kQuadBuffer;
-  interaction_.show_panel(o.panel);
-  interaction_.set_dialog(o.window.launched, has_scene());
+  interaction_.open().panel = o.panel;
+  interaction_.open().allow(o.window.launched, has_scene());
   interaction_.show_dialog(o.window.begins_empty);
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
   tell(first_keys());
@@ -205,15 +205,15 @@ geometry::Camera WindowSurface::camera_of(const geometry::Pose& head) const {
 
 // Sends the panel's orders and takes their answers, without waiting.
 void WindowSurface::run_panel(double now_s, Look& look) {
-  panel_.show(interaction_.shows_panel());
+  panel_.show(interaction_.open().panel);
   for (const Key key : panel_.take_pressed()) interaction_.press(key);
   for (const auto& [name, value] : panel_.take_chosen()) choose(now_s, name, value);
   look = interaction_.look();
   if (panel_.shown()) panel_.on_values(values());
-  panel_.on_path({.records = interaction_.records_path(),
+  panel_.on_path({.records = interaction_.path().records(),
                   .plays = interaction_.playing(),
                   .can_play = interaction_.can_play(),
-                  .recorded_s = interaction_.path_s()});
+                  .recorded_s = interaction_.path().length_s()});
   std::vector<std::string> lines;
   {
     const std::lock_guard lock(lines_->mutex);
@@ -260,7 +260,7 @@ void WindowSurface::show_news(double now_s) {
 
 // The panel has its own list of keys beside it.
 void WindowSurface::show_help() {
-  const bool here = interaction_.shows_help() && !panel_.shown();
+  const bool here = interaction_.open().help && !panel_.shown();
   const int scale = here ? help_scale(key_lines(), window_->width(), window_->height()) : 0;
   if (scale == help_scale_) return;
   help_scale_ = scale;
@@ -278,7 +278,7 @@ void WindowSurface::keep_path() {
   const auto notes = interaction_.take_notes();
   const auto help = notes.empty() ? std::vector<std::string>() : key_lines();
   for (const auto& note : notes) lines_->add(note, std::find(help.begin(), help.end(), note) == help.end());
-  const auto path = interaction_.take_path();
+  const auto path = interaction_.path().take();
   if (path.empty()) return;
   const std::string name = new_file(path_folder(), "path", ".csv");
   const Status written = geometry::write_trajectory(name, path);
@@ -331,7 +331,7 @@ Status WindowSurface::set(const std::string& name, const std::string& value) {
   const bool panel = name == "panel", fullscreen = name == "fullscreen";
   if (panel || fullscreen || hands_.values().contains(name) || name == "all") {
     if (!on) return on.error();
-    if (panel) interaction_.show_panel(*on);
+    if (panel) interaction_.open().panel = *on;
     if (fullscreen && *on != window_->fullscreen()) window_->toggle_fullscreen();
     return panel || fullscreen ? ok_status() : hands_.show(name, *on);
   }
@@ -382,7 +382,7 @@ double WindowSurface::build_panel(double now_s) {
   if (panel_.shown()) follow_notes();
   legend_.not_built();
   if (legend_.built()) legend_.build(scene_controls_.colours(), now_s, width);
-  if (panel_.shown() && interaction_.shows_help()) show_keys(key_lines());
+  if (panel_.shown() && interaction_.open().help) show_keys(key_lines());
   opening_.build(has_scene());
   return width;
 }
@@ -483,9 +483,9 @@ void WindowSurface::report(const FrameFigures& figures) {
                    {waits ? text_panel({"waiting for a view update"}, 2) : image::View(), Overlay::Corner::kUpperLeft});
   hands_.on_frame(figures.now_s, figures.frames);
   if (const auto title = title_.update(figures)) title_text_ = *title;
-  const std::string title = interaction_.records_path() ? fmt::format("{} - recording the camera's path, {:.0f} s",
-                                                                      title_text_, interaction_.path_s())
-                                                        : title_text_;
+  const std::string title = interaction_.path().records() ? fmt::format("{} - recording the camera's path, {:.0f} s",
+                                                                        title_text_, interaction_.path().length_s())
+                                                          : title_text_;
   if (title != title_shown_) window_->set_title(title_shown_ = title);
 }
 

@@ -119,18 +119,17 @@ bool XrSurface::begin() {
     session_->end_frame(frame_, nullptr);
     return false;
   }
-  follow_pace();
+  pace_.follow(alike(located_->cameras), frame_.period_s);
   camera_ = both_eyes(located_->cameras);
   head_ = session_->locate_head(frame_.display_time).value_or(camera_.pose);
   return true;
 }
 
 // A pair takes another share of a frame's time than two pictures. Runtimes' periods differ a little between frames.
-void XrSurface::follow_pace() {
-  const bool pair = alike(located_->cameras);
+void EyePace::follow(bool pair, double period_s) {
   if (pictures_a_second_ > 0 && (pair || !as_pair_)) return;
   as_pair_ = pair;
-  pictures_a_second_ = (pair ? 1 : 2) / (kDrawingShare * std::max(frame_.period_s, kShortest_s));
+  pictures_a_second_ = (pair ? 1 : 2) / (kDrawingShare * std::max(period_s, kShortest_s));
 }
 
 // The runtime predicts the head better than poses do: it knows more about it.
@@ -149,30 +148,33 @@ std::optional<ExpectedHead> XrSurface::expected(double at_s) {
 void XrSurface::present_eyes(std::array<image::View, 2>& views) {
   const gl::EglContext::Current current(*context_);
   const HandRays rays = session_->locate_hands(frame_.display_time);
-  point(rays, views[0]);  // both eyes see rays that end at one place
+  pointers_.point(rays, views[0], located_->cameras[0], tell_);  // both eyes see rays that end at one place
   for (size_t eye = 0; eye < 2; ++eye) {
-    for (size_t hand = 0; hand < rays.size(); ++hand)
-      if (rays[hand])
-        draw_line(views[eye], located_->cameras[eye], rays[hand]->pose.position_room, ends_[hand], kHandColours[hand]);
+    pointers_.draw(rays, views[eye], located_->cameras[eye]);
     session_->put(int(eye), views[eye]);
   }
   session_->end_frame(frame_, &*located_);
 }
 
-// Finds the rays' ends; after a press it prints the place for the person.
-void XrSurface::point(const HandRays& rays, const image::View& view) {
+void HandPointers::draw(const HandRays& rays, image::View& view, const geometry::Camera& camera) const {
+  for (size_t hand = 0; hand < rays.size(); ++hand)
+    if (rays[hand]) draw_line(view, camera, rays[hand]->pose.position_room, ends_[hand], kHandColours[hand]);
+}
+
+void HandPointers::point(const HandRays& rays, const image::View& view, const geometry::Camera& camera,
+                         const Tell& tell) {
   for (size_t hand = 0; hand < rays.size(); ++hand) {
     const bool pressed = rays[hand] && rays[hand]->pressed, before = std::exchange(pressed_[hand], pressed);
     const bool begins = pressed && !before;
     if (!rays[hand]) continue;
     const geometry::Pose& pose = rays[hand]->pose;
     const glm::dvec3 along = pose.orientation * glm::dvec3(0, 0, -1);
-    const auto hit = first_hit(view, located_->cameras[0], pose.position_room, along);
+    const auto hit = first_hit(view, camera, pose.position_room, along);
     ends_[hand] = hit.value_or(pose.position_room + kFarthest_m * along);
     if (!begins) continue;
-    tell_(hit ? fmt::format("the {} hand points at {:.3f},{:.3f},{:.3f} in the room", kHandNames[hand], hit->x, hit->y,
-                            hit->z)
-              : fmt::format("the {} hand points at nothing", kHandNames[hand]));
+    tell(hit ? fmt::format("the {} hand points at {:.3f},{:.3f},{:.3f} in the room", kHandNames[hand], hit->x, hit->y,
+                           hit->z)
+             : fmt::format("the {} hand points at nothing", kHandNames[hand]));
   }
 }
 

@@ -15,10 +15,35 @@
 
 namespace telesplat::viewer {
 
+/// Draws the rays of hands to what they point at, and tells the place when a trigger is pressed.
+class HandPointers {
+ public:
+  using Tell = std::function<void(const std::string&)>;
+  /// Finds the rays' ends in the picture of this camera.
+  void point(const HandRays& rays, const image::View& view, const geometry::Camera& camera, const Tell& tell);
+  void draw(const HandRays& rays, image::View& view, const geometry::Camera& camera) const;
+
+ private:
+  std::array<glm::dvec3, 2> ends_{};
+  std::array<bool, 2> pressed_{};
+};
+
+/// Chooses the pictures that are drawn each second, so that both eyes' fit into a refresh.
+class EyePace {
+ public:
+  /// pair: one choice of points serves both eyes' pictures. period_s: a refresh.
+  void follow(bool pair, double period_s);
+  double pictures_a_second() const { return pictures_a_second_; }
+
+ private:
+  double pictures_a_second_ = 0;
+  bool as_pair_ = true;  // so far one choice of points served both eyes
+};
+
 /// The runtime's clock paces frames. A lost session is opened anew every second. Recorded pictures are the left eye's.
 class XrSurface final : public DisplaySurface {
  public:
-  using Tell = std::function<void(const std::string&)>;
+  using Tell = HandPointers::Tell;
 
   /// tell: prints lines for the person. Error: the part of runtime, headset or OpenGL that is missing.
   static Result<std::unique_ptr<XrSurface>> open(const XrOptions& options, double near_m, Tell tell);
@@ -31,7 +56,7 @@ class XrSurface final : public DisplaySurface {
   bool ready() override;
   bool paces() const override { return true; }
   const std::array<geometry::Camera, 2>* eyes() const override { return located_ ? &located_->cameras : nullptr; }
-  double pictures_a_second() const override { return pictures_a_second_; }
+  double pictures_a_second() const override { return pace_.pictures_a_second(); }
   double seen_s(double) const override { return frame_.display_s; }
   bool take_jump() override { return std::exchange(jumped_, false); }
   std::optional<ExpectedHead> expected(double at_s) override;
@@ -59,8 +84,6 @@ class XrSurface final : public DisplaySurface {
   void open_session();
   bool follow_session();
   bool begin();
-  void follow_pace();
-  void point(const HandRays& rays, const image::View& view);
 
   const XrOptions options_;
   const double near_m_;
@@ -76,11 +99,10 @@ class XrSurface final : public DisplaySurface {
   std::optional<HeadsetSession::Eyes> located_;
   geometry::Camera camera_;  // covers the views of both eyes
   geometry::Pose head_;
-  double located_s_ = 0, last_display_s_ = 0, pictures_a_second_ = 0;
+  double located_s_ = 0, last_display_s_ = 0;
   int missed_ = 0;
-  bool as_pair_ = true;               // so far one choice of points served both eyes
-  std::array<glm::dvec3, 2> ends_{};  // ends of the hands' rays
-  std::array<bool, 2> pressed_{};
+  EyePace pace_;
+  HandPointers pointers_;
 };
 
 /// Displays::headset.

@@ -58,6 +58,15 @@ class DrawnScene {
     source_ = std::move(*made);
     return ok_status();
   }
+  /// Tells the surface of the session and its scene, if they are new.
+  void tell_surface() {
+    auto session = worker_.session();  // first, so that the surface gets a session's scene before the session
+    const ShownScene scene = worker_.shown_scene();
+    if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
+    if (session != session_) surface_.on_session(session_ = std::move(session));
+  }
+  /// The scene's box, as the surface knows it.
+  const geometry::Box& box_room() const { return scene_.box_room; }
   bool can_draw() const { return source_ != nullptr; }
   /// Precondition: can_draw().
   ViewSource& source() const { return *source_; }
@@ -70,6 +79,8 @@ class DrawnScene {
   std::shared_ptr<Received> received_;
   std::unique_ptr<ViewSource> source_;  // draws received_
   double pictures_a_second_ = 0;        // that source_ was made for
+  ShownScene scene_;                    // as given to the surface; so is session_
+  std::shared_ptr<const wire::Welcome> session_;
 };
 
 // A frame that is on display.
@@ -83,14 +94,13 @@ struct ShownFrame {
 class DisplayLoop {
  public:
   explicit DisplayLoop(const DisplayParts& parts)
-      : parts_(parts),
-        o_(parts.options),
+      : o_(parts.options),
         surface_(parts.surface),
         gate_(parts.gate),
         worker_(parts.worker),
         wall_(parts.wall),
         rows_(parts.frames, parts.spans, parts.wall != nullptr),
-        kept_(parts.options),
+        kept_(parts.options, parts.spool),
         drawn_(parts.worker, parts.surface, parts.make_source),
         eyes_(parts.options.stereo),
         look_(first_look(o_.render, o_.shading)),
@@ -98,7 +108,7 @@ class DisplayLoop {
 
   DisplayResult run() {
     if (!wait_for_scene()) return stopped_early();
-    kept_.open(parts_.spool ? parts_.spool() : nullptr);
+    kept_.open();
     if (!draw_from(newest_drawn()) || !rest()) return stopped_early();
     if (!surface_.paces()) {
       worker_.on_first_points(monotonic_s());
@@ -131,10 +141,7 @@ class DisplayLoop {
 
   // Returns the camera of the frame that begins, after telling the surface what there is to show.
   geometry::Camera next_camera(double now_s, double t_s) {
-    auto session = worker_.session();  // first, so that the surface gets a session's scene before the session
-    const ShownScene scene = worker_.shown_scene();
-    if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
-    if (session != session_) surface_.on_session(session_ = std::move(session));
+    drawn_.tell_surface();
     if (const auto wish = surface_.take_sampling()) worker_.set_sampling(*wish);
     if (const auto wish = surface_.take_stereo()) eyes_ = EyePictures(*wish);
     return surface_.begin_frame(now_s, t_s, look_);
@@ -160,7 +167,7 @@ class DisplayLoop {
 
   // Returns the camera to ask samplers for: this one, or one that covers what its eyes see.
   geometry::Camera asked(double now_s, double t_s, const geometry::Camera& camera, const geometry::Pose& head) {
-    return eyes_.on() ? eyes_.begin(now_s, camera, head.orientation, t_s, scene_.box_room) : camera;
+    return eyes_.on() ? eyes_.begin(now_s, camera, head.orientation, t_s, drawn_.box_room()) : camera;
   }
 
   DrawnFrame draw(const FrameInput& input, bool kept) {
@@ -346,7 +353,7 @@ class DisplayLoop {
   // All viewers of the wall ask for views of this head now.
   void ask_for(uint64_t ask, const geometry::Pose& head) {
     geometry::Camera camera = surface_.camera_of(head);
-    if (eyes_.on()) camera = eyes_.sampled(camera, head.orientation, wall_->turn().t_s, scene_.box_room);
+    if (eyes_.on()) camera = eyes_.sampled(camera, head.orientation, wall_->turn().t_s, drawn_.box_room());
     worker_.on_ask(ask, camera);
   }
 
@@ -527,7 +534,6 @@ class DisplayLoop {
     view_ = kept_.spool()->exchange(std::move(frame));
   }
 
-  const DisplayParts parts_;
   const DisplayOptions& o_;
   DisplaySurface& surface_;
   CouplingGate& gate_;
@@ -540,8 +546,6 @@ class DisplayLoop {
   EyePictures eyes_;
   ShownFrame shown_;  // last
   Look look_;
-  ShownScene scene_;  // as given to the surface; so is session_
-  std::shared_ptr<const wire::Welcome> session_;
   image::View view_;
   std::array<image::View, 2> eye_views_;  // if the surface has eyes
   bool view_intact_ = false;              // it holds what is on display

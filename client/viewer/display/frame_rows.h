@@ -1,6 +1,7 @@
 // Records displayed frames: rows of frames.csv, spans of the trace, pictures.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -36,10 +37,11 @@ class FrameRows {
 /// Chooses the frames that are kept as pictures or for verification. Used by one thread, the display's.
 class KeptFrames {
  public:
-  /// options must outlive it.
-  explicit KeptFrames(const DisplayOptions& options) : o_(options) {}
-  /// spool: null: nothing is kept.
-  void open(FrameSpool* spool) { spool_ = spool; }
+  /// Both must outlive it. spool: DisplayParts::spool.
+  KeptFrames(const DisplayOptions& options, const std::function<FrameSpool*()>& spool) : o_(options), find_(spool) {}
+  /// Call it once the session is known.
+  void open() { spool_ = find_ ? find_() : nullptr; }
+  /// Null: no frame is kept.
   FrameSpool* spool() const { return spool_; }
 
   /// FrameUse of this frame; last: the display ends with it.
@@ -49,6 +51,7 @@ class KeptFrames {
 
  private:
   const DisplayOptions& o_;
+  const std::function<FrameSpool*()>& find_;
   FrameSpool* spool_ = nullptr;
   double next_picture_s_ = 0;
 };

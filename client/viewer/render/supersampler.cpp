@@ -40,10 +40,10 @@ geometry::Camera finer(geometry::Camera camera, int by) {
 
 }  // namespace
 
-void box_filter(const uint32_t* from, size_t from_pitch, int side, int width, int height, uint32_t* to, size_t pitch) {
+void box_filter(const uint32_t* from, size_t from_pitch, int side, PixelBlock to) {
   const auto samples = uint32_t(side * side), half = samples / 2;
-  for (int y = 0; y < height; ++y, from += from_pitch * size_t(side), to += pitch)
-    for (int x = 0; x < width; ++x) {
+  for (int y = 0; y < to.height; ++y, from += from_pitch * size_t(side), to.pixels += to.pitch)
+    for (int x = 0; x < to.width; ++x) {
       // Sums of 16 channels of 8 bits fit into 12 bits.
       uint32_t red_blue = 0, green = 0;
       for (int j = 0; j < side; ++j)
@@ -53,7 +53,7 @@ void box_filter(const uint32_t* from, size_t from_pitch, int side, int width, in
           green += c >> 8 & 0xff;
         }
       const uint32_t red = ((red_blue >> 16) + half) / samples, blue = ((red_blue & 0xffff) + half) / samples;
-      to[x] = 0xff000000u | red << 16 | (green + half) / samples << 8 | blue;
+      to.pixels[x] = 0xff000000u | red << 16 | (green + half) / samples << 8 | blue;
     }
 }
 
@@ -99,7 +99,7 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
   const bool open = count_covered(rect), gaps = open || fineness.gaps;
   if (gaps) render_coarse(scene, camera, rect), close_gaps(rect, fineness.gaps);
   const auto row = size_t(fine_.width), inset = size_t(side_);
-  box_filter(fine_.colour.data() + inset * row + inset, row, side_, rect.width, rect.height, to, pitch);
+  box_filter(fine_.colour.data() + inset * row + inset, row, side_, {to, pitch, rect.width, rect.height});
   if (open && find_silhouettes(rect)) show_antialiased(scene, camera, rect, to, pitch);
   return true;
 }

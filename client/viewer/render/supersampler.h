@@ -10,10 +10,17 @@
 
 namespace telesplat::viewer {
 
+/// Pixels in rows that lie `pitch` apart.
+struct PixelBlock {
+  uint32_t* pixels;
+  size_t pitch;
+  int width, height;
+};
+
 /// Writes the mean of side x side sub-pixels, channel by channel, rounded (box filter on displayed colours, like
-/// references with several rays a pixel). from: width * side x height * side of 0x00RRGGBB, rows from_pitch apart; to:
-/// rows `pitch` apart, with 0xff in the upper byte.
-void box_filter(const uint32_t* from, size_t from_pitch, int side, int width, int height, uint32_t* to, size_t pitch);
+/// references with several rays a pixel). from: width * side x height * side of 0x00RRGGBB, rows from_pitch apart; `to`
+/// gets 0xff in the upper byte.
+void box_filter(const uint32_t* from, size_t from_pitch, int side, PixelBlock to);
 
 /// Draws rectangles of a view with side x side sub-pixels a pixel, by any renderer.
 ///

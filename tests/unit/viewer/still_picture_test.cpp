@@ -16,11 +16,11 @@ TEST(BoxFilter, TakesTheRoundedMeanOfEachChannel) {
   const uint32_t from[] = {0x000000, 0x010203, 0xffffff, 0x00ff00,  //
                            0x010203, 0x010203, 0xff00ff, 0xffffff};
   uint32_t to[2] = {};
-  box_filter(from, 4, 2, 2, 1, to, 2);
+  box_filter(from, 4, 2, {to, 2, 2, 1});
   EXPECT_EQ(to[0], 0xff010202u);  // 3/4, 6/4, 9/4
   EXPECT_EQ(to[1], 0xffbfbfbfu);  // 765/4 = 191.25
   const std::vector<uint32_t> white(16, 0xffffffff);
-  box_filter(white.data(), 4, 4, 1, 1, to, 1);
+  box_filter(white.data(), 4, 4, {to, 1, 1, 1});
   EXPECT_EQ(to[0], 0xffffffffu);
 }
 

@@ -356,19 +356,19 @@ TEST_F(InteractionTest, ARecordedPathIsWhatTPlays) {
   Interaction i(std::nullopt, look_);
   wait(i, 0.1);
   tap(i, Key::kC);
-  EXPECT_TRUE(i.records_path());
+  EXPECT_TRUE(i.path().records());
   i.move(0.5, 0.5);
   i.button(MouseButton::kLeft, true);
   i.move(0.7, 0.5);
   i.button(MouseButton::kLeft, false);
   wait(i, 1);
-  EXPECT_NEAR(i.path_s(), 1, 0.05);
+  EXPECT_NEAR(i.path().length_s(), 1, 0.05);
   const Pose end = i.advance(now_s_, true);
   tap(i, Key::kC);
-  EXPECT_FALSE(i.records_path());
-  const auto path = i.take_path();
+  EXPECT_FALSE(i.path().records());
+  const auto path = i.path().take();
   ASSERT_GE(path.size(), 60u);
-  EXPECT_TRUE(i.take_path().empty());
+  EXPECT_TRUE(i.path().take().empty());
   expect_same_pose(path.back().pose, end);
   i.set_recorded(recorded());  // the person's own recording stays
   tap(i, Key::kR);
@@ -389,7 +389,7 @@ TEST_F(InteractionTest, APathThatIsTooShortIsSaidAndNotKept) {
   i.take_notes();
   tap(i, Key::kC);
   EXPECT_EQ(i.take_notes(), std::vector<std::string>{"the camera's path is too short to keep"});
-  EXPECT_TRUE(i.take_path().empty());
+  EXPECT_TRUE(i.path().take().empty());
   tap(i, Key::kT);
   EXPECT_FALSE(i.playing());
 }
@@ -421,43 +421,43 @@ TEST_F(InteractionTest, FlightUsesTheKeysAndEscapeEndsItFirst) {
 
 TEST_F(InteractionTest, EscapeClosesWhatIsOpenAndNeverTheProgram) {
   Interaction i(std::nullopt, look_);
-  i.set_dialog(true, true);
+  i.open().allow(true, true);
   tap(i, Key::kH);
   tap(i, Key::kO);
-  EXPECT_TRUE(i.shows_dialog() && i.shows_help());
+  EXPECT_TRUE(i.open().dialog && i.open().help);
   tap(i, Key::kEscape);
-  EXPECT_FALSE(i.shows_dialog());
-  EXPECT_TRUE(i.shows_help());
+  EXPECT_FALSE(i.open().dialog);
+  EXPECT_TRUE(i.open().help);
   tap(i, Key::kEscape);
-  EXPECT_FALSE(i.shows_help());
+  EXPECT_FALSE(i.open().help);
   i.take_notes();
   for (int n = 0; n < 5; ++n) tap(i, Key::kEscape);
   EXPECT_FALSE(i.wants_to_quit());
   EXPECT_EQ(i.take_notes().back(), "Ctrl+Q quits");
-  // Where the dialog is all that there is to see, it stays.
-  i.set_dialog(true, false);
+  // A dialog that is all that there is to look at stays.
+  i.open().allow(true, false);
   i.show_dialog(true);
   tap(i, Key::kEscape);
-  EXPECT_TRUE(i.shows_dialog());
+  EXPECT_TRUE(i.open().dialog);
   i.control('Q');
   EXPECT_TRUE(i.wants_to_quit());
 }
 
 TEST_F(InteractionTest, NoLetterIsACommandWhileTheDialogIsOpen) {
   Interaction i(std::nullopt, look_);
-  i.set_dialog(true, true);
+  i.open().allow(true, true);
   tap(i, Key::kF);
   i.key(Key::kW, true);
   tap(i, Key::kO);  // ends the flight, which holds the pointer
-  EXPECT_TRUE(i.shows_dialog());
+  EXPECT_TRUE(i.open().dialog);
   EXPECT_FALSE(i.wants_pointer());
   const Pose before = wait(i);
   for (size_t key = 0; key < size_t(Key::kF1); ++key) tap(i, Key(key));
   tap(i, Key::kTab);
   i.key(Key::kW, true);
   expect_same_pose(wait(i), before);
-  EXPECT_TRUE(i.shows_dialog());
-  EXPECT_FALSE(i.wants_pointer() || i.shows_panel() || i.wants_to_quit() || i.records_path() || i.playing());
+  EXPECT_TRUE(i.open().dialog);
+  EXPECT_FALSE(i.wants_pointer() || i.open().panel || i.wants_to_quit() || i.path().records() || i.playing());
   EXPECT_FALSE(i.take(Wish::kPick) || i.take(Wish::kNextBookmark) || i.take(Wish::kBookmark) ||
                i.take(Wish::kOverlays));
   EXPECT_FALSE(i.take(Wish::kScreenshot));
@@ -470,7 +470,7 @@ TEST_F(InteractionTest, NoLetterIsACommandWhileTheDialogIsOpen) {
   // Where no file can be opened, the key sends the wish and opens no dialog.
   Interaction guest(std::nullopt, look_);
   tap(guest, Key::kO);
-  EXPECT_FALSE(guest.shows_dialog());
+  EXPECT_FALSE(guest.open().dialog);
   EXPECT_TRUE(guest.take(Wish::kOpen));
 }
 
@@ -495,10 +495,10 @@ TEST_F(InteractionTest, QQuitsWhenItIsPressedTwiceAndControlQAtOnce) {
 TEST_F(InteractionTest, HTellsEveryKey) {
   Interaction i(std::nullopt, look_);
   tap(i, Key::kH);
-  EXPECT_TRUE(i.shows_help());
+  EXPECT_TRUE(i.open().help);
   EXPECT_EQ(i.take_notes(), key_help());
   tap(i, Key::kH);
-  EXPECT_FALSE(i.shows_help());
+  EXPECT_FALSE(i.open().help);
   EXPECT_TRUE(i.take_notes().empty());
 }
 
@@ -506,7 +506,7 @@ TEST_F(InteractionTest, F1TellsKeysAsTheyArePrintedHere) {
   Interaction i(std::nullopt, look_);
   i.set_key_names([](Key key) { return key == Key::kQ ? "A" : key == Key::kW ? "Z" : us_name(key); });
   tap(i, Key::kF1);
-  EXPECT_TRUE(i.shows_help());
+  EXPECT_TRUE(i.open().help);
   const auto notes = i.take_notes();
   EXPECT_NE(std::find(notes.begin(), notes.end(), "A twice              quit (not in flight)"), notes.end());
   const auto flight = std::find_if(notes.begin(), notes.end(), [](const auto& n) { return n.starts_with("F   "); });
@@ -517,11 +517,11 @@ TEST_F(InteractionTest, F1TellsKeysAsTheyArePrintedHere) {
 
 TEST_F(InteractionTest, TabShowsThePanelAndF11AsksForAFullScreenOnce) {
   Interaction i(std::nullopt, look_);
-  EXPECT_FALSE(i.shows_panel());
+  EXPECT_FALSE(i.open().panel);
   tap(i, Key::kTab);
-  EXPECT_TRUE(i.shows_panel());
+  EXPECT_TRUE(i.open().panel);
   tap(i, Key::kTab);
-  EXPECT_FALSE(i.shows_panel());
+  EXPECT_FALSE(i.open().panel);
   EXPECT_FALSE(i.take(Wish::kFullscreen));
   tap(i, Key::kF11);
   EXPECT_TRUE(i.take(Wish::kFullscreen));

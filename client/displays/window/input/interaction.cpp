@@ -6,10 +6,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// Least time between poses of a recorded path, so that their times also differ in the file.
-constexpr double kLeastStep_s = 1e-5;
-constexpr double kDoubleClick_s = 0.4, kDoubleClick = 0.01;  // between the clicks; window heights
-constexpr double kQuitWithin_s = 3;                          // between the two presses of Q
+constexpr double kQuitWithin_s = 3;  // between the two presses of Q
 
 // True if the key writes a letter when a path is typed.
 bool writes(Key key) { return key < Key::kF1; }
@@ -17,13 +14,11 @@ bool writes(Key key) { return key < Key::kF1; }
 }  // namespace
 
 Interaction::Interaction(std::optional<geometry::Trajectory> recorded, const Look& look)
-    : recorded_(std::move(recorded)), look_(look), playing_(recorded_.has_value()), held_(kKeys) {}
+    : playback_(std::move(recorded)), look_(look) {}
 
 void Interaction::key(Key key, bool down) {
-  const bool was_down = held_[size_t(key)];
-  const bool typed = shows_dialog_ && (writes(key) || key == Key::kTab);
-  held_[size_t(key)] = down && !typed;
-  if (down && !was_down && !typed) press(key);
+  const bool typed = open_.dialog && (writes(key) || key == Key::kTab);
+  if (held_.key(key, down && !typed)) press(key);
 }
 
 void Interaction::control(char letter, bool shift) {
@@ -40,20 +35,17 @@ bool Interaction::shifted(char letter) {
 }
 
 void Interaction::show_dialog(bool shown) {
-  if (shown && !shows_dialog_) {
+  if (shown && !open_.dialog) {
     controls_.set_flying(false);
     focus_lost();
   }
-  shows_dialog_ = shown;
+  open_.dialog = shown;
 }
 
 // Closes the topmost thing first. It never ends the program, so one press too many does no harm.
 void Interaction::close_what_is_open() {
-  if (shows_dialog_ && can_close_)
-    shows_dialog_ = false;
-  else if (shows_help_)
-    shows_help_ = false;
-  else if (controls_.flying())
+  if (open_.close()) return;
+  if (controls_.flying())
     controls_.set_flying(false);
   else
     notes_.push_back("Ctrl+Q quits");
@@ -90,15 +82,12 @@ void Interaction::move_camera(const std::string& what, const std::function<void(
 }
 
 void Interaction::take_camera() {
-  if (!playing_) return;
-  playing_ = false;
-  if (!tracked_ || std::exchange(plays_path_, false)) return controls_.take_over(recorded_->at(playback_s_));
-  if (told_) controls_.take_over(*told_);
+  if (const auto pose = playback_.stop()) controls_.take_over(*pose);
 }
 
 void Interaction::go_to(const geometry::Pose& pose) {
   move_camera("view", [&] {
-    playing_ = plays_path_ = false;
+    playback_.forget();
     controls_.set_flying(false);
     controls_.take_over(pose, true);
   });
@@ -113,35 +102,26 @@ void Interaction::centre_on(const glm::dvec3& place) {
 }
 
 void Interaction::play_or_take() {
-  if (!recorded_ && !tracked_) {
+  if (!playback_.can_play()) {
     notes_.push_back("no head movement to play: --trajectory names one, C records one");
     return;
   }
-  if (playing_) return take_camera();
+  if (playing()) return take_camera();
   controls_.set_flying(false);
-  if (!tracked_ && recorded_->duration_s() > 0 && playback_s_ >= recorded_->duration_s()) playback_s_ = 0;
-  playing_ = true;
+  playback_.play();
 }
 
 void Interaction::begin_path() {
-  records_path_ = true;
-  path_.clear();
+  path_.begin();
   notes_.push_back("recording the camera's path; C ends it");
 }
 
 void Interaction::end_path() {
-  if (!records_path_) return;
-  records_path_ = false;
-  if (path_.size() < 2) {
-    notes_.push_back("the camera's path is too short to keep");
-    return;
-  }
-  finished_path_ = std::move(path_);
-  path_.clear();
+  if (!path_.records()) return;
+  const auto path = path_.end();
+  if (!path) return notes_.push_back("the camera's path is too short to keep");
   take_camera();
-  recorded_ = geometry::Trajectory::of(finished_path_);
-  has_own_path_ = true;
-  playback_s_ = 0;
+  playback_.set_own(geometry::Trajectory::of(*path));
 }
 
 // If the key sets how points are drawn, sets that and returns true.
@@ -176,8 +156,8 @@ bool Interaction::choose_look(Key key) {
 }
 
 void Interaction::show_help() {
-  shows_help_ = !shows_help_;
-  if (!shows_help_) return;
+  open_.help = !open_.help;
+  if (!open_.help) return;
   for (auto& line : key_help(key_names_)) notes_.push_back(std::move(line));
 }
 
@@ -204,16 +184,16 @@ void Interaction::press(Key key) {
     case Key::kT:
       return play_or_take();
     case Key::kC:
-      return records_path_ ? end_path() : begin_path();
+      return path_.records() ? end_path() : begin_path();
     case Key::kF1:
     case Key::kH:
       return show_help();
     case Key::kTab:
-      shows_panel_ = !shows_panel_;
+      open_.panel = !open_.panel;
       return;
     case Key::kO:
-      wishes_[size_t(Wish::kOpen)] = !can_open_;
-      return show_dialog(can_open_ && !shows_dialog_);
+      wishes_[size_t(Wish::kOpen)] = !open_.can_open;
+      return show_dialog(open_.can_open && !open_.dialog);
     case Key::kEscape:
       return close_what_is_open();
     case Key::kQ:
@@ -224,29 +204,25 @@ void Interaction::press(Key key) {
 }
 
 void Interaction::button(MouseButton button, bool down) {
-  (button == MouseButton::kLeft ? left_ : button == MouseButton::kMiddle ? middle_ : right_) = down;
+  held_.button(button, down);
   if (button != MouseButton::kLeft || !down || controls_.flying()) return;
-  const Click now{last_s_.value_or(0), pointer_.value_or(glm::dvec2(0))};
-  const bool twice = click_ && now.s - click_->s <= kDoubleClick_s && glm::distance(now.at, click_->at) <= kDoubleClick;
-  wishes_[size_t(Wish::kCentre)] = twice;
-  click_ = twice ? std::nullopt : std::optional(now);
+  wishes_[size_t(Wish::kCentre)] = held_.click(last_s_.value_or(0));
 }
 
 void Interaction::move(double x, double y) {
-  const glm::dvec2 to(x, y), from = pointer_.value_or(to);
-  pointer_ = to;
-  const double dx = to.x - from.x, dy = to.y - from.y;
-  const bool shift = held_[size_t(Key::kShift)], panning = middle_ || (left_ && shift);
-  if (!controls_.flying() && !left_ && !panning && !right_) return;
+  const glm::dvec2 by = held_.move({x, y});
+  const bool left = held_.held(MouseButton::kLeft), right = held_.held(MouseButton::kRight);
+  const bool shift = held_.held(Key::kShift), panning = held_.held(MouseButton::kMiddle) || (left && shift);
+  if (!controls_.flying() && !left && !panning && !right) return;
   take_camera();
   if (controls_.flying())
-    controls_.orbit(dx, dy);
+    controls_.orbit(by.x, by.y);
   else if (panning)
-    controls_.pan(dx, dy, height_tangent_);
-  else if (right_)
-    shift ? controls_.roll(dx) : controls_.dolly(dy);
+    controls_.pan(by.x, by.y, height_tangent_);
+  else if (right)
+    shift ? controls_.roll(by.x) : controls_.dolly(by.y);
   else
-    controls_.orbit(dx, dy);
+    controls_.orbit(by.x, by.y);
 }
 
 void Interaction::wheel(double steps) {
@@ -254,10 +230,7 @@ void Interaction::wheel(double steps) {
   controls_.wheel(steps);
 }
 
-void Interaction::focus_lost() {
-  std::fill(held_.begin(), held_.end(), false);
-  left_ = middle_ = right_ = false;
-}
+void Interaction::focus_lost() { held_.release_all(); }
 
 void Interaction::set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home,
                             double middle_x) {
@@ -265,59 +238,25 @@ void Interaction::set_scene(scene::Pipeline pipeline, const geometry::Box& box_r
   controls_.set_scene(box_room, home, middle_x);
 }
 
-void Interaction::set_recorded(geometry::Trajectory recorded) {
-  if (!has_own_path_) recorded_ = std::move(recorded);
-}
-
 void Interaction::play(geometry::Trajectory path) {
-  plays_path_ = true;
-  recorded_ = std::move(path);
-  has_own_path_ = playing_ = true;
-  playback_s_ = 0;
+  playback_.play(std::move(path));
   controls_.set_flying(false);
 }
 
-geometry::Pose Interaction::advance(double now_s, bool playback) {
+const geometry::Pose& Interaction::advance(double now_s, bool playback) {
   const double dt_s = last_s_ ? std::max(0.0, now_s - *last_s_) : 0.0;
   last_s_ = now_s;
   if (std::exchange(goes_home_, false)) {
-    if (path_is_over()) take_camera();
+    if (playback_.over()) take_camera();
     controls_.reset();
   }
-  const geometry::Pose pose = next_pose(now_s, dt_s, playback);
-  if (records_path_) record_pose(now_s, pose);
-  return pose;
-}
-
-// True if the head stands at the end of its path.
-bool Interaction::path_is_over() const {
-  const bool plays = playing_ && (!tracked_ || plays_path_);
-  return plays && recorded_->ends() && playback_s_ >= recorded_->duration_s();
-}
-
-void Interaction::set_tracked(Tracked tracked) {
-  tracked_ = std::move(tracked);
-  playing_ = true;
-}
-
-geometry::Pose Interaction::next_pose(double now_s, double dt_s, bool playback) {
-  if (playing_ && tracked_ && !plays_path_) {
-    if (const auto told = tracked_(now_s)) told_ = told;
-    return told_ ? *told_ : controls_.advance(dt_s);
-  }
-  if (playing_) {
-    if (playback) playback_s_ += dt_s;
-    return recorded_->at(playback_s_);
-  }
-  const auto axis = [&](Key more, Key less) { return double(held_[size_t(more)]) - double(held_[size_t(less)]); };
-  controls_.fly({axis(Key::kD, Key::kA), axis(Key::kE, Key::kQ), axis(Key::kW, Key::kS), held_[size_t(Key::kShift)]});
-  return controls_.advance(dt_s);
-}
-
-void Interaction::record_pose(double now_s, const geometry::Pose& pose) {
-  if (path_.empty()) path_from_s_ = now_s;
-  const double t_s = now_s - path_from_s_;
-  if (path_.empty() || t_s > path_.back().t_s + kLeastStep_s) path_.push_back({t_s, pose});
+  const auto played = playback_.next(now_s, dt_s, playback);
+  if (!playing())
+    controls_.fly({held_.axis(Key::kD, Key::kA), held_.axis(Key::kE, Key::kQ), held_.axis(Key::kW, Key::kS),
+                   held_.held(Key::kShift)});
+  pose_ = played ? *played : controls_.advance(dt_s);
+  path_.add(now_s, pose_);
+  return pose_;
 }
 
 }  // namespace telesplat::viewer

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "client/displays/window/input/camera_controls.h"
+#include "client/displays/window/input/head_path.h"
+#include "client/displays/window/input/held_input.h"
 #include "client/displays/window/input/undo.h"
 #include "client/viewer/input/keys.h"
 #include "client/viewer/input/look.h"
@@ -30,10 +32,23 @@ enum class Wish {
 };
 inline constexpr size_t kWishes = size_t(Wish::kCentre) + 1;
 
+/// Parts of the window that are open over the picture.
+struct OpenParts {
+  bool help = false, panel = false;
+  bool dialog = false;    ///< the dialog that opens data sets; Interaction::show_dialog() sets it
+  bool can_open = false;  ///< there is such a dialog
+  bool can_close = true;  ///< there is something to see beside it
+  void allow(bool opening, bool closing) { can_open = opening, can_close = closing; }
+  /// Closes the topmost of dialog and help. False: neither can be closed.
+  bool close() {
+    if (!(dialog && can_close) && !help) return false;
+    (dialog && can_close ? dialog : help) = false;
+    return true;
+  }
+};
+
 class Interaction {
  public:
-  using Path = std::vector<geometry::Trajectory::Sample>;
-
   /// recorded: a head movement that T plays, from the beginning of the session on; without it T does nothing.
   Interaction(std::optional<geometry::Trajectory> recorded, const Look& look);
   Interaction(const Interaction&) = delete;  // undo steps refer to it
@@ -59,20 +74,22 @@ class Interaction {
                  double middle_x = 0);
   scene::Pipeline pipeline() const { return pipeline_; }
   /// Sets the movement that T plays, unless the person recorded a path.
-  void set_recorded(geometry::Trajectory recorded);
+  void set_recorded(geometry::Trajectory recorded) { playback_.set_recorded(std::move(recorded)); }
   /// Does what R does, but does not take the camera: goes to the first view of the scene that is set before the next
   /// advance().
   void back_to_first_view() { goes_home_ = true; }
   /// Plays this path at once; T plays it from now on. Afterwards T returns to the tracker, if there is one.
   void play(geometry::Trajectory path);
-  bool can_play() const { return recorded_.has_value(); }
+  bool can_play() const { return playback_.has_recorded(); }
   /// From now on a tracker moves the head (nothing: no pose yet) until the person takes the camera; T returns to it.
-  using Tracked = std::function<std::optional<geometry::Pose>(double now_s)>;
-  void set_tracked(Tracked tracked);
+  void set_tracked(HeadPlayback::Tracked tracked) { playback_.set_tracked(std::move(tracked)); }
   /// Sets the height of the window's view at distance 1, so that pans follow the pointer.
   void set_height_tangent(double tangent) { height_tangent_ = tangent; }
   /// Returns the camera at `now_s`. A recorded movement advances only while `playback` is true.
-  geometry::Pose advance(double now_s, bool playback);
+  const geometry::Pose& advance(double now_s, bool playback);
+  /// As advance() returned it last. tracked(): it is the tracker's.
+  const geometry::Pose& pose() const { return pose_; }
+  bool tracked() const { return playback_.tracked(); }
 
   const Look& look() const { return look_; }
   /// Replaces the look that keys chose; they go on from it. The change is not in the undo stack.
@@ -80,30 +97,22 @@ class Interaction {
   bool wants_to_quit() const { return quit_; }
   /// True in flight: the mouse turns the head, so the pointer should be caught and hidden.
   bool wants_pointer() const { return controls_.flying(); }
-  bool playing() const { return playing_; }
-  bool shows_help() const { return shows_help_; }
-  bool shows_panel() const { return shows_panel_; }
-  void show_panel(bool shown) { shows_panel_ = shown; }
-  /// The dialog that opens data sets. While it is shown no letter is a command, and Escape closes it, unless there is
-  /// nothing else to see.
-  bool shows_dialog() const { return shows_dialog_; }
+  bool playing() const { return playback_.playing(); }
+  OpenParts& open() { return open_; }
+  /// Shows or hides the dialog that opens data sets. While it is shown no letter is a command, and Escape closes it,
+  /// unless there is nothing else to see.
   void show_dialog(bool shown);
-  /// can_open: there is such a dialog. can_close: there is something to see beside it.
-  void set_dialog(bool can_open, bool can_close) { can_open_ = can_open, can_close_ = can_close; }
   /// Sets key names for lines about keys.
   void set_key_names(KeyNames names) { key_names_ = std::move(names); }
-  bool records_path() const { return records_path_; }
-  /// Length of the path that is being recorded, seconds.
-  double path_s() const { return path_.empty() ? 0 : path_.back().t_s; }
-  /// Returns the camera's path that was recorded last, once; T plays it from now on. Empty: there is no new path.
-  Path take_path() { return std::exchange(finished_path_, {}); }
+  /// The camera's path that is being recorded; once it is complete, T plays it.
+  PathRecorder& path() { return path_; }
   /// Ends a path that is being recorded.
   void end_path();
   bool wants(Wish wish) const { return wishes_[size_t(wish)]; }
   /// True once after each time that the person asked for it.
   bool take(Wish wish) { return std::exchange(wishes_[size_t(wish)], false); }
   /// Place of the pointer, in window heights; nothing: not known yet, or the pointer is caught.
-  std::optional<glm::dvec2> pointer() const { return wants_pointer() ? std::nullopt : pointer_; }
+  std::optional<glm::dvec2> pointer() const { return wants_pointer() ? std::nullopt : held_.pointer(); }
   /// Returns the side from which the person wants to see the data, once after each press of a side's keys.
   std::optional<Side> take_side_wish() { return std::exchange(side_wish_, std::nullopt); }
   /// Moves the person's camera to this pose at once; it goes on from there.
@@ -124,39 +133,25 @@ class Interaction {
   bool choose_look(Key key);
   void change_look(const Look& look);
   void move_camera(const std::string& what, const std::function<void()>& move);
-  bool path_is_over() const;
   void show_help();
   void take_camera();
   void begin_path();
-  void record_pose(double now_s, const geometry::Pose& pose);
-  geometry::Pose next_pose(double now_s, double dt_s, bool playback);
 
-  std::optional<geometry::Trajectory> recorded_;
-  Tracked tracked_;
-  std::optional<geometry::Pose> told_;  // newest pose from tracked_
+  HeadPlayback playback_;
+  geometry::Pose pose_;
+  PathRecorder path_;
+  HeldInput held_;
+  OpenParts open_;
   Look look_;
   CameraControls controls_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
   std::array<bool, kWishes> wishes_{};
-  bool playing_ = false, quit_ = false, shows_help_ = false, shows_panel_ = false;
-  bool shows_dialog_ = false, can_open_ = false, can_close_ = true;
+  bool quit_ = false;
   std::optional<double> asked_to_quit_s_;
   KeyNames key_names_ = us_name;
-  bool records_path_ = false, has_own_path_ = false;
-  bool goes_home_ = false;   // with the next frame
-  bool plays_path_ = false;  // although there is a tracker
-  double path_from_s_ = 0;
-  Path path_, finished_path_;
-  double playback_s_ = 0, height_tangent_ = 1;
+  bool goes_home_ = false;  // with the next frame
+  double height_tangent_ = 1;
   std::optional<double> last_s_;
-  std::optional<glm::dvec2> pointer_;
-  std::vector<bool> held_;
-  bool left_ = false, middle_ = false, right_ = false;
-  struct Click {
-    double s = 0;
-    glm::dvec2 at{0.0};
-  };
-  std::optional<Click> click_;            // last click of the left button; the next may make it a double click
   std::optional<Side> side_wish_, side_;  // side_: the last wish
   UndoStack undo_;
   std::vector<std::string> notes_;

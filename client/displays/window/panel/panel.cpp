@@ -13,9 +13,9 @@ namespace {
 constexpr double kRatePeriod_s = 0.5;
 enum PlotIndex { kInterFrame, kLatency, kPoints, kBytes };
 
-std::vector<Panel::Plot> make_plots() {
+std::vector<FigurePlots::Plot> make_plots() {
   const auto plot = [](const char* name, const char* unit, uint32_t colour, int digits, double floor) {
-    return Panel::Plot{name, unit, History(Panel::kSpan_s), colour, digits, floor};
+    return FigurePlots::Plot{name, unit, History(FigurePlots::kSpan_s), colour, digits, floor};
   };
   return {plot("inter-frame delay", "ms", 0x56b4e9, 1, 20), plot("update latency", "ms", 0xe69f00, 0, 100),
           plot("points drawn", "M", 0x009e73, 2, 0.1), plot("received", "MB/s", 0xcc79a7, 2, 0.1)};
@@ -51,10 +51,12 @@ std::vector<float> History::columns(double now_s, size_t count) const {
   return out;
 }
 
-Panel::Panel(Setup setup) : setup_(std::move(setup)), shown_(setup_.shown), plots_(make_plots()) {}
+Panel::Panel(Setup setup) : setup_(std::move(setup)), shown_(setup_.shown) {}
+
+FigurePlots::FigurePlots() : plots_(make_plots()) {}
 
 // Rates are means over half a second: single frames vary too much.
-void Panel::count_rates(const FrameFigures& f) {
+void FigurePlots::count_rates(const FrameFigures& f) {
   const double dt_s = f.now_s - rated_.now_s;
   if (dt_s >= 0 && dt_s < kRatePeriod_s) return;
   const bool counts = rated_.now_s > 0 && dt_s > 0 && f.frames >= rated_.frames;
@@ -65,13 +67,17 @@ void Panel::count_rates(const FrameFigures& f) {
   rated_ = f;
 }
 
-void Panel::on_figures(const FrameFigures& f) {
+void FigurePlots::add(const FrameFigures& f) {
   if (const double ms = f.frame.inter_frame_ms(); ms > 0) plots_[kInterFrame].history.add(f.now_s, ms);
-  if (f.session.updates != figures_.session.updates) plots_[kLatency].history.add(f.now_s, f.session.latency_ms);
+  if (f.session.updates != newest_.session.updates) plots_[kLatency].history.add(f.now_s, f.session.latency_ms);
   plots_[kPoints].name = std::string(f.units.drawn) + " drawn";
   plots_[kPoints].history.add(f.now_s, double(f.frame.drawn.drawn) / 1e6);
   count_rates(f);
-  figures_ = f;
+  newest_ = f;
+}
+
+void Panel::on_figures(const FrameFigures& f) {
+  plots_.add(f);
   if (wished_coupling_ == f.frame.coupling) wished_coupling_.reset();
 }
 

@@ -44,6 +44,33 @@ class History {
   std::deque<Sample> samples_;
 };
 
+/// Plots of figures after frames. Used by one thread, the display's.
+class FigurePlots {
+ public:
+  static constexpr double kSpan_s = 20;  ///< width of the plots
+  struct Plot {
+    std::string name, unit;
+    History history;
+    uint32_t colour;  ///< 0x00RRGGBB, of Okabe and Ito's palette, which colour-blind people tell apart
+    int digits;       ///< digits after the point
+    double floor;     ///< least value of the plot's top
+  };
+
+  FigurePlots();
+  void add(const FrameFigures& figures);
+  /// The figures that were added last.
+  const FrameFigures& newest() const { return newest_; }
+  double frames_a_second() const { return frames_a_second_; }
+  const std::vector<Plot>& plots() const { return plots_; }
+
+ private:
+  void count_rates(const FrameFigures& figures);
+
+  FrameFigures newest_, rated_;  // rated_: at the last count of rates
+  double frames_a_second_ = 0;
+  std::vector<Plot> plots_;
+};
+
 /// Used by one thread, the display's.
 class Panel {
  public:
@@ -55,18 +82,10 @@ class Panel {
   };
   explicit Panel(Setup setup);
 
-  static constexpr double kSpan_s = 20;  ///< width of the plots
   static constexpr double kGrace_s = 3;  ///< time that a service may be missing without a message
   static constexpr double kTold_s = 6;   ///< time that the newest message is shown outside the panel too
   static constexpr size_t kMostMessages = 100;
 
-  struct Plot {
-    std::string name, unit;
-    History history;
-    uint32_t colour;  ///< 0x00RRGGBB, of Okabe and Ito's palette, which colour-blind people tell apart
-    int digits;       ///< digits after the point
-    double floor;     ///< least value of the plot's top
-  };
   struct Message {
     double t_s = 0;
     std::string text;
@@ -98,16 +117,15 @@ class Panel {
   void show(bool shown) { shown_ = shown; }
   const std::string& progress() const { return progress_; }
   const PathState& path() const { return path_; }
-  const FrameFigures& figures() const { return figures_; }
-  const std::vector<Plot>& plots() const { return plots_; }
-  double frames_a_second() const { return frames_a_second_; }
+  const FrameFigures& figures() const { return plots_.newest(); }
+  const FigurePlots& plots() const { return plots_; }
   scene::Pipeline pipeline() const { return pipeline_; }
   std::optional<scene::Kind> kind() const { return kind_; }
   const Setup& setup() const { return setup_; }
   /// Empty: the value is not known.
   std::string value(const std::string& order) const;
   /// The coupling in force, or one that was ordered and is not in force yet.
-  const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.frame.coupling; }
+  const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures().frame.coupling; }
   bool coupling_pending() const { return wished_coupling_.has_value(); }
   const std::optional<SessionStatus>& status() const { return status_; }
   /// The oldest message comes first.
@@ -135,15 +153,11 @@ class Panel {
   std::vector<Order> take_orders() { return std::exchange(orders_, {}); }
 
  private:
-  void count_rates(const FrameFigures& figures);
-
   Setup setup_;
   bool shown_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
   std::optional<scene::Kind> kind_;
-  FrameFigures figures_, rated_;  // the newest; the one at the last count of rates
-  double frames_a_second_ = 0;
-  std::vector<Plot> plots_;
+  FigurePlots plots_;
   std::optional<CouplingState> wished_coupling_;
   std::map<std::string, std::string> values_;
   std::vector<std::pair<std::string, std::string>> chosen_;

@@ -62,18 +62,18 @@ TEST_F(PanelTest, RatesAreMeansOfHalfASecond) {
                  .frame = {.previous_s = 1, .end_s = 1.016, .drawn = {.drawn = 500'000}},
                  .session = {.updates = 1, .latency_ms = 80}};
   panel_.on_figures(f);
-  EXPECT_EQ(panel_.frames_a_second(), 0);
+  EXPECT_EQ(panel_.plots().frames_a_second(), 0);
   for (int i = 1; i <= 60; ++i) {
     f.now_s = 100 + i / 60.0;
     ++f.frames;
     f.session.bytes_received += 50'000;
     panel_.on_figures(f);
   }
-  EXPECT_NEAR(panel_.frames_a_second(), 60, 1e-6);
-  EXPECT_NEAR(panel_.plots()[3].history.newest(), 3.0, 1e-6) << "MB/s";
-  EXPECT_NEAR(panel_.plots()[0].history.newest(), 16, 1e-9);
-  EXPECT_NEAR(panel_.plots()[1].history.newest(), 80, 1e-9);
-  EXPECT_NEAR(panel_.plots()[2].history.newest(), 0.5, 1e-9);
+  EXPECT_NEAR(panel_.plots().frames_a_second(), 60, 1e-6);
+  EXPECT_NEAR(panel_.plots().plots()[3].history.newest(), 3.0, 1e-6) << "MB/s";
+  EXPECT_NEAR(panel_.plots().plots()[0].history.newest(), 16, 1e-9);
+  EXPECT_NEAR(panel_.plots().plots()[1].history.newest(), 80, 1e-9);
+  EXPECT_NEAR(panel_.plots().plots()[2].history.newest(), 0.5, 1e-9);
 }
 
 TEST_F(PanelTest, WhatIsChosenOfTheWindowIsTakenOnceAndShownAtOnce) {

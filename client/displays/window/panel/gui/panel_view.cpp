@@ -30,7 +30,7 @@ double round_top(double most) {
 }
 
 // Draws name and newest value above one curve, so that no person must tell curves apart by their colours.
-void show_plot(const Panel::Plot& plot, double now_s) {
+void show_plot(const FigurePlots::Plot& plot, double now_s) {
   const auto columns = plot.history.columns(now_s, kColumns);
   double most = plot.floor;
   for (const float v : columns)
@@ -64,12 +64,12 @@ void show_figures(const Panel& panel, double now_s) {
   if (f.waits_s > 0)
     text(fmt::format("waiting for a view update, {:.0f} s", f.waits_s));
   else
-    text(fmt::format("{:.1f} frames a second, {:.2f} M cached", panel.frames_a_second(),
+    text(fmt::format("{:.1f} frames a second, {:.2f} M cached", panel.plots().frames_a_second(),
                      double(f.frame.drawn.cached) / 1e6));
   if (const auto& r = f.session.renderer; r.gl_ms > 0)
     text(fmt::format("{} draws: a frame took {:.1f} ms on the processor, {:.1f} ms by OpenGL", r.kept, r.cpu_ms,
                      r.gl_ms));
-  for (const auto& plot : panel.plots()) show_plot(plot, now_s);
+  for (const auto& plot : panel.plots().plots()) show_plot(plot, now_s);
 }
 
 // Buttons act as their keys do.
