@@ -34,4 +34,12 @@ std::optional<std::string> TitleLine::update(const FrameFigures& f) {
   return text;
 }
 
+std::optional<std::string> TitleLine::update(const FrameFigures& figures, const PathRecorder& path) {
+  if (const auto text = update(figures)) text_ = *text;
+  const std::string title =
+      path.records() ? fmt::format("{} - recording the camera's path, {:.0f} s", text_, path.length_s()) : text_;
+  if (title == shown_) return std::nullopt;
+  return shown_ = title;
+}
+
 }  // namespace telesplat::viewer

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
+#include "client/displays/window/input/head_path.h"
 #include "client/viewer/display/frame_figures.h"
 
 namespace telesplat::viewer {
@@ -18,9 +20,12 @@ class TitleLine {
   /// and if the display waits for long:
   ///   SCENE - waiting for a view update, 3 s
   std::optional<std::string> update(const FrameFigures& figures);
+  /// Does the same for a window whose camera's path may be recorded: the title tells its length, too.
+  std::optional<std::string> update(const FrameFigures& figures, const PathRecorder& path);
 
  private:
   std::optional<FrameFigures> last_;
+  std::string text_, shown_;
 };
 
 }  // namespace telesplat::viewer

@@ -5,6 +5,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <tuple>
 
 #include "client/viewer/display/size_text.h"
 #include "common/image/background.h"
@@ -152,6 +153,43 @@ std::map<std::string, std::string> values_of(const ViewSettings& settings) {
   std::map<std::string, std::string> out;
   for (const Row& row : kRows) out[row.order] = row.text(settings);
   return out;
+}
+
+ChosenSettings::ChosenSettings(const ViewerOptions& o, DisplayOptions& display)
+    : display_(display),
+      sampling_{o.requests.adaptive, o.requests.sampling_width, o.requests.sampling_height,
+                o.least_sampling.value_or(o.requests.min_scale)},
+      sampling_chosen_(o.least_sampling.has_value()),
+      quad_buffers_(display.stereo.mode == stereo::Mode::kQuadBuffer) {}
+
+ViewSettings ChosenSettings::get(const Look& look, bool pictures) const {
+  return {.look = look,
+          .transparent = display_.transparent,
+          .sampling = sampling_,
+          .stereo = display_.stereo,
+          .quad_buffers = quad_buffers_,
+          .legend = display_.legend,
+          .pictures = pictures};
+}
+
+bool ChosenSettings::changes_eyes(const ViewSettings& settings) const {
+  const auto eyes = [](const StereoOptions& o) {
+    return std::tuple(o.mode, o.eye_separation_m, o.screen_m, o.swap_eyes);
+  };
+  return eyes(settings.stereo) != eyes(display_.stereo);
+}
+
+void ChosenSettings::set(const ViewSettings& settings) {
+  if (changes_eyes(settings)) stereo_wish_ = display_.stereo = settings.stereo;
+  if (settings.sampling != sampling_) {
+    sampling_chosen_ = true;
+    sampling_wish_ = sampling_ = settings.sampling;
+  }
+  display_.legend = settings.legend;
+}
+
+void ChosenSettings::follow(const wire::SessionSettings& session) {
+  if (!sampling_chosen_) sampling_.least_sampling = session.least_sampling;
 }
 
 }  // namespace telesplat::viewer

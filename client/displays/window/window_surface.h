@@ -1,30 +1,34 @@
 // The display in a window: the person moves the camera, or a recorded head does.
 #pragma once
 
-#include <array>
-#include <functional>
-
-#include "client/displays/window/hands/bookmarks.h"
 #include "client/displays/window/hands/hand_overlays.h"
+#include "client/displays/window/hands/window_notes.h"
+#include "client/displays/window/input/interaction.h"
 #include "client/displays/window/legend.h"
 #include "client/displays/window/measuring.h"
 #include "client/displays/window/opening.h"
-#include "client/displays/window/panel/control_desk.h"
-#include "client/displays/window/panel/gui/notes_view.h"
-#include "client/displays/window/panel/gui/panel_view.h"
-#include "client/displays/window/panel/gui/scene_view.h"
-#include "client/displays/window/panel/order_undo.h"
-#include "client/displays/window/panel/panel.h"
-#include "client/displays/window/panel/scene_controls.h"
-#include "client/displays/window/panel/widget_log.h"
+#include "client/displays/window/panel/gui/panel_gui.h"
+#include "client/displays/window/panel/panel_orders.h"
 #include "client/displays/window/screenshots.h"
 #include "client/displays/window/title_line.h"
 #include "client/displays/window/view_settings.h"
-#include "client/displays/window/window.h"
+#include "client/displays/window/window_views.h"
 #include "client/viewer/input/pose_feed.h"
 #include "client/viewer/viewer_service.h"
 
 namespace telesplat::viewer {
+
+/// State of a window when a frame was presented.
+struct PresentedWindow {
+  double at_s = -1e9;
+  int width = 0, height = 0;  ///< the window's size, pixels
+  uint64_t overlays = 0;      ///< Overlays::version()
+  bool gui = false;           ///< Dear ImGui draws something over the frame
+  /// True if both show the same beside the frame.
+  bool like(const PresentedWindow& o) const {
+    return width == o.width && height == o.height && overlays == o.overlays && gui == o.gui;
+  }
+};
 
 class WindowSurface final : public DisplaySurface {
  public:
@@ -39,11 +43,13 @@ class WindowSurface final : public DisplaySurface {
   void on_scene(const ShownScene& scene) override;
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   void on_session(const std::shared_ptr<const wire::Welcome>& session) override;
-  std::optional<SamplingWish> take_sampling() override { return std::exchange(sampling_wish_, std::nullopt); }
-  geometry::Pose head() const override { return head_; }
-  geometry::Camera camera_of(const geometry::Pose& head) const override;
+  std::optional<SamplingWish> take_sampling() override { return chosen_.take_sampling(); }
+  geometry::Pose head() const override { return interaction_.pose(); }
+  geometry::Camera camera_of(const geometry::Pose& head) const override { return views_.camera_of(head); }
   bool visible() const override { return true; }
-  std::optional<PoseMoment> pose_moment() const override { return tracked_ ? poses_->moment() : std::nullopt; }
+  std::optional<PoseMoment> pose_moment() const override {
+    return interaction_.tracked() ? poses_->moment() : std::nullopt;
+  }
   double refresh_s() override { return window_->refresh_s(); }
   void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override { legend_.on_legend(legend); }
@@ -54,15 +60,12 @@ class WindowSurface final : public DisplaySurface {
   void report(const FrameFigures& figures) override;
   std::optional<glm::dvec2> points_at() override { return measuring_.points_at(); }
   void on_pick(const std::optional<Pick>& pick, EpochId epoch) override {
-    measuring_.on_pick(pick, epoch, terms_.get());
+    measuring_.on_pick(pick, epoch, hands_.terms());
   }
   Measurements* measurements() override { return &measuring_.places(); }
-  void on_terms(const std::shared_ptr<const SceneTerms>& terms) override {
-    terms_ = terms;
-    hands_.on_terms(terms);
-  }
+  void on_terms(const std::shared_ptr<const SceneTerms>& terms) override { hands_.on_terms(terms); }
   Status set(const std::string& name, const std::string& value) override;
-  std::optional<StereoOptions> take_stereo() override { return std::exchange(stereo_wish_, std::nullopt); }
+  std::optional<StereoOptions> take_stereo() override { return chosen_.take_stereo(); }
   bool go_to(const geometry::Pose& pose) override {
     interaction_.go_to(pose);
     return true;
@@ -73,18 +76,7 @@ class WindowSurface final : public DisplaySurface {
  private:
   struct Lines;  // lines for the person, from any thread
   WindowSurface(const ViewerOptions& options, const DisplayHelp& help, std::unique_ptr<Window> window);
-  geometry::Camera whole(const geometry::Pose& pose) const;
-  // Frustum of the window's free part; its middle lies at a tangent from the view's axis.
-  struct FreePart {
-    geometry::Camera frustum;
-    double middle_x;
-  };
-  FreePart free_part() const;
-  void fit_views();
-  void look_from(const Side& side);
-  void show_help();
   std::vector<std::string> key_lines() const;
-  void show_news(double now_s);
   void keep_path();
   ViewSettings settings() const;
   void choose(double now_s, const std::string& name, const std::string& value);
@@ -93,62 +85,31 @@ class WindowSurface final : public DisplaySurface {
   void run_panel(double now_s, Look& look);
   double build_panel(double now_s);
   void save_transfer();
-  void give(Order order, bool undoes);
   std::string path_folder() const { return options_.record.out.empty() ? "." : options_.record.out; }
   // True if there is a data set, or if one will come.
-  bool has_scene() const { return !options_.window.begins_empty || !scene_.box_room.empty(); }
-  void follow_bookmarks(const geometry::Pose& pose);
-  void follow_notes();
-  notes::Shelf shelf() const;  // precondition: terms_
+  bool has_scene() const { return !options_.window.begins_empty || views_.has_scene(); }
+  void follow_bookmarks();
 
-  ViewerOptions options_;            // options_.display: with the person's changes
-  std::shared_ptr<PoseFeed> poses_;  // moves the camera until the person takes it; null: there is no feed
-  SamplingWish sampling_;            // the person's choice
-  bool sampling_chosen_;             // the person chose its least sampling
-  std::optional<SamplingWish> sampling_wish_;
-  std::optional<StereoOptions> stereo_wish_;
+  ViewerOptions options_;  // options_.display: with the person's changes
+  ChosenSettings chosen_;
   std::unique_ptr<Window> window_;
   Interaction interaction_;
+  std::shared_ptr<PoseFeed> poses_;  // moves the camera until the person takes it; null: there is no feed
   TitleLine title_;
-  std::string title_text_, title_shown_;
   Overlays overlays_;
   HandOverlays hands_{text_panel};
-  std::shared_ptr<const SceneTerms> terms_;
   std::shared_ptr<Lines> lines_;
-  Bookmarks bookmarks_;
+  WindowNotes notes_;
   Measuring measuring_{*window_, interaction_, hands_, overlays_, [this](const std::string& line) { tell(line); }};
-  ShownScene scene_;
-  std::string scene_name_;
-  bool had_scene_ = false;
-  geometry::Pose head_;             // for the frame at hand
-  bool tracked_ = false;            // head_ is from a tracker
-  std::array<double, 4> fitted_{};  // values for which the first view was made; zeros: none yet
   WindowLegend legend_{*window_, options_.display, overlays_};
-  struct Shown {
-    double at_s = -1e9;
-    int width = 0, height = 0;  // the window's size, pixels
-    uint64_t overlays = 0;      // Overlays::version()
-    bool panel = false;
-  };
-  Shown shown_;                    // state that the window shows
-  int help_scale_ = 0;             // size of the help's letters; 0: it is hidden
-  std::vector<std::string> news_;  // shown by an overlay
+  WindowViews views_{options_, *window_, legend_, interaction_};
+  PresentedWindow shown_;
   Panel panel_;
   SceneControls scene_controls_{[this](Order order) { panel_.order(std::move(order)); }};
-  OrderUndo order_undo_;
-  SceneViewState scene_view_;
-  PanelViewState panel_view_;
+  PanelGui gui_{panel_, scene_controls_, overlays_};
   Opening opening_;
-  NotesViewState notes_view_;
-  NotesWish notes_wish_;
-  WidgetLog widget_log_ = WidgetLog::from_environment();
-  std::unique_ptr<ControlDesk> desk_;
-  bool quad_buffers_ = false;  // the window has quad buffers
+  PanelOrders orders_;
   Screenshots screenshots_;
 };
-
-/// Returns a camera whose field of view `fov_deg` spans the longer side of the image: a window that is made narrow does
-/// not become a tunnel.
-geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int width, int height, double near_m);
 
 }  // namespace telesplat::viewer

@@ -63,6 +63,8 @@ class HandOverlays {
   bool any() const { return !shown_.empty(); }
 
   void on_terms(std::shared_ptr<const SceneTerms> terms) { terms_ = std::move(terms); }
+  /// Null: not known yet.
+  const SceneTerms* terms() const { return terms_.get(); }
   void on_pick(const std::optional<Pick>& pick);
   /// frames: number of displayed frames so far.
   void on_frame(double now_s, uint64_t frames);
