@@ -176,20 +176,8 @@ MOST_FUNCTION_LINES = 60
 LONG_FUNCTIONS = {}
 MOST_MEMBERS = 20
 MOST_PARAMETERS = 6
-# Classes and functions that may have more: (path, name). Those of client/ and tools/ for now.
+# Functions that may have more: (path, name).
 LARGE_CLASSES = {
-    ("client/displays/window/input/interaction.h", "Interaction"),
-    ("client/displays/window/panel/panel.h", "Panel"),
-    ("client/displays/window/window_surface.h", "WindowSurface"),
-    ("client/displays/xr/xr_surface.h", "XrSurface"),
-    ("client/viewer/coupling/view_requester.h", "ViewRequester"),
-    ("client/viewer/display/display_loop.cpp", "DisplayLoop"),
-    ("client/viewer/display/display_options.h", "DisplayOptions"),
-    ("client/viewer/display/frame_table.h", "MeasuredFrame"),
-    ("client/viewer/display/view_source.h", "DrawnFrame"),
-    ("client/viewer/points/source.h", "PointSource"),
-    ("client/viewer/viewer_options.h", "ViewerOptions"),
-    ("tools/lab/simulation/checks.h", "Checks"),
     ("tools/lab/simulation/network/pipes.h", "SimulatedSocket"),
     ("tools/lab/simulation/scenario.h", "Scenario"),
 }
@@ -198,10 +186,6 @@ LONG_LISTS = {
     ("services/sampler/volume/shear/composite-inl.h", "CompositeRow"),
     ("services/sampler/volume/shear/resample-inl.h", "FillRow"),
     ("services/sampler/volume/shear/resample-inl.h", "ResampleRow"),
-    ("client/viewer/render/supersampler.cpp", "box_filter"),
-    ("client/viewer/render/supersampler.h", "box_filter"),
-    ("tools/telesplat/compare/measure.cpp", "measure_cell"),
-    ("tools/telesplat/compare/measure.h", "measure_cell"),
 }
 
 # Patterns that comments and pages do not use, and what to write in their place.

@@ -63,6 +63,12 @@ Checks::Viewer* Checks::viewer_of(int process) {
   return found == viewers_.end() ? nullptr : &found->second;
 }
 
+bool Checks::is_newest_master(int process) const {
+  for (auto p = parts_.rbegin(); p != parts_.rend(); ++p)
+    if (p->second.role == Role::kMaster) return p->first == process;
+  return false;
+}
+
 // ---- what passes ----------------------------------------------------------------------------------------------------
 
 void Checks::on_passed(const Passed& m) {
@@ -178,7 +184,8 @@ void Checks::delivered(const Passed& m) {
     }
   }
   const auto to = parts_.find(m.to);
-  if (m.type == wire::Welcome::kName && m.from == master_ && to != parts_.end() && to->second.role == Role::kPacker)
+  if (m.type == wire::Welcome::kName && is_newest_master(m.from) && to != parts_.end() &&
+      to->second.role == Role::kPacker)
     packer_welcomed_ = true;
   if (const auto reply = read<wire::ControlReply>(m)) orders_.on_reply(m.to, *reply, m.sent_s, now_s_);
   if (intruders_.contains(m.to) && m.type != wire::Shutdown::kName)
@@ -244,7 +251,6 @@ void Checks::on_begin(Part part, int process, double) {
   if (part.role == Role::kViewer) viewers_[process].process = process;
   if (part.role == Role::kMaster) {
     leases_.clear();
-    master_ = process;
     packer_welcomed_ = false;
     orders_.on_new_master();
     for (auto& [number, v] : viewers_) v.another_master = true;

@@ -111,6 +111,7 @@ class Checks final : public Observer {
   void compare_pictures(Session& session);
   bool has_strangers() const { return excuses_.has({Fault::kStranger, Fault::kImpostor}); }
   Viewer* viewer_of(int process);
+  bool is_newest_master(int process) const;
 
   const Scenario scenario_;
   const Excuses excuses_;
@@ -126,7 +127,6 @@ class Checks final : public Observer {
   std::map<std::string, double> packer_;  // its newest status
   double looked_s_ = 0, now_s_ = 0;
   uint64_t late_rays_ = 0;
-  int master_ = -1;                                    // the process of the newest
   std::deque<std::pair<double, uint64_t>> sequences_;  // that the packer had, and when
   uint64_t rows_ = 0;                                  // rows of updates that came to the master
   bool rests_ = false, packer_welcomed_ = false;

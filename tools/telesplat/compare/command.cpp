@@ -170,7 +170,7 @@ class Comparison {
         if (net::stop_requested()) return false;
         progress_.show(fmt::format("{}: {} {}", where, kernel, renderer->name()));
         pose.cells.push_back(
-            measure_cell(*renderer, model, models_->applied(), pose.frame.camera, cell, reference, flip));
+            measure_cell(*renderer, model, models_->applied(), pose.frame.camera, cell, {reference, flip}));
       }
     }
     return true;

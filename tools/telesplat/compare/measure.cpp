@@ -56,8 +56,7 @@ ErrorShares error_shares(const image::Reference& reference, const image::View& r
 }
 
 Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, Sequence applied,
-                  const geometry::Camera& camera, const CellOptions& o, const image::Reference& reference,
-                  const image::Flip& flip) {
+                  const geometry::Camera& camera, const CellOptions& o, const Truth& truth) {
   const size_t pixels = size_t(camera.width) * camera.height;
   Cell cell;
   cell.kernel = o.render.kernel;
@@ -102,10 +101,10 @@ Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, S
   renderer.render(list, camera, o.render, shading,
                   {camera.width, camera.height, cell.view.colour.data(), cell.view.depth_m.data()});
   for (uint32_t& c : cell.view.colour) c &= 0xffffff;
-  cell.quality = image::compare(reference, cell.view);
-  cell.shares = error_shares(reference, cell.view);
-  cell.flip_map = flip.error_map(cell.view);
-  cell.flip = image::mean_error(cell.flip_map, reference, cell.view);
+  cell.quality = image::compare(truth.reference, cell.view);
+  cell.shares = error_shares(truth.reference, cell.view);
+  cell.flip_map = truth.flip.error_map(cell.view);
+  cell.flip = image::mean_error(cell.flip_map, truth.reference, cell.view);
   return cell;
 }
 

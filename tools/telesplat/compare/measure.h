@@ -53,10 +53,15 @@ struct CellOptions {
   float detail = 1;              ///< SelectionOptions::detail
 };
 
-/// Draws `model` for `camera` and compares it with `reference`, whose FLIP comparer is `flip`.
+/// The picture that a view is compared with, and its FLIP comparer.
+struct Truth {
+  const image::Reference& reference;
+  const image::Flip& flip;
+};
+
+/// Draws `model` for `camera` and compares it with the truth.
 /// applied: the newest event of the model (renderers keep copies of points by it).
 Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, Sequence applied,
-                  const geometry::Camera& camera, const CellOptions& options, const image::Reference& reference,
-                  const image::Flip& flip);
+                  const geometry::Camera& camera, const CellOptions& options, const Truth& truth);
 
 }  // namespace telesplat::launcher
