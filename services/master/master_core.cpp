@@ -111,7 +111,8 @@ void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m
 Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
   if (const Peer* before = peers_.find(peer)) {
     const wire::Hello& hello = before->hello;
-    if (hello.instance != m.instance || hello.role != m.role) forget_viewer(hello);
+    const bool another = hello.instance != m.instance || hello.role != m.role;
+    if (another && peers_.speaks_for(peer, hello.instance)) forget_viewer(hello);
     live_.set_here(hello.role, hello.name, false);  // its name may be another now
   }
   live_.set_here(m.role, m.name, true);

@@ -44,12 +44,17 @@ const Peer* Peers::here(const std::string& id) const {
   return known == known_.end() || known->second.gone ? nullptr : &known->second;
 }
 
+bool Peers::speaks_for(const std::string& id, InstanceId instance) const {
+  const auto by = instances_.find(instance);
+  return by != instances_.end() && by->second == id;
+}
+
 Peer& Peers::enter(const std::string& id, const wire::Hello& m, double now_s) {
   Peer& p = known_[id];
   const bool another = p.hello.instance != m.instance || p.hello.role != m.role;
   if (another) p.coupling.reset();
   if (another || p.gone) p.joined = ++joined_, p.process.replaced = false;
-  instances_.erase(p.hello.instance);
+  if (speaks_for(id, p.hello.instance)) instances_.erase(p.hello.instance);
   instances_[m.instance] = id;
   p.hello = m;
   p.process.role = m.role;
@@ -78,8 +83,7 @@ bool Peers::make_room(const std::string& id, size_t most) {
 }
 
 void Peers::forget(const Peer& p, const std::string& id) {
-  if (const auto by = instances_.find(p.hello.instance); by != instances_.end() && by->second == id)
-    instances_.erase(by);
+  if (speaks_for(id, p.hello.instance)) instances_.erase(p.hello.instance);
   if (p.hello.role != "ctl") departed_.add(p.process);
 }
 

@@ -106,6 +106,8 @@ class Peers {
   Peer* find(const std::string& id);
   /// Likewise of the process with this instance, with its routing id.
   Known::value_type* find(InstanceId instance);
+  /// True if the process with this instance has this routing id: it may have come back with another one.
+  bool speaks_for(const std::string& id, InstanceId instance) const;
   /// Null: it takes no part.
   const Peer* here(const std::string& id) const;
   /// Takes in what a process says of itself.

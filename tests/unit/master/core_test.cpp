@@ -871,5 +871,19 @@ TEST_F(Master, StatusCountsInWholeNumbersAndTellsRates) {
   EXPECT_EQ(viewer()["rates"]["frames"], 0.0);
 }
 
+// Viewer 5 comes back on another connection; another viewer then takes its old one.
+TEST_F(Master, AViewerThatMovedKeepsItsViews) {
+  join_all();
+  core.on("w", hello("viewer", "viewer-1", 5), 0.2);
+  wire::ViewRequest r;
+  r.viewer = {5};
+  r.request = {1};
+  r.camera.width = r.camera.height = 256;
+  core.on("w", r, 0.3);
+  core.on("v", hello("viewer", "viewer-2", 6), 0.4);
+  core.on("s1", wire::LeaseRequest{}, 0.5);
+  ASSERT_EQ(sent<wire::Lease>("s1").size(), 1u);
+}
+
 }  // namespace
 }  // namespace telesplat::master

@@ -27,8 +27,8 @@ std::vector<std::string> names_of(const std::vector<scene::ArrayInfo>& infos) {
 
 constexpr double kSameTime_s = 0.05;
 
-// Length of a new track whose key frame is at 0 s. Others end at twice their key frame's time, with their first value,
-// so that a repeat does not jump.
+// Length of a new track whose key frame is at 0 s. Others end at twice their key frame's time. All end with their first
+// value, so that a repeat does not jump.
 constexpr double kFirstLength_s = 10;
 
 }  // namespace
@@ -235,8 +235,9 @@ void SceneControls::add_key(const julia::ParameterInfo& info, double t_s, double
   auto& tracks = timeline_.tracks;
   auto track = std::find_if(tracks.begin(), tracks.end(), [&](const auto& t) { return t.name == info.name; });
   if (track == tracks.end()) {
-    const double now = this->value(info.name), end_s = std::max(2 * t_s, kSameTime_s);
-    tracks.push_back({std::string(info.name), {{0, now}, {t_s > 0 ? end_s : kFirstLength_s, now}}});
+    const bool first = t_s < kSameTime_s;
+    const double ends = first ? value : this->value(info.name);
+    tracks.push_back({std::string(info.name), {{0, ends}, {first ? kFirstLength_s : 2 * t_s, ends}}});
     track = std::prev(tracks.end());
   }
   auto& keys = track->keys;

@@ -173,6 +173,7 @@ TEST_F(JuliaControlsTest, KeyFramesMakeATimelineThatTheMasterReads) {
   EXPECT_EQ(controls_.timeline().tracks[0].keys[1].value, 0.3) << "in place of the one there";
   controls_.add_key(info("c.y"), 7.5, 0.1);
   controls_.add_key(info("c.x"), 0, 0.2);
+  EXPECT_EQ(controls_.timeline().tracks[1].keys.back().value, 0.2) << "a repeat does not jump";
   controls_.add_key(info("iterations"), 3, 20);
   EXPECT_EQ(controls_.timeline().tracks.size(), 2u) << "what is whole is not animated";
   controls_.play();
