@@ -52,14 +52,14 @@ TEST(DicomHeader, TakesNothingFromSequencesThatAreNoFunctionalGroups) {
   w.put(0x00281053, "DS", "2");
   w.put_sequence(0x00082112, {other.content()});  // Source Image Sequence
   w.put_sequence(0x00082112, {other.content()}, false);
-  EXPECT_EQ(parsed(w.content())[0].slope, 2);
+  EXPECT_EQ(parsed(w.content())[0].pixels.slope, 2);
 }
 
 TEST(DicomHeader, KnowsFilesWithoutPreamble) {
   for (const auto syntax : {DicomWriter::Syntax::kExplicit, DicomWriter::Syntax::kImplicit}) {
     const std::string bare = dicom_slice(kPattern, 1, {.syntax = syntax, .uid = "1.2", .preamble = false});
     ASSERT_TRUE(is_dicom(bare));
-    EXPECT_EQ(parsed(bare)[0].rows, 4);
+    EXPECT_EQ(parsed(bare)[0].pixels.rows, 4);
   }
   std::string counting;  // a raw file whose first values look like a tag
   for (uint16_t v = 8; v < 200; ++v) counting += raw(v);
