@@ -133,9 +133,7 @@ class VolumeWorkTest : public testing::Test {
               made.push_back(std::make_shared<const FakeSlab>(std::move(v)));
               return made.back();
             },
-            1,
-            uint64_t(cache_bytes),
-            "sampler",
+            {.threads = 1, .cache_bytes = uint64_t(cache_bytes), .service_name = "sampler"},
             context,
             {{5},
              [this](const wire::SlabReady& m) { ready.push_back(m); },
