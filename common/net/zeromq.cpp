@@ -467,7 +467,7 @@ struct Parts {
   Tunnel* tunnel = nullptr;  // only if it connects through a proxy; owned by the context
   QueuedBytes queued{options.most_queued_bytes};
   bool guarded = false;                                   // it is bound with keys
-  std::shared_ptr<const std::set<std::string>> may_stay;  // the doorkeeper's last answer
+  std::shared_ptr<const std::set<std::string>> may_stay;  // peers that the allow-list let in at the last look
   std::string endpoint;                                   // address that it connects to
   std::mutex log_mutex;  // guards the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;

@@ -19,7 +19,7 @@ class PointSource final : public ViewSource {
   void advance(RequestId request) override { received_.advance(request); }
   std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) override;
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
-  /// Draws without sub-pixels.
+  /// Draws both eyes. It does not refine still pictures with sub-pixels.
   DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
                        const std::array<splat::FrameTarget, 2>& targets) override;
   bool draws_into_parts() const override { return true; }

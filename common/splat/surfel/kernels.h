@@ -32,8 +32,8 @@ TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, cons
 struct EwaBuffer {
   /// Splats kept between the passes; a tile with more processes its points twice. 72 bytes each.
   static constexpr size_t kRecordSplats = 32768;
-  hwy::AlignedFreeUniquePtr<float[]> visible;  ///< least depth code of the opaque ellipses
-  hwy::AlignedFreeUniquePtr<float[]> sums;     ///< 8 a pixel: EwaSum
+  hwy::AlignedFreeUniquePtr<float[]> visible;  ///< per pixel: least depth code of its opaque ellipses
+  hwy::AlignedFreeUniquePtr<float[]> sums;     ///< per pixel: 8, see EwaSum
   hwy::AlignedFreeUniquePtr<std::byte[]> record;
   int width = 0, height = 0, stride = 0;
   size_t pixels = 0;  ///< pixels that the arrays have room for

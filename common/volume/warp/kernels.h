@@ -21,8 +21,9 @@ inline constexpr float kWarpNearestW = 1e-6f;  ///< rays with a smaller W do not
 
 /// A layer, as a tile sees it. With (x, y) counted from the middle of the tile's first pixel,
 ///   X = (x0 + y xy) + x xx, Y and W likewise;  bits = bits of (clamp(X / W, least_x, most_x) + shift_x)
-/// The lower bits are the place in the image, in 1 / kWarpSubtexels of a texel, rounded. shift_x holds 2^23, and X and
-/// Y are relative to a texel near the tile, which shift_x and shift_y add again, so that floats have enough digits.
+/// The lower bits are the place in the image, in 1 / kWarpSubtexels of a texel, rounded. X and Y count from a texel
+/// near the tile, which keeps their digits. shift_x and shift_y add that texel's place, and 2^23, which leaves a whole
+/// number in the lower bits.
 struct WarpLayer {
   float x0, xx, xy, y0, yx, yy, w0, wx, wy;
   float least_x, most_x, shift_x, least_y, most_y, shift_y;

@@ -25,8 +25,8 @@ using StepReader = std::function<Result<Volume>(size_t step, const ReadProgress&
 class VolumeStore {
  public:
   /// Opens a volume; up "auto" means z. Reads the first step; all of them if they fit in cache_mb, so that levels cover
-  /// all values. Otherwise values of later steps beyond the first one's count as its smallest or largest. Steps that
-  /// are read later, and the next step ahead, are read in a thread of their own. Errors name the file.
+  /// all values. Otherwise levels cover the values of the first step, and values of later steps are clamped to
+  /// them. Steps that are read later, and the next step ahead, are read in a thread of their own. Errors name the file.
   static Result<std::unique_ptr<VolumeStore>> open(const std::string& path, const VolumeOptions& options,
                                                    const PlacementOptions& placement, const Progress& progress);
   /// The same for volumes from any source. name: for errors.

@@ -130,7 +130,7 @@ class Peers {
   }
   /// Returns the roles that the session needs and no process has, such as "data,sampler".
   std::string lacks() const;
-  /// For the run's record, by name: also those that left.
+  /// Returns all processes, also those that left, in order of their names. For the run's record.
   std::vector<metrics::Process> processes() const;
   const Departed& departed() const { return departed_; }
   Namesakes& namesakes() { return namesakes_; }

@@ -89,7 +89,7 @@ void VolumeWork::take(net::Socket& from, const net::Message& message, bool takes
       told_ready_ = {};
       bytes_before_ = bytes_received_;
       progress_s_ = now_s;
-      // An open request of the old sheet stays: its answer is as good as any.
+      // Open requests of the sheet before go on if the new sheet names their server: they bring the same slices.
       forget_servers();
     }
   });

@@ -28,7 +28,7 @@ struct ScaleBar {
   std::string text;  ///< "20 mm"
 };
 std::optional<ScaleBar> scale_bar(const geometry::Camera& camera, const SceneTerms& terms, double depth_m, int width);
-/// scale: pixels a side of a letter's dot.
+/// Draws the bar with its text. scale: a dot of a letter has scale x scale pixels.
 image::View scale_picture(const ScaleBar& bar, int scale);
 
 /// A line of `thickness` pixels: those whose centres lie within half of it get the colour.
@@ -41,7 +41,7 @@ std::vector<std::string> cursor_lines(const std::optional<scene::ToldPlace>& pla
 double middle_depth_m(const geometry::Camera& camera, const geometry::Box& box_room);
 
 /// Draws marks of the places: the part of the camera's picture that they cover, on a transparent ground (0xAARRGGBB);
-/// x, y: place of its upper left pixel. Empty: no mark is seen. scale: pixels a side of a letter's dot.
+/// x, y: place of its upper left pixel. Empty: no mark is seen. scale: a dot of a letter has scale x scale pixels.
 struct MarksPicture {
   image::View view;
   int x = 0, y = 0;
@@ -50,7 +50,7 @@ MarksPicture draw_marks(const Measurements& measurements, const geometry::Camera
 
 class HandOverlays {
  public:
-  /// Draws lines of text; scale: pixels a side of a letter's dot.
+  /// Draws lines of text; a dot of a letter has scale x scale pixels.
   using TextPanel = std::function<image::View(const std::vector<std::string>& lines, int scale)>;
   explicit HandOverlays(TextPanel panel) : panel_(std::move(panel)) {}
 

@@ -55,7 +55,7 @@ SplatPasses::SplatPasses() {
   glBindBuffer(GL_ARRAY_BUFFER, draw_numbers_);
   glEnableVertexAttribArray(0);
   glVertexAttribIPointer(0, 1, GL_UNSIGNED_INT, 0, nullptr);
-  glVertexAttribDivisor(0, 1);  // one a draw: indirect draws start at their baseInstance
+  glVertexAttribDivisor(0, 1);  // one value per draw: its baseInstance
   glBindVertexArray(0);
 }
 

@@ -144,7 +144,7 @@ struct ValidationTurn {
   uint64_t round = 0;  ///< sets of pixels that had their turn
   double sets_due = 0, at_s = -1e9;
 
-  /// Returns how many sets are due, at most `most`: each turn_s `sets` more become due.
+  /// Returns the number of pixel sets that are due, at most `most`. `sets` of them become due in turn_s, evenly.
   uint64_t take_due(int sets, double turn_s, double most, double now_s);
 };
 

@@ -238,8 +238,8 @@ bool confirms(float came_m, float shown_m) {
   return came_m == shown_m || std::abs(came_m - shown_m) <= kTolerance * shown_m;
 }
 
-// Pixels that were not cast count as clear up to the shown depth, if they need no ray. At edges, and where samples are
-// far apart, up to the nearest surface around.
+// The space before a pixel without a ray counts as empty up to the depth that the model shows there. At edges, and
+// where samples are far apart, it counts as empty up to the least depth of the pixels around.
 void clear_as_shown(const PlannedFrame& frame, int y, float* clear_m) {
   const ViewMap& map = *frame.map;
   const int width = map.camera.width, height = map.camera.height;

@@ -67,7 +67,8 @@ class SimulatedNetwork {
   double now_s() const;
   /// When something happens next; infinity: nothing does.
   double next_s() const;
-  /// Delivers all that arrives by then, in order of time. Not to be called by callbacks, nor backwards.
+  /// Moves the clock to now_s, which does not go back, and delivers in order what arrives until then. Callbacks must
+  /// not call it.
   void advance(double now_s);
 
   /// SIGKILL. What is on the wire still arrives; all else of the process is lost. Its objects may live on: their calls
