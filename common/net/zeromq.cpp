@@ -133,8 +133,7 @@ struct Attempts {
     if (!std::exchange(looked_for_mechanism, true) && mechanism_at(endpoint) == "CURVE")
       turned_away = ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
   }
-
-  // Events that tell why it is not let in.
+  // Events that show why the server does not let this socket in.
   static constexpr int kHandshakeFailed =
       ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 

@@ -23,8 +23,7 @@
 
 namespace telesplat::master {
 
-// When everyone is told of the session anew: what changes again and again is told so often at most. No clocks.
-
+/// Limits how often everyone is told of the session anew. No clocks.
 class Announcements {
  public:
   explicit Announcements(std::string lacks) : lacks_(std::move(lacks)) {}
