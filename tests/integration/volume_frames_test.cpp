@@ -95,7 +95,7 @@ TEST(VolumeFrames, AViewerGetsWhatTheSamplersSplat) {
   for (int n = 0; n < 2; ++n) {
     Sampler& one = samplers[n];
     one.work = std::make_unique<sampler::VolumeWork>(
-        sampler::make_shear_slabs(1), 1, uint64_t{1} << 28, "sampler", context,
+        sampler::make_shear_slabs(1), sampler::VolumeWork::Options{1, uint64_t{1} << 28, "sampler"}, context,
         sampler::VolumeWork::Master{{uint64_t(n) + 1},
                                     [&one](const wire::SlabReady&) { one.ready = true; },
                                     [](const wire::LeaseExtend&) {},
