@@ -42,7 +42,7 @@ constexpr Setting kSettings[] = {
      "lit: a light from the upper left and the head's; head: the head's alone; unlit: colours as they are"},
 
     {"sampling-size", "Sampling", "sampling-size", "--sampling-size", kAll, kViewer,
-     "auto: as fine as view updates in time allow; else WxH, so many pixels in the window's shape"},
+     "auto: as fine as view updates in time allow; else WxH, W times H pixels in the window's shape"},
     {"least-sampling", "Sampling", "least-sampling", "--least-sampling", kAll, kViewer,
      "sampling-size auto: sampled pixels a displayed pixel, on each axis, at least"},
 

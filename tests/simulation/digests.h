@@ -2,13 +2,30 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <cstdint>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <string>
 
+#include "tools/lab/simulation/command.h"
+
 namespace telesplat::simulation {
+
+/// Chooses glibc's plain functions, as telesplat-lab does, and one thread: other tests have the other processors.
+class PlainFunctions : public ::testing::Environment {
+  void SetUp() override {
+    choose_plain_functions();
+    threads_.emplace(tbb::global_control::max_allowed_parallelism, 1);
+  }
+  void TearDown() override { threads_.reset(); }
+  std::optional<tbb::global_control> threads_;
+};
+inline const ::testing::Environment* add_plain_functions() {
+  return ::testing::AddGlobalTestEnvironment(new PlainFunctions);
+}
 
 /// In hexadecimal digits, by the name of a standard walk or "seed-N".
 inline std::map<std::string, std::string> golden_digests() {

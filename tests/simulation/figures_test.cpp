@@ -1,6 +1,5 @@
 // Standard walks cost and show the figures of tests/simulation/figures.json.
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -13,15 +12,7 @@
 namespace telesplat::simulation {
 namespace {
 
-class PlainFunctions : public ::testing::Environment {
-  void SetUp() override {
-    choose_plain_functions();
-    threads_.emplace(tbb::global_control::max_allowed_parallelism, 1);  // other tests have the other processors
-  }
-  void TearDown() override { threads_.reset(); }
-  std::optional<tbb::global_control> threads_;
-};
-[[maybe_unused]] const auto* const plain_functions = ::testing::AddGlobalTestEnvironment(new PlainFunctions);
+const auto* const plain_functions = add_plain_functions();
 
 class StandardWalks : public ::testing::TestWithParam<Walk> {};
 INSTANTIATE_TEST_SUITE_P(All, StandardWalks, ::testing::ValuesIn(standard_walks()), [](const auto& walk) {

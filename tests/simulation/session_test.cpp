@@ -10,6 +10,8 @@
 namespace telesplat::simulation {
 namespace {
 
+const auto* const plain_functions = add_plain_functions();
+
 std::string text_of(const std::optional<Failure>& f) {
   return f ? f->check + " at " + std::to_string(f->at_s) + " s: " + f->text : "holds";
 }

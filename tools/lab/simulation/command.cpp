@@ -186,7 +186,7 @@ void choose_plain_functions() {
   std::vector<char*> arguments;
   for (std::string& w : words) arguments.push_back(w.data());
   arguments.push_back(nullptr);
-  if (words.size() > 1) execv("/proc/self/exe", arguments.data());
+  if (!words.empty()) execv("/proc/self/exe", arguments.data());
 }
 
 launcher::Command simulate_command() {

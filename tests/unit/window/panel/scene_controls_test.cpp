@@ -173,7 +173,6 @@ TEST_F(JuliaControlsTest, KeyFramesMakeATimelineThatTheMasterReads) {
   EXPECT_EQ(controls_.timeline().tracks[0].keys[1].value, 0.3) << "in place of the one there";
   controls_.add_key(info("c.y"), 7.5, 0.1);
   controls_.add_key(info("c.x"), 0, 0.2);
-  EXPECT_EQ(controls_.timeline().tracks[1].keys.back().value, 0.2) << "a repeat does not jump";
   controls_.add_key(info("iterations"), 3, 20);
   EXPECT_EQ(controls_.timeline().tracks.size(), 2u) << "what is whole is not animated";
   controls_.play();
@@ -182,6 +181,8 @@ TEST_F(JuliaControlsTest, KeyFramesMakeATimelineThatTheMasterReads) {
   ASSERT_TRUE(parsed) << parsed.error().text;
   EXPECT_EQ(parsed->tracks.size(), 2u);
   EXPECT_NEAR(parsed->values(5).at("c.y"), 0.3, 1e-12);
+  for (const auto& track : parsed->tracks)
+    EXPECT_EQ(track.keys.front().value, track.keys.back().value) << track.name << ": a repeat does not jump";
   controls_.stop();
   EXPECT_EQ(orders_.back().arguments.at("timeline"), "off");
 }
