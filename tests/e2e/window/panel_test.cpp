@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
@@ -91,10 +93,14 @@ class PanelTest : public testing::Test {
     return window.value_or(0);
   }
   // Each at once after the other: what a press is meant for is decided by where the pointer was then.
-  void click(VirtualDisplay::WindowId window, const Place& p) {
-    display_->move_pointer(window, p.x, p.y);
+  void click(VirtualDisplay::WindowId window, const Place& at) {
+    // The panel sees the pointer with the next frame.
+    display_->move_pointer(window, at.x, at.y);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
     display_->button(1, true);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
     display_->button(1, false);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
   void drag(VirtualDisplay::WindowId window, const Place& from, const Place& to) {
     display_->move_pointer(window, from.x, from.y);
@@ -153,7 +159,11 @@ TEST_F(PanelTest, LiesOverTheFrameKeepsThePointerAndGoesWithTab) {
     const size_t rows = std::min(x.size(), z.size());
     return rows > 0 ? std::pair(x[rows - 1], z[rows - 1]) : std::pair(0.0, 0.0);
   };
-  ASSERT_TRUE(wait_until([&] { return pose().second > 0; }));
+  // Rows come about once a second: the second ones from now on are of frames after the panel came back.
+  for (int n = 0; n < 2; ++n) {
+    const size_t before = run.column("frames.csv", "px").size();
+    ASSERT_TRUE(wait_until([&] { return run.column("frames.csv", "px").size() > before; }));
+  }
   const auto home = pose();
   // There and back beside the panel; a press over it is the panel's, however quickly the pointer leaves it.
   drag(window, {40, 8}, {600, 300});
