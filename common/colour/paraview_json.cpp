@@ -92,7 +92,7 @@ Result<Space> read_space(const Json& map, const std::string& path) {
 std::vector<ParaviewMap::Colour> straightened(const std::vector<ParaviewMap::Colour>& points, Space space) {
   if (space == Space::kRgb) return points;
   std::vector<ParaviewMap::Colour> out;
-  const int pieces = points.size() > kMaxPoints / kPieces ? 1 : kPieces;  // that many points lie close enough
+  const int pieces = points.size() > kMaxPoints / kPieces ? 1 : kPieces;  // more points lie close enough
   for (size_t n = 0; n < points.size(); ++n) {
     out.push_back(points[n]);
     if (n + 1 == points.size()) break;

@@ -33,7 +33,7 @@ CLEAN = {
 
 LONG = "int f(int a) {\n" + "  a += g{1}.value;\n" * 60 + "}\n"
 
-# Twenty data members and one more, beside what is none.
+# Twenty-one data members, beside functions, types and constants.
 MEMBERS = "  static int s;\n  using A = int;\n  int f() const { return 1; }\n"
 MEMBERS += "  int a = 1, b{2};\n  std::map<int, A> c;\n" * 7
 

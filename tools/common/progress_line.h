@@ -31,7 +31,7 @@ using ShouldStop = std::function<bool()>;
 /// thread may call.
 class ProgressLine {
  public:
-  /// first_after_s: shows nothing for that many seconds, for work that is often over by then.
+  /// first_after_s: seconds until it first shows, for work that is often over by then.
   explicit ProgressLine(double first_after_s = 0);
   ~ProgressLine() { close(); }
 

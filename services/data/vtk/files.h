@@ -98,7 +98,7 @@ struct Bytes {
   std::vector<std::byte> owned;
   std::span<const std::byte> in_file;  ///< instead of `owned`
 };
-/// Reads a header of one number, the count, and that many bytes. Error, starting with `what`: they are missing.
+/// Reads a header of one number, the count of bytes, and the bytes. Error, starting with `what`: they are missing.
 Bytes read_plain(EncodedBytes& in, size_t header_bytes, bool big_endian, const std::string& what);
 /// Reads a header (number of blocks, bytes of a block, bytes of the last one, packed bytes of each) and its blocks.
 /// Unpacks them on all cores. Error, starting with `what`: they are missing, damaged, or claim more than packed data

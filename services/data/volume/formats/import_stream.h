@@ -1,5 +1,5 @@
 // Sends a volume from telesplat-import through a pipe, so that its voxels are never in memory twice. Each message is a
-// kind, a length and that many bytes.
+// kind, a length, and the bytes.
 #pragma once
 
 #include <optional>
