@@ -14,6 +14,7 @@
 #include "common/core/clock.h"
 #include "common/core/machine.h"
 #include "common/parallel/crew.h"
+#include "common/splat/backdrop.h"
 #include "common/splat/finish.h"
 #include "common/splat/item_figures.h"
 #include "common/splat/tile_work.h"
@@ -83,13 +84,15 @@ struct Sight {
   /// Reach of the largest splat from its centre, pixels. Surfels reach reach_of() farther.
   float overhang = 0;
   TileBinning binning;
+  Backdrop backdrop;
+  bool has_backdrop = false;
 };
 
 }  // namespace
 
 struct CpuSplatter::Impl {
-  explicit Impl(int threads)
-      : crew(threads > 0 ? threads : usable_processors()), workspaces(static_cast<size_t>(crew.threads())) {}
+  explicit Impl(std::shared_ptr<Crew> threads)
+      : shared(std::move(threads)), crew(*shared), workspaces(static_cast<size_t>(crew.threads())) {}
 
   void prepare(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                const image::Shading& shading);
@@ -98,14 +101,18 @@ struct CpuSplatter::Impl {
   float reach_of(const DrawList& list, const ItemRun& run, const Sight& sight) const;
   TileCounts splat(const TileInput& input, const ResolvedTile& tile, const Sight& sight, Workspace& workspace);
   void draw_tile(int index, const DrawList& list, const Sight& sight, const FrameTarget& target, Workspace& workspace);
-  void finish_tile(const ResolvedTile& tile, Workspace& workspace);
+  void finish_tile(const ResolvedTile& tile, const geometry::Rect& rect, const Sight& sight, Workspace& workspace);
+  SplatStats draw_backdrop(const DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
+                           Backdrop& out);
   SplatStats render(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                     const image::Shading& shading, std::span<const FrameTarget> targets);
   SplatStats render_halved(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                            const image::Shading& shading, const FrameTarget& target);
 
-  Crew crew;
+  std::shared_ptr<Crew> shared;
+  Crew& crew;
   std::vector<Workspace> workspaces;
+  std::unique_ptr<Impl> coarse;  // draws backdrops, with the same threads; null: none was drawn yet
 
   // The frame.
   const KernelTraits* kernel = nullptr;
@@ -208,7 +215,8 @@ TileCounts CpuSplatter::Impl::splat(const TileInput& input, const ResolvedTile& 
                              .ewa = workspace.ewa});
 }
 
-void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspace) {
+void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, const geometry::Rect& rect, const Sight& sight,
+                                    Workspace& workspace) {
   SplatStats& stats = workspace.stats;
   double start = monotonic_s();
   const auto lap = [&](double& ms) {
@@ -216,12 +224,19 @@ void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspa
     ms += (now - start) * 1e3;
     start = now;
   };
-  const ResolvedTile content = crop_to_content(tile, layout.reach);
-  if (content.width == 0 || content.height == 0) return;
+  ResolvedTile content = crop_to_content(tile, layout.reach);
+  const bool empty = content.width == 0 || content.height == 0;
+  if (empty && !sight.has_backdrop) return;
   // Each stage writes as many pixels around the tile as later stages read.
   const int left_after_fill = finish_reach({false, finish.smooth, finish.antialias});
   const int left_after_smooth = finish_reach({false, false, finish.antialias});
-  if (finish.fill) fill_holes(content, left_after_fill, gaps_to_fill(finish), workspace.finish), lap(stats.fill_ms);
+  if (finish.fill && !empty)
+    fill_holes(content, left_after_fill, gaps_to_fill(finish), workspace.finish), lap(stats.fill_ms);
+  if (sight.has_backdrop) {
+    fill_from(sight.backdrop, rect, sight.resolve.near_m, tile, left_after_fill);
+    content = tile;
+    lap(stats.resolve_ms);
+  }
   if (finish.smooth) smooth(content, left_after_smooth, workspace.finish), lap(stats.smooth_ms);
   if (finish.antialias) antialias(content, workspace.finish), lap(stats.antialias_ms);
 }
@@ -236,7 +251,7 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const Sight& 
   const auto entries = sight.binning.tile(index);
   SplatStats& stats = workspace.stats;
   const double start = monotonic_s();
-  if (entries.empty()) {
+  if (entries.empty() && !sight.has_backdrop) {
     write_background(rect, resolve.background, out);
     stats.resolve_ms += (monotonic_s() - start) * 1e3;
     return;
@@ -260,12 +275,12 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const Sight& 
 
   double finished = splatted;
   const bool resolved = kernel->passes == Passes::kSums;
-  if (layout.reach == 0 && !resolved) {
+  if (layout.reach == 0 && !resolved && !sight.has_backdrop) {
     resolve_and_write_tile(tile, resolve, out);
   } else {
     if (!resolved) resolve_tile(tile, layout.reach, resolve, workspace.row);
     stats.resolve_ms += (monotonic_s() - splatted) * 1e3;
-    finish_tile(tile, workspace);
+    finish_tile(tile, rect, sight, workspace);
     finished = monotonic_s();
     write_tile(tile, layout.reach, resolve, out);
   }
@@ -273,7 +288,8 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const Sight& 
   stats.resolve_ms += (monotonic_s() - finished) * 1e3;
 }
 
-CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
+CpuSplatter::CpuSplatter(int threads)
+    : impl_(std::make_unique<Impl>(std::make_shared<Crew>(threads > 0 ? threads : usable_processors()))) {}
 CpuSplatter::~CpuSplatter() = default;
 
 SplatStats& SplatStats::operator+=(const SplatStats& other) {
@@ -283,11 +299,29 @@ SplatStats& SplatStats::operator+=(const SplatStats& other) {
   return *this;
 }
 
+SplatStats CpuSplatter::Impl::draw_backdrop(const DrawList& list, const geometry::Camera& camera,
+                                           const image::Shading& shading, Backdrop& out) {
+  if (!coarse) coarse = std::make_unique<Impl>(shared);
+  out.halvings = list.coarse->halvings;
+  out.camera = backdrop_camera(camera, out.halvings);
+  out.colour.resize(static_cast<size_t>(out.camera.width) * static_cast<size_t>(out.camera.height));
+  out.depth_m.resize(out.colour.size());
+  const FrameTarget target{out.camera.width, out.camera.height, out.colour.data(), out.depth_m.data()};
+  const SplatStats stats = coarse->render(*list.coarse, {&out.camera, 1}, kBackdrop, shading, {&target, 1});
+  out.find_whole();
+  return stats;
+}
+
 SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geometry::Camera> cameras,
                                      const RenderOptions& options, const image::Shading& shading,
                                      std::span<const FrameTarget> targets) {
   for (size_t i = 0; i < cameras.size(); ++i)
     CHECK(targets[i].width == cameras[i].width && targets[i].height == cameras[i].height && targets[i].colour);
+  SplatStats sum;
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    sights[i].has_backdrop = has_coarse(list);
+    if (has_coarse(list)) sum += draw_backdrop(list, cameras[i], shading, sights[i].backdrop);
+  }
   const double start = monotonic_s();
   prepare(list, cameras, options, shading);
   const double prepare_ms = (monotonic_s() - start) * 1e3;
@@ -306,8 +340,7 @@ SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geome
     draw_tile(static_cast<int>(tile % count), list, sights[view], targets[view],
               workspaces[static_cast<size_t>(thread)]);
   });
-  SplatStats sum;
-  sum.prepare_ms = prepare_ms;
+  sum.prepare_ms += prepare_ms;
   for (const Workspace& w : workspaces) sum += w.stats;
   return sum;
 }
@@ -333,6 +366,11 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
                                const image::Shading& shading, const FrameTarget& target) {
   if (options.halved) return impl_->render_halved(list, camera, options, shading, target);
   return impl_->render(list, {&camera, 1}, options, shading, {&target, 1});
+}
+
+SplatStats CpuSplatter::draw_backdrop(const DrawList& list, const geometry::Camera& camera,
+                                      const image::Shading& shading, Backdrop& out) {
+  return impl_->draw_backdrop(list, camera, shading, out);
 }
 
 SplatStats CpuSplatter::render_pair(const DrawList& list, const std::array<geometry::Camera, 2>& cameras,

@@ -23,7 +23,7 @@ using Messages =
     std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply, ViewRequest, LeaseRequest, Lease, LeaseExtend,
                TileDone, TileRefused, PlanRequest, Plan, FrameEnd, StatusReport, MetricRows, Control, ControlReply,
                Shutdown, Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, Refine,
-               EpochBegin, StateMark, StateRequest, StateBegin, AccessReport, SliceWeights, SlabAssignment, SlabReady,
+               EpochBegin, StateMark, StateRequest, StateBegin, BaseRequest, BasePart, BaseHidden, AccessReport, SurfelRequest, Surfels, SliceWeights, SlabAssignment, SlabReady,
                SliceLease, VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady,
                Swap, Order, OrderAnswer, PictureTile, Picture>;
 

@@ -134,6 +134,48 @@ struct StateBegin {
     f("packer", m.packer); f("after", m.after);
   }
 };
+/// Viewer -> packer: send parts of the base, if there is one.
+struct BaseRequest {
+  static constexpr std::string_view kName = "base_request";
+  InstanceId viewer;
+  uint64_t base = 0;  ///< base that the viewer has begun; 0: none yet
+  uint64_t part = 0, parts = 1;  ///< the first one, and how many; 0: only what is hidden; at most kMaxBaseParts
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("base", m.base); f("part", m.part); f("parts", m.parts);
+  }
+};
+/// Packer -> viewer: surfels of the base, the coarse form of the whole data set. Part 0 has every kBaseStride-th one.
+struct BasePart {
+  static constexpr std::string_view kName = "base_part";
+  static constexpr bool kBulk = true;
+  InstanceId packer;
+  uint64_t base = 0;  ///< number of the base: another scene or colouring has another one
+  uint64_t part = 0, parts = 1;
+  uint64_t surfels = 0;  ///< surfels of the whole base
+  uint64_t depth = 0;    ///< octree levels of its leaves' keys
+  geometry::Box box_room;  ///< box of that octree (points::ModelConfig)
+  double spacing_m = 0;  ///< side of the cells that surfels are means of
+  Bytes surfel_data;     ///< codec::encode_surfels(); SurfelLeaf::first: number of the leaf's first surfel in the base
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("base", m.base); f("part", m.part); f("parts", m.parts); f("surfels", m.surfels);
+    f("depth", m.depth); f("box_room", m.box_room); f("spacing_m", m.spacing_m);
+    f("surfel_data", m.surfel_data, kMaxBulkBytes);
+  }
+};
+/// Packer -> viewers (PUB, and in answer to a request for part 0): which surfels of the base are hidden, because finer
+/// samples lie there, or because rays passed. Words that are not named stay as they were.
+struct BaseHidden {
+  static constexpr std::string_view kName = "base_hidden";
+  static constexpr bool kBulk = true;
+  InstanceId packer;
+  uint64_t base = 0;
+  uint64_t number = 0;  ///< counts these messages on PUB; in an answer: of the newest one that it includes
+  bool whole = false;   ///< words that are not named are 0
+  std::vector<uint32_t> words;  ///< three numbers each: index i, then 64 bits of the surfels from 64 i on, low half first
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("base", m.base); f("number", m.number); f("whole", m.whole); f("words", m.words);
+  }
+};
 /// Clusters drawn since the last report.
 struct AccessReport {
   static constexpr std::string_view kName = "access_report";

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "common/geometry/surfels.h"
 #include "common/wire/decoder.h"
 #include "common/wire/encoder.h"
 
@@ -74,6 +75,7 @@ std::optional<Error> check(const M&) {
 std::optional<Error> check(const Welcome& m) {
   const SessionSettings& s = m.settings;
   for (const Setting& row : {Setting{"max_points", double(s.max_points), 0, 1e12},
+                             {"base_points", double(s.base_points), 0, double(geometry::kMaxSurfels)},
                              {"obsolete_after_s", s.obsolete_after_s, 0, 1e12},
                              {"max_rate_mbit", s.max_rate_mbit, 0, 1e6},
                              {"view_cell_m", s.view_cell_m, 0, 1e3},
@@ -147,6 +149,29 @@ std::optional<Error> check(const PictureTile& m) { return check(m.lease); }
 std::optional<Error> check(const Picture& m) {
   if (auto bad = check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame)) return bad;
   return check_pixels(m.rect);
+}
+
+std::optional<Error> check(const BaseRequest& m) {
+  if (m.part < kMaxBaseParts && m.parts <= kMaxBaseParts) return {};
+  return Error{fmt::format("{} parts from {} on, limit {}", m.parts, m.part, kMaxBaseParts)};
+}
+
+std::optional<Error> check(const BasePart& m) {
+  if (m.parts == 0 || m.parts > kMaxBaseParts || m.part >= m.parts)
+    return Error{fmt::format("part {} of {} is out of range, limit {}", m.part, m.parts, kMaxBaseParts)};
+  if (m.surfels == 0 || m.surfels > geometry::kMaxSurfels)
+    return Error{fmt::format("{} surfels, limits 1 and {}", m.surfels, geometry::kMaxSurfels)};
+  return {};
+}
+
+std::optional<Error> check(const BaseHidden& m) {
+  if (m.words.size() % 3 == 0) return {};
+  return Error{fmt::format("{} numbers are not a multiple of three", m.words.size())};
+}
+
+std::optional<Error> check(const SurfelRequest& m) {
+  if (m.most >= 1 && m.most <= geometry::kMaxSurfels) return {};
+  return Error{fmt::format("{} surfels, limits 1 and {}", m.most, geometry::kMaxSurfels)};
 }
 
 std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.frames); }

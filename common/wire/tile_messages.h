@@ -231,6 +231,29 @@ struct Chunk {
   }
 };
 
+// ---- the coarse form of a mesh: packer (DEALER) <-> data (ROUTER) ----------------------------------------------------
+
+/// A data server answers once the surfels are made; the packer repeats its request.
+struct SurfelRequest {
+  static constexpr std::string_view kName = "surfel_request";
+  EpochId epoch;
+  std::string array;      ///< as ChunkListRequest::array
+  uint64_t most = 0;      ///< surfels wished, at most geometry::kMaxSurfels
+  template <class F> static void fields(F& f, auto& m) {
+    f("epoch", m.epoch); f("array", m.array); f("most", m.most);
+  }
+};
+struct Surfels {
+  static constexpr std::string_view kName = "surfels";
+  static constexpr bool kBulk = true;
+  EpochId epoch;
+  std::string array;
+  Bytes data;  ///< layout: geometry/surfels.h; empty: there are none
+  template <class F> static void fields(F& f, auto& m) {
+    f("epoch", m.epoch); f("array", m.array); f("data", m.data, kMaxBulkBytes);
+  }
+};
+
 // ---- depth images: sampler (PUSH) -> packer (PULL) -----------------------------------------------------------------
 
 struct DepthTile {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/geometry/surfels.h"
 #include "common/image/background.h"
 #include "common/image/shading.h"
 #include "common/scene/clip_order.h"
@@ -195,6 +196,11 @@ options::Table packing_table(wire::SessionSettings& s) {
            .value = &s.max_points,
            .help = "points the model holds at most; 0: no limit",
            .limits = options::Range{0.0, 1e12},
+           .fits = points},
+          {.flag = "--base-points",
+           .value = &s.base_points,
+           .help = "points of the coarse form of the whole data set that each viewer holds; 0: none",
+           .limits = options::Range{0.0, double(geometry::kMaxSurfels)},
            .fits = points},
           {.flag = "--packing.obsolete_after_s",
            .value = &s.obsolete_after_s,

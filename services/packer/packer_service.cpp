@@ -36,13 +36,14 @@ bool is_any(std::string_view type) {
 bool belongs(std::string_view type, scene::Pipeline pipeline) {
   if (pipeline == scene::Pipeline::kSlices) return is_any<wire::SliceImages, wire::SliceAck>(type);
   if (pipeline == scene::Pipeline::kPictures) return is_any<wire::PictureTile, wire::SliceAck>(type);
-  return is_any<wire::DepthTile, wire::StateRequest, wire::AccessReport, wire::Receipt>(type);
+  return is_any<wire::DepthTile, wire::StateRequest, wire::AccessReport, wire::Receipt, wire::BaseRequest>(type);
 }
 
 class PackerTurns final : public PackerService {
  public:
   PackerTurns(const PackerOptions& o, net::Context& context)
       : options_(o),
+        context_(context),
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
                {.high_water_mark = 16,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
@@ -66,7 +67,7 @@ class PackerTurns final : public PackerService {
         rates_(o.service.max_messages) {}
 
   /// Binds the three sockets and says hello with their addresses.
-  Status open(net::Context& context) {
+  Status open() {
     wire::Hello hello;
     hello.role = "packer";
     hello.name = options_.service.name;
@@ -85,7 +86,7 @@ class PackerTurns final : public PackerService {
       if (!recorder) return recorder.error();
       recorder_ = std::move(*recorder);
     }
-    link_.emplace(context, options_.service.master, hello, options_.service.give_up_after_s);
+    link_.emplace(context_, options_.service.master, hello, options_.service.give_up_after_s);
     return ok_status();
   }
 
@@ -93,6 +94,7 @@ class PackerTurns final : public PackerService {
     receive_control();
     receive(state_, kStateAtOnce, &Packing::take_state);
     receive(tiles_, kSampledAtOnce, &Packing::take_sampled);
+    if (packing_) packing_->receive();
     if (net::stop_requested() || link_->shutdown_requested()) {
       flush_spans(1e300);
       link_->leave([&] { return status(); });
@@ -103,7 +105,8 @@ class PackerTurns final : public PackerService {
     early_.expire(now);
     if (packing_) packing_->tick(now);
     flush_spans(now);
-    const std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
+    std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
+    if (packing_) std::ranges::copy(packing_->sockets(), std::back_inserter(sockets));
     if (net::wait_readable(sockets, 0) || use_spare_time(now)) return net::Wait{};
     return_freed_memory(now);
     return net::Wait{sockets, longest_wait_s()};
@@ -213,7 +216,8 @@ class PackerTurns final : public PackerService {
     const PointPacking::Options options{.threads = options_.threads,
                                         .max_log_bytes = uint64_t(options_.log_limit_mb * 1e6),
                                         .answers = {.window_bytes = uint64_t(options_.answer_window_mb * 1e6)},
-                                        .recorder = recorder_ ? &*recorder_ : nullptr};
+                                        .recorder = recorder_ ? &*recorder_ : nullptr,
+                                        .context = &context_};
     return std::make_unique<PointPacking>(options, std::move(outlets), spans_);
   }
 
@@ -271,6 +275,7 @@ class PackerTurns final : public PackerService {
   }
 
   const PackerOptions& options_;
+  net::Context& context_;
   net::Socket tiles_, patches_, state_;
   net::PeerRates rates_;  // message rates of viewers
   net::WorkShares work_;  // viewers' shares of the packer's time
@@ -291,7 +296,7 @@ class PackerTurns final : public PackerService {
 
 Result<std::unique_ptr<PackerService>> PackerService::open(net::Context& context, const PackerOptions& o) {
   auto out = std::make_unique<PackerTurns>(o, context);
-  if (const Status s = out->open(context); !s) return s.error();
+  if (const Status s = out->open(); !s) return s.error();
   return {std::move(out)};
 }
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "common/core/ids.h"
 #include "common/net/master_link.h"
@@ -59,6 +60,10 @@ class Packing {
   virtual void take_sampled(net::Socket& from, const net::Message& message, double now_s) = 0;
   /// Takes a viewer's message, with the same rules.
   virtual void take_state(net::Socket& from, const net::Message& message, double now_s) = 0;
+
+  /// Returns sockets of its own; receive() takes their messages.
+  virtual std::vector<net::Socket*> sockets() { return {}; }
+  virtual void receive() {}
 
   /// No more tiles of this frame come.
   virtual void end_frame(const wire::FrameEnd& /*end*/, double /*now_s*/) {}

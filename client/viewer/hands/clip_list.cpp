@@ -71,6 +71,7 @@ uint32_t keep_inside(const LeafPlanes& planes, splat::DrawItem& item, splat::Dra
 void clip_list(const geometry::Clip& clip, splat::DrawList& list) {
   list.held.clear();
   if (clip.empty()) return;
+  if (list.coarse) clip_list(clip, *list.coarse);
   const points::Cluster* cluster = nullptr;
   Part part = Part::kAll;
   std::optional<LeafPlanes> planes;  // the planes on the cluster's steps
@@ -86,6 +87,7 @@ void clip_list(const geometry::Clip& clip, splat::DrawList& list) {
     list.points += count;
     return count == 0;
   });
+  if (list.coarse) list.points += list.coarse->points;
 }
 
 }  // namespace telesplat::viewer

@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "common/core/check.h"
+#include "common/splat/backdrop.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -170,6 +171,37 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
   return made;
 }
 
+void ModelCache::begin_base(const points::ModelConfig& config) {
+  auto fresh = std::make_unique<points::PointModel>(config);
+  const std::lock_guard lock(mutex_);
+  if (base_) dropped_of(base_.get()).models.push_back(std::move(base_));
+  base_ = std::move(fresh);
+  note_replica();
+}
+
+void ModelCache::put_base(std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> leaves) {
+  if (leaves.empty()) return;
+  points::Insertion insertion;
+  std::vector<points::ClusterKey> emptied;
+  for (auto& [key, mosaic] : leaves) {
+    if (!mosaic) {
+      emptied.push_back(key);
+      continue;
+    }
+    auto& change = insertion.changes.emplace_back();
+    change.key = key;
+    if (base_->find(key)) change.replaced = {0};
+    change.added.push_back(*std::move(mosaic));
+  }
+  const std::lock_guard lock(mutex_);
+  for (const auto& leaf : leaves) note_change(points::leaf_box(base_->config(), leaf.first));
+  Dropped& place = dropped_of(base_.get());
+  auto replaced = base_->commit(std::move(insertion));
+  move_to_end(replaced, place.mosaics);
+  auto dropped = base_->take_out(emptied);
+  move_to_end(dropped, place.clusters);
+}
+
 uint64_t ModelCache::digest() const { return newest_.model ? newest_.model->digest() : 0; }
 
 void ModelCache::select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options,
@@ -184,6 +216,16 @@ void ModelCache::select_displayed(const geometry::Camera& camera, const splat::S
   out.replica = replica.number;
   out.summaries = summaries_made_;
   drawn_ = replica.model.get();
+  base_drawn_ = base_.get();
+  select_base(camera, options, out);
+}
+
+void ModelCache::select_base(const geometry::Camera& camera, const splat::SelectionOptions& options,
+                             splat::DrawList& out) const {
+  if (!base_ || base_->points() == 0) return out.coarse.reset();
+  if (!out.coarse) out.coarse = std::make_shared<splat::DrawList>();
+  splat::select_coarse(*base_, camera, options, *out.coarse);
+  out.points += out.coarse->points;
 }
 
 void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
@@ -207,7 +249,7 @@ void ModelCache::take_changes(Changes& out) {
 
 void ModelCache::end_frame() {
   const std::lock_guard lock(mutex_);
-  drawn_ = nullptr;
+  drawn_ = base_drawn_ = nullptr;
   move_to_end(parked_.clusters, free_.clusters);
   move_to_end(parked_.mosaics, free_.mosaics);
   move_to_end(parked_.summaries, free_.summaries);

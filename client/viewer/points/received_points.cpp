@@ -30,6 +30,9 @@ ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLin
                  [this](const wire::StateRequest& request) {
                    if (auto* state = links_.feeds.find("state")) state->send(request);
                  },
+                 [this](const wire::BaseRequest& request) {
+                   if (auto* state = links_.feeds.find("state")) state->send(request);
+                 },
                  links.on_part, links.on_epoch, links.to_master_s},
                 cache_, fine_rays_, batches_, links.spans) {}
 

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "client/viewer/coupling/view_requester.h"
+#include "client/viewer/points/base_replica.h"
 #include "client/viewer/points/epoch_switch.h"
 #include "client/viewer/points/event_sequencer.h"
 #include "client/viewer/points/model_cache.h"
@@ -31,6 +32,7 @@ class PointReceiver {
   struct Links {
     std::function<points::ModelConfig()> config;  ///< for a replica that begins
     std::function<void(const wire::StateRequest&)> request_state;
+    std::function<void(const wire::BaseRequest&)> request_base;
     std::function<void(const ViewPart&)> on_part;  ///< a patch was applied, or put into the batches
     std::function<void()> on_epoch;                ///< a new epoch began
     std::function<double(double)> to_master_s;
@@ -44,7 +46,7 @@ class PointReceiver {
   /// there is one.
   std::optional<ShownUpdate> release();
   /// The packer is at another address.
-  void start() { sequencer_.start(); }
+  void start();
   /// True after start(): there may be a replica.
   bool begun() const { return sequencer_.begun(); }
   void receive_events(net::Socket& patches, int most);
@@ -65,6 +67,8 @@ class PointReceiver {
 
  private:
   void apply(const ModelEvent& event);
+  void on_base_part(const wire::BasePart& part);
+  void apply_base(size_t most);
   void on_published_mark(const wire::StateMark& mark);
   void record(const ModelEvent& event);
   /// False if the patch cannot be decoded.
@@ -79,6 +83,8 @@ class PointReceiver {
   UpdateBatches& batches_;
   metrics::SpanRecorder& spans_;
   EventSequencer sequencer_;
+  BaseReplica base_;
+  uint64_t base_begun_ = 0;  // BaseReplica::number() of the base in the cache
   EpochSwitch switch_;
   ReplicaCheck check_;
   points::ModelConfig config_;  // the newest replica's, which may be held, and its epoch; 0: not known yet

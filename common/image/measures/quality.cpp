@@ -40,6 +40,17 @@ struct Sums {
   }
 };
 
+// Pixels that show more than there is.
+struct Excess {
+  size_t covered = 0, nearer = 0;
+  Excess operator+(const Excess& o) const { return {covered + o.covered, nearer + o.nearer}; }
+  void add(float nearest_m, float shown_m) {
+    if (!shows(shown_m)) return;
+    covered += !shows(nearest_m);
+    nearer += shows(nearest_m) && shown_m < 0.99f * nearest_m;
+  }
+};
+
 std::array<float, 2 * kRadius + 1> gaussian() {
   std::array<float, 2 * kRadius + 1> w{};
   for (int i = -kRadius; i <= kRadius; ++i)
@@ -115,7 +126,9 @@ class RowMoments {
 };
 
 // hits: number of rays in each pixel of the reference that met the data; null: one ray, whose depth shows it.
-Quality compare_counted(const View& reference, const uint16_t* hits, const View& reconstruction) {
+// nearest_m: nearest depth of each pixel's rays; null: one ray.
+Quality compare_counted(const View& reference, const uint16_t* hits, const float* nearest_m,
+                        const View& reconstruction) {
   const int width = reference.width, height = reference.height;
   const size_t pixels = size_t(width) * height;
   CHECK(reconstruction.width == width && reconstruction.height == height);
@@ -165,6 +178,15 @@ Quality compare_counted(const View& reference, const uint16_t* hits, const View&
   q.psnr_db = mean_squared > 0 ? std::min(99.0, 10 * std::log10(255.0 * 255.0 / mean_squared)) : 99.0;
   q.ssim = sums.ssim / static_cast<double>(sums.pixels);
   if (sums.object > 0) q.hole_fraction = static_cast<double>(sums.holes) / static_cast<double>(sums.object);
+  const auto shown = [&](const tbb::blocked_range<size_t>& range, Excess sum) {
+    const float* nearest = nearest_m ? nearest_m : reference.depth_m.data();
+    for (size_t i = range.begin(); i < range.end(); ++i) sum.add(nearest[i], reconstruction.depth_m[i]);
+    return sum;
+  };
+  const Excess excess = sum_in_parallel(tbb::blocked_range<size_t>(0, pixels, 65536), Excess{}, shown,
+                                        [](const Excess& a, const Excess& b) { return a + b; });
+  q.covered_fraction = static_cast<double>(excess.covered) / static_cast<double>(pixels);
+  q.nearer_fraction = static_cast<double>(excess.nearer) / static_cast<double>(pixels);
   return q;
 }
 
@@ -176,11 +198,13 @@ const uint16_t* hits_of(const Reference& r) {
 }  // namespace
 
 Quality compare(const Reference& reference, const View& reconstruction) {
-  return compare_counted(reference.view, hits_of(reference), reconstruction);
+  const auto& nearest = reference.nearest_m;
+  return compare_counted(reference.view, hits_of(reference), nearest.empty() ? nullptr : nearest.data(),
+                         reconstruction);
 }
 
 Quality compare(const View& reference, const View& reconstruction) {
-  return compare_counted(reference, nullptr, reconstruction);
+  return compare_counted(reference, nullptr, nullptr, reconstruction);
 }
 
 bool counts(const Reference& r, const View& reconstruction, size_t at) {

@@ -13,6 +13,8 @@ struct Quality {
   double hole_fraction = 0;  ///< share of object pixels that show background or a depth > 1 % farther
   size_t object_pixels = 0;  ///< pixels whose rays all meet the data set; if 0, all figures are undefined
   size_t hole_pixels = 0;
+  double covered_fraction = 0;  ///< share of all pixels that show the data set where no ray meets it
+  double nearer_fraction = 0;   ///< share of all pixels that show something > 1 % nearer than each of their rays
 };
 
 /// An object pixel is one whose rays all meet the data; its depth is that of the farthest ray (reference.h): so a hole

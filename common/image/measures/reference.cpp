@@ -20,7 +20,7 @@ int side_of(int samples) { return static_cast<int>(std::lround(std::sqrt(samples
 void gather(const View& fine, int fine_x, int fine_y, int side, size_t at, Reference& out) {
   uint32_t sum[3] = {};
   int hits = 0;
-  float farthest = 0;
+  float farthest = 0, nearest = kNothing;
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
       const size_t from = size_t(fine_y + j) * fine.width + (fine_x + i);
@@ -28,12 +28,14 @@ void gather(const View& fine, int fine_x, int fine_y, int side, size_t at, Refer
       sum[0] += c >> 16 & 255, sum[1] += c >> 8 & 255, sum[2] += c & 255;
       hits += fine.depth_m[from] < kNothing;
       farthest = std::max(farthest, fine.depth_m[from]);
+      nearest = std::min(nearest, fine.depth_m[from]);
     }
   const auto n = static_cast<uint32_t>(side * side);
   const auto mean = [&](int channel) { return (sum[channel] + n / 2) / n; };
   out.view.colour[at] = mean(0) << 16 | mean(1) << 8 | mean(2);
   out.view.depth_m[at] = farthest;
   out.hits[at] = static_cast<uint16_t>(hits);
+  out.nearest_m[at] = nearest;
 }
 
 void gather_piece(const View& fine, const geometry::Rect& piece, int side, Reference& out) {
@@ -53,7 +55,7 @@ Status validate_samples(int samples) {
 
 Reference reference_of(View view) {
   CHECK(view.depth_m.size() == view.colour.size());
-  return {1, std::move(view), {}};
+  return {1, std::move(view), {}, {}};
 }
 
 Result<Reference> supersample(const geometry::Camera& camera, int samples,
@@ -68,7 +70,8 @@ Result<Reference> supersample(const geometry::Camera& camera, int samples,
   const size_t pixels = size_t(camera.width) * camera.height;
   Reference out{samples,
                 {camera.width, camera.height, std::vector<uint32_t>(pixels), std::vector<float>(pixels)},
-                std::vector<uint16_t>(pixels)};
+                std::vector<uint16_t>(pixels),
+                std::vector<float>(pixels)};
   for (int y = 0; y < camera.height; y += most)
     for (int x = 0; x < camera.width; x += most) {
       const geometry::Rect piece{x, y, std::min(most, camera.width - x), std::min(most, camera.height - y)};

@@ -18,10 +18,12 @@ inline constexpr int kMostSamples = 64;
 ///   view.colour   mean of the rays' colours, background included: a box filter on displayed colours
 ///   view.depth_m  the farthest depth at which a ray meets the data; +infinity unless all of them do
 ///   hits          number of rays in each pixel that met the data; empty for one ray a pixel, whose depth shows it
+///   nearest_m     the nearest depth at which a ray meets the data; +infinity if no ray does; empty for one ray a pixel
 struct Reference {
   int samples = 1;
   View view;
   std::vector<uint16_t> hits;
+  std::vector<float> nearest_m;
 };
 
 /// Error: `samples` is not 1, 4, 9, 16, 25, 36, 49 or 64.

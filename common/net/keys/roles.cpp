@@ -54,6 +54,7 @@ constexpr Row kTable[] = {
     {"control", "slice_weights", {kData}},
     {"chunks", "chunk_list_request", {kSampler}},
     {"chunks", "chunk_request", {kSampler}},
+    {"chunks", "surfel_request", {kPacker}},
     {"voxels", "voxel_request", {kSampler}},
     {"tiles", "depth_tile", {kSampler}},
     {"tiles", "slice_images", {kSampler}},
@@ -61,6 +62,7 @@ constexpr Row kTable[] = {
     {"patches", "", kWatchers},  // empty type: they subscribe
     {"state", "state_request", kWatchers},
     {"state", "access_report", kWatchers},
+    {"state", "base_request", kWatchers},
     {"state", "receipt", kWatchers},
     {"state", "slice_ack", kWatchers},
 };

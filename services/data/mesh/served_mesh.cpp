@@ -22,6 +22,7 @@
 #include "services/data/base/epochs.h"
 #include "services/data/base/placement_options.h"
 #include "services/data/mesh/cast.h"
+#include "services/data/mesh/surfels.h"
 
 namespace telesplat::data {
 namespace {
@@ -37,7 +38,7 @@ class ArrayStores {
   ~ArrayStores();
 
   /// Null: the array's store is not open.
-  const MeshStore* find(const std::string& array) const;
+  std::shared_ptr<const MeshStore> find(const std::string& array) const;
   /// Opens the array's store as soon as no other one is being opened; only the array wanted last waits.
   void want(const std::string& array);
   bool busy() const { return opening_.valid(); }
@@ -76,9 +77,9 @@ ArrayStores::~ArrayStores() {
   if (opening_.valid()) opening_.wait();
 }
 
-const MeshStore* ArrayStores::find(const std::string& array) const {
+std::shared_ptr<const MeshStore> ArrayStores::find(const std::string& array) const {
   const auto found = open_.find(array);
-  return found == open_.end() ? nullptr : found->second.get();
+  return found == open_.end() ? nullptr : found->second;
 }
 
 void ArrayStores::begin(const std::string& array) {
@@ -124,7 +125,7 @@ constexpr int kAnswersWaiting = 16;
 constexpr double kListsAtOnce = 4, kLists_s = 1;  // per peer: lists at once, then lists per second
 constexpr size_t kPeers = 1024;                   // peers whose lists are counted
 
-// Lists are large and cheap to ask for: each peer gets a few at once, then one per second.
+// Lists and surfels are large and cheap to ask for: each peer gets a few at once, then one per second.
 class ListLimit {
  public:
   bool allow(const std::string& peer, double now_s) {
@@ -221,16 +222,16 @@ class ServedMesh final : public Served {
     return ok_status();
   }
 
-  // Samplers repeat requests: for arrays that are not open yet, and for answers that found the queue full.
+  // Samplers and packers repeat requests: for what is not made yet, and for answers that found the queue full.
   void answer(const net::Message& message, const Outlets& outlets) override {
-    net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(outlets.requests, message, [&](const auto& request) {
-      constexpr bool kAsksForAll = std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkListRequest>;
-      if (kAsksForAll && !lists_.allow(message.peer, monotonic_s())) return;
-      const MeshStore* store = stores_.find(request.array);
+    using namespace wire;
+    net::dispatch<ChunkListRequest, ChunkRequest, SurfelRequest>(outlets.requests, message, [&](const auto& request) {
+      constexpr bool kAsksForOne = std::is_same_v<std::decay_t<decltype(request)>, ChunkRequest>;
+      if (!kAsksForOne && !lists_.allow(message.peer, monotonic_s())) return;
+      const auto store = stores_.find(request.array);
+      if (!store || !is_made(request, store)) return;
       using Reply = decltype(reply(request, *store));
-      if (store)
-        outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store),
-                                          [&] { return reply(request, *store); });
+      outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store), [&] { return reply(request, *store); });
     });
   }
   Result<std::optional<std::string>> carry_out(const wire::Order& order) override {
@@ -245,7 +246,7 @@ class ServedMesh final : public Served {
       if (!read) return read.error();
       colouring = *std::move(read);
     }
-    const MeshStore* store = stores_.find(colouring.array);
+    const auto store = stores_.find(colouring.array);
     if (!store) return Error{fmt::format("probe: the array {} is being read", colouring.array)};
     const auto choice = scene::choose_array(store->info().arrays, colouring.array);
     const bool of_cells = !colouring.array.empty() && choice && store->info().arrays[choice->index].of_cells;
@@ -268,6 +269,11 @@ class ServedMesh final : public Served {
   }
 
  private:
+  bool is_made(const auto&, const auto&) { return true; }
+  bool is_made(const wire::SurfelRequest& request, const std::shared_ptr<const MeshStore>& store) {
+    surfels_ = maker_.get(store, request.array, request.most);
+    return surfels_.has_value();
+  }
   static wire::ChunkList reply(const wire::ChunkListRequest& request, const MeshStore& store) {
     return {request.epoch, store.chunks()};
   }
@@ -276,6 +282,10 @@ class ServedMesh final : public Served {
     const bool exists = request.chunk.value < store.chunks().size();
     return {request.epoch, request.chunk, exists ? store.chunk(request.chunk).bytes : wire::Bytes{}};
   }
+  wire::Surfels reply(const wire::SurfelRequest& request, const MeshStore&) const {
+    return {request.epoch, request.array, surfels_->bytes};
+  }
+  uint64_t bytes_of(const wire::SurfelRequest&, const MeshStore&) const { return surfels_->bytes.size(); }
   static uint64_t bytes_of(const wire::ChunkListRequest&, const MeshStore& store) {
     return store.chunks().size() * sizeof(geometry::ChunkInfo);
   }
@@ -305,6 +315,8 @@ class ServedMesh final : public Served {
   const std::optional<double> iso_;
   ArrayStores stores_;
   ListLimit lists_;
+  SurfelMaker maker_;
+  SurfelMaker::Bytes surfels_;  // those of the request at hand
   Epochs epochs_;
   InstanceId master_;
   std::string order_, shown_, answer_;

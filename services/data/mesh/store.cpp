@@ -34,6 +34,7 @@ class Store : public MeshStore {
     CHECK(id.value < content_.chunks.size());
     return {content_.file->bytes().subspan(content_.offsets[id.value], content_.chunks[id.value].bytes), content_.file};
   }
+  geometry::ChunkBytes surfels() const override { return {content_.surfels, content_.file}; }
 
  private:
   StoreContent content_;

@@ -72,6 +72,8 @@ class MeshStore {
   virtual const std::vector<geometry::ChunkInfo>& chunks() const = 0;
   /// Returns a chunk's bytes, in mapped memory. Precondition: id is one of chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
+  /// Returns the surfels of the whole mesh (surfels.h), in mapped memory.
+  virtual geometry::ChunkBytes surfels() const = 0;
 };
 
 }  // namespace telesplat::data

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "common/parallel/in_parallel.h"
+#include "services/data/mesh/surfels.h"
 
 namespace telesplat::data {
 namespace {
@@ -23,6 +24,7 @@ struct StoreHeader {
   uint32_t chunks = 0;
   uint64_t file_bytes = 0;
   MeshFigures figures;
+  uint64_t surfels_offset = 0, surfels_bytes = 0, surfels_checksum = 0;
   uint64_t arrays_offset = 0, arrays_bytes = 0;
   uint64_t lines_bytes = 0;  ///< after the arrays
   uint64_t checksum = 0;     ///< over all fields above and the table of contents
@@ -50,6 +52,30 @@ int write_at(int descriptor, const void* data, size_t bytes, size_t offset) {
     p += n, offset += static_cast<size_t>(n), bytes -= static_cast<size_t>(n);
   }
   return 0;
+}
+
+// False: the bytes cannot be read.
+bool read_at(int descriptor, std::span<std::byte> to, size_t offset) {
+  while (!to.empty()) {
+    const ssize_t n = pread(descriptor, to.data(), to.size(), static_cast<off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    to = to.subspan(static_cast<size_t>(n)), offset += static_cast<size_t>(n);
+  }
+  return true;
+}
+
+// Makes the surfels of the chunks that the file holds.
+std::vector<std::byte> surfels_of(int descriptor, const MeshFigures& figures, std::span<const StoreEntry> entries) {
+  const auto chunk = [&](size_t i, std::vector<uint64_t>& buffer) {
+    buffer.resize((entries[i].bytes + 7) / 8);
+    const auto bytes = std::as_writable_bytes(std::span(buffer)).first(entries[i].bytes);
+    if (!read_at(descriptor, bytes, entries[i].offset)) std::memset(bytes.data(), 0, bytes.size());
+    const auto view = geometry::MeshChunkView::validate(bytes);
+    return view ? *view : geometry::MeshChunkView{};
+  };
+  const std::atomic<bool> never{false};
+  return make_surfels({figures.box_room, figures.triangles, entries.size(), chunk}, kStoredSurfels, never);
 }
 
 }  // namespace
@@ -84,6 +110,11 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   }
 
   StoreHeader header{.chunks = static_cast<uint32_t>(entries.size()), .figures = info};
+  progress(kMakingSurfels, 0.0);
+  const auto surfels = failure == 0 ? surfels_of(descriptor, info, entries) : std::vector<std::byte>();
+  header.surfels_offset = end.fetch_add(round_up(surfels.size())), header.surfels_bytes = surfels.size();
+  header.surfels_checksum = XXH3_64bits(surfels.data(), surfels.size());
+  if (failure == 0) failure = write_at(descriptor, surfels.data(), surfels.size(), header.surfels_offset);
   std::string texts = scene::to_text(info.arrays);
   header.arrays_offset = end, header.arrays_bytes = texts.size();
   for (const std::string& line : {info.format, info.up, info.up_reason, info.array, scene::to_text(info.coordinates)})
@@ -128,7 +159,12 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
   auto arrays = scene::arrays_from_text(texts.substr(0, header.arrays_bytes));
   if (!arrays) return Error{fmt::format("{}: {}", name, arrays.error().text)};
 
-  StoreContent out{*mapped, {header.figures}, {}, {}};
+  const uint64_t surfels = header.surfels_offset <= bytes.size() ? bytes.size() - header.surfels_offset : 0;
+  if (header.surfels_bytes > surfels || header.surfels_offset % kPage != 0)
+    return Error{fmt::format("{}: the surfels lie outside their store", name)};
+  StoreContent out{*mapped, {header.figures}, {}, {}, bytes.subspan(header.surfels_offset, header.surfels_bytes)};
+  if (XXH3_64bits(out.surfels.data(), out.surfels.size()) != header.surfels_checksum)
+    return Error{fmt::format("{}: the surfels of the store are damaged", name)};
   out.info.arrays = *std::move(arrays);
   std::istringstream lines{std::string(texts.substr(header.arrays_bytes))};
   std::string coordinates_text;

@@ -3,6 +3,7 @@
 //     offset 0      StoreHeader, padded to 4096
 //     4096          StoreEntry[chunks], padded to a multiple of 4096
 //     then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order of making
+//     then          the surfels of the whole mesh (common/geometry/surfels.h)
 //     then          the file's arrays as scene::to_text(); then lines: format, up axis, reason for it, array of the
 //                                 chunks' values, coordinates, and remarks on the file, without its name
 //
@@ -43,7 +44,7 @@ std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// To be raised whenever readers, placement or layout would make another file from the same mesh.
-inline constexpr uint32_t kStoreVersion = 8;
+inline constexpr uint32_t kStoreVersion = 9;
 
 /// Writes the store of a placed mesh into an open, empty, writable file. `info` describes the mesh, with boxes and
 /// counts. After a failure (disk full) the file's content is useless. Errors start with `name`. `progress` (stages
@@ -56,10 +57,11 @@ struct StoreContent {
   MeshStoreInfo info;  ///< without source and from_cache; notes without the file's name
   std::vector<geometry::ChunkInfo> chunks;
   std::vector<size_t> offsets;  ///< offset of each chunk in the file
+  std::span<const std::byte> surfels;  ///< in the file
 };
 
 /// Maps a store and checks all of it before any value is used: magic, version, size, the checksum over header and
-/// table of contents, the offsets, and the checksum of every chunk (which also loads the pages that samplers are about
+/// table of contents, the offsets, and the checksums of surfels and of every chunk (which also loads the pages that samplers are about
 /// to request).
 Result<StoreContent> read_store(int descriptor, const std::string& name);
 

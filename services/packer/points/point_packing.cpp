@@ -112,6 +112,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
     feed_.publish(*event);
     gatherer_.clear();
   }
+  base_.follow(session, config.model, core_->model().points() == 0);
   exactness_.follow(session.settings.errors);
   choose_errors();
   planning_.follow(*core_, plan_config_of(session.settings, config));
@@ -174,6 +175,8 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   if (!block.extra) exactness_.heads().seen(block.viewer, block.camera.pose, now_s);
   Planner* planner = planning_.planner();
   if (planner) planner->take(block, whole, now_s), block.missed = planner->missed(block);
+  const image::PixelMask* cast = planner && !whole ? planner->cast(block) : nullptr;
+  if (whole || cast) base_.take(block, cast);
   const auto reference = planner ? planner->reference(block) : std::nullopt;
   // The counts of a block go to the tile that completed it.
   const auto announce = [&](const Event& event) {
@@ -194,10 +197,9 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   };
   const auto event = core_->submit(std::move(block), now_s, std::move(stream), announce, reference);
   if (!event) return event.error();
-  if (*event && (*event)->frame_complete)
-    for (const auto& forget : core_->forget_superseded()) feed_.publish(forget);
-  if (planner)
-    for (const auto& forget : core_->forget(planner->disproved())) feed_.publish(forget);
+  if (*event && (*event)->frame_complete) publish_forgets(core_->forget_superseded());
+  if (planner) publish_forgets(core_->forget(planner->disproved()));
+  base_.publish();
   spans_.add("pack", begin_s, outlets_.master_now(), 0, of(done));
   return ok_status();
 }
@@ -238,8 +240,15 @@ std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& requ
   wire::Moments moments = request.moments;
   moments.planned_s = moments.published_s = outlets_.master_now();
   if (event && *event) feed_.publish(**event, moments);
-  for (const auto& forget : core_->forget_superseded()) feed_.publish(forget);
+  publish_forgets(core_->forget_superseded());
   return plan;
+}
+
+void PointPacking::publish_forgets(const std::vector<Event>& events) {
+  for (const Event& event : events) {
+    feed_.publish(event);
+    base_.forgotten(event, core_->model());
+  }
 }
 
 void PointPacking::tell_taken(wire::TileDone& done) {
@@ -258,7 +267,8 @@ void PointPacking::record(const SampledTile& block) {
 }
 
 void PointPacking::take_state(net::Socket& from, const net::Message& message, double now_s) {
-  net::dispatch<wire::StateRequest, wire::AccessReport, wire::Receipt>(from, message, [&](const auto& m) {
+  using namespace wire;
+  net::dispatch<StateRequest, AccessReport, Receipt, BaseRequest>(from, message, [&](const auto& m) {
     if (!core_) return;
     using M = std::decay_t<decltype(m)>;
     if (!senders_.may_speak(message, m.viewer)) return from.reject(message, kNotItsViewer);
@@ -266,6 +276,8 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
       feed_.receive(m, message.peer, now_s);
     else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
+    else if constexpr (std::is_same_v<M, wire::BaseRequest>)
+      base_.answer(m, message.peer);
     else
       feed_.answer(*core_, m, message, now_s);
   });
@@ -285,12 +297,14 @@ void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
   feed_.expire(now_s);
   if (!core_) return;
+  base_.tick(feed_.instance(), now_s);
   feed_.send_answers(*core_);
   choose_errors();
   refine(now_s);
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;
-    for (const auto& event : core_->tick(now_s)) feed_.publish(event);
+    publish_forgets(core_->tick(now_s));
+    base_.publish();
   }
   feed_.send_mark(*core_, now_s);
 }
@@ -305,6 +319,7 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
   values.insert({{"points", double(core_->model().points())},
                  {"model_bytes", double(core_->model().bytes())},
                  {"log_bytes", double(core_->log_bytes())},
+                 {"base_surfels", double(base_.surfels())},
                  {"sequence", double(core_->sequence().value)},
                  {"tiles", double(g.tiles)},
                  {"tiles_untold", double(s.tiles_untold)},

@@ -8,6 +8,7 @@
 #include "common/metrics/process.h"
 #include "common/metrics/recorder.h"
 #include "services/packer/packing.h"
+#include "services/packer/points/base/base_feed.h"
 #include "services/packer/points/block_gatherer.h"
 #include "services/packer/points/depth_recorder.h"
 #include "services/packer/points/exactness.h"
@@ -25,6 +26,7 @@ class PointPacking final : public Packing {
     uint64_t max_log_bytes = 0;         ///< Config::max_log_bytes
     StateAnswers::Limits answers = {};  ///< for viewers that join or have gaps
     DepthRecorder* recorder = nullptr;  ///< records sampled depth images; null: not recorded
+    net::Context* context = nullptr;    ///< for the base's socket; null: viewers get no base
   };
   /// Keeps a reference to the spans, and the recorders' addresses.
   PointPacking(const Options& options, Outlets outlets, metrics::SpanRecorder& spans)
@@ -32,12 +34,15 @@ class PointPacking final : public Packing {
         outlets_(std::move(outlets)),
         spans_(spans),
         feed_(outlets_, options.answers),
+        base_(options.context, outlets_),
         planning_(outlets_, spans) {}
   PointPacking(const PointPacking&) = delete;  // its parts refer to it
 
   bool follow(const wire::Welcome& session, double now_s) override;
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
   void take_state(net::Socket& from, const net::Message& message, double now_s) override;
+  std::vector<net::Socket*> sockets() override { return base_.sockets(); }
+  void receive() override { base_.receive(); }
   void end_frame(const wire::FrameEnd& end, double now_s) override;
   wire::Plan plan(const wire::PlanRequest& request, double now_s) override;
   std::optional<wire::Plan> plan_piece(const wire::PlanRequest& request, double now_s) override;
@@ -70,6 +75,7 @@ class PointPacking final : public Packing {
   /// Reports a tile to the master that was taken, but not published by itself.
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
+  void publish_forgets(const std::vector<Event>& events);
   void choose_errors();
   void refine(double now_s);
 
@@ -80,6 +86,7 @@ class PointPacking final : public Packing {
   std::vector<uint32_t> lease_key_;  // the master's
   std::optional<PackerCore> core_;   // nullopt until the data set's box is known
   ModelFeed feed_;
+  BaseFeed base_;
   Planning planning_;
   Exactness exactness_;
   BlockGatherer gatherer_;

@@ -123,6 +123,25 @@ TEST(Quality, HolesAreBackgroundOrFartherByMoreThanOnePercent) {
   EXPECT_DOUBLE_EQ(compare(a, b).hole_fraction, 0.03);
 }
 
+TEST(Quality, CoveredBackgroundAndNearerPixelsAreShares) {
+  View a = flat(10, 10, 0x808080, 2);
+  a.depth_m[0] = a.depth_m[1] = a.depth_m[2] = kNothing;
+  View b = a;
+  b.depth_m[0] = b.depth_m[1] = 3;  // background that is covered
+  b.depth_m[5] = 1.97f;             // 1.5 % nearer
+  b.depth_m[6] = 1.99f;             // 0.5 % nearer: not
+  b.depth_m[7] = kNothing;          // a hole: not
+  EXPECT_DOUBLE_EQ(compare(a, b).covered_fraction, 0.02);
+  EXPECT_DOUBLE_EQ(compare(a, b).nearer_fraction, 0.01);
+}
+
+TEST(Quality, AnyRayThatMeetsTheDataMakesAPixelNoBackground) {
+  Reference a{4, flat(2, 1, 0x808080, kNothing), {1, 0}, {2, kNothing}};
+  View b = flat(2, 1, 0x808080, 1.9f);
+  EXPECT_DOUBLE_EQ(compare(a, b).covered_fraction, 0.5);
+  EXPECT_DOUBLE_EQ(compare(a, b).nearer_fraction, 0.5);
+}
+
 TEST(Quality, NothingIsDefinedWithoutAnObject) {
   const View a = flat(10, 10, 0x808080, kNothing);
   const Quality q = compare(a, a);

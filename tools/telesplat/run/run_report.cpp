@@ -165,6 +165,11 @@ void add_quality(const json& s, RunReport& out) {
   out.line("hole fraction",
            fmt::format("median {} %  p95 {} %", number(figure("hole_fraction", "median"), "{:.3f}", 100),
                        number(figure("hole_fraction", "p95"), "{:.3f}", 100)));
+  out.line("background covered / too near",
+           fmt::format("median {} / {} %  p95 {} / {} %", number(figure("covered_fraction", "median"), "{:.3f}", 100),
+                       number(figure("nearer_fraction", "median"), "{:.3f}", 100),
+                       number(figure("covered_fraction", "p95"), "{:.3f}", 100),
+                       number(figure("nearer_fraction", "p95"), "{:.3f}", 100)));
   add_steadiness(q, out);
   if (q.contains("last_view"))
     out.line("last view", fmt::format("PSNR {} dB, holes {} %", number(figure("last_view", "psnr_db"), "{:.2f}"),

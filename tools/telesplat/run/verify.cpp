@@ -41,7 +41,7 @@ ordered_json last_view(const std::vector<VerifiedView>& views) {
 }
 
 struct Columns {
-  std::vector<double> psnr, ssim, flip, holes, flicker, popping;
+  std::vector<double> psnr, ssim, flip, holes, covered, nearer, flicker, popping;
 };
 
 Columns columns_of(const std::vector<VerifiedView>& views) {
@@ -56,6 +56,8 @@ Columns columns_of(const std::vector<VerifiedView>& views) {
     c.ssim.push_back(v.quality.ssim);
     c.flip.push_back(v.flip);
     c.holes.push_back(v.quality.hole_fraction);
+    c.covered.push_back(v.quality.covered_fraction);
+    c.nearer.push_back(v.quality.nearer_fraction);
   }
   return c;
 }
@@ -183,11 +185,12 @@ class Verification {
 std::string quality_csv(const std::vector<VerifiedView>& views) {
   std::string out =
       "frame,t_s,samples,psnr_db,ssim,flip,hole_fraction,object_pixels,flicker,popping,"
-      "holes_followed,holes_closed,eye\n";
+      "holes_followed,holes_closed,eye,covered_fraction,nearer_fraction\n";
   for (const auto& v : views)
     out +=
-        fmt::format("{},{:.4f},{},{:.3f},{:.5f},{:.5f},{:.6f},{},{},{}\n", v.frame, v.t_s, v.samples, v.quality.psnr_db,
-                    v.quality.ssim, v.flip, v.quality.hole_fraction, v.quality.object_pixels, change_columns(v), v.eye);
+        fmt::format("{},{:.4f},{},{:.3f},{:.5f},{:.5f},{:.6f},{},{},{},{:.6f},{:.6f}\n", v.frame, v.t_s, v.samples,
+                    v.quality.psnr_db, v.quality.ssim, v.flip, v.quality.hole_fraction, v.quality.object_pixels,
+                    change_columns(v), v.eye, v.quality.covered_fraction, v.quality.nearer_fraction);
   return out;
 }
 
@@ -212,6 +215,8 @@ ordered_json quality_json(const std::vector<VerifiedView>& views) {
                    {"ssim", precise(c.ssim)},
                    {"flip", precise(c.flip)},
                    {"hole_fraction", precise(c.holes)},
+                   {"covered_fraction", precise(c.covered)},
+                   {"nearer_fraction", precise(c.nearer)},
                    {"flicker", precise(c.flicker)},
                    {"popping", precise(c.popping)},
                    {"hole_lifetime_ms", lifetime ? ordered_json(*lifetime) : ordered_json()}};

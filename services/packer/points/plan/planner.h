@@ -75,6 +75,9 @@ class Planner final : public ModelWatcher {
   /// Returns the model as seen where a planned tile was cast, as of now: PackerCore::submit() then need not render it.
   /// nullopt: not known. Valid until the planner or the model changes.
   std::optional<KnownReference> reference(const SampledTile& tile);
+  /// Returns the rays of a planned tile. Null: its plan is not known (any more), or the tile has samples beside them.
+  /// Valid until the planner changes.
+  const image::PixelMask* cast(const SampledTile& tile);
   /// Returns the rays of a tile finer than a view that met nothing, as large as the tile. Empty: the tile is not of
   /// that kind, or its plan is no longer known.
   image::PixelMask missed(const SampledTile& tile);

@@ -45,20 +45,26 @@ void Planner::end_frame(FrameId id) {
   if (frame) frame->left = 0, frame->ended = true;
 }
 
+const image::PixelMask* Planner::cast(const SampledTile& tile) {
+  const PlannedFrame* frame = shelf_.find(tile.frame);
+  if (!frame || frame->whole || !(frame->camera == tile.camera)) return nullptr;
+  const size_t at = frame->find(tile.rect);
+  return at == frame->tiles.size() || !only_cast(tile, frame->tiles[at].mask) ? nullptr : &frame->tiles[at].mask;
+}
+
 std::optional<KnownReference> Planner::reference(const SampledTile& tile) {
   const PlannedFrame* frame = shelf_.find(tile.frame);
-  if (!frame || frame->whole || !frame->map || !frame->nearest_known || !(frame->camera == tile.camera)) return {};
-  const size_t at = frame->find(tile.rect);
-  if (at == frame->tiles.size() || !only_cast(tile, frame->tiles[at].mask)) return {};
-  return KnownReference{frame->tiles[at].mask, frame->map->nearest_m};
+  if (!frame || !frame->map || !frame->nearest_known) return {};
+  const image::PixelMask* mask = cast(tile);
+  if (!mask) return {};
+  return KnownReference{*mask, frame->map->nearest_m};
 }
 
 image::PixelMask Planner::missed(const SampledTile& tile) {
   const PlannedFrame* frame = shelf_.find(tile.frame);
-  if (!frame || frame->kind != PlannedFrame::Kind::kFine || !(frame->camera == tile.camera)) return {};
-  const size_t at = frame->find(tile.rect);
-  if (at == frame->tiles.size() || !only_cast(tile, frame->tiles[at].mask)) return {};
-  image::PixelMask out = frame->tiles[at].mask;
+  const image::PixelMask* mask = cast(tile);
+  if (!frame || frame->kind != PlannedFrame::Kind::kFine || !mask) return {};
+  image::PixelMask out = *mask;
   for (int y = 0; y < out.height(); ++y) {
     const uint32_t* depth = &tile.image.depth[static_cast<size_t>(y) * tile.rect.width];
     for (int x = 0; x < out.width(); ++x)

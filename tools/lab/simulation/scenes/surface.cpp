@@ -40,6 +40,7 @@ class SurfaceStore final : public data::MeshStore {
   const data::MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return surface_.chunks; }
   geometry::ChunkBytes chunk(ChunkId id) const override { return {surface_.bytes[size_t(id.value)], nullptr}; }
+  geometry::ChunkBytes surfels() const override { return {}; }
 
  private:
   const SurfaceParts& surface_;
