@@ -77,7 +77,8 @@ void encode_node(const detail::BitCoder& coder, Models& models, std::span<const 
 }
 
 // False: damaged, or more than `most` places.
-bool decode_node(const detail::BitDecoder& coder, Models& models, uint32_t prefix, int level, size_t most, std::vector<uint32_t>& out) {
+bool decode_node(const detail::BitDecoder& coder, Models& models, uint32_t prefix, int level, size_t most,
+                 std::vector<uint32_t>& out) {
   const uint8_t occupied = code_byte(coder, 0, models.children[static_cast<size_t>(level)]);
   if (occupied == 0) return false;
   for (uint32_t c = 0; c < 8; ++c) {

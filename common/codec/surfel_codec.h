@@ -27,8 +27,8 @@ struct LeafSurfel {
 };
 
 struct SurfelLeaf {
-  uint32_t key = 0;    ///< 30 bits: points::ClusterKey
-  uint32_t first = 0;  ///< 24 bits: a number that goes with the leaf, such as that of its first surfel
+  uint32_t key = 0;                 ///< 30 bits: points::ClusterKey
+  uint32_t first = 0;               ///< 24 bits: a number that goes with the leaf, such as that of its first surfel
   std::vector<LeafSurfel> surfels;  ///< ascending places, each once
   bool operator==(const SurfelLeaf&) const = default;
 };

@@ -40,8 +40,8 @@ Sample sample(const Backdrop& b, size_t at, float fx, float fy) {
   return {channel(red) << 16 | channel(green) << 8 | channel(blue), sum / reciprocal};
 }
 
-// Calls visit(x, at, fx, fy) for the pixels [first, last) of the picture's row y whose four backdrop pixels are covered;
-// the last three as sample() takes them. The outermost pixels of the backdrop go on to the picture's edge.
+// Calls visit(x, at, fx, fy) for the pixels [first, last) of the picture's row y whose four backdrop pixels are
+// covered, with the arguments of sample(). The outermost pixels of the backdrop go on to the picture's edge.
 void for_whole(const Backdrop& b, int y, int first, int last, const auto& visit) {
   const int side = 1 << b.halvings, last_left = b.camera.width - 2, last_top = b.camera.height - 2;
   if (last_left < 0 || last_top < 0) return;
@@ -72,7 +72,8 @@ void select_coarse(const points::PointModel& model, const geometry::Camera& came
   SelectionOptions coarse{.scale = suitable_scale(kBackdrop.kernel), .cone_culling = false};
   for (out.halvings = kLeastHalvings;; ++out.halvings) {
     if (options.eyes)
-      coarse.eyes = {backdrop_camera((*options.eyes)[0], out.halvings), backdrop_camera((*options.eyes)[1], out.halvings)};
+      coarse.eyes = {backdrop_camera((*options.eyes)[0], out.halvings),
+                     backdrop_camera((*options.eyes)[1], out.halvings)};
     select_view(model, backdrop_camera(camera, out.halvings), coarse, out);
     double widths = 0;
     for (const DrawItem& item : out.items) widths += static_cast<double>(item.splat_px) * item.level.count;

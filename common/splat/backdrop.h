@@ -1,5 +1,5 @@
-// The picture of a draw list's coarse points: drawn smoothly, at a quarter of the resolution or less, and shown in pixels
-// that the other points leave empty. Coarse points are too far apart for splats of full resolution.
+// The picture of a draw list's coarse points: drawn at a quarter of the resolution or less, and shown in pixels that
+// the other points leave empty. Coarse points are too far apart for splats of full resolution.
 #pragma once
 
 #include <cstdint>

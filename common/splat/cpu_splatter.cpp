@@ -300,7 +300,7 @@ SplatStats& SplatStats::operator+=(const SplatStats& other) {
 }
 
 SplatStats CpuSplatter::Impl::draw_backdrop(const DrawList& list, const geometry::Camera& camera,
-                                           const image::Shading& shading, Backdrop& out) {
+                                            const image::Shading& shading, Backdrop& out) {
   if (!coarse) coarse = std::make_unique<Impl>(shared);
   out.halvings = list.coarse->halvings;
   out.camera = backdrop_camera(camera, out.halvings);

@@ -19,12 +19,12 @@ namespace telesplat::wire {
 
 /// List of all messages. A message that is not in it cannot be encoded or decoded: the compiler says so. Tests and the
 /// fuzz target go through it too.
-using Messages =
-    std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply, ViewRequest, LeaseRequest, Lease, LeaseExtend,
-               TileDone, TileRefused, PlanRequest, Plan, FrameEnd, StatusReport, MetricRows, Control, ControlReply,
-               Shutdown, Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, Refine,
-               EpochBegin, StateMark, StateRequest, StateBegin, BaseRequest, BasePart, BaseHidden, AccessReport, SurfelRequest, Surfels, SliceWeights, SlabAssignment, SlabReady,
-               SliceLease, VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady,
-               Swap, Order, OrderAnswer, PictureTile, Picture>;
+using Messages = std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply, ViewRequest, LeaseRequest, Lease,
+                            LeaseExtend, TileDone, TileRefused, PlanRequest, Plan, FrameEnd, StatusReport, MetricRows,
+                            Control, ControlReply, Shutdown, Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk,
+                            DepthTile, Patch, Forget, Refine, EpochBegin, StateMark, StateRequest, StateBegin,
+                            AccessReport, SliceWeights, SlabAssignment, SlabReady, SliceLease, VoxelRequest, VoxelData,
+                            SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady, Swap, Order, OrderAnswer,
+                            PictureTile, Picture, SurfelRequest, Surfels, BaseRequest, BasePart, BaseHidden>;
 
 }  // namespace telesplat::wire

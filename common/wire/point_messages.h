@@ -139,7 +139,7 @@ struct BaseRequest {
   static constexpr std::string_view kName = "base_request";
   InstanceId viewer;
   uint64_t base = 0;  ///< base that the viewer has begun; 0: none yet
-  uint64_t part = 0, parts = 1;  ///< the first one, and how many; 0: only what is hidden; at most kMaxBaseParts
+  uint64_t part = 0, parts = 1;  ///< the first one; their number, at most kMaxBaseParts, 0: only hidden surfels
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("base", m.base); f("part", m.part); f("parts", m.parts);
   }
@@ -149,7 +149,7 @@ struct BasePart {
   static constexpr std::string_view kName = "base_part";
   static constexpr bool kBulk = true;
   InstanceId packer;
-  uint64_t base = 0;  ///< number of the base: another scene or colouring has another one
+  uint64_t base = 0;  ///< counts bases: another scene or colouring has another one
   uint64_t part = 0, parts = 1;
   uint64_t surfels = 0;  ///< surfels of the whole base
   uint64_t depth = 0;    ///< octree levels of its leaves' keys
@@ -162,16 +162,17 @@ struct BasePart {
     f("surfel_data", m.surfel_data, kMaxBulkBytes);
   }
 };
-/// Packer -> viewers (PUB, and in answer to a request for part 0): which surfels of the base are hidden, because finer
-/// samples lie there, or because rays passed. Words that are not named stay as they were.
+/// Packer -> viewers (PUB, and in answer to a request for part 0): surfels of the base that are hidden, because rays
+/// passed them. Words that are not named stay as they were.
 struct BaseHidden {
   static constexpr std::string_view kName = "base_hidden";
   static constexpr bool kBulk = true;
   InstanceId packer;
   uint64_t base = 0;
-  uint64_t number = 0;  ///< counts these messages on PUB; in an answer: of the newest one that it includes
+  uint64_t number = 0;  ///< counts these messages on PUB; in an answer: number of the newest one that it includes
   bool whole = false;   ///< words that are not named are 0
-  std::vector<uint32_t> words;  ///< three numbers each: index i, then 64 bits of the surfels from 64 i on, low half first
+  /// Three numbers each: index i, then 64 bits of the surfels from 64 i on, low half first.
+  std::vector<uint32_t> words;
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("base", m.base); f("number", m.number); f("whole", m.whole); f("words", m.words);
   }

@@ -231,7 +231,7 @@ struct Chunk {
   }
 };
 
-// ---- the coarse form of a mesh: packer (DEALER) <-> data (ROUTER) ----------------------------------------------------
+// ---- the coarse form of a mesh: packer (DEALER) <-> data (ROUTER) ---------------------------------------------------
 
 /// A data server answers once the surfels are made; the packer repeats its request.
 struct SurfelRequest {
@@ -248,7 +248,7 @@ struct Surfels {
   static constexpr bool kBulk = true;
   EpochId epoch;
   std::string array;
-  Bytes data;  ///< layout: geometry/surfels.h; empty: there are none
+  Bytes data;  ///< layout: geometry/surfels.h; empty: the mesh has no surface
   template <class F> static void fields(F& f, auto& m) {
     f("epoch", m.epoch); f("array", m.array); f("data", m.data, kMaxBulkBytes);
   }

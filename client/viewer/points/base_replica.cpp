@@ -40,7 +40,7 @@ void BaseReplica::begin(InstanceId packer, uint64_t base) {
 
 Status BaseReplica::take(const wire::BasePart& part, double now_s) {
   if (part.packer != packer_ || part.base != base_) {
-    if (part.part != 0) return ok_status();  // of a base that is over, or part 0 was lost: it is asked for again
+    if (part.part != 0) return ok_status();  // an older base, or part 0 was lost: it is asked for again
     begin(part.packer, part.base);
     asked_ = kWindow;
   }

@@ -1,5 +1,5 @@
-// A viewer's replica of the base, the coarse form of the whole data set: asks the packer for its parts, and keeps which
-// of its surfels are hidden. Messages come in, requests and mosaics of leaves go out; no sockets, no clocks.
+// A viewer's replica of the base, the coarse form of the whole data set: asks the packer for its parts, and keeps the
+// numbers of hidden surfels. Messages come in, requests and mosaics of leaves go out; no sockets, no clocks.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ namespace telesplat::viewer {
 
 class BaseReplica {
  public:
-  static constexpr uint64_t kWindow = 4;       ///< parts under way
-  static constexpr double kPatience_s = 1;     ///< after which a request is repeated
+  static constexpr uint64_t kWindow = 4;    ///< parts under way
+  static constexpr double kPatience_s = 1;  ///< after which a request is repeated
   /// Mosaics' spacing over that of the surfels: means of neighbouring cells lie up to that far apart.
   static constexpr float kSpread = 1.2f;
 
@@ -44,7 +44,7 @@ class BaseReplica {
   /// Counts bases; each begins empty.
   uint64_t number() const { return count_; }
   /// Returns the leaves that changed since the last call, at most `most`, with the mosaic of their surfels that are not
-  /// hidden; nullopt: there are none.
+  /// hidden; nullopt: all are hidden.
   std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> take_changes(size_t most);
 
  private:
@@ -52,7 +52,8 @@ class BaseReplica {
     uint32_t first = 0;   // number of its first surfel in the base
     uint32_t stride = 1;  // wire::kBaseStride while only part 0 has come
     std::vector<codec::LeafSurfel> surfels;
-    uint32_t number(size_t i) const { return first + stride * static_cast<uint32_t>(i); }  // of surfel i in the base
+    /// Returns the number of its surfel i in the base.
+    uint32_t number(size_t i) const { return first + stride * static_cast<uint32_t>(i); }
   };
   void begin(InstanceId packer, uint64_t base);
   void ask(uint64_t part, uint64_t parts, double now_s);
@@ -67,7 +68,7 @@ class BaseReplica {
   double spacing_m_ = 0;
   std::vector<bool> came_;  // parts
   size_t came_count_ = 0;
-  uint64_t asked_ = 0;      // parts before it were asked for
+  uint64_t asked_ = 0;  // parts before it were asked for
   double heard_s_ = 0;
   bool active_ = false;  // start() was called
   std::unordered_map<points::ClusterKey, Leaf> leaves_;

@@ -174,7 +174,7 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
 void ModelCache::begin_base(const points::ModelConfig& config) {
   auto fresh = std::make_unique<points::PointModel>(config);
   const std::lock_guard lock(mutex_);
-  if (base_) dropped_of(base_.get()).models.push_back(std::move(base_));
+  if (base_) parked_.models.push_back(std::move(base_));
   base_ = std::move(fresh);
   note_replica();
 }
@@ -195,7 +195,7 @@ void ModelCache::put_base(std::vector<std::pair<points::ClusterKey, std::optiona
   }
   const std::lock_guard lock(mutex_);
   for (const auto& leaf : leaves) note_change(points::leaf_box(base_->config(), leaf.first));
-  Dropped& place = dropped_of(base_.get());
+  Dropped& place = parked_;  // every frame may draw the base
   auto replaced = base_->commit(std::move(insertion));
   move_to_end(replaced, place.mosaics);
   auto dropped = base_->take_out(emptied);
@@ -216,7 +216,6 @@ void ModelCache::select_displayed(const geometry::Camera& camera, const splat::S
   out.replica = replica.number;
   out.summaries = summaries_made_;
   drawn_ = replica.model.get();
-  base_drawn_ = base_.get();
   select_base(camera, options, out);
 }
 
@@ -249,7 +248,7 @@ void ModelCache::take_changes(Changes& out) {
 
 void ModelCache::end_frame() {
   const std::lock_guard lock(mutex_);
-  drawn_ = base_drawn_ = nullptr;
+  drawn_ = nullptr;
   move_to_end(parked_.clusters, free_.clusters);
   move_to_end(parked_.mosaics, free_.mosaics);
   move_to_end(parked_.summaries, free_.summaries);

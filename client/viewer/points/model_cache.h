@@ -68,7 +68,7 @@ class ModelCache {
   uint64_t summaries_made() const { return summaries_made_; }
   /// Begins a base (base_replica.h) without points, in place of the one before.
   void begin_base(const points::ModelConfig& config);
-  /// Replaces the base's points in these leaves; nullopt: none are left.
+  /// Replaces the base's points in these leaves; nullopt: by nothing.
   void put_base(std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> leaves);
   /// Digest of the newest replica; 0: there is no replica. The display may draw meanwhile: it changes no points.
   uint64_t digest() const;
@@ -115,9 +115,7 @@ class ModelCache {
   };
   const Replica& displayed() const { return older_.model ? older_ : newest_; }
   // Returns the place for removed parts of a model: if the frame at hand draws the model, they wait for its end.
-  Dropped& dropped_of(const points::PointModel* model) {
-    return model == drawn_ || model == base_drawn_ ? parked_ : free_;
-  }
+  Dropped& dropped_of(const points::PointModel* model) { return model == drawn_ ? parked_ : free_; }
   void drop(Replica& replica);
   void select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
   void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const;
@@ -128,7 +126,7 @@ class ModelCache {
 
   mutable std::mutex mutex_;
   Replica newest_, older_;  // older_ is set only while it is on display instead of the newest
-  const points::PointModel *drawn_ = nullptr, *base_drawn_ = nullptr;
+  const points::PointModel* drawn_ = nullptr;
   std::unique_ptr<points::PointModel> base_;
   Dropped parked_, free_;
   uint64_t replicas_ = 0, patches_ = 0, summaries_made_ = 0;

@@ -25,15 +25,17 @@ ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLin
       waits_(links.gate.waits()),
       in_step_(options.in_step),
       events_(options.events),
+      base_(cache_,
+            [this](wire::BaseRequest request) {
+              request.viewer = links_.viewer;
+              if (auto* state = links_.feeds.find("state")) state->send(request);
+            }),
       receiver_({links.viewer, options.epoch_patience_s, options.events, waits_ || in_step_},
                 {[this] { return config_; },
                  [this](const wire::StateRequest& request) {
                    if (auto* state = links_.feeds.find("state")) state->send(request);
                  },
-                 [this](const wire::BaseRequest& request) {
-                   if (auto* state = links_.feeds.find("state")) state->send(request);
-                 },
-                 links.on_part, links.on_epoch, links.to_master_s},
+                 &base_, links.on_part, links.on_epoch, links.to_master_s},
                 cache_, fine_rays_, batches_, links.spans) {}
 
 Status ReceivedPoints::follow(const wire::Welcome& session) {
@@ -64,6 +66,7 @@ void ReceivedPoints::receive(int most) {
 
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
+  base_.tick(now_s);
   send_receipt(now_s);
   if (!waits_ && !in_step_) summarise();  // otherwise the display's thread applies the held changes
   cache_.free_dropped();
@@ -72,15 +75,16 @@ void ReceivedPoints::tick(double now_s) {
 // Reports to the packer how much has arrived, so that it knows how much is under way, and how fast it arrives.
 void ReceivedPoints::send_receipt(double now_s) {
   const auto received = receiver_.figures();
-  const double period_s = received.sequence == receipted_ ? kQuietReceipts_s : kReceipts_s;
-  const bool many = received.bytes_received - receipt_bytes_ >= kReceiptBytes;
-  if (received.packer.value == 0 || (now_s - receipt_s_ < period_s && !many)) return;
   auto* state = links_.feeds.find("state");
-  if (!state) return;
+  if (received.packer.value == 0 || !state || !receipts_.due(received.sequence, received.bytes_received, now_s)) return;
   state->send(wire::Receipt{links_.viewer, received.packer, received.sequence, now_s});
-  receipted_ = received.sequence;
-  receipt_s_ = now_s;
-  receipt_bytes_ = received.bytes_received;
+}
+
+bool ReceiptClock::due(Sequence newest, uint64_t bytes, double now_s) {
+  const double period_s = newest == newest_ ? kQuietReceipts_s : kReceipts_s;
+  if (now_s - sent_s_ < period_s && bytes - bytes_ < kReceiptBytes) return false;
+  newest_ = newest, sent_s_ = now_s, bytes_ = bytes;
+  return true;
 }
 
 void ReceivedPoints::summarise() {

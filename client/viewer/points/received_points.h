@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "client/viewer/points/model_cache.h"
+#include "client/viewer/points/received_base.h"
 #include "client/viewer/points/receiver.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/received.h"
@@ -13,13 +14,28 @@
 
 namespace telesplat::viewer {
 
+/// Says when a viewer reports to the packer how much has arrived.
+class ReceiptClock {
+ public:
+  /// True: a report of this newest event, and of all bytes so far, is due, and is taken to be sent.
+  bool due(Sequence newest, uint64_t bytes, double now_s);
+
+ private:
+  Sequence newest_;  // as in the last report; below: when, and after how many bytes
+  double sent_s_ = -1e9;
+  uint64_t bytes_ = 0;
+};
+
 class ReceivedPoints final : public Received {
  public:
   ReceivedPoints(const ReceivedOptions& options, const ReceivedLinks& links);
 
   Status follow(const wire::Welcome& session) override;
   std::span<const Feed> feeds() const override;
-  void on_connected() override { receiver_.start(); }
+  void on_connected() override {
+    receiver_.start();
+    base_.start(monotonic_s());
+  }
   void receive(int most) override;
   void tick(double now_s) override;
   void on_complete(RequestId request) override { batches_.complete(request); }
@@ -66,14 +82,13 @@ class ReceivedPoints final : public Received {
   ModelCache cache_;
   FineRays fine_rays_;
   UpdateBatches batches_;
+  ReceivedBase base_;
   PointReceiver receiver_;
   points::ModelConfig config_;  // valid once the feeds are connected
   AccessLog reported_;          // takes turns with seen_
   /// The last report stays valid while the display waits and draws nothing.
   std::vector<AccessLog::Report> on_display_;
-  Sequence receipted_;  // the newest event that was reported to the packer; below: when
-  double receipt_s_ = -1e9;
-  uint64_t receipt_bytes_ = 0;
+  ReceiptClock receipts_;
   std::atomic<bool> keeps_redundant_{false}, retired_{false};
 
   mutable std::mutex mutex_;  // guards the members below, which both threads use

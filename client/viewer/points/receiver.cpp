@@ -9,7 +9,6 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kAnswerPatience_s = 2.0;
-constexpr size_t kLeavesAtOnce = 64;  // of the base: some milliseconds
 
 }  // namespace
 
@@ -31,16 +30,7 @@ PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& ca
                     request.viewer = options_.viewer;
                     links_.request_state(request);
                   }}),
-      base_([this](wire::BaseRequest request) {
-        request.viewer = options_.viewer;
-        links_.request_base(request);
-      }),
       switch_(options.epoch_patience_s) {}
-
-void PointReceiver::start() {
-  sequencer_.start();
-  base_.start(monotonic_s());
-}
 
 void PointReceiver::receive_events(net::Socket& patches, int most) {
   for (int n = 0; n < most; ++n) {
@@ -52,7 +42,7 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
       if constexpr (std::is_same_v<M, StateMark>)
         on_published_mark(m);
       else if constexpr (std::is_same_v<M, BaseHidden>)
-        base_.take(m, monotonic_s());
+        links_.base->take(m, monotonic_s());
       else
         sequencer_.on_published({m, message->owner, message->arrived_s});
     });
@@ -83,37 +73,20 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
     using namespace wire;
     net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark, BasePart, BaseHidden>(
         state, *message, [&](auto& m) {
-      using M = std::decay_t<decltype(m)>;
-      if constexpr (std::is_same_v<M, StateMark>)
-        sequencer_.on_mark(m);
-      else if constexpr (std::is_same_v<M, StateBegin>)
-        sequencer_.on_answer(m);
-      else if constexpr (std::is_same_v<M, BaseHidden>)
-        base_.take(m, monotonic_s());
-      else if constexpr (std::is_same_v<M, BasePart>)
-        on_base_part(m);
-      else
-        sequencer_.on_replayed({m, message->owner, message->arrived_s});
-    });
+          using M = std::decay_t<decltype(m)>;
+          if constexpr (std::is_same_v<M, StateMark>)
+            sequencer_.on_mark(m);
+          else if constexpr (std::is_same_v<M, StateBegin>)
+            sequencer_.on_answer(m);
+          else if constexpr (std::is_same_v<M, BaseHidden> || std::is_same_v<M, BasePart>)
+            links_.base->take(m, monotonic_s());
+          else
+            sequencer_.on_replayed({m, message->owner, message->arrived_s});
+        });
   }
 }
 
-void PointReceiver::on_base_part(const wire::BasePart& part) {
-  const Status taken = base_.take(part, monotonic_s());
-  if (taken) return;
-  ++decode_errors_;
-  if (told_of_patches_.allow(monotonic_s())) log::warn("{}", taken.error().text);
-}
-
-void PointReceiver::apply_base(size_t most) {
-  if (!base_.known()) return;
-  if (std::exchange(base_begun_, base_.number()) != base_.number()) cache_.begin_base(base_.config());
-  cache_.put_base(base_.take_changes(most));
-}
-
 void PointReceiver::tick(double now_s) {
-  base_.tick(now_s);
-  apply_base(kLeavesAtOnce);
   if (sequencer_.waiting() && now_s - asked_s_ > kAnswerPatience_s) sequencer_.retry();
   if (options_.hold || !switch_.due(now_s)) return;  // held: each update decides what is shown
   cache_.show_newest();

@@ -5,10 +5,10 @@
 #include <functional>
 
 #include "client/viewer/coupling/view_requester.h"
-#include "client/viewer/points/base_replica.h"
 #include "client/viewer/points/epoch_switch.h"
 #include "client/viewer/points/event_sequencer.h"
 #include "client/viewer/points/model_cache.h"
+#include "client/viewer/points/received_base.h"
 #include "client/viewer/points/replica_check.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/record/event_record.h"
@@ -32,7 +32,7 @@ class PointReceiver {
   struct Links {
     std::function<points::ModelConfig()> config;  ///< for a replica that begins
     std::function<void(const wire::StateRequest&)> request_state;
-    std::function<void(const wire::BaseRequest&)> request_base;
+    ReceivedBase* base = nullptr;                  ///< takes messages about the base
     std::function<void(const ViewPart&)> on_part;  ///< a patch was applied, or put into the batches
     std::function<void()> on_epoch;                ///< a new epoch began
     std::function<double(double)> to_master_s;
@@ -46,7 +46,7 @@ class PointReceiver {
   /// there is one.
   std::optional<ShownUpdate> release();
   /// The packer is at another address.
-  void start();
+  void start() { sequencer_.start(); }
   /// True after start(): there may be a replica.
   bool begun() const { return sequencer_.begun(); }
   void receive_events(net::Socket& patches, int most);
@@ -67,8 +67,6 @@ class PointReceiver {
 
  private:
   void apply(const ModelEvent& event);
-  void on_base_part(const wire::BasePart& part);
-  void apply_base(size_t most);
   void on_published_mark(const wire::StateMark& mark);
   void record(const ModelEvent& event);
   /// False if the patch cannot be decoded.
@@ -83,8 +81,6 @@ class PointReceiver {
   UpdateBatches& batches_;
   metrics::SpanRecorder& spans_;
   EventSequencer sequencer_;
-  BaseReplica base_;
-  uint64_t base_begun_ = 0;  // BaseReplica::number() of the base in the cache
   EpochSwitch switch_;
   ReplicaCheck check_;
   points::ModelConfig config_;  // the newest replica's, which may be held, and its epoch; 0: not known yet

@@ -125,6 +125,19 @@ class RowMoments {
   std::array<std::vector<float>, 4> vertical_, means_;
 };
 
+// nearest_m: nearest depth of each pixel's rays.
+void add_excess(const float* nearest_m, const View& reconstruction, Quality& q) {
+  const size_t pixels = reconstruction.depth_m.size();
+  const auto shown = [&](const tbb::blocked_range<size_t>& range, Excess sum) {
+    for (size_t i = range.begin(); i < range.end(); ++i) sum.add(nearest_m[i], reconstruction.depth_m[i]);
+    return sum;
+  };
+  const Excess excess = sum_in_parallel(tbb::blocked_range<size_t>(0, pixels, 65536), Excess{}, shown,
+                                        [](const Excess& a, const Excess& b) { return a + b; });
+  q.covered_fraction = static_cast<double>(excess.covered) / static_cast<double>(pixels);
+  q.nearer_fraction = static_cast<double>(excess.nearer) / static_cast<double>(pixels);
+}
+
 // hits: number of rays in each pixel of the reference that met the data; null: one ray, whose depth shows it.
 // nearest_m: nearest depth of each pixel's rays; null: one ray.
 Quality compare_counted(const View& reference, const uint16_t* hits, const float* nearest_m,
@@ -173,20 +186,12 @@ Quality compare_counted(const View& reference, const uint16_t* hits, const float
   Quality q;
   q.object_pixels = sums.object;
   q.hole_pixels = sums.holes;
-  if (sums.pixels == 0) return q;
+  if (sums.pixels == 0) return q;  // no pixel shows more than there is
   const double mean_squared = sums.squared_error / (3.0 * static_cast<double>(sums.pixels));
   q.psnr_db = mean_squared > 0 ? std::min(99.0, 10 * std::log10(255.0 * 255.0 / mean_squared)) : 99.0;
   q.ssim = sums.ssim / static_cast<double>(sums.pixels);
   if (sums.object > 0) q.hole_fraction = static_cast<double>(sums.holes) / static_cast<double>(sums.object);
-  const auto shown = [&](const tbb::blocked_range<size_t>& range, Excess sum) {
-    const float* nearest = nearest_m ? nearest_m : reference.depth_m.data();
-    for (size_t i = range.begin(); i < range.end(); ++i) sum.add(nearest[i], reconstruction.depth_m[i]);
-    return sum;
-  };
-  const Excess excess = sum_in_parallel(tbb::blocked_range<size_t>(0, pixels, 65536), Excess{}, shown,
-                                        [](const Excess& a, const Excess& b) { return a + b; });
-  q.covered_fraction = static_cast<double>(excess.covered) / static_cast<double>(pixels);
-  q.nearer_fraction = static_cast<double>(excess.nearer) / static_cast<double>(pixels);
+  add_excess(nearest_m ? nearest_m : reference.depth_m.data(), reconstruction, q);
   return q;
 }
 

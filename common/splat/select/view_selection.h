@@ -71,13 +71,13 @@ struct DrawList {
   /// With it, a DrawItem's cluster and sequence identify the points: another packer numbers its events from 1 again.
   uint64_t replica = 0;
   std::vector<std::shared_ptr<const void>>
-      held;                ///< memory of items whose points belong to no model; the code that adds it clears it
+      held;  ///< memory of items whose points belong to no model; the code that adds it clears it
   /// Coarse points of the whole data set, which show where the others leave pixels empty (backdrop.h). Null: there are
   /// none.
   std::shared_ptr<DrawList> coarse;
-  int halvings = 0;  ///< of a coarse list: its picture has 2^-halvings as many pixels a side
+  int halvings = 0;              ///< coarse list: its picture has 2^-halvings as many pixels a side
   std::vector<uint16_t> turned;  ///< normals of items, as face_eye() has turned them
-  uint64_t summaries = 0;  ///< number of summaries made by then, of all replicas
+  uint64_t summaries = 0;        ///< number of summaries made by then, of all replicas
 };
 
 /// True if a backdrop is to be drawn.

@@ -231,7 +231,8 @@ class ServedMesh final : public Served {
       const auto store = stores_.find(request.array);
       if (!store || !is_made(request, store)) return;
       using Reply = decltype(reply(request, *store));
-      outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store), [&] { return reply(request, *store); });
+      outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store),
+                                        [&] { return reply(request, *store); });
     });
   }
   Result<std::optional<std::string>> carry_out(const wire::Order& order) override {

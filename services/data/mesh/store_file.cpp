@@ -75,7 +75,8 @@ std::vector<std::byte> surfels_of(int descriptor, const MeshFigures& figures, st
     return view ? *view : geometry::MeshChunkView{};
   };
   const std::atomic<bool> never{false};
-  return make_surfels({figures.box_room, figures.triangles, entries.size(), chunk}, kStoredSurfels, never);
+  return make_surfels({figures.box_room, figures.triangles, entries.size(), chunk}, stored_surfels(figures.triangles),
+                      never);
 }
 
 }  // namespace

@@ -56,13 +56,12 @@ struct StoreContent {
   std::shared_ptr<const MappedFile> file;
   MeshStoreInfo info;  ///< without source and from_cache; notes without the file's name
   std::vector<geometry::ChunkInfo> chunks;
-  std::vector<size_t> offsets;  ///< offset of each chunk in the file
+  std::vector<size_t> offsets;         ///< offset of each chunk in the file
   std::span<const std::byte> surfels;  ///< in the file
 };
 
-/// Maps a store and checks all of it before any value is used: magic, version, size, the checksum over header and
-/// table of contents, the offsets, and the checksums of surfels and of every chunk (which also loads the pages that samplers are about
-/// to request).
+/// Maps a store and checks all of it before any value is used: magic, version, size, the offsets, and the checksums of
+/// header, table, surfels and chunks. That also loads the pages that samplers soon request.
 Result<StoreContent> read_store(int descriptor, const std::string& name);
 
 }  // namespace telesplat::data

@@ -35,8 +35,8 @@ struct Cell {
 class Cells {
  public:
   Cells() : slots_(1 << 16) {}
-  /// The sums for a normal in a cell of the grid: those of a mean that differs by less than 60 degrees, or of the last
-  /// of kDirections.
+  /// Returns the sums for a normal in a cell of the grid: those whose mean differs by less than 60 degrees, or the last
+  /// ones.
   Cell& at(uint64_t key, const glm::vec3& normal) {
     if (2 * keys_.size() >= slots_.size()) grow();
     uint32_t* next = &slots_[find(key)];
@@ -50,7 +50,8 @@ class Cells {
     for (int n = 1;; ++n) {
       Cell& cell = cells_[at];
       const float along = glm::dot(cell.normal, normal);
-      if (n == kDirections || (along > 0 && 4 * along * along > glm::dot(cell.normal, cell.normal) * glm::dot(normal, normal)))
+      if (n == kDirections ||
+          (along > 0 && 4 * along * along > glm::dot(cell.normal, cell.normal) * glm::dot(normal, normal)))
         return cell;
       if (cell.other == 0) {
         const uint32_t fresh = add();
@@ -64,7 +65,8 @@ class Cells {
   std::vector<std::pair<uint64_t, const Cell*>> by_key() const {
     std::vector<std::pair<uint64_t, const Cell*>> out;
     for (size_t i = 0; i < keys_.size(); ++i)
-      for (uint32_t at = firsts_[i] + 1; at != 0; at = cells_[at - 1].other) out.emplace_back(keys_[i], &cells_[at - 1]);
+      for (uint32_t at = firsts_[i] + 1; at != 0; at = cells_[at - 1].other)
+        out.emplace_back(keys_[i], &cells_[at - 1]);
     return out;
   }
 
@@ -122,7 +124,9 @@ class Grid {
                                            : glm::vec3(float(c >> 16 & 255), float(c >> 8 & 255), float(c & 255));
     return {{p[0], p[1], p[2]}, image::decode_normal32(chunk.normals[v]), colour};
   }
-  int steps(float length_m) const { return std::max(1, static_cast<int>(std::ceil(length_m / (kSampleStep * cell_m_)))); }
+  int steps(float length_m) const {
+    return std::max(1, static_cast<int>(std::ceil(length_m / (kSampleStep * cell_m_))));
+  }
 
   // Samples the triangle evenly: `along` its length from the corner opposite its shortest edge, and `across` that edge.
   void add(Corner c[3], bool scalars) {
@@ -130,17 +134,16 @@ class Grid {
                             glm::distance(c[0].position, c[1].position)};
     const auto apex = static_cast<size_t>(std::min_element(edges, edges + 3) - edges);
     std::rotate(c, c + apex, c + 3);
-    const float area =
-        0.5f * glm::length(glm::cross(c[1].position - c[0].position, c[2].position - c[0].position));
+    const float area = 0.5f * glm::length(glm::cross(c[1].position - c[0].position, c[2].position - c[0].position));
     const int along = steps(*std::max_element(edges, edges + 3)), across = steps(edges[apex]);
-    const float weight = area / (static_cast<float>(along) * static_cast<float>(across));
-    if (!(weight > 0)) return;
-    if (along == 1 && across == 1) return add_sample(c, {1 / 3.0f, 1 / 3.0f, 1 / 3.0f}, weight, scalars);
+    if (!(area > 0)) return;
+    if (along == 1 && across == 1) return add_sample(c, {1 / 3.0f, 1 / 3.0f, 1 / 3.0f}, area, scalars);
+    const float mean = area / (static_cast<float>(along) * static_cast<float>(across));
     for (int i = 0; i < along; ++i)
       for (int j = 0; j < across; ++j) {
-        const float s = std::sqrt((static_cast<float>(i) + 0.5f) / static_cast<float>(along));
+        const float s = (static_cast<float>(i) + 0.5f) / static_cast<float>(along);
         const float t = (static_cast<float>(j) + 0.5f) / static_cast<float>(across);
-        add_sample(c, {1 - s, s * (1 - t), s * t}, weight, scalars);
+        add_sample(c, {1 - s, s * (1 - t), s * t}, 2 * s * mean, scalars);  // the triangle widens with s
       }
   }
   void add_sample(const Corner c[3], const glm::vec3& at, float weight, bool scalars) {
@@ -257,7 +260,7 @@ SurfelMaker::~SurfelMaker() {
 SurfelMaker::Bytes SurfelMaker::get(const std::shared_ptr<const MeshStore>& store, const std::string& array,
                                     size_t most) {
   constexpr uint64_t kAtOnce = 1 << 15;  // triangles whose surfels take milliseconds
-  if (most == kStoredSurfels) return store->surfels();
+  if (most == kMostStored) return store->surfels();
   if (const Wanted wanted{array, most}; wanted != wanted_) {
     if (making_.valid()) stop_ = true, making_.wait(), making_ = {};
     stop_ = false;
@@ -267,8 +270,8 @@ SurfelMaker::Bytes SurfelMaker::get(const std::shared_ptr<const MeshStore>& stor
       const auto chunk = [&](size_t i, std::vector<uint64_t>&) {
         return *MeshChunkView::validate(store->chunk(store->chunks()[i].id).bytes);
       };
-      const auto bytes = std::make_shared<const std::vector<std::byte>>(make_surfels(
-          {store->info().box_room, store->info().triangles, store->chunks().size(), chunk}, most, stop_));
+      const auto bytes = std::make_shared<const std::vector<std::byte>>(
+          make_surfels({store->info().box_room, store->info().triangles, store->chunks().size(), chunk}, most, stop_));
       return geometry::ChunkBytes{*bytes, bytes};
     };
     if (store->info().triangles <= kAtOnce)

@@ -1,6 +1,7 @@
 // Makes the surfels of a mesh: means of its surface in the cells of a grid.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <functional>
@@ -15,8 +16,12 @@
 
 namespace telesplat::data {
 
-/// Surfels that a chunk store holds, about.
-inline constexpr size_t kStoredSurfels = 400'000;
+/// Surfels that the chunk store of a large mesh holds, about, and that of the smallest.
+inline constexpr size_t kMostStored = 400'000, kLeastStored = 20'000;
+/// Surfels that the store of a mesh holds, about: four a triangle, within these limits.
+constexpr size_t stored_surfels(uint64_t triangles) {
+  return static_cast<size_t>(std::clamp<uint64_t>(4 * triangles, kLeastStored, kMostStored));
+}
 
 /// The chunks of a mesh, in their order.
 struct SurfelSource {

@@ -141,7 +141,7 @@ class ModelFeed {
   }
   void expire(double now_s) { meter_.expire(now_s); }
 
-  InstanceId instance() const { return instance_; }   ///< the packer, as viewers know it
+  InstanceId instance() const { return instance_; }  ///< the packer, as viewers know it
   const LinkMeter& meter() const { return meter_; }  ///< measures the viewers' links
   const StateAnswers& answers() const { return answers_; }
   uint64_t requests_refused() const { return beginnings_.refused(); }

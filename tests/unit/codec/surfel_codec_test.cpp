@@ -19,7 +19,7 @@ SurfelLeaf sheet(uint32_t key, int side) {
       const int x = 255 * i / side, z = 255 * k / side;
       const auto y = static_cast<uint8_t>(128 + 40 * std::sin(x * 0.02) * std::cos(z * 0.03));
       const auto shade = static_cast<uint32_t>(100 + x / 4);
-      const LeafSurfel s{uint8_t(x), y, uint8_t(z), uint16_t(127 + x / 16 | (127 + z / 16) << 8), shade * 0x10101};
+      const LeafSurfel s{uint8_t(x), y, uint8_t(z), uint16_t((127 + x / 16) | (127 + z / 16) << 8), shade * 0x10101};
       by_place[s.place()] = s;
     }
   SurfelLeaf leaf{key, key * 10, {}};
@@ -74,9 +74,7 @@ TEST(SurfelCodec, DamagedStreamsAreRefusedOrBounded) {
   EXPECT_GT(refused, 0u);
 }
 
-TEST(SurfelCodec, TooManyLeavesAreRefused) {
-  EXPECT_FALSE(decode_surfels(std::vector<uint8_t>(64, 0xff)).ok());
-}
+TEST(SurfelCodec, TooManyLeavesAreRefused) { EXPECT_FALSE(decode_surfels(std::vector<uint8_t>(64, 0xff)).ok()); }
 
 }  // namespace
 }  // namespace telesplat::codec

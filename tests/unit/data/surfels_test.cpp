@@ -83,8 +83,8 @@ TEST(Surfels, AreAboutAsManyAsAskedFor) {
 }
 
 TEST(Surfels, LeaveNoCellOfALargeTriangleOut) {
-  const ChunkList one{{ChunkId{0}, telesplat::test::triangle({{0, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 1, 0}},
-                                                             {{3, 0, 0}, {0, 1, 0}})}};
+  const ChunkList one{
+      {ChunkId{0}, telesplat::test::triangle({{0, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 1, 0}}, {{3, 0, 0}, {0, 1, 0}})}};
   const Made made = make(one, 1000);
   for (float x = 0.1f; x < 2.8f; x += 0.05f) {
     const glm::vec3 at(x, 0, 0.45f * (1 - x / 3));
@@ -97,11 +97,10 @@ TEST(Surfels, LeaveNoCellOfALargeTriangleOut) {
 TEST(Surfels, KeepBothSidesOfAThinWall) {
   ChunkList wall;
   for (const float side : {1.0f, -1.0f})
-    wall.emplace_back(ChunkId{wall.size()},
-                      telesplat::test::chunk_of({{{0, 0, 0.001f * side}, {0, 0, side}},
-                                                 {{1, 0, 0.001f * side}, {0, 0, side}},
-                                                 {{0, 1, 0.001f * side}, {0, 0, side}}},
-                                                {0, 1, 2}));
+    wall.emplace_back(ChunkId{wall.size()}, telesplat::test::chunk_of({{{0, 0, 0.001f * side}, {0, 0, side}},
+                                                                       {{1, 0, 0.001f * side}, {0, 0, side}},
+                                                                       {{0, 1, 0.001f * side}, {0, 0, side}}},
+                                                                      {0, 1, 2}));
   const Made made = make(wall, 500);
   size_t front = 0, back = 0;
   for (size_t i = 0; i < made.view.size(); ++i) {

@@ -96,7 +96,9 @@ TEST(Base, PartZeroHasOneSurfelInSixteen) {
   const auto part = base.part(0);
   const auto* bytes = reinterpret_cast<const uint8_t*>(part.surfel_data.data());
   size_t count = 0;
-  for (const auto& leaf : *codec::decode_surfels({bytes, part.surfel_data.size()})) count += leaf.surfels.size();
+  const auto leaves = codec::decode_surfels({bytes, part.surfel_data.size()});
+  ASSERT_TRUE(leaves.ok());
+  for (const auto& leaf : *leaves) count += leaf.surfels.size();
   EXPECT_EQ(count, (base.surfels() + 15) / 16);
 }
 

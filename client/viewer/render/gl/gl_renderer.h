@@ -50,7 +50,7 @@ class GlRenderer final : public Renderer {
   double prepare_ms_ = 0;
   std::unique_ptr<splat::CpuSplatter> coarse_;  // draws backdrops; null: none was drawn yet
   splat::Backdrop backdrop_;
-  std::vector<float> depth_m_;  // of a frame with a backdrop whose target has no depths
+  std::vector<float> depth_m_;  // depths of a frame with a backdrop whose target has no depths
   log::RateLimiter refusals_;
 };
 

@@ -72,8 +72,7 @@ void put_word(size_t index, uint64_t word, std::vector<uint32_t>& out) {
 // Rays of a tile.
 class Rays {
  public:
-  /// Of a ray that was not cast.
-  static constexpr float kNotCast = -1;
+  static constexpr float kNotCast = -1;  ///< in place of a depth
 
   Rays(const SampledTile& tile, const image::PixelMask* cast)
       : tile_(tile), cast_(cast), scale_(static_cast<float>(tile.camera.near_m * image::kMaxDepthCode)) {}
@@ -162,7 +161,7 @@ struct Base::Look {
 };
 
 bool Base::is_passed(const Look& look, const glm::vec3& position, uint16_t normal, float farthest_m) const {
-  static constexpr float kRing[][2] = {{0, 0},          {1, 0},         {-1, 0},        {0, 1},         {0, -1},
+  static constexpr float kRing[][2] = {{0, 0},       {1, 0},        {-1, 0},       {0, 1},        {0, -1},
                                        {0.7f, 0.7f}, {-0.7f, 0.7f}, {0.7f, -0.7f}, {-0.7f, -0.7f}};
   const glm::vec4 p(position, 1);
   const float depth = glm::dot(look.w, p);

@@ -48,7 +48,7 @@ class Base {
  private:
   struct Leaf {
     points::ClusterKey key;
-    geometry::Box box;  // of its surfels
+    geometry::Box box;  // holds its surfels
     uint32_t first, count;
     uint32_t shown;  // surfels that are not hidden
   };
@@ -59,9 +59,9 @@ class Base {
 
   points::ModelConfig config_;
   float spacing_m_;
-  std::vector<Leaf> leaves_;           // ascending keys
-  std::vector<glm::vec3> positions_;   // by leaf, in each leaf by place
-  std::vector<uint16_t> normals_;      // image/normal.h: encode_normal16
+  std::vector<Leaf> leaves_;             // ascending keys
+  std::vector<glm::vec3> positions_;     // by leaf, in each leaf by place
+  std::vector<uint16_t> normals_;        // image/normal.h: encode_normal16
   std::vector<uint64_t> hidden_, told_;  // a bit a surfel; told_: as take_changes() last had them
   std::vector<std::vector<uint8_t>> parts_;
 };

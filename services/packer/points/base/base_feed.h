@@ -37,7 +37,7 @@ class BaseFeed {
   size_t surfels() const { return base_ ? base_->surfels() : 0; }
 
  private:
-  // What the base depends on.
+  // The base depends on these.
   struct Scene {
     std::string content_hash, colouring;
     uint64_t most = 0;
@@ -61,7 +61,7 @@ class BaseFeed {
   bool asks_ = false;  // the data server has not answered
   double asked_s_ = -1e9, patience_s_ = 0;
   InstanceId packer_;
-  uint64_t number_ = 0;     // of the base; 0: none yet
+  uint64_t number_ = 0;     // counts bases
   uint64_t published_ = 0;  // wire::BaseHidden::number of the newest message
 };
 

@@ -50,12 +50,14 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       {{"control", wire::SliceWeights::kName}, {kData}},
       {{"chunks", wire::ChunkListRequest::kName}, {kSampler}},
       {{"chunks", wire::ChunkRequest::kName}, {kSampler}},
+      {{"chunks", wire::SurfelRequest::kName}, {kPacker}},
       {{"voxels", wire::VoxelRequest::kName}, {kSampler}},
       {{"tiles", wire::DepthTile::kName}, {kSampler}},
       {{"tiles", wire::SliceImages::kName}, {kSampler}},
       {{"tiles", wire::PictureTile::kName}, {kSampler}},
       {{"state", wire::StateRequest::kName}, watchers},
       {{"state", wire::AccessReport::kName}, watchers},
+      {{"state", wire::BaseRequest::kName}, watchers},
       {{"state", wire::Receipt::kName}, watchers},
       {{"state", wire::SliceAck::kName}, watchers}};
   // Answers and announcements of servers: no process sends them to a socket that binds.
@@ -65,7 +67,8 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       wire::PlanRequest::kName, wire::FrameEnd::kName,   wire::ChunkList::kName,      wire::Chunk::kName,
       wire::VoxelData::kName,   wire::Patch::kName,      wire::Forget::kName,         wire::EpochBegin::kName,
       wire::StateMark::kName,   wire::SliceFrame::kName, wire::SlabAssignment::kName, wire::Swap::kName,
-      wire::Refine::kName,      wire::StateBegin::kName, wire::Picture::kName};
+      wire::Refine::kName,      wire::StateBegin::kName, wire::Picture::kName,        wire::Surfels::kName,
+      wire::BasePart::kName,    wire::BaseHidden::kName};
   std::set<std::string_view> types{"nonsense"};
   const auto look_at = [&](std::string_view type) {
     types.insert(type);
@@ -85,7 +88,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
 TEST(Roles, AreLetInWhereTheyHaveSomethingToSay) {
   const std::map<Role, std::set<std::string>> doors{{kServer, {"control"}},
                                                     {kData, {"control"}},
-                                                    {kPacker, {"control"}},
+                                                    {kPacker, {"control", "chunks"}},
                                                     {kSampler, {"control", "chunks", "voxels", "tiles"}},
                                                     {kViewer, {"control", "patches", "state"}},
                                                     {kOperator, {"control", "patches", "state"}}};

@@ -4,9 +4,11 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
+#include <mutex>
 
 #include "common/colour/colour_map.h"
 #include "common/core/check.h"
+#include "common/geometry/surfels.h"
 #include "common/image/normal.h"
 #include "services/data/mesh/served_mesh.h"
 #include "services/sampler/mesh/chunk_input.h"
@@ -40,7 +42,7 @@ class SurfaceStore final : public data::MeshStore {
   const data::MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return surface_.chunks; }
   geometry::ChunkBytes chunk(ChunkId id) const override { return {surface_.bytes[size_t(id.value)], nullptr}; }
-  geometry::ChunkBytes surfels() const override { return {}; }
+  geometry::ChunkBytes surfels() const override;
 
  private:
   const SurfaceParts& surface_;
@@ -153,6 +155,44 @@ glm::dvec3 normal_at(const SurfacePart& part, const glm::dvec3& p, const glm::dv
 
 uint32_t rounded(const glm::dvec3& colour) {
   return uint32_t(colour.x + 0.5) << 16 | uint32_t(colour.y + 0.5) << 8 | uint32_t(colour.z + 0.5);
+}
+
+// Makes surfels of all that six cameras around the room see.
+std::vector<std::byte> make_surfels(const SurfaceParts& surface) {
+  constexpr int kSide = 32;      // pixels
+  constexpr double kAway_m = 1;  // from the room's origin: they see 0.5 m to each side
+  constexpr double kHalf = 0.7071067811865476;
+  const std::pair<glm::dvec3, glm::dquat> places[] = {
+      {{0, 0, kAway_m}, {1, 0, 0, 0}},          {{0, 0, -kAway_m}, {0, 0, 1, 0}},
+      {{kAway_m, 0, 0}, {kHalf, 0, kHalf, 0}},  {{-kAway_m, 0, 0}, {kHalf, 0, -kHalf, 0}},
+      {{0, kAway_m, 0}, {kHalf, -kHalf, 0, 0}}, {{0, -kAway_m, 0}, {kHalf, kHalf, 0, 0}}};
+  const geometry::Clip nothing;
+  std::vector<float> positions;
+  std::vector<uint32_t> normals, colours;
+  for (const auto& [position, orientation] : places) {
+    const geometry::Camera camera{{position, orientation}, -0.5, 0.5, -0.5, 0.5, 0.02, kSide, kSide};
+    const Rays rays(surface, camera, {0, 0, kSide, kSide}, nothing);
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x) {
+        const glm::dvec3 direction = rays.direction(x, y);
+        const Hit hit = rays.trace(direction);
+        if (!hit.part) continue;
+        const glm::dvec3 p = rays.at(direction, hit.depth_m);
+        for (int axis = 0; axis < 3; ++axis) positions.push_back(float(p[axis]));
+        normals.push_back(image::encode_normal32(glm::vec3(normal_at(*hit.part, p, direction))));
+        colours.push_back(rounded(colour_at(*hit.part, p)));
+      }
+  }
+  return geometry::build_surfels(positions, normals, colours, 1.0f / kSide, false);
+}
+
+geometry::ChunkBytes SurfaceStore::surfels() const {
+  static std::mutex mutex;
+  static std::map<const SurfaceParts*, std::vector<std::byte>> made;
+  const std::lock_guard lock(mutex);
+  auto& bytes = made[&surface_];
+  if (bytes.empty()) bytes = make_surfels(surface_);
+  return {bytes, nullptr};
 }
 
 class SurfaceSampler final : public sampler::Sampler {
