@@ -88,7 +88,7 @@ Scenario real(const char* file, geometry::Trajectory head) {
   const char* set = std::getenv("TELESPLAT_DATA");
   const char* home = std::getenv("HOME");
   s.file = (set ? set : std::string(home ? home : "") + "/.cache/telesplat-data") + "/meshes/" + file;
-  s.duration_s = 10, s.calm_s = 2;
+  s.duration_s = 11, s.calm_s = 3;  // a head that stands looks again after a second, at finer points
   s.width = 96, s.height = 72, s.display_hz = 10;
   return s;
 }
