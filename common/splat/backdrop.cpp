@@ -106,17 +106,4 @@ void fill_from(const Backdrop& backdrop, const geometry::Rect& rect, float near_
   }
 }
 
-void fill_from(const Backdrop& backdrop, const FrameTarget& target) {
-  for (int y = 0; y < target.height; ++y) {
-    uint32_t* colour = target.colour + static_cast<size_t>(y) * target.row();
-    float* depth = target.depth_m + static_cast<size_t>(y) * target.row();
-    for_whole(backdrop, y, 0, target.width, [&](int x, size_t at, float fx, float fy) {
-      if (depth[x] < kUncovered) return;
-      const Sample s = sample(backdrop, at, fx, fy);
-      colour[x] = 0xff000000u | s.colour;
-      depth[x] = s.depth_m;
-    });
-  }
-}
-
 }  // namespace telesplat::splat

@@ -41,7 +41,5 @@ inline constexpr RenderOptions kBackdrop{.kernel = Kernel::kEllipse, .finish = {
 /// surface, where the four around a pixel are covered.
 ///   rect: where the tile lies in the picture; near_m: of its camera.
 void fill_from(const Backdrop& backdrop, const geometry::Rect& rect, float near_m, const ResolvedTile& tile, int grow);
-/// The same in a finished picture. Precondition: the target has depths.
-void fill_from(const Backdrop& backdrop, const FrameTarget& target);
 
 }  // namespace telesplat::splat

@@ -368,11 +368,6 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
   return impl_->render(list, {&camera, 1}, options, shading, {&target, 1});
 }
 
-SplatStats CpuSplatter::draw_backdrop(const DrawList& list, const geometry::Camera& camera,
-                                      const image::Shading& shading, Backdrop& out) {
-  return impl_->draw_backdrop(list, camera, shading, out);
-}
-
 SplatStats CpuSplatter::render_pair(const DrawList& list, const std::array<geometry::Camera, 2>& cameras,
                                     const RenderOptions& options, const image::Shading& shading,
                                     const std::array<FrameTarget, 2>& targets) {

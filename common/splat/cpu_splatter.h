@@ -10,8 +10,6 @@
 
 namespace telesplat::splat {
 
-struct Backdrop;
-
 /// Images that a frame is drawn into. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the
 /// same shape, or null.
 struct FrameTarget {
@@ -48,9 +46,6 @@ class CpuSplatter {
   SplatStats render_pair(const DrawList& list, const std::array<geometry::Camera, 2>& cameras,
                          const RenderOptions& options, const image::Shading& shading,
                          const std::array<FrameTarget, 2>& targets);
-  /// Draws a list's coarse points (backdrop.h), as render() does for itself. Precondition: has_coarse(list).
-  SplatStats draw_backdrop(const DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
-                           Backdrop& out);
   /// Draws without any finish.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading,
                     const FrameTarget& target) {

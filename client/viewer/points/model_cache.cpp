@@ -176,6 +176,15 @@ void ModelCache::begin_base(const points::ModelConfig& config) {
   const std::lock_guard lock(mutex_);
   if (base_) parked_.models.push_back(std::move(base_));
   base_ = std::move(fresh);
+  ++summaries_made_;
+  note_replica();
+}
+
+void ModelCache::end_base() {
+  const std::lock_guard lock(mutex_);
+  if (!base_) return;
+  parked_.models.push_back(std::move(base_));
+  ++summaries_made_;
   note_replica();
 }
 
@@ -200,6 +209,7 @@ void ModelCache::put_base(std::vector<std::pair<points::ClusterKey, std::optiona
   move_to_end(replaced, place.mosaics);
   auto dropped = base_->take_out(emptied);
   move_to_end(dropped, place.clusters);
+  ++summaries_made_;
 }
 
 uint64_t ModelCache::digest() const { return newest_.model ? newest_.model->digest() : 0; }

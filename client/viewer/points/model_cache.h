@@ -64,10 +64,13 @@ class ModelCache {
   /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Precondition:
   /// no other thread changes the cache. Returns the bricks whose summaries were made, in order.
   std::vector<points::ClusterKey> summarise(size_t most);
-  /// Summaries made so far.
+  /// Chooses the base's points for a picture; nothing else of the list changes, but its number of points.
+  void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const;
+  /// Summaries made so far, and changes of the base.
   uint64_t summaries_made() const { return summaries_made_; }
   /// Begins a base (base_replica.h) without points, in place of the one before.
   void begin_base(const points::ModelConfig& config);
+  void end_base();
   /// Replaces the base's points in these leaves; nullopt: by nothing.
   void put_base(std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> leaves);
   /// Digest of the newest replica; 0: there is no replica. The display may draw meanwhile: it changes no points.
@@ -118,7 +121,6 @@ class ModelCache {
   Dropped& dropped_of(const points::PointModel* model) { return model == drawn_ ? parked_ : free_; }
   void drop(Replica& replica);
   void select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
-  void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const;
   void commit(points::Insertion insertion);  // mutex_ is held
   void note_change(points::ClusterKey key);
   void note_change(const geometry::Box& box);

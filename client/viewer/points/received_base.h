@@ -1,6 +1,7 @@
 // The base on its way into the model cache.
 #pragma once
 
+#include <optional>
 #include <utility>
 
 #include "client/viewer/points/base_replica.h"
@@ -22,18 +23,26 @@ class ReceivedBase {
   void take(const wire::BasePart& part, double now_s) {
     if (const Status s = replica_.take(part, now_s); !s && told_.allow(now_s)) log::warn("{}", s.error().text);
   }
-  /// To be called every few milliseconds.
-  void tick(double now_s) {
+  /// To be called every few milliseconds. True: the base in the cache has changed.
+  bool tick(double now_s) {
+    const uint64_t before = cache_.summaries_made();
     replica_.tick(now_s);
-    if (!replica_.known()) return;
-    if (std::exchange(begun_, replica_.number()) != replica_.number()) cache_.begin_base(replica_.config());
-    cache_.put_base(replica_.take_changes(kLeavesAtOnce));
+    if (begun_ && *begun_ != replica_.number()) {
+      cache_.end_base();
+      begun_.reset();
+    }
+    if (replica_.known()) {
+      if (!begun_) cache_.begin_base(replica_.config());
+      begun_ = replica_.number();
+      cache_.put_base(replica_.take_changes(kLeavesAtOnce));
+    }
+    return cache_.summaries_made() != before;
   }
 
  private:
   ModelCache& cache_;
   BaseReplica replica_;
-  uint64_t begun_ = 0;  // BaseReplica::number() of the base in the cache
+  std::optional<uint64_t> begun_;  // BaseReplica::number() of the base in the cache
   log::RateLimiter told_;
 };
 

@@ -66,7 +66,7 @@ void ReceivedPoints::receive(int most) {
 
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
-  base_.tick(now_s);
+  if (base_.tick(now_s) && events_) events_->add_base_change(cache_.summaries_made());
   send_receipt(now_s);
   if (!waits_ && !in_step_) summarise();  // otherwise the display's thread applies the held changes
   cache_.free_dropped();

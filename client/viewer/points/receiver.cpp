@@ -32,6 +32,12 @@ PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& ca
                   }}),
       switch_(options.epoch_patience_s) {}
 
+template <class M>
+void PointReceiver::apply_base(const M& message) {
+  links_.base->take(message, monotonic_s());
+  if (options_.events) options_.events->add(message);
+}
+
 void PointReceiver::receive_events(net::Socket& patches, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = patches.receive();
@@ -42,7 +48,7 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
       if constexpr (std::is_same_v<M, StateMark>)
         on_published_mark(m);
       else if constexpr (std::is_same_v<M, BaseHidden>)
-        links_.base->take(m, monotonic_s());
+        apply_base(m);
       else
         sequencer_.on_published({m, message->owner, message->arrived_s});
     });
@@ -79,7 +85,7 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
           else if constexpr (std::is_same_v<M, StateBegin>)
             sequencer_.on_answer(m);
           else if constexpr (std::is_same_v<M, BaseHidden> || std::is_same_v<M, BasePart>)
-            links_.base->take(m, monotonic_s());
+            apply_base(m);
           else
             sequencer_.on_replayed({m, message->owner, message->arrived_s});
         });

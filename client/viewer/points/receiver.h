@@ -67,6 +67,8 @@ class PointReceiver {
 
  private:
   void apply(const ModelEvent& event);
+  template <class M>
+  void apply_base(const M& message);
   void on_published_mark(const wire::StateMark& mark);
   void record(const ModelEvent& event);
   /// False if the patch cannot be decoded.

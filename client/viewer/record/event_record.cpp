@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "client/viewer/points/event_sequencer.h"
+#include "client/viewer/points/received_base.h"
 #include "common/codec/depth_codec.h"
 #include "common/refinement/bounded_patches.h"
 #include "common/wire/serial.h"
@@ -12,8 +13,9 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr std::string_view kMagic = "TSEVENT4", kUnrefined = "TSEVENT3", kWithoutSummaries = "TSEVENT2";
-constexpr std::string_view kReplica = "replica", kSummary = "summary";
+constexpr std::string_view kMagic = "TSEVENT5", kBaseless = "TSEVENT4", kUnrefined = "TSEVENT3",
+                           kWithoutSummaries = "TSEVENT2";
+constexpr std::string_view kReplica = "replica", kSummary = "summary", kBaseChange = "base_change";
 
 struct ReplicaBody {
   float lo[3], hi[3];
@@ -59,6 +61,16 @@ void EventRecorder::add_summary(uint64_t number, points::ClusterKey brick) {
   file_.write(kSummary, bytes_of(SummaryBody{number, brick, 0}));
 }
 
+void EventRecorder::add(const wire::BasePart& part) {
+  if (!file_.full()) file_.write(wire::BasePart::kName, wire::encode(part));
+}
+
+void EventRecorder::add(const wire::BaseHidden& hidden) {
+  if (!file_.full()) file_.write(wire::BaseHidden::kName, wire::encode(hidden));
+}
+
+void EventRecorder::add_base_change(uint64_t number) { file_.write(kBaseChange, bytes_of(number)); }
+
 struct EventReplay::Impl {
   explicit Impl(RecordReader opened, bool with_summaries) : file(std::move(opened)), makes_summaries(with_summaries) {}
 
@@ -73,6 +85,8 @@ struct EventReplay::Impl {
   bool has_events = false;  // the replica at hand has an event
   image::DepthImage tile;
   refinement::BoundedPatches bounded;
+  ModelCache cache;  // holds the base alone
+  ReceivedBase base{cache, [](const wire::BaseRequest&) {}};
 
   const std::string& type() const { return file.type(); }
   const std::string& body() const { return file.body(); }
@@ -148,6 +162,27 @@ struct EventReplay::Impl {
     return true;
   }
 
+  template <class M>
+  Result<bool> take_base() {
+    const auto message = wire::decode<M>({reinterpret_cast<const std::byte*>(body().data()), body().size()});
+    if (!message) return wrong(message.error().text);
+    base.take(*message, 0);
+    return true;
+  }
+
+  // Changes the base as the viewer did if the change's number is at most `until`; else returns false.
+  Result<bool> change_base(uint64_t until) {
+    uint64_t number = 0;
+    if (body().size() != sizeof number)
+      return wrong(fmt::format("{} bytes instead of {}", body().size(), sizeof number));
+    std::memcpy(&number, body().data(), sizeof number);
+    if (number > until) return false;
+    cache.end_frame();
+    cache.free_dropped();
+    base.tick(0);
+    return true;
+  }
+
   // Applies the pending event if it is not newer than `until`; else returns false.
   template <class E>
   Result<bool> apply_as(Sequence until) {
@@ -167,7 +202,8 @@ EventReplay::EventReplay(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 EventReplay::~EventReplay() = default;
 
 Result<std::unique_ptr<EventReplay>> EventReplay::open(const std::string& path, bool with_summaries) {
-  auto file = RecordReader::open(path, {kMagic, kUnrefined, kWithoutSummaries}, "a record of point-model events");
+  auto file =
+      RecordReader::open(path, {kMagic, kBaseless, kUnrefined, kWithoutSummaries}, "a record of point-model events");
   if (!file) return file.error();
   return std::unique_ptr<EventReplay>(new EventReplay(std::make_unique<Impl>(std::move(*file), with_summaries)));
 }
@@ -182,6 +218,12 @@ Status EventReplay::advance(const Moment& moment) {
       if (const Status s = i.begin_replica(); !s) return s;
     } else if (i.type() == kSummary) {
       applied = i.apply_summary(moment.summaries);
+    } else if (i.type() == kBaseChange) {
+      applied = i.change_base(moment.summaries);
+    } else if (i.type() == wire::BasePart::kName) {
+      applied = i.take_base<wire::BasePart>();
+    } else if (i.type() == wire::BaseHidden::kName) {
+      applied = i.take_base<wire::BaseHidden>();
     } else if (i.type() == wire::Patch::kName) {
       applied = i.apply_as<wire::Patch>(moment.sequence);
     } else if (i.type() == wire::Forget::kName) {
@@ -194,7 +236,7 @@ Status EventReplay::advance(const Moment& moment) {
       return i.wrong("is no event");
     }
     if (!applied) return applied.error();
-    if (i.type() != kReplica) i.has_events = true;
+    if (i.type() != kReplica && !i.type().starts_with("base_")) i.has_events = true;
     if (!*applied) return ok_status();
     i.pending = false;
   }
@@ -218,6 +260,10 @@ Status EventReplay::next_replica() {
 
 const points::PointModel* EventReplay::model() const { return impl_->model.get(); }
 const points::Summaries& EventReplay::summaries() const { return impl_->summaries; }
+void EventReplay::select_base(const geometry::Camera& camera, const splat::SelectionOptions& options,
+                              splat::DrawList& out) const {
+  impl_->cache.select_base(camera, options, out);
+}
 Sequence EventReplay::applied() const { return impl_->applied; }
 const FineRays& EventReplay::fine_rays() const { return impl_->rays; }
 bool EventReplay::at_end() const { return impl_->at_end; }

@@ -1,11 +1,12 @@
 // Records the point-model events that a viewer applied, as they came. They suffice to rebuild the model of any
 // displayed frame: a replica is its packer's events in their order ("Replication" in docs/architecture.md).
 //
-// File (record_file.h): "TSEVENT4". Types: "replica" (six floats: the box in room space, lo then hi; u32: octree depth;
+// File (record_file.h): "TSEVENT5". Types: "replica" (six floats: the box in room space, lo then hi; u32: octree depth;
 // u32: 1 if mosaics are merged) where a replica begins, the wire's "patch", "forget", "refine", "epoch_begin", and
 // "summary" (u64: its number, u32: key of its brick) where the viewer made a summary of a brick
-// (common/points/summary.h) from the model as it was then. "TSEVENT3", from earlier versions, has no refinements, and
-// "TSEVENT2" no summaries either.
+// (common/points/summary.h) from the model as it was then; the wire's "base_part" and "base_hidden", and "base_change"
+// (u64: number, counted with those of summaries) where the viewer put some of them into its base. "TSEVENT4", from
+// earlier versions, has no base, "TSEVENT3" no refinements either, and "TSEVENT2" no summaries.
 #pragma once
 
 #include <memory>
@@ -15,6 +16,7 @@
 #include "client/viewer/record/record_file.h"
 #include "client/viewer/render/fine_rays.h"
 #include "common/points/summary.h"
+#include "common/splat/select/view_selection.h"
 
 namespace telesplat::viewer {
 
@@ -25,6 +27,10 @@ class EventRecorder {
 
   void begin_replica(const points::ModelConfig& config);
   void add(const ModelEvent& event);
+  void add(const wire::BasePart& part);
+  void add(const wire::BaseHidden& hidden);
+  /// number: ModelCache::summaries_made() with this change.
+  void add_base_change(uint64_t number);
   /// number: counts all summaries that the viewer made, with this one.
   void add_summary(uint64_t number, points::ClusterKey brick);
   /// Returns when all events so far are on disk.
@@ -61,6 +67,8 @@ class EventReplay {
   const points::PointModel* model() const;
   /// Summaries of the model's bricks; empty unless they are made.
   const points::Summaries& summaries() const;
+  /// Chooses the base's points for a picture, as ModelCache::select_base().
+  void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const;
   Sequence applied() const;
   /// Hits of rays that are finer than the viewer's views.
   const FineRays& fine_rays() const;

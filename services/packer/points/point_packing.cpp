@@ -175,8 +175,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   if (!block.extra) exactness_.heads().seen(block.viewer, block.camera.pose, now_s);
   Planner* planner = planning_.planner();
   if (planner) planner->take(block, whole, now_s), block.missed = planner->missed(block);
-  const image::PixelMask* cast = planner && !whole ? planner->cast(block) : nullptr;
-  if (whole || cast) base_.take(block, cast);
+  base_.note(block, whole, planner ? planner->cast(block) : nullptr);
   const auto reference = planner ? planner->reference(block) : std::nullopt;
   // The counts of a block go to the tile that completed it.
   const auto announce = [&](const Event& event) {
@@ -199,7 +198,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   if (!event) return event.error();
   if (*event && (*event)->frame_complete) publish_forgets(core_->forget_superseded());
   if (planner) publish_forgets(core_->forget(planner->disproved()));
-  base_.publish();
+  base_.take_noted();
   spans_.add("pack", begin_s, outlets_.master_now(), 0, of(done));
   return ok_status();
 }

@@ -160,22 +160,9 @@ splat::SplatStats GlRenderer::stats(const splat::DrawList& list) {
   return out;
 }
 
-// The processor draws backdrops: they are small, and only viewers that lack samples need them.
-void GlRenderer::add_backdrop(const splat::DrawList& list, const geometry::Camera& camera,
-                              const image::Shading& shading, const splat::FrameTarget& target) {
-  if (!coarse_) coarse_ = std::make_unique<splat::CpuSplatter>();
-  coarse_->draw_backdrop(list, camera, shading, backdrop_);
-  splat::fill_from(backdrop_, target);
-}
-
 splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry::Camera& camera,
                                      const splat::RenderOptions& options, const image::Shading& shading,
-                                     const splat::FrameTarget& wanted) {
-  splat::FrameTarget target = wanted;
-  if (splat::has_coarse(list) && !target.depth_m) {
-    depth_m_.resize(target.row() * static_cast<size_t>(target.height));
-    target.depth_m = depth_m_.data();
-  }
+                                     const splat::FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
   const gl::EglContext::Current current(*context_);
   const double start = monotonic_s();
@@ -192,7 +179,6 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
   if (!parts_->timer.available()) glFinish();
   const double drawn = monotonic_s();
   parts_->read_back.read(parts_->targets->framebuffer(FrameTargets::kOutput), target);
-  if (splat::has_coarse(list)) add_backdrop(list, camera, shading, target);
   const double end = monotonic_s();
   splat::SplatStats out = stats(list);
   if (!parts_->timer.available()) out.project_ms = (drawn - start) * 1e3;

@@ -4,13 +4,11 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/renderer.h"
 #include "common/core/log.h"
 #include "common/gl/egl_context.h"
-#include "common/splat/backdrop.h"
 
 namespace telesplat::viewer {
 
@@ -41,16 +39,11 @@ class GlRenderer final : public Renderer {
               const image::Shading& shading, bool with_depth);
   void shade_and_finish(const splat::RenderOptions& options, bool with_depth);
   splat::SplatStats stats(const splat::DrawList& list);
-  void add_backdrop(const splat::DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
-                    const splat::FrameTarget& target);
 
   std::unique_ptr<gl::EglContext> context_;
   std::unique_ptr<Parts> parts_;
   std::string device_;
   double prepare_ms_ = 0;
-  std::unique_ptr<splat::CpuSplatter> coarse_;  // draws backdrops; null: none was drawn yet
-  splat::Backdrop backdrop_;
-  std::vector<float> depth_m_;  // depths of a frame with a backdrop whose target has no depths
   log::RateLimiter refusals_;
 };
 

@@ -12,6 +12,7 @@ namespace {
 
 // Time between two requests: the surfels are being made, or on their way.
 constexpr double kLeastPatience_s = 0.25, kMostPatience_s = 16;
+constexpr uint64_t kPartsAtOnce = 8;  // in answer to one request: about 400 kB
 
 }  // namespace
 
@@ -52,7 +53,9 @@ void BaseFeed::connect(const std::string& endpoint) {
   if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
 }
 
+// Viewers drop a base when another number comes.
 void BaseFeed::drop() {
+  if (base_) outlets_.publish(wire::BaseHidden{packer_, ++number_, ++published_, true, {}});
   base_.reset();
   asks_ = false;
   asked_s_ = -1e9, patience_s_ = kLeastPatience_s;
@@ -100,15 +103,25 @@ void BaseFeed::answer(const wire::BaseRequest& request, const std::string& peer)
   const bool begins = request.base != number_;  // it knows another base, or none yet
   const uint64_t first = begins ? 0 : request.part;
   if (first == 0) outlets_.send(wire::BaseHidden{packer_, number_, published_, true, base_->hidden()}, peer);
-  for (uint64_t n = first; n < std::min<uint64_t>(first + request.parts, base_->parts()); ++n) {
+  const uint64_t parts = std::min(request.parts, kPartsAtOnce);
+  for (uint64_t n = first; n < std::min<uint64_t>(first + parts, base_->parts()); ++n) {
     wire::BasePart part = base_->part(n);
     part.packer = packer_, part.base = number_;
     outlets_.send(part, peer);
   }
 }
 
-void BaseFeed::take(const SampledTile& tile, const image::PixelMask* cast) {
-  if (base_) base_->hide(tile, cast);
+void BaseFeed::note(const SampledTile& tile, bool whole, const image::PixelMask* cast) {
+  noted_.reset();
+  if (!base_ || (!whole && !cast)) return;
+  noted_ = {tile, whole ? std::nullopt : std::optional(*cast)};
+}
+
+void BaseFeed::take_noted() {
+  if (!noted_ || !base_) return;
+  base_->hide(noted_->tile, noted_->cast ? &*noted_->cast : nullptr);
+  noted_.reset();
+  publish();
 }
 
 void BaseFeed::forgotten(const Event& event, const points::PointModel& model) {

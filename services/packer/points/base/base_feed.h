@@ -27,8 +27,11 @@ class BaseFeed {
   /// A viewer asks for parts.
   void answer(const wire::BaseRequest& request, const std::string& peer) const;
 
-  /// Rays of a tile came. cast: as Base::hide().
-  void take(const SampledTile& tile, const image::PixelMask* cast);
+  /// Keeps the rays of a tile for take_noted(): viewers wait for its points first. whole: all pixels were cast;
+  /// cast: else its rays; null: not known.
+  void note(const SampledTile& tile, bool whole, const image::PixelMask* cast);
+  /// Learns from the rays, and publishes what changed.
+  void take_noted();
   /// The packer forgot clusters of its model.
   void forgotten(const Event& event, const points::PointModel& model);
   /// Publishes what changed.
@@ -58,6 +61,11 @@ class BaseFeed {
   std::optional<scene::ColourTable> colours_;
   EpochId epoch_;
   std::optional<Base> base_;
+  struct Noted {
+    SampledTile tile;
+    std::optional<image::PixelMask> cast;
+  };
+  std::optional<Noted> noted_;
   bool asks_ = false;  // the data server has not answered
   double asked_s_ = -1e9, patience_s_ = 0;
   InstanceId packer_;
