@@ -17,7 +17,7 @@
 namespace telesplat::data {
 
 /// Surfels that the chunk store of a large mesh holds, about, and that of the smallest.
-inline constexpr size_t kMostStored = 400'000, kLeastStored = 20'000;
+inline constexpr size_t kMostStored = 400'000, kLeastStored = 2'000;
 /// Surfels that the store of a mesh holds, about: four a triangle, within these limits.
 constexpr size_t stored_surfels(uint64_t triangles) {
   return static_cast<size_t>(std::clamp<uint64_t>(4 * triangles, kLeastStored, kMostStored));
