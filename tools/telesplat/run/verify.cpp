@@ -184,12 +184,12 @@ class Verification {
 
 std::string quality_csv(const std::vector<VerifiedView>& views) {
   std::string out =
-      "frame,t_s,samples,psnr_db,ssim,flip,hole_fraction,object_pixels,flicker,popping,"
-      "holes_followed,holes_closed,eye,covered_fraction,nearer_fraction\n";
+      "frame,t_s,samples,psnr_db,ssim,flip,hole_fraction,object_pixels,"
+      "covered_fraction,nearer_fraction,flicker,popping,holes_followed,holes_closed,eye\n";
   for (const auto& v : views)
-    out += fmt::format("{},{:.4f},{},{:.3f},{:.5f},{:.5f},{:.6f},{},{},{},{:.6f},{:.6f}\n", v.frame, v.t_s, v.samples,
+    out += fmt::format("{},{:.4f},{},{:.3f},{:.5f},{:.5f},{:.6f},{},{:.6f},{:.6f},{},{}\n", v.frame, v.t_s, v.samples,
                        v.quality.psnr_db, v.quality.ssim, v.flip, v.quality.hole_fraction, v.quality.object_pixels,
-                       change_columns(v), v.eye, v.quality.covered_fraction, v.quality.nearer_fraction);
+                       v.quality.covered_fraction, v.quality.nearer_fraction, change_columns(v), v.eye);
   return out;
 }
 
