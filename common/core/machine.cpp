@@ -35,8 +35,15 @@ double quota_of(const std::filesystem::path& group) {
   return in >> quota_us >> period_us && period_us > 0 ? quota_us / period_us : 0;
 }
 
-// The least quota of this process' control group and of the groups around it; 0: no limit.
-double least_quota() {
+// Bytes that the control group of this folder may use; 0: no limit, or the system does not report it.
+double memory_of(const std::filesystem::path& group) {
+  std::ifstream in(group / "memory.max");
+  double bytes = 0;  // or "max"
+  return in >> bytes ? bytes : 0;
+}
+
+// The least limit of this process' control group and of the groups around it; 0: no limit.
+double least_limit(double (*limit_of)(const std::filesystem::path&)) {
   std::ifstream in("/proc/self/cgroup");
   std::string line;
   while (std::getline(in, line) && !line.starts_with("0::")) {
@@ -45,7 +52,7 @@ double least_quota() {
   const std::filesystem::path root = "/sys/fs/cgroup";
   double out = 0;
   for (auto group = root / line.substr(4);; group = group.parent_path()) {
-    if (const double quota = quota_of(group); quota > 0) out = out > 0 ? std::min(out, quota) : quota;
+    if (const double limit = limit_of(group); limit > 0) out = out > 0 ? std::min(out, limit) : limit;
     if (group.string().size() <= root.string().size() + 1) return out;
   }
 }
@@ -70,8 +77,13 @@ Machine this_machine() {
 int usable_processors() {
   cpu_set_t set;
   int out = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : int(std::thread::hardware_concurrency());
-  if (const double quota = least_quota(); quota > 0) out = std::min(out, int(std::ceil(quota)));
+  if (const double quota = least_limit(quota_of); quota > 0) out = std::min(out, int(std::ceil(quota)));
   return std::max(out, 1);
+}
+
+double usable_memory_mb() {
+  const double machine_mb = this_machine().memory_mb, group_mb = least_limit(memory_of) / 1e6;
+  return group_mb > 0 && (machine_mb == 0 || group_mb < machine_mb) ? group_mb : machine_mb;
 }
 
 std::string shell_line(const std::vector<std::string>& arguments) {

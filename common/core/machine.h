@@ -18,6 +18,10 @@ Machine this_machine();
 /// its control group's share of time (cpu.max, as of containers with --cpus). std::thread ignores that share.
 int usable_processors();
 
+/// Memory that this process may use, MB: the machine's, but at most its control group's (memory.max, as of containers
+/// with --memory); 0: the system does not report it.
+double usable_memory_mb();
+
 /// Writes arguments as a shell would take them, with quotes where needed.
 std::string shell_line(const std::vector<std::string>& arguments);
 /// This process' own command line. Beyond 8192 bytes it is cut, with "..." at its end.

@@ -1,5 +1,7 @@
 // Mesh chunks: the blocks that a data server stores and serves, and a sampler traces.
 //
+// The chunks of a mesh are a tree: leaves hold its triangles, inner nodes a coarse form of what is below them.
+//
 // One chunk is one contiguous block of bytes, the same in the chunk store's file, on the wire and in a sampler's
 // memory, so that it is memory-mapped, sent and handed to Embree without a copy. Little-endian. All positions are in
 // room space.
@@ -62,12 +64,17 @@ struct MeshChunkView {
   static Result<MeshChunkView> validate(std::span<const std::byte> bytes);
 };
 
-/// Description of a chunk that a data server sends before its bytes.
+/// Description of a chunk that a data server sends before its bytes. A list of chunks is in the order of their ids,
+/// from 0 on. An inner node has the chunks [first_child, first_child + children) below it, which come before it in the
+/// list, and after those of the nodes before it.
 struct ChunkInfo {
   ChunkId id;
   Box box_room;
   uint64_t triangles = 0;
   uint64_t bytes = 0;
+  float spacing_m = 0;  ///< how far apart its vertices lie where they stand for finer ones; 0: a leaf
+  uint32_t first_child = 0, children = 0;
+  bool is_leaf() const { return children == 0; }
   bool operator==(const ChunkInfo&) const = default;
 };
 

@@ -29,15 +29,15 @@ inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 
 /// The 24 bits of a frame tag, which tagged() makes.
 inline constexpr uint32_t kFrameTagMask = (1u << 24) - 1;
-/// The bit of a frame tag that coarse passes have.
+/// The bit of a frame tag that coarse passes have, and what was sampled from coarser data than it should.
 inline constexpr uint32_t kProvisionalTag = 1u << 23;
 /// The bit of a frame tag that points of a head at rest have; the other bits are the number of that rest.
 inline constexpr uint32_t kRestTag = 1u << 22;
-/// Tag of a frame, for prepare_patch(): its number, or that of a head's rest (if not 0), with the bits of a coarse pass
-/// (step > 1) and of a rest.
-constexpr FrameId tagged(FrameId frame, uint64_t step, uint64_t rest = 0) {
+/// Tag of a frame, for prepare_patch(): its number, or that of a head's rest (if not 0), with the bits of provisional
+/// points and of a rest.
+constexpr FrameId tagged(FrameId frame, bool provisional, uint64_t rest = 0) {
   if (rest != 0) return {(rest & (kRestTag - 1)) | kRestTag};
-  return {(frame.value & (kRestTag - 1)) | (step > 1 ? kProvisionalTag : 0)};
+  return {(frame.value & (kRestTag - 1)) | (provisional ? kProvisionalTag : 0)};
 }
 /// Returns the tag if its points are provisional, else 0.
 constexpr uint32_t group_of(uint32_t tag) { return (tag & (kProvisionalTag | kRestTag)) != 0 ? tag : 0; }

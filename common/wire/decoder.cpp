@@ -312,15 +312,25 @@ void Decoder::get(const msgpack::object& o, Moments& m) {
 
 void Decoder::get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks) {
   const size_t size = list_size(o, geometry::kMaxChunks);
+  uint64_t children = 0;  // end of those of the chunks before
   for (size_t i = 0; i < size && !error_; ++i) {
-    double v[9];
+    double v[12];
     if (!numbers(entry(o, i), v)) return;
     if (!all_single(std::span(v).subspan(3))) return fail("holds a chunk whose box is beyond single precision");
-    if (!is_integer(v[0], 0, geometry::kMaxChunks) || !is_integer(v[1], 0, geometry::kMaxChunkTriangles) ||
+    if (!is_integer(v[0], double(i), double(i)) || !is_integer(v[1], 0, geometry::kMaxChunkTriangles) ||
         !is_integer(v[2], 0, kMaxBulkBytes))
       return fail("holds a chunk whose id, triangles or bytes are out of range");
-    chunks.push_back(
-        {ChunkId{uint64_t(v[0])}, {{v[3], v[4], v[5]}, {v[6], v[7], v[8]}}, uint64_t(v[1]), uint64_t(v[2])});
+    if (!is_integer(v[10], 0, double(i)) || !is_integer(v[11], 0, double(i)) || v[10] + v[11] > double(i) ||
+        (v[11] > 0 && v[10] < double(children)) || !(v[9] >= 0) || (v[11] > 0) != (v[9] > 0))
+      return fail("holds a chunk that is no node of a tree");
+    if (v[11] > 0) children = uint64_t(v[10] + v[11]);
+    chunks.push_back({ChunkId{uint64_t(v[0])},
+                      {{v[3], v[4], v[5]}, {v[6], v[7], v[8]}},
+                      uint64_t(v[1]),
+                      uint64_t(v[2]),
+                      float(v[9]),
+                      uint32_t(v[10]),
+                      uint32_t(v[11])});
   }
 }
 

@@ -137,7 +137,8 @@ void Encoder::put(const std::vector<geometry::ChunkInfo>& chunks) {
   begin_array(static_cast<uint32_t>(chunks.size()));
   for (const auto& c : chunks)
     numbers({double(c.id.value), double(c.triangles), double(c.bytes), c.box_room.lo.x, c.box_room.lo.y,
-             c.box_room.lo.z, c.box_room.hi.x, c.box_room.hi.y, c.box_room.hi.z});
+             c.box_room.lo.z, c.box_room.hi.x, c.box_room.hi.y, c.box_room.hi.z, c.spacing_m, double(c.first_child),
+             double(c.children)});
 }
 
 void Encoder::put(const volume::ShearFrame& s) {

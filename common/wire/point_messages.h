@@ -28,6 +28,11 @@ struct MissedRays {
   geometry::Rect rect{0, 0, 1, 1};  ///< where they lie
 };
 
+/// When a patch's points are removed, by their tag (points::tagged).
+struct Lifetime {
+  uint64_t rest = 0;    ///< not 0: when the head has moved on from this rest
+  bool coarse = false;  ///< DepthTile::coarse: when a later frame of the viewer is complete
+};
 struct Patch {
   static constexpr std::string_view kName = "patch";
   static constexpr bool kBulk = true;
@@ -50,15 +55,14 @@ struct Patch {
   MissedRays missed;
   Moments moments;  ///< moments of its last tile, if it completes an update; empty when resent
   bool refinable = false;  ///< points that its image leaves out may follow: Refine
-  /// Not 0: its points are removed when the head has moved on, by this tag (points::tagged).
-  uint64_t rest = 0;
+  Lifetime lifetime;
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
     f("extra", m.extra); f("frame_complete", m.frame_complete); f("left_out", m.left_out); f("samples", m.counts.samples); f("kept", m.counts.kept);
     f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
     f("missed", m.missed.words, kMaxMaskWords); f("missed_rect", m.missed.rect); f("moments", m.moments);
-    f("refinable", m.refinable); f("rest", m.rest);
+    f("refinable", m.refinable); f("rest", m.lifetime.rest); f("coarse", m.lifetime.coarse);
   }
 };
 struct Forget {

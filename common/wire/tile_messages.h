@@ -206,7 +206,7 @@ struct ChunkListRequest {
 struct ChunkList {
   static constexpr std::string_view kName = "chunk_list";
   static constexpr bool kBulk = true;
-  static constexpr size_t kElements = 10 * geometry::kMaxChunks;
+  static constexpr size_t kElements = 13 * geometry::kMaxChunks;
   EpochId epoch;
   std::vector<geometry::ChunkInfo> chunks;  ///< at most kMaxChunks
   template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("chunks", m.chunks); }
@@ -262,8 +262,9 @@ struct DepthTile {
   InstanceId sampler;
   Lease lease;  ///< as leased, with moments as far as the encoded tile
   Bytes image;  ///< codec stream of lease.rect's size
+  bool coarse = false;  ///< some of it was sampled from coarser data than the lease asks for: it is to be sampled again
   template <class F> static void fields(F& f, auto& m) {
-    f("sampler", m.sampler); f("lease", m.lease); f("image", m.image, kMaxBulkBytes);
+    f("sampler", m.sampler); f("lease", m.lease); f("image", m.image, kMaxBulkBytes); f("coarse", m.coarse);
   }
 };
 

@@ -18,7 +18,7 @@
 namespace telesplat::data {
 namespace {
 
-void sum_up(const std::vector<geometry::ChunkInfo>& chunks, MeshFileFacts& facts) {
+void sum_up(std::span<const geometry::ChunkInfo> chunks, MeshFileFacts& facts) {
   facts.chunks = chunks.size();
   for (const geometry::ChunkInfo& chunk : chunks) facts.chunk_bytes += chunk.bytes;
 }
@@ -145,7 +145,7 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   std::error_code error;
   facts.file_bytes = std::filesystem::file_size(path, error);
   if (error) facts.file_bytes = 0;  // a folder of slices
-  sum_up((*store)->chunks(), facts);
+  sum_up((*store)->leaves(), facts);
   facts.iso = options.iso;
   facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {

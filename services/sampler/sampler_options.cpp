@@ -14,10 +14,10 @@ options::Table table(SamplerOptions& o) {
                            .value = &o.threads,
                            .help = "threads to sample with; 0: one a core",
                            .limits = Range{0, 1024}},
-                          {.flag = "--chunk-cache-mb",
-                           .value = &o.chunk_cache_mb,
-                           .help = "memory for chunks, MB",
-                           .limits = Range{1, 1e6}}});
+                          {.flag = "--sampler-memory",
+                           .value = &o.memory_mb,
+                           .help = "memory for chunks or voxels, MB; 0: a quarter of the machine's or container's",
+                           .limits = Range{0, 1e7}}});
 }
 
 }  // namespace telesplat::sampler

@@ -2,6 +2,7 @@
 
 #include <iterator>
 
+#include "common/core/machine.h"
 #include "services/sampler/julia/tiles.h"
 #include "services/sampler/mesh/tiles.h"
 #include "services/sampler/tiles/work.h"
@@ -13,7 +14,9 @@ namespace {
 
 using Made = Result<std::unique_ptr<Work>>;
 
-uint64_t cache_bytes(const SamplerOptions& o) { return uint64_t(o.chunk_cache_mb * 1e6); }
+uint64_t cache_bytes(const SamplerOptions& o) {
+  return uint64_t((o.memory_mb > 0 ? o.memory_mb : usable_memory_mb() / 4) * 1e6);
+}
 
 Made tile_work(std::unique_ptr<TileSource> source, const WorkTools& tools) {
   return Made(std::make_unique<TileWork>(std::move(source), tools.link));

@@ -135,7 +135,7 @@ TEST_P(RealMesh, NothingIsForgottenAlongAWalk) {
   ASSERT_TRUE(trajectory.ok() && store.ok());
   geometry::Box box;
   std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks;
-  for (const auto& info : (*store)->chunks()) {
+  for (const auto& info : (*store)->leaves()) {
     chunks.emplace_back(info.id, (*store)->chunk(info.id));
     box.extend(info.box_room);
   }

@@ -56,7 +56,7 @@ struct Filler {
     for (double wire::Moments::*m : wire::kMoments) v.*m = 0.5 + ++n_;
   }
   void operator()(const char*, std::vector<geometry::ChunkInfo>& v, size_t = 0) {
-    v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300}};
+    v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300, 0.25f, 0, 1}};
   }
   void operator()(const char*, volume::ShearFrame& v, size_t = 0) {
     v = {1, -1, {3, 40, 5}, -0.5, 0.01, -0.25, 0.02, 100, 50, {{8, 16, 11.5}, {0, 8, 3.5}}};

@@ -87,6 +87,8 @@ class EventSequencer {
 Status add_rays(const wire::Patch& patch, const image::DepthImage& image, FineRays& rays);
 
 /// Frame tag of the patch for points::prepare_patch().
-inline FrameId tag_of(const wire::Patch& patch) { return points::tagged(patch.frame, patch.step, patch.rest); }
+inline FrameId tag_of(const wire::Patch& patch) {
+  return points::tagged(patch.frame, patch.step > 1 || patch.lifetime.coarse, patch.lifetime.rest);
+}
 
 }  // namespace telesplat::viewer

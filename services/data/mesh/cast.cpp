@@ -161,7 +161,7 @@ std::optional<scene::Probed> cast(const MeshStore& store, const scene::Probe& pr
     ChunkId chunk;
   };
   std::vector<Met> met;
-  for (const geometry::ChunkInfo& chunk : store.chunks())
+  for (const geometry::ChunkInfo& chunk : store.leaves())
     if (const double at = entry(ray, chunk.box_room); at < kInfinity) met.push_back({at, chunk.id});
   std::sort(met.begin(), met.end(), [](const Met& a, const Met& b) { return a.at < b.at; });
   Hit best;

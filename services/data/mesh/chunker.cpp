@@ -1,6 +1,7 @@
 #include "services/data/mesh/store_file.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "common/geometry/mesh_chunk.h"
 #include "common/parallel/in_parallel.h"
@@ -29,7 +30,7 @@ Box box_of(std::span<const Item> items) {
 }
 
 // Splits items[0..] recursively into `parts` parts of equal size (to one triangle); `starts` receives the first
-// index of each part.
+// index of each part. Four parts that follow each other, counted from the first, are close together: levels.h.
 void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> starts) {
   if (parts == 1) {
     starts[0] = first;
@@ -37,7 +38,7 @@ void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> 
   }
   const glm::vec3 size = box_of(items).size();
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  const size_t left_parts = parts / 2, middle = items.size() * left_parts / parts;
+  const size_t left_parts = std::bit_floor(parts - 1), middle = items.size() * left_parts / parts;
   // Ties are broken by number, so that the result depends on the mesh alone.
   std::nth_element(items.begin(), items.begin() + middle, items.end(), [axis](const Item& a, const Item& b) {
     return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis] : a.triangle < b.triangle;

@@ -162,7 +162,7 @@ class ServedMesh final : public Served {
   std::string summary() const override {
     const MeshStoreInfo& info = store_->info();
     return fmt::format(
-               "{} triangles in {} chunks{}{}", info.triangles, store_->chunks().size(),
+               "{} triangles in {} chunks{}{}", info.triangles, store_->leaves().size(),
                info.degenerate_dropped ? fmt::format(", {} degenerate ones dropped", info.degenerate_dropped) : "",
                info.from_cache ? " (from the chunk store)" : "") +
            (as_begun_ ? ", coloured by " + as_begun_->array : "");

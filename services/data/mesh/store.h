@@ -1,8 +1,10 @@
 // The chunk store: a mesh file, read once, split into spatial chunks in room space, kept on disk and memory-mapped.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -69,7 +71,12 @@ class MeshStore {
   virtual ~MeshStore() = default;
 
   virtual const MeshStoreInfo& info() const = 0;
+  /// All chunks: the leaves first, which hold the mesh, then the levels above them.
   virtual const std::vector<geometry::ChunkInfo>& chunks() const = 0;
+  std::span<const geometry::ChunkInfo> leaves() const {
+    const auto& all = chunks();
+    return {all.begin(), std::find_if_not(all.begin(), all.end(), [](const auto& c) { return c.is_leaf(); })};
+  }
   /// Returns a chunk's bytes, in mapped memory. Precondition: id is one of chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
   /// Returns the surfels of the whole mesh (surfels.h), in mapped memory.

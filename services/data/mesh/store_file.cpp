@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "common/parallel/in_parallel.h"
+#include "services/data/mesh/levels.h"
 #include "services/data/mesh/surfels.h"
 
 namespace telesplat::data {
@@ -34,6 +35,8 @@ static_assert(sizeof(StoreHeader) <= kPage);
 struct StoreEntry {
   uint64_t offset = 0, bytes = 0, triangles = 0, checksum = 0;
   geometry::Box box_room;
+  float spacing_m = 0;
+  uint32_t first_child = 0, children = 0, reserved = 0;
 };
 
 uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries, std::string_view texts) {
@@ -54,29 +57,118 @@ int write_at(int descriptor, const void* data, size_t bytes, size_t offset) {
   return 0;
 }
 
-// False: the bytes cannot be read.
-bool read_at(int descriptor, std::span<std::byte> to, size_t offset) {
-  while (!to.empty()) {
-    const ssize_t n = pread(descriptor, to.data(), to.size(), static_cast<off_t>(offset));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    to = to.subspan(static_cast<size_t>(n)), offset += static_cast<size_t>(n);
+// Writes chunks behind each other. Threads may write at once; the first failure is kept.
+class ChunkWriter {
+ public:
+  ChunkWriter(int descriptor, size_t begin) : descriptor_(descriptor), end_(begin) {}
+  /// Returns the chunk's entry. A chunk gets its place in the file when its size is known.
+  StoreEntry write(std::span<const std::byte> chunk) {
+    StoreEntry out;
+    std::memcpy(&out.box_room, chunk.data() + offsetof(geometry::ChunkHeader, lo), sizeof out.box_room);
+    uint32_t triangles = 0;
+    std::memcpy(&triangles, chunk.data() + offsetof(geometry::ChunkHeader, triangles), sizeof triangles);
+    out.triangles = triangles;
+    out.bytes = chunk.size();
+    out.checksum = XXH3_64bits(chunk.data(), chunk.size());
+    out.offset = put(chunk);
+    return out;
   }
-  return true;
+  /// Returns where the bytes are.
+  size_t put(std::span<const std::byte> bytes) {
+    const size_t offset = end_.fetch_add(round_up(bytes.size()));
+    if (const int error = failure_ ? 0 : write_at(descriptor_, bytes.data(), bytes.size(), offset)) failure_ = error;
+    return offset;
+  }
+  /// Gives the file its length, and writes its begin.
+  void finish(const StoreHeader& header, std::span<const StoreEntry> entries, const std::string& texts) {
+    if (!failure_ && ftruncate(descriptor_, static_cast<off_t>(header.file_bytes)) != 0) failure_ = errno;
+    if (!failure_) failure_ = write_at(descriptor_, entries.data(), entries.size_bytes(), kPage);
+    if (!failure_) failure_ = write_at(descriptor_, texts.data(), texts.size(), header.arrays_offset);
+    if (!failure_) failure_ = write_at(descriptor_, &header, sizeof header, 0);
+  }
+  /// Maps what is written so far. Null: there is a failure.
+  std::shared_ptr<const MappedFile> written(const std::string& name) const {
+    if (failure_ || ftruncate(descriptor_, static_cast<off_t>(end_.load())) != 0) return nullptr;
+    auto out = MappedFile::map(descriptor_, name);
+    return out ? *std::move(out) : nullptr;
+  }
+  size_t end() const { return end_; }
+  int failure() const { return failure_; }
+
+ private:
+  int descriptor_;
+  std::atomic<size_t> end_;
+  std::atomic<int> failure_ = 0;  // errno
+};
+
+geometry::MeshChunkView chunk_at(const MappedFile& file, const StoreEntry& entry) {
+  const auto view = geometry::MeshChunkView::validate(file.bytes().subspan(entry.offset, entry.bytes));
+  CHECK(view.ok());  // this program wrote it a moment ago
+  return *view;
 }
 
-// Makes the surfels of the chunks that the file holds.
-std::vector<std::byte> surfels_of(int descriptor, const MeshFigures& figures, std::span<const StoreEntry> entries) {
-  const auto chunk = [&](size_t i, std::vector<uint64_t>& buffer) {
-    buffer.resize((entries[i].bytes + 7) / 8);
-    const auto bytes = std::as_writable_bytes(std::span(buffer)).first(entries[i].bytes);
-    if (!read_at(descriptor, bytes, entries[i].offset)) std::memset(bytes.data(), 0, bytes.size());
-    const auto view = geometry::MeshChunkView::validate(bytes);
-    return view ? *view : geometry::MeshChunkView{};
-  };
+// Entries of one level.
+struct Level {
+  size_t begin = 0, end = 0;
+  size_t size() const { return end - begin; }
+};
+
+// Returns the number of entries of a tree over this many leaves, at most.
+size_t entries_above(size_t leaves) {
+  size_t all = leaves;
+  for (size_t level = leaves; level > 1; all += level) level = (level + kChildren - 1) / kChildren;
+  return all;
+}
+
+// Adds the levels above the leaves to the entries. Returns all levels.
+std::vector<Level> write_levels(ChunkWriter& out, const std::string& name, std::vector<StoreEntry>& entries,
+                                const Progress& progress) {
+  std::vector<Level> levels{{0, entries.size()}};
+  while (levels.back().size() > 1) {
+    const Level below = levels.back();
+    const auto file = out.written(name);
+    if (!file) break;
+    const std::span level(entries.data() + below.begin, below.size());
+    std::vector<geometry::Box> boxes;
+    std::vector<float> spacings;
+    for (const StoreEntry& e : level) boxes.push_back(e.box_room), spacings.push_back(e.spacing_m);
+    const LevelBelow chunks{boxes, spacings, [&](size_t i) { return chunk_at(*file, level[i]); }};
+    std::vector<StoreEntry> nodes((level.size() + kChildren - 1) / kChildren);
+    constexpr size_t kBatch = 8;  // so that this thread reports progress
+    for (size_t first = 0; first < nodes.size(); first += kBatch) {
+      progress(kMakingLevels, static_cast<double>(kChildren * first) / static_cast<double>(level.size()));
+      in_parallel(first, std::min(first + kBatch, nodes.size()), [&](size_t i) {
+        const size_t children = std::min(kChildren, level.size() - kChildren * i);
+        const CoarseNode made = make_coarse_node(chunks, kChildren * i, kChildren * i + children, kTrianglesPerChunk);
+        if (made.chunk.empty()) return;
+        nodes[i] = out.write(made.chunk);
+        nodes[i].spacing_m = made.spacing_m;
+        nodes[i].first_child = static_cast<uint32_t>(below.begin + kChildren * i);
+        nodes[i].children = static_cast<uint32_t>(children);
+      });
+    }
+    std::erase_if(nodes, [](const StoreEntry& e) { return e.children == 0; });
+    levels.push_back({entries.size(), entries.size() + nodes.size()});
+    entries.insert(entries.end(), nodes.begin(), nodes.end());
+  }
+  progress(kMakingLevels, 1.0);
+  return levels;
+}
+
+// Makes the surfels of the highest level that has enough triangles for them.
+std::vector<std::byte> surfels_of(const MappedFile& file, const MeshFigures& figures,
+                                  std::span<const StoreEntry> entries, const std::vector<Level>& levels) {
+  constexpr uint64_t kEnough = 2 * kMostStored;
+  Level chosen;
+  uint64_t triangles = 0;
+  for (const Level& level : levels) {
+    uint64_t sum = 0;
+    for (size_t i = level.begin; i < level.end; ++i) sum += entries[i].triangles;
+    if (chosen.size() == 0 || sum >= kEnough) chosen = level, triangles = sum;
+  }
+  const auto chunk = [&](size_t i, std::vector<uint64_t>&) { return chunk_at(file, entries[chosen.begin + i]); };
   const std::atomic<bool> never{false};
-  return make_surfels({figures.box_room, figures.triangles, entries.size(), chunk}, stored_surfels(figures.triangles),
-                      never);
+  return make_surfels({figures.box_room, triangles, chosen.size(), chunk}, stored_surfels(figures.triangles), never);
 }
 
 }  // namespace
@@ -85,52 +177,40 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
                    const Progress& progress) {
   progress(kSortingIntoChunks, 0.0);
   const ChunkPlan plan = plan_chunks(mesh);
-  if (plan.chunks() > geometry::kMaxChunks)
-    return Error{
-        fmt::format("{}: would be split into {} chunks, the limit is {}", name, plan.chunks(), geometry::kMaxChunks)};
+  if (entries_above(plan.chunks()) > geometry::kMaxChunks)
+    return Error{fmt::format("{}: would be split into {} chunks, the limit is {}", name, entries_above(plan.chunks()),
+                             geometry::kMaxChunks)};
   progress(kSortingIntoChunks, 1.0);
   std::vector<StoreEntry> entries(plan.chunks());
-  std::atomic<size_t> end = kPage + round_up(entries.size() * sizeof(StoreEntry));
-  std::atomic<int> failure = 0;
-
-  // Batches, so that this thread reports progress; a chunk gets its place in the file when its size is known.
-  constexpr size_t kBatch = 16;
-  for (size_t first = 0; first < plan.chunks() && failure == 0; first += kBatch) {
+  ChunkWriter out(descriptor, kPage + round_up(entries_above(plan.chunks()) * sizeof(StoreEntry)));
+  constexpr size_t kBatch = 16;  // so that this thread reports progress
+  for (size_t first = 0; first < plan.chunks() && out.failure() == 0; first += kBatch) {
     progress(kWritingTheStore, static_cast<double>(first) / static_cast<double>(plan.chunks()));
     in_parallel(first, std::min(first + kBatch, plan.chunks()), [&](size_t i) {
       const auto triangles = std::span(plan.order).subspan(plan.begin[i], plan.begin[i + 1] - plan.begin[i]);
-      const std::vector<std::byte> bytes = make_chunk(mesh, triangles);
-      StoreEntry& entry = entries[i];
-      std::memcpy(&entry.box_room, bytes.data() + offsetof(geometry::ChunkHeader, lo), sizeof entry.box_room);
-      entry.bytes = bytes.size();
-      entry.triangles = triangles.size();
-      entry.checksum = XXH3_64bits(bytes.data(), bytes.size());
-      entry.offset = end.fetch_add(round_up(bytes.size()));
-      if (const int error = write_at(descriptor, bytes.data(), bytes.size(), entry.offset)) failure = error;
+      entries[i] = out.write(make_chunk(mesh, triangles));
     });
   }
+  const std::vector<Level> levels = write_levels(out, name, entries, progress);
 
   StoreHeader header{.chunks = static_cast<uint32_t>(entries.size()), .figures = info};
   progress(kMakingSurfels, 0.0);
-  const auto surfels = failure == 0 ? surfels_of(descriptor, info, entries) : std::vector<std::byte>();
-  header.surfels_offset = end.fetch_add(round_up(surfels.size())), header.surfels_bytes = surfels.size();
-  header.surfels_checksum = XXH3_64bits(surfels.data(), surfels.size());
-  if (failure == 0) failure = write_at(descriptor, surfels.data(), surfels.size(), header.surfels_offset);
+  const auto file = out.written(name);
+  const auto surfels = file ? surfels_of(*file, info, entries, levels) : std::vector<std::byte>();
+  header.surfels_bytes = surfels.size(), header.surfels_checksum = XXH3_64bits(surfels.data(), surfels.size());
+  header.surfels_offset = out.put(surfels);
   std::string texts = scene::to_text(info.arrays);
-  header.arrays_offset = end, header.arrays_bytes = texts.size();
+  header.arrays_offset = out.end(), header.arrays_bytes = texts.size();
   for (const std::string& line : {info.format, info.up, info.up_reason, info.array, scene::to_text(info.coordinates)})
     texts += line + "\n";
   for (const std::string& note : info.notes) texts += note + "\n";
   header.lines_bytes = texts.size() - header.arrays_bytes;
-  header.file_bytes = end + round_up(texts.size());
+  header.file_bytes = out.end() + round_up(texts.size());
   header.checksum = checksum_of(header, entries, texts);
-  if (failure == 0 && ftruncate(descriptor, static_cast<off_t>(header.file_bytes)) != 0) failure = errno;
-  if (failure == 0) failure = write_at(descriptor, entries.data(), entries.size() * sizeof(StoreEntry), kPage);
-  if (failure == 0) failure = write_at(descriptor, texts.data(), texts.size(), header.arrays_offset);
-  if (failure == 0) failure = write_at(descriptor, &header, sizeof header, 0);
-  if (failure != 0)
+  out.finish(header, entries, texts);
+  if (out.failure() != 0)
     return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes,
-                             std::strerror(failure))};
+                             std::strerror(out.failure()))};
   progress(kWritingTheStore, 1.0);
   return ok_status();
 }
@@ -179,7 +259,7 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
     const StoreEntry& e = entries[i];
     if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)
       return Error{fmt::format("{}: chunk {} lies outside its store", name, i)};
-    out.chunks.push_back({ChunkId{i}, e.box_room, e.triangles, e.bytes});
+    out.chunks.push_back({ChunkId{i}, e.box_room, e.triangles, e.bytes, e.spacing_m, e.first_child, e.children});
     out.offsets.push_back(e.offset);
   }
   std::atomic<size_t> damaged = entries.size();

@@ -1,7 +1,7 @@
 // The chunk store's file: a header, a table of contents, the chunks. Written once, then mapped.
 //
 //     offset 0      StoreHeader, padded to 4096
-//     4096          StoreEntry[chunks], padded to a multiple of 4096
+//     4096          StoreEntry[chunks], padded to a multiple of 4096: the leaves, then the levels above (levels.h)
 //     then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order of making
 //     then          the surfels of the whole mesh (common/geometry/surfels.h)
 //     then          the file's arrays as scene::to_text(); then lines: format, up axis, reason for it, array of the
@@ -44,11 +44,11 @@ std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// To be raised whenever readers, placement or layout would make another file from the same mesh.
-inline constexpr uint32_t kStoreVersion = 9;
+inline constexpr uint32_t kStoreVersion = 10;
 
 /// Writes the store of a placed mesh into an open, empty, writable file. `info` describes the mesh, with boxes and
 /// counts. After a failure (disk full) the file's content is useless. Errors start with `name`. `progress` (stages
-/// kSortingIntoChunks and kWritingTheStore) is called on this thread.
+/// from kSortingIntoChunks on) is called on this thread.
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
                    const Progress& progress);
 

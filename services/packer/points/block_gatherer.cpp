@@ -79,6 +79,7 @@ Result<std::optional<BlockGatherer::Gathered>> BlockGatherer::pass(SampledTile b
 Result<std::optional<BlockGatherer::Gathered>> BlockGatherer::add(SampledTile block, const geometry::Rect& rect,
                                                                   std::span<const uint8_t> stream) {
   Status good = check(block, rect);
+  const bool is_coarse = block.coarse;
   Frame* frame = find(block.frame);
   Block* open = nullptr;
   if (frame && good) {
@@ -119,6 +120,7 @@ Result<std::optional<BlockGatherer::Gathered>> BlockGatherer::add(SampledTile bl
     const int rows = block.rect.height;
     open = &frame->blocks.emplace_back(Block{std::move(block), std::vector<bool>(static_cast<size_t>(rows)), rows});
   }
+  open->gathered.coarse |= is_coarse;
   return take(*frame, *open, rect);
 }
 

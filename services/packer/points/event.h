@@ -38,6 +38,9 @@ struct FramePart {
   bool extra = false;       ///< rays beyond what the view asked for: the tile completes no update
   /// Not 0: the tile ends its frame; this many of the frame's tiles, itself included, are not sampled.
   uint32_t left_out = 0;
+  bool coarse = false;  ///< sampled from coarser data than the frame asks for: it is to be sampled again
+  /// True if its points are removed once a later frame is complete.
+  bool provisional() const { return step > 1 || coarse; }
 };
 
 /// Returns "tile 3 of frame 17". noun: the word for the part in messages.
@@ -95,7 +98,7 @@ struct Event : FramePart {
   Sequence refines;  ///< sequence of the patch that becomes exact
 
   /// The frame tag that prepare_patch() gets for a patch.
-  FrameId tag() const { return points::tagged(frame, step, rest); }
+  FrameId tag() const { return points::tagged(frame, provisional(), rest); }
 };
 
 // Observer of the packer's model.

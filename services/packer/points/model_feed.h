@@ -44,7 +44,7 @@ inline void with_message(InstanceId packer, const Event& e, const wire::Moments&
                               .missed = {e.missed, e.missed_rect},
                               .moments = moments,
                               .refinable = e.refinable,
-                              .rest = e.rest});
+                              .lifetime = {e.rest, e.coarse}});
     case Event::Kind::kRefine:
       return send(wire::Refine{packer, e.sequence, e.epoch, e.refines, std::as_bytes(std::span(*e.blob))});
     case Event::Kind::kForget:

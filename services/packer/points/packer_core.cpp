@@ -26,7 +26,7 @@ constexpr uint32_t kMostRestNumber = points::kRestTag - 1;
 constexpr size_t kMaxRests = 16;
 constexpr double kUnheard_s = 60;  // older reports of drawn clusters count as out of date
 
-uint32_t rest_tag(uint32_t rest) { return static_cast<uint32_t>(points::tagged({}, 1, rest).value); }
+uint32_t rest_tag(uint32_t rest) { return static_cast<uint32_t>(points::tagged({}, false, rest).value); }
 
 // Defence in depth: the network code has checked tiles already.
 Status check_tile(const SampledTile& t) {
@@ -161,20 +161,22 @@ struct PackerCore::Impl {
     superseded.insert(superseded.end(), pass.patches.begin(), pass.patches.end());
   }
 
-  // A coarse frame ends when a complete one answers the same request of its viewer, or a later one.
+  // A coarse frame ends when a complete one answers the same request of its viewer, or a later one; coarse parts of a
+  // frame when another one does.
   void note_pass(const Event& event, const points::PreparedPatch& patch) {
-    if (event.step > 1) {
-      if (coarse.empty() || coarse.back().frame != event.frame)
-        coarse.push_back({event.frame, event.viewer, event.request, {}});
+    if (event.provisional() && event.rest == 0) {
+      auto at = std::find_if(coarse.begin(), coarse.end(), [&](const auto& pass) { return pass.frame == event.frame; });
+      if (at == coarse.end()) at = coarse.insert(at, {event.frame, event.viewer, event.request, {}});
+      auto& patches = at->patches;
+      for (const auto& [key, mosaic] : patch.mosaics) patches.push_back({key, mosaic.frame_tag()});
       if (coarse.size() > kMaxOpenFrames) {
         if (!keeps()) supersede(coarse.front());  // provisional points must not stay
         coarse.pop_front();
       }
-      auto& patches = coarse.back().patches;
-      for (const auto& [key, mosaic] : patch.mosaics) patches.push_back({key, mosaic.frame_tag()});
-    } else if (event.frame_complete && !event.extra && event.left_out == 0) {
+    }
+    if (event.step == 1 && event.frame_complete && !event.extra && event.left_out == 0) {
       std::erase_if(coarse, [&](const CoarsePass& pass) {
-        const bool over = pass.viewer == event.viewer && pass.request <= event.request;
+        const bool over = pass.viewer == event.viewer && pass.request <= event.request && pass.frame != event.frame;
         if (over) supersede(pass);
         return over;
       });
@@ -236,7 +238,7 @@ struct PackerCore::Impl {
     image::DepthImage decoded;
     event.blob = encoded(tile, event.bounds, &decoded);
     // A coarse pass is soon forgotten: it is not refined.
-    event.refinable = tile.step == 1;
+    event.refinable = !tile.provisional();
     ++statistics.patches_bounded;
     return std::exchange(tile.image, std::move(decoded));
   }

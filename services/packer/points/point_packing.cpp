@@ -146,7 +146,9 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
     return tell_taken(done);
   }
   const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
-  auto gathered = gatherer_.add({block_of(lease), {}}, lease.rect, stream);
+  SampledTile block{block_of(lease), {}};
+  block.coarse = m.coarse;
+  auto gathered = gatherer_.add(std::move(block), lease.rect, stream);
   if (!gathered) return refuse(received, gathered.error().text);
   if (!*gathered) return tell_taken(done);
   BlockGatherer::Gathered& got = **gathered;
@@ -175,7 +177,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   if (!block.extra) exactness_.heads().seen(block.viewer, block.camera.pose, now_s);
   Planner* planner = planning_.planner();
   if (planner) planner->take(block, whole, now_s), block.missed = planner->missed(block);
-  base_.note(block, whole, planner ? planner->cast(block) : nullptr);
+  if (!block.coarse) base_.note(block, whole, planner ? planner->cast(block) : nullptr);
   const auto reference = planner ? planner->reference(block) : std::nullopt;
   // The counts of a block go to the tile that completed it.
   const auto announce = [&](const Event& event) {
@@ -257,7 +259,7 @@ void PointPacking::tell_taken(wire::TileDone& done) {
 
 // Records whole views, as sampled.
 void PointPacking::record(const SampledTile& block) {
-  if (!options_.recorder || block.step != 1) return;
+  if (!options_.recorder || block.provisional()) return;
   const Status s = options_.recorder->add(block.frame, block.camera, block.rect, block.tiles_in_frame, block.image);
   if (s) return;
   ++records_failed_;

@@ -27,6 +27,11 @@ class RasterSampler final : public Sampler {
   Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) override;
   Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override;
   void remove_chunk(ChunkId id) override;
+  void show(const std::vector<ChunkId>& chunks) override {
+    for (auto& [id, drawable] : chunks_) drawable.shown = false;
+    for (const ChunkId id : chunks)
+      if (const auto found = chunks_.find(id); found != chunks_.end()) found->second.shown = true;
+  }
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override;
   void set_clip(const geometry::Clip& clip) override { clip_ = clip; }
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
@@ -40,6 +45,7 @@ class RasterSampler final : public Sampler {
     GLsizei indices = 0;
     bool scalars = false;
     geometry::Box box_room;
+    bool shown = true;
   };
 
   explicit RasterSampler(std::unique_ptr<gl::EglContext> context) : context_(std::move(context)) {}
@@ -255,7 +261,7 @@ void RasterSampler::draw(const geometry::Camera& camera, const geometry::Rect& p
   const geometry::Frustum frustum(geometry::crop(camera, part));
   std::vector<std::pair<float, const Drawable*>> visible;
   for (const auto& [id, drawable] : chunks_)
-    if (frustum.may_contain(drawable.box_room))
+    if (drawable.shown && frustum.may_contain(drawable.box_room))
       visible.emplace_back(glm::length(glm::clamp(eye, drawable.box_room.lo, drawable.box_room.hi) - eye), &drawable);
   std::sort(visible.begin(), visible.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [distance, drawable] : visible) {

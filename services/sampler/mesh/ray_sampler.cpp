@@ -266,6 +266,10 @@ class RaySampler final : public Sampler {
     return scene_.add(std::move(chunks));
   }
   void remove_chunk(ChunkId id) override { scene_.remove(id); }
+  std::function<Result<Add>()> preparing(ChunkId id, geometry::ChunkBytes chunk) override {
+    return [this, id, chunk = std::move(chunk)] { return scene_.prepare(id, chunk); };
+  }
+  void show(const std::vector<ChunkId>& chunks) override { scene_.show(chunks); }
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override {
     colours_ = colours ? std::move(colours) : neutral_colours();
   }

@@ -28,6 +28,9 @@ Result<RayScene::Slot> RayScene::build(ChunkId id, geometry::ChunkBytes chunk) c
                              view.vertices());
   rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, view.indices.data(), 0, 12,
                              view.triangles());
+  // A third of the time, and rays take a tenth longer: chunks come and go, and few rays are cast at each.
+  rtcSetGeometryBuildQuality(mesh, RTC_BUILD_QUALITY_LOW);
+  rtcSetSceneBuildQuality(slot.scene.get(), RTC_BUILD_QUALITY_LOW);
   rtcCommitGeometry(mesh);
   rtcAttachGeometry(slot.scene.get(), mesh);
   rtcReleaseGeometry(mesh);
@@ -72,6 +75,13 @@ Status RayScene::add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunk
   return refusals.status();
 }
 
+Result<std::function<void()>> RayScene::prepare(ChunkId id, geometry::ChunkBytes chunk) {
+  auto built = build(id, std::move(chunk));
+  if (!built) return built.error();
+  const auto slot = std::make_shared<Slot>(std::move(*built));
+  return std::function<void()>([this, id, slot] { install(id, std::move(*slot)); });
+}
+
 void RayScene::remove(ChunkId id) {
   const auto found = slot_of_.find(id);
   if (found == slot_of_.end()) return;
@@ -80,6 +90,19 @@ void RayScene::remove(ChunkId id) {
   free_.push_back(found->second);
   slot_of_.erase(found);
   changed_ = true;
+}
+
+void RayScene::show(const std::vector<ChunkId>& chunks) {
+  std::vector<bool> wanted(slots_.size());
+  for (const ChunkId id : chunks)
+    if (const auto found = slot_of_.find(id); found != slot_of_.end()) wanted[found->second] = true;
+  for (const auto& [id, at] : slot_of_) {
+    if (slots_[at].shown == wanted[at]) continue;
+    const RTCGeometry instance = rtcGetGeometry(top_.get(), at);
+    wanted[at] ? rtcEnableGeometry(instance) : rtcDisableGeometry(instance);
+    slots_[at].shown = wanted[at];
+    changed_ = true;
+  }
 }
 
 void RayScene::commit() {

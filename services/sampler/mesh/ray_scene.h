@@ -12,6 +12,7 @@
 #include <embree3/rtcore.h>
 #include <tbb/task_arena.h>
 
+#include <functional>
 #include <memory>
 #include <unordered_map>
 #include <vector>
@@ -28,7 +29,12 @@ class RayScene {
 
   /// As Sampler::add_chunks.
   Status add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks);
+  /// Builds a chunk's hierarchy. Threads may call it at once, and while scene() is traced. The returned function adds
+  /// it.
+  Result<std::function<void()>> prepare(ChunkId id, geometry::ChunkBytes chunk);
   void remove(ChunkId id);
+  /// As Sampler::show.
+  void show(const std::vector<ChunkId>& chunks);
 
   /// Brings the hierarchy over the chunks up to date. To be called before scene() is traced: until then it may refer to
   /// chunks that are gone.
@@ -54,6 +60,7 @@ class RayScene {
   struct Slot {
     HeldChunk held;
     Scene scene;
+    bool shown = true;
   };
 
   Result<Slot> build(ChunkId id, geometry::ChunkBytes chunk) const;

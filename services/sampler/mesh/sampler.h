@@ -1,7 +1,9 @@
 // The interface of all mesh samplers: chunks in, depth images of tiles out. No sockets, no clocks.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <vector>
 
 #include "common/core/ids.h"
 #include "common/core/result.h"
@@ -31,6 +33,16 @@ class Sampler {
   /// ones.
   virtual Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) = 0;
   virtual void remove_chunk(ChunkId id) = 0;
+  /// Returns the costly part of add_chunk(), which may run on any thread while tiles are sampled, and returns the rest,
+  /// for the sampler's thread. Null: this kind of sampler has no such part.
+  using Add = std::function<void()>;
+  virtual std::function<Result<Add>()> preparing(ChunkId id, geometry::ChunkBytes chunk) {
+    (void)id, (void)chunk;
+    return nullptr;
+  }
+  /// Samples these chunks alone from now on; unknown ones are ignored. Until the first call all chunks are sampled; one
+  /// that is added later is sampled until the next call.
+  virtual void show(const std::vector<ChunkId>& chunks) = 0;
 
   /// Sets the colours of chunks that hold scalars, from now on; null: neutral. Other chunks keep their colours.
   virtual void set_colours(std::shared_ptr<const scene::ColourTable> colours) = 0;

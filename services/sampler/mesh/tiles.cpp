@@ -13,6 +13,7 @@ namespace {
 
 constexpr size_t kChunksInFlight = 8;         // requests to the data server not yet answered
 constexpr uint64_t kBytesInFlight = 8 << 20;  // size of these chunks, unless it is one chunk
+constexpr uint64_t kBytesBeside = 4 << 20;    // the same while there are tiles to be sampled
 constexpr double kMostListPatience_s = 16;    // an array that is being read may take long
 constexpr double kExtend_s = 0.1;             // between two requests for more time
 constexpr double kPatience_s = 6.0;  // if nothing comes for this time, and for what the link needs: no more time
@@ -24,13 +25,13 @@ geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
   return {*copy, copy};
 }
 
-geometry::Camera part(const wire::Lease& lease) { return geometry::crop(lease.camera, lease.rect); }
+geometry::Rect all_of(const geometry::Camera& camera) { return {0, 0, camera.width, camera.height}; }
 
 }  // namespace
 
 MeshTiles::MeshTiles(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
                      net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans)
-    : sampler_(std::move(sampler)),
+    : builder_(std::move(sampler)),
       cache_(cache_bytes),
       service_name_(service_name),
       context_(context),
@@ -87,10 +88,10 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
   const Look* look = looks_.find(session.epoch);
   if (hash.empty() || hash != content_hash_ || (look && look->array != array_)) {
     if (look) array_ = look->array;
-    for (const auto& c : cache_.chunks()) sampler_->remove_chunk(c.id);
+    builder_.drop();
+    for (const auto& c : cache_.chunks()) builder_.sampler().remove_chunk(c.id);
     cache_.reset({});
     content_hash_ = hash;
-    prefetched_ = false;
   }
   begin_anew();
 }
@@ -120,15 +121,26 @@ Readiness MeshTiles::readiness(const HeldLease& held, double now_s) {
   const Look* look = looks_.find(held.lease.epoch);
   if (!look) return looks_.wait_for_welcome(held.lease.epoch, held.received_s, now_s);
   if (!look->known || look->array != array_) return {Readiness::State::kHopeless};
-  const bool ready = cache_.known() && cache_.missing(part(held.lease)).empty();
-  return {ready ? Readiness::State::kReady : Readiness::State::kWaits};
+  if (!cache_.known()) return {Readiness::State::kWaits};
+  const Cut cut = cache_.cut(held.lease.camera, held.lease.rect);
+  if (cut.fine) return {Readiness::State::kReady};
+  const double until_s = patience_.until_s(held.lease, now_s);
+  if (cut.whole && now_s >= until_s) return {Readiness::State::kReady};
+  constexpr double kLook_s = 0.005;  // between two looks at chunks that are being prepared
+  const double again_s = cut.whole ? until_s : 1e300;
+  return {Readiness::State::kWaits, builder_.busy() ? std::min(again_s, now_s + kLook_s) : again_s};
 }
 
 Sampled MeshTiles::sample(const HeldLease& held) {
   const Look& look = *looks_.find(held.lease.epoch);
-  sampler_->set_colours(look.colours);
-  sampler_->set_clip(look.clip);
-  return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect, held.pixels()); });
+  builder_.sampler().set_colours(look.colours);
+  builder_.sampler().set_clip(look.clip);
+  // All tiles of a view are sampled from one cut.
+  builder_.sampler().show(cache_.cut(held.lease.camera, all_of(held.lease.camera)).shown);
+  Sampled out = timed([&] { return builder_.sampler().sample(held.lease.camera, held.lease.rect, held.pixels()); });
+  out.coarse = !cache_.cut(held.lease.camera, held.lease.rect).fine;
+  patience_.sampled(out.coarse);
+  return out;
 }
 
 // Asks for more time for a lease whose chunks are not here, unless nothing has come for long.
@@ -139,7 +151,8 @@ void MeshTiles::extend(const HeldLease& next, double now_s) {
   last_extend_s_ = now_s;
 }
 
-// Asks for the list of chunks, then for chunks of the next tile, then for the rest as far as the budget goes.
+// Asks for the list of chunks, then for chunks of the next tile, of the view around it, and for the rest as far as the
+// budget goes: the leaves once there was no tile for a while.
 void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
   const uint64_t failed = blocks_->failed_connections();
@@ -150,33 +163,24 @@ void MeshTiles::fetch(const HeldLease* next, double now_s) {
   }
   if (retry_.overdue(now_s, broken_)) begin_anew();
   std::vector<ChunkId> wanted;
+  uint64_t most_bytes = kBytesInFlight;
   if (next) {
-    wanted = cache_.missing(part(next->lease));
-    if (!wanted.empty()) extend(*next, now_s);
+    Cut cut = cache_.cut(next->lease.camera, next->lease.rect);
+    if (!cut.fine) extend(*next, now_s);
+    if (cut.whole) most_bytes = kBytesBeside;
+    wanted = std::move(cut.missing);
+    if (wanted.empty()) wanted = cache_.cut(next->lease.camera, all_of(next->lease.camera)).missing;
   }
-  if (wanted.empty() && !prefetched_) {
-    wanted = cache_.prefetch();
-    if (wanted.empty()) {
-      prefetched_ = true;
-      log::info("{} of {} chunks held ({:.0f} MB)", cache_.chunks().size() - missing_count(), cache_.chunks().size(),
-                double(cache_.bytes()) / 1e6);
-    }
-  }
+  if (wanted.empty()) wanted = cache_.prefetch(patience_.at_rest(next != nullptr, now_s));
   for (const ChunkId id : wanted) {
     if (cache_.waiting(id)) continue;
     if (cache_.waiting_count() >= kChunksInFlight ||
-        (cache_.waiting_count() > 0 && cache_.waiting_bytes() + cache_.bytes_of(id) > kBytesInFlight))
+        (cache_.waiting_count() > 0 && cache_.waiting_bytes() + cache_.bytes_of(id) > most_bytes))
       break;
     blocks_->send(wire::ChunkRequest{epoch_, id, array_});
     cache_.mark_waiting(id);
     retry_.asked(cache_.bytes_of(id), now_s);
   }
-}
-
-size_t MeshTiles::missing_count() const {
-  size_t n = 0;
-  for (const auto& c : cache_.chunks()) n += !cache_.held(c.id);
-  return n;
 }
 
 std::vector<net::Socket*> MeshTiles::sockets() {
@@ -202,19 +206,14 @@ void MeshTiles::receive() {
     });
     if (batch.size() >= kChunksInFlight) break;
   }
-  if (batch.empty()) return;
-  const double begin_s = monotonic_s();
-  const bool all_good = sampler_->add_chunks(batch).ok();
-  for (auto& [id, bytes] : batch) {
-    const uint64_t size = bytes.bytes.size();
-    if (!all_good)  // find the bad one
-      if (const Status s = sampler_->add_chunk(id, std::move(bytes)); !s) {
-        refuse(id, s.error().text);
-        continue;
-      }
-    for (const ChunkId old : cache_.insert(id, size)) sampler_->remove_chunk(old);
+  builder_.take(std::move(batch));
+  for (const ChunkBuilder::Added& chunk : builder_.add()) {
+    spans_.add("add chunk", link_.to_master_s(chunk.begin_s), link_.to_master_s(chunk.end_s));
+    if (!chunk.status)
+      refuse(chunk.id, chunk.status.error().text);
+    else
+      for (const ChunkId old : cache_.insert(chunk.id, chunk.bytes)) builder_.sampler().remove_chunk(old);
   }
-  spans_.add("add chunks", link_.to_master_s(begin_s), link_.to_master_s(monotonic_s()));
 }
 
 void MeshTiles::refuse(ChunkId id, const std::string& why) {
@@ -227,6 +226,7 @@ void MeshTiles::refuse(ChunkId id, const std::string& why) {
 void MeshTiles::add_status(net::MasterLink::Values& values) const {
   values["chunk_mb"] = double(cache_.bytes()) / 1e6;
   values["chunks_refused"] = double(chunks_refused_);
+  values["tiles_coarse"] = double(patience_.coarse());
   values["chunks_lacking"] = double(cache_.holes());
   values["messages_rejected"] = blocks_ ? double(blocks_->rejected()) : 0.0;
 }
@@ -234,7 +234,6 @@ void MeshTiles::add_status(net::MasterLink::Values& values) const {
 // ---- the cache of chunks -------------------------------------------------------------------------------------------
 
 void ChunkCache::reset(std::vector<geometry::ChunkInfo> chunks) {
-  std::sort(chunks.begin(), chunks.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
   chunks_ = std::move(chunks);
   held_.clear();
   refused_.clear();
@@ -243,40 +242,30 @@ void ChunkCache::reset(std::vector<geometry::ChunkInfo> chunks) {
   holes_ = 0;
 }
 
-std::vector<ChunkId> ChunkCache::missing(const geometry::Camera& camera) {
-  const geometry::Frustum frustum(camera);
-  ++use_;
-  std::vector<std::pair<float, ChunkId>> order;
-  for (const auto& c : chunks_) {
-    if (!frustum.may_contain(c.box_room)) continue;
-    if (const auto it = held_.find(c.id); it != held_.end())
-      it->second.use = use_;
-    else
-      order.emplace_back(glm::distance(c.box_room.centre(), glm::vec3(camera.pose.position_room)), c.id);
-  }
-  std::sort(order.begin(), order.end());
-  std::vector<ChunkId> out;
-  for (const auto& [distance, id] : order) out.push_back(id);
-  return out;
+Cut ChunkCache::cut(const geometry::Camera& camera, const geometry::Rect& part) {
+  if (!(std::exchange(used_by_, camera) == camera)) ++use_;
+  return choose_cut(chunks_, camera, geometry::Frustum(geometry::crop(camera, part)), [this](ChunkId id) {
+    const auto found = held_.find(id);
+    if (found == held_.end()) return false;
+    found->second.use = use_;
+    return true;
+  });
 }
 
-std::vector<ChunkId> ChunkCache::prefetch() const {
+std::vector<ChunkId> ChunkCache::prefetch(bool leaves) const {
   std::vector<ChunkId> out;
   uint64_t bytes = bytes_;
-  for (const auto& c : chunks_) {
-    if (held_.contains(c.id)) continue;
-    bytes += c.bytes;
+  for (auto c = chunks_.rbegin(); c != chunks_.rend(); ++c) {
+    if (held_.contains(c->id)) continue;
+    if (c->is_leaf() && !leaves) break;
+    bytes += memory(c->bytes, c->triangles);
     if (bytes > budget_bytes_) break;
-    out.push_back(c.id);
+    out.push_back(c->id);
   }
   return out;
 }
 
-uint64_t ChunkCache::bytes_of(ChunkId id) const {
-  const auto it =
-      std::lower_bound(chunks_.begin(), chunks_.end(), id, [](const auto& info, ChunkId v) { return info.id < v; });
-  return it != chunks_.end() && it->id == id ? it->bytes : 0;
-}
+uint64_t ChunkCache::bytes_of(ChunkId id) const { return id.value < chunks_.size() ? chunks_[id.value].bytes : 0; }
 
 uint64_t ChunkCache::waiting_bytes() const {
   uint64_t out = 0;
@@ -287,7 +276,8 @@ uint64_t ChunkCache::waiting_bytes() const {
 std::vector<ChunkId> ChunkCache::insert(ChunkId id, uint64_t bytes) {
   waiting_.erase(id);
   refused_.erase(id);
-  if (held_.try_emplace(id, Held{use_, bytes}).second) bytes_ += bytes;
+  const uint64_t held = memory(bytes, id.value < chunks_.size() ? chunks_[id.value].triangles : 0);
+  if (held_.try_emplace(id, Held{use_, held}).second) bytes_ += held;
   std::vector<ChunkId> removed;
   while (bytes_ > budget_bytes_) {
     const auto oldest = std::min_element(held_.begin(), held_.end(),

@@ -5,10 +5,13 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/metrics/recorder.h"
 #include "services/sampler/epoch_book.h"
+#include "services/sampler/mesh/chunk_builder.h"
+#include "services/sampler/mesh/cut.h"
 #include "services/sampler/mesh/sampler.h"
 #include "services/sampler/retry_clock.h"
 #include "services/sampler/tiles/tile_source.h"
@@ -21,15 +24,16 @@ class ChunkCache {
  public:
   explicit ChunkCache(uint64_t budget_bytes) : budget_bytes_(budget_bytes) {}
 
-  /// Sets the data set's chunks and forgets everything held before.
+  /// Sets the data set's chunks, in the order of their ids, and forgets everything held before.
   void reset(std::vector<geometry::ChunkInfo> chunks);
   bool known() const { return !chunks_.empty(); }
 
-  /// Returns the chunks that the view needs and that are not held, nearest first, waiting ones included; marks the held
-  /// ones as used.
-  std::vector<ChunkId> missing(const geometry::Camera& camera);
-  /// Returns chunks to fetch before a view asks for them, as far as the budget goes, in order of id.
-  std::vector<ChunkId> prefetch() const;
+  /// Chooses what this part of a view is sampled from (choose_cut()); marks what is held of it, and what is above that,
+  /// as used. Waiting chunks are missing.
+  Cut cut(const geometry::Camera& camera, const geometry::Rect& part);
+  /// Returns chunks to fetch before a view asks for them, as far as the budget goes, the coarsest first; with or
+  /// without the leaves.
+  std::vector<ChunkId> prefetch(bool leaves) const;
 
   bool held(ChunkId id) const { return held_.contains(id); }
   bool waiting(ChunkId id) const { return waiting_.contains(id); }
@@ -39,6 +43,8 @@ class ChunkCache {
   /// Size of a chunk according to the list.
   uint64_t bytes_of(ChunkId id) const;
   uint64_t waiting_bytes() const;
+  /// Memory of a chunk: its bytes, and a hierarchy over its triangles (62 bytes each in Embree 3.13).
+  static uint64_t memory(uint64_t bytes, uint64_t triangles) { return bytes + 62 * triangles; }
   /// Notes a chunk of this size that came. Returns the chunks to remove to stay within the budget; none that the last
   /// view needs.
   std::vector<ChunkId> insert(ChunkId id, uint64_t bytes);
@@ -49,6 +55,7 @@ class ChunkCache {
   /// Number of chunks that views do without.
   size_t holes() const { return holes_; }
 
+  /// Memory of all chunks that are held.
   uint64_t bytes() const { return bytes_; }
   const std::vector<geometry::ChunkInfo>& chunks() const { return chunks_; }
 
@@ -64,6 +71,33 @@ class ChunkCache {
   std::set<ChunkId> waiting_;
   size_t holes_ = 0;
   uint64_t use_ = 0, bytes_ = 0;
+  geometry::Camera used_by_;  // the last view
+};
+
+/// Tells how long the tiles of a view wait for chunks before coarser ones stand in for them, and chunks for a view.
+class DetailPatience {
+ public:
+  static constexpr double kPatience_s = 0.04;
+  /// Returns the time from which this lease is sampled from what is there.
+  double until_s(const wire::Lease& lease, double now_s) {
+    if (std::exchange(frame_, lease.frame) != lease.frame) since_s_ = now_s;
+    return since_s_ + kPatience_s;
+  }
+
+  /// True once there was no lease for a second: then chunks may be prepared that no view has asked for.
+  bool at_rest(bool lease, double now_s) {
+    if (lease) leased_s_ = now_s;
+    return now_s - leased_s_ > 1;
+  }
+  void sampled(bool coarse) { coarse_ += coarse; }
+  /// Number of tiles that were sampled from coarser chunks.
+  uint64_t coarse() const { return coarse_; }
+
+ private:
+  FrameId frame_;
+  double since_s_ = 0;  // its first lease waits since then
+  double leased_s_ = -1e9;
+  uint64_t coarse_ = 0;
 };
 
 /// When the list of chunks is asked for. It is small, or its array is being read: each time it is waited for twice as
@@ -84,7 +118,7 @@ class MeshTiles final : public TileSource {
   MeshTiles(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
             net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans);
 
-  const char* name() const override { return sampler_->name(); }
+  const char* name() const override { return builder_.sampler().name(); }
   void on_welcome(const wire::Welcome& session) override;
   /// True once the list is known: a lease may wait for its chunks, but these come first, so that the earliest tiles
   /// need not wait for the whole mesh.
@@ -107,13 +141,12 @@ class MeshTiles final : public TileSource {
     geometry::Clip clip;
   };
   void learn_look(const wire::Welcome& session);
-  size_t missing_count() const;
   void begin_anew();
   void fetch_list(double now_s);
   void extend(const HeldLease& next, double now_s);
   void refuse(ChunkId id, const std::string& why);
 
-  std::unique_ptr<Sampler> sampler_;
+  ChunkBuilder builder_;
   ChunkCache cache_;
   std::string service_name_;
   net::Context& context_;
@@ -124,9 +157,9 @@ class MeshTiles final : public TileSource {
   std::string array_;  // array of the chunks held
   EpochId epoch_;      // newest epoch
   EpochBook<Look> looks_;
-  bool prefetched_ = false;
   uint64_t chunks_refused_ = 0;
   RetryClock retry_;  // for chunks
+  DetailPatience patience_;
   ListClock list_clock_;
   uint64_t failed_before_ = 0;
   bool broken_ = false;  // the connection broke after a request

@@ -29,6 +29,7 @@ struct HeldLease {
 struct Sampled {
   image::DepthImage image;  ///< canonical, of the lease's rectangle; pixels outside its mask are empty
   double begin_s = 0, end_s = 0;
+  bool coarse = false;  ///< wire::DepthTile::coarse
 };
 
 class TileSource {

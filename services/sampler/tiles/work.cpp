@@ -50,7 +50,8 @@ Delivery TileWork::sample_next() {
   const Sampled sampled = source_->sample(held);
   const auto stream = codec::encode(sampled.image, {}, nullptr, geometry::ray_axes(held.lease.camera, held.lease.rect));
   Delivery out = deliver(wire::DepthTile::kName, held, sampled);
-  out.body = wire::encode(wire::DepthTile{link_.instance(), finished(held, out), std::as_bytes(std::span(stream))});
+  out.body = wire::encode(
+      wire::DepthTile{link_.instance(), finished(held, out), std::as_bytes(std::span(stream)), sampled.coarse});
   return out;
 }
 

@@ -106,7 +106,7 @@ struct Contents {
 };
 inline Contents contents_of(const MeshStore& store) {
   Contents out;
-  for (const auto& info : store.chunks()) {
+  for (const auto& info : store.leaves()) {
     const auto bytes = store.chunk(info.id);
     const auto view = geometry::MeshChunkView::validate(bytes.bytes);
     if (!view) {

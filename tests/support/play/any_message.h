@@ -115,7 +115,9 @@ class AnyMessage {
   }
   void operator()(const char*, std::vector<geometry::ChunkInfo>& v, size_t = 0) {
     v.resize(dice_.below(3));
-    for (auto& c : v) c = {ChunkId{id()}, {{-1, -1, -1}, {1, 1, 1}}, uint32_t(whole()), uint32_t(whole())};
+    for (size_t i = 0; i < v.size(); ++i)
+      v[i] = {ChunkId{dice_.chance(30) ? id() : i}, {{-1, -1, -1}, {1, 1, 1}}, uint32_t(whole()), uint32_t(whole())};
+    if (v.size() == 2 && dice_.chance(50)) v[1].spacing_m = 0.1f, v[1].first_child = 0, v[1].children = 1;
   }
   void operator()(const char*, volume::ShearFrame& v, size_t = 0) {
     if (!values_.shears.empty()) v = dice_.pick(values_.shears);

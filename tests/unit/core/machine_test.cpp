@@ -1,4 +1,4 @@
-// Number of processors that a process may use.
+// Processors and memory that a process may use.
 #include "common/core/machine.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +8,11 @@
 
 namespace telesplat {
 namespace {
+
+TEST(Machine, MemoryIsAtMostTheMachines) {
+  EXPECT_GT(usable_memory_mb(), 100);
+  EXPECT_LE(usable_memory_mb(), this_machine().memory_mb);
+}
 
 TEST(Machine, ProcessorsAreThoseThatThisProcessMayRunOn) {
   cpu_set_t before;

@@ -36,7 +36,7 @@ TEST_P(RealFiles, OpenWithAllTheirTriangles) {
   const glm::vec3 size = info.box_room.size();
   EXPECT_NEAR(std::max({size.x, size.y, size.z}), 0.8, 1e-6);
   uint64_t triangles = 0;
-  for (const auto& chunk : store->chunks()) {
+  for (const auto& chunk : store->leaves()) {
     EXPECT_TRUE(geometry::MeshChunkView::validate(store->chunk(chunk.id).bytes).ok());
     triangles += chunk.triangles;
   }

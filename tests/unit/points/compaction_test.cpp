@@ -62,13 +62,13 @@ TEST(Compaction, ProvisionalMosaicsStayAsTheyCame) {
   uint64_t provisional = 0;
   for (uint64_t s = 1; s <= 12; ++s) {
     const uint64_t step = s % 3 == 1 ? 4 : 1;
-    PreparedPatch patch = view(s, 0.4, 320, step > 1 ? 4 : 1, tagged({s}, step));
+    PreparedPatch patch = view(s, 0.4, 320, step > 1 ? 4 : 1, tagged({s}, step > 1));
     for (const auto& [key, mosaic] : patch.mosaics) {
       EXPECT_EQ(mosaic.provisional(), step > 1);
       EXPECT_EQ(mosaic.frame_tag(), step > 1 ? s | kProvisionalTag : s);
       if (step > 1) gather(key, mosaic, expected), ++provisional;
     }
-    if (step == 1) without.insert(view(s, 0.4, 320, 1, tagged({s}, step)));
+    if (step == 1) without.insert(view(s, 0.4, 320, 1, tagged({s}, step > 1)));
     model.insert(std::move(patch));
   }
   std::vector<ClusterKey> keys;
@@ -86,9 +86,9 @@ TEST(Compaction, PointsOfARestAreMergedAmongThemselves) {
   PointModel model(compact_config()), without(compact_config()), alone(compact_config());
   for (uint64_t s = 1; s <= 60; ++s) {
     const uint64_t rest = s % 3;  // no rest, then two rests
-    model.insert(view(s, 0.4, 320, 1, tagged({s}, 1, rest)));
-    if (rest == 0) without.insert(view(s, 0.4, 320, 1, tagged({s}, 1)));
-    if (rest == 1) alone.insert(view(s, 0.4, 320, 1, tagged({s}, 1, rest)));
+    model.insert(view(s, 0.4, 320, 1, tagged({s}, false, rest)));
+    if (rest == 0) without.insert(view(s, 0.4, 320, 1, tagged({s}, false)));
+    if (rest == 1) alone.insert(view(s, 0.4, 320, 1, tagged({s}, false, rest)));
   }
   std::vector<ClusterKey> keys;
   std::vector<uint32_t> frames;
@@ -96,7 +96,7 @@ TEST(Compaction, PointsOfARestAreMergedAmongThemselves) {
   for (const auto& [key, cluster] : model.clusters()) {
     for (const uint64_t rest : {1, 2}) {
       keys.push_back(key);
-      frames.push_back(static_cast<uint32_t>(tagged({}, 1, rest).value));
+      frames.push_back(static_cast<uint32_t>(tagged({}, false, rest).value));
     }
     for (const Mosaic& m : cluster->mosaics) mosaics += m.of_rest(), of_rest_1 += m.group() == frames.end()[-2];
   }

@@ -7,14 +7,17 @@
 namespace telesplat::sampler {
 namespace {
 
-// Ten boxes in a row along x, 100 bytes each; ids in descending order.
+// Ten boxes in a row along x, 100 bytes each, without triangles.
 std::vector<geometry::ChunkInfo> row() {
   std::vector<geometry::ChunkInfo> out;
-  for (int i = 9; i >= 0; --i) {
+  for (int i = 0; i < 10; ++i) {
     const float x = float(i) - 4.5f;
-    out.push_back({ChunkId{uint64_t(i)}, {{x - 0.4f, -0.4f, -0.4f}, {x + 0.4f, 0.4f, 0.4f}}, 10, 100});
+    out.push_back({ChunkId{uint64_t(i)}, {{x - 0.4f, -0.4f, -0.4f}, {x + 0.4f, 0.4f, 0.4f}}, 0, 100});
   }
   return out;
+}
+std::vector<ChunkId> missing(ChunkCache& cache, const geometry::Camera& camera) {
+  return cache.cut(camera, {0, 0, camera.width, camera.height}).missing;
 }
 // Looks along +x from just before chunk `first`.
 geometry::Camera looking_right(int first) {
@@ -31,13 +34,13 @@ TEST(ChunkCache, AsksForWhatTheViewNeedsNearestFirst) {
   EXPECT_FALSE(cache.known());
   cache.reset(row());
   EXPECT_TRUE(cache.known());
-  EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9}));
+  EXPECT_EQ(values(missing(cache, looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9}));
   cache.mark_waiting({7});
   EXPECT_TRUE(cache.waiting({7}));
-  EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9})) << "waiting is not holding";
+  EXPECT_EQ(values(missing(cache, looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9})) << "waiting is not holding";
   EXPECT_TRUE(cache.insert({7}, 100).empty());
   EXPECT_FALSE(cache.waiting({7}));
-  EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 8, 9}));
+  EXPECT_EQ(values(missing(cache, looking_right(6))), (std::vector<uint64_t>{6, 8, 9}));
   EXPECT_EQ(cache.bytes(), 100u);
   EXPECT_TRUE(cache.insert({7}, 100).empty());
   EXPECT_EQ(cache.bytes(), 100u) << "the same chunk twice";
@@ -48,15 +51,15 @@ TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
   cache.reset(row());
   const auto view = [&](int first) {
     std::vector<uint64_t> removed;
-    for (const ChunkId id : cache.missing(looking_right(first)))
+    for (const ChunkId id : missing(cache, looking_right(first)))
       for (const ChunkId old : cache.insert(id, 100)) removed.push_back(old.value);
     return removed;
   };
-  EXPECT_TRUE(view(8).empty());                                                                     // needs 8, 9
-  EXPECT_TRUE(view(9).empty());                                                                     // needs 9 again
-  cache.missing(geometry::make_camera(geometry::look_at({-4.5, 0, 5}, {-4.5, 0, 0}), 10, 64, 64));  // sees chunk 0
+  EXPECT_TRUE(view(8).empty());                                                                      // needs 8, 9
+  EXPECT_TRUE(view(9).empty());                                                                      // needs 9 again
+  missing(cache, geometry::make_camera(geometry::look_at({-4.5, 0, 5}, {-4.5, 0, 0}), 10, 64, 64));  // sees chunk 0
   EXPECT_TRUE(cache.insert({0}, 100).empty());
-  cache.missing(geometry::make_camera(geometry::look_at({-3.5, 0, 5}, {-3.5, 0, 0}), 10, 64, 64));  // sees chunk 1
+  missing(cache, geometry::make_camera(geometry::look_at({-3.5, 0, 5}, {-3.5, 0, 0}), 10, 64, 64));  // sees chunk 1
   EXPECT_EQ(values(cache.insert({1}, 100)), (std::vector<uint64_t>{8}));
   EXPECT_TRUE(cache.held({9}));
   EXPECT_LE(cache.bytes(), 300u);
@@ -65,11 +68,11 @@ TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
 TEST(ChunkCache, NeverLetsGoOfWhatTheViewNeeds) {
   ChunkCache cache(250);
   cache.reset(row());
-  for (const ChunkId id : cache.missing(looking_right(4))) EXPECT_TRUE(cache.insert(id, 100).empty());
+  for (const ChunkId id : missing(cache, looking_right(4))) EXPECT_TRUE(cache.insert(id, 100).empty());
   EXPECT_EQ(cache.bytes(), 600u) << "over the budget, but all of it is in view";
-  EXPECT_TRUE(cache.missing(looking_right(4)).empty());
+  EXPECT_TRUE(missing(cache, looking_right(4)).empty());
   // The next view needs one chunk: the others are dropped.
-  cache.missing(looking_right(9));
+  missing(cache, looking_right(9));
   EXPECT_EQ(cache.insert({9}, 100).size(), 4u);
   EXPECT_LE(cache.bytes(), 250u);
 }
@@ -77,15 +80,16 @@ TEST(ChunkCache, NeverLetsGoOfWhatTheViewNeeds) {
 TEST(ChunkCache, PrefetchesWithinTheBudget) {
   ChunkCache cache(350);
   cache.reset(row());
-  EXPECT_EQ(values(cache.prefetch()), (std::vector<uint64_t>{0, 1, 2}));
-  cache.insert({0}, 100);
-  EXPECT_EQ(values(cache.prefetch()), (std::vector<uint64_t>{1, 2}));
+  EXPECT_EQ(values(cache.prefetch(true)), (std::vector<uint64_t>{9, 8, 7}));
+  cache.insert({9}, 100);
+  EXPECT_EQ(values(cache.prefetch(true)), (std::vector<uint64_t>{8, 7}));
+  EXPECT_TRUE(cache.prefetch(false).empty()) << "these are all leaves";
   cache.mark_waiting({5});
   cache.forget_waiting();
   EXPECT_EQ(cache.waiting_count(), 0u);
   cache.reset(row());
   EXPECT_EQ(cache.bytes(), 0u);
-  EXPECT_FALSE(cache.held({0}));
+  EXPECT_FALSE(cache.held({9}));
 }
 
 TEST(ChunkCache, SurvivesAnIdThatIsNotInTheList) {
@@ -102,10 +106,10 @@ TEST(ChunkCache, CountsWhatCame) {
   auto claimed = row();
   for (auto& c : claimed) c.bytes = 0;
   cache.reset(claimed);
-  cache.missing(looking_right(0));
+  missing(cache, looking_right(0));
   for (const uint64_t id : {0, 1, 2}) EXPECT_TRUE(cache.insert({id}, 100).empty());
   EXPECT_EQ(cache.bytes(), 300u);
-  cache.missing(looking_right(9));
+  missing(cache, looking_right(9));
   EXPECT_EQ(cache.insert({9}, 100).size(), 1u) << "over the budget";
 }
 
@@ -116,12 +120,22 @@ TEST(ChunkCache, WhatIsRefusedIsMissingAndInTheEndAHole) {
   EXPECT_EQ(cache.waiting_bytes(), 100u);
   EXPECT_FALSE(cache.refuse({9}));
   EXPECT_FALSE(cache.waiting({9}));
-  EXPECT_EQ(values(cache.missing(looking_right(9))), std::vector<uint64_t>{9});
+  EXPECT_EQ(values(missing(cache, looking_right(9))), std::vector<uint64_t>{9});
   EXPECT_FALSE(cache.refuse({9}));
   EXPECT_TRUE(cache.refuse({9})) << "the third time";
-  EXPECT_TRUE(cache.missing(looking_right(9)).empty()) << "views do without it";
+  EXPECT_TRUE(missing(cache, looking_right(9)).empty()) << "views do without it";
   EXPECT_EQ(cache.holes(), 1u);
   EXPECT_EQ(cache.bytes(), 0u);
+}
+
+TEST(ChunkCache, CountsTheHierarchyOverTriangles) {
+  ChunkCache cache(1000);
+  auto chunks = row();
+  for (auto& chunk : chunks) chunk.triangles = 10;
+  cache.reset(chunks);
+  EXPECT_EQ(cache.prefetch(true).size(), 1u);
+  cache.insert({0}, 100);
+  EXPECT_EQ(cache.bytes(), ChunkCache::memory(100, 10));
 }
 
 }  // namespace

@@ -19,11 +19,10 @@ TEST(SamplerOptions, AChildIsToldWhatDiffers) {
 TEST(SamplerOptions, ValuesBeyondTheirLimitsAreRefused) {
   SamplerOptions options;
   const options::Table rows = table(options);
-  for (const auto& [flag, value] :
-       {std::pair{"--threads", "1025"}, {"--sampler", "gpu"}, {"--chunk-cache-mb", "0.5"}})
+  for (const auto& [flag, value] : {std::pair{"--threads", "1025"}, {"--sampler", "gpu"}, {"--sampler-memory", "-1"}})
     EXPECT_FALSE(options::set(*options::find(rows, flag), value).ok()) << flag;
-  ASSERT_TRUE(options::set(*options::find(rows, "--chunk-cache-mb"), "512").ok());
-  EXPECT_EQ(options.chunk_cache_mb, 512);
+  ASSERT_TRUE(options::set(*options::find(rows, "--sampler-memory"), "512").ok());
+  EXPECT_EQ(options.memory_mb, 512);
 }
 
 TEST(SamplerOptions, OnlyWhatTravelsAsPointsHasAMeshSampler) {

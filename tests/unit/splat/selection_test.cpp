@@ -308,7 +308,7 @@ TEST(Selection, PointsOfARestAreChosenOnlyWhereTheyAreAskedFor) {
   geometry::Camera fine = camera;
   fine.width *= 2, fine.height *= 2;
   model.insert(points::prepare_patch(model.config(), Sequence{10}, fine, {0, 0, fine.width, fine.height},
-                                     sphere_image(fine, 0, 1), points::tagged({10}, 1, 1)));
+                                     sphere_image(fine, 0, 1), points::tagged({10}, false, 1)));
   splat::select_view(model, camera, {}, moving);
   EXPECT_EQ(moving.points, before.points);
   EXPECT_EQ(splat::names_of(moving), splat::names_of(before)) << "its picture need not be drawn again";

@@ -5,12 +5,14 @@
 
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "tests/support/wire_samples.h"
 
 namespace telesplat::wire {
 namespace {
 
+using namespace std::string_literals;
 using namespace telesplat::test;
 
 // Success if decoding fails with an error that names the message and `named`.
@@ -353,18 +355,35 @@ TEST(Limits, OfChunkLists) {
     return encode(m);
   };
   const geometry::Box box{{0, 0, 0}, {1, 1, 1}};
-  EXPECT_TRUE(decode<ChunkList>(bytes_of(with({ChunkId{5}, box, 10, 400}))));
+  EXPECT_TRUE(decode<ChunkList>(bytes_of(with({ChunkId{0}, box, 10, 400}))));
   // 3.45e38 is a double, but beyond float's range.
-  std::string list = "\x91\x99\x05\x0a\x64";
+  std::string list = "\x91\x9c\x00\x0a\x64"s;
   for (const double x : {0.0, 0.0, 0.0, 1.0, 3.45e38, 1.0}) {
     list += '\xcb';
     for (int shift = 56; shift >= 0; shift -= 8) list += static_cast<char>(std::bit_cast<uint64_t>(x) >> shift);
   }
+  list += "\x00\x00\x00"s;
   EXPECT_TRUE(refused<ChunkList>(with_value(encode(sample_message<ChunkList>()), "chunks", list), "single precision"));
-  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{geometry::kMaxChunks + 1}, box, 10, 400}), "chunk"));
-  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, box, geometry::kMaxChunkTriangles + 1, 400}), "chunk"));
-  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, box, 10, kMaxBulkBytes + 1}), "chunk"));
-  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, {{NAN, 0, 0}, {1, 1, 1}}, 10, 400}), "finite"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{1}, box, 10, 400}), "id"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{0}, box, geometry::kMaxChunkTriangles + 1, 400}), "chunk"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{0}, box, 10, kMaxBulkBytes + 1}), "chunk"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{0}, {{NAN, 0, 0}, {1, 1, 1}}, 10, 400}), "finite"));
+}
+
+// A list that is no tree could keep a sampler busy for ever.
+TEST(Limits, OfTreesOfChunks) {
+  const geometry::Box box{{0, 0, 0}, {1, 1, 1}};
+  const auto list = [&](const std::vector<std::tuple<float, uint32_t, uint32_t>>& nodes) {
+    ChunkList m{EpochId{1}, {}};
+    for (const auto& [spacing_m, first_child, children] : nodes)
+      m.chunks.push_back({ChunkId{m.chunks.size()}, box, 10, 400, spacing_m, first_child, children});
+    return encode(m);
+  };
+  EXPECT_TRUE(decode<ChunkList>(bytes_of(list({{0, 0, 0}, {0, 0, 0}, {1, 0, 2}, {2, 2, 1}}))));
+  for (const auto& wrong : {list({{1, 0, 1}}), list({{0, 0, 0}, {1, 0, 2}}), list({{0, 0, 0}, {1, 0, 1}, {1, 0, 1}}),
+                            list({{0, 0, 0}, {0, 0, 0}, {1, 1, 1}, {1, 0, 1}}), list({{0, 0, 0}, {0, 0, 1}}),
+                            list({{0, 0, 0}, {1, 0, 0}}), list({{0, 0, 0}, {-1, 0, 1}})})
+    EXPECT_TRUE(refused<ChunkList>(wrong, "no node of a tree"));
 }
 
 }  // namespace

@@ -122,6 +122,7 @@ class SlowSampler final : public sampler::Sampler {
     return sampler_->add_chunks(std::move(chunks));
   }
   void remove_chunk(ChunkId id) override { sampler_->remove_chunk(id); }
+  void show(const std::vector<ChunkId>& chunks) override { sampler_->show(chunks); }
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override { sampler_->set_colours(colours); }
   void set_clip(const geometry::Clip& clip) override { sampler_->set_clip(clip); }
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "common/core/machine.h"
@@ -132,6 +133,11 @@ Table own_rows(RunOptions& o) {
        .value = &o.sampler.threads,
        .help = "threads of each sampler; 0: the cores shared among them",
        .limits = Range{0, 1024}},
+      {.flag = "--sampler-memory",
+       .value = &o.sampler.memory_mb,
+       .help =
+           "MB of chunks or voxels that each sampler holds; 0: a quarter of the machine's memory, shared among them",
+       .limits = Range{0, 1e7}},
       {.flag = "--data-servers",
        .value = &o.data_servers,
        .help = "processes that each serve a part of a volume",
@@ -387,6 +393,7 @@ std::vector<std::string> sampler_arguments(const RunOptions& o) {
   const int cores = usable_processors();
   sampler::SamplerOptions s = o.sampler;
   if (s.threads == 0) s.threads = std::max(1, cores / o.samplers);
+  if (s.memory_mb == 0) s.memory_mb = std::round(usable_memory_mb() / 4 / o.samplers);
   return arguments(s);
 }
 

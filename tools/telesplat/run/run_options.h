@@ -20,7 +20,7 @@ struct RunOptions {
   data::DataServiceOptions data;
   master::MasterServiceOptions master;
   packer::PackerOptions packer;
-  sampler::SamplerOptions sampler;  ///< threads 0: the machine's cores shared among the samplers
+  sampler::SamplerOptions sampler;  ///< threads, memory_mb 0: the machine's shared among the samplers
   viewer::ViewerOptions viewer;     ///< wall "2x1": the viewers are its tiles; started_s: begin of the command
   int samplers = 1, data_servers = 1, viewers = 1;
   std::string join_master;                    ///< --master: join a running session instead of starting one

@@ -23,10 +23,10 @@ class DirectMesh : public DirectScene {
   // Replaces all chunks by those of this store.
   Status load(std::shared_ptr<data::MeshStore> store) {
     if (store_)
-      for (const auto& c : store_->chunks()) sampler_->remove_chunk(c.id);
+      for (const auto& c : store_->leaves()) sampler_->remove_chunk(c.id);
     store_ = std::move(store);
     std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks;
-    for (const auto& c : store_->chunks()) chunks.emplace_back(c.id, store_->chunk(c.id));
+    for (const auto& c : store_->leaves()) chunks.emplace_back(c.id, store_->chunk(c.id));
     return sampler_->add_chunks(std::move(chunks));
   }
   void colour_by(const std::optional<scene::Colouring>& colouring) {

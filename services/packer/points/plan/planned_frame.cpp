@@ -264,7 +264,7 @@ void note_inserted(const points::PreparedPatch& patch, const points::ModelConfig
   for (auto frame = shelf.frames().rbegin(); frame != shelf.frames().rend(); ++frame) {
     if (!frame->map || !frame->nearest_known || frame->complete()) continue;
     frame->nearest_known = ++followed <= kMostFollowed;
-    if (!frame->nearest_known || tag == points::tagged(frame->id, 1).value) continue;
+    if (!frame->nearest_known || tag == points::tagged(frame->id, false).value) continue;
     splat::add_to_reference_depth(patch, model, frame->camera, frame->map->nearest_m);
   }
 }

@@ -88,8 +88,10 @@ void Planner::take_whole(const SampledTile& tile, double now_s) {
                          .whole_m = std::vector<float>(pixels)});
   }
   if (!(frame->camera == tile.camera)) return;
-  write_depths(tile, frame->whole_m);
-  note_done(*frame, tile, nullptr);
+  if (!tile.coarse) {
+    write_depths(tile, frame->whole_m);
+    note_done(*frame, tile, nullptr);
+  }
   const auto came = static_cast<uint64_t>(tile.rect.width) * static_cast<uint64_t>(tile.rect.height);
   frame->left -= std::min(came, frame->left);
 }
@@ -100,6 +102,10 @@ void Planner::take_planned(PlannedFrame& frame, const SampledTile& tile, double 
   frame.returned[at] = true;
   --frame.left;
   const image::PixelMask& cast = frame.tiles[at].mask;
+  if (tile.coarse) {  // it tells nothing: no space counts as seen
+    if (frame.kind != PlannedFrame::Kind::kFine) frame.came_m[at].assign(cast.count(), 0);
+    return;
+  }
   if (frame.kind != PlannedFrame::Kind::kFine) {
     frame.came_m[at] = depths_of(tile, cast);
     frame.passed += static_cast<uint64_t>(

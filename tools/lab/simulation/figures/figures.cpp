@@ -106,7 +106,7 @@ Result<Truth> truth_of(const Scenario& s) {
   const auto store = data::open_mesh(s.file, options, {});
   if (!store) return store.error();
   std::shared_ptr<sampler::Sampler> sampler = sampler::make_ray_sampler(1);
-  for (const auto& chunk : (*store)->chunks())
+  for (const auto& chunk : (*store)->leaves())
     if (const Status added = sampler->add_chunk(chunk.id, (*store)->chunk(chunk.id)); !added) return added.error();
   return Truth(
       [sampler](const geometry::Camera& c) { return sampler::render_directly(*sampler, c, image::Shading({}, c)); });

@@ -5,6 +5,8 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 
 #include "common/colour/colour_map.h"
 #include "common/core/check.h"
@@ -215,6 +217,10 @@ class SurfaceSampler final : public sampler::Sampler {
     return refusals.status();
   }
   void remove_chunk(ChunkId id) override { boxes_.erase(size_t(id.value)); }
+  void show(const std::vector<ChunkId>& chunks) override {
+    shown_.emplace();
+    for (const ChunkId id : chunks) shown_->insert(size_t(id.value));
+  }
   void set_colours(std::shared_ptr<const scene::ColourTable>) override {}
   void set_clip(const geometry::Clip& clip) override { clip_ = clip; }
 
@@ -227,17 +233,21 @@ class SurfaceSampler final : public sampler::Sampler {
         if (mask && !mask->at(x, y)) continue;
         const glm::dvec3 direction = rays.direction(x, y);
         const Hit hit = rays.trace(direction);
-        if (!hit.part || !holds(*surface_, hit.part->chunk)) continue;
+        if (!hit.part) continue;
+        const bool coarse = !shows(hit.part->chunk);
+        if (coarse && !shows(surface_->chunks.size() - 1)) continue;
         const glm::dvec3 p = rays.at(direction, hit.depth_m);
         const size_t pixel = size_t(y) * size_t(tile.width) + size_t(x);
         out.depth[pixel] = image::encode_depth(hit.depth_m, camera.near_m);
-        out.colour[pixel] = rounded(colour_at(*hit.part, p));
+        out.colour[pixel] = coarse ? kCoarseColour : rounded(colour_at(*hit.part, p));
         out.normal[pixel] = image::encode_normal16(glm::vec3(normal_at(*hit.part, p, direction)));
       }
     return out;
   }
 
  private:
+  static constexpr uint32_t kCoarseColour = 0xff00ff;  // where it stays, pictures are wrong
+  bool shows(size_t chunk) const { return holds(*surface_, chunk) && (!shown_ || shown_->contains(chunk)); }
   bool holds(const SurfaceParts& surface, size_t chunk) const {
     const auto box = boxes_.find(chunk);
     return box != boxes_.end() && chunk < surface.chunks.size() && box->second == surface.chunks[chunk].box_room;
@@ -249,6 +259,7 @@ class SurfaceSampler final : public sampler::Sampler {
 
   const SurfaceParts* surface_;
   std::map<size_t, geometry::Box> boxes_;  // boxes of held chunks
+  std::optional<std::set<size_t>> shown_;  // nullopt: all
   geometry::Clip clip_;
 };
 

@@ -1,5 +1,7 @@
 #include "tools/lab/simulation/scenes/surface_parts.h"
 
+#include <optional>
+
 #include "common/image/normal.h"
 
 namespace telesplat::simulation {
@@ -97,11 +99,12 @@ std::vector<SurfacePart> fence() {
 }
 
 // A rectangle from edge to edge of each part's box.
-std::vector<std::byte> chunk_bytes_of(const std::vector<SurfacePart>& parts, size_t chunk) {
+// chunk: nullopt: all of them.
+std::vector<std::byte> chunk_bytes_of(const std::vector<SurfacePart>& parts, std::optional<size_t> chunk) {
   std::vector<float> positions;
   std::vector<uint32_t> normals, colours, indices;
   for (const SurfacePart& part : parts) {
-    if (part.chunk != chunk) continue;
+    if (chunk && part.chunk != *chunk) continue;
     const auto& [lo, hi] = part.box_room;
     const auto first = uint32_t(normals.size());
     for (const glm::vec3& corner : {lo, glm::vec3(hi.x, lo.y, hi.z), hi, glm::vec3(lo.x, hi.y, lo.z)})
@@ -127,6 +130,16 @@ SurfaceParts make(std::vector<SurfacePart> parts) {
     out.bytes.push_back(chunk_bytes_of(out.parts, size_t(chunk.id.value)));
     chunk.bytes = out.bytes.back().size();
   }
+  // The root stands in for chunks that have not come, and never belongs into a view.
+  const auto leaves = static_cast<uint32_t>(out.chunks.size());
+  out.bytes.push_back(chunk_bytes_of(out.parts, std::nullopt));
+  out.chunks.push_back({.id = {leaves},
+                        .box_room = out.box_room,
+                        .triangles = out.triangles,
+                        .bytes = out.bytes.back().size(),
+                        .spacing_m = 1000,
+                        .first_child = 0,
+                        .children = leaves});
   return out;
 }
 

@@ -21,7 +21,7 @@ struct SurfacePart {
 
 struct SurfaceParts {
   std::vector<SurfacePart> parts;
-  std::vector<geometry::ChunkInfo> chunks;  ///< index = id
+  std::vector<geometry::ChunkInfo> chunks;  ///< index = id; the last one is the root
   std::vector<std::vector<std::byte>> bytes;
   uint64_t triangles = 0;
   geometry::Box box_room;
