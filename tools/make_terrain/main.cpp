@@ -1,6 +1,9 @@
 // make-terrain: writes a coloured, made-up caldera landscape as PLY.
 #include <fmt/format.h>
 
+#include <atomic>
+#include <csignal>
+
 #include "common/core/version.h"
 #include "common/options/complain.h"
 #include "common/options/parser.h"
@@ -28,15 +31,19 @@ options::Table table(Options& o) {
           {.flag = "-o,--output", .value = &o.output, .help = "the file to write", .required = true}};
 }
 
+std::atomic<bool> stopped = false;
+
 Status make(const Options& o) {
   tools::ProgressLine line(2);
-  try {
-    const auto land =
-        terrain::make_terrain(o.triangles, o.seed, [&](double f) { line.show("make-terrain: making", f); });
-    return terrain::write_ply(land, o.output, [&](double f) { line.show("make-terrain: writing", f); });
-  } catch (const std::bad_alloc&) {
-    return Error{fmt::format("{} triangles do not fit into this machine's memory", o.triangles)};
-  }
+  const uint64_t bytes = terrain::ply_bytes(terrain::Grid(o.triangles));
+  if (bytes > 1'000'000'000)
+    line.line(fmt::format("make-terrain: {} will have {:.2f} GB", o.output, double(bytes) * 1e-9));
+  if (const Status room = terrain::check_room(o.output, bytes); !room) return room;
+  const auto progress = [&](const char* what) {
+    return [&line, what](double f) { return line.show(what, f), !stopped; };
+  };
+  const terrain::Terrain land(o.triangles, o.seed, progress("make-terrain: making the relief"));
+  return terrain::write_ply(land, o.output, progress("make-terrain: writing"));
 }
 
 }  // namespace
@@ -47,6 +54,7 @@ int main(int argc, char** argv) {
   parser.add(table(o));
   parser.version(version());
   parser.parse_or_exit("make-terrain", {argv + 1, argv + argc});
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopped = true; });
   const Status made = make(o);
   return made.ok() ? 0 : complain(made.error(), 1, "make-terrain");
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/vec3.hpp>
 
 #include "common/parallel/in_parallel.h"
 #include "tools/make_terrain/noise.h"
@@ -15,31 +16,20 @@ using Rgb = glm::dvec3;
 
 Rgb mix(const Rgb& a, const Rgb& b, double t) { return a + (b - a) * t; }
 
-// Columns, full rows of cells, and the triangles of the last, shorter row.
-struct Grid {
-  uint64_t columns, rows, rest;
-  explicit Grid(uint64_t triangles)
-      : columns(std::max<uint64_t>(static_cast<uint64_t>(std::sqrt(static_cast<double>(triangles) / 2)), 1)),
-        rows(triangles / (2 * columns)),
-        rest(triangles - rows * 2 * columns) {}
-  uint64_t vertex_rows() const { return rows + 1; }
-  uint64_t rest_vertices() const { return rest == 0 ? 0 : rest / 2 + 1; }
-  uint64_t vertices() const { return vertex_rows() * (columns + 1) + rest_vertices(); }
-  double step_m() const { return kExtentM / static_cast<double>(std::max(columns, rows)); }
-};
+}  // namespace
 
 // A place on the land: its heights and its colour.
 class Land {
  public:
-  Land(uint64_t seed, double step_m, const std::function<void(double)>& progress)
-      : seed_(seed), relief_(make_relief(seed, progress)), detail_(seed + 10), tint_(seed + 11) {
+  Land(uint64_t seed, double step_m, const Progress& progress)
+      : seed_(seed), relief_(make_relief(seed, [&](double f) { progress(f); })), detail_(seed + 10), tint_(seed + 11) {
     // Finer forms than the relief's cells, down to what the grid can show.
     for (double size = 90; size > 2 * step_m && octaves_ < 7; size /= 2) ++octaves_;
   }
 
   struct Point {
-    double height_m;  // height of the surface: ground or water
-    double ground_m;
+    float height_m;  // height of the surface: ground or water
+    float ground_m;
     bool water;
   };
   Point at(double x, double y) const {
@@ -49,7 +39,7 @@ class Land {
       ground += (1.5 + 22 * smooth(0.05, 0.8, slope)) * (detail_.ridged(x / 90, y / 90, octaves_) - 0.55);
     }
     const bool water = ground < kLakeLevelM && caldera_radius(x, y, seed_) < 1.02;
-    return {water ? kLakeLevelM : ground, ground, water};
+    return {static_cast<float>(water ? kLakeLevelM : ground), static_cast<float>(ground), water};
   }
 
   // slope: rise over run of the surface here.
@@ -97,64 +87,55 @@ class Land {
   int octaves_ = 0;
 };
 
-void add_triangles(const Grid& grid, std::vector<uint32_t>& indices) {
-  const uint64_t triangles = grid.rows * 2 * grid.columns + grid.rest, stride = grid.columns + 1;
-  indices.resize(3 * triangles);
-  in_parallel(uint64_t{0}, triangles, [&](uint64_t t) {
-    const uint64_t cell = t / 2, a = cell / grid.columns * stride + cell % grid.columns;
-    const uint64_t corner[2][3] = {{a, a + 1, a + stride}, {a + 1, a + stride + 1, a + stride}};
-    for (int k = 0; k < 3; ++k) indices[3 * t + k] = static_cast<uint32_t>(corner[t % 2][k]);
-  });
+Grid::Grid(uint64_t triangles)
+    : triangles(triangles),
+      columns(std::max<uint64_t>(static_cast<uint64_t>(std::sqrt(static_cast<double>(triangles) / 2)), 1)),
+      rows(triangles / (2 * columns)),
+      rest(triangles - rows * 2 * columns) {
+  CHECK(triangles >= kMinTriangles && triangles <= kMaxTriangles);
 }
 
-}  // namespace
+Terrain::Terrain(uint64_t triangles, uint64_t seed, const Progress& progress)
+    : grid_(triangles),
+      step_m_(kExtentM / static_cast<double>(std::max(grid_.columns, grid_.rows))),
+      land_(std::make_shared<Land>(seed, step_m_, progress)) {}
 
-Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void(double)>& user_progress) {
-  CHECK(triangles >= kMinTriangles && triangles <= kMaxTriangles);
-  const auto progress = [&](double fraction) {
-    if (user_progress) user_progress(fraction);
-  };
-  const Grid grid(triangles);
-  const double step = grid.step_m();
-  const Land land(seed, step, [&](double f) { progress(0.3 * f); });
-  Terrain out;
-  out.positions.resize(grid.vertices());
-  out.colours.resize(grid.vertices());
-  const uint64_t stride = grid.columns + 1, vertices = grid.vertices(), rows = (vertices + stride - 1) / stride;
-  std::vector<float> ground_m(vertices);
-  std::vector<uint8_t> water(vertices);
-
-  // Calls body(vertex, x, y) for all vertices, a batch of rows at a time; reports progress between `from` and `to`.
-  const auto sweep = [&](double from, double to, const auto& body) {
-    const uint64_t batch = std::max<uint64_t>(rows / 50, 16);
-    for (uint64_t first = 0; first < rows; first += batch) {
-      progress(from + (to - from) * static_cast<double>(first) / static_cast<double>(rows));
-      in_parallel(first, std::min(first + batch, rows), [&](uint64_t row) {
-        for (uint64_t v = row * stride; v < std::min((row + 1) * stride, vertices); ++v)
-          body(v, static_cast<double>(v % stride) * step, static_cast<double>(row) * step);
-      });
-    }
-  };
-  sweep(0.3, 0.7, [&](uint64_t v, double x, double y) {
-    const Land::Point p = land.at(x, y);
-    out.positions[v] = {x, y, p.height_m};
-    ground_m[v] = static_cast<float>(p.ground_m);
-    water[v] = p.water;
-  });
-  sweep(0.7, 1.0, [&](uint64_t v, double x, double y) {
-    const double z = out.positions[v].z;
+std::vector<Vertex> Terrain::vertices(uint64_t first_row, uint64_t last_row) const {
+  const uint64_t stride = grid_.columns + 1, count = grid_.vertices();
+  const uint64_t first = std::min(first_row * stride, count), last = std::min(last_row * stride, count);
+  const auto x_m = [&](uint64_t v) { return static_cast<double>(v % stride) * step_m_; };
+  const auto y_m = [&](uint64_t v) { return static_cast<double>(v / stride) * step_m_; };
+  // Slopes need the heights of one row more at either side.
+  const uint64_t begin = first - std::min(first, stride), end = std::min(last + stride, count);
+  std::vector<Land::Point> points(end - begin);
+  in_parallel(begin, end, [&](uint64_t v) { points[v - begin] = land_->at(x_m(v), y_m(v)); });
+  std::vector<Vertex> out(last - first);
+  in_parallel(first, last, [&](uint64_t v) {
+    const Land::Point& point = points[v - begin];
     const auto rise = [&](bool ahead, uint64_t next, uint64_t before) {
-      return (out.positions[ahead ? next : before].z - z) / step;
+      return (static_cast<double>(points[(ahead ? next : before) - begin].height_m) - point.height_m) / step_m_;
     };
-    const bool last_column = v % stride == grid.columns;
-    const double dx = rise(!last_column && v + 1 < vertices, v + 1, v % stride > 0 ? v - 1 : v),
-                 dy = rise(v + stride < vertices, v + stride, v - stride);
-    const Rgb c = glm::clamp(
-        land.colour(x, y, {z, ground_m[v], water[v] != 0}, water[v] ? 0 : std::hypot(dx, dy)) + 0.5, 0.0, 255.0);
-    out.colours[v] = static_cast<uint32_t>(c.r) << 16 | static_cast<uint32_t>(c.g) << 8 | static_cast<uint32_t>(c.b);
+    const bool last_column = v % stride == grid_.columns;
+    const double dx = rise(!last_column && v + 1 < count, v + 1, v % stride > 0 ? v - 1 : v),
+                 dy = rise(v + stride < count, v + stride, v - stride);
+    const Rgb c =
+        glm::clamp(land_->colour(x_m(v), y_m(v), point, point.water ? 0 : std::hypot(dx, dy)) + 0.5, 0.0, 255.0);
+    out[v - first] = {{static_cast<float>(x_m(v)), static_cast<float>(y_m(v)), point.height_m},
+                      {static_cast<uint8_t>(c.r), static_cast<uint8_t>(c.g), static_cast<uint8_t>(c.b)}};
   });
-  add_triangles(grid, out.indices);
-  progress(1.0);
+  return out;
+}
+
+std::vector<Face> Terrain::faces(uint64_t first_row, uint64_t last_row) const {
+  const auto begin_of = [&](uint64_t row) { return std::min(row * 2 * grid_.columns, grid_.triangles); };
+  const uint64_t stride = grid_.columns + 1, first = begin_of(first_row), last = begin_of(last_row);
+  std::vector<Face> out(last - first);
+  in_parallel(first, last, [&](uint64_t t) {
+    const uint64_t cell = t / 2;
+    const auto a = static_cast<uint32_t>(cell / grid_.columns * stride + cell % grid_.columns);
+    const auto c = static_cast<uint32_t>(a + stride);
+    out[t - first] = t % 2 == 0 ? Face{3, {a, a + 1, c}} : Face{3, {a + 1, c + 1, c}};
+  });
   return out;
 }
 

@@ -1,9 +1,14 @@
 // The terrain generator: exact counts, the same land for the same seed, and its result in a data server.
 #include "tools/make_terrain/terrain.h"
 
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
 #include <map>
 #include <set>
 
+#include "common/core/whole_file.h"
 #include "tests/support/files/data_files.h"
 
 namespace telesplat::terrain {
@@ -11,74 +16,109 @@ namespace {
 
 using data::test::TempFolder;
 
+struct Whole : Terrain {
+  Whole(uint64_t triangles, uint64_t seed) : Terrain(triangles, seed) {}
+  std::vector<Vertex> points = vertices(0, grid().vertex_rows());
+  std::vector<Face> triangles = faces(0, grid().vertex_rows());
+};
+
 TEST(Terrain, HasExactlyTheTrianglesAskedFor) {
   for (uint64_t triangles : {2u, 4999u}) {
-    const Terrain land = make_terrain(triangles, 3);
-    ASSERT_EQ(land.indices.size(), 3 * triangles);
-    ASSERT_EQ(land.colours.size(), land.positions.size());
-    std::vector<bool> used(land.positions.size(), false);
-    for (size_t t = 0; t < land.indices.size(); t += 3) {
-      const uint32_t* v = &land.indices[t];
+    const Whole land(triangles, 3);
+    ASSERT_EQ(land.triangles.size(), triangles);
+    std::vector<bool> used(land.points.size(), false);
+    for (const Face& face : land.triangles) {
+      glm::vec3 corner[3];
       for (int k = 0; k < 3; ++k) {
-        ASSERT_LT(v[k], land.positions.size());
-        used[v[k]] = true;
+        const uint32_t v = face.vertex[k];
+        ASSERT_LT(v, land.points.size());
+        used[v] = true;
+        const Vertex& p = land.points[v];
+        corner[k] = {p.position[0], p.position[1], p.position[2]};
       }
-      const glm::vec3 a = land.positions[v[0]], b = land.positions[v[1]], c = land.positions[v[2]];
-      EXPECT_GT(glm::cross(b - a, c - a).z, 0)
-          << "triangle " << t / 3 << " of " << triangles << " faces down or is degenerate";
+      EXPECT_GT(glm::cross(corner[1] - corner[0], corner[2] - corner[0]).z, 0) << "faces down or is degenerate";
     }
     EXPECT_TRUE(std::all_of(used.begin(), used.end(), [](bool u) { return u; })) << triangles;
   }
 }
 
-TEST(Terrain, DependsOnTheSeedAlone) {
-  const Terrain a = make_terrain(2000, 5), b = make_terrain(2000, 5), c = make_terrain(2000, 6);
-  EXPECT_EQ(a.positions, b.positions);
-  EXPECT_EQ(a.colours, b.colours);
-  EXPECT_NE(a.positions, c.positions);
+TEST(Terrain, MayHaveMoreTrianglesThanFitIntoMemory) {
+  const Terrain land(kMaxTriangles, 3);
+  const uint64_t rows = land.grid().vertex_rows(), last = land.grid().vertices() - 1;
+  ASSERT_LT(last, uint64_t{1} << 31);
+  EXPECT_EQ(+land.faces(rows - 2, rows).back().vertex[0], last - (land.grid().columns + 1));
+  EXPECT_FLOAT_EQ(land.vertices(rows - 1, rows).back().position[1], 14000);
+}
+
+std::string ply_of(const Terrain& land, uint64_t band_rows) {
+  const TempFolder folder;
+  EXPECT_TRUE(write_ply(land, folder / "land.ply", kGoOn, band_rows).ok());
+  return *read_whole(folder / "land.ply", ply_bytes(land.grid()));
+}
+
+TEST(Terrain, DependsOnTheSeedAloneAndNotOnTheBands) {
+  const Terrain land(3001, 5);
+  const std::string file = ply_of(land, 1000);
+  EXPECT_EQ(file.size(), ply_bytes(land.grid()));
+  for (uint64_t band_rows : {1, 7, 39}) EXPECT_TRUE(ply_of(land, band_rows) == file) << band_rows;
+  EXPECT_TRUE(ply_of(Terrain(3001, 5), 64) == file);
+  EXPECT_FALSE(ply_of(Terrain(3001, 6), 64) == file);
 }
 
 TEST(Terrain, IsACalderaWithALake) {
-  const Terrain land = make_terrain(100000, 7);
+  const Whole land(100000, 7);
   std::map<float, int> heights;
-  float lowest = 1e9f, highest = 0;
-  for (const auto& p : land.positions) {
-    ASSERT_TRUE(std::isfinite(p.z));
-    ++heights[p.z];
-    lowest = std::min(lowest, p.z), highest = std::max(highest, p.z);
+  std::set<int> colours;
+  for (const Vertex& v : land.points) {
+    const float z = v.position[2];
+    ASSERT_TRUE(std::isfinite(z));
+    ++heights[z], colours.insert(v.colour[0] << 16 | v.colour[1] << 8 | v.colour[2]);
   }
-  const auto lake = std::max_element(heights.begin(), heights.end(),
-                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto lake = std::ranges::max_element(heights, {}, [](const auto& height) { return height.second; });
   EXPECT_FLOAT_EQ(lake->first, 1883.0f);  // the lake's level, and flat
-  const double share = static_cast<double>(lake->second) / static_cast<double>(land.positions.size());
-  EXPECT_GT(share, 0.05);
-  EXPECT_LT(share, 0.35);
-  EXPECT_LT(lowest, 1500);
-  EXPECT_GT(highest, 2200);
-  EXPECT_LT(highest, 3500);
-  int blue = 0, water = 0;
-  std::set<uint32_t> colours(land.colours.begin(), land.colours.end());
-  for (size_t i = 0; i < land.positions.size(); ++i)
-    if (land.positions[i].z == lake->first) ++water, blue += (land.colours[i] & 255) > (land.colours[i] >> 16);
-  EXPECT_GT(blue, 0.99 * water);
+  const double share = static_cast<double>(lake->second) / static_cast<double>(land.points.size());
+  EXPECT_NEAR(share, 0.2, 0.15);
+  EXPECT_LT(heights.begin()->first, 1500);
+  EXPECT_GT(heights.rbegin()->first, 2200);
+  EXPECT_LT(heights.rbegin()->first, 3500);
+  int blue = 0;
+  for (const Vertex& v : land.points) blue += v.position[2] == lake->first && v.colour[2] > v.colour[0];
+  EXPECT_GT(blue, 0.99 * lake->second);
   EXPECT_GT(colours.size(), 1000u);
 }
 
 TEST(Terrain, ItsFileOpensAsAMeshThatStandsOnZ) {
   const TempFolder folder;
-  const Terrain land = make_terrain(3001, 2);
+  const Terrain land(3001, 2);
   ASSERT_TRUE(write_ply(land, folder / "land.ply").ok());
-  EXPECT_FALSE(std::filesystem::exists(folder / "land.ply.part"));
-  auto options = data::test::plain_options("auto");
-  const auto store = data::test::open_or_fail(folder / "land.ply", options);
+  const auto store = data::test::open_or_fail(folder / "land.ply", data::test::plain_options("auto"));
   ASSERT_TRUE(store);
   EXPECT_EQ(store->info().triangles, 3001u);
-  EXPECT_EQ(store->info().vertices, land.positions.size());
+  EXPECT_EQ(store->info().vertices, land.grid().vertices());
   EXPECT_EQ(store->info().up, "z");
   EXPECT_TRUE(store->info().had_colours);
-  const auto refused = write_ply(land, folder / "missing/land.ply");
-  ASSERT_FALSE(refused.ok());
-  EXPECT_NE(refused.error().text.find("missing/land.ply"), std::string::npos);
+}
+
+TEST(Terrain, WhatIsNotWrittenWholeLeavesNoFile) {
+  const TempFolder folder;
+  const Terrain land(3001, 2);
+  const std::string path = folder / "land.ply", missing = folder / "missing/land.ply";
+  const auto refusal = [](const Status& status) { return status.ok() ? "" : status.error().text; };
+  for (const Status& s : {write_ply(land, missing), check_room(missing, 1)})
+    EXPECT_EQ(refusal(s), missing + ": cannot be written: No such file or directory");
+  EXPECT_EQ(refusal(check_room(path, 1)), "");
+  EXPECT_TRUE(refusal(check_room(path, uint64_t{1} << 60)).starts_with(path + ": needs 1152921504.61 GB, its disk"));
+  const Progress stops = [](double fraction) { return fraction < 0.95; };
+  EXPECT_EQ(refusal(write_ply(land, path, stops, 4)), path + ": cannot be written: Operation canceled");
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small{30'000, before.rlim_max};  // as on a full disk
+  setrlimit(RLIMIT_FSIZE, &small);
+  const Status full = write_ply(land, path);
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(refusal(full), path + ": cannot be written: File too large");
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
 }
 
 }  // namespace
