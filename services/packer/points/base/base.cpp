@@ -13,7 +13,7 @@
 namespace telesplat::packer {
 namespace {
 
-// Rays tell of surfels as far as they lie at most this part of the surfels' spacing apart, at the surfels' depth.
+// Rays hide surfels where they lie at most this many of the surfels' spacings apart, at the surfels' depth.
 constexpr double kFineness = 1.0;
 // A ray that ends at most this part of the spacing before a surfel counts as having reached it.
 constexpr float kReach = 0.5f;

@@ -33,7 +33,7 @@ class Base {
   /// lie in this object. Precondition: part < parts().
   wire::BasePart part(size_t part) const;
 
-  /// Hides the surfels around which rays of a tile passed their surface, as far as its pixels are as fine as they.
+  /// Hides the surfels around which rays of a tile passed their surface, where its pixels are as fine as the surfels.
   /// cast: its rays, as large as the tile; null: all pixels.
   void hide(const SampledTile& tile, const image::PixelMask* cast);
   /// Shows the surfels in a box again: the samples there were forgotten.

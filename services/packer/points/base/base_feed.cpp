@@ -6,6 +6,7 @@
 
 #include "common/core/log.h"
 #include "common/net/dispatch.h"
+#include "common/scene/base.h"
 
 namespace telesplat::packer {
 namespace {
@@ -19,17 +20,16 @@ constexpr uint64_t kPartsAtOnce = 8;  // in answer to one request: about 400 kB
 void BaseFeed::follow(const wire::Welcome& session, const points::ModelConfig& model, bool anew) {
   const scene::SessionView view(session);
   const std::string endpoint = view.endpoint("chunks");
-  Scene scene{view.fact("content_hash"), view.fact(scene::kColouringFact), session.settings.base_points, model};
-  if (!context_ || view.kind() != scene::Kind::kMesh || endpoint.empty() || scene.content_hash.empty() ||
-      session.settings.keep_redundant)
-    scene.most = 0;
-  epoch_ = session.epoch;
-  if (scene.most > 0 && endpoint != endpoint_) connect(endpoint);
+  Scene scene{view.fact("content_hash"), view.fact(scene::kColouringFact), scene::base_points(session), model};
+  if (!context_ || scene.content_hash.empty()) scene.most = 0;
+  // The base stays while its data server is away: then there is no endpoint.
+  if (scene.most > 0 && !endpoint.empty() && endpoint != endpoint_) connect(endpoint);
   if (scene == scene_) {
     if (anew && base_) base_->show_all(), publish(true);
     return;
   }
   scene_ = std::move(scene);
+  epoch_ = session.epoch;
   drop();
   array_.clear(), colours_.reset();
   if (scene_.most == 0) return;
@@ -69,7 +69,7 @@ void BaseFeed::receive() {
   if (!blocks_) return;
   while (const auto message = blocks_->receive())
     net::dispatch<wire::Surfels>(*blocks_, *message, [&](const wire::Surfels& m) {
-      if (asks_ && m.array == array_) take_surfels(m);
+      if (asks_ && m.epoch == epoch_ && m.array == array_) take_surfels(m);
     });
 }
 

@@ -59,14 +59,14 @@ class BaseFeed {
   Scene scene_;  // most == 0: no base is wanted
   std::string array_;
   std::optional<scene::ColourTable> colours_;
-  EpochId epoch_;
+  EpochId epoch_;  // epoch that scene_ began with: requests have it, and answers repeat it
   std::optional<Base> base_;
   struct Noted {
     SampledTile tile;
     std::optional<image::PixelMask> cast;
   };
   std::optional<Noted> noted_;
-  bool asks_ = false;  // the data server has not answered
+  bool asks_ = false;  // true: the data server has yet to answer
   double asked_s_ = -1e9, patience_s_ = 0;
   InstanceId packer_;
   uint64_t number_ = 0;     // counts bases
