@@ -2,6 +2,8 @@
 // sessions more.
 #include <gtest/gtest.h>
 
+#include "client/viewer/points/received_points.h"
+#include "common/core/log.h"
 #include "common/core/machine.h"
 #include "tests/simulation/digests.h"
 #include "tests/support/simd_targets.h"
@@ -95,6 +97,33 @@ TEST(Sessions, PartsOfAnotherVolumeAreTakenOnceThoseBeforeHaveLeft) {
                .order = {},
                .show = Show::kSeries}};
   EXPECT_EQ(text_of(outcome_of(s).failure), "holds");
+}
+
+// ---- the base -------------------------------------------------------------------------------------------------------
+
+// Notes where the base that a viewer draws comes and goes.
+class BaseWatch final : public Observer {
+ public:
+  void on_frame(Part, SimulatedViewer& viewer, const viewer::DrawnFrame&, double) override {
+    splat::DrawList list;
+    dynamic_cast<viewer::ReceivedPoints&>(*viewer.received()).cache().select_base(viewer.camera(), {}, list);
+    if (shown.empty() || shown.back() != (list.points > 0)) shown.push_back(list.points > 0);
+  }
+  std::vector<bool> shown;
+};
+
+TEST(Sessions, AViewerDropsTheBaseWithItsScene) {
+  Scenario s{.seed = 1, .duration_s = 18, .show = Show::kSpheres};
+  s.to_viewers = {.latency_s = 0.1};
+  const auto shows = [](double at_s, Show show) {
+    return Event{.at_s = at_s, .fault = Fault::kShow, .a = {Role::kData, 0}, .b = {}, .amount = 0.5, .show = show};
+  };
+  s.events = {shows(3, Show::kTerrain), shows(6, Show::kJulia), shows(9, Show::kSpheres)};
+  log::initialise("simulation", "off");
+  BaseWatch watch;
+  EXPECT_EQ(text_of(run_scenario(s, {&watch}).failure), "holds");
+  if (!watch.shown.front()) watch.shown.erase(watch.shown.begin());  // frames before the base came
+  EXPECT_EQ(watch.shown, (std::vector{true, false, true, false, true})) << "spheres, terrain, and a Julia set's none";
 }
 
 // ---- all of it ------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ void BaseReplica::start(double now_s) {
 }
 
 void BaseReplica::ask(uint64_t part, uint64_t parts, double now_s) {
+  if (!expected_) return;
   ask_({.viewer = {}, .base = base_, .part = part, .parts = parts});
   asked_ = std::max(asked_, part + parts);
   heard_s_ = now_s;

@@ -27,6 +27,8 @@ class BaseReplica {
   /// Sends a request; the caller fills in the viewer.
   explicit BaseReplica(std::function<void(wire::BaseRequest)> ask) : ask_(std::move(ask)) {}
 
+  /// Says whether the session has a base; without one, nothing is asked for.
+  void expect(bool base) { expected_ = base; }
   /// The packer is at another address, or another one: its base is not known.
   void start(double now_s);
   /// Asks again for what did not come.
@@ -71,6 +73,7 @@ class BaseReplica {
   uint64_t asked_ = 0;  // parts before it were asked for
   double heard_s_ = 0;
   bool active_ = false;  // start() was called
+  bool expected_ = true;
   std::unordered_map<points::ClusterKey, Leaf> leaves_;
   std::map<uint32_t, points::ClusterKey> order_;  // leaves by Leaf::first
   struct Word {

@@ -18,6 +18,8 @@ class ReceivedBase {
   ReceivedBase(ModelCache& cache, std::function<void(wire::BaseRequest)> ask)
       : cache_(cache), replica_(std::move(ask)) {}
 
+  void expect(bool base) { replica_.expect(base); }
+  bool known() const { return replica_.known(); }
   void start(double now_s) { replica_.start(now_s); }
   void take(const wire::BaseHidden& hidden, double now_s) { replica_.take(hidden, now_s); }
   void take(const wire::BasePart& part, double now_s) {

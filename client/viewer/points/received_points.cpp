@@ -6,6 +6,7 @@
 
 #include "client/viewer/points/source.h"
 #include "client/viewer/record/event_record.h"
+#include "common/scene/base.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/session.h"
 
@@ -50,10 +51,13 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
     cut_ = {std::make_shared<const geometry::Clip>(*std::move(clip)), cut_.version + 1, session.epoch};
   }
   // The packer's first event for another model may have come before this, and with it a replica of the old model. A new
-  // connection does not bring what was sent on the old one.
-  if (config_ != config && receiver_.begun()) links_.feeds.close();
+  // connection does not bring what was sent on the old one, such as the end of the base.
+  const bool another = config_ != config && receiver_.begun(), has_base = scene::base_points(session) > 0;
+  if (another) links_.feeds.close();
   config_ = config;
   keeps_redundant_ = keep;
+  base_.expect(has_base);
+  if (base_.known() && (another || !has_base)) receiver_.drop_base();
   return ok_status();
 }
 

@@ -38,6 +38,9 @@ void PointReceiver::apply_base(const M& message) {
   if (options_.events) options_.events->add(message);
 }
 
+// The record has it as a message, so that a replay drops the base, too.
+void PointReceiver::drop_base() { apply_base(wire::BaseHidden{.packer = {}, .whole = true, .words = {}}); }
+
 void PointReceiver::receive_events(net::Socket& patches, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = patches.receive();

@@ -51,6 +51,8 @@ class PointReceiver {
   bool begun() const { return sequencer_.begun(); }
   void receive_events(net::Socket& patches, int most);
   void receive_answers(net::Socket& state, int most);
+  /// Drops the base: it is another scene's.
+  void drop_base();
   /// Does what is due by time alone. To be called every few milliseconds.
   void tick(double now_s);
 

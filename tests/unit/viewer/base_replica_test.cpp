@@ -86,6 +86,16 @@ TEST_F(BaseReplicaTest, AsksAgainForAPartThatWasLost) {
   EXPECT_TRUE(replica.complete());
 }
 
+TEST_F(BaseReplicaTest, AsksForNothingWhereTheSessionHasNoBase) {
+  replica.expect(false);
+  replica.start(now_s);
+  for (int second = 0; second < 10; ++second) replica.tick(now_s += BaseReplica::kPatience_s);
+  EXPECT_TRUE(asked.empty());
+  replica.expect(true);
+  replica.tick(now_s);
+  EXPECT_EQ(asked.size(), 1u) << "the scene has changed";
+}
+
 TEST_F(BaseReplicaTest, PartZeroShowsAllLeavesCoarsely) {
   ASSERT_TRUE(give(0).ok());
   const auto leaves = changes();

@@ -130,6 +130,33 @@ TEST_F(Receiving, ABoxThatComesAfterItsPackersFirstEventCounts) {
   ASSERT_TRUE(serve({2}, [&] { return points.cache().config().box_room == w.box_room && epoch() == 2; }));
 }
 
+TEST_F(Receiving, ABaseIsAskedForWhereTheSessionHasOne) {
+  net::Socket patches(context, net::Kind::kPub, "patches"), state(context, net::Kind::kRouter, "state");
+  ASSERT_TRUE(patches.bind("inproc://patches") && state.bind("inproc://state"));
+  wire::Welcome w = session();
+  w.endpoints = {{"patches", "inproc://patches"}, {"state", "inproc://state"}};
+  const auto received = make(scene::Pipeline::kPoints);
+  // Requests for a base in ten seconds. Each tick asks for the model anew, too: there is no answer.
+  const auto requests = [&](const char* kind, uint64_t base_points, bool keep) {
+    w.facts["kind"] = kind;
+    w.settings.base_points = base_points, w.settings.keep_redundant = keep;
+    EXPECT_TRUE(received->follow(w).ok());
+    feeds.close();
+    EXPECT_TRUE(feeds.connect(received->feeds(), w));
+    received->on_connected();
+    for (int second = 3; second <= 12; ++second) received->tick(monotonic_s() + second);
+    int models = 0, bases = 0;
+    for (const double deadline = monotonic_s() + test::patient(20); models < 11 && monotonic_s() < deadline;)
+      if (const auto message = state.receive()) ++(message->type == wire::BaseRequest::kName ? bases : models);
+    EXPECT_EQ(models, 11);
+    return bases;
+  };
+  EXPECT_EQ(requests("julia", 400'000, false), 0);
+  EXPECT_EQ(requests("mesh", 0, false), 0);
+  EXPECT_EQ(requests("mesh", 400'000, true), 0);
+  EXPECT_GE(requests("mesh", 400'000, false), 10);
+}
+
 class Successors : public Receiving {
  protected:
   std::shared_ptr<Received> begin(scene::Pipeline pipeline) {

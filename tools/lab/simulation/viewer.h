@@ -24,6 +24,8 @@ class SimulatedViewer {
   bool over() const { return worker_->shutdown_requested(); }
   std::shared_ptr<const wire::Welcome> session() const { return worker_->session(); }
   InstanceId instance() const { return worker_->instance(); }
+  /// Null: it draws nothing yet.
+  viewer::Received* received() const { return received_.get(); }
   const image::View& view() const { return view_; }
   const geometry::Camera& camera() const { return camera_; }
 
