@@ -5,14 +5,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/geometry/surfels.h"
 #include "common/points/compaction.h"
 #include "common/points/mosaic_builder.h"
 
 namespace telesplat::viewer {
+namespace {
 
+constexpr uint32_t kMostHiddenWords = geometry::kMaxSurfels / 64;
+
+}  // namespace
+
+// Received surfels stay on display until the packer's base begins.
 void BaseReplica::start(double now_s) {
   active_ = true;
   base_ = 0;
+  came_.clear(), came_count_ = 0;
   ask(0, kWindow, now_s);
 }
 
@@ -41,7 +49,8 @@ void BaseReplica::begin(InstanceId packer, uint64_t base) {
 
 Status BaseReplica::take(const wire::BasePart& part, double now_s) {
   if (part.packer != packer_ || part.base != base_) {
-    if (part.part != 0) return ok_status();  // an older base, or part 0 was lost: it is asked for again
+    // An older base that was under way, or part 0 was lost: it is asked for again.
+    if (part.part != 0 || is_older(part.packer, part.base)) return ok_status();
     begin(part.packer, part.base);
     asked_ = kWindow;
   }
@@ -55,9 +64,9 @@ Status BaseReplica::take(const wire::BasePart& part, double now_s) {
   auto leaves = codec::decode_surfels({bytes, part.surfel_data.size()});
   if (!leaves) return leaves.error();
   const uint32_t stride = part.part == 0 ? uint32_t{wire::kBaseStride} : 1;
+  const uint32_t beyond = (1023u >> config.depth << config.depth) * (1u | 1u << 10 | 1u << 20);
   for (const auto& leaf : *leaves)
-    if ((leaf.key >> config.depth & 1023u >> config.depth) != 0 ||
-        leaf.first + uint64_t{stride} * (leaf.surfels.size() - 1) >= part.surfels)
+    if ((leaf.key & beyond) != 0 || leaf.first + uint64_t{stride} * (leaf.surfels.size() - 1) >= part.surfels)
       return Error{fmt::format("part {} of base {} has surfels beyond its limits", part.part, part.base)};
   config_ = config, spacing_m_ = part.spacing_m;
   came_.resize(part.parts);
@@ -90,6 +99,7 @@ void BaseReplica::set_word(uint32_t index, uint64_t bits, uint64_t number) {
 }
 
 void BaseReplica::take(const wire::BaseHidden& m, double now_s) {
+  if (is_older(m.packer, m.base)) return;
   if (m.packer != packer_ || m.base != base_) {
     begin(m.packer, m.base);
     ask(0, kWindow, now_s);
@@ -97,14 +107,14 @@ void BaseReplica::take(const wire::BaseHidden& m, double now_s) {
   const bool gap = !m.whole && published_ != 0 && m.number > published_ + 1;
   published_ = std::max(published_, m.number);
   if (m.whole) {
-    std::vector<uint32_t> old;
+    std::set<uint32_t> old;
     for (const auto& [index, word] : hidden_)
-      if (word.bits != 0) old.push_back(index);
-    for (size_t i = 0; i < m.words.size(); i += 3) std::erase(old, m.words[i]);
+      if (word.bits != 0) old.insert(index);
+    for (size_t i = 0; i < m.words.size(); i += 3) old.erase(m.words[i]);
     for (const uint32_t index : old) set_word(index, 0, m.number);
   }
   for (size_t i = 0; i < m.words.size(); i += 3)
-    if (m.words[i] < 1u << 26) set_word(m.words[i], m.words[i + 1] | uint64_t{m.words[i + 2]} << 32, m.number);
+    if (m.words[i] < kMostHiddenWords) set_word(m.words[i], m.words[i + 1] | uint64_t{m.words[i + 2]} << 32, m.number);
   if (gap) ask_({.viewer = {}, .base = base_, .part = 0, .parts = 0});
 }
 

@@ -57,6 +57,7 @@ class BaseReplica {
     /// Returns the number of its surfel i in the base.
     uint32_t number(size_t i) const { return first + stride * static_cast<uint32_t>(i); }
   };
+  bool is_older(InstanceId packer, uint64_t base) const { return packer == packer_ && base < base_; }
   void begin(InstanceId packer, uint64_t base);
   void ask(uint64_t part, uint64_t parts, double now_s);
   void set_word(uint32_t index, uint64_t word, uint64_t number);

@@ -96,6 +96,15 @@ TEST_F(BaseReplicaTest, AsksForNothingWhereTheSessionHasNoBase) {
   EXPECT_EQ(asked.size(), 1u) << "the scene has changed";
 }
 
+TEST_F(BaseReplicaTest, AsksAnotherPackerUntilItAnswers) {
+  replica.start(now_s);
+  give_all();
+  replica.start(now_s);
+  asked.clear();
+  replica.tick(now_s += 2 * BaseReplica::kPatience_s);
+  EXPECT_EQ(asked.size(), 1u);
+}
+
 TEST_F(BaseReplicaTest, PartZeroShowsAllLeavesCoarsely) {
   ASSERT_TRUE(give(0).ok());
   const auto leaves = changes();
@@ -164,6 +173,16 @@ TEST_F(BaseReplicaTest, AnotherBaseReplacesTheFirst) {
   EXPECT_EQ(changes().size(), kLeaves);
 }
 
+TEST_F(BaseReplicaTest, AnOlderBaseThatWasUnderWayDoesNotComeBack) {
+  give_all();
+  replica.take(wire::BaseHidden{kPacker, 2, 1, true, {}}, now_s);
+  const uint64_t number = replica.number();
+  ASSERT_TRUE(give(0).ok());
+  hide(2, {0, 0xff, 0});
+  EXPECT_EQ(replica.number(), number);
+  EXPECT_FALSE(replica.known());
+}
+
 TEST_F(BaseReplicaTest, PartsThatContradictEarlierOnesAreRefused) {
   ASSERT_TRUE(give(0).ok());
   const auto stream = codec::encode_surfels(std::vector{codec::SurfelLeaf{1, 10'000, {surfel(1)}}});
@@ -177,6 +196,11 @@ TEST_F(BaseReplicaTest, PartsThatContradictEarlierOnesAreRefused) {
                       .spacing_m = 0.01,
                       .surfel_data = std::as_bytes(std::span(stream))};
   EXPECT_FALSE(replica.take(part, now_s).ok());  // a surfel beyond the base's last
+  for (const int axis : {0, 1, 2}) {
+    const auto outside = codec::encode_surfels(std::vector{codec::SurfelLeaf{16u << 10 * axis, 0, {surfel(1)}}});
+    part.surfel_data = std::as_bytes(std::span(outside));
+    EXPECT_FALSE(replica.take(part, now_s).ok()) << "axis " << axis;
+  }
   part.parts = 99;
   EXPECT_FALSE(replica.take(part, now_s).ok());
   part.parts = 1 + kLeaves, part.depth = 11;
