@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "client/viewer/points/base_replica.h"
+#include "client/viewer/record/record_file.h"
 #include "common/core/file_hash.h"
+#include "common/wire/serial.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -20,6 +23,18 @@ void expect_distribution(const nlohmann::json& d, const std::string& name) {
   EXPECT_LE(d["p99"], d["max"]) << name;
 }
 
+// All parts of the base came to the viewer, as its record of events has them.
+void expect_whole_base(const PipelineRun& run) {
+  auto file = viewer::RecordReader::open(run.out() + "/points.events", {"TSEVENT5"}, "a record of point-model events");
+  viewer::BaseReplica base([](const wire::BaseRequest&) {});
+  while (file->next()) {
+    if (file->type() != wire::BasePart::kName) continue;
+    const auto part = wire::decode<wire::BasePart>(std::as_bytes(std::span(file->body())));
+    EXPECT_TRUE(base.take(*part, 0).ok());
+  }
+  EXPECT_TRUE(base.complete());
+}
+
 TEST(Record, EveryFileIsThereAndTrue) {
   auto flags = kComesToRest;
   flags.insert(flags.end(), {"--verify", "60", "--record-every", "60"});
@@ -31,6 +46,7 @@ TEST(Record, EveryFileIsThereAndTrue) {
                            "quality.csv", "images/frame-000000.png", "logs/viewer-1.log"})
     EXPECT_TRUE(fs::exists(run.out() + "/" + name)) << name;
   EXPECT_FALSE(fs::exists(run.out() + "/spool"));
+  expect_whole_base(run);
 
   const auto s = run.summary();
   ASSERT_TRUE(s.is_object());
