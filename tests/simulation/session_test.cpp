@@ -128,6 +128,24 @@ TEST(Sessions, AViewerDropsTheBaseWithItsScene) {
 
 // ---- all of it ------------------------------------------------------------------------------------------------------
 
+// Links of 25 kB a second: the root of the chunks comes before the others, and stands in for them in another colour.
+TEST(Sessions, HoldWhereCoarseChunksStandInForOthers) {
+  Scenario s{.seed = 52, .show = Show::kTerrain, .samplers = 1};
+  s.links = {.latency_s = 0.001, .bytes_s = 25000};
+  struct Counter final : Observer {
+    size_t coarse = 0, fine = 0;
+    void on_passed(const Passed& passed) override {
+      if (passed.type != wire::DepthTile::kName || passed.what != Passed::What::kDelivered) return;
+      const auto tile = wire::decode<wire::DepthTile>(passed.body);
+      if (tile) ++(tile->coarse ? coarse : fine);
+    }
+  } counter;
+  log::initialise("simulation", "off");
+  EXPECT_EQ(text_of(run_scenario(s, {&counter}).failure), "holds");
+  EXPECT_GT(counter.coarse, 0u);
+  EXPECT_GT(counter.fine, counter.coarse);
+}
+
 TEST(Sessions, AreTheSameOnEveryInstructionSet) {
   for (const uint64_t seed : {5u, 34u}) {
     const Outcome first = outcome_of(draw_scenario(seed));

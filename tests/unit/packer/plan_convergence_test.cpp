@@ -53,6 +53,7 @@ struct Session {
     return rays;
   }
   void submit(SampledTile tile, bool whole) {
+    tile.coarse = coarse;
     planner.take(tile, whole, now_s);
     EXPECT_TRUE(core.submit(std::move(tile), now_s).ok());
     planner.settle();
@@ -69,6 +70,7 @@ struct Session {
   wire::Plan last;
   uint64_t frame = 0, forgets = 0;
   double now_s = 0;
+  bool coarse = false;  // tiles are sampled from coarser data
 };
 
 TEST(Plan, AStillViewNeedsNothingAfterAFewRounds) {
@@ -190,6 +192,34 @@ TEST(Plan, AViewThatNeedsNothingIsCompleteAtOnce) {
   ASSERT_TRUE(event.ok() && *event);
   EXPECT_TRUE((*event)->frame_complete);
   EXPECT_EQ((*event)->kept, 0u);
+}
+
+TEST(Plan, WhatCoarseDataStoodInForIsCastAgainAndThenGoes) {
+  PlanConfig config = plan_config();
+  config.validation = 0;
+  Session s(config), plain(config);
+  const geometry::Camera first = test::scene_camera({0.6, 0.3, 0.2}, 160, 120),
+                         moved = test::scene_camera({0.6, 0.3, 0.202}, 160, 120);
+  s.coarse = true;
+  EXPECT_EQ(s.view(first), 160u * 120u);
+  EXPECT_GT(s.core.model().points(), 0u);
+  EXPECT_TRUE(s.core.forget_superseded().empty()) << "nothing else shows the view";
+  s.coarse = false;
+  EXPECT_EQ(s.view(first), 160u * 120u) << "as if nothing had come";
+  EXPECT_FALSE(s.core.forget_superseded().empty());
+  plain.view(first);
+  EXPECT_EQ(s.core.model().points(), plain.core.model().points());
+  EXPECT_EQ(s.view(first), 0u);
+
+  s.coarse = true;
+  const uint64_t rays = s.view(moved);
+  EXPECT_FALSE(s.last.full);
+  EXPECT_GT(rays, 100u);
+  s.coarse = false;
+  EXPECT_EQ(s.view(moved), rays);
+  EXPECT_FALSE(s.core.forget_superseded().empty());
+  plain.view(moved);
+  EXPECT_EQ(s.core.model().points(), plain.core.model().points());
 }
 
 TEST(Plan, StrangeRequestsAreAnswered) {
