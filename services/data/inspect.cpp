@@ -18,9 +18,14 @@
 namespace telesplat::data {
 namespace {
 
-void sum_up(std::span<const geometry::ChunkInfo> chunks, MeshFileFacts& facts) {
-  facts.chunks = chunks.size();
-  for (const geometry::ChunkInfo& chunk : chunks) facts.chunk_bytes += chunk.bytes;
+void sum_up(const std::vector<geometry::ChunkInfo>& chunks, MeshFileFacts& facts) {
+  std::vector<size_t> levels;
+  for (const geometry::ChunkInfo& chunk : chunks) {
+    levels.push_back(chunk.is_leaf() ? 0 : levels.at(chunk.first_child) + 1);
+    facts.levels = std::max(facts.levels, levels.back());
+    ++(chunk.is_leaf() ? facts.chunks : facts.coarse_chunks);
+    (chunk.is_leaf() ? facts.chunk_bytes : facts.coarse_bytes) += chunk.bytes;
+  }
 }
 
 // Returns the unit of the coordinates in a file of this kind.
@@ -145,7 +150,7 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   std::error_code error;
   facts.file_bytes = std::filesystem::file_size(path, error);
   if (error) facts.file_bytes = 0;  // a folder of slices
-  sum_up((*store)->leaves(), facts);
+  sum_up((*store)->chunks(), facts);
   facts.iso = options.iso;
   facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {
@@ -206,6 +211,11 @@ Description describe(const MeshFileFacts& facts) {
   out.row("chunks",
           fmt::format("{}, {}{}", facts.chunks, bytes_text(facts.chunk_bytes), i.from_cache ? ", from the cache" : ""));
   out.json["chunks"] = {{"count", facts.chunks}, {"bytes", facts.chunk_bytes}, {"from_cache", i.from_cache}};
+  if (facts.levels > 0)
+    out.row("levels", fmt::format("{} above them, {} coarser chunks, {}; {:.1f} bytes a triangle in all", facts.levels,
+                                  facts.coarse_chunks, bytes_text(facts.coarse_bytes),
+                                  double(facts.chunk_bytes + facts.coarse_bytes) / double(i.triangles)));
+  out.json["levels"] = {{"count", facts.levels}, {"chunks", facts.coarse_chunks}, {"bytes", facts.coarse_bytes}};
   for (const std::string& note : i.notes) out.row("remark", note);
   if (!i.notes.empty()) out.json["remarks"] = i.notes;
   return out;

@@ -16,8 +16,8 @@ namespace telesplat::data {
 struct MeshFileFacts {
   MeshStoreInfo info;
   uint64_t file_bytes = 0;
-  size_t chunks = 0;
-  uint64_t chunk_bytes = 0;           ///< sum over all chunks
+  size_t chunks = 0, coarse_chunks = 0, levels = 0;  ///< leaves; those above them; depth of the tree above the leaves
+  uint64_t chunk_bytes = 0, coarse_bytes = 0;        ///< sums over leaves, and over those above
   std::optional<RasterFacts> raster;  ///< elevation rasters only
   std::string texture;                ///< draped over a raster; empty: no texture
   std::optional<double> iso;          ///< surfaces of volumes only

@@ -259,6 +259,8 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
     const StoreEntry& e = entries[i];
     if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)
       return Error{fmt::format("{}: chunk {} lies outside its store", name, i)};
+    if (uint64_t{e.first_child} + e.children > i)
+      return Error{fmt::format("{}: chunk {} of the store has children that are not before it", name, i)};
     out.chunks.push_back({ChunkId{i}, e.box_room, e.triangles, e.bytes, e.spacing_m, e.first_child, e.children});
     out.offsets.push_back(e.offset);
   }

@@ -69,6 +69,7 @@ void MeshTiles::learn_look(const wire::Welcome& session) {
 
 void MeshTiles::on_welcome(const wire::Welcome& session) {
   learn_look(session);
+  patience_.follow(session.settings);
   const scene::SessionView view(session);
   const std::string chunks = view.endpoint("chunks");
   if (chunks.empty() || (chunks == endpoint_ && session.epoch == epoch_)) return;
@@ -135,10 +136,11 @@ Sampled MeshTiles::sample(const HeldLease& held) {
   const Look& look = *looks_.find(held.lease.epoch);
   builder_.sampler().set_colours(look.colours);
   builder_.sampler().set_clip(look.clip);
-  // All tiles of a view are sampled from one cut.
-  builder_.sampler().show(cache_.cut(held.lease.camera, all_of(held.lease.camera)).shown);
+  // In the tile alone: where a chunk of another tile is missing, those above it may stand in for this tile's, too.
+  const Cut cut = cache_.cut(held.lease.camera, held.lease.rect);
+  builder_.sampler().show(cut.shown);
   Sampled out = timed([&] { return builder_.sampler().sample(held.lease.camera, held.lease.rect, held.pixels()); });
-  out.coarse = !cache_.cut(held.lease.camera, held.lease.rect).fine;
+  out.coarse = !cut.fine;
   patience_.sampled(out.coarse);
   return out;
 }

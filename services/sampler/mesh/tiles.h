@@ -78,10 +78,12 @@ class ChunkCache {
 class DetailPatience {
  public:
   static constexpr double kPatience_s = 0.04;
+  /// Only a session with plans casts again what was sampled from coarser chunks; in others tiles wait.
+  void follow(const wire::SessionSettings& s) { plans_ = s.steering && !s.keep_redundant && !s.pictures; }
   /// Returns the time from which this lease is sampled from what is there.
   double until_s(const wire::Lease& lease, double now_s) {
     if (std::exchange(frame_, lease.frame) != lease.frame) since_s_ = now_s;
-    return since_s_ + kPatience_s;
+    return plans_ ? since_s_ + kPatience_s : 1e300;
   }
 
   /// True once there was no lease for a second: then chunks may be prepared that no view has asked for.
@@ -97,6 +99,7 @@ class DetailPatience {
   FrameId frame_;
   double since_s_ = 0;  // its first lease waits since then
   double leased_s_ = -1e9;
+  bool plans_ = true;
   uint64_t coarse_ = 0;
 };
 
