@@ -154,7 +154,7 @@ void MeshTiles::extend(const HeldLease& next, double now_s) {
 }
 
 // Asks for the list of chunks, then for chunks of the next tile, of the view around it, and for the rest as far as the
-// budget goes: the leaves once there was no tile for a while.
+// budget goes: while there are tiles only of the highest levels.
 void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
   const uint64_t failed = blocks_->failed_connections();
@@ -254,12 +254,12 @@ Cut ChunkCache::cut(const geometry::Camera& camera, const geometry::Rect& part) 
   });
 }
 
-std::vector<ChunkId> ChunkCache::prefetch(bool leaves) const {
+std::vector<ChunkId> ChunkCache::prefetch(bool at_rest) const {
   std::vector<ChunkId> out;
   uint64_t bytes = bytes_;
   for (auto c = chunks_.rbegin(); c != chunks_.rend(); ++c) {
     if (held_.contains(c->id)) continue;
-    if (c->is_leaf() && !leaves) break;
+    if (!at_rest && (c->is_leaf() || chunks_[c->first_child].is_leaf())) break;
     bytes += memory(c->bytes, c->triangles);
     if (bytes > budget_bytes_) break;
     out.push_back(c->id);

@@ -31,9 +31,9 @@ class ChunkCache {
   /// Chooses what this part of a view is sampled from (choose_cut()); marks what is held of it, and what is above that,
   /// as used. Waiting chunks are missing.
   Cut cut(const geometry::Camera& camera, const geometry::Rect& part);
-  /// Returns chunks to fetch before a view asks for them, as far as the budget goes, the coarsest first; with or
-  /// without the leaves.
-  std::vector<ChunkId> prefetch(bool leaves) const;
+  /// Returns chunks to fetch before a view asks for them, as far as the budget goes, the coarsest first; but not the
+  /// leaves, nor those right above them, unless the sampler is at rest: building them takes processors from views.
+  std::vector<ChunkId> prefetch(bool at_rest) const;
 
   bool held(ChunkId id) const { return held_.contains(id); }
   bool waiting(ChunkId id) const { return waiting_.contains(id); }
