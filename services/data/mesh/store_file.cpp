@@ -87,9 +87,11 @@ class ChunkWriter {
     if (!failure_) failure_ = write_at(descriptor_, &header, sizeof header, 0);
   }
   /// Maps what is written so far. Null: there is a failure.
-  std::shared_ptr<const MappedFile> written(const std::string& name) const {
-    if (failure_ || ftruncate(descriptor_, static_cast<off_t>(end_.load())) != 0) return nullptr;
+  std::shared_ptr<const MappedFile> written(const std::string& name) {
+    if (!failure_ && ftruncate(descriptor_, static_cast<off_t>(end_.load())) != 0) failure_ = errno;
+    if (failure_) return nullptr;
     auto out = MappedFile::map(descriptor_, name);
+    if (!out) failure_ = ENOMEM;
     return out ? *std::move(out) : nullptr;
   }
   size_t end() const { return end_; }
