@@ -214,7 +214,14 @@ void MasterLink::receive() {
 }
 
 void MasterLink::tell(const std::string& fact, const std::string& value) {
-  hello_.facts[fact] = to_utf8(value);
+  wire::Hello changed = hello_;
+  changed.facts[fact] = value;
+  tell(changed);
+}
+
+void MasterLink::tell(const wire::Hello& changed) {
+  for (const auto& [fact, value] : changed.facts) hello_.facts[fact] = to_utf8(value);
+  hello_.parameters = changed.parameters, hello_.box_room = changed.box_room;
   if (!welcomed_) return;  // the hello that is due anyway contains it
   say_hello(0);            // 0: not for an exchange of clocks
 }

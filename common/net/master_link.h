@@ -173,6 +173,8 @@ class MasterLink {
 
   /// Sets a fact that was not known at first; sends it to the master in another hello.
   void tell(const std::string& fact, const std::string& value);
+  /// Sends a hello with other facts, parameters and box; facts that it lacks stay.
+  void tell(const wire::Hello& changed);
 
   /// Sends the last report and goodbye.
   void leave(const std::function<Values()>& status);

@@ -145,7 +145,7 @@ class DataTurns final : public DataService {
   std::optional<net::Wait> turn() override {
     receive();
     const auto status = [&] { return status_of(served_, requests_, rates_); };
-    if (net::stop_requested() || link_.shutdown_requested() || (stop_ && stop_())) {
+    if (failed() || net::stop_requested() || link_.shutdown_requested() || (stop_ && stop_())) {
       link_.leave(status);
       return std::nullopt;
     }
@@ -154,9 +154,14 @@ class DataTurns final : public DataService {
     if (requests_) wait.sockets.push_back(&*requests_);
     return wait;
   }
-  int exit_code() const override { return link_.exit_code(); }
+  int exit_code() const override { return served_.failure() ? link_.exit_code() : 2; }
 
  private:
+  bool failed() const {
+    const Status failure = served_.failure();
+    if (!failure) log::error("{}", failure.error().text);
+    return !failure;
+  }
   wire::Hello hello_of(const std::string& name, const std::string& endpoint, const Recorded& recorded) const {
     wire::Hello hello = make_hello(served_, name, endpoint);
     for (const auto& [fact, value] : recorded.facts) hello.facts[fact] = value;
@@ -170,6 +175,11 @@ class DataTurns final : public DataService {
     }
     if (requests_) answer_some(served_, {*requests_, link_.socket()}, rates_);
     for (const auto& [fact, value] : served_.news()) link_.tell(fact, value);
+    if (served_.take_changed()) {
+      wire::Hello changed = make_hello(served_, "", "");
+      changed.facts.try_emplace("remarks");  // else those from before stay
+      link_.tell(changed);
+    }
     if (const auto known = hash_.take()) {
       link_.tell("data_bytes", std::to_string(known->bytes));
       link_.tell("data_hash", hash_text(known->hash));

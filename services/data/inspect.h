@@ -18,10 +18,10 @@ struct MeshFileFacts {
   uint64_t file_bytes = 0;
   size_t chunks = 0, coarse_chunks = 0, levels = 0;  ///< leaves; those above them; depth of the tree above the leaves
   uint64_t chunk_bytes = 0, coarse_bytes = 0;        ///< sums over leaves, and over those above
-  std::optional<RasterFacts> raster;  ///< elevation rasters only
-  std::string texture;                ///< draped over a raster; empty: no texture
-  std::optional<double> iso;          ///< surfaces of volumes only
-  std::string unit;                   ///< unit of lengths in the file: "mm", ...; empty: not given
+  std::optional<RasterFacts> raster;                 ///< elevation rasters only
+  std::string texture;                               ///< draped over a raster; empty: no texture
+  std::optional<double> iso;                         ///< surfaces of volumes only
+  std::string unit;                                  ///< unit of lengths in the file: "mm", ...; empty: not given
 };
 
 /// Opens the file's store (making it if needed: a file whose chunks cannot be made is not usable) and sums it up.

@@ -9,6 +9,7 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/julia/served_julia.h"
+#include "services/data/mesh/out_of_core/preview.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/served_mesh.h"
 #include "services/data/surface/isosurface.h"
@@ -71,21 +72,43 @@ bool is_volume(const DataOptions& o) { return !o.mesh.iso && holds_volume(o); }
 // A file that no other kind claims is a mesh or a raster; its reader finds out which, or why not.
 bool is_mesh(const DataOptions& o) { return o.mesh.iso ? holds_volume(o) : find_mesh_file(o.scene).ok(); }
 
+// Makes the coarse form of a large mesh that has no store yet. Error: there is one, or the mesh must be read whole,
+// which also tells what is wrong with it.
+Result<std::shared_ptr<MeshStore>> preview_of(const std::string& path, const MeshOptions& options) {
+  const auto by = scene::parse_colour_by(options.colouring.by);
+  if (!by || options.iso || fs::is_directory(path)) return Error{"it is read whole"};
+  const auto open = large_mesh(path, options.elevation, by->array);
+  if (!open || !*open) return Error{"it is read whole"};
+  const auto file = MappedFile::open(path);
+  if (file && detect_format((*file)->text(), path).format == "raster") {
+    ElevationOptions coarse = options.elevation;
+    coarse.most_samples = 1 << 18;
+    auto mesh = read_mesh(path, {}, coarse);
+    return mesh ? keep_preview(path, *std::move(mesh), options) : mesh.error();
+  }
+  const auto mesh = (*open)([](double) {});
+  if (!mesh) return mesh.error();
+  return make_preview(path, **mesh, {.store = options, .array = by->array});
+}
+
 OpenServed open_as_mesh(const DataOptions& o, const Progress& progress) {
   const MeshOptions options = o.mesh_options();
   auto map = colour_map_of(options);  // before the mesh is read, which takes longer
   if (!map) return map.error();
-  auto store = open_mesh(o.scene, options, progress);
+  const auto preview = preview_of(o.scene, options);
+  auto store = preview ? preview : open_mesh(o.scene, options, progress);
   if (!store) return store.error();
   auto colouring = colouring_of(options, (*store)->info());
   if (!colouring) return colouring.error();
+  const auto open_whole = [path = o.scene, options](const Progress& working) {
+    return open_mesh(path, options, working);
+  };
+  const auto open_array = [path = o.scene, options](const std::string& array, const Progress& working) {
+    return open_mesh_by(path, options, array, working);
+  };
   return serve_mesh(std::move(*store), o.scene,
-                    {.as_begun = *std::move(colouring),
-                     .map = *std::move(map),
-                     .iso = options.iso,
-                     .open = [path = o.scene, options](const std::string& array, const Progress& working) {
-                       return open_mesh_by(path, options, array, working);
-                     }});
+                    {.as_begun = *std::move(colouring), .map = *std::move(map), .iso = options.iso, .open = open_array},
+                    preview ? OpenStore(open_whole) : nullptr);
 }
 OpenServed open_as_volume(const DataOptions& o, const Progress& progress) {
   auto store = VolumeStore::open(o.scene, o.volume, o.mesh, progress);
@@ -208,6 +231,7 @@ Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const M
   if (!source) return source.error();
   if (file->steps > 1) {
     source->variant += "-first";
+    source->random = nullptr;
     source->read = [read = source->read, folder = path, file = *file](const ReadProgress& p) {
       auto mesh = read(p);
       if (mesh)

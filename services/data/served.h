@@ -58,6 +58,10 @@ class Served {
   }
   /// Sends the answers that a thread of its own has finished meanwhile.
   virtual void send_finished(const Outlets& /*outlets*/) {}
+  /// True once after describe() and notes() changed: then everyone is told anew.
+  virtual bool take_changed() { return false; }
+  /// Error: the data cannot be served any longer.
+  virtual Status failure() const { return ok_status(); }
   /// Returns facts of the hello that have changed since the last call; they go to the master.
   virtual std::map<std::string, std::string> news() { return {}; }
   /// True while work goes on or answers wait without a message.

@@ -23,7 +23,6 @@ constexpr std::array<Tint, 7> kTints{{{0.00f, {96, 132, 82}},
                                       {0.88f, {176, 164, 156}},
                                       {1.00f, {244, 244, 246}}}};
 constexpr uint32_t kSea = pack_rgb(70, 110, 150);
-constexpr uint32_t kNone = ~uint32_t{0};
 
 uint32_t tint(float at) {
   at = std::clamp(at, 0.0f, 1.0f);
@@ -35,17 +34,11 @@ uint32_t tint(float at) {
   return pack_rgb(channel(0), channel(1), channel(2));
 }
 
-struct Relief {
-  float lo = 0, hi = 1;  // range of all heights
-  float land_lo = 0, land_hi = 1;
-  bool sea = false;
-};
-
 // Returns percentiles of heights; only of those above sea level where many lie exactly at or below it.
-Relief relief_of(const ElevationRaster& raster) {
+ElevationGrid::Relief relief_of(const ElevationRaster& raster) {
   std::vector<float> heights;
   const size_t stride = std::max<size_t>(raster.heights.size() / 1'000'000, 1);
-  Relief out{3e38f, -3e38f};
+  ElevationGrid::Relief out{3e38f, -3e38f};
   for (const float h : raster.heights)
     if (std::isfinite(h)) out.lo = std::min(out.lo, h), out.hi = std::max(out.hi, h);
   for (size_t i = 0; i < raster.heights.size(); i += stride)
@@ -62,38 +55,11 @@ Relief relief_of(const ElevationRaster& raster) {
   return out;
 }
 
-// vertex: index of each sample's vertex; kNone: no data.
-void add_triangles(const ElevationRaster& raster, const std::vector<uint32_t>& vertex, Mesh& mesh) {
-  const auto w = size_t(raster.width), h = size_t(raster.height);
-  const bool mirrored = raster.along_row.x * raster.along_column.y > raster.along_row.y * raster.along_column.x;
-  mesh.indices.reserve(6 * (w - 1) * (h - 1));
-  for (size_t y = 0; y + 1 < h; ++y)
-    for (size_t x = 0; x + 1 < w; ++x) {
-      const size_t i = y * w + x;
-      const uint32_t nw = vertex[i], ne = vertex[i + 1], sw = vertex[i + w], se = vertex[i + w + 1];
-      const int have = (nw != kNone) + (ne != kNone) + (sw != kNone) + (se != kNone);
-      const auto triangle = [&](uint32_t a, uint32_t b, uint32_t c) {
-        mesh.indices.insert(mesh.indices.end(), {a, mirrored ? c : b, mirrored ? b : c});
-      };
-      if (have == 4) {
-        // Cut along the diagonal whose ends differ less: ridges and valleys stay sharp.
-        const auto z = [&](uint32_t v) { return mesh.positions[v].z; };
-        if (std::abs(z(nw) - z(se)) <= std::abs(z(ne) - z(sw)))
-          triangle(nw, sw, se), triangle(nw, se, ne);
-        else
-          triangle(nw, sw, ne), triangle(ne, sw, se);
-      } else if (have == 3) {
-        if (nw == kNone) triangle(ne, sw, se);
-        if (ne == kNone) triangle(nw, sw, se);
-        if (sw == kNone) triangle(nw, se, ne);
-        if (se == kNone) triangle(nw, sw, ne);
-      }
-    }
-}
-
 }  // namespace
 
-Result<Mesh> elevation_mesh(const ElevationRaster& raster, const ElevationOptions& options, const std::string& name) {
+Result<std::shared_ptr<const ElevationGrid>> ElevationGrid::make(ElevationRaster raster,
+                                                                 const ElevationOptions& options,
+                                                                 const std::string& name) {
   const auto w = size_t(std::max(raster.width, 0)), h = size_t(std::max(raster.height, 0));
   if (w < 2 || h < 2) return Error{fmt::format("{}: a raster of {} x {} samples, at least 2 x 2", name, w, h)};
   if (raster.heights.size() != w * h)
@@ -108,28 +74,83 @@ Result<Mesh> elevation_mesh(const ElevationRaster& raster, const ElevationOption
         std::max(double(w) * glm::length(raster.along_row), double(h) * glm::length(raster.along_column));
     z_scale = raster.georeferenced || relief.hi == relief.lo ? 1 : side / 7 / (double(relief.hi) - relief.lo);
   }
+  Facts facts{.format = "raster", .vertices = w * h, .triangles = 2 * (w - 1) * (h - 1), .smooth = true};
+  facts.colours = true;
+  facts.unused =
+      uint64_t(std::count_if(raster.heights.begin(), raster.heights.end(), [](float z) { return !std::isfinite(z); }));
+  facts.notes = raster.notes;
+  facts.coordinates = raster.coordinates;
+  facts.coordinates.shown.z *= z_scale;
+  if (!raster.georeferenced) facts.coordinates.lengths.z = z_scale;  // heights and pixels have no common unit
+  return std::shared_ptr<const ElevationGrid>(new ElevationGrid(std::move(facts), std::move(raster), relief, z_scale));
+}
 
+glm::dvec3 ElevationGrid::position(uint64_t vertex) const {
+  const uint64_t w = uint64_t(raster_.width);
+  return {raster_.first + double(vertex % w) * raster_.along_row + double(vertex / w) * raster_.along_column,
+          raster_.heights[vertex] * z_scale_};
+}
+
+uint32_t ElevationGrid::colour(uint64_t vertex) const {
+  if (!raster_.colours.empty()) return raster_.colours[vertex];
+  const float z = raster_.heights[vertex];
+  if (relief_.sea && z <= 0) return kSea;
+  return tint((z - relief_.land_lo) / std::max(relief_.land_hi - relief_.land_lo, 1e-6f));
+}
+
+bool ElevationGrid::corners(uint64_t first, size_t count, uint32_t* out) const {
+  const bool mirrored = raster_.along_row.x * raster_.along_column.y > raster_.along_row.y * raster_.along_column.x;
+  for (uint64_t t = first; t < first + count; ++t, out += 3) {
+    const Triangle corners = triangle(t);
+    out[0] = corners[0], out[1] = corners[mirrored ? 2 : 1], out[2] = corners[mirrored ? 1 : 2];
+  }
+  return true;
+}
+
+// A cell has the triangles 2 n and 2 n + 1.
+ElevationGrid::Triangle ElevationGrid::triangle(uint64_t t) const {
+  const uint64_t w = uint64_t(raster_.width), cell = t / 2;
+  const uint64_t at = cell / (w - 1) * w + cell % (w - 1);
+  const auto nw = uint32_t(at), ne = uint32_t(at + 1), sw = uint32_t(at + w), se = uint32_t(at + w + 1);
+  const auto z = [&](uint32_t v) { return raster_.heights[v] * z_scale_; };
+  const bool has[4] = {std::isfinite(z(nw)), std::isfinite(z(ne)), std::isfinite(z(sw)), std::isfinite(z(se))};
+  const int have = has[0] + has[1] + has[2] + has[3];
+  const bool second = t % 2 == 1;
+  if (have < 3 || (have == 3 && second)) return {kNoTriangle, kNoTriangle, kNoTriangle};
+  if (have == 3)
+    return !has[0]   ? Triangle{ne, sw, se}
+           : !has[1] ? Triangle{nw, sw, se}
+           : !has[2] ? Triangle{nw, se, ne}
+                     : Triangle{nw, sw, ne};
+  // Cut along the diagonal whose ends differ less: ridges and valleys stay sharp.
+  if (std::abs(z(nw) - z(se)) <= std::abs(z(ne) - z(sw))) return second ? Triangle{nw, se, ne} : Triangle{nw, sw, se};
+  return second ? Triangle{ne, sw, se} : Triangle{nw, sw, ne};
+}
+
+Result<Mesh> elevation_mesh(ElevationRaster raster, const ElevationOptions& options, const std::string& name) {
+  const auto made = ElevationGrid::make(std::move(raster), options, name);
+  if (!made) return made.error();
+  const ElevationGrid& grid = **made;
   Mesh mesh;
-  mesh.format = "raster", mesh.smooth = true;
-  mesh.coordinates = raster.coordinates;
-  mesh.notes = raster.notes;
-  mesh.coordinates.shown.z *= z_scale;
-  if (!raster.georeferenced) mesh.coordinates.lengths.z = z_scale;  // heights and pixels have no common unit
-  std::vector<uint32_t> vertex(w * h, kNone);
-  const float land = std::max(relief.land_hi - relief.land_lo, 1e-6f);
-  for (size_t y = 0; y < h; ++y)
-    for (size_t x = 0; x < w; ++x) {
-      const size_t i = y * w + x;
-      const float z = raster.heights[i];
-      if (!std::isfinite(z)) continue;
-      vertex[i] = uint32_t(mesh.positions.size());
-      mesh.positions.emplace_back(raster.first + double(x) * raster.along_row + double(y) * raster.along_column,
-                                  z * z_scale);
-      mesh.colours.push_back(!raster.colours.empty() ? raster.colours[i]
-                             : relief.sea && z <= 0  ? kSea
-                                                     : tint((z - relief.land_lo) / land));
-    }
-  add_triangles(raster, vertex, mesh);
+  mesh.format = grid.facts().format, mesh.smooth = true;
+  mesh.coordinates = grid.facts().coordinates;
+  mesh.notes = grid.facts().notes;
+  std::vector<uint32_t> vertex(grid.vertices(), ~uint32_t{0});
+  mesh.positions.reserve(grid.vertices() - grid.facts().unused);
+  for (uint64_t v = 0; v < grid.vertices(); ++v) {
+    const glm::dvec3 p = grid.position(v);
+    if (!std::isfinite(p.z)) continue;
+    vertex[v] = uint32_t(mesh.positions.size());
+    mesh.positions.push_back(p);
+    mesh.colours.push_back(grid.colour(v));
+  }
+  mesh.indices.reserve(3 * grid.triangles());
+  for (uint64_t t = 0; t < grid.triangles(); ++t) {
+    uint32_t corners[3];
+    grid.corners(t, 1, corners);
+    if (corners[0] == RandomMesh::kNoTriangle) continue;
+    for (const uint32_t corner : corners) mesh.indices.push_back(vertex[corner]);
+  }
   if (mesh.indices.empty()) return Error{fmt::format("{}: no three neighbouring samples have data", name)};
   return mesh;
 }

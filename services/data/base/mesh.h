@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,7 @@
 #include "common/scene/arrays.h"
 #include "common/scene/placement.h"
 #include "services/data/base/progress.h"
+#include "services/data/base/random_mesh.h"
 
 namespace telesplat::data {
 
@@ -63,12 +65,17 @@ void colour_faces(Mesh& mesh, std::span<const uint32_t> of_triangles);
 /// Packs 8-bit channels into 0x00RRGGBB.
 constexpr uint32_t pack_rgb(uint32_t r, uint32_t g, uint32_t b) { return r << 16 | g << 8 | b; }
 
+/// Opens a mesh to be read here and there.
+using OpenRandom = std::function<Result<std::shared_ptr<const RandomMesh>>(const ReadProgress&)>;
+
 struct MeshSource {
   uint64_t hash = 0;    ///< over the content of all files that the mesh is read from
   std::string variant;  ///< other settings that change the mesh, as part of a file name; often empty
   /// Reads the mesh; the result has passed validate_mesh.
   std::function<Result<Mesh>(const ReadProgress&)> read;
   std::string array;  ///< the array that colours it, as for scene::choose_array(); part of the variant; empty: no array
+  /// Opens the same mesh; null: it can only be read whole, or is small.
+  OpenRandom random = nullptr;
 };
 
 /// Returns the hash of the files' contents, in this order. Unreadable files are left out: reading them reports the

@@ -210,7 +210,7 @@ void read_heights(GDALRasterBandH band, const std::string& path, double metres, 
   }
 }
 
-ElevationRaster elevation_of(ImportFiles& files, const std::string& path, const std::string& texture) {
+ElevationRaster elevation_of(ImportFiles& files, const std::string& path, const ElevationOptions& options) {
   if (files.all().empty()) refuse("{}: no file arrived", path);
   prepare_gdal(files);
   auto opened = open_with_gdal(gdal_place_of(path), path, "an elevation raster", kElevationDrivers);
@@ -224,7 +224,7 @@ ElevationRaster elevation_of(ImportFiles& files, const std::string& path, const 
   const HeightUnit unit = height_unit(dataset, band, at);
 
   ElevationRaster out;
-  while (int64_t{(w + out.step - 1) / out.step} * ((h + out.step - 1) / out.step) > kMaxRasterSamples) ++out.step;
+  while (int64_t{(w + out.step - 1) / out.step} * ((h + out.step - 1) / out.step) > options.most_samples) ++out.step;
   out.width = (w + out.step - 1) / out.step;
   out.height = (h + out.step - 1) / out.step;
   read_heights(band, path, unit.metres, out);
@@ -246,12 +246,12 @@ ElevationRaster elevation_of(ImportFiles& files, const std::string& path, const 
   if (!unit.from.empty() && unit.name != "m")
     out.notes.push_back(
         fmt::format("{}: heights are in {} ({}), {:.6g} m each", path, unit.name, unit.from, unit.metres));
-  if (!texture.empty()) drape(texture, at, w, h, out);
+  if (!options.texture.empty()) drape(options.texture, at, w, h, out);
   return out;
 }
 
 RasterFacts facts_of(ImportFiles& files, const std::string& path) {
-  const ElevationRaster raster = elevation_of(files, path, "");
+  const ElevationRaster raster = elevation_of(files, path, {});
   auto opened = open_with_gdal(gdal_place_of(path), path, "an elevation raster", kElevationDrivers);
   const GDALDatasetH dataset = opened.get();
   RasterFacts out;
@@ -285,8 +285,8 @@ RasterFacts facts_of(ImportFiles& files, const std::string& path) {
 
 }  // namespace
 
-Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture) {
-  return or_error([&] { return elevation_of(files, path, texture); });
+Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const ElevationOptions& options) {
+  return or_error([&] { return elevation_of(files, path, options); });
 }
 
 Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& path) {

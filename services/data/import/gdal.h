@@ -19,7 +19,7 @@ namespace telesplat::data {
 
 /// Reads the raster `path` and the picture `texture` (empty: no picture), both among `files`. Errors name the file: not
 /// a raster, several bands (a picture), more samples than memory.
-Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const std::string& texture);
+Result<ElevationRaster> read_elevation(ImportFiles& files, const std::string& path, const ElevationOptions& options);
 
 /// Returns the raster's own description, and the range of its heights.
 Result<RasterFacts> read_raster_facts(ImportFiles& files, const std::string& path);

@@ -45,12 +45,6 @@ uint64_t memory_with(uint64_t more) {
   return pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + more;
 }
 
-Result<Mesh> import_elevation(ImportFiles& files, const std::string& path, double z_scale, const std::string& texture) {
-  const auto raster = read_elevation(files, path, texture);
-  if (!raster) return raster.error();
-  return elevation_mesh(*raster, {z_scale, texture}, path);
-}
-
 Result<Mesh> import_mesh(ImportFiles& files, const std::string& format, const std::string& path,
                          uint64_t texture_detail, const std::string& array) {
   const auto content = files.content();
@@ -106,7 +100,7 @@ int main(int argc, char** argv) {
         "report.h)\n"
         "       telesplat-import dicom NAME BYTES    (standard output: import_stream.h)\n"
         "       telesplat-import stack NAME SIZExSIZExSIZE:TYPE  (standard output: import_stream.h)\n"
-        "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
+        "       telesplat-import raster FILE TEXTURE|'' SAMPLES  (heights: process.h)\n"
         "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n",
         stderr);
     return 2;
@@ -133,8 +127,11 @@ int main(int argc, char** argv) {
       const auto facts = read_raster_facts(files, path);
       return write_import_report(out, facts ? Result(to_notes(*facts)) : facts.error()) ? 0 : 1;
     }
-    const auto mesh = raster && argc == 5 ? import_elevation(files, path, std::atof(argv[3]), argv[4])
-                                          : import_mesh(files, format, path, texture_detail, argc == 5 ? argv[4] : "");
+    if (raster && argc == 5) {
+      const ElevationOptions options{.texture = argv[3], .most_samples = std::atoll(argv[4])};
+      return write_heights_report(out, read_elevation(files, path, options)) ? 0 : 1;
+    }
+    const auto mesh = import_mesh(files, format, path, texture_detail, argc == 5 ? argv[4] : "");
     return write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const Error error{fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};

@@ -92,14 +92,30 @@ Status end_import(pid_t child, const std::string& reader, const std::string& for
 
 }  // namespace
 
-Result<Mesh> import(const std::string& reader, std::vector<std::string> words, const std::vector<std::string>& files) {
+namespace {
+
+// Runs the program; its report lies in memory.
+Result<Descriptor> report_of(const std::string& reader, std::vector<std::string> words,
+                             const std::vector<std::string>& files) {
   const std::string format = words[0], path = words[1];
-  const Descriptor output(memfd_create("telesplat-import", MFD_CLOEXEC));
+  Descriptor output(memfd_create("telesplat-import", MFD_CLOEXEC));
   if (!output.valid()) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
   const auto child = start_import(std::move(words), files, output.get());
   if (!child) return child.error();
   if (const Status ended = end_import(*child, reader, format, path); !ended) return ended.error();
-  return read_import_report(output.get(), path, format);
+  return output;
+}
+
+}  // namespace
+
+Result<Mesh> import(const std::string& reader, std::vector<std::string> words, const std::vector<std::string>& files) {
+  const auto report = report_of(reader, words, files);
+  return report ? read_import_report(report->get(), words[1], words[0]) : report.error();
+}
+
+Result<ElevationRaster> import_heights(std::vector<std::string> words, const std::vector<std::string>& files) {
+  const auto report = report_of("GDAL's raster", words, files);
+  return report ? read_heights_report(report->get(), words[1]) : report.error();
 }
 
 Result<StreamedVolume> import_volume(const std::string& reader, std::vector<std::string> words,

@@ -38,6 +38,15 @@ bool take(std::span<const std::byte>& bytes, uint64_t count, Array& out) {
   return true;
 }
 
+// Head of a report on heights; an error's text, or heights, colours, notes and coordinates follow.
+struct HeightsReport {
+  uint64_t text_bytes = 0;  // as in Report
+  uint64_t colours = 0;     // number of colours
+  uint64_t notes_bytes = 0, coordinates_bytes = 0;
+  double first[2] = {}, along_row[2] = {}, along_column[2] = {};
+  int32_t width = 0, height = 0, step = 1, georeferenced = 0;
+};
+
 // Makes a file's text one line: it may hold any characters.
 std::string line_of(std::string text) {
   for (char& c : text)
@@ -116,6 +125,61 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
   if (!coordinates) return Error{fmt::format("{}: {}", path, coordinates.error().text)};
   mesh.coordinates = *std::move(coordinates);
   return mesh;
+}
+
+bool write_heights_report(int descriptor, const Result<ElevationRaster>& result) {
+  HeightsReport report;
+  if (!result) {
+    const std::string& text = result.error().text;
+    report.text_bytes = text.size();
+    return write_all(descriptor, &report, sizeof report) && write_all(descriptor, text.data(), text.size());
+  }
+  const ElevationRaster& raster = *result;
+  const std::string coordinates = scene::to_text(raster.coordinates);
+  std::string notes;
+  for (const auto& note : raster.notes) notes += note + "\n";
+  report.colours = raster.colours.size();
+  report.notes_bytes = notes.size(), report.coordinates_bytes = coordinates.size();
+  for (int a = 0; a < 2; ++a) {
+    report.first[a] = raster.first[a];
+    report.along_row[a] = raster.along_row[a], report.along_column[a] = raster.along_column[a];
+  }
+  report.width = raster.width, report.height = raster.height, report.step = raster.step;
+  report.georeferenced = raster.georeferenced;
+  const auto put = [&](const auto& array) {
+    return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
+  };
+  return write_all(descriptor, &report, sizeof report) && put(raster.heights) && put(raster.colours) && put(notes) &&
+         put(coordinates);
+}
+
+Result<ElevationRaster> read_heights_report(int descriptor, const std::string& path) {
+  const auto mapped = MappedFile::map(descriptor, path);
+  const Error incomplete{fmt::format("{}: what {} left of it is incomplete", path, kImportProgram)};
+  if (!mapped || (*mapped)->bytes().size() < sizeof(HeightsReport)) return incomplete;
+  HeightsReport report;
+  std::memcpy(&report, (*mapped)->bytes().data(), sizeof report);
+  auto rest = (*mapped)->bytes().subspan(sizeof report);
+  if (report.text_bytes > 0) return Error{std::string((*mapped)->text().substr(sizeof report, report.text_bytes))};
+  ElevationRaster out;
+  std::string notes, coordinates_text;
+  const uint64_t samples = report.width > 0 && report.height > 0 ? uint64_t(report.width) * uint64_t(report.height) : 0;
+  if (samples == 0 || !take(rest, samples, out.heights) || (report.colours != 0 && report.colours != samples) ||
+      !take(rest, report.colours, out.colours) || report.coordinates_bytes > kMaxCoordinates ||
+      !take(rest, report.notes_bytes, notes) || !take(rest, report.coordinates_bytes, coordinates_text))
+    return incomplete;
+  out.width = report.width, out.height = report.height, out.step = report.step;
+  out.georeferenced = report.georeferenced != 0;
+  for (int a = 0; a < 2; ++a) {
+    out.first[a] = report.first[a];
+    out.along_row[a] = report.along_row[a], out.along_column[a] = report.along_column[a];
+  }
+  std::istringstream lines(notes);
+  for (std::string note; std::getline(lines, note);) out.notes.push_back(note);
+  auto coordinates = scene::coordinates_from_text(coordinates_text);
+  if (!coordinates) return Error{fmt::format("{}: {}", path, coordinates.error().text)};
+  out.coordinates = *std::move(coordinates);
+  return out;
 }
 
 Mesh to_notes(const RasterFacts& f) {

@@ -84,17 +84,21 @@ struct Corner {
 }  // namespace
 
 ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most) {
+  CHECK(most >= 1);
+  return plan_chunk_count(mesh, (mesh.indices.size() / 3 + most - 1) / most);
+}
+
+ChunkPlan plan_chunk_count(const PlacedMesh& mesh, size_t chunks) {
   const size_t triangles = mesh.indices.size() / 3;
-  CHECK(triangles >= 1 && most >= 1);
+  CHECK(chunks >= 1 && chunks <= triangles);
   std::vector<Item> items(triangles);
   in_parallel(tbb::blocked_range<size_t>(0, triangles, 1 << 16), [&](const auto& range) {
     for (size_t t = range.begin(); t < range.end(); ++t) items[t] = item_of(mesh, static_cast<uint32_t>(t));
   });
   ChunkPlan plan;
-  const size_t parts = (triangles + most - 1) / most;
-  plan.begin.resize(parts + 1);
-  split(items, 0, parts, std::span(plan.begin).first(parts));
-  plan.begin[parts] = triangles;
+  plan.begin.resize(chunks + 1);
+  split(items, 0, chunks, std::span(plan.begin).first(chunks));
+  plan.begin[chunks] = triangles;
   plan.order.resize(triangles);
   for (size_t i = 0; i < triangles; ++i) plan.order[i] = items[i].triangle;
   return plan;

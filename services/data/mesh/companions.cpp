@@ -110,7 +110,7 @@ std::string active_array_of(const std::string& path) {
   const auto file = MappedFile::open(path);
   if (!file) return {};
   const auto text = (*file)->text();
-  return has_arrays(detect_format(text, path).format) ? active_array(text) : std::string();
+  return vtk::is_mesh_kind(detect_format(text, path).format) ? active_array(text) : std::string();
 }
 
 }  // namespace telesplat::data

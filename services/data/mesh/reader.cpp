@@ -18,6 +18,9 @@
 namespace telesplat::data {
 namespace {
 
+// Files from these sizes on are read here and there if they allow that: about five million triangles.
+constexpr size_t kLargePly_bytes = 100 << 20, kLargeRaster_bytes = 5 << 20;
+
 constexpr const char* kSupported =
     "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK's files), elevation rasters (GeoTIFF, HGT, 16-bit PNG, ASCII "
     "and "
@@ -152,9 +155,9 @@ std::optional<Result<Mesh>> read_pictured(std::string_view content, const std::s
   return import("the " + format, {format, path, std::to_string(texture_detail), array}, files);
 }
 
-// Reads an elevation raster through GDAL, in telesplat-import; colours and triangulates it (elevation.h).
-Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, const ElevationOptions& options,
-                            const ReadProgress& progress) {
+// Reads the heights of a raster through GDAL, in telesplat-import.
+Result<ElevationRaster> read_heights(std::string_view content, const std::string& path, const ElevationOptions& options,
+                                     const ReadProgress& progress) {
   if (progress) progress(0.0);
   std::error_code error;
   for (const std::string& name : vrt_sources(content))
@@ -163,7 +166,15 @@ Result<Mesh> read_with_gdal(std::string_view content, const std::string& path, c
   std::vector<std::string> files = companion_files(content, "raster", path);
   files.insert(files.begin(), path);
   if (!options.texture.empty()) files.push_back(options.texture);
-  return import("GDAL's raster", {"raster", path, fmt::format("{}", options.z_scale), options.texture}, files);
+  return import_heights({"raster", path, options.texture, std::to_string(options.most_samples)}, files);
+}
+
+// Colours and triangulates them (elevation.h).
+Result<Mesh> read_raster(std::string_view content, const std::string& path, const ElevationOptions& options,
+                         const ReadProgress& progress) {
+  auto heights = read_heights(content, path, options, progress);
+  if (!heights) return heights.error();
+  return elevation_mesh(*std::move(heights), options, path);
 }
 
 }  // namespace
@@ -222,7 +233,7 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
                 : detected.format == "off"    ? read_off(content, path, progress)
                 : detected.format == "stl"    ? read_stl(content, path, progress)
                 : detected.format == "obj"    ? read_obj(content, path, progress, folder, texture_detail)
-                : detected.format == "raster" ? read_with_gdal(content, path, elevation, progress)
+                : detected.format == "raster" ? read_raster(content, path, elevation, progress)
                 : detected.format == "gltf"   ? read_imported_gltf(content, path, progress, texture_detail)
                                               : read_vtk(content, path, progress, array);
     if (!mesh) return mesh;
@@ -233,6 +244,26 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
   } catch (const std::bad_alloc&) {
     return Error{fmt::format("{}: this machine's memory does not suffice to read its {} bytes", path, content.size())};
   }
+}
+
+Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& elevation, const std::string& array) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const size_t bytes = (*file)->bytes().size();
+  const std::string format = detect_format((*file)->text(), path).format;
+  if (format == "raster" && bytes >= kLargeRaster_bytes)
+    return OpenRandom([=](const ReadProgress& progress) -> Result<std::shared_ptr<const RandomMesh>> {
+      auto heights = read_heights((*file)->text(), path, elevation, progress);
+      if (!heights) return heights.error();
+      auto grid = ElevationGrid::make(*std::move(heights), elevation, path);
+      if (!grid) return grid.error();
+      return std::shared_ptr<const RandomMesh>(*std::move(grid));
+    });
+  if (format != "ply" || bytes < kLargePly_bytes) return OpenRandom();
+  auto mesh = random_ply(*file, path, array);
+  if (!mesh) return mesh.error();
+  if (!*mesh) return OpenRandom();
+  return OpenRandom([mesh = *mesh](const ReadProgress&) { return Result(mesh); });
 }
 
 Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
@@ -256,8 +287,11 @@ Result<MeshSource> file_source(const std::string& path, const ElevationOptions& 
   if (!array.empty()) variant += fmt::format("-by{:016x}", XXH3_64bits(array.data(), array.size()));
   const bool textured = detected.format == "obj" || detected.format == "gltf";
   if (textured && texture_detail != kDefaultTextureDetail) variant += fmt::format("-t{}", texture_detail);
+  auto random = large_mesh(path, elevation, array);
+  if (!random) return random.error();
   return MeshSource{hash_files(files, progress), variant,
-                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array, texture_detail); }, array};
+                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array, texture_detail); }, array,
+                    *std::move(random)};
 }
 
 }  // namespace telesplat::data

@@ -27,21 +27,82 @@
 namespace telesplat::data {
 namespace {
 
-// The open stores of one mesh, each with another of its arrays in the chunks, and the one that is being opened in a
-// thread of its own.
+struct GivenUp {};
+
+// Opens a store in a thread of its own.
+class StoreOpening {
+ public:
+  using Made = Result<std::shared_ptr<MeshStore>>;
+  StoreOpening() = default;
+  StoreOpening(const StoreOpening&) = delete;
+  /// Cancels it, and waits until its thread ends.
+  ~StoreOpening() {
+    stop_ = true;
+    if (opening_.valid()) opening_.wait();
+  }
+
+  void begin(OpenStore open) {
+    opening_ = std::async(std::launch::async, [this, open = std::move(open)]() -> Made {
+      try {
+        return open([this](const char* stage, double fraction) {
+          if (stop_) throw GivenUp();
+          stage_ = stage, fraction_ = fraction;
+        });
+      } catch (const GivenUp&) {
+        return Error{"given up: the data server ends"};
+      } catch (const std::exception& e) {
+        return Error{e.what()};
+      }
+    });
+  }
+  bool running() const { return opening_.valid(); }
+  /// Returns what was opened; once.
+  std::optional<Made> take() {
+    if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+      return std::nullopt;
+    return opening_.get();
+  }
+  /// Fraction that is done, 0..1, by the time that stages take of a mesh of 52 million triangles.
+  double fraction() const {
+    double before = 0;
+    for (const auto& [stage, part] : {std::pair{kIdentifying, 0.03},
+                                      {kReading, 0.05},
+                                      {kSortingIntoChunks, 0.1},
+                                      {kWritingTheStore, 0.47},
+                                      {kMakingLevels, 0.32},
+                                      {kMakingSurfels, 0.03}}) {
+      if (stage_.load() == std::string_view(stage)) return before + part * fraction_;
+      before += part;
+    }
+    return 0;
+  }
+
+ private:
+  std::future<Made> opening_;
+  std::atomic<bool> stop_{false};
+  std::atomic<const char*> stage_ = "";
+  std::atomic<double> fraction_ = 0;
+};
+
+// The open stores of one mesh, each with another of its arrays in the chunks, and the one that is being opened.
 class ArrayStores {
  public:
   using Open = decltype(ServedColours::open);
 
-  ArrayStores(std::shared_ptr<const MeshStore> first, const std::string& array, Open open);
-  /// Cancels the opening store, and waits until its thread ends.
-  ~ArrayStores();
+  ArrayStores(std::shared_ptr<const MeshStore> first, const std::string& array, Open open)
+      : first_(array), open_array_(std::move(open)) {
+    open_[array] = std::move(first);
+  }
+  /// Replaces all stores.
+  void reset(std::shared_ptr<const MeshStore> first) {
+    open_.clear();
+    open_[first_] = std::move(first);
+  }
 
   /// Null: the array's store is not open.
   std::shared_ptr<const MeshStore> find(const std::string& array) const;
   /// Opens the array's store as soon as no other one is being opened; only the array wanted last waits.
   void want(const std::string& array);
-  bool busy() const { return opening_.valid(); }
 
   /// Result of opening a store; returned once.
   struct Opened {
@@ -51,7 +112,6 @@ class ArrayStores {
   std::optional<Opened> take_opened();
 
  private:
-  using Made = Result<std::shared_ptr<MeshStore>>;
   void begin(const std::string& array);
 
   static constexpr size_t kKept = 4;  // including the first one
@@ -59,23 +119,10 @@ class ArrayStores {
   std::map<std::string, std::shared_ptr<const MeshStore>> open_;
   const std::string first_;
   Open open_array_;
-  std::future<Made> opening_;
+  StoreOpening opening_;
   std::string opening_array_;
   std::optional<std::string> next_;
-  std::atomic<bool> stop_{false};
 };
-
-struct GivenUp {};
-
-ArrayStores::ArrayStores(std::shared_ptr<const MeshStore> first, const std::string& array, Open open)
-    : first_(array), open_array_(std::move(open)) {
-  open_[array] = std::move(first);
-}
-
-ArrayStores::~ArrayStores() {
-  stop_ = true;
-  if (opening_.valid()) opening_.wait();
-}
 
 std::shared_ptr<const MeshStore> ArrayStores::find(const std::string& array) const {
   const auto found = open_.find(array);
@@ -84,22 +131,12 @@ std::shared_ptr<const MeshStore> ArrayStores::find(const std::string& array) con
 
 void ArrayStores::begin(const std::string& array) {
   opening_array_ = array;
-  opening_ = std::async(std::launch::async, [this, array]() -> Made {
-    try {
-      return open_array_(array, [this](const char*, double) {
-        if (stop_) throw GivenUp();
-      });
-    } catch (const GivenUp&) {
-      return Error{"given up: the data server ends"};
-    } catch (const std::exception& e) {
-      return Error{e.what()};
-    }
-  });
+  opening_.begin([this, array](const Progress& progress) { return open_array_(array, progress); });
 }
 
 void ArrayStores::want(const std::string& array) {
   if (find(array)) return;
-  if (!opening_.valid())
+  if (!opening_.running())
     begin(array);
   else if (opening_array_ != array)
     next_ = array;
@@ -108,17 +145,48 @@ void ArrayStores::want(const std::string& array) {
 }
 
 std::optional<ArrayStores::Opened> ArrayStores::take_opened() {
-  if (!opening_.valid() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
-  Made made = opening_.get();
-  Opened out{opening_array_, made ? ok_status() : Status(made.error())};
-  if (made) {
+  auto made = opening_.take();
+  if (!made) return std::nullopt;
+  Opened out{opening_array_, made->ok() ? ok_status() : Status(made->error())};
+  if (made->ok()) {
     for (auto old = open_.begin(); open_.size() >= kKept && old != open_.end();)
       old = old->first == first_ ? std::next(old) : open_.erase(old);
-    open_[opening_array_] = *std::move(made);
+    open_[opening_array_] = **std::move(made);
   }
   if (next_) begin(*std::exchange(next_, std::nullopt));
   return out;
 }
+
+// A store that stands in for the whole one until that is made. Requests of earlier epochs are answered from it.
+class ProvisionalStore {
+ public:
+  explicit ProvisionalStore(OpenStore whole) : shown_(whole != nullptr) {
+    if (whole) opening_.begin(std::move(whole));
+  }
+  /// True until the whole store takes its place.
+  bool shown() const { return shown_; }
+  double fraction() const { return opening_.fraction(); }
+  std::optional<StoreOpening::Made> take() { return opening_.take(); }
+  void replace(std::shared_ptr<const MeshStore> before, const std::string& content_hash) {
+    shown_ = false;
+    before_ = std::move(before), content_hash_ = content_hash;
+  }
+  /// The session's first epoch with the whole store begins.
+  void follow(const scene::SessionView& view, EpochId epoch) {
+    if (before_ && !since_ && view.fact("content_hash") == content_hash_) since_ = epoch;
+  }
+  /// Returns the store for a request of an epoch; null: the whole one.
+  std::shared_ptr<const MeshStore> find(EpochId epoch) const {
+    return before_ && (!since_ || epoch.value < since_->value) ? before_ : nullptr;
+  }
+
+ private:
+  StoreOpening opening_;
+  bool shown_;
+  std::shared_ptr<const MeshStore> before_;
+  std::string content_hash_;
+  std::optional<EpochId> since_;
+};
 
 // Answers queued per peer: samplers ask for as many chunks at a time as fill their link, and for a list.
 constexpr int kAnswersWaiting = 16;
@@ -149,13 +217,14 @@ class ListLimit {
 
 class ServedMesh final : public Served {
  public:
-  ServedMesh(std::shared_ptr<const MeshStore> store, std::string title, ServedColours colours)
+  ServedMesh(std::shared_ptr<const MeshStore> store, std::string title, ServedColours colours, OpenStore whole)
       : store_(std::move(store)),
         title_(std::move(title)),
         as_begun_(std::move(colours.as_begun)),
         map_(std::move(colours.map)),
         iso_(colours.iso),
-        stores_(store_, as_begun_ ? as_begun_->array : "", std::move(colours.open)) {}
+        stores_(store_, first_array(), std::move(colours.open)),
+        provisional_(std::move(whole)) {}
 
   scene::Kind kind() const override { return scene::Kind::kMesh; }
   std::string title() const override { return title_; }
@@ -169,6 +238,8 @@ class ServedMesh final : public Served {
   }
   std::vector<std::string> notes() const override {
     std::vector<std::string> out = store_->info().notes;
+    if (provisional_.shown())
+      out.push_back(title_ + ": is shown coarsely, from a part of its triangles, until its chunk store is made");
     if (!as_begun_ && map_.name != "viridis")
       out.push_back("--colour-map " + map_.name +
                     " shows nothing until an array is chosen: --colour-by, or ctl colour");
@@ -183,7 +254,7 @@ class ServedMesh final : public Served {
                         {"degenerate_dropped", std::to_string(info.degenerate_dropped)},
                         {"up", info.up},
                         {"from_cache", info.from_cache ? "true" : "false"},
-                        {"content_hash", fmt::format("{:016x}", info.content_hash)}});
+                        {"content_hash", hash_text()}});
     if (iso_) {
       hello.facts[scene::kIsoFact] = fmt::format("{}", *iso_);
       if (!info.arrays.empty() && !info.arrays[0].spans.empty())
@@ -206,10 +277,15 @@ class ServedMesh final : public Served {
   Status follow(const wire::Welcome& session) override {
     epochs_.keep(session);
     const scene::SessionView view(session);
+    provisional_.follow(view, session.epoch);
     const std::string order = view.fact(scene::kArrayOrderFact);
     if (std::exchange(master_, session.master) != session.master) order_.clear();  // another master counts from 1 again
     if (!order.empty() && order != order_) {
       order_ = order;
+      if (provisional_.shown() && !stores_.find(ordered_array())) {
+        answer_ = order_number() + " its chunk store is being made";
+        return ok_status();
+      }
       stores_.want(ordered_array());
       if (stores_.find(ordered_array())) answer_ = order_number();
     } else if (const std::string text = view.fact(scene::kColouringFact); text != shown_) {
@@ -228,7 +304,8 @@ class ServedMesh final : public Served {
     net::dispatch<ChunkListRequest, ChunkRequest, SurfelRequest>(outlets.requests, message, [&](const auto& request) {
       constexpr bool kAsksForOne = std::is_same_v<std::decay_t<decltype(request)>, ChunkRequest>;
       if (!kAsksForOne && !lists_.allow(message.peer, monotonic_s())) return;
-      const auto store = stores_.find(request.array);
+      const auto earlier = request.array == first_array() ? provisional_.find(request.epoch) : nullptr;
+      const auto store = earlier ? earlier : stores_.find(request.array);
       if (!store || !is_made(request, store)) return;
       using Reply = decltype(reply(request, *store));
       outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store),
@@ -257,6 +334,7 @@ class ServedMesh final : public Served {
     return std::optional(scene::to_text(*found));
   }
   void send_finished(const Outlets&) override {
+    if (auto whole = provisional_.take()) take_whole(*std::move(whole));
     const auto opened = stores_.take_opened();
     if (!opened) return;
     if (!opened->status) log::error("{}", opened->status.error().text);
@@ -264,15 +342,31 @@ class ServedMesh final : public Served {
     answer_ = order_number();
     if (!opened->status) answer_ += " " + opened->status.error().text;
   }
+  bool take_changed() override { return std::exchange(changed_, false); }
+  Status failure() const override { return failure_; }
+  void add_status(std::map<std::string, double>& values) const override {
+    if (provisional_.shown()) values["store_made"] = provisional_.fraction();
+  }
   std::map<std::string, std::string> news() override {
     if (answer_.empty()) return {};
     return {{scene::kArrayAnswerFact, std::exchange(answer_, std::string())}};
   }
 
  private:
+  void take_whole(StoreOpening::Made whole) {
+    if (!whole) return void(failure_ = whole.error());
+    const auto before = std::exchange(store_, *std::move(whole));
+    stores_.reset(store_);
+    maker_.emplace();
+    provisional_.replace(before, hash_text());
+    log::info("the whole mesh is there: {}", summary());
+    changed_ = true;
+  }
+  std::string first_array() const { return as_begun_ ? as_begun_->array : ""; }
+  std::string hash_text() const { return fmt::format("{:016x}", store_->info().content_hash); }
   bool is_made(const auto&, const auto&) { return true; }
   bool is_made(const wire::SurfelRequest& request, const std::shared_ptr<const MeshStore>& store) {
-    surfels_ = maker_.get(store, request.array, request.most);
+    surfels_ = maker_->get(store, request.array, request.most);
     return surfels_.has_value();
   }
   static wire::ChunkList reply(const wire::ChunkListRequest& request, const MeshStore& store) {
@@ -309,14 +403,17 @@ class ServedMesh final : public Served {
     return blank == order_.npos ? "" : order_.substr(blank + 1);
   }
 
-  const std::shared_ptr<const MeshStore> store_;
+  std::shared_ptr<const MeshStore> store_;
   const std::string title_;
   const std::optional<scene::Colouring> as_begun_;
   const colour::ColourMap map_;
   const std::optional<double> iso_;
   ArrayStores stores_;
+  ProvisionalStore provisional_;
+  bool changed_ = false;
+  Status failure_ = ok_status();
   ListLimit lists_;
-  SurfelMaker maker_;
+  std::optional<SurfelMaker> maker_{std::in_place};
   SurfelMaker::Bytes surfels_;  // those of the request at hand
   Epochs epochs_;
   InstanceId master_;
@@ -326,9 +423,9 @@ class ServedMesh final : public Served {
 }  // namespace
 
 std::unique_ptr<Served> serve_mesh(std::shared_ptr<const MeshStore> store, const std::string& path,
-                                   ServedColours colours) {
+                                   ServedColours colours, OpenStore whole) {
   return std::make_unique<ServedMesh>(std::move(store), std::filesystem::path(path).filename().string(),
-                                      std::move(colours));
+                                      std::move(colours), std::move(whole));
 }
 
 }  // namespace telesplat::data

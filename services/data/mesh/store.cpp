@@ -16,6 +16,7 @@
 #include "common/core/descriptor.h"
 #include "common/core/log.h"
 #include "services/data/mesh/cache.h"
+#include "services/data/mesh/out_of_core/build.h"
 #include "services/data/mesh/placing/placement.h"
 #include "services/data/mesh/store_file.h"
 
@@ -51,22 +52,19 @@ std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& p
   return std::make_shared<Store>(std::move(content), std::move(use));
 }
 
-// Reads the mesh file and writes its store into the descriptor. unwritten: set to true if writing failed.
-Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
-                   const Progress& progress, bool* unwritten = nullptr) {
+// Reads the whole mesh and writes its store.
+Status read_and_write(StorePlace& place, const std::string& path, const StoreOptions& options, const MeshSource& source,
+                      MeshStoreInfo& info, const Progress& progress) {
   auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
   if (!mesh) return mesh.error();
   progress(kReading, 1.0);
-  MeshStoreInfo info;
   for (const std::string& note : mesh->notes)
     info.notes.push_back(note.starts_with(path + ": ") ? note.substr(path.size() + 2) : note);
   info.format = mesh->format;
   info.vertices = mesh->positions.size();
   info.had_normals = !mesh->normals.empty();
   info.had_colours = !mesh->colours.empty();
-  info.content_hash = source.hash;
   info.arrays = mesh->arrays;
-  info.array = source.array;
   info.coordinates = mesh->coordinates;
   progress(kPlacing, 0.0);
   const auto placed = place_mesh(std::move(*mesh), options, path);
@@ -76,26 +74,52 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.degenerate_dropped = placed->degenerate_dropped;
   info.box_data = placed->box_data;
   info.box_room = placed->box_room;
-  info.up = placed->up;
-  info.up_reason = placed->up_reason;
-  Status written = write_store(descriptor, path, *placed, info, progress);
-  if (unwritten) *unwritten = !written;
+  info.up = placed->placing.up;
+  info.up_reason = placed->placing.up_reason;
+  Status written = write_store(place.descriptor, path, *placed, info, progress);
+  place.unwritten = !written;
   return written;
 }
 
-// Without a cache: uses a file without a name, which goes away with its last mapping.
-Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const StoreOptions& options,
-                                                const MeshSource& source, const Progress& progress) {
+// Writes the store of a mesh; a large one is never held whole if its file allows that.
+Status build_store(StorePlace& place, const std::string& path, const StoreOptions& options, const MeshSource& source,
+                   const Progress& progress) {
+  MeshStoreInfo info;
+  info.content_hash = source.hash;
+  info.array = source.array;
+  if (source.random) {
+    const auto mesh = source.random([&](double fraction) { progress(kReading, fraction); });
+    if (!mesh) return mesh.error();
+    const auto written = write_out_of_core(place, path, **mesh, {.store = options}, info, progress);
+    if (!written) return written.error();
+    if (*written) return ok_status();
+    info = MeshStoreInfo{};
+    info.content_hash = source.hash, info.array = source.array;
+  }
+  return read_and_write(place, path, options, source, info, progress);
+}
+
+// Makes a store in a file without a name, which goes away with its last mapping.
+Result<std::shared_ptr<MeshStore>> make_unnamed(const std::string& path,
+                                                const std::function<Status(StorePlace& place)>& build) {
   std::error_code ignored;
-  std::string name = (fs::temp_directory_path(ignored) / "telesplat-XXXXXX").string();
+  const fs::path folder = fs::temp_directory_path(ignored);
+  std::string name = (folder / "telesplat-XXXXXX").string();
   const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
   if (!file.valid())
     return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
   unlink(name.c_str());
-  if (auto status = build_store(file.get(), path, options, source, progress); !status) return status.error();
+  StorePlace place{file.get(), folder.string()};
+  if (auto status = build(place); !status) return status.error();
   auto content = read_store(file.get(), name);
   if (!content) return content.error();
   return make_store(std::move(*content), path, false, {});
+}
+
+// Without a cache.
+Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const StoreOptions& options,
+                                                const MeshSource& source, const Progress& progress) {
+  return make_unnamed(path, [&](StorePlace& place) { return build_store(place, path, options, source, progress); });
 }
 
 // Opens the store of a stem and locks it as used; null: it does not exist. news: remarks for the user.
@@ -119,13 +143,15 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
                                                const Progress& progress) {
   const std::string name = stem + ".mesh", part = stem + ".part";
   bool unwritten = false;
-  {
+  try {
     const auto out = Descriptor::open_file(part, O_RDWR | O_CREAT | O_TRUNC);
     if (!out.valid()) {
       log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
       return open_unnamed(path, options, source, progress);
     }
-    const Status built = build_store(out.get(), path, options, source, progress, &unwritten);
+    StorePlace place{out.get(), fs::path(stem).parent_path().string()};
+    const Status built = build_store(place, path, options, source, progress);
+    unwritten = place.unwritten;
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
       const std::string reason =
           built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
@@ -134,6 +160,9 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
       if (!unwritten) return Error{reason};
       log::warn("{}; going on without a cache", reason);
     }
+  } catch (...) {  // it was given up
+    unlink(part.c_str());
+    throw;
   }
   if (unwritten) return open_unnamed(path, options, source, progress);  // there may be room elsewhere
   std::vector<std::string> news;
@@ -169,6 +198,14 @@ Descriptor lock_making(const std::string& stem, const Progress& progress) {
 }
 
 }  // namespace
+
+Result<std::shared_ptr<MeshStore>> MeshStore::keep(const std::string& path, const PlacedMesh& mesh,
+                                                   const MeshStoreInfo& info, std::vector<std::byte> surfels) {
+  return make_unnamed(path, [&](StorePlace& place) {
+    return write_store(
+        place.descriptor, path, mesh, info, [](const char*, double) {}, std::move(surfels));
+  });
+}
 
 Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, const MeshSource& source,
                                                    const StoreOptions& options, const Progress& progress) {

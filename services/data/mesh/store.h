@@ -17,6 +17,8 @@
 
 namespace telesplat::data {
 
+struct PlacedMesh;
+
 /// Settings that change a mesh's store.
 struct StoreOptions : PlacementOptions {
   std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
@@ -68,6 +70,10 @@ class MeshStore {
   /// info(). Errors (exit code 2 for a user) name it. Precondition: options are within the limits of their flags.
   static Result<std::shared_ptr<MeshStore>> make(const std::string& path, const MeshSource& source,
                                                  const StoreOptions& options, const Progress& progress);
+  /// Keeps a placed mesh in a file without a name, which goes away with its last mapping. Errors start with the path.
+  /// surfels: of the mesh; empty: they are made.
+  static Result<std::shared_ptr<MeshStore>> keep(const std::string& path, const PlacedMesh& mesh,
+                                                 const MeshStoreInfo& info, std::vector<std::byte> surfels = {});
   virtual ~MeshStore() = default;
 
   virtual const MeshStoreInfo& info() const = 0;

@@ -175,30 +175,56 @@ std::vector<std::byte> surfels_of(const MappedFile& file, const MeshFigures& fig
 
 }  // namespace
 
-Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
-                   const Progress& progress) {
-  progress(kSortingIntoChunks, 0.0);
-  const ChunkPlan plan = plan_chunks(mesh);
-  if (entries_above(plan.chunks()) > geometry::kMaxChunks)
-    return Error{fmt::format("{}: would be split into {} chunks, the limit is {}", name, entries_above(plan.chunks()),
+struct StoreWriter::Parts {
+  Parts(int descriptor, std::string store_name, size_t leaves)
+      : name(std::move(store_name)),
+        entries(leaves),
+        out(descriptor, kPage + round_up(entries_above(leaves) * sizeof(StoreEntry))) {}
+  std::string name;
+  std::vector<StoreEntry> entries;
+  ChunkWriter out;
+};
+
+StoreWriter::StoreWriter(int descriptor, std::string name, size_t leaves)
+    : parts_(std::make_unique<Parts>(descriptor, std::move(name), leaves)) {}
+StoreWriter::StoreWriter(StoreWriter&&) noexcept = default;
+StoreWriter::~StoreWriter() = default;
+
+Result<StoreWriter> StoreWriter::begin(int descriptor, const std::string& name, size_t leaves) {
+  if (entries_above(leaves) > geometry::kMaxChunks)
+    return Error{fmt::format("{}: would be split into {} chunks, the limit is {}", name, entries_above(leaves),
                              geometry::kMaxChunks)};
-  progress(kSortingIntoChunks, 1.0);
-  std::vector<StoreEntry> entries(plan.chunks());
-  ChunkWriter out(descriptor, kPage + round_up(entries_above(plan.chunks()) * sizeof(StoreEntry)));
+  return StoreWriter(descriptor, name, leaves);
+}
+
+void StoreWriter::write_leaves(size_t first, const PlacedMesh& mesh, const ChunkPlan& plan,
+                               const ReadProgress& progress) {
   constexpr size_t kBatch = 16;  // so that this thread reports progress
-  for (size_t first = 0; first < plan.chunks() && out.failure() == 0; first += kBatch) {
-    progress(kWritingTheStore, static_cast<double>(first) / static_cast<double>(plan.chunks()));
-    in_parallel(first, std::min(first + kBatch, plan.chunks()), [&](size_t i) {
+  for (size_t begin = 0; begin < plan.chunks() && parts_->out.failure() == 0; begin += kBatch) {
+    progress(static_cast<double>(begin) / static_cast<double>(plan.chunks()));
+    in_parallel(begin, std::min(begin + kBatch, plan.chunks()), [&](size_t i) {
       const auto triangles = std::span(plan.order).subspan(plan.begin[i], plan.begin[i + 1] - plan.begin[i]);
-      entries[i] = out.write(make_chunk(mesh, triangles));
+      parts_->entries[first + i] = parts_->out.write(make_chunk(mesh, triangles));
     });
   }
+}
+
+geometry::Box StoreWriter::box_room() const {
+  geometry::Box out;
+  for (const StoreEntry& e : parts_->entries)
+    if (e.triangles > 0) out.extend(e.box_room);
+  return out;
+}
+
+Status StoreWriter::finish(const MeshStoreInfo& info, const Progress& progress, std::vector<std::byte> surfels) {
+  auto& [name, entries, out] = *parts_;
+  std::erase_if(entries, [](const StoreEntry& e) { return e.triangles == 0; });
   const std::vector<Level> levels = write_levels(out, name, entries, progress);
 
   StoreHeader header{.chunks = static_cast<uint32_t>(entries.size()), .figures = info};
   progress(kMakingSurfels, 0.0);
   const auto file = out.written(name);
-  const auto surfels = file ? surfels_of(*file, info, entries, levels) : std::vector<std::byte>();
+  if (file && surfels.empty()) surfels = surfels_of(*file, info, entries, levels);
   header.surfels_bytes = surfels.size(), header.surfels_checksum = XXH3_64bits(surfels.data(), surfels.size());
   header.surfels_offset = out.put(surfels);
   std::string texts = scene::to_text(info.arrays);
@@ -215,6 +241,17 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
                              std::strerror(out.failure()))};
   progress(kWritingTheStore, 1.0);
   return ok_status();
+}
+
+Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
+                   const Progress& progress, std::vector<std::byte> surfels) {
+  progress(kSortingIntoChunks, 0.0);
+  const ChunkPlan plan = plan_chunks(mesh);
+  auto writer = StoreWriter::begin(descriptor, name, plan.chunks());
+  if (!writer) return writer.error();
+  progress(kSortingIntoChunks, 1.0);
+  writer->write_leaves(0, mesh, plan, [&](double fraction) { progress(kWritingTheStore, fraction); });
+  return writer->finish(info, progress, std::move(surfels));
 }
 
 Result<StoreContent> read_store(int descriptor, const std::string& name) {

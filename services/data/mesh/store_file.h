@@ -36,6 +36,8 @@ struct ChunkPlan {
 /// `most` triangles; parts hold more than most / 2 (except in a smaller mesh). Neighbouring chunks are neighbours in
 /// space. Deterministic, parallel (TBB). Precondition: the mesh has triangles; most >= 1.
 ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most = kTrianglesPerChunk);
+/// The same with this number of chunks. Precondition: no more than the mesh has triangles, and at least one.
+ChunkPlan plan_chunk_count(const PlacedMesh& mesh, size_t chunks);
 
 /// Lays out one chunk (geometry::build_chunk) of these triangles: vertices are renumbered in the order of their first
 /// use, and doubled where faces of different colours meet; triangles follow a Morton curve through their centroids, so
@@ -46,11 +48,35 @@ inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// To be raised whenever readers, placement or layout would make another file from the same mesh.
 inline constexpr uint32_t kStoreVersion = 10;
 
-/// Writes the store of a placed mesh into an open, empty, writable file. `info` describes the mesh, with boxes and
-/// counts. After a failure (disk full) the file's content is useless. Errors start with `name`. `progress` (stages
-/// from kSortingIntoChunks on) is called on this thread.
+/// Writes a store into an open, empty, writable file: its leaves, then what is made of them. After a failure (disk
+/// full) the file's content is useless.
+class StoreWriter {
+ public:
+  /// leaves: at most. Error, starting with `name`: the store would have too many chunks.
+  static Result<StoreWriter> begin(int descriptor, const std::string& name, size_t leaves);
+  StoreWriter(StoreWriter&&) noexcept;
+  ~StoreWriter();
+
+  /// Writes the chunks of `plan` as the leaves from `first` on. Leaves that follow each other are neighbours in space.
+  /// Several threads may write different leaves. progress: 0..1, called on this thread.
+  void write_leaves(size_t first, const PlacedMesh& mesh, const ChunkPlan& plan, const ReadProgress& progress);
+  /// Box of the leaves that were written.
+  geometry::Box box_room() const;
+  /// Writes levels, surfels and the table of contents. `info` describes the mesh, with boxes and counts. Leaves that
+  /// were not written are left out. surfels: of the mesh; empty: they are made. Error, starting with the name: it cannot
+  /// be written.
+  Status finish(const MeshStoreInfo& info, const Progress& progress, std::vector<std::byte> surfels = {});
+
+ private:
+  StoreWriter(int descriptor, std::string name, size_t leaves);
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Writes the store of a placed mesh. `progress` (stages from kSortingIntoChunks on) is called on this thread. surfels:
+/// as for StoreWriter::finish().
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
-                   const Progress& progress);
+                   const Progress& progress, std::vector<std::byte> surfels = {});
 
 struct StoreContent {
   std::shared_ptr<const MappedFile> file;

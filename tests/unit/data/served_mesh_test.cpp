@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <thread>
+
+#include "common/net/dispatch.h"
 
 namespace telesplat::data {
 namespace {
@@ -116,6 +119,92 @@ TEST_F(ServedMeshTest, APeerGetsAFewListsAtOnce) {
   };
   EXPECT_LE(lists(asker), 5);
   EXPECT_EQ(lists(other), 1);
+}
+
+// A store of this many chunks, with this hash.
+class CountedStore final : public MeshStore {
+ public:
+  CountedStore(uint64_t hash, size_t chunks) {
+    info_.content_hash = hash;
+    for (size_t i = 0; i < chunks; ++i)
+      chunks_.push_back({.id = ChunkId{i}, .box_room = {{0, 0, 0}, {1, 1, 1}}, .triangles = 1, .bytes = 1000});
+  }
+  const MeshStoreInfo& info() const override { return info_; }
+  const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
+  geometry::ChunkBytes chunk(ChunkId) const override { return {}; }
+  geometry::ChunkBytes surfels() const override { return {}; }
+
+ private:
+  MeshStoreInfo info_;
+  std::vector<geometry::ChunkInfo> chunks_;
+};
+
+class ProvisionalMesh : public testing::Test {
+ protected:
+  void serve(const Result<std::shared_ptr<MeshStore>>& whole) {
+    served = serve_mesh(std::make_shared<CountedStore>(1, 3), "hill.ply",
+                        {.as_begun = std::nullopt, .map = *colour::find_colour_map("viridis"), .open = nullptr},
+                        [this, whole](const Progress& progress) {
+                          while (!go)
+                            progress(kReading, 0.5), std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                          return whole;
+                        });
+    ASSERT_TRUE(requests.bind("inproc://provisional"));
+    ASSERT_TRUE(asker.connect("inproc://provisional"));
+  }
+  void finish() {
+    go = true;
+    while (served->failure() && !served->take_changed()) {
+      served->send_finished({requests, master});
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  // Number of chunks in the list that an asker of this epoch gets.
+  size_t listed(uint64_t epoch) {
+    asker.send(wire::ChunkListRequest{EpochId{epoch}, ""});
+    EXPECT_TRUE(net::wait_readable({&requests}, 20000));
+    served->answer(*requests.receive(), {requests, master});
+    EXPECT_TRUE(net::wait_readable({&asker}, 20000));
+    size_t out = 0;
+    net::dispatch<wire::ChunkList>(asker, *asker.receive(),
+                                   [&](const wire::ChunkList& list) { out = list.chunks.size(); });
+    return out;
+  }
+  wire::Welcome session(uint64_t epoch) const {
+    wire::Hello hello;
+    served->describe(hello);
+    return {.master = InstanceId{1}, .epoch = EpochId{epoch}, .facts = hello.facts};
+  }
+
+  net::Context context;
+  net::Socket requests{context, net::Kind::kRouter, "requests", {}}, master{context, net::Kind::kRouter, "master", {}};
+  net::Socket asker{context, net::Kind::kDealer, "asker", {}};
+  std::atomic<bool> go{false};
+  std::unique_ptr<Served> served;
+};
+
+TEST_F(ProvisionalMesh, AnswersEarlierEpochsFromTheProvisionalStore) {
+  serve(std::shared_ptr<MeshStore>(std::make_shared<CountedStore>(2, 5)));
+  EXPECT_TRUE(served->follow(session(7)).ok());
+  ASSERT_EQ(served->notes().size(), 1u);
+  EXPECT_EQ(listed(7), 3u);
+  const wire::Welcome before = session(7);
+  finish();
+  EXPECT_TRUE(served->notes().empty());
+  EXPECT_NE(session(8).facts.at("content_hash"), before.facts.at("content_hash"));
+  EXPECT_EQ(listed(7), 3u) << "no epoch of the whole store has begun";
+  EXPECT_TRUE(served->follow(before).ok());
+  EXPECT_TRUE(served->follow(session(8)).ok());
+  EXPECT_EQ(listed(8), 5u);
+  EXPECT_EQ(listed(7), 3u) << "a sampler may not know yet";
+}
+
+TEST_F(ProvisionalMesh, EndsWhenTheWholeStoreCannotBeMade) {
+  serve(Error{"hill.ply: triangle 7 names vertex 9, there are 8"});
+  EXPECT_TRUE(served->failure().ok());
+  finish();
+  ASSERT_FALSE(served->failure().ok());
+  EXPECT_EQ(served->failure().error().text, "hill.ply: triangle 7 names vertex 9, there are 8");
 }
 
 }  // namespace

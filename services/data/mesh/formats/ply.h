@@ -129,6 +129,10 @@ class PlyArrays {
     if (faces_chosen()) values_.resize(triangles, std::exchange(of_this_face_, kMissing));
   }
 
+  scene::ValueSpan& span_of(int array) { return arrays_[size_t(array)].spans[0]; }
+  bool is_chosen(int array) const { return array == chosen_; }
+  const std::vector<scene::ArrayInfo>& infos() const { return arrays_; }
+
   /// Puts the collected values into the mesh, whose vertices and triangles are complete.
   void finish(Mesh& mesh);
 

@@ -6,6 +6,7 @@
 #include <bit>
 #include <type_traits>
 
+#include "common/scene/colouring.h"
 #include "services/data/base/polygons/polygon.h"
 #include "services/data/mesh/formats/ply.h"
 #include "services/data/mesh/formats/raw_colours.h"
@@ -308,6 +309,78 @@ Result<Mesh> read_ply(std::string_view content, const std::string& name, const R
     if (header.encoding == PlyEncoding::kAscii) return read(std::type_identity<AsciiCursor>());
     const bool swap = (header.encoding == PlyEncoding::kLittleEndian) != (std::endian::native == std::endian::little);
     return swap ? read(std::type_identity<BinaryCursor<true>>()) : read(std::type_identity<BinaryCursor<false>>());
+  });
+}
+
+namespace {
+
+// Finds where each number of a vertex lies. Returns false for what RandomMesh does not read.
+bool lay_out_vertices(const PlyElement& vertices, RandomMesh::Facts& facts, RecordMesh::Layout& layout) {
+  const Targets targets(vertices, false);
+  std::array<RecordMesh::Field, size_t(Target::kCount)> field;
+  for (size_t i = 0; i < vertices.properties.size(); ++i) {
+    const PlyProperty& p = vertices.properties[i];
+    if (p.is_list) return false;
+    field[size_t(targets.of[i])] = {layout.vertex_bytes, p.type};
+    layout.vertex_bytes += stored_bytes(p.type);
+  }
+  const auto three = [&](Target first) {
+    const auto* f = &field[size_t(first)];
+    return RecordMesh::Fields{f[0], f[1], f[2]};
+  };
+  layout.position = three(Target::kX);
+  layout.normal = three(Target::kNormalX), layout.colour = three(Target::kRed);
+  facts.normals = targets.all({Target::kNormalX, Target::kNormalY, Target::kNormalZ});
+  facts.colours = targets.colours();
+  return targets.all({Target::kX, Target::kY, Target::kZ}) &&
+         (!targets.colours() || targets.colour_type == StoredType::kU8);
+}
+
+// Finds the arrays of the vertices: their spans, and where the chosen one lies.
+void find_arrays(const PlyHeader& header, const std::string& name, const std::string& array, RecordMesh& mesh) {
+  PlyArrays arrays(header, [](const PlyElement& element, std::string_view property) {
+    return element.name != "vertex" || target_of(property, false) != Target::kNone;
+  });
+  if (!array.empty()) arrays.choose(array, name);
+  const std::vector<int>& of = arrays.arrays_of(header.elements[0]);
+  size_t at = 0;
+  for (size_t i = 0; i < of.size(); ++i) {
+    const RecordMesh::Field field{at, header.elements[0].properties[i].type};
+    at += stored_bytes(field.type);
+    if (of[i] < 0) continue;
+    scene::ValueSpan& span = arrays.span_of(of[i]);
+    for (uint64_t v = 0; v < mesh.vertices(); ++v) span.add(mesh.number(v, field));
+    if (arrays.is_chosen(of[i])) mesh.choose_scalar(field, scene::scalar_origin(span));
+  }
+  mesh.set_arrays(arrays.infos());
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const RandomMesh>> random_ply(const std::shared_ptr<const MappedFile>& file,
+                                                     const std::string& name, const std::string& array) {
+  using Found = std::shared_ptr<const RandomMesh>;
+  return or_error([&]() -> Found {
+    const PlyHeader header = parse_ply_header(file->text(), name);
+    const auto& elements = header.elements;
+    if (header.encoding == PlyEncoding::kAscii || !header.textures.empty() || elements.size() != 2 ||
+        elements[0].name != "vertex" || elements[1].name != "face" || elements[1].properties.size() != 1)
+      return nullptr;
+    const PlyProperty& corners = elements[1].properties[0];
+    if (!corners.is_list || !corners.name.starts_with("vertex_ind") || corners.type >= StoredType::kU64) return nullptr;
+    RandomMesh::Facts facts{.format = "ply", .vertices = elements[0].count, .triangles = elements[1].count};
+    RecordMesh::Layout l;
+    const size_t count_bytes = stored_bytes(corners.count_type);
+    l.corners = {0, corners.count_type}, l.first_corner = {count_bytes, corners.type};
+    l.triangle_bytes = count_bytes + 3 * stored_bytes(corners.type);
+    l.swap = (header.encoding == PlyEncoding::kLittleEndian) != (std::endian::native == std::endian::little);
+    if (!lay_out_vertices(elements[0], facts, l) || facts.vertices > kMaxVertices || facts.triangles > kMaxTriangles)
+      return nullptr;
+    l.vertices_at = header.bytes, l.triangles_at = header.bytes + facts.vertices * l.vertex_bytes;
+    if (l.triangles_at + facts.triangles * l.triangle_bytes != file->bytes().size()) return nullptr;
+    const auto mesh = std::make_shared<RecordMesh>(file, std::move(facts), l);
+    find_arrays(header, name, array, *mesh);
+    return mesh;
   });
 }
 

@@ -9,6 +9,7 @@
 #include "services/data/base/mapped_file.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
+#include "services/data/base/random_mesh.h"
 #include "services/data/texture/bake.h"
 
 namespace telesplat::data {
@@ -19,6 +20,11 @@ namespace telesplat::data {
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
                       Companions& companions, const std::string& array = {},
                       uint64_t texture_detail = kDefaultTextureDetail);
+/// Finds the vertices and triangles of a binary PLY that has nothing but these, whose vertices have no lists, and whose
+/// colours are bytes; reads the values of its arrays. Null: another PLY, or one with other polygons. name, array,
+/// errors: as for read_ply().
+Result<std::shared_ptr<const RandomMesh>> random_ply(const std::shared_ptr<const MappedFile>& file,
+                                                     const std::string& name, const std::string& array = {});
 /// Reads OFF in text, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); colours per face;
 /// comments; CRLF. Error: binary files; the prefixes 4 and n, whose vertices do not have three coordinates.
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);

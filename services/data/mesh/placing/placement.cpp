@@ -173,44 +173,57 @@ UpGuess guess_up(const Mesh& mesh) {
   return {"y", "nothing tells of a terrain or a scan"};
 }
 
-Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name) {
-  PlacedMesh placed;
+Result<Placing> find_placing(const Mesh& mesh, const geometry::DBox& used, const PlacementOptions& options,
+                             const std::string& name) {
+  Placing out;
   const UpGuess guess = options.up == "auto" ? guess_up(mesh) : UpGuess{options.up, "--up"};
-  placed.up = guess.axis, placed.up_reason = guess.reason;
-  const auto rotation = rotation_for_up(placed.up, mesh.coordinates.space);
+  out.up = guess.axis, out.up_reason = guess.reason;
+  const auto rotation = rotation_for_up(out.up, mesh.coordinates.space);
   if (!rotation) return rotation.error();
-
-  const bool smooth = mesh.smooth || (mesh.normals.empty() && is_isosurface(mesh));
-  placed.box_data = box_of_used(mesh);
-  const geometry::DBox frame = mesh.frame.value_or(placed.box_data);
+  out.rotation = *rotation;
+  out.smooth = mesh.smooth || (mesh.normals.empty() && is_isosurface(mesh));
+  const geometry::DBox frame = mesh.frame.value_or(used);
   const glm::dvec3 size = frame.size();
   const double largest = std::max({size.x, size.y, size.z});
   if (!(largest >= 1e-30 && largest <= 1e30))
     return Error{fmt::format("{}: its largest extent is {}, outside [1e-30, 1e30]", name, largest)};
-  const glm::dvec3 centre = frame.lo + size * 0.5;
-  const double scale = options.room_size_m / largest;
+  out.centre = frame.lo + size * 0.5;
+  out.scale = options.room_size_m / largest;
+  return out;
+}
 
+PlacedMesh place(Mesh&& mesh, const Placing& placing, double crease_deg) {
+  PlacedMesh placed;
+  placed.placing = placing;
+  placed.box_data = box_of_used(mesh);
   // Vertices without triangles may lie anywhere; they are not kept, so their placement does not matter.
   placed.positions_room.resize(mesh.positions.size());
-  parallel(mesh.positions.size(),
-           [&](size_t i) { placed.positions_room[i] = glm::vec3(*rotation * ((mesh.positions[i] - centre) * scale)); });
+  parallel(mesh.positions.size(), [&](size_t i) { placed.positions_room[i] = placing.room(mesh.positions[i]); });
   mesh.positions = {};
   placed.indices = std::move(mesh.indices);
   placed.degenerate_dropped = mesh.degenerate_dropped;
   take_scalars(mesh, placed);
   drop_degenerate(placed);
-  if (placed.indices.empty())
-    return Error{fmt::format("{}: all its {} triangles are degenerate (no area)", name, placed.degenerate_dropped)};
+  if (placed.indices.empty()) return placed;
   for (uint32_t i : placed.indices) placed.box_room.extend(placed.positions_room[i]);
 
   if (!placed.scalars) placed.colours = std::move(mesh.colours);
   if (mesh.normals.empty())
-    make_normals(placed, smooth ? kNoCrease_deg : options.crease_deg,
+    make_normals(placed, placing.smooth ? kNoCrease_deg : crease_deg,
                  placed.colours.empty() ? std::vector<uint32_t>() : mesh.copy_of);
   else
-    set_normals(placed, mesh.normals, glm::mat3(*rotation));
+    set_normals(placed, mesh.normals, glm::mat3(placing.rotation));
   if (placed.colours.empty() && placed.face_colours.empty())
     placed.colours.assign(placed.positions_room.size(), kNeutralAlbedo);
+  return placed;
+}
+
+Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name) {
+  const auto placing = find_placing(mesh, box_of_used(mesh), options, name);
+  if (!placing) return placing.error();
+  PlacedMesh placed = place(std::move(mesh), *placing, options.crease_deg);
+  if (placed.indices.empty())
+    return Error{fmt::format("{}: all its {} triangles are degenerate (no area)", name, placed.degenerate_dropped)};
   return placed;
 }
 

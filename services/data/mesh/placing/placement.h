@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -31,6 +32,17 @@ glm::dvec3 area_vector(const std::vector<glm::vec3>& positions, const uint32_t* 
 SmoothNormals smooth_normals(const std::vector<glm::vec3>& positions, double crease_deg,
                              std::vector<uint32_t>& indices);
 
+/// Turns, scales and moves a mesh from the file's coordinates into the room.
+struct Placing {
+  glm::dmat3 rotation{1.0};
+  glm::dvec3 centre{0.0};  ///< in the file's coordinates: the room's origin
+  double scale = 1;        ///< metres in the room per unit of the file
+  bool smooth = false;     ///< normals are made without creases
+  std::string up;          ///< x, y, z, -x, -y or -z
+  std::string up_reason;   ///< reason, in a few words
+  glm::vec3 room(const glm::dvec3& p) const { return glm::vec3(rotation * ((p - centre) * scale)); }
+};
+
 /// A mesh in room space, ready to be split. Every triangle has three different corners and an area above zero.
 struct PlacedMesh {
   std::vector<glm::vec3> positions_room;
@@ -41,8 +53,7 @@ struct PlacedMesh {
   std::vector<uint32_t> indices;  ///< three per triangle
   geometry::DBox box_data;        ///< box of the vertices that triangles use
   geometry::Box box_room;
-  std::string up;         ///< x, y, z, -x, -y or -z
-  std::string up_reason;  ///< reason, in a few words
+  Placing placing;
   uint64_t degenerate_dropped = 0;
 };
 
@@ -64,12 +75,20 @@ UpGuess guess_up(const Mesh& mesh);
 /// because marching cubes puts them on the edges of a voxel grid. Precondition: validate_mesh passed.
 bool is_isosurface(const Mesh& mesh);
 
-/// Centres the mesh's frame, or without one the box of the used vertices, at the origin, turns `up` ("auto": guess_up)
-/// to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision, rounded
-/// to float at the end. Drops degenerate triangles and counts them. Makes missing normals, with copies of vertices on
-/// sharp edges (smooth_normals()) unless the mesh is smooth or an isosurface; makes single normals without a direction,
-/// too. Takes the mesh apart as it goes to save memory. Errors start with `name`: the box has no extent, or one beyond
-/// 1e30; no triangle is left. Precondition: validate_mesh passed.
+/// Centres the mesh's frame, or without one this box of the used vertices, at the origin, turns `up` ("auto":
+/// guess_up) to +y and scales uniformly so that the largest extent of that box is room_size_m. The mesh itself is used
+/// for guesses alone. Errors start with `name`: the box has no extent, or one beyond 1e30. Precondition: validate_mesh
+/// passed.
+Result<Placing> find_placing(const Mesh& mesh, const geometry::DBox& used, const PlacementOptions& options,
+                             const std::string& name);
+
+/// Brings a mesh, or a part of one, into the room; in double precision, rounded to float at the end. Drops degenerate
+/// triangles and counts them. Makes missing normals, with copies of vertices on sharp edges (smooth_normals()) unless
+/// the mesh is smooth; makes single normals without a direction, too. Takes the mesh apart as it goes to save memory.
+/// No triangles are left if all are degenerate. Precondition: validate_mesh passed.
+PlacedMesh place(Mesh&& mesh, const Placing& placing, double crease_deg);
+
+/// Does both. Errors: those of find_placing(); no triangle is left.
 Result<PlacedMesh> place_mesh(Mesh&& mesh, const PlacementOptions& options, const std::string& name);
 
 }  // namespace telesplat::data
