@@ -9,6 +9,7 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/julia/served_julia.h"
+#include "services/data/mesh/cache.h"
 #include "services/data/mesh/out_of_core/preview.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/served_mesh.h"
@@ -221,13 +222,15 @@ Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const M
   if (options.iso && !array.empty())
     return Error{
         fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};
+  const std::string cache = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
+  const HashMemory memory{options.use_cache ? cache : ""};
   if (options.iso) {
-    const auto surface = surface_source(path, options.volume, *options.iso, progress);
+    const auto surface = surface_source(path, options.volume, *options.iso, progress, memory);
     return surface ? MeshStore::make(path, *surface, options, progress) : surface.error();
   }
   const auto file = find_mesh_file(path);
   if (!file) return file.error();
-  auto source = file_source(file->path, options.elevation, array, options.texture_detail, progress);
+  auto source = file_source(file->path, options.elevation, array, options.texture_detail, progress, memory);
   if (!source) return source.error();
   if (file->steps > 1) {
     source->variant += "-first";

@@ -15,6 +15,7 @@
 #include <set>
 
 #include "common/core/descriptor.h"
+#include "services/data/mesh/known_files.h"
 #include "services/data/mesh/store_file.h"
 
 namespace telesplat::data {
@@ -156,6 +157,7 @@ void note_use(const std::string& stem, const std::string& source, const std::str
 Result<Removal> clear_cache(const std::string& folder) {
   auto out = bound_cache(folder, std::nullopt);
   if (!out) return out;
+  forget_files(folder);
   // Remove locks and notes whose store is gone already.
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))

@@ -5,6 +5,7 @@
 //     STEM.lock   locked by the process that makes the store
 //     STEM.part   a store that is being made, or whose maker died
 //     limit       text: bytes that all stores together may have
+//     content-hashes   text: the content hashes of large files (known_files.h); not counted by the limit
 //
 // STEM begins with 16 hexadecimal digits and a dash. All other files in the folder are foreign and are never removed.
 #pragma once

@@ -267,7 +267,7 @@ Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& e
 }
 
 Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
-                               uint64_t texture_detail, const Progress& progress) {
+                               uint64_t texture_detail, const Progress& progress, const HashMemory& memory) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const DetectedFormat detected = detect_format((*file)->text(), path);
@@ -289,7 +289,7 @@ Result<MeshSource> file_source(const std::string& path, const ElevationOptions& 
   if (textured && texture_detail != kDefaultTextureDetail) variant += fmt::format("-t{}", texture_detail);
   auto random = large_mesh(path, elevation, array);
   if (!random) return random.error();
-  return MeshSource{hash_files(files, progress), variant,
+  return MeshSource{hash_known_files(files, memory, progress), variant,
                     [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array, texture_detail); }, array,
                     *std::move(random)};
 }

@@ -9,6 +9,7 @@
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
 #include "services/data/mesh/formats/readers.h"
+#include "services/data/mesh/known_files.h"
 #include "services/data/texture/bake.h"
 
 namespace telesplat::data {
@@ -54,7 +55,7 @@ Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& e
 /// another format, or an array for one without arrays. array: colours the mesh; empty: no array. texture_detail: for
 /// OBJ and glTF, bake_textures().
 Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
-                               uint64_t texture_detail, const Progress& progress);
+                               uint64_t texture_detail, const Progress& progress, const HashMemory& memory = {});
 
 /// Returns the name of the active scalars of a VTP, VTU or legacy VTK file: of its points, else of its cells. Reads
 /// only the file's words, not its arrays. Empty: it marks no array, or marks colours.

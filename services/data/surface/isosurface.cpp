@@ -22,7 +22,7 @@ std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64
 }  // namespace
 
 Result<MeshSource> surface_source(const std::string& path, const VolumeLayout& layout, double iso,
-                                  const Progress& progress) {
+                                  const Progress& progress, const HashMemory& memory) {
   auto found = find_volume(path, layout);
   if (!found) return found.error();
   const auto read = [source = *found, iso](const ReadProgress& p) -> Result<Mesh> {
@@ -39,7 +39,7 @@ Result<MeshSource> surface_source(const std::string& path, const VolumeLayout& l
       if (header->data_path != files[0]) files.push_back(header->data_path);
       files.insert(files.end(), header->more_paths.begin(), header->more_paths.end());
     }
-  return MeshSource{hash_files(files, progress), fmt::format("-surface{}{}", iso, which), read};
+  return MeshSource{hash_known_files(files, memory, progress), fmt::format("-surface{}{}", iso, which), read};
 }
 
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name) {

@@ -3,6 +3,7 @@
 
 #include "services/data/base/mesh.h"
 #include "services/data/base/volume.h"
+#include "services/data/mesh/known_files.h"
 
 namespace telesplat::data {
 
@@ -13,7 +14,7 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
 
 /// Returns that surface of the volume at `path` (its first step), for a store of chunks. Error: as find_volume.
 Result<MeshSource> surface_source(const std::string& path, const VolumeLayout& layout, double iso,
-                                  const Progress& progress);
+                                  const Progress& progress, const HashMemory& memory);
 
 /// Makes the surface where a volume's stored values are `iso`: one vertex on each grid edge that crosses it, linearly
 /// between the edge's ends; triangles of marching cubes, which form closed surfaces except at the volume's border;
