@@ -34,16 +34,18 @@ void say(const char* text) {
   }
 }
 
+[[noreturn]] void end_saying(const char* text, const char* rest) {
+  while (told.exchange(true)) pause();  // another thread ends the process already
+  say("telesplat: ");
+  say(text);
+  say(rest);
+  _exit(exit_code);
+}
+
 void on_bus_error(int, siginfo_t* info, void*) {
   const auto at = reinterpret_cast<uintptr_t>(info->si_addr);
-  for (const Place& p : places) {
-    if (!p.here || at < p.begin || at >= p.end) continue;
-    while (told.exchange(true)) pause();  // another thread ends the process already
-    say("telesplat: ");
-    say(p.name);
-    say(": was cut off while it was read\n");
-    _exit(exit_code);
-  }
+  for (const Place& p : places)
+    if (p.here && at >= p.begin && at < p.end) end_saying(p.name, ": was cut off while it was read\n");
   signal(SIGBUS, SIG_DFL);  // the access that failed fails again, with the default action
 }
 
@@ -56,6 +58,8 @@ void end_at_cut_off_files(int code) {
   action.sa_flags = SA_SIGINFO;
   sigaction(SIGBUS, &action, nullptr);
 }
+
+void end_at_damaged_file(const std::string& text) { end_saying(text.c_str(), "\n"); }
 
 NamedMapping::NamedMapping(const void* data, size_t bytes, std::string_view name) {
   for (int i = 0; i < kPlaces && place_ < 0; ++i)

@@ -169,7 +169,7 @@ std::optional<scene::Probed> cast(const MeshStore& store, const scene::Probe& pr
   for (const Met& m : met) {
     if (m.at > best.at) break;
     const auto chunk = geometry::MeshChunkView::validate(store.chunk(m.chunk).bytes);
-    if (!chunk) continue;  // cannot happen: the store was checked when it was opened
+    if (!chunk) continue;  // cannot happen: the store checks its chunks
     const double before = best.at;
     for (size_t t = 0; t < chunk->triangles(); ++t) intersect(ray, corners_of(*chunk, t), t, best);
     if (best.at < before) of = m.chunk;

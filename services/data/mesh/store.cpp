@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -15,6 +17,7 @@
 #include "common/core/clock.h"
 #include "common/core/descriptor.h"
 #include "common/core/log.h"
+#include "services/data/base/cut_off.h"
 #include "services/data/mesh/cache.h"
 #include "services/data/mesh/out_of_core/build.h"
 #include "services/data/mesh/placing/placement.h"
@@ -25,21 +28,41 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// True: the open file still has this name.
+bool is_named(const Descriptor& file, const std::string& name) {
+  struct stat held {
+  }, there{};
+  return fstat(file.get(), &held) == 0 && stat(name.c_str(), &there) == 0 && held.st_ino == there.st_ino;
+}
+
 class Store : public MeshStore {
  public:
   /// use: the lock that marks a cached store as used.
-  explicit Store(StoreContent content, Descriptor use) : content_(std::move(content)), use_(std::move(use)) {}
+  explicit Store(StoreContent content, Descriptor use)
+      : content_(std::move(content)), use_(std::move(use)), checked_(content_.checked ? 0 : content_.chunks.size()) {}
   const MeshStoreInfo& info() const override { return content_.info; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return content_.chunks; }
   geometry::ChunkBytes chunk(ChunkId id) const override {
     CHECK(id.value < content_.chunks.size());
-    return {content_.file->bytes().subspan(content_.offsets[id.value], content_.chunks[id.value].bytes), content_.file};
+    if (!content_.checked && !checked_[id.value]) {
+      if (!is_whole(content_, id.value)) end_at(id);
+      checked_[id.value] = true;
+    }
+    return {content_.chunk(id.value), content_.file};
   }
   geometry::ChunkBytes surfels() const override { return {content_.surfels, content_.file}; }
 
  private:
+  [[noreturn]] void end_at(ChunkId damaged) const {
+    const std::string& file = content_.info.kept_in;
+    if (is_named(use_, file)) std::remove(file.c_str());
+    end_at_damaged_file(fmt::format("{}: chunk {} of the store is damaged; the next start makes the store anew",
+                                    file.empty() ? content_.info.source : file, damaged.value));
+  }
+
   StoreContent content_;
   Descriptor use_;
+  mutable std::vector<std::atomic<bool>> checked_;  // empty: all chunks are
 };
 
 // news: remarks on this opening only, for the user.
@@ -111,7 +134,7 @@ Result<std::shared_ptr<MeshStore>> make_unnamed(const std::string& path,
   unlink(name.c_str());
   StorePlace place{file.get(), folder.string()};
   if (auto status = build(place); !status) return status.error();
-  auto content = read_store(file.get(), name);
+  auto content = read_store(file.get(), name, StoreOptions().checked_at_opening);
   if (!content) return content.error();
   return make_store(std::move(*content), path, false, {});
 }
@@ -123,15 +146,17 @@ Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const S
 }
 
 // Opens the store of a stem and locks it as used; null: it does not exist. news: remarks for the user.
-Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const std::string& path, bool from_cache,
+Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const std::string& path,
+                                                 const StoreOptions& options, bool from_cache,
                                                  const std::vector<std::string>& news = {}) {
   const std::string name = stem + ".mesh";
   auto file = Descriptor::open_file(name, O_RDONLY);
   if (!file.valid() && errno == ENOENT) return std::shared_ptr<MeshStore>();
   if (!file.valid()) return Error{fmt::format("{}: {}", name, std::strerror(errno))};
   file.lock(LOCK_SH);
-  auto content = read_store(file.get(), name);
+  auto content = read_store(file.get(), name, options.checked_at_opening);
   if (!content) return content.error();
+  content->info.kept_in = name;
   note_use(stem, path, fmt::format("{}, {} triangles", content->info.format, content->info.triangles));
   return make_store(std::move(*content), path, from_cache, news, std::move(file));
 }
@@ -168,7 +193,7 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
   std::vector<std::string> news;
   if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
     news.push_back(std::move(told));
-  auto store = open_existing(stem, path, false, news);
+  auto store = open_existing(stem, path, options, false, news);
   if (!store.ok() || *store) return store;
   return Error{fmt::format("{}: was removed as soon as it was made", name)};
 }
@@ -191,9 +216,7 @@ Descriptor lock_making(const std::string& stem, const Progress& progress) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       continue;
     }
-    struct stat held {
-    }, there{};
-    if (fstat(lock.get(), &held) == 0 && stat(name.c_str(), &there) == 0 && held.st_ino == there.st_ino) return lock;
+    if (is_named(lock, name)) return lock;
   }
 }
 
@@ -220,13 +243,13 @@ Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, cons
     log::warn("cache folder {}: {}; going on without", folder.string(), problem);
     return open_unnamed(path, options, source, progress);
   }
-  if (auto store = open_existing(stem, path, true); store && *store) return store;
+  if (auto store = open_existing(stem, path, options, true); store && *store) return store;
   const Descriptor lock = lock_making(stem, progress);
   if (!lock.valid()) {
     log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
     return open_unnamed(path, options, source, progress);
   }
-  auto store = open_existing(stem, path, true);
+  auto store = open_existing(stem, path, options, true);
   if (store && *store) return store;
   if (!store) {
     log::warn("{}; making it anew", store.error().text);

@@ -23,6 +23,9 @@ struct PlacedMesh;
 struct StoreOptions : PlacementOptions {
   std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
   bool use_cache = true;
+  /// Bytes of chunks, at most, that are checked when their store is opened; those of a larger store are checked when
+  /// they are first used.
+  uint64_t checked_at_opening = 256'000'000;
 };
 
 /// The colouring of a mesh, as users state it.
@@ -60,6 +63,7 @@ struct MeshStoreInfo : MeshFigures {
   std::string up;         ///< the axis that was chosen
   std::string up_reason;  ///< reason, in a few words
   bool from_cache = false;
+  std::string kept_in;             ///< the store's file; empty: it has no name and goes with this process
   std::vector<std::string> notes;  ///< Mesh::notes, and other remarks on the store for users
 };
 
@@ -83,7 +87,8 @@ class MeshStore {
     const auto& all = chunks();
     return {all.begin(), std::find_if_not(all.begin(), all.end(), [](const auto& c) { return c.is_leaf(); })};
   }
-  /// Returns a chunk's bytes, in mapped memory. Precondition: id is one of chunks().
+  /// Returns a chunk's bytes, checked, in mapped memory. If they are damaged, removes the store's file and ends this
+  /// process (end_at_damaged_file()): the next start makes the store anew. Precondition: id is one of chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
   /// Returns the surfels of the whole mesh (surfels.h), in mapped memory.
   virtual geometry::ChunkBytes surfels() const = 0;

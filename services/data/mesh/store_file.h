@@ -80,14 +80,20 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
 
 struct StoreContent {
   std::shared_ptr<const MappedFile> file;
-  MeshStoreInfo info;  ///< without source and from_cache; notes without the file's name
+  MeshStoreInfo info;  ///< without source, from_cache and kept_in; notes without the file's name
   std::vector<geometry::ChunkInfo> chunks;
   std::vector<size_t> offsets;         ///< offset of each chunk in the file
   std::span<const std::byte> surfels;  ///< in the file
+  std::vector<uint64_t> checksums;     ///< XXH3 of each chunk
+  bool checked = false;                ///< all chunks are
+  std::span<const std::byte> chunk(size_t i) const { return file->bytes().subspan(offsets[i], chunks[i].bytes); }
 };
 
-/// Maps a store and checks all of it before any value is used: magic, version, size, the offsets, and the checksums of
-/// header, table, surfels and chunks. That also loads the pages that samplers soon request.
-Result<StoreContent> read_store(int descriptor, const std::string& name);
+/// Maps a store and checks it before any value is used: magic, version, size, the offsets, and the checksums of header,
+/// table, surfels and, unless they have more than `most_checked` bytes together, chunks.
+Result<StoreContent> read_store(int descriptor, const std::string& name, uint64_t most_checked = ~uint64_t{0});
+
+/// False: the chunk is damaged.
+bool is_whole(const StoreContent& store, size_t chunk);
 
 }  // namespace telesplat::data

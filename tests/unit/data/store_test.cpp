@@ -1,6 +1,9 @@
 // The chunk store: data come back, a store is found again once made, and a damaged one is made anew.
+#include <unistd.h>
+
 #include <thread>
 
+#include "services/data/base/cut_off.h"
 #include "services/data/inspect.h"
 #include "tests/support/files/data_files.h"
 
@@ -161,6 +164,53 @@ TEST_F(StoreTest, AStoreWithDamagedSurfelsIsMadeAnew) {
     EXPECT_TRUE(surfels_now() == good) << "byte " << at;
     EXPECT_TRUE(open_or_fail(path_, options_)->info().from_cache) << "byte " << at;
   }
+}
+
+// Chunks of a large store are checked when they are first used.
+class LargeStoreTest : public StoreTest {
+ protected:
+  LargeStoreTest() {
+    path_ = folder_.write("large.ply", ply_of(wavy_grid(200)));
+    options_.checked_at_opening = 0;
+    geometry::ChunkBytes chunk = open_or_fail(path_, options_)->chunk(kDamaged);
+    std::fstream file(store_file(), std::ios::in | std::ios::out | std::ios::binary);
+    const std::string content(std::istreambuf_iterator<char>(file), {});
+    const size_t at = content.find({reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()}) + 5000;
+    file.seekp(static_cast<long>(at)).put(static_cast<char>(content[at] ^ 0x40));
+  }
+  static void use(const MeshStore& store) {
+    end_at_cut_off_files(1);
+    store.chunk(kDamaged);
+    _exit(0);
+  }
+  static constexpr ChunkId kDamaged{1};
+  static constexpr const char* kTold =
+      "^telesplat: .*\\.mesh: chunk 1 of the store is damaged; the next start makes the store anew\n$";
+};
+
+TEST_F(LargeStoreTest, ADamagedChunkIsNeverGivenAndItsStoreMadeAnew) {
+  const auto damaged = open_or_fail(path_, options_);
+  ASSERT_TRUE(damaged->info().from_cache);
+  EXPECT_TRUE(geometry::MeshChunkView::validate(damaged->chunk(ChunkId{0}).bytes).ok());
+  EXPECT_EXIT(use(*damaged), testing::ExitedWithCode(1), kTold);
+  EXPECT_TRUE(store_file().empty());
+  const auto again = open_or_fail(path_, options_);
+  EXPECT_FALSE(again->info().from_cache);
+  EXPECT_EQ(contents_of(*again).triangles.size(), 80'000u);
+}
+
+TEST_F(LargeStoreTest, OneThatFindsDamageLaterLeavesTheNewStore) {
+  const auto damaged = open_or_fail(path_, options_);
+  fs::remove(store_file());
+  open_or_fail(path_, options_);
+  EXPECT_EXIT(use(*damaged), testing::ExitedWithCode(1), kTold);
+  EXPECT_TRUE(open_or_fail(path_, options_)->info().from_cache);
+}
+
+TEST_F(LargeStoreTest, InspectChecksAll) {
+  const auto facts = inspect_store(store_file());
+  ASSERT_FALSE(facts.ok());
+  EXPECT_NE(facts.error().text.find("chunk 1 of the store is damaged"), std::string::npos) << facts.error().text;
 }
 
 TEST_F(StoreTest, FailedReadingLeavesNothingBehind) {
