@@ -39,6 +39,13 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& pa
 
 MappedFile::~MappedFile() { munmap(const_cast<std::byte*>(data_), size_); }
 
+void MappedFile::drop_pages(std::span<const std::byte> part) const {
+  constexpr size_t kPage = 4096;
+  const size_t begin = static_cast<size_t>(part.data() - data_) / kPage * kPage;
+  const auto end = static_cast<size_t>(part.data() + part.size() - data_);
+  madvise(const_cast<std::byte*>(data_) + begin, end - begin, MADV_DONTNEED);
+}
+
 Result<image::View> Companions::picture(std::string_view, const std::string& name, uint64_t) {
   return Error{fmt::format("picture {} can be decoded by telesplat-import alone", name)};
 }
@@ -54,17 +61,18 @@ Result<std::string_view> FolderCompanions::read(const std::string& named) {
 }
 
 uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress) {
-  constexpr size_t kStep = 64 << 20;
   XXH3_state_t* state = XXH3_createState();
   XXH3_64bits_reset(state);
   for (size_t n = 0; n < paths.size(); ++n) {
     const auto file = MappedFile::open(paths[n]);
     if (!file) continue;
     const auto bytes = (*file)->bytes();
-    for (size_t at = 0; at < bytes.size(); at += kStep) {
+    for (size_t at = 0; at < bytes.size(); at += kMostResident) {
       const double of_file = static_cast<double>(at) / static_cast<double>(bytes.size());
       progress(kIdentifying, (static_cast<double>(n) + of_file) / static_cast<double>(paths.size()));
-      XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
+      const auto step = bytes.subspan(at, std::min(kMostResident, bytes.size() - at));
+      XXH3_64bits_update(state, step.data(), step.size());
+      (*file)->drop_pages(step);
     }
   }
   const uint64_t hash = XXH3_64bits_digest(state);

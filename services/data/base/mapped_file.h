@@ -15,6 +15,9 @@
 
 namespace telesplat::data {
 
+/// Bytes of a mapped file that are read before drop_pages().
+inline constexpr size_t kMostResident = 64 << 20;
+
 /// The bytes live as long as the object. Not movable: hold it by shared_ptr. Reading bytes that another process has cut
 /// off meanwhile raises SIGBUS (cut_off.h).
 class MappedFile {
@@ -29,6 +32,10 @@ class MappedFile {
 
   std::span<const std::byte> bytes() const { return {data_, size_}; }
   std::string_view text() const { return {reinterpret_cast<const char*>(data_), size_}; }
+  /// Takes the pages of a part of bytes() out of this process's resident memory. They stay in the page cache, and come
+  /// back when they are read. Any thread.
+  void drop_pages(std::span<const std::byte> part) const;
+  void drop_pages() const { drop_pages(bytes()); }
 
  private:
   MappedFile(const std::byte* data, size_t size, const std::string& name)

@@ -217,11 +217,16 @@ Result<MeshFile> find_mesh_file(const std::string& path) {
   return MeshFile{steps->front(), steps->size()};
 }
 
-Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation,
+Result<Mesh> read_mesh(const std::string& path, const ReadProgress& report, const ElevationOptions& elevation,
                        const std::string& array, uint64_t texture_detail) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const std::string_view content = (*file)->text();
+  const ReadProgress progress = [&, dropped = 0.0](double fraction) mutable {
+    if ((fraction - dropped) * double(content.size()) > double(kMostResident))
+      (*file)->drop_pages(), dropped = fraction;
+    if (report) report(fraction);
+  };
   const DetectedFormat detected = detect_format(content, path);
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
   if (const Status s = check_array(array, detected.format, path); !s) return s.error();

@@ -44,6 +44,7 @@ class Store : public MeshStore {
   const std::vector<geometry::ChunkInfo>& chunks() const override { return content_.chunks; }
   geometry::ChunkBytes chunk(ChunkId id) const override {
     CHECK(id.value < content_.chunks.size());
+    if (touched_.fetch_add(content_.chunks[id.value].bytes) > kMostResident) touched_ = 0, content_.file->drop_pages();
     if (!content_.checked && !checked_[id.value]) {
       if (!is_whole(content_, id.value)) end_at(id);
       checked_[id.value] = true;
@@ -62,6 +63,7 @@ class Store : public MeshStore {
 
   StoreContent content_;
   Descriptor use_;
+  mutable std::atomic<size_t> touched_ = 0;         // bytes since pages were dropped
   mutable std::vector<std::atomic<bool>> checked_;  // empty: all chunks are
 };
 

@@ -148,6 +148,7 @@ std::vector<Level> write_levels(ChunkWriter& out, const std::string& name, std::
         nodes[i].first_child = static_cast<uint32_t>(below.begin + kChildren * i);
         nodes[i].children = static_cast<uint32_t>(children);
       });
+      file->drop_pages();
     }
     std::erase_if(nodes, [](const StoreEntry& e) { return e.children == 0; });
     levels.push_back({entries.size(), entries.size() + nodes.size()});
@@ -265,6 +266,7 @@ Status check_chunks(const StoreContent& store, const std::string& name) {
   std::atomic<size_t> damaged = store.chunks.size();
   in_parallel(size_t{0}, store.chunks.size(), [&](size_t i) {
     if (!is_whole(store, i)) damaged = i;
+    store.file->drop_pages(store.chunk(i));
   });
   if (damaged == store.chunks.size()) return ok_status();
   return Error{fmt::format("{}: chunk {} of the store is damaged", name, damaged.load())};
