@@ -18,16 +18,6 @@
 namespace telesplat::data {
 namespace {
 
-void sum_up(const std::vector<geometry::ChunkInfo>& chunks, MeshFileFacts& facts) {
-  std::vector<size_t> levels;
-  for (const geometry::ChunkInfo& chunk : chunks) {
-    levels.push_back(chunk.is_leaf() ? 0 : levels.at(chunk.first_child) + 1);
-    facts.levels = std::max(facts.levels, levels.back());
-    ++(chunk.is_leaf() ? facts.chunks : facts.coarse_chunks);
-    (chunk.is_leaf() ? facts.chunk_bytes : facts.coarse_bytes) += chunk.bytes;
-  }
-}
-
 // Returns the unit of the coordinates in a file of this kind.
 const char* unit_of(const MeshFileFacts& facts) {
   if (facts.raster)
@@ -142,15 +132,26 @@ void describe_arrays(const std::vector<scene::ArrayInfo>& arrays, Description& o
 
 }  // namespace
 
+MeshFileFacts sum_up(const MeshStoreInfo& info, const std::vector<geometry::ChunkInfo>& chunks) {
+  MeshFileFacts facts;
+  facts.info = info;
+  std::vector<size_t> levels;
+  for (const geometry::ChunkInfo& chunk : chunks) {
+    levels.push_back(chunk.is_leaf() ? 0 : levels.at(chunk.first_child) + 1);
+    facts.levels = std::max(facts.levels, levels.back());
+    ++(chunk.is_leaf() ? facts.chunks : facts.coarse_chunks);
+    (chunk.is_leaf() ? facts.chunk_bytes : facts.coarse_bytes) += chunk.bytes;
+  }
+  return facts;
+}
+
 Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& options, const Progress& progress) {
   const auto store = open_mesh(path, options, progress);
   if (!store) return store.error();
-  MeshFileFacts facts;
-  facts.info = (*store)->info();
+  MeshFileFacts facts = sum_up((*store)->info(), (*store)->chunks());
   std::error_code error;
   facts.file_bytes = std::filesystem::file_size(path, error);
   if (error) facts.file_bytes = 0;  // a folder of slices
-  sum_up((*store)->chunks(), facts);
   facts.iso = options.iso;
   facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {
@@ -173,12 +174,10 @@ Result<MeshFileFacts> inspect_store(const std::string& path) {
   const auto content = read_store(descriptor, path);
   close(descriptor);
   if (!content) return content.error();
-  MeshFileFacts facts;
-  facts.info = content->info;
+  MeshFileFacts facts = sum_up(content->info, content->chunks);
   facts.info.source = path;
   facts.info.from_cache = true;
   facts.file_bytes = content->file->bytes().size();
-  sum_up(content->chunks, facts);
   return facts;
 }
 

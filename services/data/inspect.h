@@ -24,6 +24,8 @@ struct MeshFileFacts {
   std::string unit;                                  ///< unit of lengths in the file: "mm", ...; empty: not given
 };
 
+/// Sums up the chunks of a store.
+MeshFileFacts sum_up(const MeshStoreInfo& info, const std::vector<geometry::ChunkInfo>& chunks);
 /// Opens the file's store (making it if needed: a file whose chunks cannot be made is not usable) and sums it up.
 Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& options, const Progress& progress);
 /// Describes format, counts, content of the file and computed values, arrays, box in the file's units and in the room.

@@ -38,6 +38,7 @@ Command run_command();
 Command view_command();
 Command control_command();
 Command inspect_command();
+Command build_command();
 Command compare_command();
 Command movie_command();
 Command report_command();

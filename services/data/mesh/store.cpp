@@ -147,6 +147,15 @@ Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const S
   return make_unnamed(path, [&](StorePlace& place) { return build_store(place, path, options, source, progress); });
 }
 
+// Goes on without a cache, for this reason.
+Result<std::shared_ptr<MeshStore>> open_without_cache(const std::string& reason, const std::string& path,
+                                                      const StoreOptions& options, const MeshSource& source,
+                                                      const Progress& progress) {
+  if (options.must_keep) return Error{reason};
+  log::warn("{}; going on without a cache", reason);
+  return open_unnamed(path, options, source, progress);
+}
+
 // Opens the store of a stem and locks it as used; null: it does not exist. news: remarks for the user.
 Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const std::string& path,
                                                  const StoreOptions& options, bool from_cache,
@@ -170,28 +179,26 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
                                                const Progress& progress) {
   const std::string name = stem + ".mesh", part = stem + ".part";
   bool unwritten = false;
+  std::string reason;
   try {
     const auto out = Descriptor::open_file(part, O_RDWR | O_CREAT | O_TRUNC);
-    if (!out.valid()) {
-      log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
-      return open_unnamed(path, options, source, progress);
-    }
+    if (!out.valid())
+      return open_without_cache(fmt::format("{} cannot be written ({})", part, std::strerror(errno)), path, options,
+                                source, progress);
     StorePlace place{out.get(), fs::path(stem).parent_path().string()};
     const Status built = build_store(place, path, options, source, progress);
     unwritten = place.unwritten;
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
-      const std::string reason =
-          built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
+      reason = built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
       std::error_code error;
       fs::remove(part, error);
       if (!unwritten) return Error{reason};
-      log::warn("{}; going on without a cache", reason);
     }
   } catch (...) {  // it was given up
     unlink(part.c_str());
     throw;
   }
-  if (unwritten) return open_unnamed(path, options, source, progress);  // there may be room elsewhere
+  if (unwritten) return open_without_cache(reason, path, options, source, progress);  // there may be room elsewhere
   std::vector<std::string> news;
   if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
     news.push_back(std::move(told));
@@ -241,16 +248,15 @@ Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, cons
                                .string();
   std::error_code error;
   fs::create_directories(folder, error);
-  if (const std::string problem = problem_of_shared_place(folder.string()); !problem.empty()) {
-    log::warn("cache folder {}: {}; going on without", folder.string(), problem);
-    return open_unnamed(path, options, source, progress);
-  }
+  if (const std::string problem = problem_of_shared_place(folder.string()); !problem.empty())
+    return open_without_cache(fmt::format("cache folder {}: {}", folder.string(), problem), path, options, source,
+                              progress);
   if (auto store = open_existing(stem, path, options, true); store && *store) return store;
   const Descriptor lock = lock_making(stem, progress);
-  if (!lock.valid()) {
-    log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
-    return open_unnamed(path, options, source, progress);
-  }
+  if (!lock.valid())
+    return open_without_cache(
+        fmt::format("cache folder {} cannot be written ({})", folder.string(), std::strerror(errno)), path, options,
+        source, progress);
   auto store = open_existing(stem, path, options, true);
   if (store && *store) return store;
   if (!store) {

@@ -23,6 +23,7 @@ struct PlacedMesh;
 struct StoreOptions : PlacementOptions {
   std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
   bool use_cache = true;
+  bool must_keep = false;  ///< error where the store cannot be kept, instead of going on without a cache
   /// Bytes of chunks, at most, that are checked when their store is opened; those of a larger store are checked when
   /// they are first used.
   uint64_t checked_at_opening = 256'000'000;

@@ -1,15 +1,18 @@
 #include "services/data/mesh/store_file.h"
 
 #include <fmt/format.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <sstream>
 
 #include "common/parallel/in_parallel.h"
+#include "services/data/mesh/cache.h"
 #include "services/data/mesh/levels.h"
 #include "services/data/mesh/surfels.h"
 
@@ -176,6 +179,17 @@ std::vector<std::byte> surfels_of(const MappedFile& file, const MeshFigures& fig
 
 }  // namespace
 
+Status check_room(int descriptor, const std::string& name, uint64_t triangles) {
+  struct statvfs system {};
+  if (fstatvfs(descriptor, &system) != 0) return ok_status();
+  const uint64_t needed = kBytesATriangle * triangles, there = uint64_t{system.f_bavail} * system.f_frsize;
+  if (needed <= there) return ok_status();
+  std::error_code error;
+  const auto file = std::filesystem::read_symlink(fmt::format("/proc/self/fd/{}", descriptor), error);
+  return Error{fmt::format("{}: its chunk store takes about {}, {} has {}", name, size_text(needed),
+                           error ? "its folder" : file.parent_path().string(), size_text(there))};
+}
+
 struct StoreWriter::Parts {
   Parts(int descriptor, std::string store_name, size_t leaves)
       : name(std::move(store_name)),
@@ -246,6 +260,7 @@ Status StoreWriter::finish(const MeshStoreInfo& info, const Progress& progress, 
 
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
                    const Progress& progress, std::vector<std::byte> surfels) {
+  if (const Status s = check_room(descriptor, name, mesh.indices.size() / 3); !s) return s;
   progress(kSortingIntoChunks, 0.0);
   const ChunkPlan plan = plan_chunks(mesh);
   auto writer = StoreWriter::begin(descriptor, name, plan.chunks());

@@ -48,6 +48,11 @@ inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// To be raised whenever readers, placement or layout would make another file from the same mesh.
 inline constexpr uint32_t kStoreVersion = 10;
 
+/// Bytes a triangle that a store with its levels takes, about.
+inline constexpr uint64_t kBytesATriangle = 22;
+/// Error, starting with `name`: the open file's file system has no room for the store of that many triangles.
+Status check_room(int descriptor, const std::string& name, uint64_t triangles);
+
 /// Writes a store into an open, empty, writable file: its leaves, then what is made of them. After a failure (disk
 /// full) the file's content is useless.
 class StoreWriter {

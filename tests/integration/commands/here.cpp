@@ -36,8 +36,8 @@ Said telesplat(const std::vector<std::string>& arguments) {
   return said_by([&] {
     using namespace launcher;
     const auto commands = with_manuals(
-        "", {run_command(), view_command(), control_command(), inspect_command(), compare_command(), movie_command(),
-             report_command(), sweep_command(), cache_command(), keys_command(), presets_command()});
+        "", {run_command(), view_command(), control_command(), inspect_command(), build_command(), compare_command(),
+             movie_command(), report_command(), sweep_command(), cache_command(), keys_command(), presets_command()});
     return run_commands("telesplat", "", commands, arguments);
   });
 }

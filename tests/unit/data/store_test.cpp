@@ -3,8 +3,10 @@
 
 #include <thread>
 
+#include "common/core/descriptor.h"
 #include "services/data/base/cut_off.h"
 #include "services/data/inspect.h"
+#include "services/data/mesh/store_file.h"
 #include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
@@ -241,6 +243,16 @@ TEST_F(StoreTest, GoesOnWithoutACacheThatCannotBeWritten) {
   const auto store = open_or_fail(path_, options_);
   ASSERT_TRUE(store);
   EXPECT_EQ(contents_of(*store).triangles.size(), 3200u);
+}
+
+TEST_F(StoreTest, RoomIsCheckedBeforeItIsTaken) {
+  const std::string path = folder_.write("store", "");
+  const auto file = Descriptor::open_file(path, O_RDWR);
+  EXPECT_TRUE(check_room(file.get(), "a.ply", 1).ok());
+  const Status s = check_room(file.get(), "a.ply", uint64_t{1} << 55);
+  ASSERT_FALSE(s.ok());
+  EXPECT_TRUE(s.error().text.starts_with("a.ply: its chunk store takes about 792634 TB, ")) << s.error().text;
+  EXPECT_NE(s.error().text.find(fs::path(path).parent_path().string() + " has "), std::string::npos) << s.error().text;
 }
 
 TEST_F(StoreTest, WritesThroughNoLinks) {

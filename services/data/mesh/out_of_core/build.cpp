@@ -269,6 +269,10 @@ Result<bool> write_out_of_core(StorePlace& place, const std::string& path, const
   if (!looked) return looked.error();
   if (!*looked) return false;
   const Survey& seen = **looked;
+  if (const Status s = check_room(place.descriptor, path, seen.triangles); !s) {
+    place.unwritten = true;
+    return s.error();
+  }
   const auto placing = find_placing(spread_sample(mesh), seen.box_data, options.store, path);
   if (!placing) return placing.error();
   const size_t part_triangles = options.leaf_triangles * options.leaves * 4 / 5;  // parts are not quite equal
