@@ -2,9 +2,8 @@
 //
 // The chunks of a mesh are a tree: leaves hold its triangles, inner nodes a coarse form of what is below them.
 //
-// One chunk is one contiguous block of bytes, the same in the chunk store's file, on the wire and in a sampler's
-// memory, so that it is memory-mapped, sent and handed to Embree without a copy. Little-endian. All positions are in
-// room space.
+// One chunk is one contiguous block of bytes, which Embree and OpenGL read where it lies. In the chunk store's file and
+// on the wire it is coded (chunk_code.h). Little-endian. All positions are in room space.
 //
 //   offset                          type            what
 //   0                               ChunkHeader     64 bytes
@@ -71,7 +70,7 @@ struct ChunkInfo {
   ChunkId id;
   Box box_room;
   uint64_t triangles = 0;
-  uint64_t bytes = 0;
+  uint64_t bytes = 0;   ///< coded
   float spacing_m = 0;  ///< how far apart its vertices lie where they stand for finer ones; 0: a leaf
   uint32_t first_child = 0, children = 0;
   bool is_leaf() const { return children == 0; }
@@ -84,7 +83,7 @@ std::vector<std::byte> build_chunk(std::span<const float> positions_room, std::s
                                    std::span<const uint32_t> colours, std::span<const uint32_t> indices,
                                    bool scalars = false);
 
-/// Bytes of a chunk, and an owner that keeps them alive (a mapped file, a received message, a vector).
+/// Bytes of a chunk, coded or not, and an owner that keeps them alive (a mapped file, a received message, a vector).
 struct ChunkBytes {
   std::span<const std::byte> bytes;
   std::shared_ptr<const void> owner;

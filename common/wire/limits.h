@@ -7,7 +7,7 @@
 
 namespace telesplat::wire {
 
-inline constexpr uint64_t kProtocolVersion = 18;
+inline constexpr uint64_t kProtocolVersion = 19;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions

@@ -73,13 +73,22 @@ bool is_volume(const DataOptions& o) { return !o.mesh.iso && holds_volume(o); }
 // A file that no other kind claims is a mesh or a raster; its reader finds out which, or why not.
 bool is_mesh(const DataOptions& o) { return o.mesh.iso ? holds_volume(o) : find_mesh_file(o.scene).ok(); }
 
+HashMemory hash_memory(const StoreOptions& options) {
+  const std::string cache = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
+  return {options.use_cache ? cache : ""};
+}
+
 // Makes the coarse form of a large mesh that has no store yet. Error: there is one, or the mesh must be read whole,
 // which also tells what is wrong with it.
 Result<std::shared_ptr<MeshStore>> preview_of(const std::string& path, const MeshOptions& options) {
   const auto by = scene::parse_colour_by(options.colouring.by);
   if (!by || options.iso || fs::is_directory(path)) return Error{"it is read whole"};
-  const auto open = large_mesh(path, options.elevation, by->array);
-  if (!open || !*open) return Error{"it is read whole"};
+  HashMemory memory = hash_memory(options);
+  memory.never_read = true;
+  const auto source = file_source(
+      path, options.elevation, by->array, options.texture_detail, [](const char*, double) {}, memory);
+  if (!source || !source->random) return Error{"it is read whole"};
+  if (source->hash != 0 && MeshStore::is_made(path, *source, options)) return Error{"there is one"};
   const auto file = MappedFile::open(path);
   if (file && detect_format((*file)->text(), path).format == "raster") {
     ElevationOptions coarse = options.elevation;
@@ -87,8 +96,9 @@ Result<std::shared_ptr<MeshStore>> preview_of(const std::string& path, const Mes
     auto mesh = read_mesh(path, {}, coarse);
     return mesh ? keep_preview(path, *std::move(mesh), options) : mesh.error();
   }
-  const auto mesh = (*open)([](double) {});
+  const auto mesh = source->random([](double) {});
   if (!mesh) return mesh.error();
+  if (!*mesh) return Error{"it is read whole"};
   return make_preview(path, **mesh, {.store = options, .array = by->array});
 }
 
@@ -222,8 +232,7 @@ Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const M
   if (options.iso && !array.empty())
     return Error{
         fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};
-  const std::string cache = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
-  const HashMemory memory{options.use_cache ? cache : ""};
+  const HashMemory memory = hash_memory(options);
   if (options.iso) {
     const auto surface = surface_source(path, options.volume, *options.iso, progress, memory);
     return surface ? MeshStore::make(path, *surface, options, progress) : surface.error();

@@ -1,11 +1,11 @@
-// Shared by all fuzz targets of mesh readers: a mesh that passes validation must pass placement and chunking, too.
+// Shared by all fuzz targets of mesh readers: a mesh that passes validation must pass placement, chunking and coding.
 #pragma once
 
 #include <cstdlib>
 
-#include "common/geometry/mesh_chunk.h"
-#include "services/data/mesh/store_file.h"
+#include "common/geometry/chunk_code.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/mesh/store_file.h"
 
 namespace telesplat::data {
 
@@ -18,7 +18,8 @@ inline int use(Result<Mesh> mesh) {
   for (size_t c = 0; c < plan.chunks(); ++c) {
     const auto bytes =
         make_chunk(*placed, std::span(plan.order).subspan(plan.begin[c], plan.begin[c + 1] - plan.begin[c]));
-    if (!geometry::MeshChunkView::validate(bytes).ok()) std::abort();
+    const auto view = geometry::MeshChunkView::validate(bytes);
+    if (!view.ok() || !geometry::decode_chunk(geometry::encode_chunk(*view)).ok()) std::abort();
   }
   return 0;
 }

@@ -128,15 +128,15 @@ TEST_F(RaysAndRaster, AgreeOnATerrainOfSmallTriangles) {
 test::ChunkList with_scalars(const test::ChunkList& chunks) {
   test::ChunkList out;
   for (const auto& [id, chunk] : chunks) {
-    const auto view = geometry::MeshChunkView::validate(chunk.bytes);
+    const auto held = geometry::decode_chunk(chunk.bytes);
+    const auto* view = &held->view;
     std::vector<uint32_t> scalars;
     for (size_t v = 0; v < view->vertices(); ++v) {
       const float value = 100 * view->positions_room[3 * v] + 40 * view->positions_room[3 * v + 2];
       scalars.push_back(std::bit_cast<uint32_t>(v % 100 == 7 ? std::numeric_limits<float>::quiet_NaN() : value));
     }
-    const auto bytes = std::make_shared<std::vector<std::byte>>(
-        geometry::build_chunk(view->positions_room, view->normals, scalars, view->indices, true));
-    out.emplace_back(id, geometry::ChunkBytes{*bytes, bytes});
+    out.emplace_back(
+        id, test::coded(geometry::build_chunk(view->positions_room, view->normals, scalars, view->indices, true)));
   }
   return out;
 }
@@ -216,8 +216,9 @@ TEST(SampledPoints, LieOnTheMeshAndInFrontOfNothing) {
     };
     std::vector<Triangle> triangles;
     for (const auto& [id, chunk] : chunks) {
-      const auto view = geometry::MeshChunkView::validate(chunk.bytes);
-      ASSERT_TRUE(view.ok());
+      const auto held = geometry::decode_chunk(chunk.bytes);
+      ASSERT_TRUE(held.ok());
+      const auto* view = &held->view;
       const auto at = [&](uint32_t i) {
         const float* p = &view->positions_room[3 * size_t{i}];
         return glm::dvec3(p[0], p[1], p[2]);

@@ -42,8 +42,9 @@ TEST(HitPacket, SimdEqualsScalarOnEveryTarget) {
   for (uint32_t i = 0; i < 300; ++i)
     vertices[i].normal = glm::vec3(i % 3 == 0, i % 3 == 1, i % 3 == 2) * (i % 2 ? 1.0f : -1.0f);
   const auto chunk = test::chunk_of(vertices, indices);
-  const auto view = geometry::MeshChunkView::validate(chunk.bytes);
-  ASSERT_TRUE(view.ok());
+  const auto held = geometry::decode_chunk(chunk.bytes);
+  ASSERT_TRUE(held.ok());
+  const auto* view = &held->view;
 
   for_each_target([&] {
     for (uint32_t first = 0; first < 1000; first += kPacket) {
@@ -88,8 +89,9 @@ TEST(HitPacket, ScalarsAreLookedUpOnEveryTarget) {
     indices.push_back(i);
   }
   const auto chunk = test::chunk_of(vertices, indices, true);
-  const auto view = geometry::MeshChunkView::validate(chunk.bytes);
-  ASSERT_TRUE(view.ok());
+  const auto held = geometry::decode_chunk(chunk.bytes);
+  ASSERT_TRUE(held.ok());
+  const auto* view = &held->view;
   ASSERT_TRUE(view->scalars);
   for_each_target([&] {
     for (uint32_t first = 0; first < 200; first += kPacket) {

@@ -1,7 +1,7 @@
 // Scenes of simulated sessions: what the real services need of them, and that they are the same everywhere.
 #include <gtest/gtest.h>
 
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 #include "common/image/normal.h"
 #include "common/volume/session.h"
 #include "common/volume/shear.h"
@@ -78,10 +78,10 @@ TEST_P(Surfaces, ChunksValidateAndTheirBoxesAreThoseOfTheList) {
   EXPECT_GE(chunks(), 4u);
   EXPECT_LE(chunks(), 12u);
   for (const geometry::ChunkInfo& info : surface.chunks) {
-    const auto view = geometry::MeshChunkView::validate(surface.bytes[size_t(info.id.value)]);
-    ASSERT_TRUE(view) << view.error().text;
-    EXPECT_EQ(view->box_room, info.box_room);
-    EXPECT_EQ(view->triangles(), info.triangles);
+    const auto chunk = geometry::decode_chunk(surface.bytes[size_t(info.id.value)]);
+    ASSERT_TRUE(chunk) << chunk.error().text;
+    EXPECT_EQ(chunk->view.box_room, info.box_room);
+    EXPECT_EQ(chunk->view.triangles(), info.triangles);
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_GE(info.box_room.lo[axis], -0.401f);
       EXPECT_LE(info.box_room.hi[axis], 0.401f);

@@ -1,4 +1,4 @@
-// Small meshes as chunks, for tests and benchmarks.
+// Small meshes as coded chunks, for tests and benchmarks.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 #include "common/image/normal.h"
 
 namespace telesplat::test {
@@ -19,6 +19,13 @@ struct Vertex {
   uint32_t colour = 0x808080;
 };
 
+/// Codes a chunk that build_chunk() or another function laid out.
+inline geometry::ChunkBytes coded(std::span<const std::byte> chunk) {
+  const auto bytes =
+      std::make_shared<std::vector<std::byte>>(geometry::encode_chunk(*geometry::MeshChunkView::validate(chunk)));
+  return {*bytes, bytes};
+}
+
 /// scalars: colours are the bits of floats.
 inline geometry::ChunkBytes chunk_of(const std::vector<Vertex>& vertices, const std::vector<uint32_t>& indices,
                                      bool scalars = false) {
@@ -29,9 +36,7 @@ inline geometry::ChunkBytes chunk_of(const std::vector<Vertex>& vertices, const 
     normals.push_back(image::encode_normal32(v.normal));
     colours.push_back(v.colour);
   }
-  const auto bytes =
-      std::make_shared<std::vector<std::byte>>(geometry::build_chunk(positions, normals, colours, indices, scalars));
-  return {*bytes, bytes};
+  return coded(geometry::build_chunk(positions, normals, colours, indices, scalars));
 }
 
 /// One triangle, counter-clockwise seen from its normal.

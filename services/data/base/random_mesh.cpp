@@ -21,6 +21,22 @@ double read_number(const std::byte* at, StoredType type, bool swap) {
 
 }  // namespace
 
+RecordMesh::RecordMesh(std::shared_ptr<const MappedFile> file, Facts facts, const Layout& layout)
+    : RandomMesh(std::move(facts)), file_(std::move(file)), layout_(layout) {
+  const auto is_float = [](const Field& field) { return field.type == StoredType::kF32; };
+  const size_t x = layout.position[0].at;
+  has_floats_ = !layout.swap && std::all_of(layout.position.begin(), layout.position.end(), is_float) &&
+                layout.position[1].at == x + 4 && layout.position[2].at == x + 8;
+}
+
+glm::dvec3 RecordMesh::position(uint64_t vertex) const {
+  if (!has_floats_) return three(vertex, layout_.position);
+  float p[3];
+  std::memcpy(p, file_->bytes().data() + layout_.vertices_at + vertex * layout_.vertex_bytes + layout_.position[0].at,
+              sizeof p);
+  return {p[0], p[1], p[2]};
+}
+
 bool RecordMesh::corners(uint64_t first, size_t count, uint32_t* out) const {
   const Layout& l = layout_;
   const std::byte* record = file_->bytes().data() + l.triangles_at + first * l.triangle_bytes;
@@ -55,13 +71,6 @@ float RecordMesh::scalar(uint64_t vertex) const {
 }
 
 glm::dvec3 RecordMesh::three(uint64_t vertex, const Fields& fields) const {
-  // The usual file: floats behind each other, in this machine's order.
-  if (fields[0].type == StoredType::kF32 && fields[2].at == fields[0].at + 8 && fields[1].at == fields[0].at + 4 &&
-      !layout_.swap && fields[1].type == StoredType::kF32 && fields[2].type == StoredType::kF32) {
-    float p[3];
-    std::memcpy(p, file_->bytes().data() + layout_.vertices_at + vertex * layout_.vertex_bytes + fields[0].at, 12);
-    return {p[0], p[1], p[2]};
-  }
   return {number(vertex, fields[0]), number(vertex, fields[1]), number(vertex, fields[2])};
 }
 

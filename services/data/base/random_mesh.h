@@ -47,6 +47,8 @@ class RandomMesh {
   virtual glm::vec3 normal(uint64_t vertex) const = 0;
   virtual uint32_t colour(uint64_t vertex) const = 0;  ///< 0x00RRGGBB
   virtual float scalar(uint64_t vertex) const = 0;     ///< Mesh::scalars
+  /// Frees memory of this process that reading took; what is read again is fetched again.
+  virtual void drop_pages() const {}
 
  protected:
   explicit RandomMesh(Facts facts) : facts_(std::move(facts)) {}
@@ -76,18 +78,18 @@ class RecordMesh final : public RandomMesh {
   };
 
   /// Precondition: all records of the layout lie in the file.
-  RecordMesh(std::shared_ptr<const MappedFile> file, Facts facts, const Layout& layout)
-      : RandomMesh(std::move(facts)), file_(std::move(file)), layout_(layout) {}
+  RecordMesh(std::shared_ptr<const MappedFile> file, Facts facts, const Layout& layout);
   void choose_scalar(const Field& field, double origin) {
     layout_.scalar = field, layout_.scalar_origin = origin, facts_.scalars = true;
   }
   void set_arrays(const std::vector<scene::ArrayInfo>& arrays) { facts_.arrays = arrays; }
 
   bool corners(uint64_t first, size_t count, uint32_t* out) const override;
-  glm::dvec3 position(uint64_t vertex) const override { return three(vertex, layout_.position); }
+  glm::dvec3 position(uint64_t vertex) const override;
   glm::vec3 normal(uint64_t vertex) const override { return three(vertex, layout_.normal); }
   uint32_t colour(uint64_t vertex) const override;
   float scalar(uint64_t vertex) const override;
+  void drop_pages() const override { file_->drop_pages(); }
   /// Any number of a vertex.
   double number(uint64_t vertex, const Field& field) const;
 
@@ -96,6 +98,7 @@ class RecordMesh final : public RandomMesh {
 
   std::shared_ptr<const MappedFile> file_;
   Layout layout_;
+  bool has_floats_;  // the usual file: positions are floats behind each other, in this machine's order
 };
 
 }  // namespace telesplat::data

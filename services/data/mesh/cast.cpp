@@ -8,6 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "common/geometry/chunk_code.h"
+
 namespace telesplat::data {
 namespace {
 
@@ -165,19 +167,17 @@ std::optional<scene::Probed> cast(const MeshStore& store, const scene::Probe& pr
     if (const double at = entry(ray, chunk.box_room); at < kInfinity) met.push_back({at, chunk.id});
   std::sort(met.begin(), met.end(), [](const Met& a, const Met& b) { return a.at < b.at; });
   Hit best;
-  ChunkId of;
+  geometry::HeldChunk of;
   for (const Met& m : met) {
     if (m.at > best.at) break;
-    const auto chunk = geometry::MeshChunkView::validate(store.chunk(m.chunk).bytes);
+    auto chunk = geometry::decode_chunk(store.chunk(m.chunk).bytes);
     if (!chunk) continue;  // cannot happen: the store checks its chunks
     const double before = best.at;
-    for (size_t t = 0; t < chunk->triangles(); ++t) intersect(ray, corners_of(*chunk, t), t, best);
-    if (best.at < before) of = m.chunk;
+    for (size_t t = 0; t < chunk->view.triangles(); ++t) intersect(ray, corners_of(chunk->view, t), t, best);
+    if (best.at < before) of = *std::move(chunk);
   }
   if (!(best.at < kInfinity)) return std::nullopt;
-  const auto bytes = store.chunk(of);
-  const auto chunk = geometry::MeshChunkView::validate(bytes.bytes);
-  return describe(*chunk, ray, best, scalar_origin, of_cells);
+  return describe(of.view, ray, best, scalar_origin, of_cells);
 }
 
 }  // namespace telesplat::data

@@ -106,16 +106,18 @@ void remember(const std::string& folder, const std::string& line) {
 }  // namespace
 
 uint64_t hash_known_files(const std::vector<std::string>& paths, const HashMemory& memory, const Progress& progress) {
-  if (memory.folder.empty()) return hash_files(paths, progress);
+  const auto read = [&] { return memory.never_read ? 0 : hash_files(paths, progress); };
+  if (memory.folder.empty()) return read();
   const Facts before = known_facts(paths);
   std::error_code error;
   const bool is_private = !fs::exists(memory.folder, error) || problem_of_shared_place(memory.folder).empty();
-  if (before.bytes < memory.least_bytes || !is_private) return hash_files(paths, progress);
+  if (before.bytes < memory.least_bytes || !is_private) return read();
   if (const auto known = recorded_hash(text_of(fs::path(memory.folder) / kKnownFile), before.key)) {
     progress(kIdentifying, 1.0);
     return *known;
   }
-  const uint64_t hash = hash_files(paths, progress);
+  const uint64_t hash = read();
+  if (memory.never_read) return hash;
   const std::chrono::duration<double> now = std::chrono::system_clock::now().time_since_epoch();
   if (now.count() - before.changed_s >= memory.settled_s && known_facts(paths).key == before.key)
     remember(memory.folder, line_of(before.key, hash));

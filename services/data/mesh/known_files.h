@@ -21,6 +21,7 @@ struct HashMemory {
   uint64_t least_bytes = 64 << 20;
   /// Seconds since a file's last change before its hash is remembered: its clock may be as coarse.
   double settled_s = 3;
+  bool never_read = false;  ///< true: the hash of files that are not known is 0
 };
 
 /// Returns hash_files(). Large files are not read if the folder knows files of the same devices, inodes, sizes and

@@ -256,14 +256,14 @@ bool meet(const geometry::Box& a, const geometry::Box& b) {
 
 // The chunks that a node replaces.
 struct Replaced {
-  std::vector<MeshChunkView> chunks;
+  std::vector<geometry::HeldChunk> chunks;
   geometry::Box box_room, whole_room;  // theirs, and that of the whole mesh
   size_t triangles = 0;
   float spacing_m = 0;  // the largest
 
   double area_m2() const {
     double area = 0;
-    for (const MeshChunkView& chunk : chunks)
+    for (const auto& [chunk, owner] : chunks)
       for (size_t i = 0; i < chunk.indices.size(); i += 3) {
         const glm::vec3 a = place_of(chunk, chunk.indices[i]);
         area += 0.5 * double{glm::length(glm::cross(place_of(chunk, chunk.indices[i + 1]) - a,
@@ -274,7 +274,7 @@ struct Replaced {
   size_t cells(float cell_m, size_t expected) const {
     const ClusterGrid grid{whole_room.lo, cell_m};
     KeyTable keys(expected);
-    for (const MeshChunkView& chunk : chunks)
+    for (const auto& [chunk, owner] : chunks)
       for (uint32_t v = 0; v < chunk.vertices(); ++v) keys.add(grid.key(place_of(chunk, v)));
     return keys.size();
   }
@@ -286,7 +286,7 @@ Replaced replaced_by(const LevelBelow& below, size_t first, size_t last) {
   for (size_t i = first; i < last; ++i) {
     out.chunks.push_back(below.chunk(i));
     out.box_room.extend(below.boxes_room[i]);
-    out.triangles += out.chunks.back().triangles();
+    out.triangles += out.chunks.back().view.triangles();
     out.spacing_m = std::max(out.spacing_m, below.spacings_m[i]);
   }
   return out;
@@ -317,11 +317,12 @@ CoarseNode make_coarse_node(const LevelBelow& below, size_t first, size_t last, 
   // Triangles that are larger than the cells stay as they are: then the cells must be larger.
   for (int n = 0; n < 12; ++n, out.spacing_m *= 1.5f) {
     Clustering clustering({replaced.whole_room.lo, out.spacing_m}, wanted);
-    for (const MeshChunkView& chunk : replaced.chunks) clustering.add(chunk);
+    for (const auto& chunk : replaced.chunks) clustering.add(chunk.view);
     clustering.end_own();
     const geometry::Box reach = grown(replaced.box_room, out.spacing_m);
     for (size_t i = 0; i < below.boxes_room.size(); ++i)
-      if ((i < first || i >= last) && meet(below.boxes_room[i], reach)) clustering.add_around(below.chunk(i), reach);
+      if ((i < first || i >= last) && meet(below.boxes_room[i], reach))
+        clustering.add_around(below.chunk(i).view, reach);
     out.chunk = clustering.build();
     if (out.chunk.empty()) return out;
     const size_t triangles = MeshChunkView::validate(out.chunk)->triangles();

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 
 namespace telesplat::data {
 
@@ -15,9 +15,9 @@ inline constexpr size_t kChildren = 4;
 
 /// A level of the tree that is complete.
 struct LevelBelow {
-  std::span<const geometry::Box> boxes_room;                   ///< one a chunk
-  std::span<const float> spacings_m;                           ///< one a chunk: CoarseNode::spacing_m; 0: a leaf
-  std::function<geometry::MeshChunkView(size_t chunk)> chunk;  ///< called on several threads
+  std::span<const geometry::Box> boxes_room;               ///< one a chunk
+  std::span<const float> spacings_m;                       ///< one a chunk: CoarseNode::spacing_m; 0: a leaf
+  std::function<geometry::HeldChunk(size_t chunk)> chunk;  ///< called on several threads
 };
 
 struct CoarseNode {

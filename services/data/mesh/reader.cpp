@@ -177,6 +177,24 @@ Result<Mesh> read_raster(std::string_view content, const std::string& path, cons
   return elevation_mesh(*std::move(heights), options, path);
 }
 
+// Returns MeshSource::random of a file: null unless it is large, and a PLY or raster. Error: the file cannot be opened.
+Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& elevation, const std::string& array) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const size_t bytes = (*file)->bytes().size();
+  const std::string format = detect_format((*file)->text(), path).format;
+  if (format == "raster" && bytes >= kLargeRaster_bytes)
+    return OpenRandom([=](const ReadProgress& progress) -> Result<std::shared_ptr<const RandomMesh>> {
+      auto heights = read_heights((*file)->text(), path, elevation, progress);
+      if (!heights) return heights.error();
+      auto grid = ElevationGrid::make(*std::move(heights), elevation, path);
+      if (!grid) return grid.error();
+      return std::shared_ptr<const RandomMesh>(*std::move(grid));
+    });
+  if (format != "ply" || bytes < kLargePly_bytes) return OpenRandom();
+  return OpenRandom([=](const ReadProgress&) { return random_ply(*file, path, array); });
+}
+
 }  // namespace
 
 DetectedFormat detect_format(std::string_view content, const std::string& path) {
@@ -249,26 +267,6 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& report, cons
   } catch (const std::bad_alloc&) {
     return Error{fmt::format("{}: this machine's memory does not suffice to read its {} bytes", path, content.size())};
   }
-}
-
-Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& elevation, const std::string& array) {
-  const auto file = MappedFile::open(path);
-  if (!file) return file.error();
-  const size_t bytes = (*file)->bytes().size();
-  const std::string format = detect_format((*file)->text(), path).format;
-  if (format == "raster" && bytes >= kLargeRaster_bytes)
-    return OpenRandom([=](const ReadProgress& progress) -> Result<std::shared_ptr<const RandomMesh>> {
-      auto heights = read_heights((*file)->text(), path, elevation, progress);
-      if (!heights) return heights.error();
-      auto grid = ElevationGrid::make(*std::move(heights), elevation, path);
-      if (!grid) return grid.error();
-      return std::shared_ptr<const RandomMesh>(*std::move(grid));
-    });
-  if (format != "ply" || bytes < kLargePly_bytes) return OpenRandom();
-  auto mesh = random_ply(*file, path, array);
-  if (!mesh) return mesh.error();
-  if (!*mesh) return OpenRandom();
-  return OpenRandom([mesh = *mesh](const ReadProgress&) { return Result(mesh); });
 }
 
 Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,

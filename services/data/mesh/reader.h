@@ -46,10 +46,6 @@ std::vector<std::string> companion_files(std::string_view content, const std::st
 /// Returns the files that a VRT consists of, as it names them.
 std::vector<std::string> vrt_sources(std::string_view content);
 
-/// Returns MeshSource::random of a file: null unless it is large, and a PLY or raster. Errors: those of random_ply();
-/// the file cannot be opened.
-Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& elevation, const std::string& array);
-
 /// Returns the mesh file or raster at `path`, with its companions (material libraries, buffers, the texture), and
 /// hashes them. Error, naming the file: it cannot be opened, is of no known format; elevation options are given for
 /// another format, or an array for one without arrays. array: colours the mesh; empty: no array. texture_detail: for

@@ -115,7 +115,7 @@ Status build_store(StorePlace& place, const std::string& path, const StoreOption
   if (source.random) {
     const auto mesh = source.random([&](double fraction) { progress(kReading, fraction); });
     if (!mesh) return mesh.error();
-    const auto written = write_out_of_core(place, path, **mesh, {.store = options}, info, progress);
+    const auto written = *mesh ? write_out_of_core(place, path, **mesh, {.store = options}, info, progress) : false;
     if (!written) return written.error();
     if (*written) return ok_status();
     info = MeshStoreInfo{};
@@ -139,6 +139,14 @@ Result<std::shared_ptr<MeshStore>> make_unnamed(const std::string& path,
   auto content = read_store(file.get(), name, StoreOptions().checked_at_opening);
   if (!content) return content.error();
   return make_store(std::move(*content), path, false, {});
+}
+
+// Path of the store in the cache, without the ending.
+std::string stem_of(const MeshSource& source, const StoreOptions& options) {
+  const fs::path folder = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
+  return (folder / fmt::format("{:016x}-{}-{}-{}{}", source.hash, options.up, options.room_size_m, options.crease_deg,
+                               source.variant))
+      .string();
 }
 
 // Without a cache.
@@ -239,13 +247,17 @@ Result<std::shared_ptr<MeshStore>> MeshStore::keep(const std::string& path, cons
   });
 }
 
+bool MeshStore::is_made(const std::string& path, const MeshSource& source, const StoreOptions& options) {
+  if (!options.use_cache) return false;
+  const auto store = open_existing(stem_of(source, options), path, options, true);
+  return store && *store;
+}
+
 Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, const MeshSource& source,
                                                    const StoreOptions& options, const Progress& progress) {
   if (!options.use_cache) return open_unnamed(path, options, source, progress);
-  const fs::path folder = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
-  const std::string stem = (folder / fmt::format("{:016x}-{}-{}-{}{}", source.hash, options.up, options.room_size_m,
-                                                 options.crease_deg, source.variant))
-                               .string();
+  const std::string stem = stem_of(source, options);
+  const fs::path folder = fs::path(stem).parent_path();
   std::error_code error;
   fs::create_directories(folder, error);
   if (const std::string problem = problem_of_shared_place(folder.string()); !problem.empty())

@@ -75,6 +75,8 @@ class MeshStore {
   /// info(). Errors (exit code 2 for a user) name it. Precondition: options are within the limits of their flags.
   static Result<std::shared_ptr<MeshStore>> make(const std::string& path, const MeshSource& source,
                                                  const StoreOptions& options, const Progress& progress);
+  /// True if make() would find the store of `source` in the cache.
+  static bool is_made(const std::string& path, const MeshSource& source, const StoreOptions& options);
   /// Keeps a placed mesh in a file without a name, which goes away with its last mapping. Errors start with the path.
   /// surfels: of the mesh; empty: they are made.
   static Result<std::shared_ptr<MeshStore>> keep(const std::string& path, const PlacedMesh& mesh,
@@ -88,8 +90,9 @@ class MeshStore {
     const auto& all = chunks();
     return {all.begin(), std::find_if_not(all.begin(), all.end(), [](const auto& c) { return c.is_leaf(); })};
   }
-  /// Returns a chunk's bytes, checked, in mapped memory. If they are damaged, removes the store's file and ends this
-  /// process (end_at_damaged_file()): the next start makes the store anew. Precondition: id is one of chunks().
+  /// Returns a chunk, coded (geometry/chunk_code.h) and checked, in mapped memory. If it is damaged, removes the file
+  /// of the store and ends this process (end_at_damaged_file()): the next start makes the store anew. Precondition: id
+  /// is one of chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
   /// Returns the surfels of the whole mesh (surfels.h), in mapped memory.
   virtual geometry::ChunkBytes surfels() const = 0;

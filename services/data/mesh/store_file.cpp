@@ -8,9 +8,12 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <deque>
 #include <filesystem>
+#include <mutex>
 #include <sstream>
 
+#include "common/geometry/chunk_code.h"
 #include "common/parallel/in_parallel.h"
 #include "services/data/mesh/cache.h"
 #include "services/data/mesh/levels.h"
@@ -64,16 +67,14 @@ int write_at(int descriptor, const void* data, size_t bytes, size_t offset) {
 class ChunkWriter {
  public:
   ChunkWriter(int descriptor, size_t begin) : descriptor_(descriptor), end_(begin) {}
-  /// Returns the chunk's entry. A chunk gets its place in the file when its size is known.
+  /// Codes a chunk. Returns its entry: a chunk gets its place in the file when its size is known.
   StoreEntry write(std::span<const std::byte> chunk) {
-    StoreEntry out;
-    std::memcpy(&out.box_room, chunk.data() + offsetof(geometry::ChunkHeader, lo), sizeof out.box_room);
-    uint32_t triangles = 0;
-    std::memcpy(&triangles, chunk.data() + offsetof(geometry::ChunkHeader, triangles), sizeof triangles);
-    out.triangles = triangles;
-    out.bytes = chunk.size();
-    out.checksum = XXH3_64bits(chunk.data(), chunk.size());
-    out.offset = put(chunk);
+    const auto view = geometry::MeshChunkView::validate(chunk);
+    CHECK(view.ok());  // this program made it
+    const std::vector<std::byte> coded = geometry::encode_chunk(*view);
+    StoreEntry out{.bytes = coded.size(), .triangles = view->triangles(), .box_room = view->box_room};
+    out.checksum = XXH3_64bits(coded.data(), coded.size());
+    out.offset = put(coded);
     return out;
   }
   /// Returns where the bytes are.
@@ -106,11 +107,37 @@ class ChunkWriter {
   std::atomic<int> failure_ = 0;  // errno
 };
 
-geometry::MeshChunkView chunk_at(const MappedFile& file, const StoreEntry& entry) {
-  const auto view = geometry::MeshChunkView::validate(file.bytes().subspan(entry.offset, entry.bytes));
-  CHECK(view.ok());  // this program wrote it a moment ago
-  return *view;
+geometry::HeldChunk chunk_at(const MappedFile& file, const StoreEntry& entry) {
+  auto chunk = geometry::decode_chunk(file.bytes().subspan(entry.offset, entry.bytes));
+  CHECK(chunk.ok());  // this program wrote it a moment ago
+  return *std::move(chunk);
 }
+
+// Decodes the chunks of a level. Keeps the last ones, 50 MB: nodes beside each other need the same neighbours.
+class DecodedLevel {
+ public:
+  DecodedLevel(const MappedFile& file, std::span<const StoreEntry> level) : file_(file), level_(level) {}
+  /// Threads may call it at once.
+  geometry::HeldChunk at(size_t i) {
+    {
+      const std::lock_guard lock(mutex_);
+      for (const auto& [number, chunk] : kept_)
+        if (number == i) return chunk;
+    }
+    geometry::HeldChunk chunk = chunk_at(file_, level_[i]);
+    const std::lock_guard lock(mutex_);
+    kept_.emplace_back(i, chunk);
+    if (kept_.size() > kKept) kept_.pop_front();
+    return chunk;
+  }
+
+ private:
+  static constexpr size_t kKept = 32;
+  const MappedFile& file_;
+  const std::span<const StoreEntry> level_;
+  std::mutex mutex_;
+  std::deque<std::pair<size_t, geometry::HeldChunk>> kept_;
+};
 
 // Entries of one level.
 struct Level {
@@ -137,7 +164,8 @@ std::vector<Level> write_levels(ChunkWriter& out, const std::string& name, std::
     std::vector<geometry::Box> boxes;
     std::vector<float> spacings;
     for (const StoreEntry& e : level) boxes.push_back(e.box_room), spacings.push_back(e.spacing_m);
-    const LevelBelow chunks{boxes, spacings, [&](size_t i) { return chunk_at(*file, level[i]); }};
+    DecodedLevel decoded(*file, level);
+    const LevelBelow chunks{boxes, spacings, [&](size_t i) { return decoded.at(i); }};
     std::vector<StoreEntry> nodes((level.size() + kChildren - 1) / kChildren);
     constexpr size_t kBatch = 8;  // so that this thread reports progress
     for (size_t first = 0; first < nodes.size(); first += kBatch) {
@@ -172,7 +200,7 @@ std::vector<std::byte> surfels_of(const MappedFile& file, const MeshFigures& fig
     for (size_t i = level.begin; i < level.end; ++i) sum += entries[i].triangles;
     if (chosen.size() == 0 || sum >= kEnough) chosen = level, triangles = sum;
   }
-  const auto chunk = [&](size_t i, std::vector<uint64_t>&) { return chunk_at(file, entries[chosen.begin + i]); };
+  const auto chunk = [&](size_t i) { return chunk_at(file, entries[chosen.begin + i]); };
   const std::atomic<bool> never{false};
   return make_surfels({figures.box_room, triangles, chosen.size(), chunk}, stored_surfels(figures.triangles), never);
 }

@@ -2,7 +2,7 @@
 //
 //     offset 0      StoreHeader, padded to 4096
 //     4096          StoreEntry[chunks], padded to a multiple of 4096: the leaves, then the levels above (levels.h)
-//     then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order of making
+//     then          the chunks (common/geometry/chunk_code.h), each at a multiple of 4096, in the order of making
 //     then          the surfels of the whole mesh (common/geometry/surfels.h)
 //     then          the file's arrays as scene::to_text(); then lines: format, up axis, reason for it, array of the
 //                                 chunks' values, coordinates, and remarks on the file, without its name
@@ -46,7 +46,7 @@ std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// To be raised whenever readers, placement or layout would make another file from the same mesh.
-inline constexpr uint32_t kStoreVersion = 10;
+inline constexpr uint32_t kStoreVersion = 11;
 
 /// Bytes a triangle that a store with its levels takes, about.
 inline constexpr uint64_t kBytesATriangle = 22;
@@ -68,8 +68,8 @@ class StoreWriter {
   /// Box of the leaves that were written.
   geometry::Box box_room() const;
   /// Writes levels, surfels and the table of contents. `info` describes the mesh, with boxes and counts. Leaves that
-  /// were not written are left out. surfels: of the mesh; empty: they are made. Error, starting with the name: it cannot
-  /// be written.
+  /// were not written are left out. surfels: of the mesh; empty: they are made. Error, starting with the name: it
+  /// cannot be written.
   Status finish(const MeshStoreInfo& info, const Progress& progress, std::vector<std::byte> surfels = {});
 
  private:

@@ -191,20 +191,17 @@ Grid gather(const SurfelSource& source, double cell_m, size_t stride, const std:
   std::vector<Grid> parts(kParts, Grid(source.box_room.lo, cell_m));
   const size_t count = (source.chunks + stride - 1) / stride;
   in_parallel(size_t{0}, kParts, [&](size_t part) {
-    std::vector<uint64_t> buffer;
     for (size_t i = count * part / kParts; i < count * (part + 1) / kParts && !stop; ++i)
-      parts[part].add(source.chunk(i * stride, buffer));
+      parts[part].add(source.chunk(i * stride).view);
   });
   for (size_t part = 1; part < kParts; ++part) parts[0].add(parts[part]);
-  std::vector<uint64_t> buffer;
-  if (scalars && source.chunks > 0) *scalars = source.chunk(0, buffer).scalars;
+  if (scalars && source.chunks > 0) *scalars = source.chunk(0).view.scalars;
   return std::move(parts[0]);
 }
 
 double area_of(const SurfelSource& source, size_t stride) {
-  std::vector<uint64_t> buffer;
   double area = 0;
-  for (size_t i = 0; i < source.chunks; i += stride) area += area_of(source.chunk(i, buffer));
+  for (size_t i = 0; i < source.chunks; i += stride) area += area_of(source.chunk(i).view);
   return area;
 }
 
@@ -267,8 +264,9 @@ SurfelMaker::Bytes SurfelMaker::get(const std::shared_ptr<const MeshStore>& stor
     wanted_ = wanted;
     made_.reset();
     const auto make = [this, store, most] {
-      const auto chunk = [&](size_t i, std::vector<uint64_t>&) {
-        return *MeshChunkView::validate(store->chunk(store->chunks()[i].id).bytes);
+      const auto chunk = [&](size_t i) {
+        auto out = geometry::decode_chunk(store->chunk(store->chunks()[i].id).bytes);
+        return out ? *std::move(out) : geometry::HeldChunk{};
       };
       const auto bytes = std::make_shared<const std::vector<std::byte>>(
           make_surfels({store->info().box_room, store->info().triangles, store->chunks().size(), chunk}, most, stop_));

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 #include "services/data/mesh/store.h"
 
 namespace telesplat::data {
@@ -28,8 +28,7 @@ struct SurfelSource {
   geometry::Box box_room;
   uint64_t triangles = 0;
   size_t chunks = 0;
-  /// Returns a chunk, whose bytes may lie in `buffer`. Called on several threads.
-  std::function<geometry::MeshChunkView(size_t chunk, std::vector<uint64_t>& buffer)> chunk;
+  std::function<geometry::HeldChunk(size_t chunk)> chunk;  ///< called on several threads
 };
 
 /// Returns a surfel set (geometry/surfels.h) of about `most` surfels: one for each cell of a grid that the surface

@@ -151,7 +151,7 @@ bool is_mesh_kind(std::string_view kind) {
 }
 
 std::string active_scalars(std::string_view content) {
-  if (root_tag(content).empty()) return {};
+  if (!root_tag(content).first_child()) return {};
   try {
     const XmlFile file(content, "");
     const auto data = file.root().child(file.root().attribute("type").value()), piece = data.child("Piece");

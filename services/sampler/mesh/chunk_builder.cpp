@@ -3,12 +3,13 @@
 #include <chrono>
 
 #include "common/core/clock.h"
+#include "common/geometry/chunk_code.h"
 
 namespace telesplat::sampler {
 
 void ChunkBuilder::take(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) {
   for (auto& [id, chunk] : chunks) {
-    const uint64_t bytes = chunk.bytes.size();
+    const uint64_t bytes = geometry::decoded_bytes(chunk.bytes);
     if (auto prepare = sampler_->preparing(id, chunk)) {
       waiting_.push_back({id, bytes, std::move(prepare)});
     } else {

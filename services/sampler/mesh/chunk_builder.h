@@ -21,7 +21,7 @@ class ChunkBuilder {
   /// A chunk that was added, or refused.
   struct Added {
     ChunkId id;
-    uint64_t bytes = 0;
+    uint64_t bytes = 0;  ///< decoded
     Status status;
     double begin_s = 0, end_s = 0;  ///< when it was prepared
   };

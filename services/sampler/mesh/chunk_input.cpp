@@ -2,19 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
-
 namespace telesplat::sampler {
 
-Result<HeldChunk> hold(ChunkId id, geometry::ChunkBytes chunk) {
-  if (reinterpret_cast<uintptr_t>(chunk.bytes.data()) % alignof(uint32_t) != 0) {
-    const auto copy = std::make_shared<std::vector<uint32_t>>((chunk.bytes.size() + 3) / 4);
-    std::memcpy(copy->data(), chunk.bytes.data(), chunk.bytes.size());
-    chunk = {{reinterpret_cast<const std::byte*>(copy->data()), chunk.bytes.size()}, copy};
-  }
-  const auto view = geometry::MeshChunkView::validate(chunk.bytes);
-  if (!view) return Error{fmt::format("chunk {} refused: {}", id.value, view.error().text)};
-  return HeldChunk{*view, std::move(chunk.owner)};
+Result<geometry::HeldChunk> hold(ChunkId id, std::span<const std::byte> coded) {
+  auto chunk = geometry::decode_chunk(coded);
+  if (!chunk) return Error{fmt::format("chunk {} refused: {}", id.value, chunk.error().text)};
+  return chunk;
 }
 
 Status Refusals::status() const {

@@ -1,19 +1,13 @@
-// Checks a chunk that arrives, before a sampler reads it.
+// Decodes and checks a chunk that arrives, before a sampler reads it.
 #pragma once
 
 #include "common/core/ids.h"
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 
 namespace telesplat::sampler {
 
-/// A valid chunk, and the owner that keeps its bytes alive.
-struct HeldChunk {
-  geometry::MeshChunkView view;
-  std::shared_ptr<const void> owner;
-};
-
-/// Validates a chunk. Copies bytes that are not aligned to 4 first; uses others in place. Errors name the chunk.
-Result<HeldChunk> hold(ChunkId id, geometry::ChunkBytes chunk);
+/// Decodes and validates a coded chunk. Errors name it.
+Result<geometry::HeldChunk> hold(ChunkId id, std::span<const std::byte> coded);
 
 /// Gathers the refusals of a batch into one status: "2 of 9 chunks refused; first: ...".
 class Refusals {

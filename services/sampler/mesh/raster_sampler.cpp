@@ -38,7 +38,7 @@ class RasterSampler final : public Sampler {
                            const image::PixelMask* mask = nullptr) override;
 
  private:
-  // A chunk in OpenGL: its bytes as they are, in one buffer. The caller's bytes are not needed any more.
+  // A chunk in OpenGL: its decoded bytes as they are, in one buffer.
   struct Drawable {
     GLuint buffer = 0, vertex_array = 0;
     GLuint vertices = 0;
@@ -51,7 +51,7 @@ class RasterSampler final : public Sampler {
   explicit RasterSampler(std::unique_ptr<gl::EglContext> context) : context_(std::move(context)) {}
   Status build_program();
   void reserve_targets(int width, int height);
-  Status upload(ChunkId id, geometry::ChunkBytes chunk);
+  Status upload(ChunkId id, std::span<const std::byte> coded);
   static void release(Drawable& drawable);
   void set_planes(const glm::dvec3& eye_room) const;
   void draw(const geometry::Camera& camera, const geometry::Rect& part);
@@ -135,8 +135,8 @@ void RasterSampler::release(Drawable& drawable) {
   glDeleteBuffers(1, &drawable.buffer);
 }
 
-Status RasterSampler::upload(ChunkId id, geometry::ChunkBytes chunk) {
-  const auto held = hold(id, std::move(chunk));
+Status RasterSampler::upload(ChunkId id, std::span<const std::byte> coded) {
+  const auto held = hold(id, coded);
   if (!held) return held.error();
   const geometry::MeshChunkView& view = held->view;
   const size_t bytes = geometry::chunk_bytes(view.vertices(), view.triangles());
@@ -171,7 +171,7 @@ Status RasterSampler::upload(ChunkId id, geometry::ChunkBytes chunk) {
 Status RasterSampler::add_chunk(ChunkId id, geometry::ChunkBytes chunk) {
   const gl::EglContext::Current current(*context_);
   if (!current.ok()) return Error{"the off-screen OpenGL context is lost"};
-  return upload(id, std::move(chunk));
+  return upload(id, chunk.bytes);
 }
 
 Status RasterSampler::add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) {
@@ -179,7 +179,7 @@ Status RasterSampler::add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkB
   if (!current.ok()) return Error{"the off-screen OpenGL context is lost"};
   Refusals refusals(chunks.size());
   for (auto& [id, chunk] : chunks)
-    if (const Status status = upload(id, std::move(chunk)); !status.ok()) refusals.add(status.error());
+    if (const Status status = upload(id, chunk.bytes); !status.ok()) refusals.add(status.error());
   return refusals.status();
 }
 

@@ -267,7 +267,7 @@ class RaySampler final : public Sampler {
   }
   void remove_chunk(ChunkId id) override { scene_.remove(id); }
   std::function<Result<Add>()> preparing(ChunkId id, geometry::ChunkBytes chunk) override {
-    return [this, id, chunk = std::move(chunk)] { return scene_.prepare(id, chunk); };
+    return [this, id, chunk = std::move(chunk)] { return scene_.prepare(id, chunk.bytes); };
   }
   void show(const std::vector<ChunkId>& chunks) override { scene_.show(chunks); }
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override {

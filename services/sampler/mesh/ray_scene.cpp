@@ -18,8 +18,8 @@ RayScene::RayScene(int threads)
   top_.reset(rtcNewScene(device_.get()));
 }
 
-Result<RayScene::Slot> RayScene::build(ChunkId id, geometry::ChunkBytes chunk) const {
-  auto held = hold(id, std::move(chunk));
+Result<RayScene::Slot> RayScene::build(ChunkId id, std::span<const std::byte> coded) const {
+  auto held = hold(id, coded);
   if (!held) return held.error();
   Slot slot{std::move(*held), Scene(rtcNewScene(device_.get()))};
   const geometry::MeshChunkView& view = slot.held.view;
@@ -63,7 +63,7 @@ Status RayScene::add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunk
   std::vector<std::optional<Result<Slot>>> built(chunks.size());
   arena_.execute([&] {
     in_parallel(size_t{0}, chunks.size(),
-                [&](size_t i) { built[i].emplace(build(chunks[i].first, std::move(chunks[i].second))); });
+                [&](size_t i) { built[i].emplace(build(chunks[i].first, chunks[i].second.bytes)); });
   });
   Refusals refusals(chunks.size());
   for (size_t i = 0; i < chunks.size(); ++i) {
@@ -75,8 +75,8 @@ Status RayScene::add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunk
   return refusals.status();
 }
 
-Result<std::function<void()>> RayScene::prepare(ChunkId id, geometry::ChunkBytes chunk) {
-  auto built = build(id, std::move(chunk));
+Result<std::function<void()>> RayScene::prepare(ChunkId id, std::span<const std::byte> coded) {
+  auto built = build(id, coded);
   if (!built) return built.error();
   const auto slot = std::make_shared<Slot>(std::move(*built));
   return std::function<void()>([this, id, slot] { install(id, std::move(*slot)); });

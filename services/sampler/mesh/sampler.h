@@ -25,9 +25,8 @@ class Sampler {
   /// "ray" or "raster".
   virtual const char* name() const = 0;
 
-  /// Adds a chunk and builds its BVH or GL buffers; the sampler keeps chunk.owner alive as long as it reads
-  /// its bytes (the raster sampler only until they are uploaded). Replaces a chunk of the same id. Refuses bytes that
-  /// are not valid; then nothing changes.
+  /// Decodes a coded chunk (geometry/chunk_code.h) and builds its BVH or GL buffers. Replaces a chunk of the same id.
+  /// Refuses bytes that are not valid; then nothing changes.
   virtual Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) = 0;
   /// Adds several chunks at once, in parallel where that helps; refuses bad ones as add_chunk does, and keeps the good
   /// ones.

@@ -13,17 +13,10 @@ namespace {
 
 constexpr size_t kChunksInFlight = 8;         // requests to the data server not yet answered
 constexpr uint64_t kBytesInFlight = 8 << 20;  // size of these chunks, unless it is one chunk
-constexpr uint64_t kBytesBeside = 4 << 20;    // the same while there are tiles to be sampled
+constexpr uint64_t kBytesBeside = 2 << 20;    // the same while there are tiles to be sampled
 constexpr double kMostListPatience_s = 16;    // an array that is being read may take long
 constexpr double kExtend_s = 0.1;             // between two requests for more time
 constexpr double kPatience_s = 6.0;  // if nothing comes for this time, and for what the link needs: no more time
-
-// Copies bytes that are not aligned to 16, as a received field may lie anywhere; others are used in place.
-geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
-  if (reinterpret_cast<uintptr_t>(data.data()) % 16 == 0) return {data, message.owner};
-  auto copy = std::make_shared<std::vector<std::byte>>(data.begin(), data.end());
-  return {*copy, copy};
-}
 
 geometry::Rect all_of(const geometry::Camera& camera) { return {0, 0, camera.width, camera.height}; }
 
@@ -202,7 +195,7 @@ void MeshTiles::receive() {
       } else if (cache_.waiting(m.chunk)) {
         retry_.answered(cache_.bytes_of(m.chunk), m.data.size(), monotonic_s());
         if (m.data.empty()) return refuse(m.chunk, "there is no such chunk");
-        batch.emplace_back(m.chunk, aligned(*message, m.data));
+        batch.emplace_back(m.chunk, geometry::ChunkBytes{m.data, message->owner});
         progress_s_ = now_s;
       }
     });
@@ -260,7 +253,7 @@ std::vector<ChunkId> ChunkCache::prefetch(bool at_rest) const {
   for (auto c = chunks_.rbegin(); c != chunks_.rend(); ++c) {
     if (held_.contains(c->id)) continue;
     if (!at_rest && (c->is_leaf() || chunks_[c->first_child].is_leaf())) break;
-    bytes += memory(c->bytes, c->triangles);
+    bytes += memory(kBytesPerTriangle * c->triangles, c->triangles);
     if (bytes > budget_bytes_) break;
     out.push_back(c->id);
   }

@@ -40,13 +40,15 @@ class ChunkCache {
   size_t waiting_count() const { return waiting_.size(); }
   void mark_waiting(ChunkId id) { waiting_.insert(id); }
   void forget_waiting() { waiting_.clear(); }
-  /// Size of a chunk according to the list.
+  /// Size of a coded chunk according to the list.
   uint64_t bytes_of(ChunkId id) const;
   uint64_t waiting_bytes() const;
-  /// Memory of a chunk: its bytes, and a hierarchy over its triangles (62 bytes each in Embree 3.13).
+  /// Memory of a chunk: its decoded bytes, and a hierarchy over its triangles (62 bytes each in Embree 3.13).
   static uint64_t memory(uint64_t bytes, uint64_t triangles) { return bytes + 62 * triangles; }
-  /// Notes a chunk of this size that came. Returns the chunks to remove to stay within the budget; none that the last
-  /// view needs.
+  /// Decoded bytes of chunks that have not come, about.
+  static constexpr uint64_t kBytesPerTriangle = 24;
+  /// Notes a chunk of this decoded size that came. Returns the chunks to remove to stay within the budget; none that
+  /// the last view needs.
   std::vector<ChunkId> insert(ChunkId id, uint64_t bytes);
   /// An answer was not a valid chunk. The chunk stays missing until it was refused kTries times: then views do without
   /// it. True: this was the last time.

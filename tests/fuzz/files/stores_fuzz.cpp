@@ -1,15 +1,14 @@
 // Reads any bytes as a data server's input other than meshes and headers of volumes: chunks of a store, a store,
 // output of the importing program, glTF with its pictures, packed voxels and voxels in words. The first byte chooses.
 #include <cstdlib>
-#include <cstring>
 
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 #include "services/data/gltf/reader.h"
 #include "services/data/import/process.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/store_file.h"
-#include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/formats/header.h"
+#include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/volume.h"
 #include "services/data/vtk/reader.h"
 #include "tests/support/files/memory_file.h"
@@ -29,14 +28,7 @@ uint64_t use(const geometry::MeshChunkView& chunk) {
   return sum;
 }
 void chunk(Bytes bytes) {
-  const std::vector<uint32_t> aligned = [&] {
-    std::vector<uint32_t> out((bytes.size() + 3) / 4);
-    if (!bytes.empty()) std::memcpy(out.data(), bytes.data(), bytes.size());
-    return out;
-  }();
-  if (const auto view = geometry::MeshChunkView::validate(std::as_bytes(std::span(aligned)).first(bytes.size()));
-      view.ok())
-    use(*view);
+  if (const auto chunk = geometry::decode_chunk(std::as_bytes(bytes)); chunk.ok()) use(chunk->view);
 }
 void store(Bytes bytes) {
   const test::MemoryFile file(bytes);
@@ -47,6 +39,8 @@ void report(Bytes bytes) {
   const test::MemoryFile file(bytes);
   const auto mesh = read_import_report(file.descriptor(), "fuzz", "vtu");
   if (mesh.ok()) (void)validate_mesh(*mesh, "fuzz");
+  const auto heights = read_heights_report(file.descriptor(), "fuzz");
+  if (heights.ok() && heights->heights.size() != size_t(heights->width) * size_t(heights->height)) std::abort();
 }
 void stream(Bytes bytes) {
   const test::MemoryFile file(bytes);

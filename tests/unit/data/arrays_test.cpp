@@ -240,12 +240,12 @@ TEST(ArrayStore, ChunksHoldTheValuesOfVertices) {
   ASSERT_TRUE(colouring.ok() && *colouring);
   EXPECT_EQ((*colouring)->lo, 0);
   EXPECT_EQ((*colouring)->hi, 5);
-  const auto view = geometry::MeshChunkView::validate(store->chunk({0}).bytes);
-  ASSERT_TRUE(view.ok());
-  EXPECT_TRUE(view->scalars);
+  const auto chunk = geometry::decode_chunk(store->chunk({0}).bytes);
+  ASSERT_TRUE(chunk.ok());
+  EXPECT_TRUE(chunk->view.scalars);
   std::multiset<float> values;
   int missing = 0;
-  for (const uint32_t bits : view->colours)
+  for (const uint32_t bits : chunk->view.colours)
     if (const float v = std::bit_cast<float>(bits); std::isnan(v))
       ++missing;
     else
@@ -253,7 +253,7 @@ TEST(ArrayStore, ChunksHoldTheValuesOfVertices) {
   EXPECT_EQ(values, (std::multiset<float>{-1.5f, 2, 10}));
   EXPECT_EQ(missing, 1);
   const auto plain = open_or_fail(path, plain_options());
-  EXPECT_FALSE(geometry::MeshChunkView::validate(plain->chunk({0}).bytes)->scalars);
+  EXPECT_FALSE(geometry::decode_chunk(plain->chunk({0}).bytes)->view.scalars);
 }
 
 TEST(ArrayStore, FacesHaveOneValueAndSmoothNormals) {

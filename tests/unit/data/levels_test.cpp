@@ -31,10 +31,10 @@ Level leaves(ChunkList chunks) {
 
 CoarseNode node_of(const Level& level, size_t first, size_t last, size_t most) {
   std::vector<geometry::Box> boxes;
-  for (const auto& [id, chunk] : level.chunks) boxes.push_back(MeshChunkView::validate(chunk.bytes)->box_room);
+  for (const auto& [id, chunk] : level.chunks) boxes.push_back(geometry::decode_chunk(chunk.bytes)->view.box_room);
   return make_coarse_node(
-      {boxes, level.spacings_m, [&](size_t i) { return *MeshChunkView::validate(level.chunks[i].second.bytes); }},
-      first, last, most);
+      {boxes, level.spacings_m, [&](size_t i) { return *geometry::decode_chunk(level.chunks[i].second.bytes); }}, first,
+      last, most);
 }
 
 Level above(const Level& below, size_t most) {
@@ -42,8 +42,7 @@ Level above(const Level& below, size_t most) {
   for (size_t first = 0; first < below.chunks.size(); first += kChildren) {
     CoarseNode node = node_of(below, first, std::min(first + kChildren, below.chunks.size()), most);
     EXPECT_FALSE(node.chunk.empty());
-    const auto bytes = std::make_shared<std::vector<std::byte>>(std::move(node.chunk));
-    out.chunks.emplace_back(ChunkId{first / kChildren}, geometry::ChunkBytes{*bytes, bytes});
+    out.chunks.emplace_back(ChunkId{first / kChildren}, telesplat::test::coded(node.chunk));
     out.spacings_m.push_back(node.spacing_m);
   }
   return out;
@@ -65,7 +64,7 @@ TEST(Levels, HaveAFourthOfTheTrianglesAtMostAndTwiceTheSpacing) {
   const Level low = above(terrain(), 1000), high = above(low, 1000);
   EXPECT_EQ(low.chunks.size(), 16u);
   EXPECT_EQ(high.chunks.size(), 4u);
-  for (const auto& [id, chunk] : low.chunks) EXPECT_LT(MeshChunkView::validate(chunk.bytes)->triangles(), 256u);
+  for (const auto& [id, chunk] : low.chunks) EXPECT_LT(geometry::decode_chunk(chunk.bytes)->view.triangles(), 256u);
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_GT(high.spacings_m[i], 1.29f * low.spacings_m[4 * i]);
     EXPECT_LT(high.spacings_m[i], 0.1f);
@@ -98,7 +97,7 @@ TEST(Levels, OverlapTheirNeighbours) {
   const Level fine = terrain();
   const CoarseNode node = node_of(fine, 0, 4, 1000);
   geometry::Box own;
-  for (size_t i = 0; i < 4; ++i) own.extend(MeshChunkView::validate(fine.chunks[i].second.bytes)->box_room);
+  for (size_t i = 0; i < 4; ++i) own.extend(geometry::decode_chunk(fine.chunks[i].second.bytes)->view.box_room);
   const geometry::Box box = MeshChunkView::validate(node.chunk)->box_room;
   EXPECT_GT(box.hi.x, own.hi.x + 0.2f * node.spacing_m);
   EXPECT_GT(box.hi.z, own.hi.z + 0.2f * node.spacing_m);
@@ -123,7 +122,7 @@ TEST(Levels, KeepWhatIsThinnerThanACell) {
   const CoarseNode node = node_of(fine, 0, 1, 200);
   ASSERT_FALSE(node.chunk.empty());
   ASSERT_GT(node.spacing_m, 10 * 0.0008f);
-  const ChunkList coarse{{ChunkId{0}, {node.chunk, nullptr}}};
+  const ChunkList coarse{{ChunkId{0}, telesplat::test::coded(node.chunk)}};
   for (const glm::dvec3& eye : {glm::dvec3(0, 0, 1), glm::dvec3(0, 1, 0), glm::dvec3(0.3, 0.8, -0.6)}) {
     const geometry::Camera camera = geometry::make_camera(geometry::look_at(eye, {0, 0, 0}), 60, 2000, 1200);
     const auto truth = double(covered(picture(fine.chunks, camera)));
@@ -190,7 +189,7 @@ TEST(Levels, KeepLargeTrianglesBesideSmallOnes) {
   const CoarseNode node = node_of(leaves(chunks), 0, 2, 1000);
   ASSERT_FALSE(node.chunk.empty());
   const geometry::Camera down = geometry::make_camera(geometry::look_at({2, 3, 2}, {2, -1, 2.01}), 40, 64, 64);
-  EXPECT_EQ(covered(picture({{ChunkId{0}, {node.chunk, nullptr}}}, down)), 64u * 64u);
+  EXPECT_EQ(covered(picture({{ChunkId{0}, telesplat::test::coded(node.chunk)}}, down)), 64u * 64u);
 }
 
 TEST(Levels, TheSameChunksGiveTheSameBytes) {

@@ -37,7 +37,7 @@ TEST_P(RealFiles, OpenWithAllTheirTriangles) {
   EXPECT_NEAR(std::max({size.x, size.y, size.z}), 0.8, 1e-6);
   uint64_t triangles = 0;
   for (const auto& chunk : store->leaves()) {
-    EXPECT_TRUE(geometry::MeshChunkView::validate(store->chunk(chunk.id).bytes).ok());
+    EXPECT_TRUE(geometry::decode_chunk(store->chunk(chunk.id).bytes).ok());
     triangles += chunk.triangles;
   }
   EXPECT_EQ(triangles, info.triangles);

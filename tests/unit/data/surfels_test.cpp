@@ -19,14 +19,12 @@ using telesplat::test::Vertex;
 SurfelSource source_of(const ChunkList& chunks) {
   SurfelSource out;
   for (const auto& [id, chunk] : chunks) {
-    const auto view = *geometry::MeshChunkView::validate(chunk.bytes);
+    const auto view = geometry::decode_chunk(chunk.bytes)->view;
     out.box_room.extend(view.box_room.lo), out.box_room.extend(view.box_room.hi);
     out.triangles += view.triangles();
   }
   out.chunks = chunks.size();
-  out.chunk = [&chunks](size_t i, std::vector<uint64_t>&) {
-    return *geometry::MeshChunkView::validate(chunks[i].second.bytes);
-  };
+  out.chunk = [&chunks](size_t i) { return *geometry::decode_chunk(chunks[i].second.bytes); };
   return out;
 }
 

@@ -99,6 +99,17 @@ TEST(Terrain, ItsFileOpensAsAMeshThatStandsOnZ) {
   EXPECT_TRUE(store->info().had_colours);
 }
 
+TEST(Terrain, ItsChunksAndTheirLevelsAreSmall) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_ply(Terrain(200'000, 7), folder / "land.ply").ok());
+  const auto store = data::test::open_or_fail(folder / "land.ply", data::test::plain_options("auto"));
+  ASSERT_TRUE(store);
+  EXPECT_GT(store->chunks().size(), store->leaves().size());
+  uint64_t bytes = 0;
+  for (const geometry::ChunkInfo& chunk : store->chunks()) bytes += chunk.bytes;
+  EXPECT_LT(bytes, 18 * store->info().triangles);
+}
+
 TEST(Terrain, WhatIsNotWrittenWholeLeavesNoFile) {
   const TempFolder folder;
   const Terrain land(3001, 2);

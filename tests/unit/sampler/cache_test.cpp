@@ -78,10 +78,13 @@ TEST(ChunkCache, NeverLetsGoOfWhatTheViewNeeds) {
 }
 
 TEST(ChunkCache, PrefetchesWithinTheBudget) {
-  ChunkCache cache(350);
-  cache.reset(row());
-  EXPECT_EQ(values(cache.prefetch(true)), (std::vector<uint64_t>{9, 8, 7}));
-  cache.insert({9}, 100);
+  auto chunks = row();
+  for (auto& chunk : chunks) chunk.triangles = 10;
+  const uint64_t decoded = 10 * ChunkCache::kBytesPerTriangle;
+  ChunkCache cache(3 * ChunkCache::memory(decoded, 10) + 50);
+  cache.reset(chunks);
+  EXPECT_EQ(values(cache.prefetch(true)), (std::vector<uint64_t>{9, 8, 7})) << "coded bytes do not count";
+  cache.insert({9}, decoded);
   EXPECT_EQ(values(cache.prefetch(true)), (std::vector<uint64_t>{8, 7}));
   EXPECT_TRUE(cache.prefetch(false).empty()) << "these are all leaves";
   cache.mark_waiting({5});

@@ -19,7 +19,7 @@ namespace {
 constexpr uint64_t kSampled = 1 << 20;  // centroids of a survey, about
 // Vertices and triangles to guess by. The corners of triangles are few: vertices that come often seem to lie on a grid.
 constexpr uint64_t kGuessedBy = 1 << 16, kTrianglesGuessedBy = 1 << 12;
-constexpr size_t kBytesATriangle = 100;  // memory that a part takes while it is made
+constexpr size_t kBytesWhileMade = 100;  // memory that a part takes while it is made
 
 bool is_finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
@@ -72,6 +72,7 @@ struct ReadPart {
 class PartReader {
  public:
   PartReader(const RandomMesh& mesh, const Placing& placing) : mesh_(mesh), placing_(placing) {}
+  const RandomMesh& mesh() const { return mesh_; }
   /// own, around: ascending triangles.
   ReadPart read(const std::vector<uint32_t>& own, const std::vector<uint32_t>& around) const;
 
@@ -160,7 +161,7 @@ class PartWriter {
 
   Status write(const Progress& progress) {
     const size_t parts = partition_.around.size();
-    const size_t of_part = options_.leaf_triangles * options_.leaves * kBytesATriangle;
+    const size_t of_part = options_.leaf_triangles * options_.leaves * kBytesWhileMade;
     const size_t at_once =
         std::clamp<size_t>(options_.memory_bytes / of_part, 1, std::max(1u, std::thread::hardware_concurrency()));
     std::vector<Status> done(parts, ok_status());
@@ -170,6 +171,7 @@ class PartWriter {
       in_parallel(begin, end, [&](size_t part) { done[part] = write(part); });
       for (size_t part = begin; part < end; ++part)
         if (!done[part]) return done[part];
+      reader_.mesh().drop_pages();
     }
     return ok_status();
   }

@@ -39,7 +39,7 @@ struct OutOfCoreOptions {
   StoreOptions store;
   uint64_t memory_bytes = uint64_t{2} << 30;  ///< taken by what is being made, about
   size_t leaf_triangles = 1 << 16;            ///< in a chunk, at most
-  size_t leaves = 64;                         ///< in a part: a power of four
+  size_t leaves = 16;                         ///< in a part: a power of four
 };
 
 /// Writes the store, and completes `info`, whose content_hash and array are known. The leaves have the triangles of

@@ -152,6 +152,7 @@ bool for_blocks(const RandomMesh& mesh, const std::function<void(uint64_t, std::
     const size_t count = std::min<uint64_t>(kTriangles, mesh.triangles() - first);
     if (!mesh.corners(first, count, corners.data())) return false;
     turn(first, std::span(corners).first(3 * count));
+    mesh.drop_pages();
   }
   return true;
 }

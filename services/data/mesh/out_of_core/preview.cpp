@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "common/core/clock.h"
-#include "common/geometry/mesh_chunk.h"
+#include "common/geometry/chunk_code.h"
 #include "common/geometry/surfels.h"
 #include "common/image/normal.h"
 #include "common/parallel/in_parallel.h"
@@ -135,9 +135,12 @@ Result<std::shared_ptr<MeshStore>> make_preview(const std::string& path, const R
   if (!placing) return placing.error();
   Soup soup(mesh, *placing);
   read_spread(mesh, options, soup);
+  mesh.drop_pages();
   if (soup.triangles() == 0) return Error{fmt::format("{}: none of the triangles that were looked at is whole", path)};
   const auto chunks = soup.chunks(1 << 16);
-  const auto chunk = [&](size_t i, std::vector<uint64_t>&) { return *geometry::MeshChunkView::validate(chunks[i]); };
+  const auto chunk = [&](size_t i) {
+    return geometry::HeldChunk{*geometry::MeshChunkView::validate(chunks[i]), nullptr};
+  };
   const glm::dvec3 half = info.box_data.size() * 0.5;
   const glm::vec3 lo = placing->room(placing->centre - half), hi = placing->room(placing->centre + half);
   info.box_room = {glm::min(lo, hi), glm::max(lo, hi)};

@@ -13,8 +13,8 @@ namespace telesplat::data {
 struct PreviewOptions {
   StoreOptions store;
   std::string array;                  ///< MeshSource::array
-  uint64_t most_triangles = 1 << 20;  ///< that are read
-  double most_s = 0.8;                ///< for reading them, about; a 4096th of the mesh is read in any case
+  uint64_t most_triangles = 1 << 19;  ///< that are read
+  double most_s = 0.5;                ///< for reading them, about; a 4096th of the mesh is read in any case
 };
 
 /// Returns a store of squares that cover the cells of a grid where triangles were found: surfels (surfels.h), with the

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "common/core/descriptor.h"
+#include "common/geometry/chunk_code.h"
 #include "common/image/normal.h"
 #include "services/data/mesh/formats/readers.h"
 #include "services/data/mesh/out_of_core/build.h"
@@ -59,8 +60,8 @@ std::vector<Triangle> triangles_of(const StoreContent& store) {
   std::vector<Triangle> out;
   for (const geometry::ChunkInfo& info : store.chunks) {
     if (!info.is_leaf()) break;
-    const auto chunk =
-        *geometry::MeshChunkView::validate(store.file->bytes().subspan(store.offsets[info.id.value], info.bytes));
+    const auto held = *geometry::decode_chunk(store.chunk(info.id.value));
+    const geometry::MeshChunkView& chunk = held.view;
     for (size_t t = 0; t < chunk.triangles(); ++t) {
       Triangle& triangle = out.emplace_back();
       for (size_t k = 0; k < 3; ++k) {
@@ -68,6 +69,7 @@ std::vector<Triangle> triangles_of(const StoreContent& store) {
         std::memcpy(triangle[k].data(), &chunk.positions_room[3 * size_t{v}], 12);
         triangle[k][3] = chunk.normals[v], triangle[k][4] = chunk.colours[v];
       }
+      std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()), triangle.end());
     }
   }
   std::sort(out.begin(), out.end());
@@ -228,8 +230,8 @@ TEST(Preview, CoversTheWholeMeshFromAPartOfItsTriangles) {
   // Every vertex of the mesh lies near a square's middle: at most a cell and its height away.
   std::vector<glm::vec3> middles;
   for (const auto& info : (*made)->leaves()) {
-    const auto bytes = (*made)->chunk(info.id);
-    const auto chunk = *geometry::MeshChunkView::validate(bytes.bytes);
+    const auto held = *geometry::decode_chunk((*made)->chunk(info.id).bytes);
+    const geometry::MeshChunkView& chunk = held.view;
     for (size_t i = 0; i < chunk.indices.size(); i += 3) {
       glm::vec3 sum(0);
       for (size_t k = 0; k < 3; ++k) {

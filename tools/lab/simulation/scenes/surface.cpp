@@ -203,7 +203,7 @@ class SurfaceSampler final : public sampler::Sampler {
 
   const char* name() const override { return "ray"; }
   Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) override {
-    const auto held = sampler::hold(id, std::move(chunk));
+    const auto held = sampler::hold(id, chunk.bytes);
     if (!held) return held.error();
     boxes_[size_t(id.value)] = held->view.box_room;
     for (const Surface other : {Surface::kSpheres, Surface::kTerrain, Surface::kFence})

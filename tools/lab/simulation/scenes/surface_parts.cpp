@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "common/geometry/chunk_code.h"
 #include "common/image/normal.h"
 
 namespace telesplat::simulation {
@@ -113,7 +114,8 @@ std::vector<std::byte> chunk_bytes_of(const std::vector<SurfacePart>& parts, std
     colours.insert(colours.end(), 4, part.colours[0]);
     for (const uint32_t corner : {0, 1, 2, 0, 2, 3}) indices.push_back(first + corner);
   }
-  return geometry::build_chunk(positions, normals, colours, indices);
+  const auto laid_out = geometry::build_chunk(positions, normals, colours, indices);
+  return geometry::encode_chunk(*geometry::MeshChunkView::validate(laid_out));
 }
 
 SurfaceParts make(std::vector<SurfacePart> parts) {

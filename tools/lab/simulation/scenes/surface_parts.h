@@ -21,8 +21,8 @@ struct SurfacePart {
 
 struct SurfaceParts {
   std::vector<SurfacePart> parts;
-  std::vector<geometry::ChunkInfo> chunks;  ///< index = id; the last one is the root
-  std::vector<std::vector<std::byte>> bytes;
+  std::vector<geometry::ChunkInfo> chunks;    ///< index = id; the last one is the root
+  std::vector<std::vector<std::byte>> bytes;  ///< chunks, coded
   uint64_t triangles = 0;
   geometry::Box box_room;
 };
