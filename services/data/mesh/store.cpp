@@ -83,8 +83,7 @@ Status read_and_write(StorePlace& place, const std::string& path, const StoreOpt
   auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
   if (!mesh) return mesh.error();
   progress(kReading, 1.0);
-  for (const std::string& note : mesh->notes)
-    info.notes.push_back(note.starts_with(path + ": ") ? note.substr(path.size() + 2) : note);
+  for (const std::string& note : mesh->notes) info.notes.push_back(without_name(note, path));
   info.format = mesh->format;
   info.vertices = mesh->positions.size();
   info.had_normals = !mesh->normals.empty();

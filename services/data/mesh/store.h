@@ -90,9 +90,9 @@ class MeshStore {
     const auto& all = chunks();
     return {all.begin(), std::find_if_not(all.begin(), all.end(), [](const auto& c) { return c.is_leaf(); })};
   }
-  /// Returns a chunk, coded (geometry/chunk_code.h) and checked, in mapped memory. If it is damaged, removes the file
-  /// of the store and ends this process (end_at_damaged_file()): the next start makes the store anew. Precondition: id
-  /// is one of chunks().
+  /// Returns a chunk, coded (geometry/chunk_code.h) and checked, in mapped memory. If it is damaged, removes its store
+  /// and ends this process (end_at_damaged_file()): the next start makes the store anew. Precondition: id is one of
+  /// chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
   /// Returns the surfels of the whole mesh (surfels.h), in mapped memory.
   virtual geometry::ChunkBytes surfels() const = 0;

@@ -203,20 +203,25 @@ class PartWriter {
 };
 
 // Completes what is known before the parts are written.
-void describe(const RandomMesh& mesh, const Survey& seen, const Placing& placing, MeshStoreInfo& info) {
+void describe(const RandomMesh& mesh, const Survey& seen, const Placing& placing, const std::string& path,
+              MeshStoreInfo& info) {
   const RandomMesh::Facts& facts = mesh.facts();
   info.format = facts.format, info.arrays = facts.arrays, info.coordinates = facts.coordinates;
   info.vertices = facts.vertices - facts.unused;
   info.had_normals = facts.normals, info.had_colours = facts.colours;
   info.box_data = seen.box_data;
   info.up = placing.up, info.up_reason = placing.up_reason;
-  info.notes = facts.notes;
+  for (const std::string& note : facts.notes) info.notes.push_back(without_name(note, path));
   if (seen.not_finite > 0)
     info.notes.push_back(fmt::format("{} of {} triangles are left out: a coordinate of theirs is no finite number",
                                      seen.not_finite, seen.triangles));
 }
 
 }  // namespace
+
+std::string without_name(const std::string& note, const std::string& path) {
+  return note.starts_with(path + ": ") ? note.substr(path.size() + 2) : note;
+}
 
 Result<std::optional<Survey>> survey(const RandomMesh& mesh, const std::string& name, const ReadProgress& progress) {
   Survey out;
@@ -291,7 +296,7 @@ Result<bool> write_out_of_core(StorePlace& place, const std::string& path, const
   if (!writer) return writer.error();
   PartWriter parts(mesh, *placing, **divided, *writer, options);
   if (const Status s = parts.write(progress); !s) return failed(s.error());
-  describe(mesh, seen, *placing, info);
+  describe(mesh, seen, *placing, path, info);
   info.degenerate_dropped = parts.degenerate();
   info.triangles = seen.triangles - seen.not_finite - parts.degenerate();
   info.box_room = writer->box_room();

@@ -28,6 +28,9 @@ Result<std::optional<Survey>> survey(const RandomMesh& mesh, const std::string& 
 /// Returns a few vertices and triangles, spread over the file, to guess by (find_placing()).
 Mesh spread_sample(const RandomMesh& mesh);
 
+/// Returns a remark without the file's name before it, as stores hold it.
+std::string without_name(const std::string& note, const std::string& path);
+
 /// Where a store is made: an open, empty, writable file, and a folder with room for four bytes a triangle meanwhile.
 struct StorePlace {
   int descriptor;

@@ -10,6 +10,7 @@
 #include "common/core/descriptor.h"
 #include "common/geometry/chunk_code.h"
 #include "common/image/normal.h"
+#include "services/data/base/elevation.h"
 #include "services/data/mesh/formats/readers.h"
 #include "services/data/mesh/out_of_core/build.h"
 #include "services/data/mesh/out_of_core/partition.h"
@@ -151,6 +152,21 @@ TEST_F(OutOfCore, LeavesTangledMeshesToThoseWhoReadThemWhole) {
   const auto made = write(*random_mesh(folder_, binary_ply(mesh)), info);
   ASSERT_TRUE(made.ok());
   EXPECT_FALSE(*made);
+}
+
+TEST_F(OutOfCore, HoldsTheSameTrianglesOfARasterWithHoles) {
+  ElevationRaster raster;
+  raster.width = 120, raster.height = 110;
+  for (int i = 0; i < 120 * 110; ++i)
+    raster.heights.push_back(i % 97 == 5 ? float(kNan) : float(3 * std::sin(0.1 * (i % 120)) * std::cos(0.002 * i)));
+  raster.notes = {"mesh.ply: a remark"};
+  const Mesh mesh = *elevation_mesh(ElevationRaster(raster), {}, "mesh.ply");
+  MeshStoreInfo info;
+  ASSERT_TRUE(*write(**ElevationGrid::make(raster, {}, "mesh.ply"), info));
+  EXPECT_EQ(info.vertices, mesh.positions.size());
+  EXPECT_EQ(info.triangles, mesh.indices.size() / 3);
+  EXPECT_EQ(info.notes, std::vector<std::string>{"a remark"});
+  EXPECT_EQ(triangles_of(written()), triangles_of(whole(mesh)));
 }
 
 TEST_F(OutOfCore, HoldsTheValuesOfAnArray) {
