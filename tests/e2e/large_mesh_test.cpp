@@ -44,7 +44,7 @@ void write_hills(const std::string& path, int n) {
 
 TEST(LargeMesh, IsShownCoarselyUntilItsStoreIsMade) {
   const TemporaryFolder folder;
-  write_hills(folder / "hills.ply", 1650);
+  write_hills(folder / "hills.ply", 1700);
   ASSERT_GT(std::filesystem::file_size(folder / "hills.ply"), 100u << 20);
   const std::vector<std::string> flags{"--duration", "0",        "--trajectory", "still",   "--up",
                                        "z",          "--verify", "20",           "--cache", folder / "cache"};
