@@ -87,10 +87,11 @@ Status Pipeline::set_samplers(int count) {
 // Starts no server if there is no data set yet.
 Status Pipeline::start_data() {
   const RunOptions& o = options_;
+  // As the packer: a store that is being made is worth a little delay of frames.
+  const int nice = o.viewer.xr.on ? kServersNice : kServersNice / 2;
   for (int i = 0; i < o.data_servers && !o.data.scene.empty(); ++i) {
     const std::string name = o.data_servers == 1 ? "data" : fmt::format("data-{}", i + 1);
-    if (const Status s =
-            group_.start({.role = "data", .name = name, .arguments = data_arguments(o, i), .nice = kServersNice});
+    if (const Status s = group_.start({.role = "data", .name = name, .arguments = data_arguments(o, i), .nice = nice});
         !s)
       return s;
   }
