@@ -50,7 +50,7 @@ inline constexpr uint32_t kStoreVersion = 11;
 
 /// Bytes a triangle that a store with its levels takes, about.
 inline constexpr uint64_t kBytesATriangle = 22;
-/// Error, starting with `name`: the open file's file system has no room for the store of that many triangles.
+/// Checks that the disk of the open file has room for a store of that many triangles. The error starts with `name`.
 Status check_room(int descriptor, const std::string& name, uint64_t triangles);
 
 /// Writes a store into an open, empty, writable file: its leaves, then what is made of them. After a failure (disk
