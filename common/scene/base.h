@@ -5,10 +5,10 @@
 
 namespace telesplat::scene {
 
-/// Surfels that the base is to have, about; 0: the session has no base.
-inline uint64_t base_points(const wire::Welcome& session) {
+/// Triangles that the base is to have at most; 0: the session has no base.
+inline uint64_t base_triangles(const wire::Welcome& session) {
   const bool has_base = SessionView(session).kind() == Kind::kMesh && !session.settings.keep_redundant;
-  return has_base ? session.settings.base_points : 0;
+  return has_base ? session.settings.base_triangles : 0;
 }
 
 }  // namespace telesplat::scene

@@ -1,44 +1,73 @@
-// The picture of a draw list's coarse points: drawn at a quarter of the resolution or less, and shown in pixels that
-// the other points leave empty. Coarse points are too far apart for splats of full resolution.
+// The picture of the base, drawn at half the resolution or less, and shown in pixels that points leave empty.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/geometry/camera.h"
+#include "common/geometry/clip.h"
+#include "common/image/shading.h"
+#include "common/splat/base_mesh.h"
 #include "common/splat/finish.h"
+
+namespace telesplat {
+class Crew;
+}
 
 namespace telesplat::splat {
 
-/// A backdrop has a quarter to a sixteenth of the picture's pixels a side.
-inline constexpr int kLeastHalvings = 2, kMostHalvings = 4;
-
-/// The camera of a backdrop: each of its pixels covers 2^halvings x 2^halvings pixels of the picture.
-inline geometry::Camera backdrop_camera(geometry::Camera camera, int halvings) {
-  for (int n = 0; n < halvings; ++n) camera = geometry::half_size(camera);
-  return camera;
-}
-
-/// Chooses a model's points for the backdrop of a picture, and its resolution: splats are a few pixels wide.
-/// options: those of the picture.
-void select_coarse(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
-                   DrawList& out);
-
 struct Backdrop {
-  geometry::Camera camera;
-  int halvings = kLeastHalvings;
-  std::vector<uint32_t> colour;  ///< 0xffRRGGBB
-  std::vector<float> depth_m;    ///< +infinity: empty
-  std::vector<uint8_t> whole;    ///< 1: the pixel, the next one, and those below them are covered
-  /// Finds `whole`.
-  void find_whole();
+  geometry::Camera camera;  ///< each of its pixels covers 2^halvings x 2^halvings pixels of the picture
+  int halvings = 1;
+  std::vector<uint32_t> colour;   ///< 0x00RRGGBB
+  std::vector<float> reciprocal;  ///< 1 / depth in metres; 0: empty
+  std::vector<float> limit_m;     ///< depth beyond which points are seen through the surface; +infinity: no point is
 };
 
-/// Kernel and finish of backdrops.
-inline constexpr RenderOptions kBackdrop{.kernel = Kernel::kEllipse, .finish = {.antialias = false}};
+/// Draws triangles, both sides, shaded at their corners. Keeps its buffers from picture to picture.
+class BackdropPainter {
+ public:
+  /// clip: what is cut away is not drawn. picture: camera of the picture that the backdrop is for.
+  void paint(const BaseMesh& mesh, const geometry::Clip& clip, const geometry::Camera& picture,
+             const image::Shading& shading, Crew& crew, Backdrop& out);
 
-/// Fills the empty pixels of a resolved tile, grown by `grow` pixels: bilinear between the backdrop's pixels of one
-/// surface, where the four around a pixel are covered.
+ private:
+  // A vertex in homogeneous pixels: (x w, y w, w), w its depth in metres.
+  struct Corner {
+    float xw, yw, w;
+    float x, y;  // pixels, if it lies beyond the near plane
+    uint32_t colour;
+    bool is_lit;  // it has its colour
+  };
+  struct Bounds {
+    int left, right, top, bottom;  // the last ones included
+  };
+  struct Drawn {
+    uint32_t first;  // index of its first corner in BasePart::indices
+    Bounds bounds;
+  };
+  // A part of the mesh that may be in view.
+  struct Seen {
+    const BasePart* part;
+    const std::vector<uint64_t>* hidden;  // or null
+    size_t first;                         // its vertices in corners_
+    bool clipped;                         // some of it is cut away
+    std::vector<float> inside_m;          // clipped: distance from each plane, of each vertex
+    std::vector<Drawn> drawn;
+  };
+  struct Band;
+  void transform(Seen& seen, const geometry::Clip& clip, const geometry::Camera& camera, const image::Shading& shading);
+
+  static std::optional<Bounds> bounds_of(const Corner* const (&c)[3], const geometry::Camera& camera);
+
+  std::vector<Seen> seen_;
+  std::vector<Corner> corners_;
+};
+
+/// Fills the pixels of a resolved tile, grown by `grow` pixels, that are empty, or whose point lies beyond the
+/// backdrop's limit, where the backdrop's pixel there is covered: bilinear between the pixels of its surface.
 ///   rect: where the tile lies in the picture; near_m: of its camera.
 void fill_from(const Backdrop& backdrop, const geometry::Rect& rect, float near_m, const ResolvedTile& tile, int grow);
 

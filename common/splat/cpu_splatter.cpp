@@ -102,8 +102,6 @@ struct CpuSplatter::Impl {
   TileCounts splat(const TileInput& input, const ResolvedTile& tile, const Sight& sight, Workspace& workspace);
   void draw_tile(int index, const DrawList& list, const Sight& sight, const FrameTarget& target, Workspace& workspace);
   void finish_tile(const ResolvedTile& tile, const geometry::Rect& rect, const Sight& sight, Workspace& workspace);
-  SplatStats draw_backdrop(const DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
-                           Backdrop& out);
   SplatStats render(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                     const image::Shading& shading, std::span<const FrameTarget> targets);
   SplatStats render_halved(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
@@ -112,7 +110,7 @@ struct CpuSplatter::Impl {
   std::shared_ptr<Crew> shared;
   Crew& crew;
   std::vector<Workspace> workspaces;
-  std::unique_ptr<Impl> coarse;  // draws backdrops, with the same threads; null: none was drawn yet
+  BackdropPainter painter;
 
   // The frame.
   const KernelTraits* kernel = nullptr;
@@ -299,30 +297,17 @@ SplatStats& SplatStats::operator+=(const SplatStats& other) {
   return *this;
 }
 
-SplatStats CpuSplatter::Impl::draw_backdrop(const DrawList& list, const geometry::Camera& camera,
-                                            const image::Shading& shading, Backdrop& out) {
-  if (!coarse) coarse = std::make_unique<Impl>(shared);
-  out.halvings = list.coarse->halvings;
-  out.camera = backdrop_camera(camera, out.halvings);
-  out.colour.resize(static_cast<size_t>(out.camera.width) * static_cast<size_t>(out.camera.height));
-  out.depth_m.resize(out.colour.size());
-  const FrameTarget target{out.camera.width, out.camera.height, out.colour.data(), out.depth_m.data()};
-  const SplatStats stats = coarse->render(*list.coarse, {&out.camera, 1}, kBackdrop, shading, {&target, 1});
-  out.find_whole();
-  return stats;
-}
-
 SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geometry::Camera> cameras,
                                      const RenderOptions& options, const image::Shading& shading,
                                      std::span<const FrameTarget> targets) {
   for (size_t i = 0; i < cameras.size(); ++i)
     CHECK(targets[i].width == cameras[i].width && targets[i].height == cameras[i].height && targets[i].colour);
   SplatStats sum;
-  for (size_t i = 0; i < cameras.size(); ++i) {
-    sights[i].has_backdrop = has_coarse(list);
-    if (has_coarse(list)) sum += draw_backdrop(list, cameras[i], shading, sights[i].backdrop);
-  }
   const double start = monotonic_s();
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    sights[i].has_backdrop = has_base(list);
+    if (has_base(list)) painter.paint(*list.base, list.base_clip, cameras[i], shading, crew, sights[i].backdrop);
+  }
   prepare(list, cameras, options, shading);
   const double prepare_ms = (monotonic_s() - start) * 1e3;
   for (Workspace& w : workspaces) {

@@ -7,7 +7,7 @@
 
 namespace telesplat::wire {
 
-inline constexpr uint64_t kProtocolVersion = 19;
+inline constexpr uint64_t kProtocolVersion = 20;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions
@@ -28,7 +28,8 @@ inline constexpr uint64_t kMaxBuffers = 8;            ///< buffers of a loosely 
 inline constexpr size_t kSealWords = 4;               ///< words of a lease's seal: 16 bytes
 inline constexpr size_t kLeaseKeyWords = 8;           ///< words of the key that seals leases: 32 bytes
 inline constexpr uint64_t kMaxBaseParts = 4096;       ///< parts of a base
-inline constexpr uint64_t kBaseStride = 16;           ///< part 0 of a base has one surfel in this many
+inline constexpr uint64_t kMaxBaseTriangles = 1u << 22;  ///< triangles of a base
+inline constexpr uint64_t kBasePart = 4096;           ///< triangles of a part of a base, at most
 inline constexpr size_t kMaxViews = 64;               ///< viewers that one sampling frame of a volume serves
 
 /// A bulk field. When encoding it points to the sender's bytes; when decoded it points into the received frame.

@@ -143,30 +143,37 @@ struct BaseRequest {
   static constexpr std::string_view kName = "base_request";
   InstanceId viewer;
   uint64_t base = 0;  ///< base that the viewer has begun; 0: none yet
-  uint64_t part = 0, parts = 1;  ///< the first one; their number, at most kMaxBaseParts, 0: only hidden surfels
+  uint64_t part = 0, parts = 1;  ///< the first one; their number, at most kMaxBaseParts, 0: only what is hidden
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("base", m.base); f("part", m.part); f("parts", m.parts);
   }
 };
-/// Packer -> viewer: surfels of the base, the coarse form of the whole data set. Part 0 has every kBaseStride-th one.
+/// Packer -> viewers (PUB, now and then, and in answer to a request for another base): the base, the coarse form of
+/// the whole data set, is this one.
+struct BaseBegin {
+  static constexpr std::string_view kName = "base_begin";
+  InstanceId packer;
+  uint64_t base = 0;    ///< counts bases: another scene or colouring has another one
+  uint64_t coarse = 0;  ///< the first parts: a coarser form of the whole, until the others have come; less than parts
+  uint64_t parts = 0;   ///< 0: there is no base
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("base", m.base); f("coarse", m.coarse); f("parts", m.parts);
+  }
+};
+/// Packer -> viewer: some triangles of the base. Triangle i of part n has the number kBasePart n + i.
 struct BasePart {
   static constexpr std::string_view kName = "base_part";
   static constexpr bool kBulk = true;
   InstanceId packer;
-  uint64_t base = 0;  ///< counts bases: another scene or colouring has another one
-  uint64_t part = 0, parts = 1;
-  uint64_t surfels = 0;  ///< surfels of the whole base
-  uint64_t depth = 0;    ///< octree levels of its leaves' keys
-  geometry::Box box_room;  ///< box of that octree (points::ModelConfig)
-  double spacing_m = 0;  ///< side of the cells that surfels are means of
-  Bytes surfel_data;     ///< codec::encode_surfels(); SurfelLeaf::first: number of the leaf's first surfel in the base
+  uint64_t base = 0, part = 0;
+  double error_m = 0;  ///< how far the surface may lie from these triangles, about
+  Bytes mesh;          ///< a coded chunk with colours (geometry/chunk_code.h)
   template <class F> static void fields(F& f, auto& m) {
-    f("packer", m.packer); f("base", m.base); f("part", m.part); f("parts", m.parts); f("surfels", m.surfels);
-    f("depth", m.depth); f("box_room", m.box_room); f("spacing_m", m.spacing_m);
-    f("surfel_data", m.surfel_data, kMaxBulkBytes);
+    f("packer", m.packer); f("base", m.base); f("part", m.part); f("error_m", m.error_m);
+    f("mesh", m.mesh, kMaxBulkBytes);
   }
 };
-/// Packer -> viewers (PUB, and in answer to a request for part 0): surfels of the base that are hidden, because rays
+/// Packer -> viewers (PUB, and in answer to a request for part 0): triangles of the base that are hidden, because rays
 /// passed them. Words that are not named stay as they were.
 struct BaseHidden {
   static constexpr std::string_view kName = "base_hidden";
@@ -175,7 +182,7 @@ struct BaseHidden {
   uint64_t base = 0;
   uint64_t number = 0;  ///< counts these messages on PUB; in an answer: number of the newest one that it includes
   bool whole = false;   ///< words that are not named are 0
-  /// Three numbers each: index i, then 64 bits of the surfels from 64 i on, low half first.
+  /// Three numbers each: index i, then 64 bits of the triangles from 64 i on, low half first.
   std::vector<uint32_t> words;
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("base", m.base); f("number", m.number); f("whole", m.whole); f("words", m.words);

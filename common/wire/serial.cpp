@@ -4,7 +4,6 @@
 
 #include <array>
 
-#include "common/geometry/surfels.h"
 #include "common/wire/decoder.h"
 #include "common/wire/encoder.h"
 
@@ -75,7 +74,7 @@ std::optional<Error> check(const M&) {
 std::optional<Error> check(const Welcome& m) {
   const SessionSettings& s = m.settings;
   for (const Setting& row : {Setting{"max_points", double(s.max_points), 0, 1e12},
-                             {"base_points", double(s.base_points), 0, double(geometry::kMaxSurfels)},
+                             {"base_triangles", double(s.base_triangles), 0, double(kMaxBaseTriangles)},
                              {"obsolete_after_s", s.obsolete_after_s, 0, 1e12},
                              {"max_rate_mbit", s.max_rate_mbit, 0, 1e6},
                              {"view_cell_m", s.view_cell_m, 0, 1e3},
@@ -156,22 +155,21 @@ std::optional<Error> check(const BaseRequest& m) {
   return Error{fmt::format("{} parts from {} on, limit {}", m.parts, m.part, kMaxBaseParts)};
 }
 
+std::optional<Error> check(const BaseBegin& m) {
+  if (m.parts > kMaxBaseParts) return Error{fmt::format("{} parts, limit {}", m.parts, kMaxBaseParts)};
+  if (m.coarse == 0 || m.coarse < m.parts) return {};
+  return Error{fmt::format("{} of {} parts are coarse ones", m.coarse, m.parts)};
+}
+
 std::optional<Error> check(const BasePart& m) {
-  if (m.parts == 0 || m.parts > kMaxBaseParts || m.part >= m.parts)
-    return Error{fmt::format("part {} of {} is out of range, limit {}", m.part, m.parts, kMaxBaseParts)};
-  if (m.surfels == 0 || m.surfels > geometry::kMaxSurfels)
-    return Error{fmt::format("{} surfels, limits 1 and {}", m.surfels, geometry::kMaxSurfels)};
-  return {};
+  if (m.part >= kMaxBaseParts) return Error{fmt::format("part {}, limit {}", m.part, kMaxBaseParts)};
+  if (m.error_m >= 0 && m.error_m < 1e6) return {};
+  return Error{fmt::format("an error of {} m, limits 0 and 1e6", m.error_m)};
 }
 
 std::optional<Error> check(const BaseHidden& m) {
   if (m.words.size() % 3 == 0) return {};
   return Error{fmt::format("{} numbers are not a multiple of three", m.words.size())};
-}
-
-std::optional<Error> check(const SurfelRequest& m) {
-  if (m.most >= 1 && m.most <= geometry::kMaxSurfels) return {};
-  return Error{fmt::format("{} surfels, limits 1 and {}", m.most, geometry::kMaxSurfels)};
 }
 
 std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.frames); }

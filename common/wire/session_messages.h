@@ -62,7 +62,7 @@ struct SessionSettings {
   bool keep_redundant = false;  ///< also packs points that the model shows already (T7.3)
   uint64_t max_points = 20'000'000;  ///< least recently drawn clusters are forgotten above it; 0: no limit
   double obsolete_after_s = 0;  ///< clusters that nothing drew for longer are forgotten (T4.3.3); 0: never
-  uint64_t base_points = 400'000;  ///< surfels of the coarse form of the whole data set in each viewer; 0: none
+  uint64_t base_triangles = 400'000;  ///< most triangles of the coarse form of the mesh in each viewer; 0: none
   PointErrors errors;
   double max_rate_mbit = 0;  ///< wished rate to each viewer; 0: as much as its link carries
   // Sampling.
@@ -85,7 +85,7 @@ struct SessionSettings {
   bool operator==(const SessionSettings&) const = default;
   template <class F> static void fields(F& f, auto& m) {
     f("keep_redundant", m.keep_redundant); f("max_points", m.max_points);
-    f("base_points", m.base_points);
+    f("base_triangles", m.base_triangles);
     f("obsolete_after_s", m.obsolete_after_s); f("depth_error", m.errors.depth);
     f("normal_error", m.errors.normal); f("colour_error", m.errors.colour); f("max_rate_mbit", m.max_rate_mbit);
     f("steering", m.steering); f("view_cell_m", m.view_cell_m); f("validation", m.validation);

@@ -193,7 +193,7 @@ struct FrameEnd {
   }
 };
 
-// ---- blocks of a mesh: sampler (DEALER) <-> data (ROUTER) ----------------------------------------------------------
+// ---- blocks of a mesh: sampler, packer (DEALER) <-> data (ROUTER) --------------------------------------------------
 
 /// array: the array that colours the mesh in this epoch (scene::Colouring::array): the chunks hold that array's values
 /// in place of colours; empty: the file's own colours. A data server that does not have it does not answer.
@@ -228,29 +228,6 @@ struct Chunk {
   Bytes data;  ///< layout: geometry/mesh_chunk.h; empty if the server has no such chunk
   template <class F> static void fields(F& f, auto& m) {
     f("epoch", m.epoch); f("chunk", m.chunk); f("data", m.data, kMaxBulkBytes);
-  }
-};
-
-// ---- the coarse form of a mesh: packer (DEALER) <-> data (ROUTER) ---------------------------------------------------
-
-/// A data server answers once the surfels are made; the packer repeats its request.
-struct SurfelRequest {
-  static constexpr std::string_view kName = "surfel_request";
-  EpochId epoch;
-  std::string array;      ///< as ChunkListRequest::array
-  uint64_t most = 0;      ///< surfels wished, at most geometry::kMaxSurfels
-  template <class F> static void fields(F& f, auto& m) {
-    f("epoch", m.epoch); f("array", m.array); f("most", m.most);
-  }
-};
-struct Surfels {
-  static constexpr std::string_view kName = "surfels";
-  static constexpr bool kBulk = true;
-  EpochId epoch;
-  std::string array;
-  Bytes data;  ///< layout: geometry/surfels.h; empty: the mesh has no surface
-  template <class F> static void fields(F& f, auto& m) {
-    f("epoch", m.epoch); f("array", m.array); f("data", m.data, kMaxBulkBytes);
   }
 };
 

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <optional>
 
-#include "common/geometry/surfels.h"
 #include "common/image/background.h"
 #include "common/image/shading.h"
 #include "common/scene/clip_order.h"
@@ -197,10 +196,10 @@ options::Table packing_table(wire::SessionSettings& s) {
            .help = "points the model holds at most; 0: no limit",
            .limits = options::Range{0.0, 1e12},
            .fits = points},
-          {.flag = "--base-points",
-           .value = &s.base_points,
-           .help = "points of the coarse form of the whole data set that each viewer holds; 0: none",
-           .limits = options::Range{0.0, double(geometry::kMaxSurfels)},
+          {.flag = "--base-triangles",
+           .value = &s.base_triangles,
+           .help = "triangles of the coarse form of the whole mesh that each viewer holds, at most; 0: none",
+           .limits = options::Range{0.0, double(wire::kMaxBaseTriangles)},
            .fits = points},
           {.flag = "--packing.obsolete_after_s",
            .value = &s.obsolete_after_s,

@@ -28,9 +28,10 @@ void expect_whole_base(const PipelineRun& run) {
   auto file = viewer::RecordReader::open(run.out() + "/points.events", {"TSEVENT5"}, "a record of point-model events");
   viewer::BaseReplica base([](const wire::BaseRequest&) {});
   while (file->next()) {
+    const auto body = std::as_bytes(std::span(file->body()));
+    if (file->type() == wire::BaseBegin::kName) base.take(*wire::decode<wire::BaseBegin>(body), 0);
     if (file->type() != wire::BasePart::kName) continue;
-    const auto part = wire::decode<wire::BasePart>(std::as_bytes(std::span(file->body())));
-    EXPECT_TRUE(base.take(*part, 0).ok());
+    EXPECT_TRUE(base.take(*wire::decode<wire::BasePart>(body), 0).ok());
   }
   EXPECT_TRUE(base.complete());
 }

@@ -225,7 +225,6 @@ class OneChunk final : public MeshStore {
   const MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
   geometry::ChunkBytes chunk(ChunkId) const override { return {*bytes_, bytes_}; }
-  geometry::ChunkBytes surfels() const override { return {}; }
 
  private:
   MeshStoreInfo info_;

@@ -106,8 +106,8 @@ class BaseWatch final : public Observer {
  public:
   void on_frame(Part, SimulatedViewer& viewer, const viewer::DrawnFrame&, double) override {
     splat::DrawList list;
-    dynamic_cast<viewer::ReceivedPoints&>(*viewer.received()).cache().select_base(viewer.camera(), {}, list);
-    if (shown.empty() || shown.back() != (list.points > 0)) shown.push_back(list.points > 0);
+    dynamic_cast<viewer::ReceivedPoints&>(*viewer.received()).cache().select_part(viewer.camera(), {}, list);
+    if (shown.empty() || shown.back() != splat::has_base(list)) shown.push_back(splat::has_base(list));
   }
   std::vector<bool> shown;
 };

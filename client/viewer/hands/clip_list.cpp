@@ -70,8 +70,8 @@ uint32_t keep_inside(const LeafPlanes& planes, splat::DrawItem& item, splat::Dra
 
 void clip_list(const geometry::Clip& clip, splat::DrawList& list) {
   list.held.clear();
+  list.base_clip = clip;
   if (clip.empty()) return;
-  if (list.coarse) clip_list(clip, *list.coarse);
   const points::Cluster* cluster = nullptr;
   Part part = Part::kAll;
   std::optional<LeafPlanes> planes;  // the planes on the cluster's steps
@@ -87,7 +87,6 @@ void clip_list(const geometry::Clip& clip, splat::DrawList& list) {
     list.points += count;
     return count == 0;
   });
-  if (list.coarse) list.points += list.coarse->points;
 }
 
 }  // namespace telesplat::viewer

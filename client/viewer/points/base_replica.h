@@ -1,18 +1,15 @@
-// A viewer's replica of the base, the coarse form of the whole data set: asks the packer for its parts, and keeps the
-// numbers of hidden surfels. Messages come in, requests and mosaics of leaves go out; no sockets, no clocks.
+// A viewer's replica of the base, the coarse form of the whole data set: asks the packer for its parts. Messages come
+// in, requests and meshes go out; no sockets, no clocks.
 #pragma once
 
 #include <cstdint>
 #include <functional>
-#include <map>
-#include <optional>
-#include <set>
+#include <memory>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
-#include "common/codec/surfel_codec.h"
-#include "common/points/point_model.h"
+#include "common/core/result.h"
+#include "common/splat/base_mesh.h"
 #include "common/wire/point_messages.h"
 
 namespace telesplat::viewer {
@@ -21,8 +18,6 @@ class BaseReplica {
  public:
   static constexpr uint64_t kWindow = 4;    ///< parts under way
   static constexpr double kPatience_s = 1;  ///< after which a request is repeated
-  /// Mosaics' spacing over that of the surfels: means of neighbouring cells lie up to that far apart.
-  static constexpr float kSpread = 1.2f;
 
   /// Sends a request; the caller fills in the viewer.
   explicit BaseReplica(std::function<void(wire::BaseRequest)> ask) : ask_(std::move(ask)) {}
@@ -33,57 +28,39 @@ class BaseReplica {
   void start(double now_s);
   /// Asks again for what did not come.
   void tick(double now_s);
-  /// Error: the part cannot be decoded, or contradicts earlier ones.
-  Status take(const wire::BasePart& part, double now_s);
+  void take(const wire::BaseBegin& begin, double now_s);
   void take(const wire::BaseHidden& hidden, double now_s);
-  /// True once all parts have come.
-  bool complete() const { return came_count_ > 0 && came_count_ == came_.size(); }
+  /// Error: the part cannot be decoded, or lies beyond its limits.
+  Status take(const wire::BasePart& part, double now_s);
 
   /// True once a base has begun.
-  bool known() const { return config_.has_value(); }
-  /// The octree of its leaves. Precondition: known().
-  const points::ModelConfig& config() const { return *config_; }
-  /// Counts bases; each begins empty.
-  uint64_t number() const { return count_; }
-  /// Returns the leaves that changed since the last call, at most `most`, with the mosaic of their surfels that are not
-  /// hidden; nullopt: all are hidden.
-  std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> take_changes(size_t most);
+  bool known() const { return !parts_.empty(); }
+  /// True once all parts have come.
+  bool complete() const { return known() && came_ == parts_.size(); }
+  /// Changes whenever mesh() does.
+  uint64_t changes() const { return changes_; }
+  /// Returns the coarse parts that have come, or, once all others have, those. Null: none has come.
+  std::shared_ptr<const splat::BaseMesh> mesh() const;
 
  private:
-  struct Leaf {
-    uint32_t first = 0;   // number of its first surfel in the base
-    uint32_t stride = 1;  // wire::kBaseStride while only part 0 has come
-    std::vector<codec::LeafSurfel> surfels;
-    /// Returns the number of its surfel i in the base.
-    uint32_t number(size_t i) const { return first + stride * static_cast<uint32_t>(i); }
-  };
-  bool is_older(InstanceId packer, uint64_t base) const { return packer == packer_ && base < base_; }
-  void begin(InstanceId packer, uint64_t base);
   void ask(uint64_t part, uint64_t parts, double now_s);
-  void set_word(uint32_t index, uint64_t word, uint64_t number);
-  std::optional<points::Mosaic> mosaic(const Leaf& leaf);
+  void set_word(uint32_t index, uint64_t bits, uint64_t number);
 
   std::function<void(wire::BaseRequest)> ask_;
   InstanceId packer_;
   uint64_t base_ = 0;  // the packer's number; 0: not known
-  uint64_t count_ = 0;
-  std::optional<points::ModelConfig> config_;
-  double spacing_m_ = 0;
-  std::vector<bool> came_;  // parts
-  size_t came_count_ = 0;
-  uint64_t asked_ = 0;  // parts before it were asked for
-  double heard_s_ = 0;
-  bool active_ = false;  // start() was called
-  bool expected_ = true;
-  std::unordered_map<points::ClusterKey, Leaf> leaves_;
-  std::map<uint32_t, points::ClusterKey> order_;  // leaves by Leaf::first
+  std::vector<std::shared_ptr<const splat::BasePart>> parts_;
   struct Word {
     uint64_t bits = 0, number = 0;
   };
   std::unordered_map<uint32_t, Word> hidden_;
   uint64_t published_ = 0;  // newest wire::BaseHidden::number; 0: none
-  std::set<points::ClusterKey> changed_;
-  uint64_t mosaics_ = 0;
+  size_t coarse_ = 0, came_ = 0;
+  uint64_t asked_ = 0;  // parts before it were asked for
+  uint64_t changes_ = 0;
+  double heard_s_ = 0;
+  bool active_ = false;  // start() was called
+  bool expected_ = true;
 };
 
 }  // namespace telesplat::viewer

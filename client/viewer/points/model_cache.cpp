@@ -171,45 +171,13 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
   return made;
 }
 
-void ModelCache::begin_base(const points::ModelConfig& config) {
-  auto fresh = std::make_unique<points::PointModel>(config);
+bool ModelCache::set_base(std::shared_ptr<const splat::BaseMesh> base) {
   const std::lock_guard lock(mutex_);
-  if (base_) parked_.models.push_back(std::move(base_));
-  base_ = std::move(fresh);
+  if (!base && !base_) return false;
+  base_ = std::move(base);
   ++summaries_made_;
   note_replica();
-}
-
-void ModelCache::end_base() {
-  const std::lock_guard lock(mutex_);
-  if (!base_) return;
-  parked_.models.push_back(std::move(base_));
-  ++summaries_made_;
-  note_replica();
-}
-
-void ModelCache::put_base(std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> leaves) {
-  if (leaves.empty()) return;
-  points::Insertion insertion;
-  std::vector<points::ClusterKey> emptied;
-  for (auto& [key, mosaic] : leaves) {
-    if (!mosaic) {
-      emptied.push_back(key);
-      continue;
-    }
-    auto& change = insertion.changes.emplace_back();
-    change.key = key;
-    if (base_->find(key)) change.replaced = {0};
-    change.added.push_back(*std::move(mosaic));
-  }
-  const std::lock_guard lock(mutex_);
-  for (const auto& leaf : leaves) note_change(points::leaf_box(base_->config(), leaf.first));
-  Dropped& place = parked_;  // every frame may draw the base
-  auto replaced = base_->commit(std::move(insertion));
-  move_to_end(replaced, place.mosaics);
-  auto dropped = base_->take_out(emptied);
-  move_to_end(dropped, place.clusters);
-  ++summaries_made_;
+  return true;
 }
 
 uint64_t ModelCache::digest() const { return newest_.model ? newest_.model->digest() : 0; }
@@ -226,15 +194,7 @@ void ModelCache::select_displayed(const geometry::Camera& camera, const splat::S
   out.replica = replica.number;
   out.summaries = summaries_made_;
   drawn_ = replica.model.get();
-  select_base(camera, options, out);
-}
-
-void ModelCache::select_base(const geometry::Camera& camera, const splat::SelectionOptions& options,
-                             splat::DrawList& out) const {
-  if (!base_ || base_->points() == 0) return out.coarse.reset();
-  if (!out.coarse) out.coarse = std::make_shared<splat::DrawList>();
-  splat::select_coarse(*base_, camera, options, *out.coarse);
-  out.points += out.coarse->points;
+  out.base = base_;
 }
 
 void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {

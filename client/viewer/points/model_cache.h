@@ -64,15 +64,10 @@ class ModelCache {
   /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Precondition:
   /// no other thread changes the cache. Returns the bricks whose summaries were made, in order.
   std::vector<points::ClusterKey> summarise(size_t most);
-  /// Chooses the base's points for a picture; nothing else of the list changes, but its number of points.
-  void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const;
   /// Summaries made so far, and changes of the base.
   uint64_t summaries_made() const { return summaries_made_; }
-  /// Begins a base (base_replica.h) without points, in place of the one before.
-  void begin_base(const points::ModelConfig& config);
-  void end_base();
-  /// Replaces the base's points in these leaves; nullopt: by nothing.
-  void put_base(std::vector<std::pair<points::ClusterKey, std::optional<points::Mosaic>>> leaves);
+  /// Draws this base from now on; null: none. False: it is the one that is drawn, or still none.
+  bool set_base(std::shared_ptr<const splat::BaseMesh> base);
   /// Digest of the newest replica; 0: there is no replica. The display may draw meanwhile: it changes no points.
   uint64_t digest() const;
 
@@ -129,7 +124,7 @@ class ModelCache {
   mutable std::mutex mutex_;
   Replica newest_, older_;  // older_ is set only while it is on display instead of the newest
   const points::PointModel* drawn_ = nullptr;
-  std::unique_ptr<points::PointModel> base_;
+  std::shared_ptr<const splat::BaseMesh> base_;
   Dropped parked_, free_;
   uint64_t replicas_ = 0, patches_ = 0, summaries_made_ = 0;
   std::vector<points::ClusterKey> wanted_;  // requested summaries of the newest replica

@@ -52,7 +52,7 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
   }
   // The packer's first event for another model may have come before this, and with it a replica of the old model. A new
   // connection does not bring what was sent on the old one, such as the end of the base.
-  const bool another = config_ != config && receiver_.begun(), has_base = scene::base_points(session) > 0;
+  const bool another = config_ != config && receiver_.begun(), has_base = scene::base_triangles(session) > 0;
   if (another) links_.feeds.close();
   config_ = config;
   keeps_redundant_ = keep;

@@ -39,18 +39,18 @@ void PointReceiver::apply_base(const M& message) {
 }
 
 // The record has it as a message, so that a replay drops the base, too.
-void PointReceiver::drop_base() { apply_base(wire::BaseHidden{.packer = {}, .whole = true, .words = {}}); }
+void PointReceiver::drop_base() { apply_base(wire::BaseBegin{}); }
 
 void PointReceiver::receive_events(net::Socket& patches, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = patches.receive();
     if (!message) return;
     using namespace wire;
-    net::dispatch<Patch, Forget, Refine, EpochBegin, StateMark, BaseHidden>(patches, *message, [&](auto& m) {
+    net::dispatch<Patch, Forget, Refine, EpochBegin, StateMark, BaseBegin, BaseHidden>(patches, *message, [&](auto& m) {
       using M = std::decay_t<decltype(m)>;
       if constexpr (std::is_same_v<M, StateMark>)
         on_published_mark(m);
-      else if constexpr (std::is_same_v<M, BaseHidden>)
+      else if constexpr (std::is_same_v<M, BaseBegin> || std::is_same_v<M, BaseHidden>)
         apply_base(m);
       else
         sequencer_.on_published({m, message->owner, message->arrived_s});
@@ -80,14 +80,15 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
     if (!message) return;
     asked_s_ = monotonic_s();  // an answer that still comes in is not late
     using namespace wire;
-    net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark, BasePart, BaseHidden>(
+    net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark, BasePart, BaseBegin, BaseHidden>(
         state, *message, [&](auto& m) {
           using M = std::decay_t<decltype(m)>;
           if constexpr (std::is_same_v<M, StateMark>)
             sequencer_.on_mark(m);
           else if constexpr (std::is_same_v<M, StateBegin>)
             sequencer_.on_answer(m);
-          else if constexpr (std::is_same_v<M, BaseHidden> || std::is_same_v<M, BasePart>)
+          else if constexpr (std::is_same_v<M, BaseBegin> || std::is_same_v<M, BaseHidden> ||
+                             std::is_same_v<M, BasePart>)
             apply_base(m);
           else
             sequencer_.on_replayed({m, message->owner, message->arrived_s});

@@ -4,8 +4,8 @@
 
 #include <cstring>
 
+#include "client/viewer/points/base_replica.h"
 #include "client/viewer/points/event_sequencer.h"
-#include "client/viewer/points/received_base.h"
 #include "common/codec/depth_codec.h"
 #include "common/refinement/bounded_patches.h"
 #include "common/wire/serial.h"
@@ -65,6 +65,10 @@ void EventRecorder::add(const wire::BasePart& part) {
   if (!file_.full()) file_.write(wire::BasePart::kName, wire::encode(part));
 }
 
+void EventRecorder::add(const wire::BaseBegin& begin) {
+  if (!file_.full()) file_.write(wire::BaseBegin::kName, wire::encode(begin));
+}
+
 void EventRecorder::add(const wire::BaseHidden& hidden) {
   if (!file_.full()) file_.write(wire::BaseHidden::kName, wire::encode(hidden));
 }
@@ -85,8 +89,8 @@ struct EventReplay::Impl {
   bool has_events = false;  // the replica at hand has an event
   image::DepthImage tile;
   refinement::BoundedPatches bounded;
-  ModelCache cache;  // holds the base alone
-  ReceivedBase base{cache, [](const wire::BaseRequest&) {}};
+  BaseReplica base{[](const wire::BaseRequest&) {}};
+  std::shared_ptr<const splat::BaseMesh> shown_base;
 
   const std::string& type() const { return file.type(); }
   const std::string& body() const { return file.body(); }
@@ -166,7 +170,11 @@ struct EventReplay::Impl {
   Result<bool> take_base() {
     const auto message = wire::decode<M>({reinterpret_cast<const std::byte*>(body().data()), body().size()});
     if (!message) return wrong(message.error().text);
-    base.take(*message, 0);
+    if constexpr (std::is_same_v<M, wire::BasePart>) {
+      if (const Status s = base.take(*message, 0); !s) return wrong(s.error().text);
+    } else {
+      base.take(*message, 0);
+    }
     return true;
   }
 
@@ -177,9 +185,7 @@ struct EventReplay::Impl {
       return wrong(fmt::format("{} bytes instead of {}", body().size(), sizeof number));
     std::memcpy(&number, body().data(), sizeof number);
     if (number > until) return false;
-    cache.end_frame();
-    cache.free_dropped();
-    base.tick(0);
+    shown_base = base.mesh();
     return true;
   }
 
@@ -222,6 +228,8 @@ Status EventReplay::advance(const Moment& moment) {
       applied = i.change_base(moment.summaries);
     } else if (i.type() == wire::BasePart::kName) {
       applied = i.take_base<wire::BasePart>();
+    } else if (i.type() == wire::BaseBegin::kName) {
+      applied = i.take_base<wire::BaseBegin>();
     } else if (i.type() == wire::BaseHidden::kName) {
       applied = i.take_base<wire::BaseHidden>();
     } else if (i.type() == wire::Patch::kName) {
@@ -260,10 +268,7 @@ Status EventReplay::next_replica() {
 
 const points::PointModel* EventReplay::model() const { return impl_->model.get(); }
 const points::Summaries& EventReplay::summaries() const { return impl_->summaries; }
-void EventReplay::select_base(const geometry::Camera& camera, const splat::SelectionOptions& options,
-                              splat::DrawList& out) const {
-  impl_->cache.select_base(camera, options, out);
-}
+std::shared_ptr<const splat::BaseMesh> EventReplay::base() const { return impl_->shown_base; }
 Sequence EventReplay::applied() const { return impl_->applied; }
 const FineRays& EventReplay::fine_rays() const { return impl_->rays; }
 bool EventReplay::at_end() const { return impl_->at_end; }

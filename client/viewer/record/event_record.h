@@ -28,6 +28,7 @@ class EventRecorder {
   void begin_replica(const points::ModelConfig& config);
   void add(const ModelEvent& event);
   void add(const wire::BasePart& part);
+  void add(const wire::BaseBegin& begin);
   void add(const wire::BaseHidden& hidden);
   /// number: ModelCache::summaries_made() with this change.
   void add_base_change(uint64_t number);
@@ -67,8 +68,8 @@ class EventReplay {
   const points::PointModel* model() const;
   /// Summaries of the model's bricks; empty unless they are made.
   const points::Summaries& summaries() const;
-  /// Chooses the base's points for a picture, as ModelCache::select_base().
-  void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const;
+  /// The base that the viewer drew (splat::DrawList::base).
+  std::shared_ptr<const splat::BaseMesh> base() const;
   Sequence applied() const;
   /// Hits of rays that are finer than the viewer's views.
   const FineRays& fine_rays() const;

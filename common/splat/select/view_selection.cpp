@@ -235,33 +235,7 @@ uint64_t names_of(const DrawList& list) {
     } name{item.sequence.value, item.cluster->key, item.first, item.level.count, item.splat_px};
     hash = XXH3_64bits_withSeed(&name, sizeof name, hash);
   }
-  return list.coarse ? hash ^ names_of(*list.coarse) : hash;
-}
-
-void face_eye(const glm::vec3& eye_room, DrawList& list) {
-  static const std::vector<uint16_t> turned = [] {
-    std::vector<uint16_t> out(65536);
-    for (uint32_t code = 0; code < out.size(); ++code)
-      out[code] = image::encode_normal16(-image::decode_normal16(static_cast<uint16_t>(code)));
-    return out;
-  }();
-  constexpr float kFromBehind = -0.3f;  // cosine: such an item shows the back of its surface
-  constexpr size_t kPadding = 64;       // kernels read whole vectors beyond the last points
-  list.turned.resize(list.points + kPadding);
-  uint16_t* next = list.turned.data();
-  for (DrawItem& item : list.items) {
-    const points::Mosaic::Level& l = item.level;
-    glm::vec3 sum(0);
-    for (uint32_t i = 0; i < l.count; ++i) sum += image::octahedral16(l.normal[i]);
-    const glm::vec3 to_eye = eye_room - item.cluster->leaf_room.centre();
-    item.may_face_away = true;
-    if (glm::dot(sum, to_eye) >= kFromBehind * glm::length(sum) * glm::length(to_eye)) continue;
-    for (uint32_t i = 0; i < l.count; ++i) next[i] = turned[l.normal[i]];
-    item.level.normal = next;
-    item.sequence = {};  // renderers keep no copies of this item
-    item.first = item.of = 0;
-    next += l.count;
-  }
+  return list.base ? hash ^ list.base->number << 32 : hash;
 }
 
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,

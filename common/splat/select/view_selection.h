@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "common/geometry/camera.h"
+#include "common/geometry/clip.h"
 #include "common/points/summary.h"
+#include "common/splat/base_mesh.h"
 
 namespace telesplat::splat {
 
@@ -72,16 +74,14 @@ struct DrawList {
   uint64_t replica = 0;
   std::vector<std::shared_ptr<const void>>
       held;  ///< memory of items whose points belong to no model; the code that adds it clears it
-  /// Coarse points of the whole data set, which show where the others leave pixels empty (backdrop.h). Null: there are
-  /// none.
-  std::shared_ptr<DrawList> coarse;
-  int halvings = 0;              ///< coarse list: its picture has 2^-halvings as many pixels a side
-  std::vector<uint16_t> turned;  ///< normals of items, as face_eye() has turned them
+  /// Shows where the points leave pixels empty (backdrop.h), or null.
+  std::shared_ptr<const BaseMesh> base;
+  geometry::Clip base_clip;  ///< cuts the base; points are cut already
   uint64_t summaries = 0;        ///< number of summaries made by then, of all replicas
 };
 
 /// True if a backdrop is to be drawn.
-inline bool has_coarse(const DrawList& list) { return list.coarse && !list.coarse->items.empty(); }
+inline bool has_base(const DrawList& list) { return list.base && list.base->triangles > 0; }
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses the number of each mosaic's points (level_choice.h): the
 /// desired pixel range is the display's, or the sampling view's if that is less, times detail. Splat size = scale *
@@ -92,10 +92,6 @@ inline bool has_coarse(const DrawList& list) { return list.coarse && !list.coars
 ///   options.best_patch_only.
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
                  DrawList& out, const points::Summaries* summaries = nullptr);
-
-/// Turns the normals of items that are seen from behind, for surfaces that have two sides; other points that face away
-/// are not drawn.
-void face_eye(const glm::vec3& eye_room, DrawList& list);
 
 /// Hashes the points of a list and their splat sizes. Two lists of one replica with the same hash show the same.
 uint64_t names_of(const DrawList& list);

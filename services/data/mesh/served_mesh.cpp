@@ -22,7 +22,6 @@
 #include "services/data/base/epochs.h"
 #include "services/data/base/placement_options.h"
 #include "services/data/mesh/cast.h"
-#include "services/data/mesh/surfels.h"
 
 namespace telesplat::data {
 namespace {
@@ -68,9 +67,8 @@ class StoreOpening {
     for (const auto& [stage, part] : {std::pair{kIdentifying, 0.03},
                                       {kReading, 0.05},
                                       {kSortingIntoChunks, 0.1},
-                                      {kWritingTheStore, 0.47},
-                                      {kMakingLevels, 0.32},
-                                      {kMakingSurfels, 0.03}}) {
+                                      {kWritingTheStore, 0.5},
+                                      {kMakingLevels, 0.32}}) {
       if (stage_.load() == std::string_view(stage)) return before + part * fraction_;
       before += part;
     }
@@ -193,7 +191,7 @@ constexpr int kAnswersWaiting = 16;
 constexpr double kListsAtOnce = 4, kLists_s = 1;  // per peer: lists at once, then lists per second
 constexpr size_t kPeers = 1024;                   // peers whose lists are counted
 
-// Lists and surfels are large and cheap to ask for: each peer gets a few at once, then one per second.
+// Lists are large and cheap to ask for: each peer gets a few at once, then one per second.
 class ListLimit {
  public:
   bool allow(const std::string& peer, double now_s) {
@@ -301,12 +299,12 @@ class ServedMesh final : public Served {
   // Samplers and packers repeat requests: for what is not made yet, and for answers that found the queue full.
   void answer(const net::Message& message, const Outlets& outlets) override {
     using namespace wire;
-    net::dispatch<ChunkListRequest, ChunkRequest, SurfelRequest>(outlets.requests, message, [&](const auto& request) {
+    net::dispatch<ChunkListRequest, ChunkRequest>(outlets.requests, message, [&](const auto& request) {
       constexpr bool kAsksForOne = std::is_same_v<std::decay_t<decltype(request)>, ChunkRequest>;
       if (!kAsksForOne && !lists_.allow(message.peer, monotonic_s())) return;
       const auto earlier = request.array == first_array() ? provisional_.find(request.epoch) : nullptr;
       const auto store = earlier ? earlier : stores_.find(request.array);
-      if (!store || !is_made(request, store)) return;
+      if (!store) return;
       using Reply = decltype(reply(request, *store));
       outlets.requests.send_made<Reply>(message.peer, bytes_of(request, *store),
                                         [&] { return reply(request, *store); });
@@ -357,18 +355,12 @@ class ServedMesh final : public Served {
     if (!whole) return void(failure_ = whole.error());
     const auto before = std::exchange(store_, *std::move(whole));
     stores_.reset(store_);
-    maker_.emplace();
     provisional_.replace(before, hash_text());
     log::info("the whole mesh is there: {}", summary());
     changed_ = true;
   }
   std::string first_array() const { return as_begun_ ? as_begun_->array : ""; }
   std::string hash_text() const { return fmt::format("{:016x}", store_->info().content_hash); }
-  bool is_made(const auto&, const auto&) { return true; }
-  bool is_made(const wire::SurfelRequest& request, const std::shared_ptr<const MeshStore>& store) {
-    surfels_ = maker_->get(store, request.array, request.most);
-    return surfels_.has_value();
-  }
   static wire::ChunkList reply(const wire::ChunkListRequest& request, const MeshStore& store) {
     return {request.epoch, store.chunks()};
   }
@@ -377,10 +369,6 @@ class ServedMesh final : public Served {
     const bool exists = request.chunk.value < store.chunks().size();
     return {request.epoch, request.chunk, exists ? store.chunk(request.chunk).bytes : wire::Bytes{}};
   }
-  wire::Surfels reply(const wire::SurfelRequest& request, const MeshStore&) const {
-    return {request.epoch, request.array, surfels_->bytes};
-  }
-  uint64_t bytes_of(const wire::SurfelRequest&, const MeshStore&) const { return surfels_->bytes.size(); }
   static uint64_t bytes_of(const wire::ChunkListRequest&, const MeshStore& store) {
     return store.chunks().size() * sizeof(geometry::ChunkInfo);
   }
@@ -413,8 +401,6 @@ class ServedMesh final : public Served {
   bool changed_ = false;
   Status failure_ = ok_status();
   ListLimit lists_;
-  std::optional<SurfelMaker> maker_{std::in_place};
-  SurfelMaker::Bytes surfels_;  // those of the request at hand
   Epochs epochs_;
   InstanceId master_;
   std::string order_, shown_, answer_;

@@ -51,7 +51,6 @@ class Store : public MeshStore {
     }
     return {content_.chunk(id.value), content_.file};
   }
-  geometry::ChunkBytes surfels() const override { return {content_.surfels, content_.file}; }
 
  private:
   [[noreturn]] void end_at(ChunkId damaged) const {
@@ -239,10 +238,9 @@ Descriptor lock_making(const std::string& stem, const Progress& progress) {
 }  // namespace
 
 Result<std::shared_ptr<MeshStore>> MeshStore::keep(const std::string& path, const PlacedMesh& mesh,
-                                                   const MeshStoreInfo& info, std::vector<std::byte> surfels) {
+                                                   const MeshStoreInfo& info) {
   return make_unnamed(path, [&](StorePlace& place) {
-    return write_store(
-        place.descriptor, path, mesh, info, [](const char*, double) {}, std::move(surfels));
+    return write_store(place.descriptor, path, mesh, info, [](const char*, double) {});
   });
 }
 

@@ -78,9 +78,8 @@ class MeshStore {
   /// True if make() would find the store of `source` in the cache.
   static bool is_made(const std::string& path, const MeshSource& source, const StoreOptions& options);
   /// Keeps a placed mesh in a file without a name, which goes away with its last mapping. Errors start with the path.
-  /// surfels: of the mesh; empty: they are made.
   static Result<std::shared_ptr<MeshStore>> keep(const std::string& path, const PlacedMesh& mesh,
-                                                 const MeshStoreInfo& info, std::vector<std::byte> surfels = {});
+                                                 const MeshStoreInfo& info);
   virtual ~MeshStore() = default;
 
   virtual const MeshStoreInfo& info() const = 0;
@@ -94,8 +93,6 @@ class MeshStore {
   /// and ends this process (end_at_damaged_file()): the next start makes the store anew. Precondition: id is one of
   /// chunks().
   virtual geometry::ChunkBytes chunk(ChunkId id) const = 0;
-  /// Returns the surfels of the whole mesh (surfels.h), in mapped memory.
-  virtual geometry::ChunkBytes surfels() const = 0;
 };
 
 }  // namespace telesplat::data

@@ -17,7 +17,6 @@
 #include "common/parallel/in_parallel.h"
 #include "services/data/mesh/cache.h"
 #include "services/data/mesh/levels.h"
-#include "services/data/mesh/surfels.h"
 
 namespace telesplat::data {
 namespace {
@@ -31,7 +30,6 @@ struct StoreHeader {
   uint32_t chunks = 0;
   uint64_t file_bytes = 0;
   MeshFigures figures;
-  uint64_t surfels_offset = 0, surfels_bytes = 0, surfels_checksum = 0;
   uint64_t arrays_offset = 0, arrays_bytes = 0;
   uint64_t lines_bytes = 0;  ///< after the arrays
   uint64_t checksum = 0;     ///< over all fields above and the table of contents
@@ -152,12 +150,11 @@ size_t entries_above(size_t leaves) {
   return all;
 }
 
-// Adds the levels above the leaves to the entries. Returns all levels.
-std::vector<Level> write_levels(ChunkWriter& out, const std::string& name, std::vector<StoreEntry>& entries,
-                                const Progress& progress) {
-  std::vector<Level> levels{{0, entries.size()}};
-  while (levels.back().size() > 1) {
-    const Level below = levels.back();
+// Adds the levels above the leaves to the entries.
+void write_levels(ChunkWriter& out, const std::string& name, std::vector<StoreEntry>& entries,
+                  const Progress& progress) {
+  Level below{0, entries.size()};
+  while (below.size() > 1) {
     const auto file = out.written(name);
     if (!file) break;
     const std::span level(entries.data() + below.begin, below.size());
@@ -182,27 +179,10 @@ std::vector<Level> write_levels(ChunkWriter& out, const std::string& name, std::
       file->drop_pages();
     }
     std::erase_if(nodes, [](const StoreEntry& e) { return e.children == 0; });
-    levels.push_back({entries.size(), entries.size() + nodes.size()});
+    below = {entries.size(), entries.size() + nodes.size()};
     entries.insert(entries.end(), nodes.begin(), nodes.end());
   }
   progress(kMakingLevels, 1.0);
-  return levels;
-}
-
-// Makes the surfels of the highest level that has enough triangles for them.
-std::vector<std::byte> surfels_of(const MappedFile& file, const MeshFigures& figures,
-                                  std::span<const StoreEntry> entries, const std::vector<Level>& levels) {
-  constexpr uint64_t kEnough = 2 * kMostStored;
-  Level chosen;
-  uint64_t triangles = 0;
-  for (const Level& level : levels) {
-    uint64_t sum = 0;
-    for (size_t i = level.begin; i < level.end; ++i) sum += entries[i].triangles;
-    if (chosen.size() == 0 || sum >= kEnough) chosen = level, triangles = sum;
-  }
-  const auto chunk = [&](size_t i) { return chunk_at(file, entries[chosen.begin + i]); };
-  const std::atomic<bool> never{false};
-  return make_surfels({figures.box_room, triangles, chosen.size(), chunk}, stored_surfels(figures.triangles), never);
 }
 
 }  // namespace
@@ -259,17 +239,12 @@ geometry::Box StoreWriter::box_room() const {
   return out;
 }
 
-Status StoreWriter::finish(const MeshStoreInfo& info, const Progress& progress, std::vector<std::byte> surfels) {
+Status StoreWriter::finish(const MeshStoreInfo& info, const Progress& progress) {
   auto& [name, entries, out] = *parts_;
   std::erase_if(entries, [](const StoreEntry& e) { return e.triangles == 0; });
-  const std::vector<Level> levels = write_levels(out, name, entries, progress);
+  write_levels(out, name, entries, progress);
 
   StoreHeader header{.chunks = static_cast<uint32_t>(entries.size()), .figures = info};
-  progress(kMakingSurfels, 0.0);
-  const auto file = out.written(name);
-  if (file && surfels.empty()) surfels = surfels_of(*file, info, entries, levels);
-  header.surfels_bytes = surfels.size(), header.surfels_checksum = XXH3_64bits(surfels.data(), surfels.size());
-  header.surfels_offset = out.put(surfels);
   std::string texts = scene::to_text(info.arrays);
   header.arrays_offset = out.end(), header.arrays_bytes = texts.size();
   for (const std::string& line : {info.format, info.up, info.up_reason, info.array, scene::to_text(info.coordinates)})
@@ -287,7 +262,7 @@ Status StoreWriter::finish(const MeshStoreInfo& info, const Progress& progress, 
 }
 
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
-                   const Progress& progress, std::vector<std::byte> surfels) {
+                   const Progress& progress) {
   if (const Status s = check_room(descriptor, name, mesh.indices.size() / 3); !s) return s;
   progress(kSortingIntoChunks, 0.0);
   const ChunkPlan plan = plan_chunks(mesh);
@@ -295,7 +270,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   if (!writer) return writer.error();
   progress(kSortingIntoChunks, 1.0);
   writer->write_leaves(0, mesh, plan, [&](double fraction) { progress(kWritingTheStore, fraction); });
-  return writer->finish(info, progress, std::move(surfels));
+  return writer->finish(info, progress);
 }
 
 bool is_whole(const StoreContent& store, size_t chunk) {
@@ -342,12 +317,7 @@ Result<StoreContent> read_store(int descriptor, const std::string& name, uint64_
   auto arrays = scene::arrays_from_text(texts.substr(0, header.arrays_bytes));
   if (!arrays) return Error{fmt::format("{}: {}", name, arrays.error().text)};
 
-  const uint64_t surfels = header.surfels_offset <= bytes.size() ? bytes.size() - header.surfels_offset : 0;
-  if (header.surfels_bytes > surfels || header.surfels_offset % kPage != 0)
-    return Error{fmt::format("{}: the surfels lie outside their store", name)};
-  StoreContent out{*mapped, {header.figures}, {}, {}, bytes.subspan(header.surfels_offset, header.surfels_bytes), {}};
-  if (XXH3_64bits(out.surfels.data(), out.surfels.size()) != header.surfels_checksum)
-    return Error{fmt::format("{}: the surfels of the store are damaged", name)};
+  StoreContent out{*mapped, {header.figures}, {}, {}, {}};
   out.info.arrays = *std::move(arrays);
   std::istringstream lines{std::string(texts.substr(header.arrays_bytes))};
   std::string coordinates_text;

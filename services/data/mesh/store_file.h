@@ -3,7 +3,6 @@
 //     offset 0      StoreHeader, padded to 4096
 //     4096          StoreEntry[chunks], padded to a multiple of 4096: the leaves, then the levels above (levels.h)
 //     then          the chunks (common/geometry/chunk_code.h), each at a multiple of 4096, in the order of making
-//     then          the surfels of the whole mesh (common/geometry/surfels.h)
 //     then          the file's arrays as scene::to_text(); then lines: format, up axis, reason for it, array of the
 //                                 chunks' values, coordinates, and remarks on the file, without its name
 //
@@ -46,7 +45,7 @@ std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// To be raised whenever readers, placement or layout would make another file from the same mesh.
-inline constexpr uint32_t kStoreVersion = 11;
+inline constexpr uint32_t kStoreVersion = 12;
 
 /// Bytes a triangle that a store with its levels takes, about.
 inline constexpr uint64_t kBytesATriangle = 22;
@@ -67,10 +66,9 @@ class StoreWriter {
   void write_leaves(size_t first, const PlacedMesh& mesh, const ChunkPlan& plan, const ReadProgress& progress);
   /// Box of the leaves that were written.
   geometry::Box box_room() const;
-  /// Writes levels, surfels and the table of contents. `info` describes the mesh, with boxes and counts. Leaves that
-  /// were not written are left out. surfels: of the mesh; empty: they are made. Error, starting with the name: it
-  /// cannot be written.
-  Status finish(const MeshStoreInfo& info, const Progress& progress, std::vector<std::byte> surfels = {});
+  /// Writes levels and the table of contents. `info` describes the mesh, with boxes and counts. Leaves that were not
+  /// written are left out. Error, starting with the name: it cannot be written.
+  Status finish(const MeshStoreInfo& info, const Progress& progress);
 
  private:
   StoreWriter(int descriptor, std::string name, size_t leaves);
@@ -78,24 +76,22 @@ class StoreWriter {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Writes the store of a placed mesh. `progress` (stages from kSortingIntoChunks on) is called on this thread. surfels:
-/// as for StoreWriter::finish().
+/// Writes the store of a placed mesh. `progress` (stages from kSortingIntoChunks on) is called on this thread.
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
-                   const Progress& progress, std::vector<std::byte> surfels = {});
+                   const Progress& progress);
 
 struct StoreContent {
   std::shared_ptr<const MappedFile> file;
   MeshStoreInfo info;  ///< without source, from_cache and kept_in; notes without the file's name
   std::vector<geometry::ChunkInfo> chunks;
-  std::vector<size_t> offsets;         ///< offset of each chunk in the file
-  std::span<const std::byte> surfels;  ///< in the file
-  std::vector<uint64_t> checksums;     ///< XXH3 of each chunk
-  bool checked = false;                ///< all chunks are
+  std::vector<size_t> offsets;      ///< offset of each chunk in the file
+  std::vector<uint64_t> checksums;  ///< XXH3 of each chunk
+  bool checked = false;             ///< all chunks are
   std::span<const std::byte> chunk(size_t i) const { return file->bytes().subspan(offsets[i], chunks[i].bytes); }
 };
 
 /// Maps a store and checks it before any value is used: magic, version, size, the offsets, and the checksums of header,
-/// table, surfels and, unless they have more than `most_checked` bytes together, chunks.
+/// table and, unless they have more than `most_checked` bytes together, chunks.
 Result<StoreContent> read_store(int descriptor, const std::string& name, uint64_t most_checked = ~uint64_t{0});
 
 /// False: the chunk is damaged.

@@ -112,7 +112,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
     feed_.publish(*event);
     gatherer_.clear();
   }
-  base_.follow(session, config.model, core_->model().points() == 0);
+  base_.follow(session, core_->model().points() == 0);
   exactness_.follow(session.settings.errors);
   choose_errors();
   planning_.follow(*core_, plan_config_of(session.settings, config));
@@ -320,7 +320,7 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
   values.insert({{"points", double(core_->model().points())},
                  {"model_bytes", double(core_->model().bytes())},
                  {"log_bytes", double(core_->log_bytes())},
-                 {"base_surfels", double(base_.surfels())},
+                 {"base_triangles", double(base_.triangles())},
                  {"sequence", double(core_->sequence().value)},
                  {"tiles", double(g.tiles)},
                  {"tiles_untold", double(s.tiles_untold)},

@@ -17,7 +17,6 @@ class NoChunks final : public MeshStore {
   const MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
   geometry::ChunkBytes chunk(ChunkId) const override { return {}; }
-  geometry::ChunkBytes surfels() const override { return {}; }
 
  private:
   MeshStoreInfo info_;
@@ -69,7 +68,6 @@ class CountsChunks final : public MeshStore {
     ++looked_at;
     return {bytes_, nullptr};
   }
-  geometry::ChunkBytes surfels() const override { return {}; }
   mutable int looked_at = 0;
 
  private:
@@ -132,7 +130,6 @@ class CountedStore final : public MeshStore {
   const MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
   geometry::ChunkBytes chunk(ChunkId) const override { return {}; }
-  geometry::ChunkBytes surfels() const override { return {}; }
 
  private:
   MeshStoreInfo info_;

@@ -150,25 +150,6 @@ TEST_F(StoreTest, DamagedStoresAreMadeAnew) {
   }
 }
 
-TEST_F(StoreTest, AStoreWithDamagedSurfelsIsMadeAnew) {
-  const auto surfels_now = [&] {
-    const geometry::ChunkBytes surfels = open_or_fail(path_, options_)->surfels();
-    return std::string(reinterpret_cast<const char*>(surfels.bytes.data()), surfels.bytes.size());
-  };
-  const std::string good = surfels_now();
-  for (const size_t at : {size_t{0}, good.size() / 2, good.size() - 1}) {
-    std::ifstream file(store_file(), std::ios::binary);
-    std::string content(std::istreambuf_iterator<char>(file), {});
-    const size_t begin = content.find(good);
-    ASSERT_NE(begin, content.npos);
-    content[begin + at] ^= 0x40;
-    std::ofstream(store_file(), std::ios::binary) << content;
-    EXPECT_FALSE(open_or_fail(path_, options_)->info().from_cache) << "byte " << at;
-    EXPECT_TRUE(surfels_now() == good) << "byte " << at;
-    EXPECT_TRUE(open_or_fail(path_, options_)->info().from_cache) << "byte " << at;
-  }
-}
-
 // Chunks of a large store are checked when they are first used.
 class LargeStoreTest : public StoreTest {
  protected:

@@ -1,5 +1,5 @@
 // Surfels of a mesh: means of its surface, as many as asked for, on both sides of a wall.
-#include "services/data/mesh/surfels.h"
+#include "services/data/mesh/out_of_core/surfels.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "common/geometry/surfels.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::data::test {
@@ -16,32 +15,16 @@ namespace {
 using telesplat::test::ChunkList;
 using telesplat::test::Vertex;
 
-SurfelSource source_of(const ChunkList& chunks) {
-  SurfelSource out;
+Surfels make(const ChunkList& chunks, size_t most) {
+  std::vector<geometry::HeldChunk> held;
+  std::vector<geometry::MeshChunkView> views;
+  geometry::Box box;
   for (const auto& [id, chunk] : chunks) {
-    const auto view = geometry::decode_chunk(chunk.bytes)->view;
-    out.box_room.extend(view.box_room.lo), out.box_room.extend(view.box_room.hi);
-    out.triangles += view.triangles();
+    held.push_back(*geometry::decode_chunk(chunk.bytes));
+    views.push_back(held.back().view);
+    box.extend(views.back().box_room.lo), box.extend(views.back().box_room.hi);
   }
-  out.chunks = chunks.size();
-  out.chunk = [&chunks](size_t i) { return *geometry::decode_chunk(chunks[i].second.bytes); };
-  return out;
-}
-
-struct Made {
-  std::vector<std::byte> bytes;
-  geometry::SurfelView view;
-  glm::vec3 position(size_t i) const {
-    return {view.positions_room[3 * i], view.positions_room[3 * i + 1], view.positions_room[3 * i + 2]};
-  }
-};
-Made make(const ChunkList& chunks, size_t most) {
-  const std::atomic<bool> stop{false};
-  Made out{make_surfels(source_of(chunks), most, stop), {}};
-  const auto view = geometry::SurfelView::validate(out.bytes);
-  EXPECT_TRUE(view.ok());
-  if (view) out.view = *view;
-  return out;
+  return make_surfels(views, box, most);
 }
 
 // A ball of 0.3 m, its colour by height: red below, blue above.
@@ -61,34 +44,36 @@ ChunkList ball(uint32_t rings) {
 }
 
 TEST(Surfels, LieOnTheSurfaceWithItsNormalsAndColours) {
-  const Made made = make(ball(60), 3000);
-  const float cell = made.view.spacing_m;
-  for (size_t i = 0; i < made.view.size(); ++i) {
-    const glm::vec3 p = made.position(i), n = image::decode_normal32(made.view.normals[i]);
+  const Surfels made = make(ball(60), 3000);
+  const float cell = made.spacing_m;
+  for (size_t i = 0; i < made.positions.size(); ++i) {
+    const glm::vec3 p = made.positions[i], n = image::decode_normal32(made.normals[i]);
     EXPECT_NEAR(glm::length(p), 0.3f, 0.3f * cell);
     EXPECT_GT(glm::dot(n, glm::normalize(p)), 0.9f);
     if (std::abs(p.y) > cell) {
-      EXPECT_EQ(made.view.colours[i], p.y > 0 ? 0x0000ffu : 0xff0000u);
+      EXPECT_EQ(made.colours[i], p.y > 0 ? 0x0000ffu : 0xff0000u);
     }
   }
 }
 
 TEST(Surfels, AreAboutAsManyAsAskedFor) {
   for (const size_t most : {200, 2000, 20000}) {
-    EXPECT_NEAR(double(make(ball(100), most).view.size()), double(most), 0.35 * double(most));
-    EXPECT_NEAR(double(make(telesplat::test::terrain(150, 50), most).view.size()), double(most), 0.35 * double(most));
+    EXPECT_NEAR(double(make(ball(100), most).positions.size()), double(most), 0.35 * double(most));
+    EXPECT_NEAR(double(make(telesplat::test::terrain(150, 50), most).positions.size()), double(most),
+                0.35 * double(most));
   }
 }
 
 TEST(Surfels, LeaveNoCellOfALargeTriangleOut) {
   const ChunkList one{
       {ChunkId{0}, telesplat::test::triangle({{0, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 1, 0}}, {{3, 0, 0}, {0, 1, 0}})}};
-  const Made made = make(one, 1000);
+  const Surfels made = make(one, 1000);
   for (float x = 0.1f; x < 2.8f; x += 0.05f) {
     const glm::vec3 at(x, 0, 0.45f * (1 - x / 3));
     float nearest = 9;
-    for (size_t i = 0; i < made.view.size(); ++i) nearest = std::min(nearest, glm::distance(at, made.position(i)));
-    EXPECT_LT(nearest, made.view.spacing_m) << x;
+    for (size_t i = 0; i < made.positions.size(); ++i)
+      nearest = std::min(nearest, glm::distance(at, made.positions[i]));
+    EXPECT_LT(nearest, made.spacing_m) << x;
   }
 }
 
@@ -99,10 +84,10 @@ TEST(Surfels, KeepBothSidesOfAThinWall) {
                                                                        {{1, 0, 0.001f * side}, {0, 0, side}},
                                                                        {{0, 1, 0.001f * side}, {0, 0, side}}},
                                                                       {0, 1, 2}));
-  const Made made = make(wall, 500);
+  const Surfels made = make(wall, 500);
   size_t front = 0, back = 0;
-  for (size_t i = 0; i < made.view.size(); ++i) {
-    const float z = image::decode_normal32(made.view.normals[i]).z;
+  for (size_t i = 0; i < made.positions.size(); ++i) {
+    const float z = image::decode_normal32(made.normals[i]).z;
     EXPECT_GT(std::abs(z), 0.99f);
     ++(z > 0 ? front : back);
   }
@@ -118,43 +103,21 @@ TEST(Surfels, ScalarsAreMeansOfThoseThatExist) {
                                       {{0, 0.001f, z}, {0, 0, 1}, bits(value)}},
                                      {0, 1, 2}, true);
   };
-  const Made made = make({{ChunkId{0}, one(0, 4)}, {ChunkId{1}, one(1, none)}}, 2);
-  ASSERT_TRUE(made.view.scalars);
-  ASSERT_EQ(made.view.size(), 2u);
+  const Surfels made = make({{ChunkId{0}, one(0, 4)}, {ChunkId{1}, one(1, none)}}, 2);
+  ASSERT_EQ(made.positions.size(), 2u);
   for (size_t i = 0; i < 2; ++i) {
-    const float value = std::bit_cast<float>(made.view.colours[i]);
-    if (made.position(i).z < 0.5f)
+    const float value = std::bit_cast<float>(made.colours[i]);
+    if (made.positions[i].z < 0.5f)
       EXPECT_FLOAT_EQ(value, 4);
     else
       EXPECT_TRUE(std::isnan(value));
   }
 }
 
-TEST(Surfels, TheSameChunksGiveTheSameBytes) {
+TEST(Surfels, TheSameChunksGiveTheSameSurfels) {
   const ChunkList chunks = telesplat::test::terrain(80, 16);
-  EXPECT_EQ(make(chunks, 1500).bytes, make(chunks, 1500).bytes);
-}
-
-TEST(Surfels, AreNotMadeOnceStopped) {
-  const std::atomic<bool> stop{true};
-  const ChunkList chunks = ball(20);
-  EXPECT_TRUE(make_surfels(source_of(chunks), 100, stop).empty());
-}
-
-TEST(SurfelSet, RefusesDamagedBytes) {
-  const auto good = make(ball(20), 100).bytes;
-  const auto refused = [](const std::vector<std::byte>& bytes) { return !geometry::SurfelView::validate(bytes).ok(); };
-  EXPECT_FALSE(refused(good));
-  EXPECT_TRUE(refused({good.begin(), good.end() - 4}));
-  EXPECT_TRUE(refused({good.begin(), good.begin() + 20}));
-  for (const size_t field : {0, 4, 8, 12}) {  // magic, count, scalars, spacing
-    auto bad = good;
-    for (size_t i = field; i < field + 4; ++i) bad[i] = std::byte{0xff};
-    EXPECT_TRUE(refused(bad)) << field;
-  }
-  auto bad = good;
-  for (size_t i = 32; i < 36; ++i) bad[i] = std::byte{0xff};  // a position that is not a number
-  EXPECT_TRUE(refused(bad));
+  const Surfels a = make(chunks, 1500), b = make(chunks, 1500);
+  EXPECT_TRUE(a.positions == b.positions && a.normals == b.normals && a.colours == b.colours);
 }
 
 }  // namespace

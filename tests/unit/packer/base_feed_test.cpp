@@ -4,20 +4,20 @@
 #include <gtest/gtest.h>
 
 #include "common/core/clock.h"
-#include "common/image/normal.h"
+#include "tests/support/mesh_chunks.h"
 #include "tests/support/patience.h"
 
 namespace telesplat::packer {
 namespace {
 
-const points::ModelConfig kModel{{glm::vec3(-0.5f), glm::vec3(0.5f)}, 5};
-
-// Surfels along a line.
-std::vector<std::byte> set_of(size_t surfels) {
-  std::vector<float> positions(3 * surfels);
-  for (size_t i = 0; i < surfels; ++i) positions[3 * i] = -0.4f + 0.01f * float(i);
-  return geometry::build_surfels(positions, std::vector(surfels, image::encode_normal32({0, 0, 1})),
-                                 std::vector(surfels, 0x204060u), 0.01f, false);
+// A strip of triangles.
+geometry::ChunkBytes strip(size_t triangles) {
+  std::vector<test::Vertex> vertices;
+  std::vector<uint32_t> indices;
+  for (size_t i = 0; i < triangles + 2; ++i)
+    vertices.push_back({{0.01f * float(i) - 0.4f, i % 2 ? 0.01f : 0.0f, 0}, {0, 0, 1}, 0x204060});
+  for (uint32_t i = 0; i < triangles; ++i) indices.insert(indices.end(), {i, i + 1, i + 2});
+  return test::chunk_of(vertices, indices);
 }
 
 class BaseFeedTest : public testing::Test {
@@ -30,32 +30,52 @@ class BaseFeedTest : public testing::Test {
     w.facts = {{"kind", "mesh"}, {"content_hash", content}};
     w.endpoints = {{"chunks", "inproc://chunks"}};
     w.settings.keep_redundant = false;
+    w.box_room = {glm::vec3(-0.5f), glm::vec3(0.5f)};
     return w;
   }
-  // Follows the session, and returns its request for the base.
-  wire::SurfelRequest ask(const wire::Welcome& session) {
-    feed.follow(session, kModel, true);
-    feed.tick({7}, 1);
+  // Follows the session, and returns its request for a list of chunks.
+  wire::ChunkListRequest ask(const wire::Welcome& session) {
+    feed.follow(session, true);
+    feed.tick({7}, now_s += 1);
+    const auto message = asked();
+    return message ? wire::decode<wire::ChunkListRequest>(message->body).value() : wire::ChunkListRequest{};
+  }
+  std::optional<net::Message> asked() {
     net::wait_readable({&data}, int(1000 * test::patient(20)));
-    const auto message = data.receive();
+    auto message = data.receive();
     if (message) packer = message->peer;
-    return message ? wire::decode<wire::SurfelRequest>(message->body).value() : wire::SurfelRequest{};
+    return message;
   }
-  void answer(const wire::SurfelRequest& asked, size_t surfels) {
-    data.send(wire::Surfels{asked.epoch, asked.array, set_of(surfels)}, packer);
+  // Answers with a root of half as many triangles above two chunks.
+  void answer(const wire::ChunkListRequest& request, size_t triangles) {
+    const uint64_t half = triangles / 2;
+    data.send(wire::ChunkList{request.epoch,
+                              {{.id = {0}, .triangles = half},
+                               {.id = {1}, .triangles = half},
+                               {.id = {2}, .triangles = half, .spacing_m = 1, .first_child = 0, .children = 2}}},
+              packer);
   }
-  // Takes answers until there is a base; returns its surfels.
-  size_t received() {
-    for (const double deadline = monotonic_s() + test::patient(20); feed.surfels() == 0 && monotonic_s() < deadline;) {
-      net::wait_readable({feed.sockets()[0]}, 5);
+  void serve(const wire::ChunkRequest& request, size_t triangles) {
+    const auto chunk = strip(triangles / 2);
+    data.send(wire::Chunk{request.epoch, request.chunk, chunk.bytes}, packer);
+  }
+  // Serves chunks until there is a base; returns its triangles.
+  size_t received(size_t triangles) {
+    for (const double deadline = monotonic_s() + test::patient(20);
+         feed.triangles() == 0 && monotonic_s() < deadline;) {
+      net::wait_readable({feed.sockets()[0], &data}, 5);
+      while (const auto message = data.receive())
+        if (message->type == wire::ChunkRequest::kName)
+          serve(wire::decode<wire::ChunkRequest>(message->body).value(), triangles);
       feed.receive();
     }
-    return feed.surfels();
+    return feed.triangles();
   }
 
-  uint64_t base = 0;  // number of the newest one that viewers were told of
-  Outlets outlets{.to_viewers = [this](std::string_view, const std::string& body) {
-    base = wire::decode<wire::BaseHidden>(std::as_bytes(std::span(body))).value().base;
+  double now_s = 0;
+  wire::BaseBegin told;  // the newest one on PUB
+  Outlets outlets{.to_viewers = [this](std::string_view type, const std::string& body) {
+    if (type == wire::BaseBegin::kName) told = wire::decode<wire::BaseBegin>(std::as_bytes(std::span(body))).value();
   }};
   std::string packer;
   net::Context context;
@@ -67,28 +87,60 @@ TEST_F(BaseFeedTest, ALateAnswerForTheDataBeforeIsNotTaken) {
   const auto first = ask(session(1, "aa")), second = ask(session(2, "bb"));
   answer(first, 10);
   answer(second, 20);
-  EXPECT_EQ(received(), 20u);
+  EXPECT_EQ(received(20), 20u);
 }
 
 TEST_F(BaseFeedTest, AnAnswerThatWasAskedForInAnEarlierEpochOfTheSameDataIsTaken) {
-  const auto asked = ask(session(1, "aa"));
-  feed.follow(session(2, "aa"), kModel, true);
-  answer(asked, 10);
-  EXPECT_EQ(received(), 10u);
+  const auto request = ask(session(1, "aa"));
+  feed.follow(session(2, "aa"), true);
+  answer(request, 10);
+  EXPECT_EQ(received(10), 10u);
+}
+
+TEST_F(BaseFeedTest, ViewersLearnHowManyPartsAreCoarse) {
+  answer(ask(session(1, "aa")), 10);
+  ASSERT_EQ(received(10), 10u);
+  EXPECT_EQ(told.parts, 3u);
+  EXPECT_EQ(told.coarse, 1u);
+}
+
+TEST_F(BaseFeedTest, AChunkThatIsLostIsAskedForAgain) {
+  answer(ask(session(1, "aa")), 10);
+  net::wait_readable({feed.sockets()[0]}, int(1000 * test::patient(20)));
+  feed.receive();
+  EXPECT_EQ(asked()->type, wire::ChunkRequest::kName);  // and gets no answer
+  feed.tick({7}, now_s += 60);
+  EXPECT_EQ(received(10), 10u);
+}
+
+TEST_F(BaseFeedTest, DamagedChunksGiveNoBase) {
+  const auto request = ask(session(1, "aa"));
+  answer(request, 10);
+  net::wait_readable({feed.sockets()[0]}, int(1000 * test::patient(20)));
+  feed.receive();
+  ASSERT_TRUE(asked());
+  const std::vector<std::byte> damaged(100);
+  data.send(wire::Chunk{request.epoch, {2}, damaged}, packer);
+  net::wait_readable({feed.sockets()[0]}, int(1000 * test::patient(20)));
+  feed.receive();
+  EXPECT_EQ(feed.triangles(), 0u);
+  feed.tick({7}, now_s += 60);
+  EXPECT_FALSE(data.receive()) << "nothing more is asked for";
 }
 
 TEST_F(BaseFeedTest, TheBaseStaysWhileItsDataServerIsAway) {
   answer(ask(session(1, "aa")), 10);
-  ASSERT_EQ(received(), 10u);
-  const uint64_t number = base;
+  ASSERT_EQ(received(10), 10u);
+  const uint64_t number = told.base;
   auto away = session(1, "aa");
   away.endpoints.clear();
-  feed.follow(away, kModel, false);
-  EXPECT_EQ(feed.surfels(), 10u);
-  EXPECT_EQ(base, number);
-  feed.follow(session(2, "bb"), kModel, true);
-  EXPECT_EQ(feed.surfels(), 0u) << "other data";
-  EXPECT_GT(base, number) << "viewers drop it";
+  feed.follow(away, false);
+  EXPECT_EQ(feed.triangles(), 10u);
+  EXPECT_EQ(told.base, number);
+  feed.follow(session(2, "bb"), true);
+  EXPECT_EQ(feed.triangles(), 0u) << "other data";
+  EXPECT_GT(told.base, number) << "viewers drop it";
+  EXPECT_EQ(told.parts, 0u);
 }
 
 }  // namespace

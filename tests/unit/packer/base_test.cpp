@@ -1,62 +1,146 @@
-// The base hides surfels that rays have passed, and keeps those on surfaces and behind them.
+// The base has as much detail as its number of triangles allows, loses none of the mesh, and hides triangles that rays
+// have passed.
 #include "services/packer/points/base/base.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <functional>
+#include <map>
 #include <set>
 
-#include "common/codec/surfel_codec.h"
-#include "common/image/normal.h"
+#include "tests/support/mesh_chunks.h"
 
 namespace telesplat::packer {
 namespace {
 
-constexpr float kSpacing = 0.02f;
-const points::ModelConfig kModel{{glm::vec3(-0.5f), glm::vec3(0.5f)}, 5};
-
-// A square of surfels at depth z that faces +z, from -half to half.
-std::vector<glm::vec3> square(float z, float half) {
-  std::vector<glm::vec3> out;
-  for (float x = -half; x <= half; x += kSpacing)
-    for (float y = -half; y <= half; y += kSpacing) out.emplace_back(x, y, z);
+// Eight leaves of 100 triangles, two nodes of 100 above them, and a root of 50.
+std::vector<geometry::ChunkInfo> tree() {
+  std::vector<geometry::ChunkInfo> out;
+  for (uint64_t i = 0; i < 8; ++i) out.push_back({.id = {i}, .triangles = 100});
+  for (uint32_t i = 0; i < 2; ++i)
+    out.push_back(
+        {.id = {8 + i}, .triangles = 100, .spacing_m = 1 + 0.1f * float(i), .first_child = 4 * i, .children = 4});
+  out.push_back({.id = {10}, .triangles = 50, .spacing_m = 2, .first_child = 8, .children = 2});
   return out;
 }
 
-std::vector<std::byte> set_of(const std::vector<glm::vec3>& surfels) {
-  std::vector<float> positions;
-  for (const glm::vec3& p : surfels) positions.insert(positions.end(), {p.x, p.y, p.z});
-  return geometry::build_surfels(positions, std::vector(surfels.size(), image::encode_normal32({0, 0, 1})),
-                                 std::vector(surfels.size(), 0x204060u), kSpacing, false);
-}
-Base base_of(const std::vector<glm::vec3>& surfels) {
-  const auto bytes = set_of(surfels);
-  return Base(*geometry::SurfelView::validate(bytes), kModel, nullptr);
+std::vector<uint64_t> numbers(const std::vector<ChunkId>& ids) {
+  std::vector<uint64_t> out;
+  for (const ChunkId id : ids) out.push_back(id.value);
+  return out;
 }
 
-// All surfels of a base with their numbers, as its parts tell them.
-std::vector<std::pair<uint32_t, glm::vec3>> told(const Base& base) {
-  std::vector<std::pair<uint32_t, glm::vec3>> out;
-  for (size_t n = 1; n < base.parts(); ++n) {
-    const auto part = base.part(n);
-    const auto* bytes = reinterpret_cast<const uint8_t*>(part.surfel_data.data());
-    const auto leaves = codec::decode_surfels({bytes, part.surfel_data.size()});
-    EXPECT_TRUE(leaves.ok());
-    const points::ModelConfig config{part.box_room, int(part.depth), false};
-    for (const auto& leaf : *leaves) {
-      const geometry::Box box = points::leaf_box(config, leaf.key);
-      for (size_t i = 0; i < leaf.surfels.size(); ++i) {
-        const auto& s = leaf.surfels[i];
-        out.emplace_back(leaf.first + i, box.lo + (glm::vec3(s.x, s.y, s.z) + 0.5f) / 256.0f * box.size());
-      }
+TEST(Base, TakesTheFinestChunksThatItHasRoomFor) {
+  using Numbers = std::vector<uint64_t>;
+  EXPECT_EQ(numbers(choose_base(tree(), 10).fine), Numbers{10}) << "the root, though it has more";
+  EXPECT_EQ(numbers(choose_base(tree(), 199).fine), Numbers{10});
+  EXPECT_EQ(numbers(choose_base(tree(), 200).fine), (Numbers{8, 9}));
+  EXPECT_EQ(numbers(choose_base(tree(), 500).fine), (Numbers{4, 5, 6, 7, 8})) << "the coarser node is parted";
+  EXPECT_EQ(numbers(choose_base(tree(), 800).fine), (Numbers{0, 1, 2, 3, 4, 5, 6, 7}));
+}
+
+TEST(Base, HasTheRootsFirstUnlessTheyAreAllOfIt) {
+  EXPECT_EQ(numbers(choose_base(tree(), 800).coarse), std::vector<uint64_t>{10});
+  EXPECT_TRUE(choose_base(tree(), 10).coarse.empty());
+  EXPECT_TRUE(choose_base({}, 10).fine.empty());
+}
+
+// Triangles with the colours of their corners, each corner at a multiple of a tenth of a millimetre.
+std::multiset<std::vector<int64_t>> triangles_of(const geometry::MeshChunkView& chunk) {
+  std::multiset<std::vector<int64_t>> out;
+  for (size_t t = 0; t < chunk.triangles(); ++t) {
+    std::vector<std::vector<int64_t>> corners;
+    for (size_t k = 0; k < 3; ++k) {
+      const uint32_t v = chunk.indices[3 * t + k];
+      corners.push_back({chunk.colours[v]});
+      for (size_t axis = 0; axis < 3; ++axis)
+        corners.back().push_back(std::lround(1e4 * double(chunk.positions_room[3 * size_t{v} + axis])));
     }
+    std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
+    std::vector<int64_t> flat;
+    for (const auto& corner : corners) flat.insert(flat.end(), corner.begin(), corner.end());
+    out.insert(flat);
   }
   return out;
 }
 
-std::set<uint32_t> numbers(const std::vector<uint32_t>& words) {
+TEST(Base, PartsHaveEveryTriangleOfTheirChunks) {
+  Base base(0.8f, nullptr);
+  std::multiset<std::vector<int64_t>> wanted, told;
+  for (const auto& [id, chunk] : test::terrain(100, 100)) {
+    const auto held = geometry::decode_chunk(chunk.bytes).value();
+    // Positions that the base's steps of 2^-16 m leave as they are.
+    std::vector<float> positions(held.view.positions_room.begin(), held.view.positions_room.end());
+    for (float& p : positions) p = std::round(p * 65536) / 65536;
+    const auto rounded = geometry::build_chunk(positions, held.view.normals, held.view.colours, held.view.indices);
+    const auto view = geometry::MeshChunkView::validate(rounded).value();
+    base.add(view, 0, false);
+    wanted.merge(triangles_of(view));
+  }
+  for (size_t n = 0; n < base.parts(); ++n) {
+    const auto held = geometry::decode_chunk(base.part(n).mesh).value();
+    EXPECT_LE(held.view.triangles(), wire::kBasePart);
+    told.merge(triangles_of(held.view));
+  }
+  EXPECT_EQ(base.triangles(), 20'000u);
+  EXPECT_EQ(base.coarse_parts(), 0u);
+  EXPECT_GT(base.parts(), 4u);
+  EXPECT_TRUE(told == wanted);
+}
+
+TEST(Base, ColoursScalars) {
+  scene::Colouring colouring;
+  colouring.range = {0, 1};
+  const scene::ColourTable table = scene::make_table(colouring);
+  const auto chunk = test::chunk_of({{{0, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.0f)},
+                                     {{1, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.5f)},
+                                     {{0, 1, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(1.0f)}},
+                                    {0, 1, 2}, true);
+  Base base(1, &table);
+  base.add(geometry::decode_chunk(chunk.bytes)->view, 0.1f, true);
+  EXPECT_EQ(base.coarse_parts(), 1u);
+  EXPECT_EQ(base.triangles(), 0u) << "fine ones count";
+  const auto held = geometry::decode_chunk(base.part(0).mesh).value();
+  EXPECT_FALSE(held.view.scalars);
+  std::map<float, uint32_t> colours;  // by x + 2 y
+  for (size_t v = 0; v < 3; ++v)
+    colours[held.view.positions_room[3 * v] + 2 * held.view.positions_room[3 * v + 1]] = held.view.colours[v];
+  EXPECT_EQ(colours, (std::map<float, uint32_t>{{0, table.at(0)}, {1, table.at(0.5f)}, {2, table.at(1)}}));
+}
+
+// A base of a square of 0.8 m at depth z that faces +z, in triangles of 2 cm.
+constexpr float kSide = 0.02f;
+Base square(float z, float error_m = 1e-4f) {
+  std::vector<test::Vertex> vertices;
+  std::vector<uint32_t> indices;
+  for (uint32_t i = 0; i <= 40; ++i)
+    for (uint32_t k = 0; k <= 40; ++k) {
+      vertices.push_back({{kSide * (float(i) - 20), kSide * (float(k) - 20), z}, {0, 0, 1}});
+      const uint32_t at = 41 * i + k;
+      if (i < 40 && k < 40) indices.insert(indices.end(), {at, at + 1, at + 41, at + 1, at + 42, at + 41});
+    }
+  Base out(1, nullptr);
+  out.add(geometry::decode_chunk(test::chunk_of(vertices, indices).bytes)->view, error_m, false);
+  return out;
+}
+// The x of each triangle's middle, by its number.
+std::vector<float> places(const Base& base) {
+  std::vector<float> out;
+  const auto held = geometry::decode_chunk(base.part(0).mesh).value();
+  for (size_t t = 0; t < held.view.triangles(); ++t) {
+    float x = 0;
+    for (size_t k = 0; k < 3; ++k) x += held.view.positions_room[3 * size_t{held.view.indices[3 * t + k]}] / 3;
+    out.push_back(x);
+  }
+  return out;
+}
+
+std::set<uint32_t> hidden(const Base& base) {
   std::set<uint32_t> out;
+  const auto words = base.hidden();
   for (size_t i = 0; i < words.size(); i += 3)
     for (uint64_t bits = words[i + 1] | uint64_t{words[i + 2]} << 32; bits != 0; bits &= bits - 1)
       out.insert(64 * words[i] + uint32_t(std::countr_zero(bits)));
@@ -77,91 +161,77 @@ SampledTile seen(const std::function<double(double x, double y)>& depth_m) {
     }
   return tile;
 }
+const auto kNothing = [](double, double) { return 0.0; };
 
-TEST(Base, PartsHaveEverySurfelInItsPlace) {
-  const auto surfels = square(0, 0.4f);
-  const Base base = base_of(surfels);
-  EXPECT_EQ(base.surfels(), surfels.size());
-  std::set<uint32_t> seen_numbers;
-  for (const auto& [number, at] : told(base)) {
-    EXPECT_TRUE(seen_numbers.insert(number).second);
-    EXPECT_LT(std::abs(at.z), 0.001f);
-  }
-  EXPECT_EQ(seen_numbers.size(), surfels.size());
-  EXPECT_EQ(*seen_numbers.rbegin(), surfels.size() - 1);
+TEST(Base, RaysThatMeetNothingHideTriangles) {
+  Base base = square(0);
+  base.hide(seen(kNothing), nullptr);
+  EXPECT_EQ(hidden(base).size(), base.triangles());
 }
 
-TEST(Base, PartZeroHasOneSurfelInSixteen) {
-  const Base base = base_of(square(0, 0.4f));
-  const auto part = base.part(0);
-  const auto* bytes = reinterpret_cast<const uint8_t*>(part.surfel_data.data());
-  size_t count = 0;
-  const auto leaves = codec::decode_surfels({bytes, part.surfel_data.size()});
-  ASSERT_TRUE(leaves.ok());
-  for (const auto& leaf : *leaves) count += leaf.surfels.size();
-  EXPECT_EQ(count, (base.surfels() + 15) / 16);
-}
-
-TEST(Base, RaysThatMeetNothingHideSurfels) {
-  Base base = base_of(square(0, 0.3f));
-  base.hide(seen([](double, double) { return 0.0; }), nullptr);
-  EXPECT_EQ(numbers(base.hidden()).size(), base.surfels());
-}
-
-TEST(Base, RaysThatEndOnASurfaceHideNoSurfelInside) {
-  Base base = base_of(square(0, 0.3f));
+TEST(Base, RaysThatEndOnASurfaceHideNothing) {
+  Base base = square(0);
   base.hide(seen([](double, double) { return 1.0; }), nullptr);
   EXPECT_TRUE(base.hidden().empty());
 }
 
-TEST(Base, SurfelsBehindASurfaceStay) {
-  Base base = base_of(square(-0.2f, 0.3f));
+TEST(Base, TrianglesBehindASurfaceStay) {
+  Base base = square(-0.2f);
   base.hide(seen([](double, double) { return 1.0; }), nullptr);
   EXPECT_TRUE(base.hidden().empty());
 }
 
-TEST(Base, SurfelsAtTheEdgeOfASurfaceAreHidden) {
-  Base base = base_of(square(0, 0.3f));
-  // The surface ends at x = 0.1; x at depth 1 is x there.
+TEST(Base, RaysThatEndWithinItsErrorHideNothing) {
+  Base rough = square(0, 0.1f), exact = square(0);
+  const auto behind = seen([](double, double) { return 1.08; });
+  rough.hide(behind, nullptr);
+  exact.hide(behind, nullptr);
+  EXPECT_TRUE(rough.hidden().empty());
+  EXPECT_EQ(hidden(exact).size(), exact.triangles());
+}
+
+TEST(Base, TrianglesOfTheMeshItselfStay) {
+  Base base = square(0, 0);
+  base.hide(seen(kNothing), nullptr);
+  EXPECT_TRUE(base.hidden().empty());
+}
+
+TEST(Base, TrianglesAtTheEdgeOfASurfaceAreHidden) {
+  Base base = square(0);
+  // The surface ends at x = 0.1.
   base.hide(seen([](double x, double) { return x < 0.1 ? 1.0 : 0.0; }), nullptr);
-  const auto hidden = numbers(base.hidden());
-  for (const auto& [number, at] : told(base)) {
-    if (at.x > 0.1f - 0.5f * kSpacing) {
-      EXPECT_TRUE(hidden.contains(number)) << at.x;
-    }
-    if (at.x < 0.1f - 1.5f * kSpacing) {
-      EXPECT_FALSE(hidden.contains(number)) << at.x;
-    }
+  const auto gone = hidden(base);
+  const auto at = places(base);
+  for (uint32_t i = 0; i < at.size(); ++i) {
+    if (at[i] > 0.1f + kSide) EXPECT_TRUE(gone.contains(i)) << at[i];
+    if (at[i] < 0.1f - kSide) EXPECT_FALSE(gone.contains(i)) << at[i];
   }
 }
 
 TEST(Base, RaysThatWereNotCastTellNothing) {
-  Base base = base_of(square(0, 0.3f));
+  Base base = square(0);
   image::PixelMask cast;
   cast.reset(256, 256);
-  base.hide(seen([](double, double) { return 0.0; }), &cast);
+  base.hide(seen(kNothing), &cast);
   EXPECT_TRUE(base.hidden().empty());
 }
 
-TEST(Base, RaysCoarserThanTheSurfelsTellNothing) {
-  Base base = base_of(square(0, 0.3f));
-  SampledTile far = seen([](double, double) { return 0.0; });
+TEST(Base, RaysCoarserThanItsTrianglesTellNothing) {
+  Base base = square(0);
+  SampledTile far = seen(kNothing);
   far.camera = geometry::make_camera({{0, 0, 9}, {1, 0, 0, 0}}, 60, 256, 256);
   base.hide(far, nullptr);
   EXPECT_TRUE(base.hidden().empty());
 }
 
-TEST(Base, ShowsTheSurfelsOfABoxAgain) {
-  Base base = base_of(square(0, 0.3f));
-  base.hide(seen([](double, double) { return 0.0; }), nullptr);
+TEST(Base, ShowsTheTrianglesOfABoxAgain) {
+  Base base = square(0);
+  base.hide(seen(kNothing), nullptr);
   (void)base.take_changes();
-  const geometry::Box box{glm::vec3(0, -1, -1), glm::vec3(1, 1, 1)};
-  base.show(box);
-  const auto hidden = numbers(base.hidden());
-  for (const auto& [number, at] : told(base))
-    if (std::abs(at.x) > 0.001f) {
-      EXPECT_EQ(hidden.contains(number), at.x < 0) << at.x;
-    }
+  base.show({glm::vec3(0, -1, -1), glm::vec3(1, 1, 1)});
+  const auto gone = hidden(base);
+  const auto at = places(base);
+  for (uint32_t i = 0; i < at.size(); ++i) EXPECT_EQ(gone.contains(i), at[i] < 0);
   EXPECT_FALSE(base.take_changes().empty());
   EXPECT_TRUE(base.take_changes().empty());
 }

@@ -1,12 +1,14 @@
-// The backdrop shows coarse points in pixels that finer points leave empty, and nowhere else.
+// The backdrop shows the base in pixels that points leave empty, and nowhere else.
 #include "common/splat/backdrop.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "common/points/mosaic_builder.h"
+#include "common/splat/cpu_splatter.h"
 
 namespace telesplat::splat {
 namespace {
@@ -15,8 +17,8 @@ constexpr float kNothing = std::numeric_limits<float>::infinity();
 const geometry::Camera kCamera = geometry::make_camera({{0, 0, 1}, {1, 0, 0, 0}}, 60, 320, 240);
 const points::ModelConfig kModel{{glm::vec3(-0.5f), glm::vec3(0.5f)}, 2, false};
 
-// A square of points at z that faces +z, or -z, from x0 to x1 and -0.3 to 0.3.
-points::PointModel square(float z, float x0, float x1, float step, uint32_t colour, bool away = false) {
+// A square of points at z that faces +z, from x0 to x1 and -0.3 to 0.3.
+points::PointModel square(float z, float x0, float x1, float step, uint32_t colour) {
   points::PointModel model(kModel);
   const points::OctreeGrid grid = points::octree_grid(kModel);
   std::map<points::ClusterKey, std::vector<glm::dvec3>> leaves;
@@ -32,7 +34,7 @@ points::PointModel square(float z, float x0, float x1, float step, uint32_t colo
     points::MosaicBuilder out({1}, {}, {n, n, n});
     for (uint32_t i = 0; i < n; ++i) {
       out.x[i] = uint16_t(places[i].x), out.y[i] = uint16_t(places[i].y), out.z[i] = uint16_t(places[i].z);
-      out.normal[i] = image::encode_normal16({0, 0, away ? -1 : 1});
+      out.normal[i] = image::encode_normal16({0, 0, 1});
       out.colour[i] = colour;
     }
     auto& change = insertion.changes.emplace_back();
@@ -43,29 +45,53 @@ points::PointModel square(float z, float x0, float x1, float step, uint32_t colo
   return model;
 }
 
+// Two triangles that face +z, or -z.
+BasePart rectangle(float z, float x0, float x1, float y1, uint32_t colour, float facing = 1) {
+  BasePart out;
+  for (const glm::vec3& p : {glm::vec3(x0, -0.3f, z), {x1, -0.3f, z}, {x1, y1, z}, {x0, y1, z}}) {
+    out.positions.push_back(p);
+    out.normals.emplace_back(0, 0, facing);
+    out.colours.push_back(colour);
+    out.box_room.extend(p);
+  }
+  out.indices = {0, 1, 2, 0, 2, 3};
+  find_planes(out);
+  return out;
+}
+std::shared_ptr<const BaseMesh> mesh_of(std::vector<BasePart> parts) {
+  auto out = std::make_shared<BaseMesh>();
+  for (BasePart& part : parts) {
+    out->triangles += part.indices.size() / 3;
+    out->parts.push_back(std::make_shared<const BasePart>(std::move(part)));
+  }
+  return out;
+}
+
 struct Picture {
   std::vector<uint32_t> colour = std::vector<uint32_t>(320 * 240);
   std::vector<float> depth_m = std::vector<float>(320 * 240);
   FrameTarget target() { return {320, 240, colour.data(), depth_m.data()}; }
-  // Share of pixels that show something nearer than 9 m.
+  // Share of pixels that show something.
   double covered() const {
     return double(std::ranges::count_if(depth_m, [](float d) { return d < kNothing; })) / double(depth_m.size());
   }
 };
 
-// Draws a model's points with those of another one behind them.
-Picture drawn(const points::PointModel& model, const points::PointModel* coarse, RenderOptions options = {}) {
+// Draws a model's points before a base.
+Picture drawn(const points::PointModel& model, std::shared_ptr<const BaseMesh> base, RenderOptions options = {},
+              const geometry::Clip& clip = {}, const geometry::Camera& camera = kCamera) {
   DrawList list;
-  select_view(model, kCamera, {}, list);
-  if (coarse) {
-    list.coarse = std::make_shared<DrawList>();
-    select_coarse(*coarse, kCamera, {}, *list.coarse);
-  }
+  select_view(model, camera, {}, list);
+  list.base = std::move(base);
+  list.base_clip = clip;
   Picture out;
   image::ShadingParameters unlit;
   unlit.lit = false;
-  CpuSplatter(2).render(list, kCamera, options, image::Shading(unlit, kCamera), out.target());
+  CpuSplatter(2).render(list, camera, options, image::Shading(unlit, camera), out.target());
   return out;
+}
+Picture drawn(std::shared_ptr<const BaseMesh> base, const geometry::Camera& camera = kCamera) {
+  return drawn(points::PointModel(kModel), std::move(base), {}, {}, camera);
 }
 
 class BackdropTest : public testing::TestWithParam<Kernel> {
@@ -73,56 +99,110 @@ class BackdropTest : public testing::TestWithParam<Kernel> {
   const RenderOptions options{.kernel = GetParam()};
 };
 
-TEST_P(BackdropTest, CoarsePointsFillTheEmptyHalf) {
-  const auto fine = square(0, -0.3f, 0, 0.002f, 0xff0000), coarse = square(0, -0.3f, 0.3f, 0.02f, 0x0000ff);
-  const Picture with = drawn(fine, &coarse, options), without = drawn(fine, nullptr, options);
+TEST_P(BackdropTest, TheBaseFillsTheEmptyHalf) {
+  const auto fine = square(0, -0.3f, 0, 0.002f, 0xff0000);
+  const auto base = mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)});
+  const Picture with = drawn(fine, base, options), without = drawn(fine, nullptr, options);
   size_t filled = 0;
   for (int y = 70; y < 170; ++y)
     for (int x = 80; x < 240; ++x) {
       const size_t at = size_t(320 * y + x);
-      EXPECT_LT(with.depth_m[at], kNothing) << x << " " << y;
-      EXPECT_NEAR(with.depth_m[at], 1, 0.01);
+      EXPECT_NEAR(with.depth_m[at], 1, 0.01) << x << " " << y;
       if (x < 155) EXPECT_EQ(with.colour[at], without.colour[at]);
       if (x > 165) filled += (with.colour[at] & 0xffffff) == 0x0000ff;
     }
   EXPECT_EQ(filled, 100u * 74u);
 }
 
-TEST_P(BackdropTest, FattensASurfaceByHalfASpacingAtMost) {
-  const auto fine = square(0, -0.3f, 0.3f, 0.002f, 0xff0000), coarse = square(0, -0.3f, 0.3f, 0.02f, 0x0000ff);
-  const double fatter = 0.62 / 0.6;
-  EXPECT_LT(drawn(fine, &coarse, options).covered(), fatter * fatter * drawn(fine, nullptr, options).covered());
-}
-
-TEST_P(BackdropTest, FarPointsShowBeforeCoarseOnes) {
-  // Rays reached the far surface, so the coarse points before it are not known to be there.
-  const auto fine = square(-0.3f, -0.4f, 0.4f, 0.002f, 0xff0000), coarse = square(0.2f, -0.3f, 0.3f, 0.02f, 0x0000ff);
-  EXPECT_EQ(drawn(fine, &coarse, options).colour[320 * 120 + 160] & 0xffffff, 0xff0000u);
+TEST_P(BackdropTest, PointsBehindTheBaseAreNotSeenThroughIt) {
+  const auto fine = square(-0.3f, -0.4f, 0.4f, 0.002f, 0xff0000);
+  BasePart part = rectangle(0.2f, -0.3f, 0.3f, 0.3f, 0x0000ff);
+  EXPECT_EQ(drawn(fine, mesh_of({part}), options).colour[320 * 120 + 160] & 0xffffff, 0x0000ffu);
+  part.error_m = 0.6f;  // they may lie on the surface that it stands for
+  EXPECT_EQ(drawn(fine, mesh_of({part}), options).colour[320 * 120 + 160] & 0xffffff, 0xff0000u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, BackdropTest, testing::ValuesIn(kKernels),
                          [](const auto& of) { return std::string(kernel_name(of.param)); });
 
+TEST(Backdrop, CoversThePixelsOfItsTriangles) {
+  const double side = 0.6 * kCamera.focal_x();
+  EXPECT_NEAR(drawn(mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)})).covered(), side * side / (320 * 240),
+              2 * side / (320 * 240));
+}
+
 TEST(Backdrop, SurfacesAreSeenFromBehind) {
-  const points::PointModel nothing(kModel);
-  const auto coarse = square(0, -0.3f, 0.3f, 0.02f, 0x0000ff, true);
-  EXPECT_GT(drawn(nothing, &coarse).covered(), 0.2);
+  const auto front = mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)});
+  const auto back = mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff, -1)});
+  EXPECT_EQ(drawn(front).depth_m, drawn(back).depth_m);
+}
+
+TEST(Backdrop, TheNearestTriangleShows) {
+  const BasePart near = rectangle(0.1f, -0.3f, 0.3f, 0.3f, 0x0000ff), far = rectangle(0, -0.3f, 0.3f, 0.3f, 0xff0000);
+  for (const auto& mesh : {mesh_of({near, far}), mesh_of({far, near})}) {
+    const Picture picture = drawn(mesh);
+    EXPECT_EQ(picture.colour[320 * 120 + 160] & 0xffffff, 0x0000ffu);
+    EXPECT_NEAR(picture.depth_m[320 * 120 + 160], 0.9f, 0.001f);
+  }
+}
+
+TEST(Backdrop, HiddenTrianglesAreNotDrawn) {
+  auto base = std::make_shared<BaseMesh>(*mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)}));
+  const double whole = drawn(base).covered();
+  base->hidden = {{2}};  // the second triangle
+  EXPECT_NEAR(drawn(base).covered(), 0.5 * whole, 0.01);
+}
+
+TEST(Backdrop, TrianglesThatMeetLeaveNoPixelEmpty) {
+  // A fan of thin triangles, near by, around a point that is no pixel's centre.
+  BasePart fan;
+  for (int i = 0; i <= 90; ++i) {
+    const float angle = float(i) * float(M_PI) / 45;
+    fan.positions.push_back(i == 90 ? glm::vec3(0.013f, 0.007f, 0) : glm::vec3(std::cos(angle), std::sin(angle), 0));
+    fan.normals.emplace_back(0, 0, 1);
+    fan.colours.push_back(0x0000ff);
+    fan.box_room.extend(fan.positions.back());
+    if (i < 90) fan.indices.insert(fan.indices.end(), {uint16_t(i), uint16_t((i + 1) % 90), uint16_t(90)});
+  }
+  find_planes(fan);
+  EXPECT_EQ(drawn(mesh_of({fan})).covered(), 1);
+}
+
+TEST(Backdrop, AFloorUnderTheEyeReachesBehindIt) {
+  // From behind the eye to far ahead of it: no triangle lies wholly before the near plane.
+  BasePart floor;
+  for (const glm::vec3& p : {glm::vec3(-50, -0.2f, 50), {50, -0.2f, 50}, {50, -0.2f, -50}, {-50, -0.2f, -50}}) {
+    floor.positions.push_back(p);
+    floor.normals.emplace_back(0, 1, 0);
+    floor.colours.push_back(0x0000ff);
+    floor.box_room.extend(p);
+  }
+  floor.indices = {0, 1, 2, 0, 2, 3};
+  find_planes(floor);
+  const Picture picture = drawn(mesh_of({floor}));
+  for (int y = 125; y < 240; ++y)
+    for (int x = 0; x < 320; ++x) {
+      const double depth = 0.2 * kCamera.focal_y() / (y + 0.5 - 120);
+      ASSERT_NEAR(picture.depth_m[size_t(320 * y + x)], depth, 0.05 * depth) << x << " " << y;
+    }
+  EXPECT_EQ(picture.depth_m[320 * 100 + 160], kNothing);
+}
+
+TEST(Backdrop, ClippedTrianglesEndAtThePlane) {
+  const auto base = mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)});
+  const geometry::Clip clip{{{{1, 0, 0}, 0.1}}};  // x >= 0.1 stays
+  const Picture cut = drawn(points::PointModel(kModel), base, {}, clip);
+  const int edge = int(160 + 0.1 * kCamera.focal_x());
+  EXPECT_EQ(cut.depth_m[size_t(320 * 120 + edge - 3)], kNothing);
+  EXPECT_LT(cut.depth_m[size_t(320 * 120 + edge + 3)], kNothing);
+  EXPECT_EQ(drawn(points::PointModel(kModel), base, {}, {{{{1, 0, 0}, 0.4}}}).covered(), 0);
 }
 
 TEST(Backdrop, WithoutFinishAPictureIsFilledToo) {
-  const points::PointModel nothing(kModel);
-  const auto coarse = square(0, -0.3f, 0.3f, 0.02f, 0x0000ff);
-  const double covered = drawn(nothing, &coarse).covered();
-  EXPECT_NEAR(drawn(nothing, &coarse, {.finish = {false, false, false}}).covered(), covered, 0.02 * covered);
-}
-
-TEST(Backdrop, HasFewerPixelsTheFartherApartItsPointsAre) {
-  DrawList list;
-  select_coarse(square(0, -0.3f, 0.3f, 0.01f, 0), kCamera, {}, list);
-  const int fine = list.halvings;
-  select_coarse(square(0, -0.3f, 0.3f, 0.1f, 0), kCamera, {}, list);
-  EXPECT_EQ(fine, kLeastHalvings);
-  EXPECT_EQ(list.halvings, kMostHalvings);
+  const auto base = mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)});
+  const double covered = drawn(base).covered();
+  EXPECT_NEAR(drawn(points::PointModel(kModel), base, {.finish = {false, false, false}}).covered(), covered,
+              0.02 * covered);
 }
 
 }  // namespace

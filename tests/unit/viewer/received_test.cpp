@@ -137,9 +137,9 @@ TEST_F(Receiving, ABaseIsAskedForWhereTheSessionHasOne) {
   w.endpoints = {{"patches", "inproc://patches"}, {"state", "inproc://state"}};
   const auto received = make(scene::Pipeline::kPoints);
   // Requests for a base in ten seconds. Each tick asks for the model anew, too: there is no answer.
-  const auto requests = [&](const char* kind, uint64_t base_points, bool keep) {
+  const auto requests = [&](const char* kind, uint64_t base_triangles, bool keep) {
     w.facts["kind"] = kind;
-    w.settings.base_points = base_points, w.settings.keep_redundant = keep;
+    w.settings.base_triangles = base_triangles, w.settings.keep_redundant = keep;
     EXPECT_TRUE(received->follow(w).ok());
     feeds.close();
     EXPECT_TRUE(feeds.connect(received->feeds(), w));

@@ -162,6 +162,7 @@ class Comparison {
     cell.best_patch_only = subject_.best_patch_only;
     cell.repeat = options_.repeat;
     cell.detail = float(pose.frame.detail);
+    cell.base = models_->base();
     for (const auto& kernel : options_.kernels) {
       cell.render = {*splat::kernel_named(kernel), finish_};
       cell.splat_scale =

@@ -70,6 +70,7 @@ Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, S
   selection.best_patch_only = o.best_patch_only;
   const image::Shading shading(o.shading, camera);
   splat::DrawList list;
+  list.base = o.base;
   struct Timed {
     double select_ms, render_ms;
     splat::SplatStats stats;

@@ -51,6 +51,7 @@ struct CellOptions {
   image::ShadingParameters shading;
   bool best_patch_only = false;  ///< as SelectionOptions has it
   float detail = 1;              ///< SelectionOptions::detail
+  std::shared_ptr<const splat::BaseMesh> base;  ///< DrawList::base
 };
 
 /// The picture that a view is compared with, and its FLIP comparer.

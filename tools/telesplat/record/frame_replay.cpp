@@ -70,7 +70,7 @@ class PointReplay final : public FrameReplay {
     selection.eyes = eyes;
     const geometry::Camera drawn = frame.look.render.halved ? geometry::half_size(camera) : camera;
     splat::select_view(*models_->model(), drawn, selection, list_, &models_->summaries());
-    models_->select_base(drawn, selection, list_);
+    list_.base = models_->base();
     list_.applied = models_->applied();
     list_.replica = models_->replica() + 1;
     list_.epoch = frame.epoch;
@@ -112,7 +112,7 @@ class PointReplay final : public FrameReplay {
     const viewer::Supersampler::Scene scene{
         [&](const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& list) {
           splat::select_view(*models_->model(), camera, options, list, &models_->summaries());
-          models_->select_base(camera, options, list);
+          list.base = models_->base();
           list.applied = list_.applied;
           list.replica = list_.replica;
           list.epoch = list_.epoch;

@@ -21,10 +21,8 @@ class ModelReplay {
   /// Null before the first frame. Valid until the next call.
   const points::PointModel* model() const { return events_->model(); }
   const points::Summaries& summaries() const { return events_->summaries(); }
-  /// As ModelCache::select_base().
-  void select_base(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) const {
-    events_->select_base(camera, options, out);
-  }
+  /// splat::DrawList::base of the frame.
+  std::shared_ptr<const splat::BaseMesh> base() const { return events_->base(); }
   /// Number of the model's newest event. replica(): 0 for the first packer's model, 1 for the second, ...
   Sequence applied() const { return events_->applied(); }
   uint32_t replica() const { return replica_; }

@@ -3,19 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 
 #include "common/core/clock.h"
 #include "common/geometry/chunk_code.h"
-#include "common/geometry/surfels.h"
 #include "common/image/normal.h"
 #include "common/parallel/in_parallel.h"
 #include "services/data/base/mesh.h"
 #include "services/data/mesh/out_of_core/build.h"
-#include "services/data/mesh/surfels.h"
+#include "services/data/mesh/out_of_core/surfels.h"
 
 namespace telesplat::data {
 namespace {
@@ -105,18 +103,17 @@ void read_spread(const RandomMesh& mesh, const PreviewOptions& options, Soup& ou
 }
 
 // A square for each surfel, so wide that those of neighbouring cells overlap.
-PlacedMesh squares(const geometry::SurfelView& surfels) {
+PlacedMesh squares(const Surfels& surfels, bool scalars) {
   PlacedMesh out;
-  out.scalars = surfels.scalars;
+  out.scalars = scalars;
   const float half = 0.75f * surfels.spacing_m;
-  for (size_t i = 0; i < surfels.size(); ++i) {
-    const float* p = &surfels.positions_room[3 * i];
+  for (size_t i = 0; i < surfels.positions.size(); ++i) {
     const glm::vec3 n = image::decode_normal32(surfels.normals[i]);
     const glm::vec3 aside = std::abs(n.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
     const glm::vec3 u = half * glm::normalize(glm::cross(n, aside)), v = glm::cross(n, u);
     const auto first = static_cast<uint32_t>(out.positions_room.size());
     for (const glm::vec3& corner : {-u - v, u - v, u + v, -u + v}) {
-      out.positions_room.push_back(glm::vec3(p[0], p[1], p[2]) + corner);
+      out.positions_room.push_back(surfels.positions[i] + corner);
       out.normals.push_back(surfels.normals[i]);
       out.colours.push_back(surfels.colours[i]);
     }
@@ -138,16 +135,13 @@ Result<std::shared_ptr<MeshStore>> make_preview(const std::string& path, const R
   mesh.drop_pages();
   if (soup.triangles() == 0) return Error{fmt::format("{}: none of the triangles that were looked at is whole", path)};
   const auto chunks = soup.chunks(1 << 16);
-  const auto chunk = [&](size_t i) {
-    return geometry::HeldChunk{*geometry::MeshChunkView::validate(chunks[i]), nullptr};
-  };
+  std::vector<geometry::MeshChunkView> views;
+  for (const auto& chunk : chunks) views.push_back(*geometry::MeshChunkView::validate(chunk));
   const glm::dvec3 half = info.box_data.size() * 0.5;
   const glm::vec3 lo = placing->room(placing->centre - half), hi = placing->room(placing->centre + half);
   info.box_room = {glm::min(lo, hi), glm::max(lo, hi)};
-  const std::atomic<bool> never{false};
-  const auto bytes = make_surfels({info.box_room, soup.triangles(), chunks.size(), chunk},
-                                  std::clamp<size_t>(soup.triangles() / 6, 1000, 1 << 17), never);
-  const PlacedMesh placed = squares(*geometry::SurfelView::validate(bytes));
+  const auto surfels = make_surfels(views, info.box_room, std::clamp<size_t>(soup.triangles() / 6, 1000, 1 << 17));
+  const PlacedMesh placed = squares(surfels, mesh.facts().scalars);
   const RandomMesh::Facts& facts = mesh.facts();
   info.format = facts.format, info.arrays = facts.arrays, info.array = options.array;
   info.coordinates = facts.coordinates;
@@ -155,7 +149,7 @@ Result<std::shared_ptr<MeshStore>> make_preview(const std::string& path, const R
   info.had_normals = facts.normals, info.had_colours = facts.colours;
   info.up = placing->up, info.up_reason = placing->up_reason;
   info.content_hash = mesh.vertices() ^ mesh.triangles() << 32;  // no file's content: another one follows it
-  return MeshStore::keep(path, placed, info, bytes);
+  return MeshStore::keep(path, placed, info);
 }
 
 Result<std::shared_ptr<MeshStore>> keep_preview(const std::string& path, Mesh&& mesh, const StoreOptions& options) {

@@ -3,66 +3,26 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
 #include <limits>
-#include <utility>
+#include <queue>
 
-#include "common/codec/surfel_codec.h"
-#include "common/image/normal.h"
+#include "common/geometry/camera.h"
+#include "common/geometry/chunk_code.h"
 #include "common/wire/limits.h"
 
 namespace telesplat::packer {
 namespace {
 
-// Rays hide surfels where they lie at most this many of the surfels' spacings apart, at the surfels' depth.
-constexpr double kFineness = 1.0;
-// A ray that ends at most this part of the spacing before a surfel counts as having reached it.
-constexpr float kReach = 0.5f;
-// Radius around a surfel in which rays are looked at, in spacings; and in pixels, at least.
-constexpr float kAround = 0.75f, kAround_px = 1.5f;
-// A ray has passed a surfel's plane if it ends this part of its depth, and of the spacing, behind it.
-constexpr float kBehind = 0.02f, kBehindSpacings = 0.5f;
-
-struct Placed {
-  uint32_t key, place;  // leaf, and place in it
-  uint32_t surfel;      // number in the set
-  codec::LeafSurfel coded;
-};
-
-std::vector<Placed> placed(const geometry::SurfelView& set, const points::OctreeGrid& grid,
-                           const scene::ColourTable* colours) {
-  std::vector<Placed> out;
-  out.reserve(set.size());
-  const double last = (1 << grid.depth) - 1;
-  for (uint32_t i = 0; i < set.size(); ++i) {
-    const float* p = &set.positions_room[3 * size_t{i}];
-    const glm::dvec3 at = (glm::dvec3(double(p[0]), double(p[1]), double(p[2])) - grid.lo) / grid.leaf_size;
-    uint32_t key = 0;
-    uint8_t steps[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const double leaf = std::clamp(std::floor(at[axis]), 0.0, last);
-      key |= static_cast<uint32_t>(leaf) << (10 * axis);
-      steps[axis] = static_cast<uint8_t>(std::clamp((at[axis] - leaf) * 256, 0.0, 255.0));
-    }
-    const uint32_t colour = colours ? colours->at(std::bit_cast<float>(set.colours[i])) : set.colours[i] & 0xffffff;
-    codec::LeafSurfel coded{steps[0], steps[1], steps[2],
-                            image::encode_normal16(image::decode_normal32(set.normals[i])), colour};
-    out.push_back({key, coded.place(), i, coded});
-  }
-  std::ranges::sort(out, {}, [](const Placed& s) { return std::tuple(s.key, s.place, s.surfel); });
-  const auto doubles = std::ranges::unique(out, {}, [](const Placed& s) { return std::pair(s.key, s.place); });
-  out.erase(doubles.begin(), doubles.end());
-  return out;
-}
-
-// Codes every stride-th surfel of [first, last). Each leaf's number is that of its first surfel.
-std::vector<uint8_t> coded(std::span<const Placed> all, size_t first, size_t last, size_t stride) {
-  std::vector<codec::SurfelLeaf> leaves;
-  for (size_t i = first; i < last; i += stride) {
-    if (leaves.empty() || leaves.back().key != all[i].key) leaves.push_back({all[i].key, uint32_t(i), {}});
-    leaves.back().surfels.push_back(all[i].coded);
-  }
-  return codec::encode_surfels(leaves);
-}
+// Steps of positions along the largest side of the mesh.
+constexpr float kSteps = 1 << 16;
+// Upper bits of both coordinates of a normal: half a degree.
+constexpr uint32_t kNormalBits = 0xff00ff00;
+// A ray has passed a triangle if it ends this part of its depth behind it, and farther from its plane than the error.
+constexpr float kBehind = 0.02f;
+// Triangles with smaller sides are not looked at: rays beside them would count.
+constexpr double kLeastSide_px = 4;
 
 void put_word(size_t index, uint64_t word, std::vector<uint32_t>& out) {
   for (const uint64_t number : {uint64_t{index}, word & 0xffffffff, word >> 32})
@@ -84,13 +44,6 @@ class Rays {
     const uint32_t code = tile_.image.depth[static_cast<size_t>(y) * static_cast<size_t>(tile_.rect.width) + x];
     return code == 0 ? std::numeric_limits<float>::infinity() : scale_ / static_cast<float>(code);
   }
-  /// The farthest of the rays at a pixel and beside it.
-  float farthest(int x, int y) const {
-    float out = kNotCast;
-    for (int j = y - 1; j <= y + 1; ++j)
-      for (int i = x - 1; i <= x + 1; ++i) out = std::max(out, at(i, j));
-    return out;
-  }
 
  private:
   const SampledTile& tile_;
@@ -105,117 +58,160 @@ double distance(const geometry::Box& box, const glm::dvec3& from) {
 
 }  // namespace
 
-Base::Base(const geometry::SurfelView& set, const points::ModelConfig& model, const scene::ColourTable* colours)
-    : config_{model.box_room, std::min(model.depth, kDepth), false}, spacing_m_(set.spacing_m) {
-  const auto all = placed(set, points::octree_grid(config_), colours);
-  for (const Placed& s : all) {
-    const float* p = &set.positions_room[3 * size_t{s.surfel}];
-    const glm::vec3 position(p[0], p[1], p[2]);
-    if (leaves_.empty() || leaves_.back().key != s.key)
-      leaves_.push_back({s.key, {}, static_cast<uint32_t>(positions_.size()), 0, 0});
-    Leaf& leaf = leaves_.back();
-    leaf.box.extend(position);
-    ++leaf.count, ++leaf.shown;
-    positions_.push_back(position);
-    normals_.push_back(s.coded.normal);
+BaseChunks choose_base(const std::vector<geometry::ChunkInfo>& tree, uint64_t most) {
+  std::vector<bool> is_child(tree.size());
+  for (const auto& node : tree)
+    for (size_t i = node.first_child; i < std::min<size_t>(node.first_child + node.children, tree.size()); ++i)
+      is_child[i] = true;
+  const auto finer = [&](size_t a, size_t b) { return tree[a].spacing_m < tree[b].spacing_m; };
+  std::priority_queue<size_t, std::vector<size_t>, decltype(finer)> open(finer);
+  BaseChunks out;
+  uint64_t triangles = 0;
+  for (size_t i = 0; i < tree.size(); ++i) {
+    if (is_child[i]) continue;
+    open.push(i);
+    triangles += tree[i].triangles;
+    out.coarse.push_back(tree[i].id);
   }
-  hidden_.assign((all.size() + 63) / 64, 0);
-  told_ = hidden_;
-  parts_.push_back(coded(all, 0, all.size(), wire::kBaseStride));
-  // A part has whole leaves.
-  for (size_t i = 0; i < leaves_.size();) {
-    const size_t first = leaves_[i].first;
-    size_t last = first;
-    for (; i < leaves_.size() && (last == first || last - first + leaves_[i].count <= kPart); ++i)
-      last += leaves_[i].count;
-    parts_.push_back(coded(all, first, last, 1));
+  while (!open.empty()) {
+    const geometry::ChunkInfo& node = tree[open.top()];
+    open.pop();
+    uint64_t below = 0;
+    for (uint32_t i = 0; i < node.children; ++i) below += tree[node.first_child + i].triangles;
+    if (below <= node.triangles || triangles - node.triangles + below > most) {
+      out.fine.push_back(node.id);
+      continue;
+    }
+    triangles += below - node.triangles;
+    for (uint32_t i = 0; i < node.children; ++i) open.push(node.first_child + i);
   }
+  std::ranges::sort(out.fine);
+  if (out.fine == out.coarse) out.coarse.clear();
+  return out;
 }
 
-wire::BasePart Base::part(size_t part) const {
-  return {.part = part,
-          .parts = parts_.size(),
-          .surfels = surfels(),
-          .depth = static_cast<uint64_t>(config_.depth),
-          .box_room = config_.box_room,
-          .spacing_m = double{spacing_m_},
-          .surfel_data = std::as_bytes(std::span(parts_[part]))};
+Base::Base(float largest_m, const scene::ColourTable* colours)
+    : step_m_(std::exp2(std::ceil(std::log2(largest_m / kSteps)))), colours_(colours) {}
+
+void Base::add(const geometry::MeshChunkView& chunk, float spacing_m, bool coarse) {
+  for (size_t first = 0; first < chunk.triangles(); first += wire::kBasePart)
+    add_part(chunk, first, std::min<size_t>(wire::kBasePart, chunk.triangles() - first), spacing_m);
+  if (coarse)
+    coarse_ = parts_.size();
+  else
+    triangles_ += chunk.triangles();
+  hidden_.resize(parts_.size() * (wire::kBasePart / 64));
+  told_.resize(hidden_.size());
 }
 
-void Base::flip(Leaf& leaf, size_t i) {
-  hidden_[i / 64] ^= uint64_t{1} << i % 64;
-  leaf.shown = is_hidden(i) ? leaf.shown - 1 : leaf.shown + 1;
+void Base::add_part(const geometry::MeshChunkView& chunk, size_t first, size_t count, float spacing_m) {
+  Part& part = parts_.emplace_back();
+  part.error_m = spacing_m + step_m_;
+  std::vector<float> positions;
+  std::vector<uint32_t> normals, colours, indices;
+  const auto corners = chunk.indices.subspan(3 * first, 3 * count);
+  std::vector<uint32_t> used(corners.begin(), corners.end());
+  std::ranges::sort(used);
+  used.erase(std::ranges::unique(used).begin(), used.end());
+  for (const uint32_t v : used) {
+    for (size_t axis = 0; axis < 3; ++axis)
+      positions.push_back(std::round(chunk.positions_room[3 * size_t{v} + axis] / step_m_) * step_m_);
+    normals.push_back(chunk.normals[v] & kNormalBits);
+    colours.push_back(colours_ ? colours_->at(std::bit_cast<float>(chunk.colours[v])) : chunk.colours[v] & 0xffffff);
+  }
+  for (const uint32_t v : corners) {
+    const auto i = static_cast<size_t>(std::ranges::lower_bound(used, v) - used.begin());
+    indices.push_back(static_cast<uint32_t>(i));
+    part.corners.emplace_back(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
+  }
+  float area_m2 = 0;
+  for (size_t i = 0; i < part.corners.size(); i += 3) {
+    const glm::vec3* p = &part.corners[i];
+    area_m2 += 0.5f * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+  }
+  part.side_m = std::sqrt(2 * area_m2 / static_cast<float>(count));
+  if (spacing_m == 0) part.corners.clear();
+  const auto laid_out = geometry::build_chunk(positions, normals, colours, indices);
+  const auto view = *geometry::MeshChunkView::validate(laid_out);
+  part.box = view.box_room;
+  part.code = geometry::encode_chunk(view);
 }
 
-// A tile as its rays look at surfels.
+void Base::set_hidden(size_t i, bool hidden) {
+  const uint64_t bit = uint64_t{1} << i % 64;
+  hidden_[i / 64] = hidden ? hidden_[i / 64] | bit : hidden_[i / 64] & ~bit;
+}
+
+// A tile as its rays look at triangles.
 struct Base::Look {
   Look(const SampledTile& tile, const image::PixelMask* cast)
       : camera(geometry::crop(tile.camera, tile.rect)), eye(tile.camera.pose.position_room), rays(tile, cast) {
     const auto t = camera.room_to_pixel();
     x = glm::vec4(t.x), y = glm::vec4(t.y), w = glm::vec4(t.w);
+    pixel = static_cast<float>(1 / std::min(camera.focal_x(), camera.focal_y()));
   }
+  bool is_passed(const glm::vec3* corners, float error_m) const;
+
   geometry::Camera camera;
   glm::vec3 eye;
   Rays rays;
   glm::vec4 x, y, w;  // camera.room_to_pixel()
+  float pixel;        // side of a pixel at a depth of 1 m
 };
 
-bool Base::is_passed(const Look& look, const glm::vec3& position, uint16_t normal, float farthest_m) const {
-  static constexpr float kRing[][2] = {{0, 0},       {1, 0},        {-1, 0},       {0, 1},        {0, -1},
-                                       {0.7f, 0.7f}, {-0.7f, 0.7f}, {0.7f, -0.7f}, {-0.7f, -0.7f}};
-  const glm::vec4 p(position, 1);
-  const float depth = glm::dot(look.w, p);
-  if (depth < static_cast<float>(look.camera.near_m) || depth > farthest_m) return false;
-  const float x = glm::dot(look.x, p) / depth, y = glm::dot(look.y, p) / depth;
-  if (!(x >= 0 && y >= 0 && x < static_cast<float>(look.camera.width) && y < static_cast<float>(look.camera.height)))
-    return false;
-  const auto pixel = [](float at) { return static_cast<int>(std::floor(at)); };
-  if (look.rays.farthest(pixel(x), pixel(y)) < depth - kReach * spacing_m_) return false;
-  const glm::vec3 n = image::octahedral16(normal);
-  const float plane = glm::dot(n, position - look.eye);
-  const float radius = std::max(kAround * spacing_m_ * static_cast<float>(look.camera.focal_x()) / depth, kAround_px);
-  for (const auto& ring : kRing) {
-    const int i = pixel(x + radius * ring[0]), j = pixel(y + radius * ring[1]);
-    const float ended = look.rays.at(i, j);
-    if (ended <= depth) continue;
-    // The surfel's plane along that ray; of one that is seen edge-on, its own depth.
-    const float along = glm::dot(n, glm::vec3(look.camera.unproject(i + 0.5, j + 0.5, 1)) - look.eye);
-    const float met = along != 0 ? plane / along : depth;
-    const float surface = met > depth && met < 2 * depth ? met : depth;
-    if (ended > (1 + kBehind) * surface + kBehindSpacings * spacing_m_) return true;
-  }
-  return false;
+// Looks at rays through four places inside the triangle. True: more of them passed it than ended at it.
+bool Base::Look::is_passed(const glm::vec3* c, float error_m) const {
+  constexpr float kMost = 0.6f, kLeast = 0.2f;  // parts of the corners
+  const glm::vec3 middle = (c[0] + c[1] + c[2]) / 3.0f;
+  const glm::vec3 across = glm::cross(c[1] - c[0], c[2] - c[0]);
+  const float length = glm::length(across), away = std::abs(glm::dot(across, middle - eye));
+  if (!(away > 0)) return false;
+  int passed = 0;
+  const auto look_at = [&](const glm::vec3& p) {
+    const float depth = glm::dot(glm::vec3(w), p) + w.w;
+    if (!(depth >= static_cast<float>(camera.near_m))) return;
+    const float u = (glm::dot(glm::vec3(x), p) + x.w) / depth, v = (glm::dot(glm::vec3(y), p) + y.w) / depth;
+    if (!(u >= 0 && v >= 0 && u < static_cast<float>(camera.width) && v < static_cast<float>(camera.height))) return;
+    // Depths of a plane that lies farther away are greater by the same factor everywhere.
+    const float error = error_m + depth * pixel;
+    const float behind = (1 + kBehind) * (away + error * length) / away, ended = rays.at(int(u), int(v));
+    if (ended > behind * depth)
+      ++passed;
+    else if (ended > depth / behind)
+      --passed;
+  };
+  look_at(middle);
+  for (int k = 0; k < 3; ++k) look_at(kMost * c[k] + kLeast * (c[(k + 1) % 3] + c[(k + 2) % 3]));
+  return passed > 0;
 }
 
 void Base::hide(const SampledTile& tile, const image::PixelMask* cast) {
   const Look look(tile, cast);
   const geometry::Frustum frustum(look.camera);
-  const double focal = std::min(look.camera.focal_x(), look.camera.focal_y());
-  const double farthest = kFineness * static_cast<double>(spacing_m_) * focal;
-  for (Leaf& leaf : leaves_) {
-    if (leaf.shown == 0 || !frustum.may_contain(leaf.box)) continue;
-    if (distance(leaf.box, tile.camera.pose.position_room) > farthest) continue;
-    for (size_t i = leaf.first; i < leaf.first + leaf.count; ++i)
-      if (!is_hidden(i) && is_passed(look, positions_[i], normals_[i], static_cast<float>(farthest))) flip(leaf, i);
+  for (size_t n = coarse_; n < parts_.size(); ++n) {
+    const Part& part = parts_[n];
+    if (!frustum.may_contain(part.box)) continue;
+    const double side_px = double{part.side_m} / double{look.pixel};  // at a depth of 1 m
+    if (kLeastSide_px * distance(part.box, tile.camera.pose.position_room) > side_px) continue;
+    for (size_t i = 0; i < part.corners.size() / 3; ++i)
+      if (const size_t number = n * wire::kBasePart + i; !is_hidden(number))
+        if (look.is_passed(&part.corners[3 * i], part.error_m)) set_hidden(number, true);
   }
 }
 
 void Base::show(const geometry::Box& box) {
-  for (Leaf& leaf : leaves_) {
-    const bool apart = glm::any(glm::lessThan(leaf.box.hi, box.lo)) || glm::any(glm::lessThan(box.hi, leaf.box.lo));
-    if (leaf.shown == leaf.count || apart) continue;
-    for (size_t i = leaf.first; i < leaf.first + leaf.count; ++i) {
-      const glm::vec3& p = positions_[i];
-      if (is_hidden(i) && glm::all(glm::lessThanEqual(box.lo, p)) && glm::all(glm::lessThanEqual(p, box.hi)))
-        flip(leaf, i);
+  for (size_t n = coarse_; n < parts_.size(); ++n) {
+    const Part& part = parts_[n];
+    if (glm::any(glm::lessThan(part.box.hi, box.lo)) || glm::any(glm::lessThan(box.hi, part.box.lo))) continue;
+    for (size_t i = 0; i < part.corners.size() / 3; ++i) {
+      const glm::vec3 middle = (part.corners[3 * i] + part.corners[3 * i + 1] + part.corners[3 * i + 2]) / 3.0f;
+      if (glm::all(glm::lessThanEqual(box.lo, middle)) && glm::all(glm::lessThanEqual(middle, box.hi)))
+        set_hidden(n * wire::kBasePart + i, false);
     }
   }
 }
 
-void Base::show_all() {
-  hidden_.assign(hidden_.size(), 0);
-  for (Leaf& leaf : leaves_) leaf.shown = leaf.count;
-}
+void Base::show_all() { hidden_.assign(hidden_.size(), 0); }
 
 std::vector<uint32_t> Base::take_changes() {
   std::vector<uint32_t> out;

@@ -1,42 +1,51 @@
-// The base: the coarse form of the whole data set, which viewers show where they have nothing finer. It hides surfels
-// that rays have passed: where there is no surface, and where it ends, because a surfel would reach beyond it. Samples
-// show such places. No sockets, no clocks.
+// The base: the coarse form of a whole mesh, which viewers show where they have no samples. It hides triangles that
+// rays have passed: where there is no surface, and where it ends. Samples show such places. No sockets, no clocks.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
-#include "common/geometry/surfels.h"
+#include "common/core/ids.h"
+#include "common/geometry/mesh_chunk.h"
 #include "common/image/pixel_mask.h"
-#include "common/points/point_model.h"
 #include "common/scene/colouring.h"
 #include "common/wire/point_messages.h"
 #include "services/packer/points/event.h"
 
 namespace telesplat::packer {
 
+/// Chunks that a base is made of. No two of `fine` lie on one way from the root.
+struct BaseChunks {
+  std::vector<ChunkId> coarse;  ///< the roots of the tree; empty: they are the fine ones
+  std::vector<ChunkId> fine;
+};
+
+/// Chooses chunks of at most `most` triangles together that have the whole mesh, or the roots where these have more:
+/// the coarsest is parted while there is room. tree: a list of chunks in the order of their ids (geometry::ChunkInfo).
+BaseChunks choose_base(const std::vector<geometry::ChunkInfo>& tree, uint64_t most);
+
 class Base {
  public:
-  /// Octree levels of its leaves, at most: 16 x 16 x 16 leaves.
-  static constexpr int kDepth = 4;
-  /// Surfels of a part, about: 50 kB.
-  static constexpr size_t kPart = 12000;
+  /// largest_m: side of the mesh's box, metres. colours: of scalars; null: chunks hold colours.
+  Base(float largest_m, const scene::ColourTable* colours);
 
-  /// colours: of scalars; null: surfels hold colours. Precondition: a valid set and model.
-  Base(const geometry::SurfelView& set, const points::ModelConfig& model, const scene::ColourTable* colours);
+  /// Adds the triangles of a chunk. spacing_m: geometry::ChunkInfo::spacing_m. coarse: of BaseChunks::coarse.
+  /// Precondition: all coarse ones come first.
+  void add(const geometry::MeshChunkView& chunk, float spacing_m, bool coarse);
 
-  size_t surfels() const { return positions_.size(); }
+  /// Triangles of the fine parts.
+  size_t triangles() const { return triangles_; }
   size_t parts() const { return parts_.size(); }
-  /// Part 0 has one surfel in wire::kBaseStride, the others all of them. The caller fills in packer and base. Its bytes
-  /// lie in this object. Precondition: part < parts().
-  wire::BasePart part(size_t part) const;
+  size_t coarse_parts() const { return coarse_; }
+  /// The caller fills in packer and base. Its bytes lie in this object. Precondition: n < parts().
+  wire::BasePart part(size_t n) const { return {{}, 0, n, double{parts_[n].error_m}, parts_[n].code}; }
 
-  /// Hides the surfels around which rays of a tile passed their surface, where its pixels are as fine as the surfels.
+  /// Hides the fine triangles that rays of a tile passed, where its pixels are as fine as the triangles.
   /// cast: its rays, as large as the tile; null: all pixels.
   void hide(const SampledTile& tile, const image::PixelMask* cast);
-  /// Shows the surfels in a box again: the samples there were forgotten.
+  /// Shows the triangles with their centroid in a box again: the samples there were forgotten.
   void show(const geometry::Box& box);
   void show_all();
 
@@ -46,24 +55,23 @@ class Base {
   std::vector<uint32_t> hidden() const;
 
  private:
-  struct Leaf {
-    points::ClusterKey key;
-    geometry::Box box;  // holds its surfels
-    uint32_t first, count;
-    uint32_t shown;  // surfels that are not hidden
+  struct Part {
+    geometry::Box box;
+    float error_m;                   // how far the surface may lie away
+    float side_m;                    // mean side of its triangles
+    std::vector<glm::vec3> corners;  // three a triangle; empty: they are the mesh itself
+    std::vector<std::byte> code;
   };
   struct Look;
-  bool is_passed(const Look& look, const glm::vec3& position, uint16_t normal, float farthest_m) const;
+  void add_part(const geometry::MeshChunkView& chunk, size_t first, size_t count, float spacing_m);
   bool is_hidden(size_t i) const { return hidden_[i / 64] >> i % 64 & 1; }
-  void flip(Leaf& leaf, size_t i);
+  void set_hidden(size_t i, bool hidden);
 
-  points::ModelConfig config_;
-  float spacing_m_;
-  std::vector<Leaf> leaves_;             // ascending keys
-  std::vector<glm::vec3> positions_;     // by leaf, in each leaf by place
-  std::vector<uint16_t> normals_;        // image/normal.h: encode_normal16
-  std::vector<uint64_t> hidden_, told_;  // a bit a surfel; told_: as take_changes() last had them
-  std::vector<std::vector<uint8_t>> parts_;
+  const float step_m_;  // positions are multiples of it: they take fewer bytes
+  const scene::ColourTable* const colours_;
+  std::vector<Part> parts_;
+  size_t coarse_ = 0, triangles_ = 0;
+  std::vector<uint64_t> hidden_, told_;  // a bit a triangle, by its number; told_: as take_changes() last had them
 };
 
 }  // namespace telesplat::packer

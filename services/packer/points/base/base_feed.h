@@ -1,28 +1,30 @@
-// Fetches the base from the data server, follows what samples tell of it, and sends it to viewers.
+// Follows the session and what samples tell of the base, and sends it to viewers.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/net/socket.h"
+#include "common/scene/colouring.h"
 #include "services/packer/packing.h"
 #include "services/packer/points/base/base.h"
+#include "services/packer/points/base/base_fetch.h"
 
 namespace telesplat::packer {
 
 class BaseFeed {
  public:
   /// Keeps references to both. context: null: there is no base.
-  BaseFeed(net::Context* context, const Outlets& outlets) : context_(context), outlets_(outlets) {}
+  BaseFeed(net::Context* context, const Outlets& outlets)
+      : outlets_(outlets), wanted_(context != nullptr), fetch_(context) {}
 
-  /// Follows the session. model: of the packer; anew: that model holds no samples yet.
-  void follow(const wire::Welcome& session, const points::ModelConfig& model, bool anew);
-  std::vector<net::Socket*> sockets();
+  /// Follows the session. anew: the packer's model holds no samples yet.
+  void follow(const wire::Welcome& session, bool anew);
+  std::vector<net::Socket*> sockets() { return fetch_.sockets(); }
   /// Takes the data server's answers.
   void receive();
-  /// Asks for the base if it is wanted. packer: as viewers know this packer.
+  /// Asks for chunks that are wanted. packer: as viewers know this packer.
   void tick(InstanceId packer, double now_s);
   /// A viewer asks for parts.
   void answer(const wire::BaseRequest& request, const std::string& peer) const;
@@ -34,40 +36,34 @@ class BaseFeed {
   void take_noted();
   /// The packer forgot clusters of its model.
   void forgotten(const Event& event, const points::PointModel& model);
-  /// Publishes what changed.
+  /// Tells viewers which base there is, and what changed.
   void publish();
 
-  size_t surfels() const { return base_ ? base_->surfels() : 0; }
+  size_t triangles() const { return base_ ? base_->triangles() : 0; }
 
  private:
   // The base depends on these.
   struct Scene {
     std::string content_hash, colouring;
     uint64_t most = 0;
-    points::ModelConfig model;
+    float largest_m = 0;
     bool operator==(const Scene&) const = default;
   };
-  void connect(const std::string& endpoint);
-  void drop();
-  void take_surfels(const wire::Surfels& surfels);
   void publish(bool whole);
+  void drop();
+  wire::BaseBegin begin() const;
 
-  net::Context* const context_;
   const Outlets& outlets_;
-  std::optional<net::Socket> blocks_;
-  std::string endpoint_;
+  const bool wanted_;  // false: there is no base
+  BaseFetch fetch_;
   Scene scene_;  // most == 0: no base is wanted
-  std::string array_;
   std::optional<scene::ColourTable> colours_;
-  EpochId epoch_;  // epoch that scene_ began with: requests have it, and answers repeat it
-  std::optional<Base> base_;
+  std::optional<Base> base_;  // the base that viewers have
   struct Noted {
     SampledTile tile;
     std::optional<image::PixelMask> cast;
   };
   std::optional<Noted> noted_;
-  bool asks_ = false;  // true: the data server has yet to answer
-  double asked_s_ = -1e9, patience_s_ = 0;
   InstanceId packer_;
   uint64_t number_ = 0;     // counts bases
   uint64_t published_ = 0;  // wire::BaseHidden::number of the newest message

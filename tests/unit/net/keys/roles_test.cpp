@@ -48,9 +48,8 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       {{"control", wire::Plan::kName}, {kPacker}},
       {{"control", wire::LinkReport::kName}, {kPacker}},
       {{"control", wire::SliceWeights::kName}, {kData}},
-      {{"chunks", wire::ChunkListRequest::kName}, {kSampler}},
-      {{"chunks", wire::ChunkRequest::kName}, {kSampler}},
-      {{"chunks", wire::SurfelRequest::kName}, {kPacker}},
+      {{"chunks", wire::ChunkListRequest::kName}, {kSampler, kPacker}},
+      {{"chunks", wire::ChunkRequest::kName}, {kSampler, kPacker}},
       {{"voxels", wire::VoxelRequest::kName}, {kSampler}},
       {{"tiles", wire::DepthTile::kName}, {kSampler}},
       {{"tiles", wire::SliceImages::kName}, {kSampler}},
@@ -67,7 +66,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       wire::PlanRequest::kName, wire::FrameEnd::kName,   wire::ChunkList::kName,      wire::Chunk::kName,
       wire::VoxelData::kName,   wire::Patch::kName,      wire::Forget::kName,         wire::EpochBegin::kName,
       wire::StateMark::kName,   wire::SliceFrame::kName, wire::SlabAssignment::kName, wire::Swap::kName,
-      wire::Refine::kName,      wire::StateBegin::kName, wire::Picture::kName,        wire::Surfels::kName,
+      wire::Refine::kName,      wire::StateBegin::kName, wire::Picture::kName,        wire::BaseBegin::kName,
       wire::BasePart::kName,    wire::BaseHidden::kName};
   std::set<std::string_view> types{"nonsense"};
   const auto look_at = [&](std::string_view type) {

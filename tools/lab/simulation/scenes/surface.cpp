@@ -10,7 +10,7 @@
 
 #include "common/colour/colour_map.h"
 #include "common/core/check.h"
-#include "common/geometry/surfels.h"
+#include "common/geometry/chunk_code.h"
 #include "common/image/normal.h"
 #include "services/data/mesh/served_mesh.h"
 #include "services/sampler/mesh/chunk_input.h"
@@ -43,10 +43,14 @@ class SurfaceStore final : public data::MeshStore {
   }
   const data::MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return surface_.chunks; }
-  geometry::ChunkBytes chunk(ChunkId id) const override { return {surface_.bytes[size_t(id.value)], nullptr}; }
-  geometry::ChunkBytes surfels() const override;
+  geometry::ChunkBytes chunk(ChunkId id) const override {
+    const bool is_root = id.value + 1 == surface_.chunks.size();
+    return {is_root ? root() : surface_.bytes[size_t(id.value)], nullptr};
+  }
 
  private:
+  std::span<const std::byte> root() const;
+
   const SurfaceParts& surface_;
   data::MeshStoreInfo info_;
 };
@@ -159,42 +163,55 @@ uint32_t rounded(const glm::dvec3& colour) {
   return uint32_t(colour.x + 0.5) << 16 | uint32_t(colour.y + 0.5) << 8 | uint32_t(colour.z + 0.5);
 }
 
-// Makes surfels of all that six cameras around the room see.
-std::vector<std::byte> make_surfels(const SurfaceParts& surface) {
-  constexpr int kSide = 32;      // pixels
+// Makes a mesh of all that six cameras around the room see, with the surface's box.
+std::vector<std::byte> make_coarse(const SurfaceParts& surface) {
+  constexpr int kSide = 48;      // pixels
   constexpr double kAway_m = 1;  // from the room's origin: they see 0.5 m to each side
   constexpr double kHalf = 0.7071067811865476;
+  constexpr double kStep_m = 0.05;  // between neighbouring depths of one surface, at most
   const std::pair<glm::dvec3, glm::dquat> places[] = {
       {{0, 0, kAway_m}, {1, 0, 0, 0}},          {{0, 0, -kAway_m}, {0, 0, 1, 0}},
       {{kAway_m, 0, 0}, {kHalf, 0, kHalf, 0}},  {{-kAway_m, 0, 0}, {kHalf, 0, -kHalf, 0}},
       {{0, kAway_m, 0}, {kHalf, -kHalf, 0, 0}}, {{0, -kAway_m, 0}, {kHalf, kHalf, 0, 0}}};
   const geometry::Clip nothing;
-  std::vector<float> positions;
-  std::vector<uint32_t> normals, colours;
+  const auto& [lo, hi] = surface.box_room;
+  std::vector<float> positions{lo.x, lo.y, lo.z, hi.x, hi.y, hi.z};
+  std::vector<uint32_t> normals(2), colours(2), indices;
   for (const auto& [position, orientation] : places) {
     const geometry::Camera camera{{position, orientation}, -0.5, 0.5, -0.5, 0.5, 0.02, kSide, kSide};
     const Rays rays(surface, camera, {0, 0, kSide, kSide}, nothing);
-    for (int y = 0; y < kSide; ++y)
+    std::vector<std::pair<uint32_t, double>> above(kSide), row(kSide);  // vertex (0: no hit) and depth
+    for (int y = 0; y < kSide; ++y, std::swap(above, row))
       for (int x = 0; x < kSide; ++x) {
         const glm::dvec3 direction = rays.direction(x, y);
         const Hit hit = rays.trace(direction);
+        const auto at = size_t(x);
+        row[at] = {0, hit.depth_m};
         if (!hit.part) continue;
+        row[at].first = uint32_t(normals.size());
         const glm::dvec3 p = rays.at(direction, hit.depth_m);
-        for (int axis = 0; axis < 3; ++axis) positions.push_back(float(p[axis]));
+        for (int axis = 0; axis < 3; ++axis) positions.push_back(std::clamp(float(p[axis]), lo[axis], hi[axis]));
         normals.push_back(image::encode_normal32(glm::vec3(normal_at(*hit.part, p, direction))));
         colours.push_back(rounded(colour_at(*hit.part, p)));
+        if (x == 0 || y == 0) continue;
+        const std::pair<uint32_t, double> corners[] = {above[at - 1], row[at - 1], row[at], above[at]};
+        const auto [least, most] =
+            std::minmax({corners[0].second, corners[1].second, corners[2].second, corners[3].second});
+        if (!(most - least < kStep_m)) continue;
+        for (const int k : {0, 1, 2, 0, 2, 3}) indices.push_back(corners[k].first);
       }
   }
-  return geometry::build_surfels(positions, normals, colours, 1.0f / kSide, false);
+  const auto laid_out = geometry::build_chunk(positions, normals, colours, indices);
+  return geometry::encode_chunk(*geometry::MeshChunkView::validate(laid_out));
 }
 
-geometry::ChunkBytes SurfaceStore::surfels() const {
+std::span<const std::byte> SurfaceStore::root() const {
   static std::mutex mutex;
   static std::map<const SurfaceParts*, std::vector<std::byte>> made;
   const std::lock_guard lock(mutex);
   auto& bytes = made[&surface_];
-  if (bytes.empty()) bytes = make_surfels(surface_);
-  return {bytes, nullptr};
+  if (bytes.empty()) bytes = make_coarse(surface_);
+  return bytes;
 }
 
 class SurfaceSampler final : public sampler::Sampler {

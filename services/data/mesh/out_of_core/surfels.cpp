@@ -1,16 +1,13 @@
-#include "services/data/mesh/surfels.h"
+#include "services/data/mesh/out_of_core/surfels.h"
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
 
-#include "common/geometry/surfels.h"
 #include "common/image/normal.h"
-#include "common/net/service.h"
 #include "common/parallel/in_parallel.h"
 
 namespace telesplat::data {
@@ -18,8 +15,6 @@ namespace {
 
 using geometry::MeshChunkView;
 
-// Triangles that the search for the size of the cells looks at, about.
-constexpr uint64_t kSearched = 1 << 19;
 // Samples of a triangle lie at most this part of a cell apart.
 constexpr float kSampleStep = 0.8f;
 constexpr double kMostCells = (1 << 20) - 1;  // along an axis: 20 bits of a key
@@ -91,7 +86,7 @@ class Cells {
   std::vector<Cell> cells_;
 };
 
-struct Corner {
+struct SurfacePoint {
   glm::vec3 position, normal, colour;
 };
 
@@ -101,8 +96,8 @@ class Grid {
 
   void add(const MeshChunkView& chunk) {
     for (size_t t = 0; t < chunk.triangles(); ++t) {
-      Corner c[3];
-      for (size_t k = 0; k < 3; ++k) c[k] = corner(chunk, chunk.indices[3 * t + k]);
+      SurfacePoint c[3];
+      for (size_t k = 0; k < 3; ++k) c[k] = point_of(chunk, chunk.indices[3 * t + k]);
       add(c, chunk.scalars);
     }
   }
@@ -117,7 +112,7 @@ class Grid {
   const std::vector<Cell>& cells() const { return cells_.cells(); }
 
  private:
-  static Corner corner(const MeshChunkView& chunk, uint32_t v) {
+  static SurfacePoint point_of(const MeshChunkView& chunk, uint32_t v) {
     const float* p = &chunk.positions_room[3 * size_t{v}];
     const uint32_t c = chunk.colours[v];
     const glm::vec3 colour = chunk.scalars ? glm::vec3(std::bit_cast<float>(c), 1, 0)
@@ -129,7 +124,7 @@ class Grid {
   }
 
   // Samples the triangle evenly: `along` its length from the corner opposite its shortest edge, and `across` that edge.
-  void add(Corner c[3], bool scalars) {
+  void add(SurfacePoint c[3], bool scalars) {
     const float edges[3] = {glm::distance(c[1].position, c[2].position), glm::distance(c[2].position, c[0].position),
                             glm::distance(c[0].position, c[1].position)};
     const auto apex = static_cast<size_t>(std::min_element(edges, edges + 3) - edges);
@@ -146,9 +141,10 @@ class Grid {
         add_sample(c, {1 - s, s * (1 - t), s * t}, 2 * s * mean, scalars);  // the triangle widens with s
       }
   }
-  void add_sample(const Corner c[3], const glm::vec3& at, float weight, bool scalars) {
-    const auto mix = [&](glm::vec3 Corner::*m) { return at.x * c[0].*m + at.y * c[1].*m + at.z * c[2].*m; };
-    const glm::vec3 position = mix(&Corner::position), normal = mix(&Corner::normal), colour = mix(&Corner::colour);
+  void add_sample(const SurfacePoint c[3], const glm::vec3& at, float weight, bool scalars) {
+    const auto mix = [&](glm::vec3 SurfacePoint::*m) { return at.x * c[0].*m + at.y * c[1].*m + at.z * c[2].*m; };
+    const glm::vec3 position = mix(&SurfacePoint::position), normal = mix(&SurfacePoint::normal),
+                    colour = mix(&SurfacePoint::colour);
     const glm::vec3 place = (position - origin_) / cell_m_;
     const auto along = [](float p) { return static_cast<uint64_t>(std::clamp(double(p), 0.0, kMostCells)); };
     Cell& cell = cells_.at(along(place.x) | along(place.y) << 20 | along(place.z) << 40, normal);
@@ -161,11 +157,6 @@ class Grid {
   glm::vec3 origin_;
   float cell_m_;
   Cells cells_;
-};
-
-struct Extent {
-  geometry::Box box;
-  double area_m2 = 0;
 };
 
 // Area of a triangle is half of its cross product's length.
@@ -185,34 +176,26 @@ double area_of(const MeshChunkView& chunk) {
 // Parts of the chunks that are gathered at a time: a fixed number, so that the sums are the same on all machines.
 constexpr size_t kParts = 4;
 
-// Gathers every `stride`-th chunk into cells of this size. scalars: what the chunks hold.
-Grid gather(const SurfelSource& source, double cell_m, size_t stride, const std::atomic<bool>& stop,
-            bool* scalars = nullptr) {
-  std::vector<Grid> parts(kParts, Grid(source.box_room.lo, cell_m));
-  const size_t count = (source.chunks + stride - 1) / stride;
+Grid gather(std::span<const MeshChunkView> chunks, const glm::vec3& origin, double cell_m) {
+  std::vector<Grid> parts(kParts, Grid(origin, cell_m));
   in_parallel(size_t{0}, kParts, [&](size_t part) {
-    for (size_t i = count * part / kParts; i < count * (part + 1) / kParts && !stop; ++i)
-      parts[part].add(source.chunk(i * stride).view);
+    for (size_t i = chunks.size() * part / kParts; i < chunks.size() * (part + 1) / kParts; ++i)
+      parts[part].add(chunks[i]);
   });
   for (size_t part = 1; part < kParts; ++part) parts[0].add(parts[part]);
-  if (scalars && source.chunks > 0) *scalars = source.chunk(0).view.scalars;
   return std::move(parts[0]);
 }
 
-double area_of(const SurfelSource& source, size_t stride) {
-  double area = 0;
-  for (size_t i = 0; i < source.chunks; i += stride) area += area_of(source.chunk(i).view);
-  return area;
-}
-
-// Searches for the size of the cells that gives about `most` surfels, on every `stride`-th chunk.
-double find_cell(const SurfelSource& source, size_t most, size_t stride, const std::atomic<bool>& stop) {
-  const double wanted = static_cast<double>(most) / static_cast<double>(stride);
-  const glm::vec3 size = source.box_room.size();
+// Searches for the size of the cells that gives about `most` surfels.
+double find_cell(std::span<const MeshChunkView> chunks, const geometry::Box& box, size_t most) {
+  const auto wanted = static_cast<double>(most);
+  const glm::vec3 size = box.size();
   const double largest = double{std::max({size.x, size.y, size.z})}, least = largest / kMostCells;
-  double cell = std::clamp(std::sqrt(1.5 * area_of(source, stride) / wanted), least, largest);
-  for (int n = 0; n < 5 && !stop; ++n) {
-    const double ratio = static_cast<double>(gather(source, cell, stride, stop).cells().size()) / wanted;
+  double area = 0;
+  for (const MeshChunkView& chunk : chunks) area += area_of(chunk);
+  double cell = std::clamp(std::sqrt(1.5 * area / wanted), least, largest);
+  for (int n = 0; n < 5; ++n) {
+    const double ratio = static_cast<double>(gather(chunks, box.lo, cell).cells().size()) / wanted;
     if (ratio > 0.8 && ratio < 1) break;
     cell = std::clamp(cell * std::sqrt(ratio / 0.9), least, largest);
   }
@@ -221,67 +204,25 @@ double find_cell(const SurfelSource& source, size_t most, size_t stride, const s
 
 }  // namespace
 
-std::vector<std::byte> make_surfels(const SurfelSource& source, size_t most, const std::atomic<bool>& stop) {
-  const size_t stride = std::clamp<size_t>(static_cast<size_t>(source.triangles / kSearched), 1, source.chunks);
-  const double cell_m = find_cell(source, most, stride, stop);
-  const glm::vec3 origin = source.box_room.lo;
-  bool scalars = false;
-  const Grid grid = gather(source, cell_m, 1, stop, &scalars);
-  const auto& cells = grid.cells();
-  const size_t count = std::min<size_t>(cells.size(), geometry::kMaxSurfels);
-  if (count == 0 || stop) return {};
-  std::vector<float> positions(3 * count);
-  std::vector<uint32_t> normals(count), colours(count);
-  for (size_t i = 0; i < count; ++i) {
-    const Cell& cell = cells[i];
-    const glm::vec3 p = origin + cell.position / cell.weight;
-    positions[3 * i] = p.x, positions[3 * i + 1] = p.y, positions[3 * i + 2] = p.z;
+Surfels make_surfels(std::span<const MeshChunkView> chunks, const geometry::Box& box_room, size_t most) {
+  const double cell_m = find_cell(chunks, box_room, most);
+  const Grid grid = gather(chunks, box_room.lo, cell_m);
+  const bool scalars = !chunks.empty() && chunks[0].scalars;
+  Surfels out{static_cast<float>(cell_m), {}, {}, {}};
+  for (const Cell& cell : grid.cells()) {
+    out.positions.push_back(box_room.lo + cell.position / cell.weight);
     const float length = glm::length(cell.normal);
-    normals[i] = image::encode_normal32(length > 0 ? cell.normal / length : glm::vec3(0, 0, 1));
+    out.normals.push_back(image::encode_normal32(length > 0 ? cell.normal / length : glm::vec3(0, 0, 1)));
     if (scalars) {
       const float none = std::numeric_limits<float>::quiet_NaN();
-      colours[i] = std::bit_cast<uint32_t>(cell.colour.y > 0 ? cell.colour.x / cell.colour.y : none);
+      out.colours.push_back(std::bit_cast<uint32_t>(cell.colour.y > 0 ? cell.colour.x / cell.colour.y : none));
     } else {
       const glm::vec3 c = cell.colour / cell.weight + 0.5f;
-      colours[i] = static_cast<uint32_t>(c.x) << 16 | static_cast<uint32_t>(c.y) << 8 | static_cast<uint32_t>(c.z);
+      out.colours.push_back(static_cast<uint32_t>(c.x) << 16 | static_cast<uint32_t>(c.y) << 8 |
+                            static_cast<uint32_t>(c.z));
     }
   }
-  return geometry::build_surfels(positions, normals, colours, static_cast<float>(cell_m), scalars);
-}
-
-SurfelMaker::~SurfelMaker() {
-  stop_ = true;
-  if (making_.valid()) making_.wait();
-}
-
-SurfelMaker::Bytes SurfelMaker::get(const std::shared_ptr<const MeshStore>& store, const std::string& array,
-                                    size_t most) {
-  constexpr uint64_t kAtOnce = 1 << 15;  // triangles whose surfels take milliseconds
-  if (most == kMostStored) return store->surfels();
-  if (const Wanted wanted{array, most}; wanted != wanted_) {
-    if (making_.valid()) stop_ = true, making_.wait(), making_ = {};
-    stop_ = false;
-    wanted_ = wanted;
-    made_.reset();
-    const auto make = [this, store, most] {
-      const auto chunk = [&](size_t i) {
-        auto out = geometry::decode_chunk(store->chunk(store->chunks()[i].id).bytes);
-        return out ? *std::move(out) : geometry::HeldChunk{};
-      };
-      const auto bytes = std::make_shared<const std::vector<std::byte>>(
-          make_surfels({store->info().box_room, store->info().triangles, store->chunks().size(), chunk}, most, stop_));
-      return geometry::ChunkBytes{*bytes, bytes};
-    };
-    if (store->info().triangles <= kAtOnce)
-      made_ = make();
-    else
-      making_ = std::async(std::launch::async, [make] {
-        net::lower_thread_priority(10);  // samplers wait for chunks, and people for pictures
-        return make();
-      });
-  }
-  if (making_.valid() && making_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) made_ = making_.get();
-  return made_;
+  return out;
 }
 
 }  // namespace telesplat::data
