@@ -39,7 +39,7 @@ FLOORS = {
     ],
     "services/data": [
         ["services/data/base"],
-        ["services/data/texture"],
+        ["services/data/texture", "services/data/cloud"],
         ["services/data/gltf", "services/data/vtk", "services/data/mesh/formats"],
         ["services/data/volume/formats"],
         ["services/data/import"],

@@ -25,7 +25,7 @@ inline constexpr uint32_t kNeutralAlbedo = 0xc8c8c8;  ///< the colour of data wi
 inline constexpr uint32_t kNoColour = ~uint32_t{0};   ///< a triangle without a colour: its vertices keep theirs
 
 struct Mesh {
-  std::string format;                 ///< "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf"
+  std::string format;  ///< "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf"; of clouds "... points"
   std::vector<glm::dvec3> positions;  ///< in the file's units
   std::vector<glm::vec3> normals;     ///< empty, or one per vertex; of any length; (0, 0, 0): to be computed
   std::vector<uint32_t> colours;      ///< empty, or one per vertex: 0x00RRGGBB

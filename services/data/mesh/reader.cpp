@@ -10,6 +10,7 @@
 #include "services/data/base/mapped_file.h"
 #include "services/data/base/numbered.h"
 #include "services/data/base/text_scanner.h"
+#include "services/data/cloud/readers.h"
 #include "services/data/gltf/container.h"
 #include "services/data/import/process.h"
 #include "services/data/mesh/formats/obj_materials.h"
@@ -18,13 +19,14 @@
 namespace telesplat::data {
 namespace {
 
-// Files from these sizes on are read here and there if they allow that: about five million triangles.
-constexpr size_t kLargePly_bytes = 100 << 20, kLargeRaster_bytes = 5 << 20;
+// Files from these sizes on are read here and there if they allow that: about five million triangles; a million points.
+constexpr size_t kLargePly_bytes = 100 << 20, kLargeRaster_bytes = 5 << 20, kLargeCloud_bytes = 24 << 20;
 
 constexpr const char* kSupported =
-    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK's files), elevation rasters (GeoTIFF, HGT, 16-bit PNG, ASCII "
-    "and "
-    "XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, raw voxels with --raw)";
+    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK's files), point clouds (LAS, PLY, PCD, PTX, XYZ, PTS, CSV), "
+    "elevation rasters (GeoTIFF, HGT, 16-bit PNG, ASCII and XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, "
+    "DICOM, "
+    "VTI, raw voxels with --raw)";
 
 std::string extension_of(const std::string& path) { return lower(std::filesystem::path(path).extension().string()); }
 
@@ -36,9 +38,13 @@ bool is_one_of(const std::string& word, std::initializer_list<const char*> words
 std::string unread_kind(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   const bool zip = content.starts_with("PK\3\4"sv), gzip = content.starts_with("\x1f\x8b"sv);
-  if (content.starts_with("LASF") || content.starts_with("ASTM-E57") || content.starts_with("# .PCD") ||
-      is_one_of(extension, {".las", ".laz", ".e57", ".pcd", ".pts", ".ptx"}))
-    return fmt::format("is a point cloud; point clouds are not read yet; {}", kSupported);
+  if (content.starts_with("LASF") || extension == ".laz")
+    return fmt::format("is a compressed point cloud (LAZ), which is not read; {}", kUnpackLaz);
+  if (content.starts_with("ASTM-E57") || extension == ".e57")
+    return fmt::format(
+        "is a point cloud in E57, which is not read: 'pdal translate FILE OUT.las' makes a LAS of it; {}", kSupported);
+  if (extension == ".json" && content.find("\"hierarchyType\"") != content.npos)
+    return fmt::format("belongs to a point cloud in EPT, which is not read: {}", kUnpackEpt);
   if (content.starts_with("NGSP") || is_one_of(extension, {".spz", ".sog", ".splat", ".ksplat"}))
     return fmt::format("holds Gaussian splats, not a mesh; splats of other programs are not read; {}", kSupported);
   if (zip && (extension == ".3mf" || content.find("3D/3dmodel") != content.npos))
@@ -91,6 +97,34 @@ bool looks_like_raster(std::string_view content, const std::string& extension) {
   return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2", ".xyz", ".vrt"});
 }
 
+// The format of a cloud, by content, or by name where a text's content is not conclusive; empty: it is none.
+std::string cloud_format(std::string_view content, const std::string& extension) {
+  const bool packed = content.size() > kLasFormatByte && (content[kLasFormatByte] & 0x80) != 0;
+  if (content.starts_with("LASF")) return packed ? "" : "las";
+  if (content.starts_with("# .PCD")) return "pcd";
+  if (is_ptx(content)) return "ptx";
+  if (is_one_of(extension, {".las", ".pcd", ".ptx"})) return extension.substr(1);
+  bool grid = false;
+  if (is_one_of(extension, {".xyz", ".csv", ".txt", ".asc", ".pts"}) && is_xyz(content, &grid))
+    return grid && extension == ".xyz" ? "" : "xyz";
+  return extension == ".pts" ? "xyz" : "";
+}
+
+ReadCloud read_cloud(std::string_view content, const std::string& format, const std::string& path,
+                     const ReadProgress& progress, const std::string& array) {
+  return format == "las"   ? read_las(content, path, progress, array)
+         : format == "pcd" ? read_pcd(content, path, progress, array)
+         : format == "ptx" ? read_ptx(content, path, progress, array)
+                           : read_xyz(content, path, progress, array);
+}
+
+Result<Mesh> read_cloud_mesh(std::string_view content, const std::string& format, const std::string& path,
+                             const ReadProgress& progress, const std::string& array) {
+  const auto cloud = read_cloud(content, format, path, progress, array);
+  if (!cloud) return cloud.error();
+  return (*cloud)->mesh();
+}
+
 // True for OFF after prefixes that its reader accepts or names.
 bool looks_like_off(std::string_view content) {
   const size_t at = content.substr(0, 9).find("OFF");
@@ -119,8 +153,9 @@ Status check_array(const std::string& array, const std::string& format, const st
   if (format == "raster")
     return Error{
         fmt::format("--colour-by {}: {} is an elevation raster, which is coloured by its heights", array, path)};
-  return Error{fmt::format("--colour-by {}: {} is a file of format {}, which has no arrays; PLY, VTP, VTU and VTK have",
-                           array, path, format)};
+  return Error{fmt::format(
+      "--colour-by {}: {} is a file of format {}, which has no arrays; PLY, VTP, VTU, VTK and point clouds have", array,
+      path, format)};
 }
 
 // Reads a VTK file; files that it names are read from its folder.
@@ -177,7 +212,8 @@ Result<Mesh> read_raster(std::string_view content, const std::string& path, cons
   return elevation_mesh(*std::move(heights), options, path);
 }
 
-// Returns MeshSource::random of a file: null unless it is large, and a PLY or raster. Error: the file cannot be opened.
+// Returns MeshSource::random of a file: null unless it is large, and a PLY, raster or cloud. Error: the file cannot be
+// opened.
 Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& elevation, const std::string& array) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
@@ -190,6 +226,13 @@ Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& e
       auto grid = ElevationGrid::make(*std::move(heights), elevation, path);
       if (!grid) return grid.error();
       return std::shared_ptr<const RandomMesh>(*std::move(grid));
+    });
+  if (is_cloud_format(format) && bytes >= kLargeCloud_bytes)
+    return OpenRandom([=](const ReadProgress& progress) -> Result<std::shared_ptr<const RandomMesh>> {
+      auto cloud = read_cloud((*file)->text(), format, path, progress, array);
+      (*file)->drop_pages();
+      if (!cloud) return cloud.error();
+      return std::shared_ptr<const RandomMesh>(*std::move(cloud));
     });
   if (format != "ply" || bytes < kLargePly_bytes) return OpenRandom();
   return OpenRandom([=](const ReadProgress&) { return random_ply(*file, path, array); });
@@ -205,6 +248,7 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
     if (vtk::is_image(content)) return {"", fmt::format("is a volume, not a mesh; {}", kSupported)};
     return {kind, ""};
   }
+  if (std::string cloud = cloud_format(content, extension); !cloud.empty()) return {std::move(cloud), ""};
   if (looks_like_raster(content, extension)) return {"raster", ""};
   if (std::string complaint = other_kind(content, extension); !complaint.empty()) return {"", std::move(complaint)};
   if (is_binary_stl(content)) return {"stl", ""};
@@ -218,7 +262,13 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   return {"", fmt::format("is of no known format; {}", kSupported)};
 }
 
-bool has_arrays(std::string_view format) { return format == "ply" || vtk::is_mesh_kind(format); }
+bool is_cloud_format(std::string_view format) {
+  return format == "las" || format == "pcd" || format == "ptx" || format == "xyz";
+}
+
+bool has_arrays(std::string_view format) {
+  return format == "ply" || is_cloud_format(format) || vtk::is_mesh_kind(format);
+}
 
 Result<MeshFile> find_mesh_file(const std::string& path) {
   std::error_code error;
@@ -251,14 +301,15 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& report, cons
   try {
     FolderCompanions folder(path);
     auto pictured = read_pictured(content, detected.format, path, progress, array, texture_detail);
-    auto mesh = pictured                      ? *std::move(pictured)
-                : detected.format == "ply"    ? read_ply(content, path, progress, folder, array, texture_detail)
-                : detected.format == "off"    ? read_off(content, path, progress)
-                : detected.format == "stl"    ? read_stl(content, path, progress)
-                : detected.format == "obj"    ? read_obj(content, path, progress, folder, texture_detail)
-                : detected.format == "raster" ? read_raster(content, path, elevation, progress)
-                : detected.format == "gltf"   ? read_imported_gltf(content, path, progress, texture_detail)
-                                              : read_vtk(content, path, progress, array);
+    auto mesh = pictured                           ? *std::move(pictured)
+                : detected.format == "ply"         ? read_ply(content, path, progress, folder, array, texture_detail)
+                : detected.format == "off"         ? read_off(content, path, progress)
+                : detected.format == "stl"         ? read_stl(content, path, progress)
+                : detected.format == "obj"         ? read_obj(content, path, progress, folder, texture_detail)
+                : detected.format == "raster"      ? read_raster(content, path, elevation, progress)
+                : detected.format == "gltf"        ? read_imported_gltf(content, path, progress, texture_detail)
+                : is_cloud_format(detected.format) ? read_cloud_mesh(content, detected.format, path, progress, array)
+                                                   : read_vtk(content, path, progress, array);
     if (!mesh) return mesh;
     auto status = validate_mesh(*mesh, path);
     if (!status && drop_not_finite(*mesh, path)) status = validate_mesh(*mesh, path);

@@ -14,8 +14,8 @@
 
 namespace telesplat::data {
 
-/// A file's format, by its content first and its extension second: "ply", "obj", "stl", "off", "gltf", "raster", a
-/// result of vtk::kind_of(), or "" with a sentence on its likely kind (an image, a volume, an elevation raster) and on
+/// A file's format, by its content first and its extension second: "ply", "obj", "stl", "off", "gltf", "raster", "las",
+/// "pcd", "ptx", "xyz" (rows of text), a result of vtk::kind_of(), or "" with a sentence on its likely kind (an image, a volume, an elevation raster) and on
 /// the supported formats.
 struct DetectedFormat {
   std::string format;
@@ -38,6 +38,8 @@ struct MeshFile {
 };
 Result<MeshFile> find_mesh_file(const std::string& path);
 
+/// True if files of this format are clouds (services/data/cloud/readers.h).
+bool is_cloud_format(std::string_view format);
 /// True if files of this format can hold arrays.
 bool has_arrays(std::string_view format);
 /// Returns the paths of other files that `path` needs (material libraries of an OBJ and their textures, pictures of a

@@ -2,10 +2,13 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <cmath>
+
 #include "services/data/gltf/container.h"
 #include "services/data/inspect.h"
 #include "services/data/mesh/reader.h"
 #include "tests/support/files/data_files.h"
+#include "tests/support/files/las_file.h"
 
 namespace telesplat::data::test {
 namespace {
@@ -52,6 +55,7 @@ TEST_P(BadInput, IsRefusedWithALineThatSaysWhy) {
 }
 
 const std::string kThree = "0 0 0\n1 0 0\n0 1 0\n";
+const std::string kPcd = "# .PCD\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
 const std::string kVtk = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET ";
 const std::string kVtp =
     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData><Piece "
@@ -71,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"bad-type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\nend_header\n1\n", "type"},
         BadFile{"no-z.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
                 "lacks x, y or z"},
-        BadFile{"points.ply", ply("3", "0", kThree), "holds 3 points and no triangles: point clouds"},
+        BadFile{"nan-points.ply", ply("1", "0", "0 nan 0\n"), "holds no points with finite coordinates"},
         BadFile{"out-of-range.ply", ply("3", "1", kThree + "3 0 1 3\n"), "names vertex 3, there are 3"},
         BadFile{"negative-index.ply", ply("3", "1", kThree + "3 0 1 -1\n"), "names vertex -1"},
         BadFile{"nan.ply", ply("3", "1", "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"), "vertex 1 is not finite"},
@@ -152,8 +156,32 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"model.3mf", "PK\3\4", "is a 3MF file, which is not read: save the model as STL, OBJ or PLY"},
         BadFile{"splats.sog", "PK\3\4", "holds Gaussian splats"},
         BadFile{"splats.spz", "\x1f\x8b\x08", "holds Gaussian splats"},
-        BadFile{"cloud.pts", "1 2 3\n", "point clouds are not read yet"},
-        BadFile{"cloud", "LASF", "point clouds are not read yet"},
+        BadFile{"cut.pts", "3\n1 2 3\n4 5\n", "is damaged: 2 numbers, 3 are needed: '4 5'"},
+        BadFile{"words.pts", "some words\n", "does not begin with lines of three numbers"},
+        BadFile{"one.xyz", "1 2 3\n1 2 3\n", "its 2 points have no extent"},
+        BadFile{"cut.ptx", "90000\n90000\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 .5\n",
+                "is truncated: point 1 of 8100000000 is missing"},
+        BadFile{"short.las", "LASF", "is truncated: a LAS header has 227 bytes, the file 4"},
+        BadFile{"lying.las", las_file({{}, {}}, {}, 4000000000), "claims 4000000000 points of 26 bytes, 2 are there"},
+        BadFile{"none.las", las_file({}), "holds no points"},
+        BadFile{"one.las", las_file({{}}), "its 1 points have no extent"},
+        BadFile{"nan.las", las_file({{}, {1, 2, 3}}).replace(131, 8, raw(std::nan(""))), "finite coordinates"},
+        BadFile{"withheld.las", las_file({{.classes = 0x80}}), "all its 1 points are marked as withheld"},
+        BadFile{"new.las", las_file({{}}).replace(25, 1, "\5"), "is LAS 1.5; 1.0 to 1.4 are read"},
+        BadFile{"format.las", las_file({{}}).replace(104, 1, "\13"), "points of format 11; 0 to 10 are read"},
+        BadFile{"small.las", las_file({{}}).replace(105, 2, raw(uint16_t{25})), "points of 25 bytes; format 2 has"},
+        BadFile{"packed.laz", las_file({{}}).replace(104, 1, "\x82"),
+                "(LAZ), which is not read; unpack it: 'laszip -i"},
+        BadFile{"cloud.e57", "ASTM-E57", "in E57, which is not read: 'pdal translate FILE OUT.las'"},
+        BadFile{"lying.pcd", kPcd + "POINTS 900000000000\nDATA binary\n123", "900000000000 points, the limit is"},
+        BadFile{"cut.pcd", kPcd + "POINTS 2\nDATA binary\n123", "claims 2 points of 12 bytes, but only 3 bytes"},
+        BadFile{"cut-text.pcd", kPcd + "POINTS 3\nDATA ascii\n1 2 3\n4 5\n", "point 1 of 3 cannot be read"},
+        BadFile{"grown.pcd",
+                kPcd + "POINTS 9000000\nDATA binary_compressed\n" + raw(uint32_t{3}) + raw(uint32_t{108000000}) + "abc",
+                "compressed points are damaged: 0 of 108000000"},
+        BadFile{"wide.pcd", kPcd + "COUNT 1 1 1000000\nPOINTS 1\nDATA binary\n", "1 to 65536 are read"},
+        BadFile{"flat.pcd", "# .PCD\nFIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", "lack x, y or z"},
+        BadFile{"no-data.pcd", "# .PCD\nFIELDS x y z\n", "has no line DATA"},
         BadFile{
             "splats.ply",
             "ply\nformat ascii 1.0\nelement vertex 1\n" + kPlyVertex + "property float f_dc_0\nend_header\n1 2 3 4\n",
@@ -165,6 +193,15 @@ INSTANTIATE_TEST_SUITE_P(
           n.begin(), n.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
       return n;
     });
+
+TEST(BadPath, AFolderOfEptSaysWhatToDo) {
+  const TempFolder folder;
+  const std::string file = folder.write("ept.json", "{\"hierarchyType\": \"json\"}");
+  EXPECT_NE(refusal(file).find("belongs to a point cloud in EPT"), std::string::npos);
+  const auto kind = kind_of({.scene = folder / ""});
+  ASSERT_FALSE(kind.ok());
+  EXPECT_NE(kind.error().text.find("pdal translate ept.json"), std::string::npos) << kind.error().text;
+}
 
 TEST(BadPath, MissingFolderUnreadable) {
   const TempFolder folder;

@@ -6,10 +6,10 @@
 #include <unordered_map>
 
 #include "services/data/base/polygons/polygon.h"
+#include "services/data/base/raw_colours.h"
 #include "services/data/base/refusal.h"
 #include "services/data/base/text_scanner.h"
 #include "services/data/mesh/formats/obj_materials.h"
-#include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/formats/readers.h"
 #include "services/data/texture/texture.h"
 

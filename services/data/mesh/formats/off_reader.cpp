@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "services/data/base/polygons/polygon.h"
+#include "services/data/base/raw_colours.h"
 #include "services/data/base/refusal.h"
 #include "services/data/base/text_scanner.h"
-#include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/formats/readers.h"
 
 namespace telesplat::data {

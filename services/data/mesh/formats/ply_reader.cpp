@@ -8,8 +8,9 @@
 
 #include "common/scene/colouring.h"
 #include "services/data/base/polygons/polygon.h"
+#include "services/data/base/raw_colours.h"
+#include "services/data/cloud/cloud.h"
 #include "services/data/mesh/formats/ply.h"
-#include "services/data/mesh/formats/raw_colours.h"
 #include "services/data/mesh/formats/readers.h"
 
 namespace telesplat::data {
@@ -108,8 +109,8 @@ class PlyBody {
       else
         skip(element);
     }
-    if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0 && !mesh_.positions.empty()) refuse_faceless();
     arrays_.finish(mesh_);
+    if (mesh_.indices.empty() && mesh_.degenerate_dropped == 0 && !mesh_.positions.empty()) return cloud();
     if (array.empty()) colour_triangles(companions, texture_detail);
     return std::move(mesh_);
   }
@@ -118,11 +119,14 @@ class PlyBody {
   [[noreturn]] void ended(const PlyElement& element, uint64_t at) const {
     refuse("{}: is truncated or damaged: {} {} of {} cannot be read", name_, element.name, at, element.count);
   }
-  [[noreturn]] void refuse_faceless() const {
+  // Vertices without faces.
+  Mesh cloud() {
     const PlyElement* vertices = header_.find("vertex");
-    const bool splats = vertices && (vertices->find("f_dc_0") >= 0 || vertices->find("packed_position") >= 0);
-    refuse("{}: holds {} {} and no triangles: {}", name_, mesh_.positions.size(), splats ? "Gaussian splats" : "points",
-           splats ? "splats of other programs are not read" : "point clouds are not read yet");
+    if (vertices && (vertices->find("f_dc_0") >= 0 || vertices->find("packed_position") >= 0))
+      refuse("{}: holds {} Gaussian splats and no triangles: splats of other programs are not read", name_,
+             mesh_.positions.size());
+    mesh_.format = fmt::format("PLY points ({})", header_.encoding == PlyEncoding::kAscii ? "ascii" : "binary");
+    return need(SquareCloud::make({std::move(mesh_), {}, false}, name_))->mesh();
   }
   // Colours triangles by their pictures, else by their own colours.
   void colour_triangles(Companions& companions, uint64_t texture_detail) {

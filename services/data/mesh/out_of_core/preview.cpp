@@ -12,6 +12,7 @@
 #include "common/image/normal.h"
 #include "common/parallel/in_parallel.h"
 #include "services/data/base/mesh.h"
+#include "services/data/cloud/square.h"
 #include "services/data/mesh/out_of_core/build.h"
 #include "services/data/mesh/out_of_core/surfels.h"
 
@@ -108,16 +109,13 @@ PlacedMesh squares(const Surfels& surfels, bool scalars) {
   out.scalars = scalars;
   const float half = 0.75f * surfels.spacing_m;
   for (size_t i = 0; i < surfels.positions.size(); ++i) {
-    const glm::vec3 n = image::decode_normal32(surfels.normals[i]);
-    const glm::vec3 aside = std::abs(n.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-    const glm::vec3 u = half * glm::normalize(glm::cross(n, aside)), v = glm::cross(n, u);
     const auto first = static_cast<uint32_t>(out.positions_room.size());
-    for (const glm::vec3& corner : {-u - v, u - v, u + v, -u + v}) {
+    for (const glm::vec3& corner : square_around(image::decode_normal32(surfels.normals[i]), half)) {
       out.positions_room.push_back(surfels.positions[i] + corner);
       out.normals.push_back(surfels.normals[i]);
       out.colours.push_back(surfels.colours[i]);
     }
-    out.indices.insert(out.indices.end(), {first, first + 1, first + 2, first, first + 2, first + 3});
+    for (const uint32_t corner : kSquare) out.indices.push_back(first + corner);
   }
   return out;
 }

@@ -11,6 +11,7 @@
 #include "common/image/normal.h"
 #include "common/parallel/in_parallel.h"
 #include "services/data/base/placement_options.h"
+#include "services/data/cloud/cloud.h"
 #include "services/data/vtk/reader.h"
 
 namespace telesplat::data {
@@ -165,6 +166,9 @@ bool is_isosurface(const Mesh& mesh) {
 UpGuess guess_up(const Mesh& mesh) {
   if (mesh.format == "raster") return {"z", "an elevation raster"};
   if (mesh.format == "iso") return {"z", "the surface of a volume"};
+  const scene::Space space = mesh.coordinates.space;
+  if (space == scene::Space::kProjected || space == scene::Space::kGeographic) return {"z", "heights over a map"};
+  if (is_cloud(mesh.format) && !mesh.format.starts_with("PLY")) return {"z", "a survey or laser scan"};
   geometry::DBox box;
   for (uint32_t i : mesh.indices) box.extend(mesh.positions[i]);
   if (vtk::is_mesh_kind(mesh.format)) return {"z", "VTK's formats hold scans and simulations"};

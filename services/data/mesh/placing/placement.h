@@ -61,6 +61,7 @@ struct PlacedMesh {
 ///   z for terrains: elevation rasters; or the box is less than 0.35 times as high in z as it is wide in x and y, and
 ///     the surface is an open height field in z (its area vector, the sum of all triangle normals times areas, is at
 ///     least 0.4 times the total area and within 30 degrees of z; over a closed surface that sum is zero);
+///   z for coordinates of a map, and for clouds of points, PLY aside;
 ///   z for medical data: isosurfaces (most vertices have two coordinates, and only two, in common with many others,
 ///     because marching cubes puts them on the edges of a voxel grid), VTK's own formats, and surfaces of volumes;
 ///   y otherwise.
