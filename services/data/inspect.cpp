@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "services/data/base/mapped_file.h"
+#include "services/data/cloud/cloud.h"
 #include "services/data/kinds.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/store_file.h"
@@ -39,12 +40,14 @@ std::string unit_of_volume(const std::string& path, const MeshOptions& options) 
 const char* normals_of(const MeshFileFacts& facts) {
   if (facts.iso) return "from the volume's gradients";
   if (facts.raster) return "computed from the heights";
+  if (is_cloud(facts.info.format)) return "of the squares";
   return facts.info.had_normals ? "in the file" : "none in the file: computed";
 }
 
 std::string colours_of(const MeshFileFacts& facts) {
   if (!facts.texture.empty()) return "of the picture " + facts.texture;
   if (facts.raster) return "none in the file: tinted by height";
+  if (is_cloud(facts.info.format) && facts.info.had_colours) return "in the file, or its intensity: see the remarks";
   return facts.info.had_colours ? "in the file" : "none in the file: neutral grey";
 }
 
@@ -87,6 +90,8 @@ void describe_raster(const RasterFacts& r, const geometry::DBox& box, Descriptio
 
 void describe_shape(const MeshFileFacts& facts, Description& out) {
   const MeshStoreInfo& i = facts.info;
+  if (is_cloud(i.format)) out.row("points", fmt::format("{}, each a square of two triangles", i.vertices / 4));
+  if (is_cloud(i.format)) out.json["points"] = i.vertices / 4;
   out.row("triangles",
           fmt::format(
               "{}{}; {} vertices", i.triangles,
@@ -184,9 +189,10 @@ Result<MeshFileFacts> inspect_store(const std::string& path) {
 Description describe(const MeshFileFacts& facts) {
   const MeshStoreInfo& i = facts.info;
   Description out(facts.raster ? "raster" : "mesh", fmt::format("{}: {}", i.source,
-                                                                facts.raster ? "an elevation raster"
-                                                                : facts.iso  ? "the surface of a volume"
-                                                                             : "a mesh"));
+                                                                facts.raster         ? "an elevation raster"
+                                                                : facts.iso          ? "the surface of a volume"
+                                                                : is_cloud(i.format) ? "a cloud of points"
+                                                                                     : "a mesh"));
   const std::string format = facts.raster ? facts.raster->format : facts.iso ? "volume" : i.format;
   out.row("format", fmt::format("{}{}", format, facts.file_bytes ? ", " + bytes_text(facts.file_bytes) : ""));
   out.json["path"] = i.source;
@@ -202,8 +208,14 @@ Description describe(const MeshFileFacts& facts) {
     out.row("coloured by", i.array + " (--colour-by none: by the file's own colours)");
     out.json["coloured_by"] = i.array;
   }
-  out.row("box", fmt::format("{} .. {}, {}", vector_text(i.box_data.lo), vector_text(i.box_data.hi), unit_of(facts)));
-  out.row("size", extent_text(i.box_data.size()));
+  const bool on_map = is_cloud(i.format) && i.coordinates.space != scene::Space::kPlain;
+  const glm::dvec3 shown = on_map ? i.coordinates.shown : glm::dvec3(1);
+  if (on_map) out.row("reference", i.coordinates.reference);
+  if (on_map) out.json["reference"] = i.coordinates.reference;
+  out.row("box", fmt::format("{} .. {}, {}", vector_text(i.box_data.lo / shown), vector_text(i.box_data.hi / shown),
+                             on_map ? fmt::format("{}, heights in {}", i.coordinates.unit, i.coordinates.height_unit)
+                                    : unit_of(facts)));
+  out.row("size", extent_text(i.box_data.size()) + (on_map ? " m" : ""));
   out.json["box"] = box_json(i.box_data);
   out.json["unit"] = unit_of(facts);
   describe_room(out, i.box_room, i.up, i.up_reason);

@@ -20,6 +20,7 @@ constexpr float kReach = 0.75f;
 // Points around are a surface if their least variance is below this part of the next one, and that is above the other
 // part of the largest.
 constexpr float kFlat = 0.2f, kWide = 0.02f;
+constexpr double kLeastExtent = 1e-30, kMostExtent = 1e30;
 constexpr float kNoSurface = 0.5f, kMostOfNeighbours = 3;
 
 bool is_finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
@@ -83,29 +84,29 @@ class Fit {
  public:
   explicit Fit(Cloud& cloud) : cloud_(cloud), points_(cloud.points) {}
 
-  /// Returns false if all points lie at one place.
+  /// Returns false if all points lie at one place, or too far apart.
   bool run() {
-    for (const glm::dvec3& p : points_.positions) box_.extend(p);
-    const glm::dvec3 size = box_.size();
-    extent_ = std::max({size.x, size.y, size.z});
-    if (!(extent_ > 0) || !std::isfinite(extent_)) return false;
-    flat_ = cloud_.z_up || (size.z < 0.35 * size.x && size.z < 0.35 * size.y);
+    for (const glm::dvec3& p : points_.positions) view_.box.extend(p);
+    const glm::dvec3 size = view_.box.size();
+    view_.extent = std::max({size.x, size.y, size.z});
+    if (!(view_.extent >= kLeastExtent && view_.extent <= kMostExtent)) return false;
+    view_.from_above = cloud_.z_up || (size.z < 0.35 * size.x && size.z < 0.35 * size.y);
+    view_.scans = cloud_.scans;
     const size_t count = points_.positions.size();
     std::vector<Neighbours::Point> scaled(count);
     in_parallel(size_t{0}, count, [&](size_t i) {
-      scaled[i] = {glm::vec3((points_.positions[i] - middle()) / extent_), uint32_t(i)};
+      scaled[i] = {glm::vec3((points_.positions[i] - view_.middle()) / view_.extent), uint32_t(i)};
     });
     points_.normals.resize(count, glm::vec3(0));
     halves_.resize(count);
     fit(Neighbours(std::move(scaled)));
     return true;
   }
+  CloudView take_view() { return std::move(view_); }
   std::vector<float> take_halves() { return std::move(halves_); }
   float median_side() const { return 2 * median_; }
 
  private:
-  glm::dvec3 middle() const { return box_.lo + box_.size() * 0.5; }
-
   void fit(const Neighbours& tree) {
     const std::vector<Neighbours::Point>& points = tree.points();
     std::vector<float> own(points.size());
@@ -119,10 +120,10 @@ class Fit {
     set_median(own);
     in_parallel(uint32_t{0}, uint32_t(points.size()), [&](uint32_t i) {
       const float most = kMostOfNeighbours * std::min(own[others[i][0]], own[others[i][1]]);
-      halves_[points[i].index] = own[i] > 0 ? std::min(own[i], most > 0 ? most : median_) : median_;
-      halves_[points[i].index] *= float(extent_);
+      const float half = own[i] > 0 ? std::min(own[i], most > 0 ? most : median_) : median_;
+      halves_[points[i].index] = std::copysign(half * float(view_.extent), halves_[points[i].index]);
     });
-    median_ *= float(extent_);
+    median_ *= float(view_.extent);
   }
 
   // Sets the median of those above 0.
@@ -134,7 +135,7 @@ class Fit {
     median_ = *middle;
   }
 
-  // Sets the point's normal; returns half the side of its square, 0 if the neighbours lie at the point itself.
+  // Sets the point's normal, and the sign of its half; returns that, 0 if the neighbours lie at the point itself.
   float half_of(const std::vector<Neighbours::Point>& points, const Neighbours::Point& point,
                 const Neighbours::List& found, int count) {
     glm::dvec3 mean(0);
@@ -150,39 +151,39 @@ class Fit {
     const float length = glm::length(normal);
     const bool given = length > 1e-20f && std::isfinite(length);
     normal = given ? normal / length : axes.variance[2] > 0 ? axes.normal : glm::vec3(0, 0, 1);
-    if (!given && glm::dot(glm::dvec3(normal), seen_from(point.index)) < 0) normal = -normal;
+    if (!given && glm::dot(glm::dvec3(normal), view_.towards(point.index, points_.positions[point.index])) < 0)
+      normal = -normal;
     float near = 0;  // mean distance of the nearest four
     const int few = std::min(count, 4);
     for (int i = 0; i < few; ++i) near += std::sqrt(found[size_t(i)].squared) / float(few);
     // Distance in a grid that is as dense as the points here.
     constexpr float kPi = 3.14159265f;
     const float dense = std::sqrt(found[size_t(count - 1)].squared * kPi / float(count + 1));
-    const bool surface = axes.variance[0] < kFlat * axes.variance[1] && axes.variance[1] > kWide * axes.variance[2];
-    return kReach * std::max(near, dense) * (given || surface ? 1.0f : kNoSurface);
-  }
-
-  // Direction from the point to where it was seen from, as far as that is known.
-  glm::dvec3 seen_from(size_t point) const {
-    const glm::dvec3& at = points_.positions[point];
-    const auto later = std::upper_bound(cloud_.scans.begin(), cloud_.scans.end(), point,
-                                        [](size_t p, const Cloud::Scan& scan) { return p < scan.first; });
-    if (later != cloud_.scans.begin()) {
-      const glm::dvec3 way = std::prev(later)->scanner - middle();
-      if (glm::length(way) < 2 * extent_) return std::prev(later)->scanner - at;
-    }
-    return flat_ ? glm::dvec3(0, 0, 1) : at - middle();
+    const bool surface =
+        given || (axes.variance[0] < kFlat * axes.variance[1] && axes.variance[1] > kWide * axes.variance[2]);
+    halves_[point.index] = surface ? 1.0f : -1.0f;
+    return kReach * std::max(near, dense) * (surface ? 1.0f : kNoSurface);
   }
 
   Cloud& cloud_;
   Mesh& points_;
-  geometry::DBox box_;
-  double extent_ = 0;
-  bool flat_ = false;
+  CloudView view_;
   std::vector<float> halves_;
   float median_ = 0;
 };
 
 }  // namespace
+
+glm::dvec3 CloudView::towards(size_t point, const glm::dvec3& at) const {
+  const auto later = std::upper_bound(scans.begin(), scans.end(), point,
+                                      [](size_t p, const Cloud::Scan& scan) { return p < scan.first; });
+  glm::dvec3 way = at - middle();
+  if (from_above) way = {0, 0, 1};
+  if (later != scans.begin() && glm::length(std::prev(later)->scanner - middle()) < 2 * extent)
+    way = std::prev(later)->scanner - at;
+  const double length = glm::length(way);
+  return length > 0 ? way / length : glm::dvec3(0, 0, 1);
+}
 
 Result<std::shared_ptr<const SquareCloud>> SquareCloud::make(Cloud&& cloud, const std::string& name) {
   Mesh& points = cloud.points;
@@ -193,7 +194,9 @@ Result<std::shared_ptr<const SquareCloud>> SquareCloud::make(Cloud&& cloud, cons
   if (count == 0) return Error{fmt::format("{}: holds no points{}", name, read > 0 ? " with finite coordinates" : "")};
   const bool own_normals = !points.normals.empty();
   Fit fit(cloud);
-  if (!fit.run()) return Error{fmt::format("{}: its {} points have no extent, or one that is not finite", name, count)};
+  if (!fit.run())
+    return Error{fmt::format("{}: its {} points have no extent, or one outside [{}, {}]", name, count, kLeastExtent,
+                             kMostExtent)};
   points.notes.push_back(
       fmt::format("{}: a cloud of {} points, each shown as a square in the plane of {}; the median side is {:.3g}{}",
                   name, count, own_normals ? "its normal" : "the points around it", fit.median_side(),
@@ -201,7 +204,8 @@ Result<std::shared_ptr<const SquareCloud>> SquareCloud::make(Cloud&& cloud, cons
   Facts facts{.format = points.format, .vertices = 4 * count, .triangles = 2 * count, .normals = true};
   facts.colours = !points.colours.empty(), facts.scalars = !points.scalars.empty();
   facts.arrays = points.arrays, facts.notes = points.notes, facts.coordinates = points.coordinates;
-  return std::shared_ptr<const SquareCloud>(new SquareCloud(std::move(facts), std::move(points), fit.take_halves()));
+  return std::shared_ptr<const SquareCloud>(
+      new SquareCloud(std::move(facts), std::move(points), fit.take_view(), fit.take_halves()));
 }
 
 bool SquareCloud::corners(uint64_t first, size_t count, uint32_t* out) const {
@@ -212,7 +216,13 @@ bool SquareCloud::corners(uint64_t first, size_t count, uint32_t* out) const {
 
 glm::dvec3 SquareCloud::position(uint64_t vertex) const {
   const uint64_t point = vertex / 4;
-  return points_.positions[point] + glm::dvec3(square_around(points_.normals[point], halves_[point])[vertex % 4]);
+  return points_.positions[point] + glm::dvec3(square_around(points_.normals[point], half(point))[vertex % 4]);
+}
+
+glm::vec3 SquareCloud::normal(uint64_t vertex) const {
+  const uint64_t point = vertex / 4;
+  const glm::vec3 own = points_.normals[point];
+  return halves_[point] > 0 ? own : glm::normalize(own + glm::vec3(view_.towards(point, points_.positions[point])));
 }
 
 Mesh SquareCloud::mesh() const {

@@ -2,6 +2,7 @@
 // around it.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -29,6 +30,18 @@ struct Cloud {
   bool z_up = false;  ///< it is known that z points up
 };
 
+/// Where a cloud is seen from.
+struct CloudView {
+  std::vector<Cloud::Scan> scans;
+  geometry::DBox box;
+  double extent = 0;  ///< the box's largest side
+  bool from_above = false;
+
+  glm::dvec3 middle() const { return box.lo + 0.5 * box.size(); }  // lo + hi may not be finite
+  /// Direction of length 1 from a point to its scanner, or as told below.
+  glm::dvec3 towards(size_t point, const glm::dvec3& at) const;
+};
+
 /// True if Mesh::format is that of a cloud.
 inline bool is_cloud(std::string_view mesh_format) { return mesh_format.find(" points") != mesh_format.npos; }
 
@@ -38,7 +51,8 @@ inline bool is_cloud(std::string_view mesh_format) { return mesh_format.find(" p
 /// from the middle of the cloud's box.
 ///     A side is 1.5 times the distance to neighbours, so that squares of a regular grid meet however they are turned;
 /// half as long where the points around are no surface (wires, twigs), and at most three times as long as those of
-/// points nearby, so that strays stay small.
+/// points nearby, so that strays stay small. Where they are no surface, the squares are shaded as if they were turned
+/// half of the way to where the cloud is seen from: leaves do not glitter.
 class SquareCloud final : public RandomMesh {
  public:
   /// Error texts start with `name`: no points, more than kMaxPoints, all at one place.
@@ -46,21 +60,22 @@ class SquareCloud final : public RandomMesh {
 
   bool corners(uint64_t first, size_t count, uint32_t* out) const override;
   glm::dvec3 position(uint64_t vertex) const override;
-  glm::vec3 normal(uint64_t vertex) const override { return points_.normals[vertex / 4]; }
+  glm::vec3 normal(uint64_t vertex) const override;
   uint32_t colour(uint64_t vertex) const override { return points_.colours[vertex / 4]; }
   float scalar(uint64_t vertex) const override { return points_.scalars[vertex / 4]; }
   /// Half a side of a point's square, in Mesh::positions' unit.
-  float half(size_t point) const { return halves_[point]; }
+  float half(size_t point) const { return std::abs(halves_[point]); }
 
   /// The same as a mesh.
   Mesh mesh() const;
 
  private:
-  SquareCloud(Facts facts, Mesh&& points, std::vector<float> halves)
-      : RandomMesh(std::move(facts)), points_(std::move(points)), halves_(std::move(halves)) {}
+  SquareCloud(Facts facts, Mesh&& points, CloudView&& view, std::vector<float> halves)
+      : RandomMesh(std::move(facts)), points_(std::move(points)), view_(std::move(view)), halves_(std::move(halves)) {}
 
   Mesh points_;
-  std::vector<float> halves_;
+  CloudView view_;
+  std::vector<float> halves_;  // negative: the points around are no surface
 };
 
 }  // namespace telesplat::data

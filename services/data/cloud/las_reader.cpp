@@ -99,9 +99,10 @@ class LasReader {
       refuse("{}: is truncated: header claims {} points of {} bytes, {} are there", name_, count_, point_bytes_, there);
     for (size_t a = 0; a < 3; ++a)
       scale_[a] = number<double>(content_, 131 + 8 * a), offset_[a] = number<double>(content_, 155 + 8 * a);
-    for (int a = 0; a < 3; ++a)
-      box_.extend(glm::dvec3(0)), box_.hi[a] = number<double>(content_, 179 + 16 * size_t(a)),
-                                  box_.lo[a] = number<double>(content_, 187 + 16 * size_t(a));
+    for (int a = 0; a < 3; ++a) {
+      box_.hi[a] = number<double>(content_, 179 + 16 * size_t(a));
+      box_.lo[a] = number<double>(content_, 187 + 16 * size_t(a));
+    }
     records_at_ = header;
   }
 
@@ -113,10 +114,9 @@ class LasReader {
       take_record(at, 54, bytes);
       at += 54 + bytes;
     }
-    if (minor_ < 4) return;
-    at = number<uint64_t>(content_, 235);
-    for (uint32_t n = number<uint32_t>(content_, 243); n > 0 && at < content_.size() && content_.size() - at >= 60;
-         --n) {
+    if (minor_ == 4) at = number<uint64_t>(content_, 235);
+    for (uint32_t n = minor_ == 4 ? number<uint32_t>(content_, 243) : 0;
+         n > 0 && at < content_.size() && content_.size() - at >= 60; --n) {
       const uint64_t bytes = std::min<uint64_t>(number<uint64_t>(content_, at + 20), content_.size());
       take_record(at, 60, bytes);
       at += 60 + bytes;
@@ -226,7 +226,7 @@ class LasReader {
   std::vector<ExtraNumber> extra_;
   std::vector<std::string> extra_names_;
   std::optional<Reference> reference_;
-  std::vector<uint16_t> keys_;  // of GeoTIFF, and their texts
+  std::vector<uint16_t> keys_;  // the numbers of GeoTIFF, and their texts
   std::string_view key_texts_;
 };
 

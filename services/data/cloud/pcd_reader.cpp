@@ -32,7 +32,7 @@ struct PcdField {
 
 // Unpacks LZF, as M. Lehmann's liblzf writes it. Refuses what does not become exactly `bytes`.
 std::vector<char> unpack_lzf(std::string_view packed, size_t bytes, const std::string& name) {
-  constexpr size_t kMostGrowth = 264 / 3 + 1;  // three bytes say at most so much
+  constexpr size_t kMostGrowth = 264 / 3 + 1;  // three bytes stand for up to 264
   const auto damaged = [&](size_t made) {
     refuse("{}: its compressed points are damaged: {} of {} bytes can be unpacked", name, made, bytes);
   };
@@ -121,7 +121,7 @@ class PcdReader {
         });
       for (size_t i = 0; i < std::min(words.size(), fields_.size()); ++i) {
         double value = 0;
-        if (key == "TYPE") fields_[i].type = words[i][0];
+        if (key == "TYPE") fields_[i].type = words[i].empty() ? ' ' : words[i][0];
         if ((key != "SIZE" && key != "COUNT") || !TextScanner(words[i]).number(value)) continue;
         if (!(value >= (key == "SIZE") && value <= 1 << 20))
           refuse("{}: {} {:.20} of field {}", name_, key, words[i], fields_[i].name.substr(0, 40));

@@ -64,11 +64,11 @@ class PointRows {
 
   const std::string& name_;
   std::vector<Column> columns_;
-  std::vector<int> arrays_of_;  // of each column; -1: no array
+  std::vector<int> arrays_of_;  // the array of each column; -1: it has none
   std::vector<scene::ArrayInfo> arrays_;
   int chosen_ = -1, intensity_ = -1;
   bool has_normals_ = false, has_colours_ = false, has_packed_ = false;
-  std::vector<double> values_;      // of the chosen array
+  std::vector<double> values_;      // those of the chosen array
   std::vector<float> intensities_;  // until there are colours
   std::vector<glm::vec3> colours_;
   Cloud cloud_;

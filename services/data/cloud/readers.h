@@ -11,7 +11,8 @@
 
 namespace telesplat::data {
 
-inline constexpr size_t kLasFormatByte = 104;  ///< of a LAS file: the points' format; its highest bit: compressed
+inline constexpr size_t kLasFormatByte =
+    104;  ///< a LAS file tells its points' format here; its highest bit: compressed
 inline constexpr const char* kUnpackLaz = "unpack it: 'laszip -i FILE -o OUT.las' or 'pdal translate FILE OUT.las'";
 inline constexpr const char* kUnpackEpt = "'pdal translate ept.json OUT.las' makes a LAS of it";
 

@@ -39,7 +39,7 @@ Reference reference_of(Space space, const std::string& name, const std::optional
   return out;
 }
 
-// A part "KEYWORD[...]" of a text: what stands between its brackets. Empty: there is none.
+// A part "KEYWORD[...]" of a text: what stands between its brackets. Empty: there is no such part.
 std::string_view part(std::string_view text, std::initializer_list<std::string_view> keywords) {
   for (const std::string_view keyword : keywords) {
     size_t at = text.find(keyword);
@@ -130,7 +130,7 @@ std::optional<Reference> reference_of_keys(std::span<const uint16_t> keys, std::
   };
   std::string name;
   for (size_t i = 4; i + 4 <= keys.size(); i += 4)
-    if ((keys[i] == kCitation || (keys[i] == 3073 && name.empty())) && keys[i + 1] == 34737)
+    if ((keys[i] == kCitation || ((keys[i] == 2049 || keys[i] == 3073) && name.empty())) && keys[i + 1] == 34737)
       name = texts.substr(std::min<size_t>(keys[i + 3], texts.size()), keys[i + 2]);
   while (!name.empty() && (name.back() == '|' || name.back() == '\0')) name.pop_back();
   const auto named = [&](int key) {

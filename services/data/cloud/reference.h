@@ -20,8 +20,8 @@ struct Reference {
 /// Source: OGC 12-063r5, 18-010r7.
 std::optional<Reference> reference_of_wkt(std::string_view text);
 
-/// The same of GeoTIFF keys (VLR 34735: numbers of 16 bits) and their texts (34737). Source: OGC 19-008r4. nullopt: they
-/// name neither a projected nor a geographic system.
+/// Reads GeoTIFF keys (VLR 34735: numbers of 16 bits) and their texts (34737). Source: OGC 19-008r4. nullopt: they name
+/// neither a projected nor a geographic system.
 std::optional<Reference> reference_of_keys(std::span<const uint16_t> keys, std::string_view texts);
 
 }  // namespace telesplat::data

@@ -109,10 +109,10 @@ std::vector<std::string> guessed_columns(const std::vector<std::vector<double>>&
   if (more == 1 || (more >= 4 && colours_at(4) && !colours_at(3))) out.push_back("intensity");
   while (out.size() + 3 <= rows[0].size()) {
     const bool first = std::find(out.begin(), out.end(), "red") == out.end();
-    if (first && colours_at(out.size()))
-      out.insert(out.end(), {"red", "green", "blue"});
-    else if (normal_at(out.size()))
+    if (normal_at(out.size()))
       out.insert(out.end(), {"nx", "ny", "nz"});
+    else if (first && colours_at(out.size()))
+      out.insert(out.end(), {"red", "green", "blue"});
     else
       break;
   }

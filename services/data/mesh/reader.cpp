@@ -97,7 +97,7 @@ bool looks_like_raster(std::string_view content, const std::string& extension) {
   return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2", ".xyz", ".vrt"});
 }
 
-// The format of a cloud, by content, or by name where a text's content is not conclusive; empty: it is none.
+// The format of a cloud, by content, or by name where a text's content is not conclusive; empty: another format.
 std::string cloud_format(std::string_view content, const std::string& extension) {
   const bool packed = content.size() > kLasFormatByte && (content[kLasFormatByte] & 0x80) != 0;
   if (content.starts_with("LASF")) return packed ? "" : "las";

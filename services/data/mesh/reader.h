@@ -15,8 +15,8 @@
 namespace telesplat::data {
 
 /// A file's format, by its content first and its extension second: "ply", "obj", "stl", "off", "gltf", "raster", "las",
-/// "pcd", "ptx", "xyz" (rows of text), a result of vtk::kind_of(), or "" with a sentence on its likely kind (an image, a volume, an elevation raster) and on
-/// the supported formats.
+/// "pcd", "ptx", "xyz" (rows of text), a result of vtk::kind_of(), or "" with a sentence on its likely kind (an image,
+/// a volume, an elevation raster) and on the supported formats.
 struct DetectedFormat {
   std::string format;
   std::string complaint;

@@ -133,6 +133,8 @@ int inspect(InspectOptions o, const options::Given& given) {
   std::error_code error;
   if (path != julia::kSceneWord && !fs::exists(path, error)) return complain({fmt::format("{}: no such file", path)});
   const Inspected subject = subject_of(o.data);
+  if (const auto kind = data::kind_of(o.data); !kind && fs::exists(path + "/ept.json", error))
+    return complain(kind.error());
   // The folder holds no run: print why, without regard to flags.
   if (subject == Inspected::kRun && !fs::exists(path + "/summary.json", error))
     return complain(inspect_run(path).error());

@@ -5,6 +5,7 @@
 
 #include "services/data/cloud/readers.h"
 #include "services/data/cloud/reference.h"
+#include "services/data/mesh/placing/placement.h"
 #include "services/data/mesh/reader.h"
 #include "tests/support/files/data_files.h"
 #include "tests/support/files/las_file.h"
@@ -52,7 +53,7 @@ std::string remarks(const Mesh& mesh) {
   return out;
 }
 
-// A file of the real data; empty, and the test is skipped, where there is none.
+// A file of the real data; empty: it is missing, and the test is skipped.
 std::string real(const std::string& name) {
   const char *folder = std::getenv("TELESPLAT_DATA"), *home = std::getenv("HOME");
   const std::string path =
@@ -88,7 +89,7 @@ TEST(RealClouds, ExtraBytesAreArrays) {
   const Mesh mesh = read(path, "Colors[1]");
   ASSERT_EQ(points(mesh), 1065u);
   EXPECT_EQ(mesh.scalars[0], 77);
-  EXPECT_EQ(array(mesh, "Intensity (2)").spans[0].hi, array(mesh, "intensity").spans[0].hi);
+  EXPECT_EQ(array(mesh, "Intensity").spans[0].hi, array(mesh, "intensity").spans[0].hi);
   EXPECT_EQ(mesh.colours[0], pack_rgb(68, 77, 88));
 }
 
@@ -279,7 +280,9 @@ std::string lzf(const std::string& bytes) {
 TEST(Pcd, HasOneMeaningInEachEncoding) {
   const std::string packed = lzf(pcd_bytes(true));
   const std::string files[] = {
-      kPcd + "ascii\n0 0 0.5 1 1 1 1 1.48172e-39 0 7\n1 1 .5 1 1 1 1 1.48172e-39 1 8\n2 0 .5 1 1 1 1 1.48172e-39 2 9\n",
+      kPcd +
+          "ascii\n0 0 0.5 1 1 1 1 1.48091464e-39 0 7\n1 1 .5 1 1 1 1 1.48091464e-39 1 8\n2 0 .5 1 1 1 1 1.48091464e-39 "
+          "2 9\n",
       kPcd + "binary\n" + pcd_bytes(false),
       kPcd + "binary_compressed\n" + raw(uint32_t(packed.size())) + raw(uint32_t(pcd_bytes(true).size())) + packed};
   for (const std::string& file : files) {
@@ -294,7 +297,7 @@ TEST(Pcd, HasOneMeaningInEachEncoding) {
 
 struct Text {
   std::string name, content, arrays;
-  uint32_t colour;  // of the first point
+  uint32_t colour;  // the first point has it
   bool normals;
 };
 
