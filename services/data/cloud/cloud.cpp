@@ -21,7 +21,7 @@ constexpr float kReach = 0.75f;
 // part of the largest.
 constexpr float kFlat = 0.2f, kWide = 0.02f;
 constexpr double kLeastExtent = 1e-30, kMostExtent = 1e30;
-constexpr float kNoSurface = 0.5f, kMostOfNeighbours = 3;
+constexpr float kNoSurface = 0.5f, kMostOfNeighbours = 2;
 
 bool is_finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 

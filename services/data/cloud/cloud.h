@@ -50,7 +50,7 @@ inline bool is_cloud(std::string_view mesh_format) { return mesh_format.find(" p
 /// towards the scanner; where it is not known, or far outside, up if z points up or the cloud is flat in z; else away
 /// from the middle of the cloud's box.
 ///     A side is 1.5 times the distance to neighbours, so that squares of a regular grid meet however they are turned;
-/// half as long where the points around are no surface (wires, twigs), and at most three times as long as those of
+/// half as long where the points around are no surface (wires, twigs), and at most twice as long as those of
 /// points nearby, so that strays stay small. Where they are no surface, the squares are shaded as if they were turned
 /// half of the way to where the cloud is seen from: leaves do not glitter.
 class SquareCloud final : public RandomMesh {

@@ -121,7 +121,8 @@ std::vector<std::string> guessed_columns(const std::vector<std::vector<double>>&
 }
 
 // nullopt: the text does not begin with rows of numbers.
-std::optional<Layout> layout_of(std::string_view content) {
+// strict: a line among the first 100 that does not fit means that it is no such text.
+std::optional<Layout> layout_of(std::string_view content, bool strict) {
   constexpr size_t kLookedAt = 100, kMostLine = 1 << 16;
   Layout out;
   Lines lines(content.substr(0, 1 << 20));
@@ -135,15 +136,18 @@ std::optional<Layout> layout_of(std::string_view content) {
       out.counted = true;
     } else if (numbers && row.size() >= 3) {
       if (rows.empty()) out.begin = lines.begin();
-      if (!rows.empty() && row.size() != rows[0].size()) return cut ? std::optional<Layout>() : std::nullopt;
-      rows.push_back(row);
+      if (rows.empty() || row.size() == rows[0].size()) rows.push_back(row);
+      if (row.size() == rows[0].size()) continue;
+      if (strict && !cut) return std::nullopt;
+      break;
     } else if (rows.empty() && out.columns.empty()) {
       if (auto names = lines.words(); has_places(names) && names.size() <= kMaxColumns)
         out.columns = std::move(names);
       else if (lines.line().front() != '#' && !lines.line().starts_with("//"))
         return std::nullopt;
-    } else if (!(numbers && row.size() == 1 && out.counted) && !cut) {
-      return std::nullopt;
+    } else if (!(numbers && row.size() == 1 && out.counted)) {
+      if (strict && !cut) return std::nullopt;
+      break;
     }
   }
   if (rows.empty()) return std::nullopt;
@@ -159,7 +163,7 @@ std::optional<Layout> layout_of(std::string_view content) {
 
 std::shared_ptr<const SquareCloud> read_rows(std::string_view content, const std::string& name,
                                              const ReadProgress& progress, const std::string& array) {
-  const auto layout = layout_of(content);
+  const auto layout = layout_of(content, false);
   if (!layout)
     refuse("{}: does not begin with lines of three numbers or more, or a line of names with x, y and z", name);
   PointRows rows(name, layout->columns, array);
@@ -244,7 +248,7 @@ bool is_ptx(std::string_view content) {
 }
 
 bool is_xyz(std::string_view content, bool* regular_grid) {
-  const auto layout = layout_of(content);
+  const auto layout = layout_of(content, true);
   if (!layout || !regular_grid) return layout.has_value();
   std::vector<double> row;
   std::vector<glm::dvec2> places, steps;

@@ -23,10 +23,9 @@ namespace {
 constexpr size_t kLargePly_bytes = 100 << 20, kLargeRaster_bytes = 5 << 20, kLargeCloud_bytes = 24 << 20;
 
 constexpr const char* kSupported =
-    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK's files), point clouds (LAS, PLY, PCD, PTX, XYZ, PTS, CSV), "
-    "elevation rasters (GeoTIFF, HGT, 16-bit PNG, ASCII and XYZ grids, VRT) and volumes (NRRD, MetaImage, NIfTI, "
-    "DICOM, "
-    "VTI, raw voxels with --raw)";
+    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK), clouds (LAS, PLY, PCD, PTX, XYZ, PTS, CSV), elevation "
+    "rasters "
+    "(GeoTIFF, HGT, 16-bit PNG, ASCII, XYZ, VRT), volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, --raw)";
 
 std::string extension_of(const std::string& path) { return lower(std::filesystem::path(path).extension().string()); }
 
@@ -41,8 +40,7 @@ std::string unread_kind(std::string_view content, const std::string& extension) 
   if (content.starts_with("LASF") || extension == ".laz")
     return fmt::format("is a compressed point cloud (LAZ), which is not read; {}", kUnpackLaz);
   if (content.starts_with("ASTM-E57") || extension == ".e57")
-    return fmt::format(
-        "is a point cloud in E57, which is not read: 'pdal translate FILE OUT.las' makes a LAS of it; {}", kSupported);
+    return "is a point cloud in E57, which is not read: 'pdal translate FILE OUT.las' makes a LAS of it";
   if (extension == ".json" && content.find("\"hierarchyType\"") != content.npos)
     return fmt::format("belongs to a point cloud in EPT, which is not read: {}", kUnpackEpt);
   if (content.starts_with("NGSP") || is_one_of(extension, {".spz", ".sog", ".splat", ".ksplat"}))

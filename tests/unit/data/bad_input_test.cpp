@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"grown.pcd",
                 kPcd + "POINTS 9000000\nDATA binary_compressed\n" + raw(uint32_t{3}) + raw(uint32_t{108000000}) + "abc",
                 "compressed points are damaged: 0 of 108000000"},
-        BadFile{"wide.pcd", kPcd + "COUNT 1 1 1000000\nPOINTS 1\nDATA binary\n", "1 to 65536 are read"},
+        BadFile{"wide.pcd", kPcd + "COUNT 1 1 1000000\nPOINTS 1\nDATA binary\n", "more than 256 numbers a point"},
         BadFile{"flat.pcd", "# .PCD\nFIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", "lack x, y or z"},
         BadFile{"no-data.pcd", "# .PCD\nFIELDS x y z\n", "has no line DATA"},
         BadFile{
