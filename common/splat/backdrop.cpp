@@ -19,6 +19,8 @@ constexpr float kSurface = 0.1f;
 constexpr size_t kBandsAThread = 4;
 // Depths lie beyond a triangle's if they are greater by this, and those of a plane as many errors behind it.
 constexpr float kBeyond = 1.05f, kErrors = 1.5f;
+// Points are seen through triangles of at least this many pixels of the picture: samples of smaller ones lie close.
+constexpr int kLeastSeenThrough_px = 8;
 constexpr float kNone = std::numeric_limits<float>::infinity();
 
 uint32_t mixed(const uint32_t (&colours)[4], const float (&weights)[4], size_t n) {
@@ -90,7 +92,9 @@ void BackdropPainter::Band::draw(const Seen& seen, const Corner* corners, const 
     // Depths of a plane that lies farther away are greater by the same factor everywhere.
     const glm::vec4& plane = part.planes[drawn.first / 3];
     const float away = std::abs(glm::dot(glm::vec3(plane), eye) - plane.w);
-    t.beyond = away > 0 ? kBeyond * (away + kErrors * part.error_m) / away : kNone;
+    const auto& b = drawn.bounds;
+    const bool is_large = (1 + std::max(b.right - b.left, b.bottom - b.top)) << out.halvings >= kLeastSeenThrough_px;
+    if (is_large && away > 0) t.beyond = kBeyond * (away + kErrors * part.error_m) / away;
     draw(t);
   }
 }

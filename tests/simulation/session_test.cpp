@@ -128,10 +128,10 @@ TEST(Sessions, AViewerDropsTheBaseWithItsScene) {
 
 // ---- all of it ------------------------------------------------------------------------------------------------------
 
-// Links of 25 kB a second: the root of the chunks comes before the others, and stands in for them in another colour.
+// Links of 60 kB a second: the root of the chunks comes before the others, and stands in for them in another colour.
 TEST(Sessions, HoldWhereCoarseChunksStandInForOthers) {
   Scenario s{.seed = 52, .show = Show::kTerrain, .samplers = 1};
-  s.links = {.latency_s = 0.001, .bytes_s = 25000};
+  s.links = {.latency_s = 0.001, .bytes_s = 60000};
   struct Counter final : Observer {
     size_t coarse = 0, fine = 0;
     void on_passed(const Passed& passed) override {

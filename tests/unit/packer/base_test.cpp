@@ -93,7 +93,7 @@ TEST(Base, PartsHaveEveryTriangleOfTheirChunks) {
 
 TEST(Base, ColoursScalars) {
   scene::Colouring colouring;
-  colouring.range = {0, 1};
+  colouring.map = *colour::find_colour_map("viridis");
   const scene::ColourTable table = scene::make_table(colouring);
   const auto chunk = test::chunk_of({{{0, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.0f)},
                                      {{1, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.5f)},

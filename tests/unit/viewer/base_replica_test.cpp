@@ -25,10 +25,10 @@ class BaseReplicaTest : public testing::Test {
     replica.take(wire::BaseBegin{kPacker, base, std::min(kCoarse, parts), parts}, now_s);
   }
   Status give(uint64_t part, uint64_t base = 1) {
-    const std::vector<test::Vertex> corners{
-        {{0, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}}, {{1, 1, 0}, {0, 0, 1}}};
-    const auto chunk =
-        part < kCoarse ? test::chunk_of(corners, {0, 1, 2}) : test::chunk_of(corners, {0, 1, 2, 1, 3, 2});
+    std::vector<test::Vertex> corners{{{0, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}}};
+    std::vector<uint32_t> indices{0, 1, 2};
+    if (part >= kCoarse) corners.push_back({{1, 1, 0}, {0, 0, 1}}), indices.insert(indices.end(), {1, 3, 2});
+    const auto chunk = test::chunk_of(corners, indices);
     return replica.take(wire::BasePart{kPacker, base, part, 0.1, chunk.bytes}, now_s);
   }
   void hide(uint64_t number, const std::vector<uint32_t>& words, bool whole = false) {
@@ -37,7 +37,8 @@ class BaseReplicaTest : public testing::Test {
   // The first 64 triangles of each part, as bits of those that are hidden.
   std::vector<uint64_t> hidden() const {
     std::vector<uint64_t> out;
-    for (const auto& words : replica.mesh()->hidden) out.push_back(words.empty() ? 0 : words[0]);
+    const auto mesh = replica.mesh();
+    for (const auto& words : mesh->hidden) out.push_back(words.empty() ? 0 : words[0]);
     return out;
   }
   void give_all() {

@@ -165,10 +165,10 @@ uint32_t rounded(const glm::dvec3& colour) {
 
 // Makes a mesh of all that six cameras around the room see, with the surface's box.
 std::vector<std::byte> make_coarse(const SurfaceParts& surface) {
-  constexpr int kSide = 48;      // pixels
+  constexpr int kSide = 32;      // pixels
   constexpr double kAway_m = 1;  // from the room's origin: they see 0.5 m to each side
   constexpr double kHalf = 0.7071067811865476;
-  constexpr double kStep_m = 0.05;  // between neighbouring depths of one surface, at most
+  constexpr double kStep_m = 0.1;  // between neighbouring depths of one surface, at most
   const std::pair<glm::dvec3, glm::dquat> places[] = {
       {{0, 0, kAway_m}, {1, 0, 0, 0}},          {{0, 0, -kAway_m}, {0, 0, 1, 0}},
       {{kAway_m, 0, 0}, {kHalf, 0, kHalf, 0}},  {{-kAway_m, 0, 0}, {kHalf, 0, -kHalf, 0}},
