@@ -47,7 +47,7 @@ TEST(LargeMesh, IsShownCoarselyUntilItsStoreIsMade) {
   write_hills(folder / "hills.ply", 1700);
   ASSERT_GT(std::filesystem::file_size(folder / "hills.ply"), 100u << 20);
   const std::vector<std::string> flags{"--duration", "0",        "--trajectory", "still",   "--up",
-                                       "z",          "--verify", "20",           "--cache", folder / "cache"};
+                                       "z",          "--verify", "200",          "--cache", folder / "cache"};
   {
     PipelineRun run(flags, folder / "hills.ply");
     ASSERT_TRUE(run.wait_showing()) << run.program().err();
