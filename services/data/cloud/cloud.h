@@ -7,9 +7,9 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "common/scene/base.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/random_mesh.h"
 
@@ -42,8 +42,7 @@ struct CloudView {
   glm::dvec3 towards(size_t point, const glm::dvec3& at) const;
 };
 
-/// True if Mesh::format is that of a cloud.
-inline bool is_cloud(std::string_view mesh_format) { return mesh_format.find(" points") != mesh_format.npos; }
+using scene::is_cloud;
 
 /// Point n has the vertices 4 n to 4 n + 3 and the triangles 2 n and 2 n + 1.
 ///     Normals are the file's, else those of the plane through the nearest ten points (least squares). They look

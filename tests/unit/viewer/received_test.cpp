@@ -154,6 +154,9 @@ TEST_F(Receiving, ABaseIsAskedForWhereTheSessionHasOne) {
   EXPECT_EQ(requests("julia", 400'000, false), 0);
   EXPECT_EQ(requests("mesh", 0, false), 0);
   EXPECT_EQ(requests("mesh", 400'000, true), 0);
+  w.facts["format"] = "LAS 1.4 points (format 7)";
+  EXPECT_EQ(requests("mesh", 400'000, false), 0);
+  w.facts["format"] = "PLY (ascii)";
   EXPECT_GE(requests("mesh", 400'000, false), 10);
 }
 
