@@ -109,6 +109,7 @@ void BackdropPainter::Band::draw(const Triangle& t) {
   if (volume == 0) return;
   const double scale = 1 / volume;
   for (auto& f : functions) f *= scale;
+  const auto most = static_cast<float>(1 / out.camera.near_m);  // what lies before the near plane covers nothing
   const uint32_t colours[4] = {c[0]->colour, c[1]->colour, c[2]->colour};
   for (int y = t.bounds.top; y <= t.bounds.bottom; ++y) {
     double begin = t.bounds.left, end = t.bounds.right;
@@ -133,7 +134,7 @@ void BackdropPainter::Band::draw(const Triangle& t) {
       for (int k = 0; k < 3; ++k) weights[k] = static_cast<float>(value[k] + x * functions[k].x);
       const float reciprocal = weights[0] + weights[1] + weights[2];
       float& nearest = out.reciprocal[row + static_cast<size_t>(x)];
-      if (reciprocal <= nearest) continue;
+      if (reciprocal <= nearest || reciprocal > most) continue;
       bool is_kept = true;
       for (size_t p = 0; p < t.planes; ++p)
         is_kept &= weights[0] * t.inside[0][p] + weights[1] * t.inside[1][p] + weights[2] * t.inside[2][p] >= 0;

@@ -168,10 +168,10 @@ TEST(Backdrop, TrianglesThatMeetLeaveNoPixelEmpty) {
   EXPECT_EQ(drawn(mesh_of({fan})).covered(), 1);
 }
 
-TEST(Backdrop, AFloorUnderTheEyeReachesBehindIt) {
-  // From behind the eye to far ahead of it: no triangle lies wholly before the near plane.
+// A floor from behind the eye to far ahead of it: no triangle lies wholly before the near plane.
+BasePart floor_at(float y) {
   BasePart floor;
-  for (const glm::vec3& p : {glm::vec3(-50, -0.2f, 50), {50, -0.2f, 50}, {50, -0.2f, -50}, {-50, -0.2f, -50}}) {
+  for (const glm::vec3& p : {glm::vec3(-50, y, 50), {50, y, 50}, {50, y, -50}, {-50, y, -50}}) {
     floor.positions.push_back(p);
     floor.normals.emplace_back(0, 1, 0);
     floor.colours.push_back(0x0000ff);
@@ -179,13 +179,22 @@ TEST(Backdrop, AFloorUnderTheEyeReachesBehindIt) {
   }
   floor.indices = {0, 1, 2, 0, 2, 3};
   find_planes(floor);
-  const Picture picture = drawn(mesh_of({floor}));
+  return floor;
+}
+
+TEST(Backdrop, AFloorUnderTheEyeReachesBehindIt) {
+  const Picture picture = drawn(mesh_of({floor_at(-0.2f)}));
   for (int y = 145; y < 240; ++y)
     for (int x = 0; x < 320; ++x) {
       const double depth = 0.2 * kCamera.focal_y() / (y + 0.5 - 120);
       ASSERT_NEAR(picture.depth_m[size_t(320 * y + x)], depth, 0.05 * depth) << x << " " << y;
     }
   EXPECT_EQ(picture.depth_m[320 * 100 + 160], kNothing);
+}
+
+TEST(Backdrop, WhatLiesBeforeTheNearPlaneCoversNothing) {
+  const Picture picture = drawn(mesh_of({floor_at(-0.001f), rectangle(0, -0.3f, 0.3f, 0.3f, 0xff0000)}));
+  EXPECT_NEAR(picture.depth_m[320 * 160 + 160], 1, 0.01);
 }
 
 TEST(Backdrop, ClippedTrianglesEndAtThePlane) {
