@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/geometry/camera.h"
@@ -23,10 +24,15 @@ struct Backdrop {
   int halvings = 1;
   std::vector<uint32_t> colour;   ///< 0x00RRGGBB
   std::vector<float> reciprocal;  ///< 1 / depth in metres; 0: empty
-  std::vector<float> limit_m;     ///< depth beyond which points are seen through the surface; +infinity: no point is
+  /// Info words (pixel_key.h) up to this one stay; the greatest one: all do, the pixel is empty.
+  std::vector<uint32_t> limit;
 };
 
-/// Draws triangles, both sides, shaded at their corners. Keeps its buffers from picture to picture.
+/// Error, over its distance, that a part of a base may have: finer ones look no better in the backdrop of this picture.
+double fine_enough(const geometry::Camera& picture);
+
+/// Draws triangles, both sides, shaded at their corners: in place of a part that is not fine enough, its node's
+/// children's there, if there are any. Keeps its buffers from picture to picture.
 class BackdropPainter {
  public:
   /// clip: what is cut away is not drawn. picture: camera of the picture that the backdrop is for.
@@ -37,7 +43,7 @@ class BackdropPainter {
   // A vertex in homogeneous pixels: (x w, y w, w), w its depth in metres.
   struct Corner {
     float xw, yw, w;
-    float x, y;  // pixels, if it lies beyond the near plane
+    float x, y, reciprocal;  // pixels, and 1 / w, if it lies beyond the near plane
     uint32_t colour;
     bool is_lit;  // it has its colour
   };
@@ -51,17 +57,21 @@ class BackdropPainter {
   // A part of the mesh that may be in view.
   struct Seen {
     const BasePart* part;
-    const std::vector<uint64_t>* hidden;  // or null
-    size_t first;                         // its vertices in corners_
-    bool clipped;                         // some of it is cut away
-    std::vector<float> inside_m;          // clipped: distance from each plane, of each vertex
+    const BaseNode::Bits* hidden;  // or null
+    float error_m;                 // its node's
+    size_t first;                  // its vertices in corners_
+    bool clipped;                  // some of it is cut away
+    std::vector<float> inside_m;   // clipped: distance from each plane, of each vertex
     std::vector<Drawn> drawn;
+    int top, bottom;  // rows of these
   };
   struct Band;
+  size_t look(const BaseMesh& mesh, const geometry::Clip& clip, const geometry::Camera& picture);
   void transform(Seen& seen, const geometry::Clip& clip, const geometry::Camera& camera, const image::Shading& shading);
 
   static std::optional<Bounds> bounds_of(const Corner* const (&c)[3], const geometry::Camera& camera);
 
+  std::vector<std::pair<size_t, const BaseNode*>> open_;  // nodes to look at, and the nodes above them
   std::vector<Seen> seen_;
   std::vector<Corner> corners_;
 };

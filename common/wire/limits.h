@@ -7,7 +7,7 @@
 
 namespace telesplat::wire {
 
-inline constexpr uint64_t kProtocolVersion = 20;
+inline constexpr uint64_t kProtocolVersion = 21;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions
@@ -27,8 +27,8 @@ inline constexpr uint64_t kMaxSlabs = 1024;           ///< slabs of a volume, an
 inline constexpr uint64_t kMaxBuffers = 8;            ///< buffers of a loosely coupled viewer
 inline constexpr size_t kSealWords = 4;               ///< words of a lease's seal: 16 bytes
 inline constexpr size_t kLeaseKeyWords = 8;           ///< words of the key that seals leases: 32 bytes
-inline constexpr uint64_t kMaxBaseParts = 4096;       ///< parts of a base
-inline constexpr uint64_t kMaxBaseTriangles = 1u << 22;  ///< triangles of a base
+inline constexpr uint64_t kMaxBaseParts = 1u << 21;   ///< parts of a base
+inline constexpr uint64_t kMaxBaseTriangles = 1u << 22;  ///< triangles of a base that a viewer asks for
 inline constexpr uint64_t kBasePart = 4096;           ///< triangles of a part of a base, at most
 inline constexpr size_t kMaxViews = 64;               ///< viewers that one sampling frame of a volume serves
 

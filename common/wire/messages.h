@@ -25,6 +25,6 @@ using Messages = std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply,
                             DepthTile, Patch, Forget, Refine, EpochBegin, StateMark, StateRequest, StateBegin,
                             AccessReport, SliceWeights, SlabAssignment, SlabReady, SliceLease, VoxelRequest, VoxelData,
                             SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady, Swap, Order, OrderAnswer,
-                            PictureTile, Picture, BaseRequest, BaseBegin, BasePart, BaseHidden>;
+                            PictureTile, Picture, BaseRequest, BaseBegin, BasePart, BaseHidden, BaseTree>;
 
 }  // namespace telesplat::wire

@@ -7,6 +7,7 @@
 #include "common/core/ids.h"
 #include "common/geometry/box.h"
 #include "common/geometry/camera.h"
+#include "common/geometry/mesh_chunk.h"
 #include "common/wire/limits.h"
 #include "common/wire/moments.h"
 
@@ -143,38 +144,53 @@ struct BaseRequest {
   static constexpr std::string_view kName = "base_request";
   InstanceId viewer;
   uint64_t base = 0;  ///< base that the viewer has begun; 0: none yet
-  uint64_t part = 0, parts = 1;  ///< the first one; their number, at most kMaxBaseParts, 0: only what is hidden
+  uint64_t part = 0, parts = 1;  ///< the first one; their number, 0: only what is hidden
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("base", m.base); f("part", m.part); f("parts", m.parts);
   }
 };
-/// Packer -> viewers (PUB, now and then, and in answer to a request for another base): the base, the coarse form of
-/// the whole data set, is this one.
+/// Packer -> viewers (PUB, now and then): the base, the coarse form of the whole data set, is this one.
 struct BaseBegin {
   static constexpr std::string_view kName = "base_begin";
   InstanceId packer;
-  uint64_t base = 0;    ///< counts bases: another scene or colouring has another one
-  uint64_t coarse = 0;  ///< the first parts: a coarser form of the whole, until the others have come; less than parts
-  uint64_t parts = 0;   ///< 0: there is no base
+  uint64_t base = 0;   ///< counts bases: another scene or colouring has another one
+  uint64_t nodes = 0;  ///< nodes of its tree; 0: there is no base
   template <class F> static void fields(F& f, auto& m) {
-    f("packer", m.packer); f("base", m.base); f("coarse", m.coarse); f("parts", m.parts);
+    f("packer", m.packer); f("base", m.base); f("nodes", m.nodes);
   }
 };
+/// Packer -> viewer, in answer to a request for another base: its tree, the levels of the mesh's store. A node has a
+/// part for each kBasePart triangles; parts are numbered from those of node 0 on.
+struct BaseTree {
+  static constexpr std::string_view kName = "base_tree";
+  static constexpr bool kBulk = true;
+  static constexpr size_t kElements = 13 * geometry::kMaxChunks;
+  InstanceId packer;
+  uint64_t base = 0;
+  std::vector<geometry::ChunkInfo> nodes;  ///< at most kMaxChunks; kMaxBaseParts parts
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("base", m.base); f("nodes", m.nodes);
+  }
+};
+/// Number of the first part of each node of a base, and of its end.
+inline std::vector<uint64_t> first_base_parts(const std::vector<geometry::ChunkInfo>& nodes) {
+  std::vector<uint64_t> out{0};
+  for (const auto& node : nodes) out.push_back(out.back() + (node.triangles + kBasePart - 1) / kBasePart);
+  return out;
+}
 /// Packer -> viewer: some triangles of the base. Triangle i of part n has the number kBasePart n + i.
 struct BasePart {
   static constexpr std::string_view kName = "base_part";
   static constexpr bool kBulk = true;
   InstanceId packer;
   uint64_t base = 0, part = 0;
-  double error_m = 0;  ///< how far the surface may lie from these triangles, about
-  Bytes mesh;          ///< a coded chunk with colours (geometry/chunk_code.h)
+  Bytes mesh;  ///< a coded chunk with colours (geometry/chunk_code.h)
   template <class F> static void fields(F& f, auto& m) {
-    f("packer", m.packer); f("base", m.base); f("part", m.part); f("error_m", m.error_m);
-    f("mesh", m.mesh, kMaxBulkBytes);
+    f("packer", m.packer); f("base", m.base); f("part", m.part); f("mesh", m.mesh, kMaxBulkBytes);
   }
 };
-/// Packer -> viewers (PUB, and in answer to a request for part 0): triangles of the base that are hidden, because rays
-/// passed them. Words that are not named stay as they were.
+/// Packer -> viewers (PUB, and in answer to a request for a tree, or for no part): triangles of the base that are
+/// hidden, because rays passed them. Words that are not named stay as they were.
 struct BaseHidden {
   static constexpr std::string_view kName = "base_hidden";
   static constexpr bool kBulk = true;

@@ -156,15 +156,21 @@ std::optional<Error> check(const BaseRequest& m) {
 }
 
 std::optional<Error> check(const BaseBegin& m) {
-  if (m.parts > kMaxBaseParts) return Error{fmt::format("{} parts, limit {}", m.parts, kMaxBaseParts)};
-  if (m.coarse == 0 || m.coarse < m.parts) return {};
-  return Error{fmt::format("{} of {} parts are coarse ones", m.coarse, m.parts)};
+  if (m.nodes <= geometry::kMaxChunks) return {};
+  return Error{fmt::format("{} nodes, limit {}", m.nodes, geometry::kMaxChunks)};
 }
 
 std::optional<Error> check(const BasePart& m) {
-  if (m.part >= kMaxBaseParts) return Error{fmt::format("part {}, limit {}", m.part, kMaxBaseParts)};
-  if (m.error_m >= 0 && m.error_m < 1e6) return {};
-  return Error{fmt::format("an error of {} m, limits 0 and 1e6", m.error_m)};
+  if (m.part < kMaxBaseParts) return {};
+  return Error{fmt::format("part {}, limit {}", m.part, kMaxBaseParts)};
+}
+
+std::optional<Error> check(const BaseTree& m) {
+  for (const auto& node : m.nodes)
+    if (node.triangles == 0 && !node.is_leaf()) return Error{fmt::format("node {} has no triangles", node.id.value)};
+  const uint64_t parts = first_base_parts(m.nodes).back();
+  if (parts <= kMaxBaseParts) return {};
+  return Error{fmt::format("{} parts, limit {}", parts, kMaxBaseParts)};
 }
 
 std::optional<Error> check(const BaseHidden& m) {

@@ -62,7 +62,7 @@ struct SessionSettings {
   bool keep_redundant = false;  ///< also packs points that the model shows already (T7.3)
   uint64_t max_points = 20'000'000;  ///< least recently drawn clusters are forgotten above it; 0: no limit
   double obsolete_after_s = 0;  ///< clusters that nothing drew for longer are forgotten (T4.3.3); 0: never
-  uint64_t base_triangles = 400'000;  ///< most triangles of the coarse form of the mesh in each viewer; 0: none
+  uint64_t base_triangles = 500'000;  ///< most triangles of the mesh's coarse form that each viewer shows; 0: none
   PointErrors errors;
   double max_rate_mbit = 0;  ///< wished rate to each viewer; 0: as much as its link carries
   // Sampling.

@@ -198,7 +198,7 @@ options::Table packing_table(wire::SessionSettings& s) {
            .fits = points},
           {.flag = "--base-triangles",
            .value = &s.base_triangles,
-           .help = "triangles of the coarse form of the whole mesh that each viewer holds, at most; 0: none",
+           .help = "triangles of the coarse form of the whole mesh that each viewer shows, at most; 0: none",
            .limits = options::Range{0.0, double(wire::kMaxBaseTriangles)},
            .fits = points},
           {.flag = "--packing.obsolete_after_s",

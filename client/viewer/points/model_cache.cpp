@@ -173,8 +173,8 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
 
 bool ModelCache::set_base(std::shared_ptr<const splat::BaseMesh> base) {
   const std::lock_guard lock(mutex_);
-  if (!base && !base_) return false;
-  base_ = std::move(base);
+  if (!base && !base_.mesh) return false;
+  base_.mesh = std::move(base);
   ++summaries_made_;
   note_replica();
   return true;
@@ -194,12 +194,13 @@ void ModelCache::select_displayed(const geometry::Camera& camera, const splat::S
   out.replica = replica.number;
   out.summaries = summaries_made_;
   drawn_ = replica.model.get();
-  out.base = base_;
+  out.base = base_.mesh;
 }
 
 void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
   const std::lock_guard lock(mutex_);
   select_displayed(camera, options, out);
+  base_.from = {camera.pose.position_room, splat::fine_enough(camera)};
   if (&displayed() == &newest_) wanted_ = out.summaries_wanted;
 }
 

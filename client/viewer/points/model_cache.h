@@ -68,6 +68,11 @@ class ModelCache {
   uint64_t summaries_made() const { return summaries_made_; }
   /// Draws this base from now on; null: none. False: it is the one that is drawn, or still none.
   bool set_base(std::shared_ptr<const splat::BaseMesh> base);
+  /// From where the newest picture shows the base; nothing before the first one.
+  std::optional<splat::Viewpoint> viewpoint() const {
+    const std::lock_guard lock(mutex_);
+    return base_.from;
+  }
   /// Digest of the newest replica; 0: there is no replica. The display may draw meanwhile: it changes no points.
   uint64_t digest() const;
 
@@ -124,7 +129,7 @@ class ModelCache {
   mutable std::mutex mutex_;
   Replica newest_, older_;  // older_ is set only while it is on display instead of the newest
   const points::PointModel* drawn_ = nullptr;
-  std::shared_ptr<const splat::BaseMesh> base_;
+  splat::ShownBase base_;
   Dropped parked_, free_;
   uint64_t replicas_ = 0, patches_ = 0, summaries_made_ = 0;
   std::vector<points::ClusterKey> wanted_;  // requested summaries of the newest replica

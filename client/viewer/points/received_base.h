@@ -15,17 +15,22 @@ class ReceivedBase {
   ReceivedBase(ModelCache& cache, std::function<void(wire::BaseRequest)> ask)
       : cache_(cache), replica_(std::move(ask)) {}
 
-  void expect(bool base) { replica_.expect(base); }
+  void expect(uint64_t most) { replica_.expect(most); }
   bool known() const { return replica_.known(); }
   void start(double now_s) { replica_.start(now_s); }
   void take(const wire::BaseBegin& begin, double now_s) { replica_.take(begin, now_s); }
+  void take(const wire::BaseTree& tree, double now_s) { replica_.take(tree, now_s); }
   void take(const wire::BaseHidden& hidden, double now_s) { replica_.take(hidden, now_s); }
-  void take(const wire::BasePart& part, double now_s) {
-    if (const Status s = replica_.take(part, now_s); !s && told_.allow(now_s)) log::warn("{}", s.error().text);
+  /// False: it is refused.
+  bool take(const wire::BasePart& part, double now_s) {
+    const Status s = replica_.take(part, now_s);
+    if (!s && told_.allow(now_s)) log::warn("{}", s.error().text);
+    return s.ok();
   }
+  std::vector<uint32_t> take_dropped() { return replica_.take_dropped(); }
   /// To be called every few milliseconds. True: the base in the cache has changed.
   bool tick(double now_s) {
-    replica_.tick(now_s);
+    replica_.tick(cache_.viewpoint(), now_s);
     if (std::exchange(shown_, replica_.changes()) == replica_.changes()) return false;
     return cache_.set_base(replica_.mesh());
   }

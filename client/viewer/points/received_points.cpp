@@ -56,7 +56,7 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
   if (another) links_.feeds.close();
   config_ = config;
   keeps_redundant_ = keep;
-  base_.expect(has_base);
+  base_.expect(scene::base_triangles(session));
   if (base_.known() && (another || !has_base)) receiver_.drop_base();
   return ok_status();
 }
@@ -70,7 +70,10 @@ void ReceivedPoints::receive(int most) {
 
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
-  if (base_.tick(now_s) && events_) events_->add_base_change(cache_.summaries_made());
+  const bool changed = base_.tick(now_s);
+  for (const uint32_t node : base_.take_dropped())
+    if (events_) events_->add_base_drop(node);
+  if (changed && events_) events_->add_base_change(cache_.summaries_made());
   send_receipt(now_s);
   if (!waits_ && !in_step_) summarise();  // otherwise the display's thread applies the held changes
   cache_.free_dropped();

@@ -34,7 +34,11 @@ PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& ca
 
 template <class M>
 void PointReceiver::apply_base(const M& message) {
-  links_.base->take(message, monotonic_s());
+  if constexpr (std::is_same_v<M, wire::BasePart>) {
+    if (!links_.base->take(message, monotonic_s())) return;
+  } else {
+    links_.base->take(message, monotonic_s());
+  }
   if (options_.events) options_.events->add(message);
 }
 
@@ -80,14 +84,14 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
     if (!message) return;
     asked_s_ = monotonic_s();  // an answer that still comes in is not late
     using namespace wire;
-    net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark, BasePart, BaseBegin, BaseHidden>(
+    net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark, BasePart, BaseTree, BaseHidden>(
         state, *message, [&](auto& m) {
           using M = std::decay_t<decltype(m)>;
           if constexpr (std::is_same_v<M, StateMark>)
             sequencer_.on_mark(m);
           else if constexpr (std::is_same_v<M, StateBegin>)
             sequencer_.on_answer(m);
-          else if constexpr (std::is_same_v<M, BaseBegin> || std::is_same_v<M, BaseHidden> ||
+          else if constexpr (std::is_same_v<M, BaseTree> || std::is_same_v<M, BaseHidden> ||
                              std::is_same_v<M, BasePart>)
             apply_base(m);
           else

@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::string_view kMagic = "TSEVENT5", kBaseless = "TSEVENT4", kUnrefined = "TSEVENT3",
                            kWithoutSummaries = "TSEVENT2";
-constexpr std::string_view kReplica = "replica", kSummary = "summary", kBaseChange = "base_change";
+constexpr std::string_view kReplica = "replica", kSummary = "summary", kBaseChange = "base_change",
+                           kBaseDrop = "base_drop";
 
 struct ReplicaBody {
   float lo[3], hi[3];
@@ -72,6 +73,12 @@ void EventRecorder::add(const wire::BaseBegin& begin) {
 void EventRecorder::add(const wire::BaseHidden& hidden) {
   if (!file_.full()) file_.write(wire::BaseHidden::kName, wire::encode(hidden));
 }
+
+void EventRecorder::add(const wire::BaseTree& tree) {
+  if (!file_.full()) file_.write(wire::BaseTree::kName, wire::encode(tree));
+}
+
+void EventRecorder::add_base_drop(uint32_t node) { file_.write(kBaseDrop, bytes_of(node)); }
 
 void EventRecorder::add_base_change(uint64_t number) { file_.write(kBaseChange, bytes_of(number)); }
 
@@ -178,6 +185,14 @@ struct EventReplay::Impl {
     return true;
   }
 
+  Result<bool> drop_base() {
+    uint32_t node = 0;
+    if (body().size() != sizeof node) return wrong(fmt::format("{} bytes instead of {}", body().size(), sizeof node));
+    std::memcpy(&node, body().data(), sizeof node);
+    base.drop(node);
+    return true;
+  }
+
   // Changes the base as the viewer did if the change's number is at most `until`; else returns false.
   Result<bool> change_base(uint64_t until) {
     uint64_t number = 0;
@@ -228,6 +243,10 @@ Status EventReplay::advance(const Moment& moment) {
       applied = i.change_base(moment.summaries);
     } else if (i.type() == wire::BasePart::kName) {
       applied = i.take_base<wire::BasePart>();
+    } else if (i.type() == kBaseDrop) {
+      applied = i.drop_base();
+    } else if (i.type() == wire::BaseTree::kName) {
+      applied = i.take_base<wire::BaseTree>();
     } else if (i.type() == wire::BaseBegin::kName) {
       applied = i.take_base<wire::BaseBegin>();
     } else if (i.type() == wire::BaseHidden::kName) {

@@ -4,8 +4,9 @@
 // File (record_file.h): "TSEVENT5". Types: "replica" (six floats: the box in room space, lo then hi; u32: octree depth;
 // u32: 1 if mosaics are merged) where a replica begins, the wire's "patch", "forget", "refine", "epoch_begin", and
 // "summary" (u64: its number, u32: key of its brick) where the viewer made a summary of a brick
-// (common/points/summary.h) from the model as it was then; the wire's "base_part" and "base_hidden", and "base_change"
-// (u64: number, counted with those of summaries) where the viewer put some of them into its base. "TSEVENT4", from
+// (common/points/summary.h) from the model as it was then; the wire's "base_begin", "base_tree", "base_part" and
+// "base_hidden", "base_drop" (u32: a node of the base whose triangles go), and "base_change" (u64: number, counted with
+// those of summaries) where the viewer showed what it had of its base. "TSEVENT4", from
 // earlier versions, has no base, "TSEVENT3" no refinements either, and "TSEVENT2" no summaries.
 #pragma once
 
@@ -29,7 +30,10 @@ class EventRecorder {
   void add(const ModelEvent& event);
   void add(const wire::BasePart& part);
   void add(const wire::BaseBegin& begin);
+  void add(const wire::BaseTree& tree);
   void add(const wire::BaseHidden& hidden);
+  /// The viewer dropped the triangles of a node of its base.
+  void add_base_drop(uint32_t node);
   /// number: ModelCache::summaries_made() with this change.
   void add_base_change(uint64_t number);
   /// number: counts all summaries that the viewer made, with this one.

@@ -81,7 +81,7 @@ struct DrawList {
 };
 
 /// True if a backdrop is to be drawn.
-inline bool has_base(const DrawList& list) { return list.base && list.base->triangles > 0; }
+inline bool has_base(const DrawList& list) { return list.base && !list.base->nodes.empty(); }
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses the number of each mosaic's points (level_choice.h): the
 /// desired pixel range is the display's, or the sampling view's if that is less, times detail. Splat size = scale *

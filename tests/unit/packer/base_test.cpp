@@ -1,5 +1,4 @@
-// The base has as much detail as its number of triangles allows, loses none of the mesh, and hides triangles that rays
-// have passed.
+// The base loses none of the mesh, holds what viewers ask for, and hides triangles that rays have passed.
 #include "services/packer/points/base/base.h"
 
 #include <gtest/gtest.h>
@@ -15,38 +14,6 @@
 
 namespace telesplat::packer {
 namespace {
-
-// Eight leaves of 100 triangles, two nodes of 100 above them, and a root of 50.
-std::vector<geometry::ChunkInfo> tree() {
-  std::vector<geometry::ChunkInfo> out;
-  for (uint64_t i = 0; i < 8; ++i) out.push_back({.id = {i}, .triangles = 100});
-  for (uint32_t i = 0; i < 2; ++i)
-    out.push_back(
-        {.id = {8 + i}, .triangles = 100, .spacing_m = 1 + 0.1f * float(i), .first_child = 4 * i, .children = 4});
-  out.push_back({.id = {10}, .triangles = 50, .spacing_m = 2, .first_child = 8, .children = 2});
-  return out;
-}
-
-std::vector<uint64_t> numbers(const std::vector<ChunkId>& ids) {
-  std::vector<uint64_t> out;
-  for (const ChunkId id : ids) out.push_back(id.value);
-  return out;
-}
-
-TEST(Base, TakesTheFinestChunksThatItHasRoomFor) {
-  using Numbers = std::vector<uint64_t>;
-  EXPECT_EQ(numbers(choose_base(tree(), 10).fine), Numbers{10}) << "the root, though it has more";
-  EXPECT_EQ(numbers(choose_base(tree(), 199).fine), Numbers{10});
-  EXPECT_EQ(numbers(choose_base(tree(), 200).fine), (Numbers{8, 9}));
-  EXPECT_EQ(numbers(choose_base(tree(), 500).fine), (Numbers{4, 5, 6, 7, 8})) << "the coarser node is parted";
-  EXPECT_EQ(numbers(choose_base(tree(), 800).fine), (Numbers{0, 1, 2, 3, 4, 5, 6, 7}));
-}
-
-TEST(Base, HasTheRootsFirstUnlessTheyAreAllOfIt) {
-  EXPECT_EQ(numbers(choose_base(tree(), 800).coarse), std::vector<uint64_t>{10});
-  EXPECT_TRUE(choose_base(tree(), 10).coarse.empty());
-  EXPECT_TRUE(choose_base({}, 10).fine.empty());
-}
 
 // Triangles with the colours of their corners, each corner at a multiple of a tenth of a millimetre.
 std::multiset<std::vector<int64_t>> triangles_of(const geometry::MeshChunkView& chunk) {
@@ -67,42 +34,56 @@ std::multiset<std::vector<int64_t>> triangles_of(const geometry::MeshChunkView& 
   return out;
 }
 
+geometry::MeshChunkView view_of(const geometry::ChunkBytes& chunk, geometry::HeldChunk& held) {
+  held = geometry::decode_chunk(chunk.bytes).value();
+  return held.view;
+}
+geometry::ChunkInfo leaf(uint64_t id, uint64_t triangles) {
+  return {.id = {id}, .box_room = {glm::vec3(-1), glm::vec3(1)}, .triangles = triangles};
+}
+
 TEST(Base, PartsHaveEveryTriangleOfTheirChunks) {
-  Base base(0.8f, nullptr);
+  const auto chunks = test::terrain(100, 100);
+  std::vector<geometry::ChunkInfo> nodes;
+  for (const auto& [id, chunk] : chunks)
+    nodes.push_back(leaf(nodes.size(), geometry::decode_chunk(chunk.bytes)->view.triangles()));
+  Base base(nodes, 0.8f, nullptr);
   std::multiset<std::vector<int64_t>> wanted, told;
-  for (const auto& [id, chunk] : test::terrain(100, 100)) {
-    const auto held = geometry::decode_chunk(chunk.bytes).value();
+  for (uint32_t n = 0; n < chunks.size(); ++n) {
+    geometry::HeldChunk held;
+    const auto exact = view_of(chunks[n].second, held);
     // Positions that the base's steps of 2^-16 m leave as they are.
-    std::vector<float> positions(held.view.positions_room.begin(), held.view.positions_room.end());
+    std::vector<float> positions(exact.positions_room.begin(), exact.positions_room.end());
     for (float& p : positions) p = std::round(p * 65536) / 65536;
-    const auto rounded = geometry::build_chunk(positions, held.view.normals, held.view.colours, held.view.indices);
+    const auto rounded = geometry::build_chunk(positions, exact.normals, exact.colours, exact.indices);
     const auto view = geometry::MeshChunkView::validate(rounded).value();
-    base.add(view, 0, false);
+    ASSERT_TRUE(base.add(n, view));
     wanted.merge(triangles_of(view));
   }
-  for (size_t n = 0; n < base.parts(); ++n) {
+  for (uint64_t n = 0; n < base.parts(); ++n) {
     const auto held = geometry::decode_chunk(base.part(n).mesh).value();
     EXPECT_LE(held.view.triangles(), wire::kBasePart);
     told.merge(triangles_of(held.view));
   }
   EXPECT_EQ(base.triangles(), 20'000u);
-  EXPECT_EQ(base.coarse_parts(), 0u);
   EXPECT_GT(base.parts(), 4u);
   EXPECT_TRUE(told == wanted);
+}
+
+geometry::ChunkBytes scalars() {
+  return test::chunk_of({{{0, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.0f)},
+                         {{1, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.5f)},
+                         {{0, 1, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(1.0f)}},
+                        {0, 1, 2}, true);
 }
 
 TEST(Base, ColoursScalars) {
   scene::Colouring colouring;
   colouring.map = *colour::find_colour_map("viridis");
   const scene::ColourTable table = scene::make_table(colouring);
-  const auto chunk = test::chunk_of({{{0, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.0f)},
-                                     {{1, 0, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(0.5f)},
-                                     {{0, 1, 0}, {0, 0, 1}, std::bit_cast<uint32_t>(1.0f)}},
-                                    {0, 1, 2}, true);
-  Base base(1, &table);
-  base.add(geometry::decode_chunk(chunk.bytes)->view, 0.1f, true);
-  EXPECT_EQ(base.coarse_parts(), 1u);
-  EXPECT_EQ(base.triangles(), 0u) << "fine ones count";
+  geometry::HeldChunk chunk;
+  Base base({leaf(0, 1)}, 1, &table);
+  ASSERT_TRUE(base.add(0, view_of(scalars(), chunk)));
   const auto held = geometry::decode_chunk(base.part(0).mesh).value();
   EXPECT_FALSE(held.view.scalars);
   std::map<float, uint32_t> colours;  // by x + 2 y
@@ -111,7 +92,30 @@ TEST(Base, ColoursScalars) {
   EXPECT_EQ(colours, (std::map<float, uint32_t>{{0, table.at(0)}, {1, table.at(0.5f)}, {2, table.at(1)}}));
 }
 
-// A base of a square of 0.8 m at depth z that faces +z, in triangles of 2 cm.
+TEST(Base, RefusesChunksThatAreNotWhatTheListSays) {
+  geometry::HeldChunk chunk;
+  const auto triangle =
+      test::chunk_of({{{0, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}}}, {0, 1, 2});
+  EXPECT_TRUE(Base({leaf(0, 1)}, 1, nullptr).add(0, view_of(triangle, chunk)));
+  EXPECT_FALSE(Base({leaf(0, 2)}, 1, nullptr).add(0, view_of(triangle, chunk)));
+  EXPECT_FALSE(Base({leaf(0, 1)}, 1, nullptr).add(0, view_of(scalars(), chunk)));
+}
+
+TEST(Base, HoldsTheNodesThatWereAskedForLast) {
+  geometry::HeldChunk chunk;
+  const auto view = view_of(
+      test::chunk_of({{{0, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}}}, {0, 1, 2}), chunk);
+  Base base({leaf(0, 1), leaf(1, 1), leaf(2, 1)}, 1, nullptr);
+  for (uint32_t n = 0; n < 3; ++n) ASSERT_TRUE(base.add(n, view));
+  (void)base.part(0);
+  base.keep_within(2);
+  EXPECT_TRUE(base.has(0));
+  EXPECT_FALSE(base.has(1));
+  EXPECT_TRUE(base.has(2));
+  EXPECT_EQ(base.triangles(), 2u);
+}
+
+// A base of a square of 0.8 m at depth z that faces +z, in triangles of 2 cm, and a node that nothing is known of.
 constexpr float kSide = 0.02f;
 Base square(float z, float error_m = 1e-4f) {
   std::vector<test::Vertex> vertices;
@@ -122,12 +126,17 @@ Base square(float z, float error_m = 1e-4f) {
       const uint32_t at = 41 * i + k;
       if (i < 40 && k < 40) indices.insert(indices.end(), {at, at + 1, at + 41, at + 1, at + 42, at + 41});
     }
-  Base out(1, nullptr);
-  out.add(geometry::decode_chunk(test::chunk_of(vertices, indices).bytes)->view, error_m, false);
+  auto above = leaf(1, 3200);
+  if (error_m > 0) above.spacing_m = error_m, above.children = 1;
+  auto behind = leaf(2, 1);
+  behind.box_room = {glm::vec3(0, 0, 9), glm::vec3(1, 1, 9)};
+  Base out({leaf(0, 0), above, behind}, 1, nullptr);
+  geometry::HeldChunk held;
+  EXPECT_TRUE(out.add(1, view_of(test::chunk_of(vertices, indices), held)));
   return out;
 }
 // The x of each triangle's middle, by its number.
-std::vector<float> places(const Base& base) {
+std::vector<float> places(Base& base) {
   std::vector<float> out;
   const auto held = geometry::decode_chunk(base.part(0).mesh).value();
   for (size_t t = 0; t < held.view.triangles(); ++t) {
@@ -234,6 +243,30 @@ TEST(Base, ShowsTheTrianglesOfABoxAgain) {
   for (uint32_t i = 0; i < at.size(); ++i) EXPECT_EQ(gone.contains(i), at[i] < 0);
   EXPECT_FALSE(base.take_changes().empty());
   EXPECT_TRUE(base.take_changes().empty());
+}
+
+TEST(Base, HoldsTheNodesThatTilesShow) {
+  Base base = square(0);
+  geometry::HeldChunk held;
+  ASSERT_TRUE(base.add(
+      2, view_of(test::triangle({{0, 0, 9}, {0, 0, 1}}, {{1, 0, 9}, {0, 0, 1}}, {{0, 1, 9}, {0, 0, 1}}), held)));
+  base.hide(seen(kNothing), nullptr);
+  base.keep_within(3200);
+  EXPECT_TRUE(base.has(1));
+  EXPECT_FALSE(base.has(2)) << "it lies behind the eye";
+}
+
+TEST(Base, ForgetsWhatIsHiddenOfANodeThatGoes) {
+  Base base = square(0);
+  base.hide(seen(kNothing), nullptr);
+  (void)base.take_changes();
+  geometry::HeldChunk held;
+  ASSERT_TRUE(base.add(
+      2, view_of(test::triangle({{0, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}}), held)));
+  base.keep_within(1);
+  ASSERT_FALSE(base.has(1));
+  EXPECT_TRUE(hidden(base).empty());
+  EXPECT_FALSE(base.take_changes().empty()) << "viewers learn of it";
 }
 
 }  // namespace

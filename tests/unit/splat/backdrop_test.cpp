@@ -58,13 +58,18 @@ BasePart rectangle(float z, float x0, float x1, float y1, uint32_t colour, float
   find_planes(out);
   return out;
 }
-std::shared_ptr<const BaseMesh> mesh_of(std::vector<BasePart> parts) {
-  auto out = std::make_shared<BaseMesh>();
+BaseNode node_of(std::vector<BasePart> parts, float error_m = 0) {
+  BaseNode out;
+  out.error_m = error_m;
   for (BasePart& part : parts) {
-    out->triangles += part.indices.size() / 3;
-    out->parts.push_back(std::make_shared<const BasePart>(std::move(part)));
+    out.box_room.extend(part.box_room);
+    out.part_m = std::max(out.part_m, double{glm::length(part.box_room.size())});
+    out.parts.push_back({std::make_shared<const BasePart>(std::move(part)), nullptr});
   }
   return out;
+}
+std::shared_ptr<const BaseMesh> mesh_of(std::vector<BasePart> parts, float error_m = 0) {
+  return std::make_shared<const BaseMesh>(BaseMesh{{node_of(std::move(parts), error_m)}, 1, 1});
 }
 
 struct Picture {
@@ -116,10 +121,10 @@ TEST_P(BackdropTest, TheBaseFillsTheEmptyHalf) {
 
 TEST_P(BackdropTest, PointsBehindTheBaseAreNotSeenThroughIt) {
   const auto fine = square(-0.3f, -0.4f, 0.4f, 0.002f, 0xff0000);
-  BasePart part = rectangle(0.2f, -0.3f, 0.3f, 0.3f, 0x0000ff);
+  const BasePart part = rectangle(0.2f, -0.3f, 0.3f, 0.3f, 0x0000ff);
   EXPECT_EQ(drawn(fine, mesh_of({part}), options).colour[320 * 120 + 160] & 0xffffff, 0x0000ffu);
-  part.error_m = 0.6f;  // they may lie on the surface that it stands for
-  EXPECT_EQ(drawn(fine, mesh_of({part}), options).colour[320 * 120 + 160] & 0xffffff, 0xff0000u);
+  // They may lie on the surface that it stands for.
+  EXPECT_EQ(drawn(fine, mesh_of({part}, 0.6f), options).colour[320 * 120 + 160] & 0xffffff, 0xff0000u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, BackdropTest, testing::ValuesIn(kKernels),
@@ -149,8 +154,22 @@ TEST(Backdrop, TheNearestTriangleShows) {
 TEST(Backdrop, HiddenTrianglesAreNotDrawn) {
   auto base = std::make_shared<BaseMesh>(*mesh_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)}));
   const double whole = drawn(base).covered();
-  base->hidden = {{2}};  // the second triangle
+  base->nodes[0].parts[0].hidden = std::make_shared<const BaseNode::Bits>(BaseNode::Bits{2});  // the second triangle
   EXPECT_NEAR(drawn(base).covered(), 0.5 * whole, 0.01);
+}
+
+TEST(Backdrop, AFinerNodeShowsWhereTheCoarseOneIsTooCoarse) {
+  const float fine = float(fine_enough(kCamera));  // at a depth of 1 m
+  for (const float error_m : {0.5f * fine, 2 * fine}) {
+    BaseMesh mesh{{node_of({rectangle(0, -0.3f, 0.3f, 0.3f, 0x0000ff)}, error_m)}, 1, 1};
+    mesh.nodes[0].first_child = 1, mesh.nodes[0].children = 2;
+    mesh.nodes.push_back(node_of({rectangle(0, -0.3f, 0, 0.3f, 0x00ff00)}));
+    mesh.nodes.push_back(node_of({rectangle(0, 0, 0.3f, 0.3f, 0xff0000)}));
+    const Picture picture = drawn(std::make_shared<const BaseMesh>(mesh));
+    const bool coarse = error_m < fine;
+    EXPECT_EQ(picture.colour[320 * 120 + 140] & 0xffffff, coarse ? 0x0000ffu : 0x00ff00u);
+    EXPECT_EQ(picture.colour[320 * 120 + 180] & 0xffffff, coarse ? 0x0000ffu : 0xff0000u);
+  }
 }
 
 TEST(Backdrop, TrianglesThatMeetLeaveNoPixelEmpty) {

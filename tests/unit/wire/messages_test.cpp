@@ -193,12 +193,12 @@ TEST(WireFuzzer, HasASeedOfThisVersionForEachMessage) {
 
 TEST(GoldenBytes, OfAMark) {
   EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000, 5})),
-            "87a17614a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e"
+            "87a17615a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e"
             "7473ce00011170a664696765737405");
 }
 TEST(GoldenBytes, OfALease) {
   EXPECT_EQ(hex(encode(sample_message<Lease>())),
-            "de0014a17614a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6"
+            "de0014a17615a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6"
             "766965776572cf0000010000000004a772657175657374cf0000010000000005a474696c6505a47374657004a5626c6f636b03af"
             "626c6f636b735f696e5f6672616d6508a663616d6572619ecb3fb999999999999acb3fc999999999999acb3fd3333333333333cb"
             "3fe333333333333300cb3fe999999999999a00ff01cabf000000ca3f400000cb3f847ae147ae147bcd0140ccc8a4726563749440"
@@ -211,18 +211,18 @@ TEST(GoldenBytes, OfALease) {
 // Version, packer, sequence, tiles_in_frame, image.
 TEST(GoldenBytes, OfAPatch) {
   EXPECT_EQ(hex(encode(Patch{.packer = InstanceId{5}, .sequence = Sequence{300}, .tiles_in_frame = 1})),
-            "85a17614000501cd012c070110c400");
+            "85a17615000501cd012c070110c400");
 }
 
 TEST(BriefMessages, HaveNumbersForTheNamesOfTheirFields) {
-  const auto back = decode<Patch>(bytes_of("\x83\xa1v\x14\x07\x09\x0b\x02"));
+  const auto back = decode<Patch>(bytes_of("\x83\xa1v\x15\x07\x09\x0b\x02"));
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->tiles_in_frame, 9u);
   EXPECT_EQ(back->left_out, 2u);
-  const auto named = decode<Patch>(bytes_of("\x83\xa1v\x14\x07\x09\xa8left_out\x02"));
+  const auto named = decode<Patch>(bytes_of("\x83\xa1v\x15\x07\x09\xa8left_out\x02"));
   ASSERT_TRUE(named) << "a field that nobody knows";
   EXPECT_EQ(named->left_out, 0u);
-  const auto wrong = decode<Patch>(bytes_of("\x82\xa1v\x14\x0b\xc0"));
+  const auto wrong = decode<Patch>(bytes_of("\x82\xa1v\x15\x0b\xc0"));
   ASSERT_FALSE(wrong);
   EXPECT_NE(wrong.error().text.find("left_out"), std::string::npos) << wrong.error().text;
 }
@@ -322,7 +322,7 @@ TEST(BriefMessages, HaveMomentsInTwoBytesOrOne) {
   EXPECT_EQ(back->moments.begun_s, 0);
 
   const auto moments = [&](const std::string& bytes) {
-    return decode<Patch>(bytes_of("\x83\xa1v\x14\x07\x01\x13\xc4" + std::string(1, char(bytes.size())) + bytes));
+    return decode<Patch>(bytes_of("\x83\xa1v\x15\x07\x01\x13\xc4" + std::string(1, char(bytes.size())) + bytes));
   };
   const auto refused = [&](const std::string& bytes) {
     const auto got = moments(bytes);

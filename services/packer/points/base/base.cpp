@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
-#include <queue>
+#include <utility>
 
 #include "common/geometry/camera.h"
 #include "common/geometry/chunk_code.h"
@@ -24,9 +24,8 @@ constexpr float kBehind = 0.02f;
 // Triangles with smaller sides are not looked at: rays beside them would count.
 constexpr double kLeastSide_px = 4;
 
-void put_word(size_t index, uint64_t word, std::vector<uint32_t>& out) {
-  for (const uint64_t number : {uint64_t{index}, word & 0xffffffff, word >> 32})
-    out.push_back(static_cast<uint32_t>(number));
+void put_word(uint64_t index, uint64_t word, std::vector<uint32_t>& out) {
+  for (const uint64_t number : {index, word & 0xffffffff, word >> 32}) out.push_back(static_cast<uint32_t>(number));
 }
 
 // Rays of a tile.
@@ -51,6 +50,32 @@ class Rays {
   float scale_;
 };
 
+// Returns the corners of a chunk's triangles, three each, in an order in which neighbours follow each other: along a
+// Z curve through their centroids.
+std::vector<uint32_t> in_order(const geometry::MeshChunkView& chunk) {
+  constexpr float kCells = 1023;
+  const glm::vec3 size = chunk.box_room.size();
+  const float side = std::max({size.x, size.y, size.z, std::numeric_limits<float>::min()});
+  std::vector<std::pair<uint32_t, uint32_t>> order;  // place on the curve, triangle
+  for (uint32_t t = 0; t < chunk.triangles(); ++t) {
+    glm::vec3 middle(0);
+    for (size_t k = 0; k < 3; ++k) {
+      const float* p = &chunk.positions_room[3 * size_t{chunk.indices[3 * size_t{t} + k]}];
+      middle += glm::vec3(p[0], p[1], p[2]) / 3.0f;
+    }
+    const glm::uvec3 cell(glm::clamp((middle - chunk.box_room.lo) / side, 0.0f, 1.0f) * kCells);
+    uint32_t place = 0;
+    for (uint32_t bit = 0; bit < 10; ++bit)
+      for (int axis = 0; axis < 3; ++axis) place |= (cell[axis] >> bit & 1) << (3 * bit + static_cast<uint32_t>(axis));
+    order.emplace_back(place, t);
+  }
+  std::ranges::sort(order);
+  std::vector<uint32_t> out;
+  for (const auto& [place, t] : order)
+    for (size_t k = 0; k < 3; ++k) out.push_back(chunk.indices[3 * size_t{t} + k]);
+  return out;
+}
+
 double distance(const geometry::Box& box, const glm::dvec3& from) {
   const glm::dvec3 nearest = glm::clamp(from, glm::dvec3(box.lo), glm::dvec3(box.hi));
   return glm::length(from - nearest);
@@ -58,58 +83,55 @@ double distance(const geometry::Box& box, const glm::dvec3& from) {
 
 }  // namespace
 
-BaseChunks choose_base(const std::vector<geometry::ChunkInfo>& tree, uint64_t most) {
-  std::vector<bool> is_child(tree.size());
-  for (const auto& node : tree)
-    for (size_t i = node.first_child; i < std::min<size_t>(node.first_child + node.children, tree.size()); ++i)
-      is_child[i] = true;
-  const auto finer = [&](size_t a, size_t b) { return tree[a].spacing_m < tree[b].spacing_m; };
-  std::priority_queue<size_t, std::vector<size_t>, decltype(finer)> open(finer);
-  BaseChunks out;
-  uint64_t triangles = 0;
-  for (size_t i = 0; i < tree.size(); ++i) {
-    if (is_child[i]) continue;
-    open.push(i);
-    triangles += tree[i].triangles;
-    out.coarse.push_back(tree[i].id);
-  }
-  while (!open.empty()) {
-    const geometry::ChunkInfo& node = tree[open.top()];
-    open.pop();
-    uint64_t below = 0;
-    for (uint32_t i = 0; i < node.children; ++i) below += tree[node.first_child + i].triangles;
-    if (below <= node.triangles || triangles - node.triangles + below > most) {
-      out.fine.push_back(node.id);
-      continue;
-    }
-    triangles += below - node.triangles;
-    for (uint32_t i = 0; i < node.children; ++i) open.push(node.first_child + i);
-  }
-  std::ranges::sort(out.fine);
-  if (out.fine == out.coarse) out.coarse.clear();
-  return out;
+Base::Base(std::vector<geometry::ChunkInfo> nodes, float largest_m, const scene::ColourTable* colours)
+    : nodes_(std::move(nodes)),
+      first_part_(wire::first_base_parts(nodes_)),
+      step_m_(std::exp2(std::ceil(std::log2(largest_m / kSteps)))),
+      colours_(colours) {}
+
+uint32_t Base::node_of(uint64_t part) const {
+  return static_cast<uint32_t>(std::ranges::upper_bound(first_part_, part) - first_part_.begin() - 1);
 }
 
-Base::Base(float largest_m, const scene::ColourTable* colours)
-    : step_m_(std::exp2(std::ceil(std::log2(largest_m / kSteps)))), colours_(colours) {}
-
-void Base::add(const geometry::MeshChunkView& chunk, float spacing_m, bool coarse) {
-  for (size_t first = 0; first < chunk.triangles(); first += wire::kBasePart)
-    add_part(chunk, first, std::min<size_t>(wire::kBasePart, chunk.triangles() - first), spacing_m);
-  if (coarse)
-    coarse_ = parts_.size();
-  else
-    triangles_ += chunk.triangles();
-  hidden_.resize(parts_.size() * (wire::kBasePart / 64));
-  told_.resize(hidden_.size());
+bool Base::add(uint32_t node, const geometry::MeshChunkView& chunk) {
+  if (chunk.triangles() != nodes_[node].triangles || chunk.scalars != (colours_ != nullptr)) return false;
+  if (has(node)) return true;
+  Held& held = held_[node];
+  const auto corners = in_order(chunk);
+  for (size_t first = 0; first < corners.size(); first += 3 * wire::kBasePart) {
+    const size_t count = std::min<size_t>(3 * wire::kBasePart, corners.size() - first);
+    held.parts.push_back(make_part(chunk, std::span(corners).subspan(first, count), nodes_[node].is_leaf()));
+  }
+  held.used = ++uses_;
+  triangles_ += chunk.triangles();
+  return true;
 }
 
-void Base::add_part(const geometry::MeshChunkView& chunk, size_t first, size_t count, float spacing_m) {
-  Part& part = parts_.emplace_back();
-  part.error_m = spacing_m + step_m_;
+void Base::keep_within(uint64_t most) {
+  while (triangles_ > most && held_.size() > 1) {
+    const auto oldest = std::ranges::min_element(held_, {}, [](const auto& h) { return h.second.used; });
+    const uint32_t node = oldest->first;
+    triangles_ -= nodes_[node].triangles;
+    held_.erase(oldest);
+    for (uint64_t part = first_part_[node]; part < first_part_[node + 1]; ++part)
+      if (const auto hidden = hidden_.find(part); hidden != hidden_.end()) {
+        for (size_t word = 0; word < kWords; ++word) set_word(part, hidden->second, word, 0);
+        hidden_.erase(hidden);
+      }
+  }
+}
+
+wire::BasePart Base::part(uint64_t part) {
+  const uint32_t node = node_of(part);
+  Held& held = held_.at(node);
+  held.used = ++uses_;
+  return {{}, 0, part, held.parts[part - first_part_[node]].code};
+}
+
+Base::Part Base::make_part(const geometry::MeshChunkView& chunk, std::span<const uint32_t> corners, bool leaf) const {
+  Part part;
   std::vector<float> positions;
   std::vector<uint32_t> normals, colours, indices;
-  const auto corners = chunk.indices.subspan(3 * first, 3 * count);
   std::vector<uint32_t> used(corners.begin(), corners.end());
   std::ranges::sort(used);
   used.erase(std::ranges::unique(used).begin(), used.end());
@@ -129,17 +151,17 @@ void Base::add_part(const geometry::MeshChunkView& chunk, size_t first, size_t c
     const glm::vec3* p = &part.corners[i];
     area_m2 += 0.5f * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
   }
-  part.side_m = std::sqrt(2 * area_m2 / static_cast<float>(count));
-  if (spacing_m == 0) part.corners.clear();
+  part.side_m = std::sqrt(2 * area_m2 / static_cast<float>(corners.size() / 3));
+  if (leaf) part.corners = {};
   const auto laid_out = geometry::build_chunk(positions, normals, colours, indices);
   const auto view = *geometry::MeshChunkView::validate(laid_out);
   part.box = view.box_room;
   part.code = geometry::encode_chunk(view);
+  return part;
 }
 
-void Base::set_hidden(size_t i, bool hidden) {
-  const uint64_t bit = uint64_t{1} << i % 64;
-  hidden_[i / 64] = hidden ? hidden_[i / 64] | bit : hidden_[i / 64] & ~bit;
+void Base::set_word(uint64_t part, Bits& bits, size_t word, uint64_t to) {
+  if (std::exchange(bits[word], to) != to) changed_.insert(part * kWords + word);
 }
 
 // A tile as its rays look at triangles.
@@ -188,42 +210,71 @@ bool Base::Look::is_passed(const glm::vec3* c, float error_m) const {
 void Base::hide(const SampledTile& tile, const image::PixelMask* cast) {
   const Look look(tile, cast);
   const geometry::Frustum frustum(look.camera);
-  for (size_t n = coarse_; n < parts_.size(); ++n) {
-    const Part& part = parts_[n];
-    if (!frustum.may_contain(part.box)) continue;
-    const double side_px = double{part.side_m} / double{look.pixel};  // at a depth of 1 m
-    if (kLeastSide_px * distance(part.box, tile.camera.pose.position_room) > side_px) continue;
-    for (size_t i = 0; i < part.corners.size() / 3; ++i)
-      if (const size_t number = n * wire::kBasePart + i; !is_hidden(number))
-        if (look.is_passed(&part.corners[3 * i], part.error_m)) set_hidden(number, true);
-  }
-}
-
-void Base::show(const geometry::Box& box) {
-  for (size_t n = coarse_; n < parts_.size(); ++n) {
-    const Part& part = parts_[n];
-    if (glm::any(glm::lessThan(part.box.hi, box.lo)) || glm::any(glm::lessThan(box.hi, part.box.lo))) continue;
-    for (size_t i = 0; i < part.corners.size() / 3; ++i) {
-      const glm::vec3 middle = (part.corners[3 * i] + part.corners[3 * i + 1] + part.corners[3 * i + 2]) / 3.0f;
-      if (glm::all(glm::lessThanEqual(box.lo, middle)) && glm::all(glm::lessThanEqual(middle, box.hi)))
-        set_hidden(n * wire::kBasePart + i, false);
+  for (auto& [node, held] : held_) {
+    if (!frustum.may_contain(nodes_[node].box_room)) continue;
+    held.used = ++uses_;
+    if (nodes_[node].is_leaf()) continue;
+    for (size_t n = 0; n < held.parts.size(); ++n) {
+      const Part& part = held.parts[n];
+      if (!frustum.may_contain(part.box)) continue;
+      const double side_px = double{part.side_m} / double{look.pixel};  // at a depth of 1 m
+      if (kLeastSide_px * distance(part.box, tile.camera.pose.position_room) <= side_px)
+        hide(first_part_[node] + n, part, nodes_[node].spacing_m + step_m_, look);
     }
   }
 }
 
-void Base::show_all() { hidden_.assign(hidden_.size(), 0); }
+void Base::hide(uint64_t number, const Part& part, float error_m, const Look& look) {
+  const auto known = hidden_.find(number);
+  Bits bits = known == hidden_.end() ? Bits{} : known->second;
+  bool any = false;
+  for (size_t i = 0; i < part.corners.size() / 3; ++i) {
+    const uint64_t bit = uint64_t{1} << i % 64;
+    if (bits[i / 64] & bit || !look.is_passed(&part.corners[3 * i], error_m)) continue;
+    set_word(number, bits, i / 64, bits[i / 64] | bit);
+    any = true;
+  }
+  if (any) hidden_[number] = bits;
+}
+
+void Base::show(const geometry::Box& box) {
+  for (auto& [number, bits] : hidden_) {
+    const uint32_t node = node_of(number);
+    const geometry::Box& around = nodes_[node].box_room;
+    if (glm::any(glm::lessThan(around.hi, box.lo)) || glm::any(glm::lessThan(box.hi, around.lo))) continue;
+    const Part& part = held_.at(node).parts[number - first_part_[node]];
+    for (size_t i = 0; i < part.corners.size() / 3; ++i) {
+      const uint64_t bit = uint64_t{1} << i % 64;
+      if (!(bits[i / 64] & bit)) continue;
+      const glm::vec3 middle = (part.corners[3 * i] + part.corners[3 * i + 1] + part.corners[3 * i + 2]) / 3.0f;
+      if (glm::all(glm::lessThanEqual(box.lo, middle)) && glm::all(glm::lessThanEqual(middle, box.hi)))
+        set_word(number, bits, i / 64, bits[i / 64] & ~bit);
+    }
+  }
+  std::erase_if(hidden_, [](const auto& part) { return part.second == Bits{}; });
+}
+
+void Base::show_all() {
+  for (auto& [number, bits] : hidden_)
+    for (size_t word = 0; word < kWords; ++word) set_word(number, bits, word, 0);
+  hidden_.clear();
+}
 
 std::vector<uint32_t> Base::take_changes() {
   std::vector<uint32_t> out;
-  for (size_t i = 0; i < hidden_.size(); ++i)
-    if (hidden_[i] != told_[i]) put_word(i, told_[i] = hidden_[i], out);
+  for (const uint64_t index : changed_) {
+    const auto part = hidden_.find(index / kWords);
+    put_word(index, part == hidden_.end() ? 0 : part->second[index % kWords], out);
+  }
+  changed_.clear();
   return out;
 }
 
 std::vector<uint32_t> Base::hidden() const {
   std::vector<uint32_t> out;
-  for (size_t i = 0; i < hidden_.size(); ++i)
-    if (hidden_[i] != 0) put_word(i, hidden_[i], out);
+  for (const auto& [number, bits] : hidden_)
+    for (size_t word = 0; word < kWords; ++word)
+      if (bits[word] != 0) put_word(number * kWords + word, bits[word], out);
   return out;
 }
 

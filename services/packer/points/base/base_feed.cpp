@@ -9,7 +9,9 @@
 namespace telesplat::packer {
 namespace {
 
-constexpr uint64_t kPartsAtOnce = 8;  // in answer to one request: about 200 kB
+constexpr uint64_t kPartsAtOnce = 8;   // in answer to one request: about 200 kB
+constexpr size_t kMostWaiting = 1024;  // parts that viewers wait for; they ask again
+constexpr uint64_t kHeld = 2;          // triangles that are held, over those that a viewer asks for
 
 }  // namespace
 
@@ -37,25 +39,46 @@ void BaseFeed::follow(const wire::Welcome& session, bool anew) {
     array = colouring->array;
     colours_ = scene::make_table(*colouring);
   }
-  fetch_.begin({session.epoch, array, scene_.most, scene_.largest_m}, colours_ ? &*colours_ : nullptr);
+  fetch_.begin({session.epoch, array});
 }
 
 void BaseFeed::drop() {
   fetch_.stop();
+  waiting_.clear();
   if (!base_) return;
   base_.reset();
   ++number_;
-  outlets_.publish(begin());
+  outlets_.publish(summary());
 }
 
 void BaseFeed::receive() {
-  auto made = fetch_.receive();
-  if (!made) return;
-  base_.emplace(*std::move(made));
+  fetch_.receive({[this](std::vector<geometry::ChunkInfo> nodes) { begin(std::move(nodes)); },
+                  [this](ChunkId chunk, const auto& held) { take(chunk, held); }});
+}
+
+void BaseFeed::begin(std::vector<geometry::ChunkInfo> nodes) {
+  const uint64_t parts = wire::first_base_parts(nodes).back();
+  if (parts == 0 || parts > wire::kMaxBaseParts)
+    return log::warn("viewers have no base: it has {} parts, limits 1 and {}", parts, wire::kMaxBaseParts);
+  base_.emplace(std::move(nodes), scene_.largest_m, colours_ ? &*colours_ : nullptr);
   ++number_;
-  log::info("the base has {} triangles in {} parts, {} of them coarse ones", base_->triangles(), base_->parts(),
-            base_->coarse_parts());
+  log::info("the base has {} nodes in {} parts", base_->nodes().size(), base_->parts());
   publish(true);
+}
+
+void BaseFeed::take(ChunkId chunk, const Result<geometry::HeldChunk>& held) {
+  if (!base_) return;
+  const auto node = static_cast<uint32_t>(chunk.value);
+  if (!held || !base_->add(node, held->view)) {
+    log::warn("viewers have no base: chunk {} {}", chunk.value, held ? "is not what the list says" : held.error().text);
+    return drop();
+  }
+  std::erase_if(waiting_, [&](const Waiting& w) {
+    if (base_->node_of(w.part) != node) return false;
+    send_part(w.part, w.peer);
+    return true;
+  });
+  base_->keep_within(kHeld * scene_.most);
 }
 
 void BaseFeed::tick(InstanceId packer, double now_s) {
@@ -63,21 +86,31 @@ void BaseFeed::tick(InstanceId packer, double now_s) {
   fetch_.tick(now_s);
 }
 
-void BaseFeed::answer(const wire::BaseRequest& request, const std::string& peer) const {
-  if (!base_ || packer_.value == 0) return;
-  const bool begins = request.base != number_;  // it knows another base, or none yet
-  if (begins) outlets_.send(begin(), peer);
-  const uint64_t first = begins ? 0 : request.part, parts = std::min(request.parts, kPartsAtOnce);
-  if (first == 0) outlets_.send(wire::BaseHidden{packer_, number_, published_, true, base_->hidden()}, peer);
-  for (uint64_t n = first; n < std::min<uint64_t>(first + parts, base_->parts()); ++n) {
-    wire::BasePart part = base_->part(n);
-    part.packer = packer_, part.base = number_;
-    outlets_.send(part, peer);
-  }
+void BaseFeed::send_part(uint64_t part, const std::string& peer) {
+  wire::BasePart out = base_->part(part);
+  out.packer = packer_, out.base = number_;
+  outlets_.send(out, peer);
 }
 
-wire::BaseBegin BaseFeed::begin() const {
-  return {packer_, number_, base_ ? base_->coarse_parts() : 0, base_ ? base_->parts() : 0};
+void BaseFeed::answer(const wire::BaseRequest& request, const std::string& peer) {
+  if (!base_ || packer_.value == 0) return;
+  if (request.base != number_) outlets_.send(wire::BaseTree{packer_, number_, base_->nodes()}, peer);
+  if (request.base != number_ || request.parts == 0) {
+    outlets_.send(wire::BaseHidden{packer_, number_, published_, true, base_->hidden()}, peer);
+    return;
+  }
+  for (uint64_t n = request.part; n < std::min(request.part + std::min(request.parts, kPartsAtOnce), base_->parts());
+       ++n) {
+    const uint32_t node = base_->node_of(n);
+    if (base_->has(node)) {
+      send_part(n, peer);
+      continue;
+    }
+    fetch_.want(ChunkId{node});
+    if (std::ranges::any_of(waiting_, [&](const Waiting& w) { return w.part == n && w.peer == peer; })) continue;
+    if (waiting_.size() == kMostWaiting) waiting_.pop_front();
+    waiting_.push_back({n, peer});
+  }
 }
 
 void BaseFeed::note(const SampledTile& tile, bool whole, const image::PixelMask* cast) {
@@ -101,14 +134,14 @@ void BaseFeed::forgotten(const Event& event, const points::PointModel& model) {
 
 void BaseFeed::publish() {
   if (number_ == 0 || packer_.value == 0) return;
-  outlets_.publish(begin());
+  outlets_.publish(summary());
   if (base_) publish(false);
 }
 
 // whole: tells of all hidden triangles.
 void BaseFeed::publish(bool whole) {
   if (packer_.value == 0) return;
-  if (whole) outlets_.publish(begin());
+  if (whole) outlets_.publish(summary());
   std::vector<uint32_t> words = base_->take_changes();
   if (whole) words = base_->hidden();
   if (words.empty() && !whole) return;

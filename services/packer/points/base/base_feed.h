@@ -1,6 +1,7 @@
 // Follows the session and what samples tell of the base, and sends it to viewers.
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,7 +28,7 @@ class BaseFeed {
   /// Asks for chunks that are wanted. packer: as viewers know this packer.
   void tick(InstanceId packer, double now_s);
   /// A viewer asks for parts.
-  void answer(const wire::BaseRequest& request, const std::string& peer) const;
+  void answer(const wire::BaseRequest& request, const std::string& peer);
 
   /// Keeps the rays of a tile for take_noted(): viewers wait for its points first. whole: all pixels were cast;
   /// cast: else its rays; null: not known.
@@ -51,7 +52,10 @@ class BaseFeed {
   };
   void publish(bool whole);
   void drop();
-  wire::BaseBegin begin() const;
+  void begin(std::vector<geometry::ChunkInfo> nodes);
+  void take(ChunkId chunk, const Result<geometry::HeldChunk>& held);
+  void send_part(uint64_t part, const std::string& peer);
+  wire::BaseBegin summary() const { return {packer_, number_, base_ ? base_->nodes().size() : 0}; }
 
   const Outlets& outlets_;
   const bool wanted_;  // false: there is no base
@@ -59,6 +63,12 @@ class BaseFeed {
   Scene scene_;  // most == 0: no base is wanted
   std::optional<scene::ColourTable> colours_;
   std::optional<Base> base_;  // the base that viewers have
+  // Parts that viewers wait for.
+  struct Waiting {
+    uint64_t part;
+    std::string peer;
+  };
+  std::deque<Waiting> waiting_;
   struct Noted {
     SampledTile tile;
     std::optional<image::PixelMask> cast;

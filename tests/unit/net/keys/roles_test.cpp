@@ -67,7 +67,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       wire::VoxelData::kName,   wire::Patch::kName,      wire::Forget::kName,         wire::EpochBegin::kName,
       wire::StateMark::kName,   wire::SliceFrame::kName, wire::SlabAssignment::kName, wire::Swap::kName,
       wire::Refine::kName,      wire::StateBegin::kName, wire::Picture::kName,        wire::BaseBegin::kName,
-      wire::BasePart::kName,    wire::BaseHidden::kName};
+      wire::BasePart::kName,    wire::BaseHidden::kName, wire::BaseTree::kName};
   std::set<std::string_view> types{"nonsense"};
   const auto look_at = [&](std::string_view type) {
     types.insert(type);
