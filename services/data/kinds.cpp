@@ -96,9 +96,9 @@ Result<std::shared_ptr<MeshStore>> preview_of(const std::string& path, const Mes
   if (is_cloud_format(format)) {
     constexpr size_t kLeast_bytes = 64 << 20;
     constexpr uint64_t kMostPoints = 1 << 17;
-    if (format != "las" || (*file)->bytes().size() < kLeast_bytes || !by->array.empty())
+    if ((format != "las" && format != "e57") || (*file)->bytes().size() < kLeast_bytes || !by->array.empty())
       return Error{"it is read whole"};
-    const auto cloud = read_las((*file)->text(), path, {}, "", kMostPoints);
+    const auto cloud = (format == "las" ? read_las : read_e57)((*file)->text(), path, {}, "", kMostPoints);
     return cloud ? keep_preview(path, (*cloud)->mesh(), options) : cloud.error();
   }
   if (format == "raster") {
@@ -155,9 +155,8 @@ constexpr Row kRows[] = {
      "folder with a numbered series)",
      is_volume, open_as_volume},
     {Kind::kMesh,
-     "mesh file (PLY, OBJ, STL, OFF, VTP, VTU, VTS, VTR, VTM, PVD, VTK, glTF, GLB), point cloud (LAS, PLY, PCD, PTX, "
-     "XYZ, "
-     "PTS, CSV) or elevation raster (GeoTIFF, HGT, 16-bit PNG, ASCII grid)",
+     "mesh file (PLY, OBJ, STL, OFF, VTP, VTU, VTS, VTR, VTM, PVD, VTK, glTF, GLB), point cloud (LAS, LAZ, COPC, EPT, "
+     "E57, PLY, PCD, PTX, XYZ, PTS, CSV) or elevation raster (GeoTIFF, HGT, 16-bit PNG, ASCII grid)",
      is_mesh, open_as_mesh},
 };
 static_assert(std::size(kRows) == std::size(scene::kKinds), "a row a kind");
@@ -195,8 +194,6 @@ Result<const Row*> row_of(const DataOptions& o) {
   if (o.mesh.iso && other_file)
     if (const Status s = refuse_unknown_format(o.scene); !s) return s.error();
   if (o.mesh.iso) return Error{fmt::format("--iso: {} is no volume", o.scene)};
-  if (std::filesystem::exists(fs::path(o.scene) / "ept.json", error))
-    return Error{fmt::format("{}: is a point cloud in EPT, which is not read: {}", o.scene, kUnpackEpt)};
   return Error{fmt::format(
       "{}: is a folder, and not one of DICOM slices or of a numbered series of volume files; a data file is needed, "
       "or the word julia",

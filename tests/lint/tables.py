@@ -120,7 +120,7 @@ OUTSIDE_HEADERS = [
     (r"msgpack.*", ["common/wire"]),
     (r"zmq.*", ["common/net"]),
     (r"sodium\.h", ["common/net/keys", "common/wire/lease_seal.cpp"]),
-    (r"pugixml\.hpp", ["services/data/vtk", "services/data/mesh"]),
+    (r"pugixml\.hpp", ["services/data/vtk", "services/data/mesh", "services/data/cloud"]),
     (r"lz(4|ma)\.h", ["services/data/vtk", "tests/unit/data/vtk"]),
     (r"draco/.*", ["services/data/gltf", "tests/unit/data/gltf"]),
     (r"meshoptimizer\.h", ["common/geometry/chunk_code.cpp", "services/data/gltf", "tests/unit/data/gltf"]),

@@ -6,8 +6,10 @@
 #include <limits>
 
 #include "common/core/utf8.h"
+#include "common/parallel/in_parallel.h"
 #include "services/data/base/refusal.h"
 #include "services/data/base/stored_type.h"
+#include "services/data/cloud/laz/laz.h"
 #include "services/data/cloud/point_rows.h"
 #include "services/data/cloud/readers.h"
 
@@ -23,14 +25,6 @@ constexpr PointFormat kFormats[kMostFormat + 1] = {{20, 0, 0, 0},    {28, 20, 0,
                                                    {57, 20, 0, 0},   {63, 20, 28, 0}, {30, 22, 0, 0},  {36, 22, 30, 0},
                                                    {38, 22, 30, 36}, {59, 22, 0, 0},  {67, 22, 30, 36}};
 
-// Reads a number of the file, which has Intel's byte order as this machine has. Precondition: it lies in the text.
-template <class T>
-T number(std::string_view bytes, size_t at) {
-  T out;
-  std::memcpy(&out, bytes.data() + at, sizeof out);
-  return out;
-}
-
 // Text of a field that ends at its first 0.
 std::string text_of(std::string_view field) { return to_utf8(std::string(field.substr(0, field.find('\0')))); }
 
@@ -42,22 +36,47 @@ struct ExtraNumber {
   std::optional<double> none;  // the value of points without one
 };
 
-class LasReader {
+class LasReader final : public Part {
  public:
-  LasReader(std::string_view content, const std::string& name) : content_(content), name_(name) {}
-
-  std::shared_ptr<const SquareCloud> read(const ReadProgress& progress, const std::string& array, uint64_t most) {
+  LasReader(std::string_view content, const std::string& name) : content_(content), name_(name) {
     read_header();
     read_records();
-    PointRows rows(name_, columns(), array);
+    name_columns();
+  }
+
+  std::shared_ptr<const SquareCloud> read(const ReadProgress& progress, const std::string& array, uint64_t most) {
+    PointRows rows(name_, columns_, array);
     const uint64_t step = count_ > most ? (count_ + most - 1) / most : 1;
-    rows.reserve(count_ / step + 1);
+    rows.reserve(std::min<uint64_t>(count_ / step + 1, content_.size()));  // the file justifies a point a byte
     if (step > 1) rows.set_frame(box_);
-    std::vector<double> row(columns_);
+    const uint64_t withheld = packed_ ? add_chunks(progress, most, rows) : add_records(progress, step, rows);
+    if (withheld > 0) rows.add_note(fmt::format("{} points are left out: the file marks them as withheld", withheld));
+    if (withheld > 0 && rows.size() == 0) refuse("{}: all its {} points are marked as withheld", name_, count_);
+    return rows.finish(fmt::format("{} 1.{} points (format {})", packed_ ? "LAZ" : "LAS", minor_, format_), 255,
+                       reference_, true);
+  }
+
+  void decode_all() {
+    if (!packed_) return;
+    const LazPoints points = packed_points();
+    for (size_t i = 0; i < points.chunks(); ++i) {
+      const std::vector<char> chunk = points.decode(i, count_);
+      records_.insert(records_.end(), chunk.begin(), chunk.end());
+    }
+  }
+  const std::vector<std::string>& columns() const override { return columns_; }
+  uint64_t add(PointRows& rows) const override {
+    if (!packed_) return add(content_.substr(points_at_, count_ * point_bytes_), point_bytes_, rows);
+    return add({records_.data(), records_.size()}, point_bytes_, rows);
+  }
+
+ private:
+  // Adds every n-th record; stride: n times a record's bytes. Returns the number of points that are withheld.
+  uint64_t add(std::string_view records, size_t stride, PointRows& rows) const {
     uint64_t withheld = 0;
-    for (uint64_t i = 0; i < count_; i += step) {
-      if ((i / step & 0xffff) == 0 && progress) progress(double(i) / double(count_));
-      const std::string_view point = content_.substr(points_at_ + i * point_bytes_, point_bytes_);
+    std::vector<double> row(columns_.size());
+    for (size_t at = 0; at < records.size(); at += stride) {
+      const std::string_view point = records.substr(at, point_bytes_);
       if (is_withheld(point)) {
         ++withheld;
         continue;
@@ -65,12 +84,9 @@ class LasReader {
       decode(point, row);
       rows.add(row);
     }
-    if (withheld > 0) rows.add_note(fmt::format("{} points are left out: the file marks them as withheld", withheld));
-    if (withheld > 0 && rows.size() == 0) refuse("{}: all its {} points are marked as withheld", name_, count_);
-    return rows.finish(fmt::format("LAS 1.{} points (format {})", minor_, format_), 255, reference_, true);
+    return withheld;
   }
 
- private:
   void read_header() {
     constexpr size_t kHeader = 227, kHeader14 = 375;
     if (content_.size() < kHeader)
@@ -80,8 +96,8 @@ class LasReader {
     if (major != 1 || minor_ > 4) refuse("{}: is LAS {}.{}; 1.0 to 1.4 are read", name_, major, minor_);
     const auto header = number<uint16_t>(content_, 94);
     points_at_ = number<uint32_t>(content_, 96);
-    const auto format = uint8_t(content_[kLasFormatByte]);
-    if (format & 0xc0) refuse("{}: is compressed (LAZ), which is not read; {}", name_, kUnpackLaz);
+    const int format = content_[104] & 0x3f;
+    packed_ = is_packed_las(content_);
     if (format > kMostFormat) refuse("{}: points of format {}; 0 to {} are read", name_, format, kMostFormat);
     format_ = format;
     point_bytes_ = number<uint16_t>(content_, 105);
@@ -95,7 +111,7 @@ class LasReader {
              points_at_, content_.size());
     count_ = number<uint32_t>(content_, 107);
     if (large && number<uint64_t>(content_, 247) != 0) count_ = number<uint64_t>(content_, 247);
-    if (const uint64_t there = (content_.size() - points_at_) / point_bytes_; count_ > there)
+    if (const uint64_t there = (content_.size() - points_at_) / point_bytes_; count_ > there && !packed_)
       refuse("{}: is truncated: header claims {} points of {} bytes, {} are there", name_, count_, point_bytes_, there);
     for (size_t a = 0; a < 3; ++a)
       scale_[a] = number<double>(content_, 131 + 8 * a), offset_[a] = number<double>(content_, 155 + 8 * a);
@@ -129,6 +145,7 @@ class LasReader {
     const std::string user = text_of(content_.substr(at + 2, 16));
     const auto id = number<uint16_t>(content_, at + 18);
     const std::string_view body = content_.substr(at + head, bytes);
+    if (user == kLazUser && id == kLazRecord) laz_record_ = body;
     if (user == "LASF_Spec" && id == 4) take_extra_bytes(body);
     if (user != "LASF_Projection") return;
     if (id == 2112)
@@ -171,24 +188,57 @@ class LasReader {
     }
   }
 
-  std::vector<std::string> columns() {
+  void name_columns() {
     const PointFormat& format = kFormats[format_];
-    std::vector<std::string> out = {"x",
-                                    "y",
-                                    "z",
-                                    "intensity",
-                                    "return_number",
-                                    "number_of_returns",
-                                    "classification",
-                                    "scan_angle",
-                                    "user_data",
-                                    "point_source_id"};
+    std::vector<std::string>& out = columns_;
+    out = {"x",
+           "y",
+           "z",
+           "intensity",
+           "return_number",
+           "number_of_returns",
+           "classification",
+           "scan_angle",
+           "user_data",
+           "point_source_id"};
     if (format.gps_time) out.push_back("gps_time");
     if (format.colours) out.insert(out.end(), {"red", "green", "blue"});
     if (format.infrared) out.push_back("infrared");
     out.insert(out.end(), extra_names_.begin(), extra_names_.end());
-    columns_ = out.size();
-    return out;
+  }
+
+  LazPoints packed_points() const {
+    return LazPoints(content_, name_, laz_record_, {format_, point_bytes_, points_at_, count_});
+  }
+
+  uint64_t add_records(const ReadProgress& progress, uint64_t step, PointRows& rows) const {
+    const uint64_t together = step << 16;
+    uint64_t withheld = 0;
+    for (uint64_t first = 0; first < count_; first += together) {
+      if (progress) progress(double(first) / double(count_));
+      const uint64_t bytes = std::min(together, count_ - first) * point_bytes_;
+      withheld += add(content_.substr(points_at_ + first * point_bytes_, bytes), step * point_bytes_, rows);
+    }
+    return withheld;
+  }
+
+  // Adds the first ones of each chunk where there are more than `most`.
+  uint64_t add_chunks(const ReadProgress& progress, uint64_t most, PointRows& rows) const {
+    constexpr size_t kTogether = 32;
+    const LazPoints points = packed_points();
+    const size_t chunks = points.chunks(), step = count_ > most ? chunks / most + 1 : 1;
+    const uint64_t of_chunk = count_ > most ? most * step / chunks + 1 : count_;
+    uint64_t withheld = 0;
+    for (size_t first = 0; first < chunks; first += kTogether * step) {
+      if (progress) progress(double(first) / double(chunks));
+      std::array<std::vector<char>, kTogether> decoded;
+      in_parallel(size_t{0}, kTogether, [&](size_t i) {
+        if (first + i * step < chunks) decoded[i] = points.decode(first + i * step, of_chunk);
+      });
+      for (const std::vector<char>& records : decoded)
+        withheld += add({records.data(), records.size()}, point_bytes_, rows);
+    }
+    return withheld;
   }
 
   bool is_withheld(std::string_view point) const { return format_ < 6 ? point[15] & 0x80 : point[15] & 4; }
@@ -219,18 +269,31 @@ class LasReader {
   std::string_view content_;
   const std::string& name_;
   int minor_ = 0, format_ = 0;
-  size_t points_at_ = 0, point_bytes_ = 0, records_at_ = 0, columns_ = 0;
+  bool packed_ = false;
+  size_t points_at_ = 0, point_bytes_ = 0, records_at_ = 0;
   uint64_t count_ = 0;
   double scale_[3] = {}, offset_[3] = {};
   geometry::DBox box_;
   std::vector<ExtraNumber> extra_;
-  std::vector<std::string> extra_names_;
+  std::vector<std::string> extra_names_, columns_;
+  std::vector<char> records_;  // those of all points, if they were compressed
   std::optional<Reference> reference_;
   std::vector<uint16_t> keys_;  // the numbers of GeoTIFF, and their texts
-  std::string_view key_texts_;
+  std::string_view key_texts_, laz_record_;
 };
 
 }  // namespace
+
+std::unique_ptr<const Part> decode_las(std::string_view content, const std::string& name) {
+  auto part = std::make_unique<LasReader>(content, name);
+  part->decode_all();
+  return part;
+}
+
+bool is_packed_las(std::string_view content) {
+  constexpr size_t kFormat = 104;  // the points' format; its highest bits: compressed
+  return content.starts_with("LASF") && content.size() > kFormat && (content[kFormat] & 0xc0) != 0;
+}
 
 ReadCloud read_las(std::string_view content, const std::string& name, const ReadProgress& progress,
                    const std::string& array, uint64_t most_points) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -73,5 +74,17 @@ class PointRows {
   std::vector<glm::vec3> colours_;
   Cloud cloud_;
 };
+
+/// One of several files that hold a cloud.
+class Part {
+ public:
+  virtual ~Part() = default;
+  virtual const std::vector<std::string>& columns() const = 0;
+  /// Adds the points to rows of these columns; returns the number of those that are left out: withheld ones.
+  virtual uint64_t add(PointRows& rows) const = 0;
+};
+
+/// Decodes a LAS file on this thread. It and its name, for error texts, live as long as the part. Throws Refusal.
+std::unique_ptr<const Part> decode_las(std::string_view content, const std::string& name);
 
 }  // namespace telesplat::data

@@ -5,23 +5,28 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "services/data/base/progress.h"
 #include "services/data/cloud/cloud.h"
 
 namespace telesplat::data {
 
-inline constexpr size_t kLasFormatByte =
-    104;  ///< a LAS file tells its points' format here; its highest bit: compressed
-inline constexpr const char* kUnpackLaz = "unpack it: 'laszip -i FILE -o OUT.las' or 'pdal translate FILE OUT.las'";
-inline constexpr const char* kUnpackEpt = "'pdal translate ept.json OUT.las' makes a LAS of it";
-
 using ReadCloud = Result<std::shared_ptr<const SquareCloud>>;
 
-/// Reads LAS 1.0 to 1.4, point formats 0 to 10; extra bytes; withheld points are left out. Source: ASPRS, "LAS
-/// Specification 1.4 - R15", 2019. most_points: every n-th point is read if there are more. Error: compressed points
-/// (LAZ, COPC).
+/// Reads LAS 1.0 to 1.4, point formats 0 to 10; compressed ones (LAZ, COPC) without wave packets; extra bytes; withheld
+/// points are left out. Source: ASPRS, "LAS Specification 1.4 - R15", 2019. most_points: if there are more, every n-th
+/// one is read, or the first ones of each chunk.
 ReadCloud read_las(std::string_view content, const std::string& name, const ReadProgress& progress,
+                   const std::string& array = {}, uint64_t most_points = kMaxPoints);
+/// Reads an EPT folder, whose file ept.json this is, and the files in it: points as laszip, binary or zstandard.
+ReadCloud read_ept(std::string_view content, const std::string& path, const ReadProgress& progress,
+                   const std::string& array = {});
+/// Returns the files that an ept.json needs, relative to its folder; files that cannot be read name none.
+std::vector<std::string> ept_files(std::string_view content, const std::string& path);
+/// Reads E57 1.0: places in either kind of coordinates, poses, colours, intensity and other numbers; points that the
+/// scanner did not measure are left out. most_points: every n-th point is read if there are more.
+ReadCloud read_e57(std::string_view content, const std::string& name, const ReadProgress& progress,
                    const std::string& array = {}, uint64_t most_points = kMaxPoints);
 /// Reads PCD 0.5 to 0.7: text, binary, compressed; fields named _ are left out; a field of several numbers is as many
 /// arrays. Source: R. Rusu, "The PCD (Point Cloud Data) file format", pointclouds.org.
@@ -37,6 +42,8 @@ ReadCloud read_ptx(std::string_view content, const std::string& name, const Read
 ReadCloud read_xyz(std::string_view content, const std::string& name, const ReadProgress& progress,
                    const std::string& array = {});
 
+/// True if the points of a LAS file are compressed.
+bool is_packed_las(std::string_view content);
 /// True if the text is a PTX, or lines that read_xyz() reads. regular_grid: it has three columns, and its first
 /// points follow each other in steps of a raster: along a row, and to the next row.
 bool is_ptx(std::string_view content);

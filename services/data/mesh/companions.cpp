@@ -6,6 +6,7 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/base/text_scanner.h"
+#include "services/data/cloud/readers.h"
 #include "services/data/gltf/container.h"
 #include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/formats/ply.h"
@@ -88,6 +89,7 @@ std::vector<std::string> companion_files(std::string_view content, const std::st
   }
   if (format == "ply")
     if (auto header = or_error([&] { return parse_ply_header(content, path); })) names = std::move(header->textures);
+  if (format == "ept") names = ept_files(content, path);
   if (format == "gltf") names = gltf_files(content);
   if (vtk::is_mesh_kind(format)) {
     FolderCompanions companions(path);

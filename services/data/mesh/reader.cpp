@@ -20,12 +20,12 @@ namespace telesplat::data {
 namespace {
 
 // Files from these sizes on are read here and there if they allow that: about five million triangles; a million points.
-constexpr size_t kLargePly_bytes = 100 << 20, kLargeRaster_bytes = 5 << 20, kLargeCloud_bytes = 24 << 20;
+constexpr size_t kLargePly_bytes = 100 << 20, kLargeRaster_bytes = 5 << 20, kLargeCloud_bytes = 24 << 20,
+                 kLargePackedCloud_bytes = 5 << 20;
 
 constexpr const char* kSupported =
-    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK), clouds (LAS, PLY, PCD, PTX, XYZ, PTS, CSV), elevation "
-    "rasters "
-    "(GeoTIFF, HGT, 16-bit PNG, ASCII, XYZ, VRT), volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, --raw)";
+    "supported are meshes (PLY, OBJ, STL, OFF, glTF, VTK), clouds (LAS, LAZ, EPT, E57, PLY, PCD, PTX, XYZ), elevation "
+    "rasters (GeoTIFF, HGT, 16-bit PNG, ASCII, XYZ, VRT), volumes (NRRD, MetaImage, NIfTI, DICOM, VTI, --raw)";
 
 std::string extension_of(const std::string& path) { return lower(std::filesystem::path(path).extension().string()); }
 
@@ -37,12 +37,6 @@ bool is_one_of(const std::string& word, std::initializer_list<const char*> words
 std::string unread_kind(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   const bool zip = content.starts_with("PK\3\4"sv), gzip = content.starts_with("\x1f\x8b"sv);
-  if (content.starts_with("LASF") || extension == ".laz")
-    return fmt::format("is a compressed point cloud (LAZ), which is not read; {}", kUnpackLaz);
-  if (content.starts_with("ASTM-E57") || extension == ".e57")
-    return "is a point cloud in E57, which is not read: 'pdal translate FILE OUT.las' makes a LAS of it";
-  if (extension == ".json" && content.find("\"hierarchyType\"") != content.npos)
-    return fmt::format("belongs to a point cloud in EPT, which is not read: {}", kUnpackEpt);
   if (content.starts_with("NGSP") || is_one_of(extension, {".spz", ".sog", ".splat", ".ksplat"}))
     return fmt::format("holds Gaussian splats, not a mesh; splats of other programs are not read; {}", kSupported);
   if (zip && (extension == ".3mf" || content.find("3D/3dmodel") != content.npos))
@@ -97,8 +91,9 @@ bool looks_like_raster(std::string_view content, const std::string& extension) {
 
 // The format of a cloud, by content, or by name where a text's content is not conclusive; empty: another format.
 std::string cloud_format(std::string_view content, const std::string& extension) {
-  const bool packed = content.size() > kLasFormatByte && (content[kLasFormatByte] & 0x80) != 0;
-  if (content.starts_with("LASF")) return packed ? "" : "las";
+  if (content.starts_with("LASF") || extension == ".laz") return "las";
+  if (content.starts_with("ASTM-E57") || extension == ".e57") return "e57";
+  if (extension == ".json" && content.find("\"hierarchyType\"") != content.npos) return "ept";
   if (content.starts_with("# .PCD")) return "pcd";
   if (is_ptx(content)) return "ptx";
   if (is_one_of(extension, {".las", ".pcd", ".ptx"})) return extension.substr(1);
@@ -111,6 +106,8 @@ std::string cloud_format(std::string_view content, const std::string& extension)
 ReadCloud read_cloud(std::string_view content, const std::string& format, const std::string& path,
                      const ReadProgress& progress, const std::string& array) {
   return format == "las"   ? read_las(content, path, progress, array)
+         : format == "ept" ? read_ept(content, path, progress, array)
+         : format == "e57" ? read_e57(content, path, progress, array)
          : format == "pcd" ? read_pcd(content, path, progress, array)
          : format == "ptx" ? read_ptx(content, path, progress, array)
                            : read_xyz(content, path, progress, array);
@@ -225,7 +222,8 @@ Result<OpenRandom> large_mesh(const std::string& path, const ElevationOptions& e
       if (!grid) return grid.error();
       return std::shared_ptr<const RandomMesh>(*std::move(grid));
     });
-  if (is_cloud_format(format) && bytes >= kLargeCloud_bytes)
+  const bool packed = format == "e57" || is_packed_las((*file)->text());
+  if (is_cloud_format(format) && (format == "ept" || bytes >= (packed ? kLargePackedCloud_bytes : kLargeCloud_bytes)))
     return OpenRandom([=](const ReadProgress& progress) -> Result<std::shared_ptr<const RandomMesh>> {
       auto cloud = read_cloud((*file)->text(), format, path, progress, array);
       (*file)->drop_pages();
@@ -261,7 +259,7 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
 }
 
 bool is_cloud_format(std::string_view format) {
-  return format == "las" || format == "pcd" || format == "ptx" || format == "xyz";
+  return format == "las" || format == "ept" || format == "e57" || format == "pcd" || format == "ptx" || format == "xyz";
 }
 
 bool has_arrays(std::string_view format) {
@@ -271,6 +269,8 @@ bool has_arrays(std::string_view format) {
 Result<MeshFile> find_mesh_file(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_directory(path, error)) return MeshFile{path};
+  if (const std::string ept = (std::filesystem::path(path) / "ept.json").string(); std::filesystem::exists(ept, error))
+    return MeshFile{ept};
   const auto files = files_of_folder(path);
   if (!files) return files.error();
   std::vector<std::string> meshes;

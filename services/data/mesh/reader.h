@@ -15,8 +15,8 @@
 namespace telesplat::data {
 
 /// A file's format, by its content first and its extension second: "ply", "obj", "stl", "off", "gltf", "raster", "las",
-/// "pcd", "ptx", "xyz" (rows of text), a result of vtk::kind_of(), or "" with a sentence on its likely kind (an image,
-/// a volume, an elevation raster) and on the supported formats.
+/// "ept", "e57", "pcd", "ptx", "xyz" (rows of text), a result of vtk::kind_of(), or "" with a sentence on its likely
+/// kind (an image, a volume, an elevation raster) and on the supported formats.
 struct DetectedFormat {
   std::string format;
   std::string complaint;
@@ -30,8 +30,8 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {},
                        const std::string& array = {}, uint64_t texture_detail = kDefaultTextureDetail);
 
-/// Returns the mesh file for a path: the file itself, or the first one of a folder that holds only a numbered series of
-/// mesh files. steps: their number. Error: the folder holds no such series.
+/// Returns the mesh file for a path: the file itself, the ept.json of a folder, or the first one of a folder that holds
+/// only a numbered series of mesh files. steps: their number. Error: the folder holds no such series.
 struct MeshFile {
   std::string path;
   size_t steps = 1;
