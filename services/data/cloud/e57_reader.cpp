@@ -106,7 +106,9 @@ class E57Reader {
       page.copy(out.data() + i * kPayload, kPayload);
     });
     if (damaged < pages) refuse("{}: is damaged: the check sum of page {} of {} is wrong", name_, damaged + 0, pages);
-    return out.substr(within, size);
+    out.erase(0, within);
+    out.resize(size);
+    return out;
   }
 
   void read_text() {

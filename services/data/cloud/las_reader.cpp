@@ -222,21 +222,23 @@ class LasReader final : public Part {
     return withheld;
   }
 
-  // Adds the first ones of each chunk where there are more than `most`.
+  // Adds every n-th one where there are more than `most`; of very many only the first ones of each chunk are decoded.
   uint64_t add_chunks(const ReadProgress& progress, uint64_t most, PointRows& rows) const {
     constexpr size_t kTogether = 32;
+    constexpr uint64_t kMostDecoded = 1 << 24;  // in a few seconds on two cores
     const LazPoints points = packed_points();
-    const size_t chunks = points.chunks(), step = count_ > most ? chunks / most + 1 : 1;
-    const uint64_t of_chunk = count_ > most ? most * step / chunks + 1 : count_;
+    const size_t chunks = points.chunks();
+    const uint64_t decoded_in_all = count_ > most ? std::min(count_, kMostDecoded) : count_;
+    const uint64_t of_chunk = decoded_in_all < count_ ? decoded_in_all / chunks + 1 : count_;
+    const uint64_t step = std::max<uint64_t>(decoded_in_all / most, 1);
     uint64_t withheld = 0;
-    for (size_t first = 0; first < chunks; first += kTogether * step) {
+    for (size_t first = 0; first < chunks; first += kTogether) {
       if (progress) progress(double(first) / double(chunks));
       std::array<std::vector<char>, kTogether> decoded;
-      in_parallel(size_t{0}, kTogether, [&](size_t i) {
-        if (first + i * step < chunks) decoded[i] = points.decode(first + i * step, of_chunk);
-      });
+      in_parallel(size_t{0}, std::min(kTogether, chunks - first),
+                  [&](size_t i) { decoded[i] = points.decode(first + i, of_chunk); });
       for (const std::vector<char>& records : decoded)
-        withheld += add({records.data(), records.size()}, point_bytes_, rows);
+        withheld += add({records.data(), records.size()}, step * point_bytes_, rows);
     }
     return withheld;
   }

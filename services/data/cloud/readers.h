@@ -16,7 +16,7 @@ using ReadCloud = Result<std::shared_ptr<const SquareCloud>>;
 
 /// Reads LAS 1.0 to 1.4, point formats 0 to 10; compressed ones (LAZ, COPC) without wave packets; extra bytes; withheld
 /// points are left out. Source: ASPRS, "LAS Specification 1.4 - R15", 2019. most_points: if there are more, every n-th
-/// one is read, or the first ones of each chunk.
+/// one is read; of very many compressed ones, every n-th of the first ones of each chunk.
 ReadCloud read_las(std::string_view content, const std::string& name, const ReadProgress& progress,
                    const std::string& array = {}, uint64_t most_points = kMaxPoints);
 /// Reads an EPT folder, whose file ept.json this is, and the files in it: points as laszip, binary or zstandard.
