@@ -40,7 +40,7 @@ struct Viewpoint {
 
 struct BaseMesh;
 
-/// A base on display: null: there is none.
+/// The base on display, or null.
 struct ShownBase {
   std::shared_ptr<const BaseMesh> mesh;
   std::optional<Viewpoint> from;  ///< from where the newest picture shows it; nothing: there is no picture

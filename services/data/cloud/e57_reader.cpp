@@ -86,6 +86,8 @@ class E57Reader {
       invalid += add_points(scans_[s], step, rows);
       scans_[s].fields.clear();
     }
+    if (step > 1) rows.set_frame(box_);
+    if (count > kMaxPoints) rows.add_note(fmt::format("only every {}th of its {} points is read", step, count));
     if (invalid > 0) rows.add_note(fmt::format("{} points are left out: the scanner measured none there", invalid));
     if (pictures_ > 0) rows.add_note(fmt::format("its {} pictures are left out", pictures_));
     return rows.finish(fmt::format("E57 points ({} scan{})", scans_.size(), scans_.size() == 1 ? "" : "s"),
@@ -112,6 +114,7 @@ class E57Reader {
   }
 
   void read_text() {
+    if (!content_.starts_with("ASTM-E57")) refuse("{}: is no E57 file: it does not begin with ASTM-E57", name_);
     if (content_.size() < kHeader) refuse("{}: is truncated: an E57 header has {} bytes", name_, kHeader);
     const auto major = number<uint32_t>(content_, 8);
     const auto page = number<uint64_t>(content_, 40);
@@ -138,6 +141,9 @@ class E57Reader {
     if (pose) {
       const pugi::xml_node r = pose.child("rotation"), t = pose.child("translation");
       if (r) scan.rotation = glm::dquat(value(r, "w"), value(r, "x"), value(r, "y"), value(r, "z"));
+      const double length = glm::length(scan.rotation);
+      if (!(length > 0 && std::isfinite(length))) refuse("{}: a scan's rotation has the length {}", name_, length);
+      scan.rotation /= length;
       scan.place = {value(t, "x"), value(t, "y"), value(t, "z")};
     }
     for (const pugi::xml_node& codec : points.child("codecs").children())
@@ -231,26 +237,33 @@ class E57Reader {
     return double(int64_t(uint64_t(field.least) + raw)) * field.scale + field.offset;
   }
 
-  // Returns the number of points that were left out.
-  uint64_t add_points(const Scan& scan, uint64_t step, PointRows& rows) const {
+  glm::dvec3 place_of(const Scan& scan, uint64_t i) const {
+    glm::dvec3 p(std::numeric_limits<double>::quiet_NaN());
+    for (const Field& field : scan.fields)
+      if (field.coordinate) p[columns_[size_t(field.column)][0] - 'x'] = value_of(field, i);
+    if (scan.spherical)
+      p = p.x * glm::dvec3(std::cos(p.z) * std::cos(p.y), std::cos(p.z) * std::sin(p.y), std::sin(p.z));
+    return scan.place == scan.place ? scan.rotation * p + scan.place : p;
+  }
+
+  // Adds every n-th point; the box has all. Returns the number of points that were left out.
+  uint64_t add_points(const Scan& scan, uint64_t step, PointRows& rows) {
     uint64_t invalid = 0;
-    const bool posed = scan.place == scan.place;
     std::vector<double> row(columns_.size());
     size_t places[3];
     for (size_t k = 0; k < 3; ++k)
       places[k] = size_t(std::find(columns_.begin(), columns_.end(), std::string(1, char('x' + k))) - columns_.begin());
-    for (uint64_t i = 0; i < scan.count; i += step) {
+    for (uint64_t i = 0; i < scan.count; ++i) {
       if (scan.invalid && value_of(scan.fields[*scan.invalid], i) != 0) {
         ++invalid;
         continue;
       }
+      const glm::dvec3 p = place_of(scan, i);
+      box_.extend(p);
+      if (i % step != 0) continue;
       std::fill(row.begin(), row.end(), std::numeric_limits<double>::quiet_NaN());
       for (const Field& field : scan.fields)
         if (field.column >= 0) row[size_t(field.column)] = value_of(field, i);
-      glm::dvec3 p(row[places[0]], row[places[1]], row[places[2]]);
-      if (scan.spherical)
-        p = p.x * glm::dvec3(std::cos(p.z) * std::cos(p.y), std::cos(p.z) * std::sin(p.y), std::sin(p.z));
-      if (posed) p = scan.rotation * p + scan.place;
       for (int k = 0; k < 3; ++k) row[places[k]] = p[k];
       rows.add(row);
     }
@@ -262,6 +275,7 @@ class E57Reader {
   std::vector<std::string> columns_;
   std::vector<Scan> scans_;
   std::optional<Reference> reference_;
+  geometry::DBox box_;
   size_t pictures_ = 0;
   bool real_colours_ = false;
 };

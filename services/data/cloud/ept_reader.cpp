@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -131,11 +132,18 @@ class BinaryPart final : public Part {
  private:
   void unpack(const std::string& name) {
     constexpr size_t kMostGrowth = 1000;
-    const auto size = ZSTD_getFrameContentSize(content_.data(), content_.size());
-    if (size > content_.size() * kMostGrowth) refuse("{}: is damaged: it claims {} bytes", name, size);
-    unpacked_.resize(size);
-    const size_t made = ZSTD_decompress(unpacked_.data(), size, content_.data(), content_.size());
-    if (made != size) refuse("{}: is truncated or damaged: it cannot be unpacked to {} bytes", name, size);
+    const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+    std::vector<char> block(ZSTD_DStreamOutSize());
+    ZSTD_inBuffer in{content_.data(), content_.size(), 0};
+    for (size_t left = 1; left != 0;) {
+      ZSTD_outBuffer out{block.data(), block.size(), 0};
+      left = ZSTD_decompressStream(context.get(), &out, &in);
+      if (ZSTD_isError(left)) refuse("{}: is damaged: {}", name, ZSTD_getErrorName(left));
+      if (left != 0 && out.pos == 0 && in.pos == in.size) refuse("{}: is truncated at {} bytes", name, in.size);
+      unpacked_.append(block.data(), out.pos);
+      if (unpacked_.size() > content_.size() * kMostGrowth)
+        refuse("{}: is damaged: {} bytes become more than {}", name, content_.size(), content_.size() * kMostGrowth);
+    }
     content_ = unpacked_;
   }
 

@@ -49,6 +49,7 @@ class LasReader final : public Part {
     const uint64_t step = count_ > most ? (count_ + most - 1) / most : 1;
     rows.reserve(std::min<uint64_t>(count_ / step + 1, content_.size()));  // the file justifies a point a byte
     if (step > 1) rows.set_frame(box_);
+    if (count_ > kMaxPoints) rows.add_note(fmt::format("only every {}th of its {} points is read", step, count_));
     const uint64_t withheld = packed_ ? add_chunks(progress, most, rows) : add_records(progress, step, rows);
     if (withheld > 0) rows.add_note(fmt::format("{} points are left out: the file marks them as withheld", withheld));
     if (withheld > 0 && rows.size() == 0) refuse("{}: all its {} points are marked as withheld", name_, count_);
@@ -88,6 +89,7 @@ class LasReader final : public Part {
   }
 
   void read_header() {
+    if (!content_.starts_with("LASF")) refuse("{}: is no LAS file: it does not begin with LASF", name_);
     constexpr size_t kHeader = 227, kHeader14 = 375;
     if (content_.size() < kHeader)
       refuse("{}: is truncated: a LAS header has {} bytes, the file {}", name_, kHeader, content_.size());
@@ -228,9 +230,9 @@ class LasReader final : public Part {
     constexpr uint64_t kMostDecoded = 1 << 24;  // in a few seconds on two cores
     const LazPoints points = packed_points();
     const size_t chunks = points.chunks();
-    const uint64_t decoded_in_all = count_ > most ? std::min(count_, kMostDecoded) : count_;
+    const uint64_t decoded_in_all = most < kMostDecoded ? std::min(count_, kMostDecoded) : count_;
     const uint64_t of_chunk = decoded_in_all < count_ ? decoded_in_all / chunks + 1 : count_;
-    const uint64_t step = std::max<uint64_t>(decoded_in_all / most, 1);
+    const uint64_t step = (decoded_in_all + most - 1) / most;
     uint64_t withheld = 0;
     for (size_t first = 0; first < chunks; first += kTogether) {
       if (progress) progress(double(first) / double(chunks));

@@ -11,7 +11,7 @@ void SymbolModel::begin() {
   uint32_t table_bits = 3;
   while (symbols_ > uint32_t{1} << table_bits) ++table_bits;
   shift_ = 15 - table_bits;
-  numbers_.assign(2 * symbols_ + (size_t{1} << table_bits) + 2, 1);
+  numbers_.assign(2 * symbols_ + (size_t{1} << table_bits) + 3, 1);
   cycle_ = symbols_;
   update();
   left_ = cycle_ = (symbols_ + 6) / 2;

@@ -24,7 +24,7 @@ class SymbolModel {
 
   uint32_t symbols_, shift_ = 0, total_ = 0, cycle_ = 0, left_ = 0;
   // For each symbol, and an end, the sum of the frequencies below it, as parts of kOne; the counts of symbols; a table
-  // from equal parts of kOne to the last symbol that begins at or below them.
+  // from equal parts of kOne, and two beyond it, which rounding reaches, to the last symbol that begins at or below.
   std::vector<uint16_t> numbers_;
 };
 

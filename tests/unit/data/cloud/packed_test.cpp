@@ -139,8 +139,11 @@ TEST(Ept, BinaryNodesAreReadByTheirSchema) {
 
 TEST(Ept, ZstandardNodesAreUnpacked) {
   std::array<std::string, 3> nodes = ept_points();
-  for (std::string& node : nodes)  // a frame with its size, and one block as it is
-    node = "\x28\xb5\x2f\xfd\x20"s + char(node.size()) + char(1 | node.size() << 3) + "\0\0"s + node;
+  for (size_t i = 0; i < nodes.size(); ++i) {  // a frame with its size, or a window in place of it; a block as it is
+    const std::string& node = nodes[i];
+    const std::string head = i == 0 ? "\x20"s + char(node.size()) : "\0\0"s;
+    nodes[i] = "\x28\xb5\x2f\xfd" + head + char(1 | node.size() << 3) + "\0\0"s + node;
+  }
   const TempFolder folder;
   write_ept(folder, "zstandard", "zst", nodes);
   const Mesh mesh = read(folder / "ept.json");
