@@ -70,7 +70,7 @@ void BaseReplica::plan(const splat::Viewpoint& from) {
     open.pop();
     uint64_t below = 0;
     for (uint32_t i = 0; i < node.children; ++i) below += nodes_[node.first_child + i].info.triangles;
-    if (node.is_leaf() || plan_.triangles - node.triangles + below > most_) continue;
+    if (below <= node.triangles || plan_.triangles - node.triangles + below > most_) continue;
     plan_.triangles -= node.triangles;
     for (uint32_t i = 0; i < node.children; ++i) want(node.first_child + i);
   }

@@ -32,7 +32,9 @@ uint64_t hash_of(const SurfaceParts& surface) {  // FNV-1a
 // The store of a mesh without its file.
 class SurfaceStore final : public data::MeshStore {
  public:
-  explicit SurfaceStore(const SurfaceParts& surface) : surface_(surface) {
+  explicit SurfaceStore(const SurfaceParts& surface) : surface_(surface), chunks_(surface.chunks) {
+    chunks_.back().triangles = geometry::decode_chunk(root())->view.triangles();
+    chunks_.back().bytes = root().size();
     info_.content_hash = hash_of(surface);
     info_.triangles = surface.triangles;
     info_.vertices = 2 * surface.triangles;
@@ -42,7 +44,7 @@ class SurfaceStore final : public data::MeshStore {
     info_.up = "y";
   }
   const data::MeshStoreInfo& info() const override { return info_; }
-  const std::vector<geometry::ChunkInfo>& chunks() const override { return surface_.chunks; }
+  const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
   geometry::ChunkBytes chunk(ChunkId id) const override {
     const bool is_root = id.value + 1 == surface_.chunks.size();
     return {is_root ? root() : surface_.bytes[size_t(id.value)], nullptr};
@@ -52,6 +54,7 @@ class SurfaceStore final : public data::MeshStore {
   std::span<const std::byte> root() const;
 
   const SurfaceParts& surface_;
+  std::vector<geometry::ChunkInfo> chunks_;
   data::MeshStoreInfo info_;
 };
 
