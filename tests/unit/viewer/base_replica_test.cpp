@@ -42,7 +42,7 @@ class BaseReplicaTest : public testing::Test {
     const float x1 = x0 + (part < kLeftPart ? 1 : part < kRootPart ? 2 : 4);
     return replica.take(wire::BasePart{kPacker, base, part, chunk(x0, x1, kPart).bytes}, now_s);
   }
-  // A triangle, so often.
+  // Repeats one triangle.
   static geometry::ChunkBytes chunk(float x0, float x1, uint64_t triangles) {
     std::vector<uint32_t> indices;
     for (uint64_t i = 0; i < triangles; ++i) indices.insert(indices.end(), {0, 1, 2});

@@ -10,6 +10,7 @@
 
 #include "common/geometry/camera.h"
 #include "common/geometry/chunk_code.h"
+#include "common/splat/base_mesh.h"
 #include "common/wire/limits.h"
 
 namespace telesplat::packer {
@@ -74,11 +75,6 @@ std::vector<uint32_t> in_order(const geometry::MeshChunkView& chunk) {
   for (const auto& [place, t] : order)
     for (size_t k = 0; k < 3; ++k) out.push_back(chunk.indices[3 * size_t{t} + k]);
   return out;
-}
-
-double distance(const geometry::Box& box, const glm::dvec3& from) {
-  const glm::dvec3 nearest = glm::clamp(from, glm::dvec3(box.lo), glm::dvec3(box.hi));
-  return glm::length(from - nearest);
 }
 
 }  // namespace
@@ -218,7 +214,7 @@ void Base::hide(const SampledTile& tile, const image::PixelMask* cast) {
       const Part& part = held.parts[n];
       if (!frustum.may_contain(part.box)) continue;
       const double side_px = double{part.side_m} / double{look.pixel};  // at a depth of 1 m
-      if (kLeastSide_px * distance(part.box, tile.camera.pose.position_room) <= side_px)
+      if (kLeastSide_px * splat::distance_m(part.box, tile.camera.pose.position_room) <= side_px)
         hide(first_part_[node] + n, part, nodes_[node].spacing_m + step_m_, look);
     }
   }
